@@ -1,7 +1,8 @@
 //! Allowed reactions to a fault: the safe states of each code, and an operator who resets and enables again.
 //!
-//! The states are repeated here, independent of the firmware's table (`scarab::safety::FaultCode::reaction`).
-//! A changed reaction must be changed in both, or every run that meets it fails.
+//! The states are repeated here, independently of the firmware's table
+//! (`scarab::safety::FaultCode::reaction`). A changed reaction must be changed in both, or every run with
+//! that code fails.
 
 #[cfg(test)]
 mod recovery;
@@ -45,7 +46,7 @@ pub fn hand(since: u64) -> Contacts {
 pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
     use FaultCode as Code;
     match code {
-        // A motor too fast for a short circuit is released, and so are both if neither was switching.
+        // A motor too fast for a short circuit is turned off; both are, if neither was switching.
         Code::EncoderPlace | Code::EncoderFrozen => &["Short", "Off"],
         Code::EncoderStep
         | Code::SupplyLost

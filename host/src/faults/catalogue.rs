@@ -3,8 +3,7 @@
 //! A row is in this table once its detector exists. [`Row::lacking`] states its gaps, and docs/safety.md
 //! lists the other rows. Magnitudes are drawn over the whole range of a fault, so that the smallest detected
 //! one is a result. Faults below a detector's threshold are marked in advance from the firmware's settings
-//! ([`Bounds`]). A fault that exists only under a condition ([`Onset`]) is judged by the machine's motion
-//! until then.
+//! ([`Bounds`]). A fault with an onset condition ([`Onset`]) is judged by the machine's motion before that.
 
 pub mod board;
 pub mod current;
@@ -28,25 +27,25 @@ use crate::base::random::Random;
 pub enum Expected {
     /// Both bridges off, permanently.
     Off,
-    /// Both bridges off, whatever other fault is being reacted to.
+    /// Both bridges off, even during the reaction to another fault.
     Released,
     /// Reset by the watchdog; the new start refuses to enable.
     Restarted,
     /// Velocity damped, then bridges off.
     Damp,
-    /// Damped and no other state: there is energy for it.
+    /// Damped, without another state, because the bus has enough energy.
     Damped,
     /// Active short circuit by the low sides: the motors brake.
     Brake,
     /// The reading is rejected and the motion continues.
     Rejected,
-    /// Noise: the machine continues bit for bit as without it.
+    /// Noise: the machine continues bit for bit as without the injection.
     Ignored,
     /// The motion continues within its limits, or is damped.
     Kept,
 }
 
-/// Condition under which the fault begins to exist.
+/// Condition at which the fault begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Onset {
     /// At the injection.
@@ -55,9 +54,9 @@ pub enum Onset {
     After(u64),
     /// When the servo next reads the faulted channel.
     ServoTick,
-    /// When the bus has risen above this, V.
+    /// When the bus has risen above this voltage, V.
     BusAbove(f64),
-    /// When the bus has fallen below this, V.
+    /// When the bus has fallen below this voltage, V.
     BusBelow(f64),
     /// When a joint turns faster than this multiple of its limit.
     Speed(f64),
@@ -187,10 +186,10 @@ pub struct Bounds {
     pub frozen_swing_a: f64,
     /// Joint speed at which an electrical turn takes 25 ms, rad/s.
     pub judged_speed: f64,
-    /// Phase-current change that may leave the code unchanged, because dead time outweighs the current loop,
-    /// A.
+    /// Phase-current change, A, that may leave the code unchanged, because dead time outweighs the current
+    /// loop.
     pub stuck_a: f64,
-    /// Shunt offset whose voltage exceeds that of dead time and of changes within a turn, A.
+    /// Shunt offset, A, whose voltage exceeds that of dead time and of changes within a turn.
     pub smallest_offset_a: f64,
 }
 

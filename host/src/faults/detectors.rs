@@ -2,7 +2,7 @@
 //! enabled.
 //!
 //! Why in addition to the rows: a fault with several detectors is still detected when one of them breaks.
-//! Here each code must be the one that reports in some run, and the result of these runs without it is
+//! Here each code must be the reporting one in some run. The result of these runs without that code is
 //! listed.
 
 use scarab::safety::FaultCode;
@@ -22,11 +22,11 @@ pub struct DetectorReport {
     pub faults: Vec<&'static str>,
     /// Runs in which the code was reported in time.
     pub seen: usize,
-    /// Those of them that are missed without the code.
+    /// Runs of these that are missed without the code.
     pub missed_without: usize,
-    /// Those of them in which another code reports in time without it.
+    /// Runs of these in which another code reports in time without it.
     pub seen_by_others: usize,
-    /// Those of them that cannot be judged without it: the fault did not last, or the joint no longer moved.
+    /// Runs of these that cannot be judged without it: the fault did not last, or the joint no longer moved.
     pub unjudged_without: usize,
 }
 
@@ -44,8 +44,8 @@ fn codes(rows: &[Entry]) -> impl Iterator<Item = FaultCode> {
     FaultCode::ALL.into_iter().filter(has)
 }
 
-/// Additional views of a row's runs: all detectors enabled, and each of several codes disabled alone. All of
-/// the row's detectors are disabled in the main run, which equals that of its only code where it has one.
+/// Additional views of a row's runs: with all detectors enabled, and with each of several codes disabled
+/// alone. The main run disables all of the row's detectors; for a row with one code that is the same.
 pub(super) fn views(row: &'static Row, rows: &[Entry]) -> Vec<Blind> {
     if row.id == crate::faults::campaign::CAPPED {
         return Vec::new();
@@ -114,7 +114,7 @@ impl DetectorReport {
     pub fn line(&self) -> String {
         let Self { code, seen, missed_without, seen_by_others, unjudged_without, .. } = self;
         format!(
-            "{code} ({}): told in {seen} runs; without it {missed_without} missed, {seen_by_others} seen by others, {unjudged_without} not to be judged\n",
+            "{code} ({}): reported in {seen} runs; without it {missed_without} missed, {seen_by_others} detected by others, {unjudged_without} not judged\n",
             self.faults.join(", ")
         )
     }

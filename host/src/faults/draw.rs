@@ -40,9 +40,9 @@ pub const fn beside(event: Event, expected: Expected) -> Scenario {
     Scenario { injections: [None; 2], event, ..one(nothing, expected) }
 }
 
-/// Makes a lasting fault intermittent in one of four runs: one wrong reading in two to five. The number of
-/// readings until the axis rejects them follows from its count of doubts (`scarab::motor::Axis`). One wrong
-/// reading in five is accepted without end.
+/// Makes a lasting fault intermittent in one of four runs: one wrong reading in two to five. The axis rejects
+/// the readings after a number that follows from its count of doubtful readings (`scarab::motor::Axis`). One
+/// wrong reading in five is accepted without limit.
 pub fn now_and_then(random: &mut Random, lasting: Scenario) -> Scenario {
     if random.below(4) > 0 {
         return lasting;

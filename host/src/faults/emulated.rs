@@ -26,7 +26,7 @@ use crate::run::trace::run as reading;
 pub const MOST: [u64; 3] = [1, 6, 2];
 
 /// Range of servo ticks at which an image crashes: the approach, and the excitation after it. Later crashes
-/// only take longer to run.
+/// only take longer.
 const TICKS: [u64; 2] = [1_000, 9_000];
 const MS_PER_INSTRUCTION: f64 = 8e-6;
 
@@ -43,13 +43,13 @@ const SEARCH: Head = Head {
 
 const CRASH: Head = Head {
     id: "K4",
-    fault: "panic, hard fault, interrupt that nobody handles, emulated",
+    fault: "panic, hard fault, unhandled interrupt, emulated",
     detector: "crash handler",
     state: "Off, reset",
     deadline_ms: 0.01,
     unit: "",
     codes: &[],
-    lacking: Some("that bridges fall with the store: the emulator logs it, there is nothing behind"),
+    lacking: Some("effect of the register writes on the bridges: the emulator only logs them"),
 };
 
 const OVERFLOW: Head = Head {

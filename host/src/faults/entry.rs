@@ -17,7 +17,8 @@ pub struct Head {
     pub detector: &'static str,
     /// Safe state: the catalogue's last column.
     pub state: &'static str,
-    /// Time limit from the fault to the safe state's first command, ms; infinite where the limit is no time.
+    /// Time limit from the fault to the safe state's first command, ms; infinite where the limit is not a
+    /// time.
     pub deadline_ms: f64,
     /// Unit of the magnitude.
     pub unit: &'static str,
@@ -79,14 +80,14 @@ impl Entry {
     }
 }
 
-/// Safe state that the firmware uses besides or instead of the catalogue's, where the fault itself takes away
-/// what the catalogue's state requires.
+/// Safe state that the firmware uses besides or instead of the catalogue's, where the fault removes a
+/// precondition of the catalogue's state.
 #[must_use]
 pub fn instead(id: &str) -> Option<&'static str> {
     match id {
         // A host whose frames are blocked by others counts as lost.
         "B4" => Some("Damp"),
-        // A motor too fast for a short circuit is released.
+        // A motor too fast for a short circuit is turned off.
         "E1" => Some("Off"),
         // Push and foot contact: the result is refused if the disturbed rows cannot be excluded.
         "H2" => Some("refused"),

@@ -1,5 +1,5 @@
-//! Hours of normal motion in which no fault may be reported: a false alarm drops a wearer as surely as a
-//! missed fault.
+//! Hours of normal motion in which no fault may be reported: a false alarm can drop a wearer, as a missed
+//! fault can.
 //!
 //! Complete drives, all noise, a wearer who pushes. Each stretch is a machine with its own seed. The operator
 //! enables it, it identifies, then repeats the gaits with the resulting model.
@@ -20,7 +20,7 @@ use crate::rig::pair::Context;
 
 /// Duration of one stretch, s.
 const STRETCH_S: u64 = 180;
-/// Pushes of a wearer who leans, kicks and is carried along: up to a fifth of the torque cap.
+/// Pushes of a wearer who leans and kicks: up to a fifth of the torque cap.
 const PUSHES: PushDescription = PushDescription { rate: 0.5, torque: 20.0, duration: 0.4 };
 
 /// Result of the hours. Field names are part of the JSON interface.
@@ -84,8 +84,8 @@ fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<(u64, Option<String>
         rig.advance();
         if let Some(code) = rig.alarm() {
             let at = (rig.period - from) as f64 / PERIODS_PER_S as f64;
-            let told = format!("seed {seed}, {at:.3} s: {}: {:?}", code.words(), rig.state());
-            return Ok((rig.period - from, Some(told)));
+            let alarm_text = format!("seed {seed}, {at:.3} s: {}: {:?}", code.words(), rig.state());
+            return Ok((rig.period - from, Some(alarm_text)));
         }
         if rig.leg.control().activity() == Activity::Idle && !rig.is_asked() {
             if let Some(motion) = gaits.get(next % gaits.len()).copied().flatten() {

@@ -14,13 +14,13 @@ use crate::rig::faulty_board::{Edges, PERIODS_PER_S, Rig};
 
 /// Longest damping: 300 ms, and one servo tick until its end is visible.
 const LONGEST_DAMPING: u64 = PERIODS_PER_S * 3 / 10 + 12;
-/// Largest excursion to which a joint is driven, rad: beyond its range, or beyond where it rested outside.
-/// The monitor permits the same 0.5 degrees.
+/// Largest excursion of a driven joint, rad, beyond its range or beyond its rest position outside. The
+/// monitor permits the same 0.5 degrees.
 pub const MARGIN_RAD: f64 = 0.008_727;
 /// Largest torque of a servo tick relative to the cap: ripple, and a step of the current.
 const TORQUE_MARGIN: f64 = 1.1;
 
-/// Parts of the plant's state that a run can hold the firmware responsible for.
+/// Invariants for whose violation the firmware, not the injection, is responsible.
 #[derive(Clone, Copy, Debug)]
 pub struct Scope {
     /// The measured currents are the true ones.
@@ -28,7 +28,7 @@ pub struct Scope {
     /// No push is stronger than the drive.
     pub range: bool,
     /// Counts reach the servo unchanged.
-    pub place: bool,
+    pub rotor_position: bool,
 }
 
 impl Scope {
@@ -41,15 +41,15 @@ impl Scope {
             |injection: &Injection| matches!(injection.channel, Counter | Index | JointCounts | Target);
         Self {
             torque: !injections.clone().any(lies),
-            place: !injections.clone().any(|injection| injection.channel == JointCounts),
+            rotor_position: !injections.clone().any(|injection| injection.channel == JointCounts),
             range: !injections.any(lost)
                 && !events.iter().any(|event| matches!(event, Event::Kick(..) | Event::Touch(_))),
         }
     }
 }
 
-/// Periods for which a joint may be driven with a wrong rotor position; within them, detection is in time.
-const ASTRAY: u64 = PERIODS_PER_S / 50;
+/// Periods for which a joint may be driven with a wrong rotor position before the detection is late.
+const MOST_WRONG_PERIODS: u64 = PERIODS_PER_S / 50;
 
 /// Checks one run.
 #[derive(Clone, Debug)]
@@ -67,17 +67,16 @@ pub struct Invariants<const N: usize> {
     model: Option<IdentifiedModel<N>>,
     judging: bool,
     /// Counts beyond those of the joints' angles, counts per rad, and tolerated deviation in counts.
-    places: [f64; N],
+    rotor_positions: [f64; N],
     counts_per_rad: [f64; N],
     doubt: [f64; N],
-    /// Positions are checked; periods for which a joint has been driven with a wrong one.
+    /// Whether positions are checked; periods for which a joint has been driven with a wrong one.
     watched: bool,
-    astray: u64,
+    wrong_periods: u64,
     /// Angles at the last enabling, rad, and the motion within which lost counts are detected, rad.
     enabled_at: [f64; N],
     turn: [f64; N],
-    /// Angles when the drive was last off or braking, rad. A leg that rests outside its range is enabled to
-    /// return.
+    /// Angles when the drive was last off or braking, rad. A leg outside its range is enabled only to return.
     off_at: [f64; N],
     broken: Vec<String>,
 }
@@ -96,11 +95,11 @@ impl<const N: usize> Invariants<N> {
             stop_open: None,
             model: rig.leg.control().model().copied(),
             judging: is_judging(rig),
-            places: core::array::from_fn(|joint| place(rig, joint, counts_per_rad[joint])),
+            rotor_positions: core::array::from_fn(|joint| rotor_position(rig, joint, counts_per_rad[joint])),
             counts_per_rad,
             doubt: core::array::from_fn(|joint| doubt(&leg.joints[joint])),
             watched: false,
-            astray: 0,
+            wrong_periods: 0,
             enabled_at: [0.0; N],
             turn: core::array::from_fn(|joint| LOST_TURNS * TAU / leg.joints[joint].encoder.ratio),
             off_at: [0.0; N],
@@ -116,12 +115,12 @@ impl<const N: usize> Invariants<N> {
         let switching = rig.is_switching();
         self.commands(rig, rig.commands());
         self.parameters(rig);
-        self.places(rig);
+        self.check_rotor_positions(rig);
         if let Some(output) = &rig.output {
             let torque = output.servo.decision.torque;
             let over = |joint: usize| f64::from(torque[joint].abs().0) > self.cap_nm[joint] * 1.000_001;
             if (0..N).any(over) {
-                self.note(rig, "more torque was asked for than the cap");
+                self.note(rig, "requested torque above the cap");
             }
         }
         // A braking motor is not damped by the servo, whatever the servo did before.
@@ -133,7 +132,7 @@ impl<const N: usize> Invariants<N> {
         if switching && self.scope.torque {
             let torque = rig.world.motor_torque();
             if (0..N).any(|joint| torque[joint].abs() > TORQUE_MARGIN * self.cap_nm[joint]) {
-                self.note(rig, "the motors made more torque than the cap");
+                self.note(rig, "motor torque above the cap");
             }
         }
         // A braking motor is not driven: the leg's weight may lower it.
@@ -147,7 +146,7 @@ impl<const N: usize> Invariants<N> {
                     || position[joint] > high.max(off_at) + MARGIN_RAD
             };
             if (0..N).any(beyond) {
-                self.note(rig, "driven beyond a joint's range, or farther out than it rested");
+                self.note(rig, "driven beyond a joint's range, or farther out than its rest position");
             }
         }
         match (self.released, switching) {
@@ -163,26 +162,26 @@ impl<const N: usize> Invariants<N> {
     }
 
     /// Checks the rotor positions of switching axes from now on, once the rotors have turned. Lost counts at
-    /// rest show at the index, a frozen counter at the motor's voltage.
-    pub fn knows_places(&mut self) {
-        self.watched = self.scope.place;
+    /// rest are detected at the index, a frozen counter by the motor's voltage.
+    pub fn check_positions_from_now(&mut self) {
+        self.watched = self.scope.rotor_position;
     }
 
-    fn places<const B: usize>(&mut self, rig: &Rig<N, B>) {
+    fn check_rotor_positions<const B: usize>(&mut self, rig: &Rig<N, B>) {
         let follows = rig.is_switching() && !rig.is_braking();
         let position = rig.world.anatomical_position();
         if !self.watched || !follows || rig.is_restarted() {
-            (self.astray, self.enabled_at) = (0, position);
+            (self.wrong_periods, self.enabled_at) = (0, position);
             return;
         }
         let wrong = |joint: usize| {
-            let off = place(rig, joint, self.counts_per_rad[joint]) - self.places[joint];
-            off.abs() > self.doubt[joint]
+            let off = rotor_position(rig, joint, self.counts_per_rad[joint]) - self.rotor_positions[joint];
+            off.abs() > self.tolerance[joint]
                 && (position[joint] - self.enabled_at[joint]).abs() > self.turn[joint]
         };
-        self.astray = if (0..N).any(wrong) { self.astray + 1 } else { 0 };
-        if self.astray == ASTRAY {
-            self.note(rig, "enabled again with a rotor that stands elsewhere than its counts say");
+        self.wrong_periods = if (0..N).any(wrong) { self.wrong_periods + 1 } else { 0 };
+        if self.wrong_periods == MOST_WRONG_PERIODS {
+            self.note(rig, "enabled again with wrong rotor counts");
         }
     }
 
@@ -192,7 +191,7 @@ impl<const N: usize> Invariants<N> {
         if model != self.model.as_ref() {
             let accepted = rig.leg.control().verdict().is_some_and(|verdict| verdict.is_accepted());
             if !(self.judging && accepted && rig.alarm().is_none()) {
-                self.note(rig, "other parameters without a verdict that accepts them");
+                self.note(rig, "parameters changed without an accepting verdict");
             }
             self.model = model.copied();
         }
@@ -213,7 +212,7 @@ impl<const N: usize> Invariants<N> {
             command.duty.iter().all(|duty| duty.is_finite() && (0.0..=1.0).contains(duty))
         };
         if !commands.iter().all(sensible) {
-            self.note(rig, "a duty that is none");
+            self.note(rig, "a duty not finite or outside 0..1");
         }
         if commands.iter().any(|command| command.enabled) && !commands.iter().all(|command| command.enabled) {
             self.note(rig, "one axis switches, the other does not");
@@ -236,8 +235,8 @@ impl<const N: usize> Invariants<N> {
 }
 
 fn is_judging<const N: usize, const B: usize>(rig: &Rig<N, B>) -> bool {
-    // The verdict may come in the tick in which the last motion ends. One of an earlier identification was
-    // cleared at the start of this one.
+    // The verdict may come in the tick in which the last motion ends. The start of this identification
+    // cleared that of an earlier one.
     matches!(rig.leg.control().activity(), Activity::Identify(_))
 }
 
@@ -247,7 +246,7 @@ fn cap_nm(joint: &JointFile) -> f64 {
 }
 
 /// Counts of a joint beyond those of its angle.
-fn place<const N: usize, const B: usize>(rig: &Rig<N, B>, joint: usize, counts_per_rad: f64) -> f64 {
+fn rotor_position<const N: usize, const B: usize>(rig: &Rig<N, B>, joint: usize, counts_per_rad: f64) -> f64 {
     f64::from(rig.counts()[joint]) - counts_per_rad * rig.world.anatomical_position()[joint]
 }
 
@@ -256,7 +255,7 @@ fn counts_per_rad(joint: &JointFile) -> f64 {
 }
 
 /// Counts of an eighth of an electrical turn: a requested torque is then 0.7 of its value.
-fn doubt(joint: &JointFile) -> f64 {
+fn eighth_of_an_electrical_turn(joint: &JointFile) -> f64 {
     let pole_pairs = joint.motor.as_ref().map_or(1.0, |motor| motor.pole_pairs as f64);
     f64::from(joint.encoder.counts) / pole_pairs / 8.0
 }

@@ -8,7 +8,7 @@
 //! | [`aftermath`] | allowed safe states of each code; an operator who resets and enables again |
 //! | [`campaign`] | many runs, forked from identifications |
 //! | [`detectors`] | each fault code of the firmware disabled separately |
-//! | [`mod@bench`] | rows that are no forks: components, calibrations, identifications with ideal drives |
+//! | [`mod@bench`] | rows that are not forks: components, calibrations, identifications with ideal drives |
 //! | [`emulated`] | rows that require a processor, run on the emulated one |
 //! | [`trial`] | every channel faulted in every form, and two faults at once: no invariant may break |
 //! | [`hours`] | normal motion, in which no fault may be reported |

@@ -39,10 +39,10 @@ pub struct Outcome {
     pub recording: Option<FaultCurves>,
 }
 
-/// Detectors that are disabled in a run.
+/// Disabled detectors of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Blind {
-    /// None.
+    /// No detector is disabled.
     #[default]
     Nobody,
     /// All detectors of the row.
@@ -58,7 +58,7 @@ pub struct Manner {
     pub blind: Blind,
     /// Curves are recorded.
     pub recorded: bool,
-    /// A safe machine is watched for a tenth of the usual time only, 2 ms.
+    /// A safe machine is observed for a tenth of the usual time only, 2 ms.
     pub brief: bool,
 }
 

@@ -313,7 +313,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         let own = alarm.is_none_or(|code| self.row.codes.contains(&code));
         let early = onset.is_none() && !own;
         let elsewhere = !early && seen.is_some_and(|state| !self.leads_to(state));
-        false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !self.tells_of_a_push(code));
+        false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !self.is_caused_by_a_push(code));
         let alarm = alarm.map(FaultCode::name);
         let begun = onset.map_or(safe, |onset| onset.min(safe));
         let after_ms = seen.map(|_| (safe - begun) as f64 * PERIOD_MS);
@@ -364,7 +364,7 @@ impl<'a, const B: usize> Watched<'a, B> {
 
     /// In some runs the operator resets and tries to enable again.
     fn reset(&mut self) {
-        self.invariants.knows_places();
+        self.invariants.check_positions_from_now();
         for since in 0..RESET {
             self.rig.hand = hand(since);
             self.step();

@@ -23,16 +23,16 @@ use crate::formats::leg_file::LegFile;
 use crate::report::fault_curves::FaultCurves;
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 
-/// Rows that are excluded from pairs. A hang ends in a reset that removes the other fault, and changed limits
-/// cannot be enforced.
+/// Rows excluded from pairs. A hang ends in a reset that removes the other fault, and changed limits cannot
+/// be enforced.
 const ALONE: [&str; 2] = ["K3", "M2"];
 /// Names of the two kinds.
 pub const KINDS: [&str; 2] = ["sweep", "pairs"];
 /// Longest time between two faults, periods.
 const APART: u64 = PERIODS_PER_S / 20;
-/// Periods for which an undetected fault is watched.
+/// Periods for which an undetected fault is observed.
 const PATIENCE: u64 = PERIODS_PER_S / 5;
-/// Periods for which a safe machine is watched.
+/// Periods for which a safe machine is observed.
 const AFTERWARDS: u64 = PERIODS_PER_S / 50;
 
 /// Channels of sensors, contacts and links that can be faulted.
@@ -192,13 +192,13 @@ impl Trial {
             alarm = alarm.or(rig.alarm());
             safe_since = if rig.is_switching() { None } else { safe_since.or(Some(since)) };
             let over = safe_since.is_some_and(|safe| since >= safe.max(self.last) + AFTERWARDS);
-            // Undetected for long enough, or damped to its end.
+            // Undetected for the whole time, or damped to its end.
             if over || alarm.is_none() && since >= self.last + PATIENCE {
                 break;
             }
         }
         if alarm.is_some() && seed.is_multiple_of(RESET_EVERY) {
-            invariants.knows_places();
+            invariants.check_positions_from_now();
             for since in 0..RESET {
                 rig.hand = hand(since);
                 let stop = rig.injector.happens(Channel::EmergencyStop, 0, rig.period);

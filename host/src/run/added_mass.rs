@@ -9,11 +9,11 @@
 //!
 //! | symbol | meaning |
 //! | --- | --- |
-//! | theta | ten rigid-body parameters of what was added to a link: M, H, inertia |
+//! | theta | ten rigid-body parameters of the mass added to a link: M, H, inertia |
 //! | D | factor of each parameter in each base parameter |
 //!
-//! Friction and offset are not compared: they change from day to day. What the base parameters do not
-//! separate is not determined. The mass on the first link, for example, only shows in its first moments.
+//! Friction and offset are not compared: they change from day to day. Sums that the base parameters do not
+//! separate stay undetermined: the mass on the first link, for example, appears only in its first moments.
 
 use nalgebra::SVector;
 use scarab::model::{INERTIAL_PARAMETERS, Parameter};
@@ -25,7 +25,7 @@ use crate::run::compare_model::{Common, ROUNDING, quantile};
 
 /// Smallest independent share of a column's length for its parameter to be determined.
 const INDEPENDENT_SHARE: f64 = 1e-3;
-/// Sigmas from which a mass is large enough to have a place.
+/// Significance, in sigma, from which the position of a mass is reported.
 const LEAST_SIGMAS: f64 = 3.0;
 
 type Column = SVector<f64, LARGEST_BASE_SET>;
@@ -77,7 +77,7 @@ struct Fit {
     parameters: Vec<Parameter>,
     values: Vec<f64>,
     covariance: Vec<Vec<f64>>,
-    /// False where another column that was dropped shares the parameter's effect.
+    /// False where a dropped column shares the parameter's effect.
     determined: Vec<bool>,
     chi2: f64,
 }

@@ -142,8 +142,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
         })
     }
 
-    /// Whether the parameter is not estimated and thus zero in the model; `dropped` are base
-    /// parameters held at zero.
+    /// Whether the parameter is not estimated and thus zero in the model. `dropped` marks base parameters
+    /// held at zero.
     pub fn is_zero(&self, dropped: &[bool; B], joint: usize, parameter: Parameter) -> bool {
         self.model.base.standing(joint, parameter) == Standing::Off
             || self.device.drive(joint, parameter).is_some_and(|base| dropped[base])
@@ -271,14 +271,14 @@ impl<const N: usize, const B: usize> Background<N, B> {
         }
     }
 
-    /// Findings whose words count what the verdict does not know: whether there is a prior, and whether the
-    /// search for a possible leg has arrived.
+    /// Completes the words of findings with facts that the verdict does not have: whether there is a prior,
+    /// and whether the search for a physically consistent leg has converged.
     fn in_context(&self, findings: &[FindingReport], consistent: &ConsistentReport) -> Vec<FindingReport> {
         let mut findings = findings.to_vec();
         for finding in findings.iter_mut().filter(|finding| !finding.passed && finding.test == "prior_box") {
             if consistent.base.settled == Some(false) {
                 finding.words = format!(
-                    "the search for a possible leg has not arrived: it ended {} chi-square units above the best one",
+                    "the search for a possible leg has not converged: it ended {} chi-square units above the optimum",
                     plain(consistent.base.excess_chi2)
                 );
             } else if self.prior.is_none() {
@@ -400,11 +400,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
 /// Costs in chi-square units.
 #[derive(Clone, Debug)]
 pub struct Costs<const B: usize> {
-    /// J_LS.
+    /// Cost of least squares (J_LS).
     pub least_squares: f64,
-    /// J_C - J_LS.
+    /// Rise of the cost to the optimum in the box (J_C - J_LS).
     pub above: f64,
-    /// J(p) - J_LS for any parameters.
+    /// Rise of the cost for any parameters (J(p) - J_LS).
     pub factor: Factor<f64, B>,
 }
 

@@ -6,12 +6,12 @@
 //! limit = k (1 - 2/(9 k) + z sqrt(2/(9 k)))^3     its quantile, z that of the normal distribution
 //! ```
 //!
-//! Why the distance and not each parameter alone: errors of hardly separable parameters are large
-//! and correlated. Each of them may be off while their sum is accurate.
+//! The distance is tested, not each parameter alone: errors of hardly separable parameters are large and
+//! correlated. Each of them may be wrong while their sum is accurate.
 //!
 //! Source: E. B. Wilson and M. M. Hilferty, The distribution of chi-square, 1931.
-//! Limits: differences between two days (temperature of the gears, fit of the wearer in the shell) are
-//! not in the sigma of one recording. They appear as a change, which they are.
+//! Limits: differences between two days (temperature of the gears, fit of the wearer in the shell) are not in
+//! the sigma of one recording. The test reports them as a change.
 
 use nalgebra::SVector;
 

@@ -1,9 +1,9 @@
 //! Physically consistent legs: result of the board, result of a swarm over whole legs, and the optimum.
 //!
 //! The board searches base values and completes them. The host also runs the beetle swarm over
-//! log-Cholesky coordinates of every link, in the board's precision. In double precision it finds
-//! the least cost of any allowed leg. That problem is convex, so its optimum is the global one, up
-//! to the barriers' 21 N times 1e-8.
+//! log-Cholesky coordinates of every link, in the board's precision. In double precision it finds the least
+//! cost of any allowed leg. That problem is convex, so the result is the global optimum to within 21 N times
+//! 1e-8, the effect of the barriers.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ use crate::report::{ConsistentReport, ConsistentSearchReport};
 const DIMENSIONS: usize = 42;
 /// Excess at which a search counts as finished, chi-square units.
 const ARRIVED: f64 = 0.5;
-/// Share of the optimum's cost within which single precision has arrived.
+/// Share of the optimum's cost within which single precision has converged.
 const SHARE_OF_COST: f64 = 1e-3;
 
 /// Least cost of an allowed leg above that of least squares, chi-square units.

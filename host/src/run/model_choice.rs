@@ -1,7 +1,7 @@
 //! Model terms of each joint: requested, used, and why.
 //!
 //! The firmware decides (`scarab::ident::solve::selection`, `scarab::ident::record::stribeck`). This module
-//! converts leg files to its choices and its decisions to words.
+//! converts leg files to its choices, and its decisions to words.
 //!
 //! | `offset` | `asymmetric_coulomb` | constant column |
 //! | --- | --- | --- |
@@ -51,8 +51,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
         self.device.drive_choice.get(joint).map_or(Constant::Offset, |choice| choice.meaning)
     }
 
-    /// All terms of all joints. `stribeck` holds for each joint whether its Stribeck friction is
-    /// used, and the root mean square of its torque. A gain of NaN was not reported.
+    /// All terms of all joints. `stribeck` states for each joint whether its Stribeck friction is used, and
+    /// the root mean square of its torque. An unreported gain is NaN.
     #[must_use]
     pub fn model_choice(
         &self,
@@ -91,17 +91,17 @@ impl<const N: usize, const B: usize> Background<N, B> {
         asked: Switch,
     ) -> Decision {
         match asked {
-            Switch::Off => return decided(false, "ruled out"),
-            Switch::On => return decided(true, "asked for"),
+            Switch::Off => return decided(false, "disabled by the leg file"),
+            Switch::On => return decided(true, "requested by the leg file"),
             Switch::Auto => {}
         }
         let base = match self.model.base.standing(joint, parameter) {
             Standing::Alone(base) => base,
             Standing::Grouped(base) => {
                 let sum = self.base_name(base);
-                return decided(true, &format!("measured in the sum {sum} only: there is no column to drop"));
+                return decided(true, &format!("measured in the sum {sum} only: no column to drop"));
             }
-            Standing::Unseen | Standing::Off => return decided(false, "torque never sees it"),
+            Standing::Unseen | Standing::Off => return decided(false, "has no effect on torque"),
         };
         if !found.is_made {
             return decided(true, "the identification ended before it was decided");
@@ -109,13 +109,13 @@ impl<const N: usize, const B: usize> Background<N, B> {
         let (used, gain, limit) =
             (!found.dropped[base], f64::from(found.gain[base]), selection::SMALLEST_GAIN);
         let why = if gain.is_nan() {
-            if used { "the data tell it" } else { "the data do not tell it: held at zero" }.into()
+            if used { "determined by the data" } else { "not determined by the data: held at zero" }.into()
         } else if used {
             format!("explains {} chi-square units, limit {limit}", plain(gain.into()))
         } else if gain > 0.0 {
             format!("explains {} chi-square units, limit {limit}: held at zero", plain(gain.into()))
         } else {
-            "not told apart from the others by this motion: held at zero".into()
+            "not distinguishable from the others by this motion: held at zero".into()
         };
         Decision { used, gain: Some(gain), limit: Some(limit), why }
     }
@@ -125,11 +125,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
             return decided(
                 false,
                 match asked.offset {
-                    Switch::Off => "ruled out",
+                    Switch::Off => "disabled by the leg file",
                     Switch::Auto if self.device.stribeck_choice(joint) == Choice::Off => {
-                        "not looked for: the encoder is too coarse at this bandwidth"
+                        "not searched: the encoder is too coarse at this bandwidth"
                     }
-                    _ => "not told apart from the asymmetric Coulomb friction that was asked for",
+                    _ => "not distinguishable from the requested asymmetric Coulomb friction",
                 },
             );
         }
@@ -138,8 +138,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     fn asymmetry(&self, found: &Selection<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
         match (asked.asymmetric, self.meaning(joint)) {
-            (Switch::Off, _) => decided(false, "ruled out"),
-            (_, Constant::Offset) => decided(false, "not told apart from the offset, which is taken for it"),
+            (Switch::Off, _) => decided(false, "disabled by the leg file"),
+            (_, Constant::Offset) => decided(false, "not distinguishable from the offset, which includes it"),
             (asymmetric, Constant::Asymmetry) => self.column(found, joint, Parameter::OFF, asymmetric),
         }
     }
@@ -155,19 +155,19 @@ impl<const N: usize, const B: usize> Background<N, B> {
             return decided(
                 used,
                 match asked {
-                    Switch::Off => "ruled out",
-                    _ => "not looked for: plain least squares, or nothing was recorded",
+                    Switch::Off => "disabled by the leg file",
+                    _ => "not searched: plain least squares, or nothing was recorded",
                 },
             );
         };
         let (gain, surplus) = (f64::from(gain), f64::from(surplus));
         if asked == Switch::On {
-            let why = if used { "asked for" } else { "asked for, but the best curve explains nothing" };
+            let why = if used { "requested by the leg file" } else { "requested by the leg file, but the best curve explains nothing" };
             return Decision { gain: Some(gain), ..decided(used, why) };
         }
         let limit = stribeck::SMALLEST_GAIN;
         if gain.is_nan() {
-            return decided(used, "the data do not show it");
+            return decided(used, "not shown by the data");
         }
         let share = 100.0 * surplus / f64::from(size);
         let why = format!(

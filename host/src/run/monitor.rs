@@ -210,7 +210,7 @@ pub fn watch<const N: usize, const B: usize>(
         Err(reasons) => return Ok(MonitorRun::refused(options.seed, reasons)),
     };
     let model_monitor = pair.leg.identification().model_monitor();
-    let baseline = model_monitor.baseline().ok_or_else(|| leg.error("an accepted model is not watched"))?;
+    let baseline = model_monitor.baseline().ok_or_else(|| leg.error("the firmware does not monitor the accepted model"))?;
     let mut run = MonitorRun {
         row_sigma_nm: baseline
             .row_variance
@@ -292,7 +292,7 @@ fn change<const N: usize, const B: usize>(
         .disturbances
         .iter()
         .any(|disturbance| matches!(disturbance, Disturbance::Friction { over_s, .. } if *over_s > after_s));
-    // A truth that still changes is no reference.
+    // Without a final truth there is no reference.
     let known: &[_] = if run.still_changing { &[] } else { &options.disturbances };
     let thresholds = &context.configuration.thresholds;
     let waited_s = waited as f64 * TICK_S;

@@ -66,17 +66,17 @@ pub struct ReplayOptions {
     pub plan: Plan,
     /// Prior for the search box.
     pub prior: PriorChoice,
-    /// Estimator; the robust one excludes disturbances and searches Stribeck friction by itself.
+    /// Estimator; only the robust one excludes disturbances and searches Stribeck friction.
     pub estimator: Estimator,
     /// Seed of the swarm.
     pub swarm_seed: u64,
     /// Output file for the predicted torque of the validation part.
     pub csv: Option<PathBuf>,
-    /// Delay of the torque against the angle to be taken out, ms: none, one for all joints, or one for each.
+    /// Delay of the torque against the angle to be removed, ms: none, one for all joints, or one for each.
     pub torque_delay_ms: Vec<f64>,
-    /// Whether an even clock replaces the stamps.
+    /// Whether an even clock replaces the time stamps.
     pub even_stamps: bool,
-    /// Known load in all recordings, which is taken off.
+    /// Known load in all recordings, to be subtracted.
     pub load: Option<Payload<f64>>,
     /// Known mass in the recordings `with_payload`.
     pub payload: Option<Payload<f64>>,
@@ -305,7 +305,7 @@ fn identified<const N: usize, const B: usize>(
     let validation = if validated { vec![motion(unused)] } else { Vec::new() };
     let mut run =
         background.report(&solver, verdict, &[motion(solver.record().clone())], &validation, &circumstances);
-    // A misfit above the noise may be vibration, of which a larger bandwidth lets more through.
+    // A misfit above the noise may be vibration; a larger bandwidth passes more of it.
     let proposed_hz = if noise_is_known && !options.chooses_bandwidth {
         Some(chosen_bandwidth(leg, &background, options)?).filter(|hz| *hz > options.bandwidth_hz)
     } else {
@@ -335,7 +335,7 @@ fn identified<const N: usize, const B: usize>(
     Ok(Replayed { bandwidth_hz: options.bandwidth_hz, run, sources, series })
 }
 
-/// Takes the durations of disturbances from the rows themselves: blocks of a long motion are long.
+/// Takes the durations of disturbances from the rows themselves, because blocks of a long motion are long.
 fn time_disturbances<const N: usize, const B: usize>(
     recorder: &mut HostRecorder<N, B>,
     background: &Background<N, B>,
@@ -407,7 +407,7 @@ fn warn(file: &Path, warning: &dyn std::fmt::Display) {
     eprintln!("warning: {}: {warning}", file.display());
 }
 
-/// Training and held-out parts, the whole files, and what was found in their samples.
+/// Training and held-out parts, the whole files, and the findings about their samples.
 type Parts = (Vec<Recording>, Vec<Recording>, Vec<Whole>, Screening);
 
 fn read_all(options: &ReplayOptions, leg: &LegFile, ratios: &[f64]) -> Result<Parts, ToolError> {
@@ -436,7 +436,7 @@ fn warn_of_another_leg(recording: &Recording, leg: &LegFile) {
     let (in_file, in_leg) = (recording.joints_in_file, leg.joints.len());
     if in_file > in_leg {
         let warning = format!(
-            "holds {in_file} joints, the leg `{}` has {in_leg}: the others are ignored, as if they did not move",
+            "holds {in_file} joints, the leg `{}` has {in_leg}: the other columns are ignored, as if those joints were at rest",
             leg.name
         );
         warn(&recording.file, &warning);

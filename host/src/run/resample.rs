@@ -1,9 +1,9 @@
 //! Puts recordings with jitter or another rate on the uniform 500 Hz grid of the filter chain.
 //!
-//! Why here: the firmware samples on a clock, and its differentiating kernels are exact on a
-//! uniform grid only. The effect of a recorder's clock is therefore removed once, on the host.
-//! Angle and torque pass the same linear operator, whose weights depend on the time stamps alone.
-//! Both are attenuated alike without delay, so the relation to be identified is unchanged.
+//! The firmware samples on a clock, and its differentiating kernels are exact on a uniform grid only. The
+//! effect of a recorder's clock is therefore removed once, on the host. Angle and torque pass the same linear
+//! operator, whose weights depend on the time stamps alone. Both are attenuated alike without delay, so the
+//! relation to be identified is unchanged.
 //!
 //! With the grid period T = 2 ms and the recording's step h:
 //!
@@ -76,7 +76,7 @@ impl fmt::Display for BandwidthWarning {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             formatter,
-            "a bandwidth of {} Hz is more than a recording at {:.0} Hz carries; up to {:.1} Hz can be trusted",
+            "a bandwidth of {} Hz is too large for a recording at {:.0} Hz: choose at most {:.1} Hz",
             self.bandwidth_hz,
             self.native_rate_hz,
             TRUSTED_BANDWIDTH * self.native_rate_hz

@@ -1,10 +1,10 @@
 //! Scale and load of a simulated run: a second run with a known mass, and a known load.
 //!
-//! Why here: the board identifies one leg as it hangs. A second run with a known mass determines
-//! the torque constants (`scarab::ident::solve::scale`). It compares the records of two identifications,
-//! each through the whole firmware on the same simulated leg; attaching the mass between them is
-//! the operator's part. The first run is then solved again with corrected torques, by the same
-//! solver and verdict. A known load is subtracted from the records in the same way.
+//! The board identifies one leg in its present state. A second run with a known mass determines the torque
+//! constants (`scarab::ident::solve::scale`). It compares the records of two identifications, each through
+//! the whole firmware on the same simulated leg; between them the operator attaches the mass. The first run
+//! is then solved again with corrected torques, by the same solver and verdict. A known load is subtracted
+//! from the records in the same way.
 //!
 //! Without a mass, results stay relative to the assumed torque constants, and the report says so.
 
@@ -100,8 +100,8 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         Ok(Self { payload: Some(*stated), ratios, load: None, load_base: [0.0; B] })
     }
 
-    /// Ratios of assumed over true constants; `None` unless the mass determined all of them well
-    /// and without contradiction.
+    /// Ratios of assumed over true constants; `None` unless the mass determined all of them accurately and
+    /// without contradiction.
     #[must_use]
     pub fn trusted(&self) -> Option<[ConstantRatio<f32>; N]> {
         let all: Option<Vec<_>> = self
@@ -242,7 +242,7 @@ fn second_run<const N: usize, const B: usize>(
     gravity: [f32; 3],
 ) -> Result<Record<f32, N, B>, ToolError> {
     let mut pair = pair.clone();
-    pair.evaluations = 0; // the record is all that is wanted
+    pair.evaluations = 0; // only the record is used
     pair.world.attach(payload.joint, payload.mass, payload.place.into());
     for _ in 0..(ATTACHING_S / TICK_S) as u32 {
         pair.tick(None, gravity);

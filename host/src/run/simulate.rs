@@ -1,4 +1,4 @@
-//! Complete simulated run: the firmware's leg against the plant, with data that only a simulation has.
+//! Complete simulated run: the firmware's leg against the plant, with data that only a simulation provides.
 
 use std::time::Instant;
 
@@ -76,7 +76,7 @@ pub fn drive<'a, const N: usize, const B: usize>(
     perturb::at_start(leg, &mut pair, wrong)?;
     let mut watch = Watch::new(context);
     if !pair.enable(context.gravity) {
-        let words = "the drive refused to be enabled at the start: the leg is not where it may be";
+        let words = "the drive refused to be enabled at the start: the leg is outside its range";
         return Ok(Driven { pair, watch, stopped: Some(words.into()) });
     }
     let mut request = Some(ControlRequest::Identify);

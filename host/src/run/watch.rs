@@ -1,4 +1,4 @@
-//! Observes a run, including data that the firmware does not have.
+//! Observes a simulated run, including data that the firmware does not have.
 
 use std::time::Instant;
 
@@ -71,7 +71,7 @@ fn truth_fit<const N: usize, const B: usize>(
     values: &[f32; B],
 ) -> [TruthFit; N] {
     core::array::from_fn(|joint| {
-        // The rows predate the friction curve: its part is built from other columns.
+        // The rows precede the friction curve, so its part comes from other columns.
         let curve = model.stribeck[joint];
         let places = [Parameter::FC, Parameter::FV].map(|parameter| model.drive(joint, parameter));
         let surplus = curve.excess * places[0].map_or(0.0, |base| values[base]);
@@ -221,7 +221,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
     }
 
     fn watch_search(&mut self, pair: &Pair<N, B>) {
-        // Before the selection of columns, costs belong to another problem.
+        // Before the columns are selected, costs belong to another problem.
         let solver = pair.leg.identification().solver().filter(|solver| solver.is_selected());
         let Some(solver) = solver else { return };
         let iterations = solver.search().iterations();

@@ -193,9 +193,9 @@ fn one_column_cannot_be_asked_for_twice_and_who_yields_is_said() {
         (found.used, found.why.clone())
     };
     let taken = words(Switch::On, Switch::Auto, "asymmetric_coulomb");
-    assert_eq!(taken, ("off", "not told apart from the offset, which is taken for it".into()));
+    assert_eq!(taken, ("off", "not distinguishable from the offset, which includes it".into()));
     let (used, why) = words(Switch::Auto, Switch::On, "offset");
-    assert!(used == "off" && why.contains("asymmetric Coulomb friction that was asked for"), "{why}");
+    assert!(used == "off" && why.contains("requested asymmetric Coulomb friction"), "{why}");
     for (key, word) in [("rotor", "maybe"), ("asymmetric_coulomb", "yes")] {
         let text = LegFile::load(DEFAULT_LEG).expect("shipped").to_toml().replacen(
             "name = \"hip\"",

@@ -19,7 +19,7 @@ const HELD: Contacts = Contacts { enabling: true, start: false };
 const PRESSED: Contacts = Contacts { enabling: false, start: true };
 
 fn ready() -> TestRig {
-    // Without gravity: the weight of a hanging leg loads the rotor differently at each angle, which a
+    // Without gravity, because the weight of a hanging leg loads the rotor differently at each angle, which a
     // calibration refuses.
     let mut leg = LegFile { gravity: [0.0; 3], ..LegFile::load(DEFAULT_LEG).expect("shipped") };
     // The zero pose is within the range, so the leg can be enabled without moving it first.
@@ -90,7 +90,7 @@ fn a_lost_rotor_position_requires_calibration_and_reference() {
         hold(&mut rig, PRESSED, 0.3);
         assert!(!hold(&mut rig, OPEN, 2.0));
         assert!(hold(&mut rig, HELD, 0.4), "joint {joint}: {:?} {:?}", rig.alarm(), rig.state());
-        assert!(rig.is_switching(), "joint {joint}: enabled, and no axis runs");
+        assert!(rig.is_switching(), "joint {joint}: enabled, but no axis switches");
     }
 }
 
@@ -159,7 +159,7 @@ fn missing_ticks_during_a_flash_write_are_no_fault() {
         let mut rig = ready();
         rig.board.signals.inhibit.raise_bits(if storing { Cause::Storing.bit() } else { 0 });
         for joint in 0..2 {
-            // On the board the watchdog's timeout is longer at this time, here it is not.
+            // On the board the watchdog's timeout is longer meanwhile; here it is not.
             let timing = Timing::lasting(rig.period, periods);
             rig.injector.add(Injection { channel: Channel::Tick, joint, form: Form::Off, timing });
         }

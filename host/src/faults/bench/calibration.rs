@@ -1,9 +1,9 @@
-//! E5: a motor that is wired differently from its axis' configuration, or becomes loose during calibration.
-//! Its calibration has to refuse before any torque is requested.
+//! E5: a motor that is wired differently from its axis' configuration, or comes loose during calibration. Its
+//! calibration must refuse before any torque is requested.
 //!
 //! In two of five runs a phase wire, the encoder or a shunt breaks at a tick of the calibration. A passed
-//! calibration is missed if its result differs from that of an intact motor. Otherwise the result is usable,
-//! and the running axis detects the broken part (P1, E1, C1 to C3).
+//! calibration counts as missed if its result differs from that of an intact motor. Otherwise the result is
+//! usable, and the running axis detects the broken part (P1, E1, C1 to C3).
 
 use core::f64::consts::TAU;
 
@@ -26,7 +26,7 @@ use crate::rig::board::{axis_configuration, calibration_settings, commission, re
 pub(super) const BENCH: Bench = Bench {
     head: Head {
         id: "E5",
-        fault: "phases, encoder or shunts connected wrongly, not at all, or come loose in a calibration",
+        fault: "phases, encoder or shunts connected wrongly, not at all, or loose during a calibration",
         detector: "checks of the calibration",
         state: "Refuse",
         deadline_ms: f64::INFINITY,
@@ -75,7 +75,7 @@ fn one(head: &Head, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, To
         way => wiring.shunts_inverted[way as usize - 9] = true,
     }
     if blind {
-        // Blind: the checks pass for any motor.
+        // Blind: the checks pass for every motor.
         axis = sound;
     }
     let configuration = axis_configuration(joint, motor);
@@ -143,7 +143,7 @@ fn loose(
         4 => reading(shunt, Form::Stuck),
         _ => reading(shunt, Form::Offset(random.sign() * random.uniform(5.0, 60.0) / AMPERE_PER_CODE)),
     };
-    // Blind: the checks pass for any motor.
+    // Blind: the checks pass for every motor.
     let (_, found) = if blind { (at, sound) } else { measure(Some((at, &loose)))? };
     let is_right = found.zip(sound).is_some_and(|(found, sound)| is_like(&found, &sound));
     let mut came = outcome(head, seed, found.is_none().then_some("Refuse"));

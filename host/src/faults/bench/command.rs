@@ -1,7 +1,7 @@
 //! J1 by command: no command to the servo drives a joint out of its range.
 //!
-//! The proof of motions (`LegConfiguration::prove`) is bypassed. The servo is commanded at once to a position
-//! beyond the range, at some speed, as by an unproved motion or corrupted memory. Ideal drives.
+//! The proof of motions (`LegConfiguration::prove`) is bypassed. The servo is commanded directly to a
+//! position beyond the range, at some speed, as by an unproved motion or corrupted memory. Ideal drives.
 
 use hal_sim::world::World;
 use rayon::prelude::*;
@@ -57,7 +57,7 @@ fn one(head: &Head, leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -
     let mut world = World::<JOINTS>::new(&leg.description()?, seed);
     world.set_current_noise(&context.current_noise(leg));
     world.place(&start_position(leg));
-    let unfit = |_| leg.error("the servo refuses its joints");
+    let unfit = |_| leg.error("the servo rejects its joint configuration");
     let mut servo = Servo::new(context.configuration.joints).map_err(unfit)?;
     let mut sample = world.sample();
     let mut motion = MotionState::at_rest([0.0; JOINTS]);
@@ -92,7 +92,7 @@ fn one(head: &Head, leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -
         }
         let caps = servo.limits().joints().map(|joint| joint.torque_cap().0);
         if output.decision.torque.iter().zip(caps).any(|(torque, cap)| torque.0.abs() > cap * 1.000_001) {
-            found.broken.push(format!("tick {tick}: more torque was asked for than the cap"));
+            found.broken.push(format!("tick {tick}: requested torque above the cap"));
             break;
         }
     }

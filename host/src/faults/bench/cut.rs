@@ -2,8 +2,8 @@
 //! operator still holds the switch and the host continues as before.
 //!
 //! Requirement: the image starts without calibration and zeros, so the drive stays disabled (not ready to
-//! switch on) whatever host and operator do. All stored data is present. Blind: half of the runs start as a
-//! board that has forgotten nothing, the others with an empty memory.
+//! switch on), independent of host and operator. All stored data is present. Blind: half of the runs start as
+//! a board that still has everything in memory, the others with an empty memory.
 
 use scarab::hal::{AxisCommand, Contacts};
 
@@ -16,7 +16,7 @@ use crate::faults::run::Outcome;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 
-/// Servo ticks until the bus voltage has to be gone, of operated contacts, and of an opened switch.
+/// Servo ticks until the bus voltage must be zero, of operated contacts, and of an opened switch.
 const PATIENCE: u64 = 2 * 4000;
 const HANDS: u64 = 1000;
 const OPEN: u64 = 200;

@@ -1,10 +1,10 @@
 //! H2, H3, H4: identifications of a leg that the wearer pushes, whose foot touches the floor, or that differs
 //! from the firmware's configuration. Ideal drives: only the result of the identification is judged.
 //!
-//! A run is missed if a model is accepted whose torque error on an unseen motion exceeds [`HARMFUL_PERCENT`]
-//! of the mean. It is detected if the result is refused, or if rows are excluded and the remaining model is
-//! good. A good model without any detection means that the disturbance was too small to matter. The report
-//! states which case it was.
+//! A run counts as missed if a model is accepted whose torque error on an unseen motion exceeds
+//! [`HARMFUL_PERCENT`] of the mean. It counts as detected if the result is refused, or if rows are excluded
+//! and the remaining model is good. A good model without any detection means that the disturbance was
+//! negligible. The report states which case it was.
 
 use hal_sim::world::World;
 use rayon::prelude::*;
@@ -107,7 +107,7 @@ fn judge(
     perturb::configure(&mut context, wrong)?;
     let pair = drive(leg, &simulated, &context, &options)?.pair;
     let model = if blind {
-        // Any result, from an estimate with equal weights: as if there were neither weights nor verdict.
+        // Any result, from an estimate with equal weights: as without weights and verdict.
         let finding = pair.leg.identification();
         let found = finding.solver().filter(|_| finding.verdict().is_some());
         found.map(|solver| IdentifiedModel::new(finding.model(), &solver.estimate().values))
@@ -119,7 +119,7 @@ fn judge(
     let noticed = shares.is_some_and(|shares| shares.iter().any(|share| *share > NOTICED_SHARE));
     let harmless = error.is_some_and(|error| error <= HARMFUL_PERCENT);
     let state = match error {
-        // A different leg has to be refused, whatever rows are excluded.
+        // A different leg must be refused, whatever rows are excluded.
         Some(_) => (harmless && noticed && head.id != "H3").then_some("Limit"),
         None => Some(refused(head, pair.leg.identification().verdict())),
     };
@@ -131,7 +131,7 @@ fn judge(
     Ok(found)
 }
 
-/// State where no model is in use; for foot contact it depends on whether contact is among the reasons.
+/// State where no model is in use; for foot contact, whether contact is among the reasons.
 fn refused(head: &Head, verdict: Option<Verdict>) -> &'static str {
     match verdict {
         Some(verdict) if head.id == "H4" && verdict.has(Reason::Contact) => "refused: contact",

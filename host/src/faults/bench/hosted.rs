@@ -1,4 +1,4 @@
-//! A leg on the bus, moved by its host, and its forks: the start of the rows of bus and store.
+//! A leg on the bus, moved by its host, and its forks: the base of the rows of bus and store.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -54,10 +54,10 @@ pub(super) fn hosted(leg: &LegFile) -> Result<Host, ToolError> {
     Ok(host)
 }
 
-/// A bus without host commands, and an operator whose leg identifies itself.
+/// A bus without host commands, and an operator who starts an identification.
 pub(super) fn identifying(leg: &LegFile) -> Result<Host, ToolError> {
     let mut host = Host::new(board(leg)?);
-    // The switch was held until now.
+    // The switch was held before.
     host.rig().hand = Contacts::default();
     host.run(LET_GO);
     begin(leg, host.rig())?;
@@ -92,7 +92,7 @@ impl Fork<'_> {
         }
     }
 
-    /// Name of the drive's safe state; `None` while it follows.
+    /// Name of the drive's safe state; `None` while the drive follows.
     pub(super) fn safe_state(&mut self) -> Option<&'static str> {
         match self.host.rig().state().permission() {
             Permission::Follow => None,
@@ -128,7 +128,7 @@ pub(super) fn forked<'a>(
     seeds: &[u64],
     run: impl Fn(Fork<'a>) -> Result<Outcome, ToolError> + Sync,
 ) -> Result<Vec<Outcome>, ToolError> {
-    forked_within(head, leg, base, seeds, Scope { torque: true, range: true, place: true }, run)
+    forked_within(head, leg, base, seeds, Scope { torque: true, range: true, rotor_position: true }, run)
 }
 
 /// Like [`forked`], with invariants of this scope.

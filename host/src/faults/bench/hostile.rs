@@ -9,8 +9,8 @@
 //! | B4 | host moves the leg, other frames of the lowest priority | motion continues within 2 mrad |
 //! | B4 | host moves the leg, other frames of the highest priority | host timeout: damped in time as in B1 |
 //!
-//! After B3's frames both nodes are reset and have to answer. Frames are random: any identifier, length 0 to
-//! 8, truncated and interleaved transfers, network management, controlwords that enable.
+//! After B3's frames both nodes are reset and must answer. Frames are random: any identifier, length 0 to 8,
+//! truncated and interleaved transfers, network management, controlwords that enable.
 
 use scarab::bus::Frame;
 use scarab::hal::Contacts;
@@ -27,14 +27,14 @@ use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::TICK_NS;
 use crate::rig::bus::host::Host;
 
-/// Servo ticks of hostile frames, and frames in each: more than the bus can carry.
+/// Servo ticks of hostile frames, and frames in each: more than the bus carries.
 const FLOOD: u64 = 400;
 const FRAMES: u64 = 3;
 /// Servo ticks until waiting frames have been sent and the nodes are back.
 const DRAINED: u64 = 4000;
 /// Device type of a servo drive with CiA 402's profile.
 const SERVO_DRIVE: u32 = 0x0002_0192;
-/// Bus load from which the bus counts as full.
+/// Bus load above which the bus counts as full.
 const FULL: f64 = 0.98;
 /// Allowed deviation of a motion because frames wait for others, rad.
 const OFF_RAD: f64 = 2e-3;
@@ -56,8 +56,8 @@ pub(super) const FRAMES_BENCH: Bench = Bench {
 pub(super) const BABBLE: Bench = Bench {
     head: Head {
         id: "B4",
-        fault: "a node that babbles, wire at 100 %",
-        detector: "the bus stands below the servo; a host that is not heard is lost",
+        fault: "a node that sends without pause, bus at 100 %",
+        detector: "bus level below the servo's; host timeouts",
         state: "-",
         deadline_ms: f64::INFINITY,
         unit: "",
@@ -165,7 +165,7 @@ fn moved_on(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     Ok(fork.ended(unaffected.then_some("-"), alarm))
 }
 
-/// Returns whether both joints are where they would have been.
+/// Returns whether both joints are where an undisturbed run has them.
 fn is_near(fork: &mut Fork<'_>, alone: &mut Host) -> bool {
     let [with, without] = [&mut fork.host, alone].map(|host| host.rig().world.anatomical_position());
     with.iter().zip(without).all(|(with, without)| (with - without).abs() < OFF_RAD)
@@ -179,7 +179,7 @@ fn flooded(mut fork: Fork<'_>, off: bool) -> Result<Outcome, ToolError> {
             fork.host.network.send(frame);
         }
         if off && fork.random.below(8) == 0 {
-            // In the correct order, as a real host.
+            // In the correct order, as by a real host.
             for (node, word) in [(1, 6), (2, 6), (1, 7), (2, 7), (1, 15), (2, 15)] {
                 fork.host.command(node, word);
             }

@@ -65,7 +65,7 @@ pub(super) const CUT: Bench = Bench {
         ..head(
             "F1",
             "power cut at any byte of a write or erase",
-            "records are whole or not there",
+            "records are complete or absent",
             "Refuse only if both are lost",
         )
     },
@@ -80,7 +80,7 @@ pub(super) const ROT: Bench = Bench {
 pub(super) const ARMED: Bench = Bench {
     head: head(
         "F3",
-        "store asked for while the drive is on; the processor that stands meanwhile",
+        "store requested while the drive is on; processor stalled during a write",
         "permit of a drive that is off, interlock",
         "-",
     ),
@@ -118,7 +118,7 @@ impl All {
         Self { objects: [0, 1].map(|joint| memory.objects(joint).ok().flatten()), model: memory.any_model() }
     }
 
-    /// Random bytes, since the store does not interpret them.
+    /// Random bytes; the store does not interpret them.
     fn random(random: &mut Xoshiro256PlusPlus, model: &KeptModel<JOINTS>) -> Self {
         let objects = [0, 1].map(|_| {
             let mut bytes = vec![0; 1 + random.next_u32() as usize % LONGEST];
@@ -139,7 +139,7 @@ impl All {
         objects && self.model.as_ref().is_some_and(|model| memory.keep_any(OFF, model))
     }
 
-    /// Returns whether each record is from one of both sets, and no new record follows an old one.
+    /// Returns whether each record comes from one of both sets, and no new record follows an old one.
     fn is_between(&self, old: &Self, new: &Self) -> bool {
         let parts = |all: &Self| {
             let [first, second] = all.objects.clone();
@@ -201,7 +201,7 @@ fn cuts(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Ou
     Ok(seeds.par_iter().map(|seed| cut(head, &filled, *seed, blind)).collect())
 }
 
-/// Blind: the record is written over the old one and accepted without a check.
+/// Blind: the record overwrites the old one and is accepted without a check.
 fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
     let mut random = Random::new(head.id, seed);
     let Filled { memory, old, new, work } = &filled[random.below(filled.len() as u64) as usize];
@@ -223,12 +223,12 @@ fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
     let whole = told.is_between(old, new);
     let mut found = outcome(head, seed, whole.then_some(head.state));
     if kept && told != *new {
-        found.broken.push("a save that was cut was told as done".into());
+        found.broken.push("an interrupted save was reported as done".into());
     }
     let mut again = old.clone();
     again.objects.reverse();
     if !again.keep(&mut memory) || All::of(&mut memory) != again {
-        found.broken.push("nothing can be kept after a cut".into());
+        found.broken.push("nothing can be stored after a power cut".into());
     }
     found.magnitude = Some(bytes as f64);
     found
@@ -271,7 +271,7 @@ impl Rotting {
                 objects.extend(host.board().memory().objects(joint).ok().flatten());
             }
             if !host.board().memory().keep_any(OFF, kept) {
-                return Err(refused("a flash that keeps no model"));
+                return Err(refused("its flash does not store a model"));
             }
         }
         let mut models = Vec::new();
@@ -279,7 +279,7 @@ impl Rotting {
             host.board().memory().keep_any(OFF, &kept);
             host.board().power_on();
             let model = host.rig().leg.control().model().copied();
-            let model = model.ok_or_else(|| refused("a model of its own that is not taken back"))?;
+            let model = model.ok_or_else(|| refused("its own stored model is not accepted"))?;
             models.push((kept, model));
         }
         let models = models.try_into().map_err(|_| refused("two models"))?;
@@ -299,7 +299,8 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
     let mut board = rotting.board.clone();
     corrupt(&mut board, rotting, if blind { 4 } else { random.below(6) }, &mut random);
     let told_apart = readable(board.memory());
-    // Only the store can decide which of its records are intact: what it reads was stored once, or is absent.
+    // Only the store can decide which of its records are intact: each value it reads was stored once, or is
+    // absent.
     let after = All::of(board.memory());
     if blind && random.coin() {
         let mut own = rotting.kept;

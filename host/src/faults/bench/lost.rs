@@ -6,12 +6,12 @@
 //! | B2 | bus off, error passive | status of the controller | Damp, Off |
 //!
 //! Object 6007 selects the kind of damping (1 or 3). Times count from the host's timeout: its consumer time
-//! or its event timer, which each run draws. Then the host returns with heartbeat and targets. It starts the
+//! or its event timer, drawn for each run. Then the host returns with heartbeat and targets. It starts the
 //! network and sends "enable operation" repeatedly, which must not enable.
 //!
-//! Where 6007 makes the loss a fault (1), the host requests each step from the first on, which does not
-//! enable either without a reset. A quick stop (3) may be left that way. An emergency message must report the
-//! event within 10 ms of the safe state, after bus off as soon as the bus is back.
+//! Where 6007 makes the loss a fault (1), the host requests each step from the first on; without a reset this
+//! must not enable either. A quick stop (3) may be left that way. An emergency message must report the event
+//! within 10 ms of the safe state, or after bus off as soon as the bus is back.
 
 use scarab::bus::{Controller, Frame};
 use scarab::safety::FaultCode;
@@ -26,11 +26,11 @@ use crate::rig::bus::board::TICK_NS;
 use crate::rig::bus::host::Speaks;
 use crate::rig::faulty_board::PERIOD_MS;
 
-/// Limit after a host's timeout, ms. The bus checks after every second servo tick, the servo takes its order
-/// in the next tick, and the servo's command acts one period later.
+/// Limit after a host's timeout, ms. The bus checks after every second servo tick, the servo takes the order
+/// in the next tick, and its command acts one period later.
 pub(super) const BUS_MS: f64 = 3.0 * TICK_NS as f64 * 1e-6 + PERIOD_MS;
 const MS: u64 = 1_000_000;
-/// Servo ticks: damping with a margin; presence of the returned host.
+/// Servo ticks of damping with a margin, and of the returned host.
 const DAMPED: u64 = 1400;
 const BACK: u64 = 400;
 /// Servo ticks between two attempts of a returned host.
@@ -51,7 +51,7 @@ pub(super) const HOST_LOST: Bench = Bench {
         detector: "heartbeat consumer, event timer of the received PDO",
         state: "Damp",
         deadline_ms: BUS_MS,
-        unit: "ms of its own time",
+        unit: "ms of the host's timeout",
         codes: &[FaultCode::Heartbeat, FaultCode::LatePdo],
         lacking: None,
     },
@@ -77,7 +77,7 @@ pub(super) const BUS_LOST: Bench = Bench {
 pub(super) struct Patience {
     /// Consumer time and event timer, ms.
     times_ms: [u32; 2],
-    /// Selects which of both ends.
+    /// Ends that fall silent.
     pub(super) silent: [bool; 2],
     /// A loss is a fault, not a quick stop.
     faults: bool,
@@ -119,7 +119,7 @@ pub(super) fn watched(fork: &mut Fork<'_>, silent: [bool; 2], blind: bool) -> Re
     Ok(Patience { times_ms, silent, faults: option == FAULT })
 }
 
-/// Runs until the leg is safe: returns the state, and the time since the timeout, ms.
+/// Runs until the leg is safe; returns the state, and the time since the timeout, ms.
 pub(super) fn until_safe(fork: &mut Fork<'_>, patience: &Patience) -> (Option<&'static str>, Option<f64>) {
     loop {
         let command_ns = fork.tick() + (PERIOD_MS * 1e6) as u64;
@@ -134,12 +134,12 @@ pub(super) fn until_safe(fork: &mut Fork<'_>, patience: &Patience) -> (Option<&'
 }
 
 /// Checks that both nodes report the event soon.
-fn tells(fork: &mut Fork<'_>, state: Option<&str>, codes: [FaultCode; 2]) {
+fn check_report(fork: &mut Fork<'_>, state: Option<&str>, codes: [FaultCode; 2]) {
     fork.run(TOLD);
     let codes = codes.map(FaultCode::number);
     let told = |node: &u16| fork.host.told().iter().any(|(from, code)| from == node && codes.contains(code));
     if state.is_some() && !NODES.iter().all(told) {
-        fork.broken("no emergency message tells of it");
+        fork.broken("no emergency message reports it");
     }
 }
 
@@ -148,7 +148,7 @@ pub(super) fn comes_back(fork: &mut Fork<'_>, speaks: Speaks, faults: bool) {
     fork.host.speaks = Speaks { targets: false, words: false, heartbeat: 0 };
     fork.run(DAMPED);
     if fork.host.rig().is_switching() {
-        fork.broken("damped and not off afterwards");
+        fork.broken("damped, but not off afterwards");
     }
     fork.host.speaks = speaks;
     for tick in 0..BACK {
@@ -161,7 +161,7 @@ pub(super) fn comes_back(fork: &mut Fork<'_>, speaks: Speaks, faults: bool) {
         }
         fork.tick();
         if fork.host.is_enabled() || fork.host.rig().is_switching() {
-            return fork.broken("enabled by a host that came back");
+            return fork.broken("enabled by a returned host");
         }
     }
 }
@@ -183,7 +183,7 @@ fn silent(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     }
     let (state, after_ms) = until_safe(&mut fork, &patience);
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
-    tells(&mut fork, state, [FaultCode::Heartbeat, FaultCode::LatePdo]);
+    check_report(&mut fork, state, [FaultCode::Heartbeat, FaultCode::LatePdo]);
     comes_back(&mut fork, speaks, patience.faults);
     let early = after_ms.is_some_and(|after| after <= 0.0);
     let in_time = after_ms.is_some_and(|after| after <= BUS_MS + 1e-9);
@@ -223,7 +223,7 @@ fn left(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     fork.run(lasts);
     fork.host.board().set_controller(Controller::Active, !blind);
-    tells(&mut fork, state, [FaultCode::BusPassive, FaultCode::BusOff]);
+    check_report(&mut fork, state, [FaultCode::BusPassive, FaultCode::BusOff]);
     comes_back(&mut fork, speaks, option == FAULT);
     let in_time = after_ms.is_some_and(|after| after <= fork.head.deadline_ms);
     let found = fork.ended(state, alarm);

@@ -1,7 +1,7 @@
 //! Rows that are not forks of an identification with complete drives: components alone, motors on a test
 //! stand, identifications with ideal drives.
 //!
-//! A run is judged by its outcome, and repeated by its row and its seed like any other.
+//! A run is judged by its outcome, and repeated by its row and its seed.
 
 mod calibration;
 mod command;
@@ -27,7 +27,7 @@ use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
 use crate::formats::leg_file::LegFile;
 
-/// Runs a bench for some seeds. If blind, the fault's detector is disabled as each bench states.
+/// Runs a bench for some seeds. If blind, the fault's detector is disabled as stated by each bench.
 pub type Runs = fn(&Head, &LegFile, &[u64], bool) -> Result<Vec<Outcome>, ToolError>;
 
 /// A row with its own bench.

@@ -4,7 +4,8 @@
 //! Each motor is calibrated on its test stand and driven back and forth. Its axis' inputs are then replayed
 //! to axes whose counter starts elsewhere, one for each offset. The motion is the same if commands and joint
 //! samples are equal bit for bit. Successive seeds start the counter one count farther from its wrap, odd
-//! seeds below and even ones above. So 65,536 seeds cover all offsets, and of the first hundreds every other
+//! seeds below and even ones above. So 65,536 seeds cover all offsets, and among the first hundreds every
+//! other counter wraps during the motion.
 //! one wraps during the motion.
 
 use core::f64::consts::TAU;
@@ -83,7 +84,7 @@ fn run(
 
 impl Driven {
     fn new(leg: &LegFile, index: usize) -> Result<Self, ToolError> {
-        let unfit = || leg.error("a motor for every joint that can be calibrated is needed");
+        let unfit = || leg.error("every joint needs a motor that can be calibrated");
         let drives = leg.complete_description::<JOINTS>()?;
         let joint = &leg.joints[index];
         let motor = joint.motor.as_ref().ok_or_else(unfit)?;
@@ -113,7 +114,7 @@ impl Driven {
             sample
         });
         if axis.fault().is_some() {
-            return Err(leg.error("its motor cannot be driven on a stand").into());
+            return Err(leg.error("its motor cannot be driven on the test stand").into());
         }
         Ok(Self { configuration, calibration, first, samples, commands, joint })
     }

@@ -34,8 +34,8 @@ const WIDENED: Radian = Radian(2.0);
 const SECOND: u64 = 4000;
 /// Largest share of the torque cap.
 const SHARE: f64 = 0.25;
-/// Largest speed outside the range, rad/s: the commanded 0.1 rad/s with the transient of taking over the
-/// weight.
+/// Largest speed outside the range, rad/s: the commanded 0.1 rad/s plus the transient while the drive takes
+/// the weight.
 const FASTEST: f64 = 0.3;
 /// Code of a refused step towards enabled.
 const REFUSED: u16 = NoticeCode::NotEnabled.number();
@@ -45,7 +45,7 @@ pub(super) const BENCH: Bench = Bench {
     head: Head {
         id: "J3",
         fault: "leg rests outside its range and is enabled",
-        detector: "bounds of the way back",
+        detector: "bounds of the return into the range",
         state: "Limit, Damp, Refuse",
         deadline_ms: f64::INFINITY,
         unit: "degrees",
@@ -66,7 +66,7 @@ fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
     base.begin()?;
     base.move_leg(leg)?;
     // A returning joint is driven outside its range.
-    let scope = Scope { torque: true, range: false, place: true };
+    let scope = Scope { torque: true, range: false, rotor_position: true };
     forked_within(head, leg, base, seeds, scope, |fork| one(fork, leg))
 }
 
@@ -131,7 +131,7 @@ fn begins(fork: &mut Fork<'_>) -> bool {
     fork.host.follow_places();
     fork.host.speaks = Speaks { targets: true, ..NOTHING };
     fork.run(40);
-    // A swinging leg is refused; the request is repeated.
+    // A swinging leg is refused, so the request is repeated.
     (0..8).any(|_| {
         let is_enabled = enable(fork);
         if !is_enabled {
@@ -141,7 +141,7 @@ fn begins(fork: &mut Fork<'_>) -> bool {
     })
 }
 
-/// The host's targets are the joints' angles: returns whether the joints return.
+/// Sets the host's targets to the joints' angles; returns whether the joints return.
 fn comes_back(fork: &mut Fork<'_>, leg: &LegFile, from: [f64; JOINTS]) -> bool {
     if !begins(fork) {
         return false;

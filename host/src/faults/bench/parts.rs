@@ -17,13 +17,13 @@ use crate::rig::board::BRAKE;
 pub(super) const BENCH: Bench = Bench {
     head: Head {
         id: "V3",
-        fault: "brake chopper set to nonsense, or shown a voltage that is none",
-        detector: "check when it is made; bounds of the duty",
+        fault: "brake chopper with implausible settings, or an invalid voltage",
+        detector: "check at construction; bounds of the duty",
         state: "Refuse",
         deadline_ms: f64::INFINITY,
         unit: "",
         codes: &[],
-        lacking: Some("a resistor that is absent: the bus rises until the axes release (V1)"),
+        lacking: Some("an absent resistor: the bus rises until the axes turn off (V1)"),
     },
     run: chop,
 };
@@ -34,7 +34,7 @@ fn chop(head: &Head, _: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outc
 
 /// Voltages given to the valid chopper in each run.
 const SHOWN: usize = 16;
-/// Values that are no voltage.
+/// Invalid voltages.
 const NONE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
 /// Blind: valid settings and a valid voltage are used instead, as if there were no check.

@@ -1,7 +1,7 @@
-//! I1: a search is cancelled at any step, meets a fault or the emergency stop, or returns invalid values. All
-//! previous parameters must remain.
+//! I1: a search is cancelled at any step, stopped by a fault or the emergency stop, or returns invalid
+//! values. All previous parameters must remain.
 //!
-//! One leg identifies itself twice; each run forks it at the start of the second search. Ideal drives.
+//! One leg identifies itself twice. Each run forks it at the start of the second search. Ideal drives.
 
 use rayon::prelude::*;
 use scarab::leg::{Activity, ControlRequest, IdentifiedModel, IdentifyPhase, Step};
@@ -21,13 +21,13 @@ use crate::rig::pair::{Context, Pair};
 const BASE: usize = 13;
 /// Longest identification, servo ticks.
 const LONGEST: u64 = 300 * 4000;
-/// Servo ticks for which a leg is watched after its search: half a second.
+/// Servo ticks for which a leg is observed after its search: half a second.
 const AFTERWARDS: u64 = 2000;
 
 pub(super) const BENCH: Bench = Bench {
     head: Head {
         id: "I1",
-        fault: "search cancelled, stopped by a fault or the emergency stop, or its result is nonsense",
+        fault: "search cancelled, stopped by a fault or the emergency stop, or with an invalid result",
         detector: "cancelled between two candidates; verdict",
         state: "old parameters stay",
         deadline_ms: f64::INFINITY,
@@ -67,7 +67,7 @@ impl Searching {
         let mut pair = Pair::new(leg, &context, 1)?;
         let gravity = context.gravity;
         if !pair.enable(gravity) {
-            return Err(refused("the drive refuses to be enabled"));
+            return Err(refused("the drive cannot be enabled"));
         }
         go(&mut pair, gravity, |pair| phase(pair).is_none());
         let old = *pair.leg.control().model().ok_or_else(|| refused("its identification is refused"))?;
@@ -79,7 +79,7 @@ impl Searching {
             ticks += 1;
         }
         if phase(&ahead).is_none() {
-            return Err(refused("its second identification does not come to a search"));
+            return Err(refused("its second identification does not reach the search"));
         }
         Ok(Self { pair, old, ticks, gravity })
     }
@@ -136,7 +136,7 @@ fn one(head: &Head, searching: &Searching, seed: u64, blind: bool) -> Outcome {
     let mut found = outcome(head, seed, kept.then_some("old parameters stay"));
     found.magnitude = Some(at as f64);
     if !kept {
-        found.broken.push("parameters changed without a verdict that accepts them".into());
+        found.broken.push("parameters changed without an accepting verdict".into());
     }
     found
 }

@@ -4,10 +4,10 @@
 //! below 100 ms) and 6007 (1 or 3). First the host pauses three times for less than 95 ms: no fault may be
 //! reported.
 //!
-//! In a quarter of the runs it then stops either SYNC and targets or its controlwords, and continues the
-//! other. Again no fault may be reported, and the run counts as undetectable. In the other runs it stops
-//! completely. Its timeout is 100 ms after the last frame that a node received. Then as B1: damped, reported
-//! within 10 ms, and not enabled by a host that returns.
+//! In a quarter of the runs the host then stops either SYNC and targets or its controlwords, and continues
+//! the other. Again no fault may be reported, and the run counts as undetectable. In the other runs it stops
+//! completely. Its timeout is 100 ms after the last frame that a node received. The requirements are those of
+//! B1: damped, reported within 10 ms, and not enabled by a host that returns.
 
 use scarab::safety::FaultCode;
 
@@ -37,7 +37,7 @@ pub(super) const BENCH: Bench = Bench {
         detector: "cycles of SYNC, received PDOs and controlword",
         state: "Damp",
         deadline_ms: BUS_MS,
-        unit: "ms of its cycle",
+        unit: "ms of the host's cycle",
         codes: &[FaultCode::HostSilent],
         lacking: None,
     },
@@ -92,7 +92,7 @@ fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     fork.run(TOLD);
     let silent = FaultCode::HostSilent.number();
     if state.is_some() && !fork.host.told().iter().any(|(_, code)| *code == silent) {
-        fork.broken("no emergency message tells of it");
+        fork.broken("no emergency message reports it");
     }
     comes_back(&mut fork, speaks, option == 1);
     let early = after_ms.is_some_and(|after| after <= 0.0);

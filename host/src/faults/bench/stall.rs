@@ -12,7 +12,7 @@
 //! | a sector erased | 1 to 2 s more for each | no zeros: enabling requires a new reference |
 //!
 //! Neither is a fault: nothing is reported, and the watchdog does not reset. Hosts receive FF0D before and
-//! 0000 after the write. If they went on sending, they also receive the loss of frames (8110, 0000). The
+//! 0000 after the write. Hosts that continue to send also receive the loss of frames (8110, 0000). The
 //! requested data is stored.
 
 use scarab::leg::DriveState;
@@ -113,7 +113,7 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     });
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let calm = alarm.is_none() && !fork.host.rig().is_restarted();
-    // The leg is commanded to stay, which takes some cycles to send.
+    // The leg is commanded to keep its position, which takes some cycles to send.
     fork.host.speaks.targets = true;
     fork.run(ASKED);
     for word in [6, 7, 15] {

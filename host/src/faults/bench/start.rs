@@ -23,7 +23,7 @@ use crate::rig::pair::Context;
 
 /// Periods until the switch is closed; the low-pass of 2.7 ms has settled by then.
 const RELEASED: u64 = PERIODS_PER_S / 10;
-/// Periods until the drive has to be enabled, with some time to spare.
+/// Periods until the drive must be enabled, with a margin.
 const ENABLED: u64 = PERIODS_PER_S / 2;
 /// Detectable offset of one shunt, A: 2 A of the vector, plus 10 % for calibration and low-pass.
 const SEEN_A: f64 = 1.1 * 2.0 * 0.866;
@@ -31,8 +31,8 @@ const SEEN_A: f64 = 1.1 * 2.0 * 0.866;
 pub(super) const ZEROS: Bench = Bench {
     head: Head {
         id: "C1",
-        fault: "current offset while the bridges are released",
-        detector: "zero window when arming",
+        fault: "current offset while the bridges are off",
+        detector: "offset limit at enabling",
         state: "Refuse / Off",
         deadline_ms: 10.0,
         unit: "A",

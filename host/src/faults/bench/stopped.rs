@@ -3,7 +3,7 @@
 //!
 //! | where | machine | requirement |
 //! | --- | --- | --- |
-//! | boot, to the start of an identification | whole board, operator goes on | off in the tick, not enabled |
+//! | boot, to the start of an identification | whole board, operator continues | off in the tick, not enabled |
 //! | calibration | motor on a test stand, tick checks | off in the tick, calibration ended without result |
 
 use core::f64::consts::TAU;
@@ -56,7 +56,7 @@ fn stop(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Ou
     let length = calibrated(leg, 0, 1, None, false)?.0;
     let run = |seed: &u64| {
         let mut random = Random::new("X1 at rest", *seed);
-        // Only even seeds reach this bench, because the odd ones are forks.
+        // Only even seeds reach this bench; the odd ones are forks.
         if random.coin() {
             Ok(boot(head, leg, &ready, *seed, &mut random, blind))
         } else {
@@ -84,7 +84,7 @@ fn boot(
     let pressed = begin + random.below(BOOTED) * random.below(1000).min(1);
     let lasting = 1 + random.below(PERIODS_PER_S / 100);
     rig.injector.add(at(Channel::EmergencyStop, 0, Form::Off, Timing::lasting(pressed, lasting)));
-    let mut invariants = Invariants::new(leg, Scope { torque: true, range: true, place: true }, &rig);
+    let mut invariants = Invariants::new(leg, Scope { torque: true, range: true, rotor_position: true }, &rig);
     let (mut seen, mut came_back) = (None, false);
     for since in 0..BOOTED + CLOSED {
         rig.hand.start = rig.state() == DriveState::OperationEnabled && since >= PRESSED;
@@ -127,7 +127,7 @@ fn calibration(
     found.after_ms = released.then(|| (ticks - pressed) as f64 * PERIOD_MS);
     found.period = pressed;
     found.alarm = released.then(|| FaultCode::EmergencyStop.name());
-    // The calibration was over before the contact opened.
+    // The calibration ended before the contact opened.
     found.undetectable = !released && ticks <= pressed && !blind;
     Ok(found)
 }
@@ -141,7 +141,7 @@ fn calibrated(
     pressed: Option<u64>,
     blind: bool,
 ) -> Result<(u64, bool), ToolError> {
-    let unfit = || leg.error("a motor for every joint that can be calibrated is needed");
+    let unfit = || leg.error("every joint needs a motor that can be calibrated");
     let drives = leg.complete_description::<JOINTS>()?;
     let joint = &leg.joints[index];
     let motor = joint.motor.as_ref().ok_or_else(unfit)?;

@@ -19,7 +19,7 @@ pub static ROWS: [Row; 2] = [
         codes: &[FaultCode::GateConfiguration],
         deadline_ms: 10.0,
         unit: "",
-        lacking: Some("registers that are upset and right again between two looks"),
+        lacking: Some("registers that change and recover between two checks"),
         draw: registers,
     },
     Row {

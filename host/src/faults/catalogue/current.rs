@@ -24,7 +24,7 @@ pub static ROWS: [Row; 3] = [
     Row {
         id: "C3",
         fault: "conversion stuck or missing",
-        detector: "same code while another current is asked for; ends of conversion, of shunts and of the supply's",
+        detector: "constant code while the requested current changes; end-of-conversion flags of shunts and supply",
         state: "Off",
         codes: &[FaultCode::Conversion, FaultCode::StuckConversion, FaultCode::CurrentZero],
         // Limit for a stuck conversion; a missing one is detected in its own tick.

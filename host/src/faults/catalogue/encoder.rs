@@ -13,7 +13,7 @@ pub static ROWS: [Row; 2] = [
     Row {
         id: "E2",
         fault: "wrong reading of an encoder, one or three in 10 ms",
-        detector: "greatest step per tick: the duties of the tick before are kept; three in 10 ms in the servo",
+        detector: "largest step per tick: the previous duties stay; three in 10 ms in the servo",
         state: "Limit, Damp",
         codes: &[FaultCode::EncoderStep],
         // Limit: the servo's next tick.
@@ -24,8 +24,8 @@ pub static ROWS: [Row; 2] = [
     },
     Row {
         id: "E4",
-        fault: "lost counts, no index; a single wrong index pulse is none",
-        detector: "two index pulses at one wrong place, two turns without a right one; greatest step",
+        fault: "lost counts, missing index; a single wrong index pulse is no fault",
+        detector: "two index pulses at one wrong position, two turns without a right one; largest step",
         state: "Damp",
         codes: &[FaultCode::EncoderPlace],
         deadline_ms: f64::INFINITY,
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_that_begins_after_the_run_is_not_missed() {
+    fn a_fault_that_begins_after_the_run_does_not_count_as_missed() {
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
         let [.., mut moving] = machines(&leg);
         let speed = |rig: &Rig<JOINTS, BASE>| rig.world.velocity()[0].abs();

@@ -19,7 +19,7 @@ pub static ROWS: [Row; 2] = [
         deadline_ms: f64::INFINITY,
         unit: "N m",
         lacking: Some(
-            "pushes above half of the torque cap, against which no drive that is capped can stop a joint",
+            "pushes above half of the torque cap, which no torque-limited drive can stop",
         ),
         draw: pushed,
     },
@@ -36,8 +36,7 @@ pub static ROWS: [Row; 2] = [
     },
 ];
 
-/// J1: a push towards either end of the range, not stronger than the torque that the leg's weight leaves to
-/// the drive.
+/// J1: a push towards either end of the range, limited to the drive's torque left beside the leg's weight.
 fn pushed(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let peak = random.logarithmic(10.0, 70.0);

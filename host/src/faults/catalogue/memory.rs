@@ -1,4 +1,4 @@
-//! Values that change in memory by themselves.
+//! Values changed by bit flips in memory.
 
 use scarab::motor::Axis;
 use scarab::safety::FaultCode;
@@ -13,12 +13,12 @@ use crate::rig::faulty_board::PERIODS_PER_S;
 pub static ROWS: [Row; 1] = [Row {
     id: "M2",
     fault: "a bit flips in gains or limits of an axis or the servo",
-    detector: "sum over them, every 64 ms",
+    detector: "checksum over them, every 64 ms",
     state: "Damp",
     codes: &[FaultCode::Parameters],
     deadline_ms: 100.0,
     unit: "",
-    lacking: Some("motions, models and filters, which are not summed up"),
+    lacking: Some("motions, models and filters, which the checksum does not cover"),
     draw: upset,
 }];
 

@@ -1,7 +1,7 @@
 //! Faults that the voltages of an axis show: a frozen counter, drifted current-sensor offsets, open phases.
 //!
 //! These faults are detectable in motion only ([`Onset::Driven`]). A run in which the joint does not turn for
-//! the whole deadline shows nothing.
+//! the whole deadline proves nothing.
 
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab::safety::FaultCode;
@@ -16,13 +16,13 @@ pub static ROWS: [Row; 3] = [
     Row {
         id: "E1",
         fault: "encoder frozen while moving",
-        detector: "back-EMF against counts, or counts that stand still while the current changes by half of its limit; 8 and 16 ms",
+        detector: "back-EMF against counts, or constant counts while the current changes by half of its limit; 8 and 16 ms",
         state: "Short",
         codes: &[FaultCode::EncoderFrozen],
         deadline_ms: 20.0,
         unit: "",
         lacking: Some(
-            "slower than back-EMF outweighs dead time and resistance, while the current changes by less than half of its limit",
+            "so slow that dead time and resistance hide the back-EMF, while the current changes by less than half of its limit",
         ),
         draw: frozen,
     },
@@ -34,7 +34,7 @@ pub static ROWS: [Row; 3] = [
         codes: &[FaultCode::CurrentZero, FaultCode::OpenPhase, FaultCode::Overcurrent],
         deadline_ms: 50.0,
         unit: "A",
-        lacking: Some("small offsets while the joint moves; below 2 A of the vector when arming"),
+        lacking: Some("small offsets while the joint moves; below 2 A of the vector at enabling"),
         draw: drift,
     },
     Row {
@@ -50,12 +50,12 @@ pub static ROWS: [Row; 3] = [
         ],
         deadline_ms: 50.0,
         unit: "",
-        lacking: Some("while nothing is asked of the motor"),
+        lacking: Some("without a current target"),
         draw: open_phase,
     },
 ];
 
-/// Time within which a joint has to turn, and to keep turning.
+/// Time within which a joint must turn, and for which it must keep turning.
 const PATIENCE: u64 = PERIODS_PER_S / 2;
 
 /// E1: counter and index of a failed sensor.

@@ -12,12 +12,12 @@ use crate::rig::faulty_board::PERIOD_MS;
 pub static ROWS: [Row; 1] = [Row {
     id: "N1",
     fault: "NaN or infinity in a sample, a target or the modulation",
-    detector: "borders of the servo and of the axis",
+    detector: "checks at the inputs of servo and axis",
     state: "Off",
     codes: &[FaultCode::NotFinite],
     deadline_ms: PERIOD_MS,
     unit: "",
-    lacking: Some("fitness, which no port reaches (I1)"),
+    lacking: Some("cost of the search, which no port reaches (I1)"),
     draw: not_finite,
 }];
 

@@ -23,7 +23,7 @@ pub static ROWS: [Row; 2] = [
     },
     Row {
         id: "X2",
-        fault: "bouncing emergency stop, released, hands at the contacts",
+        fault: "bouncing emergency stop, closed again, other contacts operated",
         detector: "latch; operator's edges",
         state: "Off",
         codes: &[FaultCode::EmergencyStop],

@@ -24,7 +24,7 @@ pub static ROWS: [Row; 2] = [
     Row {
         id: "V2",
         fault: "undervoltage: reading, or the supply cut",
-        detector: "a fifth lost against the mean of a second, 1 ms: Damp; the lower border in each tick, twice: Off",
+        detector: "a fifth lost against the mean of a second, 1 ms: Damp; the lower limit in each tick, twice: Off",
         state: "Damp if there is energy, else Off",
         codes: &[FaultCode::BusVoltage, FaultCode::SupplyLost],
         deadline_ms: 1.0,

@@ -34,7 +34,7 @@ const HUNG: Row = Row {
     // 4 ms until the next check, and 512 cycles of an oscillator of 17 kHz.
     deadline_ms: 4.0 + 512.0 / 17.0 + PERIOD_MS,
     unit: "",
-    lacking: Some("a hang of the task that feeds, which is seen as well but not run here"),
+    lacking: Some("a hang of the task that feeds the watchdog: also detected, but not run here"),
     draw: hang,
 };
 

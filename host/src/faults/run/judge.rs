@@ -23,7 +23,7 @@ impl<const B: usize> Watched<'_, B> {
 
     /// Returns whether a push alone may cause this code; other codes report a healthy part as broken. A kick
     /// that holds the other joint while its torque grows looks like a frozen counter.
-    pub(super) fn tells_of_a_push(&self, code: FaultCode) -> bool {
+    pub(super) fn is_caused_by_a_push(&self, code: FaultCode) -> bool {
         use FaultCode as Code;
         match code {
             Code::PositionLimit

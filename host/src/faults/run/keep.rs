@@ -6,11 +6,11 @@ use scarab::safety::FaultCode;
 use crate::faults::run::{Outcome, Watched};
 use crate::rig::faulty_board::PERIOD_MS;
 
-/// Factor of the cap above which a torque counts as beyond it: offsets and gains of the shunts, and ripple.
+/// Factor of the cap from which a torque counts as above it: offsets and gains of the shunts, and ripple.
 const BEYOND: f64 = 1.05;
 
 impl<const B: usize> Watched<'_, B> {
-    /// Runs a push to its end and checks the limits. Where the row has a deadline, the time is the longest
+    /// Runs a push to its end and checks the limits. In a row with a deadline, the time is the longest
     /// uninterrupted one in which a motor made more than 1.05 times its cap.
     pub(super) fn keep(mut self) -> Outcome {
         let limit = self.begun + self.scenario.patience;
@@ -52,7 +52,8 @@ impl<const B: usize> Watched<'_, B> {
         }
     }
 
-    /// Runs noise and compares with a twin without it, bit for bit. Any difference is a false alarm.
+    /// Runs noise and compares with an identical run without it, bit for bit. Any difference is a false
+    /// alarm.
     pub(super) fn ignore(mut self) -> Outcome {
         let mut twin = self.rig.clone();
         twin.injector = Injector::new(self.seed);
@@ -81,7 +82,7 @@ impl<const B: usize> Watched<'_, B> {
         }
     }
 
-    /// Returns whether a motor's torque is beyond its joint's cap.
+    /// Returns whether a motor's torque is above its joint's cap.
     fn is_beyond_cap(&self) -> bool {
         let torque = self.rig.world.motor_torque();
         let limits = self.rig.leg.control().limits().joints();

@@ -1,14 +1,14 @@
-//! Most likely cause of a refusal, from refits with one thing corrected.
+//! Most likely cause of a refusal, from fits repeated with one error corrected.
 //!
 //! ```text
 //! remaining     misfit of the refit over the torque, root mean square over the joints
-//! sound         nothing negative by more than 5 sigma that cannot be; torque of the prior's sign and size
+//! plausible     no parameter negative by more than 5 sigma that must be positive; torque of the prior's sign and size
 //! ```
 //!
-//! Ranked: samples; then the correction that is sound and leaves least of the misfit. Where the recording as
-//! it is leads to no sound leg, a correction has to restore that; otherwise it has to halve the misfit's
-//! power, or be a direction that refuses. Another leg is named only where a link's length or a zero asks for
-//! it.
+//! Ranking: findings about samples first, then the plausible correction that leaves least of the misfit.
+//! Where the uncorrected fit is not plausible, a correction must make it so. Otherwise the correction must
+//! halve the misfit's power, or be a direction that refuses. Another leg is named only where a link's length
+//! or a zero is significant.
 
 use crate::base::number::Number;
 use crate::report::doubt::{CauseReport, DirectionReport, SampleFinding};
@@ -24,11 +24,11 @@ use crate::run::doubt::{Doubts, Question, midway_words, sample_cause};
 const NEGATIVE_SIGMA: f64 = 5.0;
 /// Ratio of a joint's torque to the prior's, beyond which its unit is wrong.
 const PLAUSIBLE_RATIO: f64 = 30.0;
-/// Part of the misfit that a correction may leave where the recording as it is is sound.
+/// Part of the misfit that a correction may leave where the uncorrected fit is plausible.
 const HALVED: f64 = 0.7;
-/// Significance of a direction that is named where nothing else is.
+/// Significance of a direction that is named where no other cause is found.
 const WEAKER: f64 = 3.0;
-/// Misfits closer than this are equal: the simpler correction is named.
+/// Misfits closer than this ratio count as equal: the simpler correction is named.
 const EQUAL: f64 = 1.1;
 
 /// Change of the angles and torques of one instant.
@@ -42,18 +42,18 @@ struct Correction<const N: usize> {
     apply: Change<N>,
 }
 
-/// How good a fit is.
+/// Quality of a fit.
 #[derive(Clone, Copy, Debug)]
 struct Quality {
     remaining: f64,
     sound: bool,
 }
 
-/// A cause that was tried.
+/// A corrected error with its fit.
 struct Tried {
     cause: CauseReport,
     quality: Quality,
-    /// Whether the same error of another joint looks alike.
+    /// Whether the same error of another joint cannot be distinguished.
     is_shared: bool,
 }
 
@@ -72,8 +72,8 @@ pub fn likely<const N: usize, const B: usize>(
     if let Some(cause) = encoder_steps(question, doubts, findings) {
         return cause;
     }
-    // Damage looks like friction at rest and like columns without effect: neither is taken from the refused
-    // fit.
+    // Damage resembles friction at rest and columns without effect: the refused fit's choice of both is not
+    // used.
     let plain = question.with_all_columns();
     let again = plain.as_ref().and_then(|plain| Doubts::of(plain).ok().flatten());
     let (question, doubts) = match (&plain, &again) {
@@ -82,7 +82,7 @@ pub fn likely<const N: usize, const B: usize>(
     };
     let here = quality(question, &doubts.equations);
     let mut tried = refits(question);
-    // Before the delays, because a low-pass is tried only where it is clearer than a delay.
+    // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
     let lags = lag::all(&doubts.equations).into_iter().filter(|lag| lag.significance > CHANCE);
     tried.extend(lags.map(|lag| of_lag(question, doubts, lag, here)));
     for (found, report) in doubts.found.iter().zip(&doubts.directions) {
@@ -128,8 +128,8 @@ pub fn likely<const N: usize, const B: usize>(
     }
 }
 
-/// Steps of the encoders as the cause: where nothing else refuses, or where everything is right at a lower
-/// bandwidth.
+/// Encoder steps as the cause: where nothing else refuses, or where a lower bandwidth makes the recording
+/// acceptable.
 fn encoder_steps<const N: usize, const B: usize>(
     question: &Question<N, B>,
     doubts: &Doubts<N, B>,
@@ -153,7 +153,7 @@ fn encoder_steps<const N: usize, const B: usize>(
             return None;
         }
         format!(
-            "encoder too coarse at this bandwidth: with `--bandwidth {hz}` nothing speaks against the recording"
+            "encoder too coarse at this bandwidth: with `--bandwidth {hz}` the recording is accepted"
         )
     };
     let (joint, share) = bias.largest_share();
@@ -166,8 +166,8 @@ fn encoder_steps<const N: usize, const B: usize>(
     })
 }
 
-/// A joint, or all, whose angle is in degrees: it spans more than two turns, and taken as degrees it leaves
-/// less than half of the misfit and a possible leg.
+/// A joint, or all, whose angle is in degrees. It spans more than two turns; read as degrees it leaves less
+/// than half of the misfit and a plausible leg.
 #[must_use]
 pub fn in_degrees<const N: usize, const B: usize>(
     question: &Question<N, B>,
@@ -183,7 +183,7 @@ pub fn in_degrees<const N: usize, const B: usize>(
     )
 }
 
-/// The cause that leaves least; of nearly equal ones the simpler, and of one name the better.
+/// Cause that leaves least of the misfit; of nearly equal ones the simpler, of one name the better.
 fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
     let least = passing.iter().map(|tried| tried.quality.remaining).fold(f64::INFINITY, f64::min);
     passing.retain(|tried| tried.quality.remaining <= EQUAL * least);
@@ -196,7 +196,7 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
     Some(best.cause)
 }
 
-/// A direction that is not certain enough to refuse by itself, after something else refused.
+/// Direction that is not significant enough to refuse by itself, named after another refusal.
 fn weaker<const N: usize, const B: usize>(
     question: &Question<N, B>,
     doubts: &Doubts<N, B>,
@@ -222,13 +222,13 @@ fn unknown() -> CauseReport {
         joint: None,
         value: Number::UNKNOWN,
         sigma: Number::UNKNOWN,
-        words: "no single correction of units, signs, columns, delay, scale or gravity makes it acceptable"
+        words: "no single correction of units, signs, columns, delay, scale or gravity makes the recording acceptable"
             .into(),
     }
 }
 
 fn is_refusing<const N: usize, const B: usize>(doubts: &Doubts<N, B>, cause: &CauseReport) -> bool {
-    // A low-pass, or a delay of all joints, is one of the delays that refused.
+    // A low-pass, or a delay of all joints, belongs to the delays that refused.
     let is_lag = cause.name == "torque_filter" || (cause.name == "delay" && cause.joint.is_none());
     cause.name == "changed_midway"
         || doubts.directions.iter().filter(|report| !report.passed).any(|report| {
@@ -368,7 +368,7 @@ fn corrections<const N: usize>() -> Vec<Correction<N>> {
         all.push(Correction {
             name: "angle_unit",
             joint,
-            words: format!("angle of {} taken as degrees", who(joint)),
+            words: format!("angle of {} read as degrees", who(joint)),
             apply: Box::new(move |angles, _| {
                 let each = angles.iter_mut().enumerate();
                 each.filter(|(at, _)| chosen(joint, *at)).for_each(|(_, angle)| *angle = angle.to_radians());
@@ -443,7 +443,7 @@ fn quality<const N: usize, const B: usize>(
     }
 }
 
-/// Whether nothing is negative that cannot be.
+/// Whether every parameter that must be positive is so within 5 sigma.
 fn is_sound<const N: usize, const B: usize>(
     question: &Question<N, B>,
     values: &[f64; B],

@@ -1,4 +1,4 @@
-//! Directions of doubt: errors of a logging chain that a rigid-body model can see, each fitted beside the
+//! Errors of a logging chain along which a recording can be wrong ("directions"), each fitted beside the
 //! parameters.
 //!
 //! ```text
@@ -10,8 +10,8 @@
 //!
 //! Each is a nonlinear least-squares problem in d and p, solved by Gauss-Newton with p eliminated (Golub and
 //! Pereyra 1973). A delay starts from the best of a scan, because its cost is not convex beyond a quarter of
-//! a period; gravity from the best of 24 directions. The column of a delay is the slope of the *predicted*
-//! torque: the slope of the measured one holds noise, which would count as information.
+//! a period; gravity starts from the best of 24 directions. The column of a delay is the slope of the
+//! *predicted* torque. The slope of the measured torque contains noise, which would count as information.
 //!
 //! A direction refuses when all of these hold:
 //!
@@ -21,9 +21,9 @@
 //! gain > 0.1 x misfit                 x = 1 - noise^2 / misfit^2, at least 0.02
 //! ```
 //!
-//! The third keeps a machine whose misfit is mostly something else, as a real one's is. A torque scale common
-//! to all joints is invisible without a known mass. In the plane gravity's direction and the zero of joint 1
-//! are one.
+//! The third condition accepts a real machine, whose misfit has mostly other causes. A torque scale common to
+//! all joints is invisible without a known mass. In the plane gravity's direction and the zero of joint 1 are
+//! the same direction.
 
 use std::borrow::Cow;
 
@@ -33,19 +33,19 @@ use scarab::ident::{RowModel, Smoothed};
 use crate::run::doubt::fit::{Fit, Score, score};
 use crate::run::doubt::rows::Equations;
 
-/// Standard deviations that chance exceeds once in ten million.
+/// Standard deviations that chance exceeds once in ten million tests.
 pub const CHANCE: f64 = 5.2;
 /// Shift of a parameter that is tolerated, in its sigma.
 pub const TOLERATED_SHIFT: f64 = 2.0;
-/// Share of the misfit that a direction has to explain where nothing of it is noise.
+/// Share of the misfit that a direction must explain where none of it is noise.
 pub const EXPLAINED_SHARE: f64 = 0.1;
-/// Part of the misfit that is never noise, however well the model fits: in hours of motion any small error is
-/// certain.
+/// Part of the misfit that is never noise, however well the model fits: over hours of motion any small error
+/// becomes significant.
 pub const SMALLEST_SYSTEMATIC: f64 = 0.02;
-/// Correlation of two columns from which both are called alike.
+/// Correlation of two columns from which they count as indistinguishable.
 const ALIKE: f64 = 0.95;
-/// Share of a column that the parameters must leave. Rounding leaves 1e-12 of an absorbed one; gravity of a
-/// slow leg 6e-6.
+/// Share of a column that the parameters must leave. Rounding leaves 1e-12 of an absorbed column; gravity of
+/// a slow leg leaves 6e-6.
 const SEEN_SHARE: f64 = 1e-8;
 /// Range and step of a delay's scan, s.
 const SCAN_S: (f64, f64, f64) = (-0.040, 0.080, 0.004);
@@ -54,7 +54,7 @@ const GRAVITY_SCAN: usize = 24;
 /// Steps of Gauss-Newton.
 const STEPS: usize = 8;
 
-/// What may be wrong.
+/// Possible error of the logging chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Torque of a joint against its angle.
@@ -128,7 +128,7 @@ impl Kind {
 /// One direction with the parameters fitted beside it.
 #[derive(Clone, Debug)]
 pub struct Found<const B: usize> {
-    /// What may be wrong.
+    /// Kind of error.
     pub kind: Kind,
     /// Value, SI.
     pub value: f64,
@@ -136,13 +136,13 @@ pub struct Found<const B: usize> {
     pub noise_sigma: f64,
     /// Standard deviation by the scatter of the segments.
     pub segment_sigma: f64,
-    /// Whether the motion shows it at all.
+    /// Whether the motion determines it at all.
     pub seen: bool,
-    /// Cost without and with it.
+    /// Cost without and with the direction.
     pub cost: (f64, f64),
-    /// Parameters of the motion identified from, with it minus without it.
+    /// Parameters of the training motion, with the direction minus without it.
     pub shift: [f64; B],
-    /// All parameters with it.
+    /// All parameters with the direction.
     pub values: [f64; B],
     /// Directions that cannot be distinguished from this one.
     pub alike: Vec<String>,
@@ -162,13 +162,14 @@ impl<const B: usize> Found<B> {
         if self.seen { self.value.abs() / self.sigma() } else { 0.0 }
     }
 
-    /// Share of the misfit that it explains.
+    /// Share of the misfit that the direction explains.
     #[must_use]
     pub fn explained(&self) -> f64 {
         if self.seen { ((self.cost.0 - self.cost.1) / self.cost.0).max(0.0) } else { 0.0 }
     }
 
-    /// Variance that the doubt adds to each parameter: the shift, as far as the direction is not chance.
+    /// Variance that a possible error adds to each parameter: the shift, reduced by the part that chance
+    /// explains.
     #[must_use]
     pub fn variance(&self) -> [f64; B] {
         let certain = (1.0 - (2.0 / self.significance().max(1e-9)).powi(2)).max(0.0);
@@ -178,7 +179,7 @@ impl<const B: usize> Found<B> {
 
 /// Joint's zero in chain angles, and its torques.
 pub struct Directions<'a, const N: usize, const B: usize> {
-    /// Rows.
+    /// Filtered rows.
     pub equations: &'a Equations<N, B>,
     /// Chain angle of each joint's zero, rad.
     pub zero: [f64; N],
@@ -189,7 +190,7 @@ pub struct Directions<'a, const N: usize, const B: usize> {
 type System<'a, const B: usize> = (Cow<'a, [[f64; B]]>, Cow<'a, [f64]>);
 
 impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
-    /// Every direction, with those that cannot be distinguished from it.
+    /// Fits every direction and lists those that cannot be distinguished from it.
     #[must_use]
     pub fn all(&self) -> Vec<Found<B>> {
         let plain = self.equations.fit(&self.equations.columns, &self.equations.torque, false);

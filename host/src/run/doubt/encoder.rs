@@ -1,10 +1,10 @@
 //! Bias of the parameters by the steps of an encoder.
 //!
-//! Why: an angle in steps has noise in its acceleration, and least squares makes inertias too small by it
-//! (errors in variables). The noise is no white noise: it lies in the rows' band where a joint is slow,
-//! beside the reversals. So it is not computed but repeated: the smoothed motion is read once more by an
-//! encoder with the same steps, and the shift of the parameters is the bias of the first reading (Cook and
-//! Stefanski 1994, simulation and extrapolation, with one repetition).
+//! Why: an angle in steps has noise in its acceleration, which makes inertias too small in least squares
+//! (errors in variables). The noise is not white: where a joint is slow, beside the reversals, it lies in the
+//! rows' band. So the noise is not computed but repeated: an encoder with the same steps reads the smoothed
+//! motion once more. The shift of the parameters is the bias of the first reading (simulation and
+//! extrapolation, Cook and Stefanski 1994, with one repetition).
 //!
 //! ```text
 //! q_s, tau_s = Y(q_s) p        smoothed motion, and the torque that the fitted parameters predict for it
@@ -14,9 +14,9 @@
 //! ```
 //!
 //! Both fits have the weights of the joints and the resampling of the recording. Cost: five times the rows of
-//! a recording. Known limits: where a servo answers to the steps they are part of the motion. The torque
-//! error of one arm in twenty with such a servo was twice what is found here, of the others as large
-//! (`scripts/plant_coverage --coarse`, 12 bits, 8 Hz).
+//! a recording. Known limits: where a servo reacts to the steps, they are part of the motion. For one arm in
+//! twenty with such a servo the torque error was twice the predicted one, for the others as large as
+//! predicted (`scripts/plant_coverage --coarse`, 12 bits, 8 Hz).
 
 use std::path::PathBuf;
 
@@ -33,28 +33,28 @@ use crate::run::resample::Resampled;
 
 /// Share of the changes of a column that must be whole steps.
 const WHOLE_STEPS: f64 = 0.95;
-/// Largest deviation from a whole step, share of a step.
+/// Largest deviation from a whole step, as a share of a step.
 const EXACT: f64 = 0.05;
-/// Changes below this number of steps are counted, and how many there have to be.
+/// Changes below this number of steps are counted, and the least number of them.
 const SMALL_CHANGE: f64 = 20.0;
 const FEWEST: usize = 20;
 /// Readings of 4 kHz in one sample of the firmware's log.
 const READINGS: usize = 8;
 /// Positions of the counts under the motion.
 const PHASES: usize = 4;
-/// Acceleration noise over the motion's, in power, below which the steps cannot matter. White noise of a
+/// Acceleration noise over the motion's, in power, below which the steps are negligible. White noise of a
 /// twelfth of the squared step has this power; slow stretches have up to ten times more.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Largest error of a joint's predicted torque by the steps, share of its rms: of the parameters' bias and of
-/// the steps in the motion that is predicted from.
+/// Largest error of a joint's predicted torque by the steps, as a share of its rms. Sources: the parameters'
+/// bias, and steps in the motion from which the torque is predicted.
 pub const LARGEST_SHARE: f64 = 0.03;
 /// Largest noise of the steps in an inertial column, as a share of its power. An inertia is too small by this
-/// share; where it is small already, the second reading shows less.
+/// share; once it is small, the second reading shows less.
 pub const LARGEST_NOISE: f64 = 0.1;
 /// Bandwidths to choose from, Hz.
 pub const BANDWIDTHS_HZ: [f64; 8] = [16.0, 12.5, 10.0, 8.0, 6.3, 5.0, 4.0, 3.2];
 
-/// How an angle was read.
+/// How an angle was read: step and averaging.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encoder {
     /// Angle of one count, rad.
@@ -65,13 +65,14 @@ pub struct Encoder {
 
 impl Encoder {
     /// Encoder of a column of angles; `None` for a continuous one. `described_rad` is the step by the leg
-    /// file, which tells a mean of readings from finer counts.
+    /// file, which distinguishes a mean of readings from finer counts.
     #[must_use]
     pub fn of(angle: &[f64], described_rad: f64) -> Option<Self> {
         let mut changes: Vec<f64> =
             angle.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|&change| change > 1e-12).collect();
         changes.sort_by(f64::total_cmp);
-        // The smallest change is one step, unless a few samples were replaced by others between the counts.
+        // The smallest change is one step, unless the outlier filter replaced a few samples by values between
+        // the counts.
         let step_rad = [1000, 200, 50].iter().find_map(|part| step(&changes, changes.len() / part))?;
         let is_mean = (READINGS as f64 * step_rad / described_rad - 1.0).abs() < EXACT;
         Some(if is_mean {
@@ -94,7 +95,7 @@ impl Encoder {
     }
 }
 
-/// How the angles of recordings were read.
+/// Encoders of the recordings' angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encoders<const N: usize> {
     /// Encoder of each joint; `None` where the angle is continuous.
@@ -115,7 +116,7 @@ pub struct Bias<const N: usize, const B: usize> {
 }
 
 impl<const N: usize, const B: usize> Bias<N, B> {
-    /// Joint whose torque is moved most, and by what share.
+    /// Joint with the largest torque error, and that error as a share.
     #[must_use]
     pub fn largest_share(&self) -> (usize, f64) {
         largest(&self.torque_share)
@@ -127,13 +128,13 @@ impl<const N: usize, const B: usize> Bias<N, B> {
         largest(&self.column_noise)
     }
 
-    /// Whether the bias is so large that the second reading no longer shows it.
+    /// Whether the bias is too large for the second reading to show it.
     #[must_use]
     pub fn is_beyond(&self) -> bool {
         self.largest_noise().1 > LARGEST_NOISE
     }
 
-    /// Whether the recording must be refused.
+    /// Whether the bias refuses the recording.
     #[must_use]
     pub fn refuses(&self) -> bool {
         self.is_beyond() || self.largest_share().1 > LARGEST_SHARE
@@ -142,8 +143,8 @@ impl<const N: usize, const B: usize> Bias<N, B> {
 
 impl<const N: usize> Encoders<N> {
     /// Describes the encoders to a model, for rows of this bandwidth: standstill by the leg file, pulses by
-    /// the coarser of leg file and recordings. The counts of a recording alone say little about standstill:
-    /// of the real pendulum sp, with 2.9 mrad, slow rows predict well.
+    /// the coarser of leg file and recordings. The counts of a recording alone do not determine standstill:
+    /// with 2.9 mrad, slow rows of the real pendulum `sp` still predict well.
     pub fn describe<T: Real, const B: usize>(
         &self,
         leg: &LegFile,
@@ -164,10 +165,10 @@ impl<const N: usize> Encoders<N> {
         model.pulse = pulse;
     }
 
-    /// Bias of the parameters of `fit`; `None` where the steps cannot matter.
+    /// Bias of the parameters of `fit`; `None` where the steps are negligible.
     ///
     /// # Errors
-    /// The bandwidth is not possible.
+    /// The filter cannot be built for the bandwidth.
     pub fn bias<const B: usize>(
         &self,
         equations: &Equations<N, B>,
@@ -226,10 +227,10 @@ impl<const N: usize> Encoders<N> {
     }
 
     /// Largest of [`BANDWIDTHS_HZ`] up to `largest_hz` at which the steps shift no parameter by more than its
-    /// standard deviation by noise and segments; the smallest one where none does.
+    /// standard deviation by noise and segments; the smallest one if none qualifies.
     ///
     /// # Errors
-    /// A bandwidth is not possible.
+    /// The filter cannot be built for a bandwidth.
     pub fn bandwidth_hz<const B: usize>(
         &self,
         largest_hz: f64,
@@ -269,7 +270,8 @@ impl<const N: usize> Encoders<N> {
         })
     }
 
-    /// The smoothed motion with its predicted torque, read by the encoders, or as it is without a phase.
+    /// Smoothed motion with its predicted torque, read by the encoders at a phase; unquantised without a
+    /// phase.
     fn repeated<const B: usize>(
         &self,
         equations: &Equations<N, B>,
@@ -360,8 +362,8 @@ fn prediction_noise<const N: usize, const B: usize>(
     })
 }
 
-/// Step of an encoder from the changes of its angle in ascending order, if the change at this place is one
-/// step and the other small ones are whole steps.
+/// Step of an encoder from the changes of its angle in ascending order. The change at `index` must be one
+/// step, and the other small ones whole steps.
 fn step(changes: &[f64], place: usize) -> Option<f64> {
     let smallest = *changes.get(place)?;
     // A mean, because numbers in text are rounded.
@@ -377,7 +379,7 @@ fn step(changes: &[f64], place: usize) -> Option<f64> {
     (small >= FEWEST && whole as f64 >= WHOLE_STEPS * small as f64).then_some(step_rad)
 }
 
-/// Place of a time between two grid points: the first of them, and the share of the way to the second.
+/// Position of a time between two grid points: the first of them, and the share of the way to the second.
 fn between(time_s: f64, points: usize) -> (usize, f64) {
     let place = (time_s * SAMPLE_RATE_HZ).clamp(0.0, points.saturating_sub(1) as f64);
     let first = (place.floor() as usize).min(points.saturating_sub(2));
@@ -419,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn means_of_eight_readings_are_told_from_finer_counts_by_the_leg_file() {
+    fn leg_file_distinguishes_means_of_eight_readings_from_finer_counts() {
         let fine: Vec<f64> =
             (0..40_000).map(|k| ((k as f64 * 0.000_25).sin() / 1.6e-3).floor() * 1.6e-3).collect();
         let means: Vec<f64> = fine.chunks_exact(8).map(|chunk| chunk.iter().sum::<f64>() / 8.0).collect();

@@ -7,8 +7,8 @@
 //! sigma_segments^2 = c(G) sum_g (sum_(k in g) w^2 u r1)^2 / S^2,   r1 = r - u delta
 //! ```
 //!
-//! g are the segments (clusters). The second sigma needs no model of the noise: only that different segments
-//! err independently (Liang and Zeger 1986). The covariance of the parameters has the same two forms.
+//! g are the segments (clusters). The second sigma needs no model of the noise, only that segments err
+//! independently (Liang and Zeger 1986). The covariance of the parameters has the same two forms.
 
 /// Smallest independent share of a column that counts as determined.
 const DETERMINED_SHARE: f64 = 1e-9;
@@ -139,7 +139,7 @@ pub struct Score {
     pub segment_sigma: f64,
     /// Share of the column's power that the parameters leave.
     pub seen: f64,
-    /// Weighted column without what the parameters explain.
+    /// Weighted column minus the part that the parameters explain.
     pub column: Vec<f64>,
 }
 
@@ -201,8 +201,8 @@ pub fn score<const B: usize>(
 }
 
 /// G / (G - 1) t^2 / z^2 for the G segments that have data. `t` and `z` are the 97.5 % quantiles of Student's
-/// distribution with G - 1 degrees of freedom and of the normal one: the scatter of a few segments says
-/// little. Expansion of `t`: Abramowitz and Stegun (1964), 26.7.5.
+/// distribution with G - 1 degrees of freedom and of the normal one, since few segments determine the scatter
+/// poorly. Expansion of `t`: Abramowitz and Stegun (1964), 26.7.5.
 fn small_sample(sums: &[f64]) -> f64 {
     const Z: f64 = 1.96;
     let filled = sums.iter().filter(|sum| **sum != 0.0).count() as f64;

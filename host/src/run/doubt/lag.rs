@@ -1,35 +1,35 @@
-//! Torque that lags behind the angle: late, or behind a filter.
+//! Torque that lags behind the angle: by a delay or by a filter.
 //!
 //! ```text
 //! filter   tau        = LP(Y) p    LP: first-order low-pass of time constant T, corner 1 / (2 pi T)
-//! delay    tau(t + d) = Y p        of all joints together; of one joint it is a direction of doubt
+//! delay    tau(t + d) = Y p        of all joints together; of one joint it is a direction
 //! ```
 //!
 //! Why: both look alike where the motion is slow against 1 / T, but they need different corrections. Each is
-//! fitted with the parameters eliminated. The columns are filtered, not the torque taken back: that would
-//! amplify its noise, and the least misfit would belong to too short a time. The time comes from a scan and a
-//! search between its best points. Runs after a refusal only. Cost: about 25 fits of the rows for each joint
-//! and for all.
+//! fitted with the parameters eliminated. The columns are filtered; inverting the filter on the torque would
+//! amplify its noise, and the best time would come out too short. The time comes from a scan and a search
+//! between its best points. Runs only after a refusal. Cost: about 25 fits of the rows for each joint and for
+//! all.
 
 use crate::report::doubt::CauseReport;
 use crate::run::doubt::fit::{Fit, score};
 use crate::run::doubt::rows::Equations;
 
-/// Times that the scan tries, s.
+/// Times tried by the scan, s.
 const SCAN_S: [f64; 8] = [0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064, 0.128];
-/// Steps of the search between two points of the scan. Each leaves 0.62 of the interval.
+/// Steps of the search between two points of the scan. Each step leaves 0.62 of the interval.
 const STEPS: usize = 16;
 /// Shortest time that is searched, s.
 const SHORTEST_S: f64 = 1e-4;
 /// Share of the time constant by which the difference quotient changes it.
 const DIFFERENCE: f64 = 1e-2;
 /// Factor by which a low-pass must leave less of the misfit than a delay. On a real arm, whose misfit is many
-/// times its noise, it leaves 1.25 times less where the torque is 60 ms late.
+/// times its noise, a low-pass leaves 1.25 times less although the torque is delayed by 60 ms.
 const CLEARER: f64 = 1.3;
 /// Golden section.
 const SECTION: f64 = 0.618_033_988_749_895;
 
-/// How a torque lags.
+/// Kind of a lag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Delay,
@@ -42,15 +42,15 @@ pub struct Lag<const B: usize> {
     pub cause: CauseReport,
     /// Time over its standard deviation.
     pub significance: f64,
-    /// Part of the misfit's power that it leaves.
+    /// Part of the misfit's power that remains.
     pub remaining: f64,
-    /// Cost of the equations of the joints that lag.
+    /// Cost of the equations of the lagging joints.
     own_cost: f64,
-    /// All parameters with it.
+    /// All parameters with the lag.
     pub values: [f64; B],
-    /// Columns with it.
+    /// Columns with the lag.
     pub columns: Vec<[f64; B]>,
-    /// Torques without it.
+    /// Torques without the lag.
     pub torque: Vec<f64>,
 }
 
@@ -63,7 +63,7 @@ pub fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Vec<L
     for joint in joints.chain((N > 1).then_some(None)) {
         let [delay, filter] = [Kind::Delay, Kind::Filter].map(|kind| search.one(kind, joint));
         let is_clearer = CLEARER * CLEARER * filter.own_cost < delay.own_cost;
-        // The delay of one joint is a direction of doubt.
+        // The delay of one joint is one of the directions.
         found.extend(joint.is_none().then_some(delay));
         found.extend(is_clearer.then_some(filter));
     }
@@ -134,7 +134,7 @@ impl<const N: usize, const B: usize> Search<'_, N, B> {
     }
 }
 
-/// Place of the least cost between two times, by golden section.
+/// Time of the least cost between two times, by golden section.
 fn least(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f64 {
     let (mut one, mut other) = (high - SECTION * (high - low), low + SECTION * (high - low));
     let (mut at_one, mut at_other) = (cost(one), cost(other));

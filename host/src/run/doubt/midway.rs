@@ -6,20 +6,21 @@
 //! s        = b1' A^-1 b2 / (c2 - b2' A^-1 b2),    gain = 1 / s
 //! ```
 //!
-//! The point of change is the same share of every recording, or lies in one recording; the best of a grid
-//! counts. sigma is that of s with the columns of the parameters, noise or segments whichever is larger.
+//! The change comes at the same share of every recording, or within one recording; the best of a grid counts.
+//! sigma is that of s with the columns of the parameters: the larger of noise and segments.
 
 use crate::run::doubt::directions::CHANCE;
 use crate::run::doubt::fit::{Fit, score};
 use crate::run::doubt::rows::{Equations, Place};
 
-/// Change of the gain that is tolerated beside chance: 5 % come with the temperature of a drive.
+/// Change of the gain that is tolerated beside chance: the temperature of a drive changes it by 5 %.
 const LARGEST_CHANGE: f64 = 0.05;
-/// Part of the misfit that a change of sign has to explain. A push moves the gain as well, but by less.
+/// Part of the misfit that a change of sign must explain. A push changes the gain as well, but explains less.
 const EXPLAINED_BY_SIGN: f64 = 0.5;
-/// Part of the misfit that a change has to explain.
+/// Part of the misfit that a change must explain.
 const EXPLAINED_SHARE: f64 = 0.1;
-/// Part of the torque's power that lies on either side of a change. Less is a gain of the whole recording.
+/// Least part of the torque's power on either side of a change. With less, the gain of the whole recording is
+/// wrong.
 const SMALLEST_SIDE: f64 = 0.02;
 /// Points of change tried in each recording.
 const POINTS: usize = 39;
@@ -29,18 +30,18 @@ const POINTS: usize = 39;
 pub struct Midway {
     /// Joint, from 0; `None` for all.
     pub joint: Option<usize>,
-    /// Share of the recording after which it acts.
+    /// Share of the recording after which the change acts.
     pub share: f64,
     /// Relative change of the gain; -2 is a change of sign.
     pub change: f64,
     /// Standard deviation of the change.
     pub sigma: f64,
-    /// Part of the misfit that it explains.
+    /// Part of the misfit that the change explains.
     pub explained: f64,
 }
 
 impl Midway {
-    /// Whether the recording is refused for it.
+    /// Whether the change refuses the recording.
     #[must_use]
     pub fn refuses(&self) -> bool {
         self.change.abs() > self.limit()
@@ -82,7 +83,8 @@ fn product<const B: usize>(fit: &Fit<B>, one: &[f64; B], other: &[f64; B]) -> f6
     rows.map(|(row, one)| one * row.iter().zip(other).map(|(a, b)| a * b).sum::<f64>()).sum()
 }
 
-/// Factor of the torques in `after` that leaves least of the misfit over the torque, and what it explains.
+/// Factor of the torques in `after` that leaves least of the misfit over the torque, and the share it
+/// explains.
 fn change<const B: usize>(plain: &Fit<B>, whole: &Sums<B>, after: &Sums<B>) -> (f64, f64) {
     let share = |cost: f64, power: f64| cost / power.max(1e-300);
     let right: [f64; B] = core::array::from_fn(|base| whole.right[base] - after.right[base]);
@@ -94,10 +96,10 @@ fn change<const B: usize>(plain: &Fit<B>, whole: &Sums<B>, after: &Sums<B>) -> (
     (factor, 1.0 - share(cost, power) / share(plain.cost, whole.power))
 }
 
-/// Looks for the change that explains most; `None` where none explains a tenth of the misfit.
+/// Searches the change that explains most; `None` where none explains a tenth of the misfit.
 ///
-/// Once with the robust weights, which forgive a push, and once with every row: after a change of sign,
-/// robust weights call what lies after it disturbed.
+/// Searches once with the robust weights, which ignore a push, and once with every row: after a change of
+/// sign, robust weights exclude the rows after it.
 #[must_use]
 pub fn look<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
     let robust = strongest(all);
@@ -125,7 +127,7 @@ fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Mi
     for scope in scopes {
         for joint in joints.iter().copied() {
             let own = Sums::of(all, |place| is_after(place, scope, joint, -1.0));
-            // A gain of all of it is another error: a torque scale, or another machine.
+            // A gain of the whole recording is another error: a torque scale, or another machine.
             let always = if own.power < 0.999 * whole.power { change(&plain, &whole, &own).1 } else { 0.0 };
             for point in 1..=POINTS {
                 let share = point as f64 / (POINTS + 1) as f64;
@@ -165,7 +167,7 @@ fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Mi
         .collect();
     let segments: Vec<usize> = all.places.iter().map(|place| place.cluster).collect();
     let scored = score(&fit, &all.columns, &torque, &z, &all.weight, &segments);
-    // Chi-square of one for each independent row, whatever the misfit before was.
+    // Chi-square of one for each independent row, independent of the previous misfit.
     let rows = all.places.len() as f64 * all.information().min(1.0) - fit.rank as f64;
     let noise = scored.noise_sigma * (fit.cost / rows.max(1.0)).sqrt();
     // The change is 1 / s - 1, and the column has the size of s times the torque.

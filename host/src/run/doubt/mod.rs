@@ -1,8 +1,9 @@
-//! Doubts about a recording: errors of the logging chain that the verdict on a model alone does not see.
+//! Errors of the logging chain that the verdict on a model alone does not detect.
 //!
-//! Why: a torque that is late, or an encoder of the wrong scale, is fitted almost as well as a right
-//! recording, by wrong parameters with a small sigma. Each such error is fitted beside the parameters,
-//! reported always, and refused where it is certain, moves the parameters and explains what the model misses.
+//! Why: a recording with a late torque, or with a wrong encoder scale, fits almost as well as a right one,
+//! with wrong parameters and a small sigma. Each such error is fitted beside the parameters and always
+//! reported. It refuses the recording where it is significant, changes the parameters, and explains part of
+//! the misfit.
 //!
 //! | file | subject |
 //! | --- | --- |
@@ -44,7 +45,7 @@ use encoder::{Bias, Encoders, LARGEST_NOISE, LARGEST_SHARE};
 use midway::Midway;
 use rows::{Equations, Filters, Motion};
 
-/// What is asked about.
+/// Recordings and the chosen model: input of all checks.
 pub struct Question<const N: usize, const B: usize> {
     /// Model that was chosen.
     pub model: RowModel<f64, N, B>,
@@ -77,7 +78,7 @@ impl<const N: usize, const B: usize> Question<N, B> {
         self.anatomy.map(|joint| joint.zero_offset())
     }
 
-    /// The question with every column and without Stribeck friction; `None` if that is this one.
+    /// The same input with every column and without Stribeck friction; `None` if nothing changes.
     #[must_use]
     pub fn with_all_columns(&self) -> Option<Self> {
         let active = core::array::from_fn(|base| base < self.model.base.rank());
@@ -92,7 +93,7 @@ impl<const N: usize, const B: usize> Question<N, B> {
     /// Equations of other motions under this model; `None` with too few rows.
     ///
     /// # Errors
-    /// The bandwidth is not possible.
+    /// The filter cannot be built for the bandwidth.
     pub fn equations(&self, motions: &[Motion<N>]) -> Result<Option<Equations<N, B>>, KernelError> {
         self.equations_at(motions, self.bandwidth_hz)
     }
@@ -100,7 +101,7 @@ impl<const N: usize, const B: usize> Question<N, B> {
     /// Equations of other motions at another bandwidth.
     ///
     /// # Errors
-    /// The bandwidth is not possible.
+    /// The filter cannot be built for the bandwidth.
     pub fn equations_at(
         &self,
         motions: &[Motion<N>],
@@ -117,22 +118,22 @@ impl<const N: usize, const B: usize> Question<N, B> {
         RowModel { still_speed, pulse: self.model.pulse.map(|pulse| share * pulse), ..self.model.clone() }
     }
 
-    /// Bandwidth at which the encoders' steps do not matter, if they do at this one.
+    /// Bandwidth at which the encoders' steps are negligible, if they are not at this one.
     ///
     /// # Errors
-    /// The bandwidth is not possible.
+    /// The filter cannot be built for the bandwidth.
     fn calmer_hz(&self) -> Result<Option<f64>, KernelError> {
         let hz = self.encoders.bandwidth_hz(self.bandwidth_hz, |hz| self.equations_at(&self.motions, hz))?;
         Ok((hz < self.bandwidth_hz).then_some(hz))
     }
 
-    /// The question at a lower bandwidth.
+    /// The same input at a lower bandwidth.
     fn at(&self, bandwidth_hz: f64) -> Self {
         Self { model: self.model_at(bandwidth_hz), motions: self.motions.clone(), bandwidth_hz, ..*self }
     }
 }
 
-/// Answers to a question.
+/// Results of all checks.
 pub struct Doubts<const N: usize, const B: usize> {
     /// Rows of all recordings.
     pub equations: Equations<N, B>,
@@ -144,12 +145,12 @@ pub struct Doubts<const N: usize, const B: usize> {
     pub midway: Option<Midway>,
     /// Misfit over noise of each joint; `None` where the noise is unknown.
     pub misfit_over_noise: [Option<f64>; N],
-    /// Standard deviation of each base parameter: noise, scatter over segments, and doubt that was not
-    /// refused.
+    /// Standard deviation of each base parameter: noise, scatter over segments, and possible errors that were
+    /// not refused.
     pub sigma: [Sigma; B],
-    /// Effect of the encoders' steps; `None` where they cannot matter.
+    /// Effect of the encoders' steps; `None` where they are negligible.
     pub encoder: Option<Bias<N, B>>,
-    /// Bandwidth at which they do not matter, Hz; only where they refuse.
+    /// Bandwidth at which the steps are negligible, Hz; only where they refuse.
     better_hz: Option<f64>,
 }
 
@@ -162,14 +163,14 @@ pub struct Sigma {
     pub segments: f64,
     /// Part caused by the scatter between recordings; zero where unknown.
     pub recordings: f64,
-    /// Part caused by directions that are not certain.
+    /// Part caused by directions that are not significant.
     pub doubt: f64,
     /// Part caused by the steps of the encoders.
     pub encoder: f64,
 }
 
 impl Sigma {
-    /// Part caused by what the model does not explain.
+    /// Part caused by unmodelled effects.
     #[must_use]
     pub fn misfit(&self) -> f64 {
         self.segments.max(self.recordings)
@@ -201,7 +202,7 @@ impl<const N: usize, const B: usize> Doubts<N, B> {
     /// Fits every direction; `None` where a joint has too few rows.
     ///
     /// # Errors
-    /// The bandwidth is not possible.
+    /// The filter cannot be built for the bandwidth.
     pub fn of(question: &Question<N, B>) -> Result<Option<Self>, KernelError> {
         let Some(equations) = question.equations(&question.motions)? else { return Ok(None) };
         let found = Directions { equations: &equations, zero: question.zero(), axis: question.axis }.all();
@@ -237,7 +238,7 @@ impl<const N: usize, const B: usize> Doubts<N, B> {
         Ok(Some(Self { equations, found, directions, midway, misfit_over_noise, sigma, encoder, better_hz }))
     }
 
-    /// Tests of the verdict.
+    /// Findings for the verdict.
     #[must_use]
     pub fn findings(&self) -> Vec<FindingReport> {
         let mut findings: Vec<FindingReport> = self.directions.iter().map(DirectionReport::finding).collect();
@@ -274,13 +275,13 @@ impl<const N: usize, const B: usize> Doubts<N, B> {
         findings
     }
 
-    /// Steps that are too coarse, in words.
+    /// Message about steps that are too coarse.
     fn encoder_words(&self, bias: &Bias<N, B>) -> String {
         let better = self.better_hz.map_or(String::new(), |hz| format!("; `--bandwidth {hz}` is better"));
         let effect = if bias.is_beyond() {
             let (joint, share) = bias.largest_noise();
             format!(
-                "make {:.0} % of the acceleration of joint {}, at most {:.0} % may be",
+                "make {:.0} % of the acceleration of joint {}, limit {:.0} %",
                 100.0 * share,
                 joint + 1,
                 100.0 * LARGEST_NOISE
@@ -288,7 +289,7 @@ impl<const N: usize, const B: usize> Doubts<N, B> {
         } else {
             let (joint, share) = bias.largest_share();
             format!(
-                "move the torque of joint {} by {:.1} % of its rms, at most {:.1} % may be",
+                "change the torque of joint {} by {:.1} % of its rms, limit {:.1} %",
                 joint + 1,
                 100.0 * share,
                 100.0 * LARGEST_SHARE
@@ -311,7 +312,7 @@ impl<const N: usize, const B: usize> Doubts<N, B> {
     }
 }
 
-/// Finding of a sample test in the verdict.
+/// Finding about samples, for the verdict.
 #[must_use]
 pub fn sample_finding(finding: &SampleFinding) -> FindingReport {
     FindingReport {
@@ -326,7 +327,7 @@ pub fn sample_finding(finding: &SampleFinding) -> FindingReport {
     }
 }
 
-/// Finding of a sample test as the cause.
+/// Finding about samples, as the likely cause.
 #[must_use]
 pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
     CauseReport {
@@ -338,7 +339,7 @@ pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
     }
 }
 
-/// A change midway in words.
+/// Message about a change midway.
 #[must_use]
 pub fn midway_words(midway: &Midway) -> String {
     let who = midway.joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
@@ -354,7 +355,7 @@ pub fn midway_words(midway: &Midway) -> String {
     )
 }
 
-/// Part of the misfit's power that is no noise, 0..1; one where the noise is unknown.
+/// Part of the misfit's power that is not noise, 0..1; one where the noise is unknown.
 fn systematic<const N: usize>(misfit_over_noise: &[Option<f64>; N], rows: &[f64; N]) -> f64 {
     let all: f64 = rows.iter().sum();
     let noise: f64 = misfit_over_noise

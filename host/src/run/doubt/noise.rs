@@ -7,14 +7,14 @@
 //! sigma   = median |d_k| / sqrt(sum_i w_i^2 / m) / 0.674490      of one sample; D = sigma^2 dt its density
 //! ```
 //!
-//! Divided differences hold for any stamps, the density for any rate between 50 Hz and 20 kHz. The bins see
-//! noise up to four times the bandwidth: what the low-pass lets through, and little of what a recorder's own
-//! filter took away. Limits: a motion at half the bandwidth leaves 1.3 % of its amplitude; noise that is not
-//! white is misjudged.
+//! Divided differences hold for any time stamps, the density for any rate between 50 Hz and 20 kHz. The bins
+//! see noise up to four times the bandwidth: all that the low-pass passes, and little of the band that a
+//! recorder's own filter removed. Limits: a motion at half the bandwidth leaves 1.3 % of its amplitude; the
+//! density of noise that is not white is wrong.
 
 /// Median of the absolute value of a standard normal number.
 const NORMAL_MEDIAN: f64 = 0.674_490;
-/// Differences below which nothing is known.
+/// Least number of differences for an estimate.
 const FEWEST: usize = 20;
 
 /// Scatter of one file's torque in units of sqrt(density), one number for each difference.
@@ -42,7 +42,7 @@ pub fn scatter(time_s: &[f64], torque: &[f64], bandwidth_hz: f64) -> Vec<f64> {
     bins.windows(4).map(difference).filter(|value| value.is_finite()).collect()
 }
 
-/// Density of the noise, (N m)^2 s, from the scatter of all files; `None` where there is too little.
+/// Density of the noise, (N m)^2 s, from the scatter of all files; `None` with too few differences.
 #[must_use]
 pub fn density(mut scatter: Vec<f64>) -> Option<f64> {
     if scatter.len() < FEWEST {

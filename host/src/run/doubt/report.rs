@@ -1,4 +1,4 @@
-//! Directions of doubt, judged.
+//! Judges the fitted directions for report and verdict.
 
 use crate::base::number::Number;
 use crate::report::doubt::{CauseReport, DirectionReport};
@@ -7,7 +7,7 @@ use crate::run::doubt::directions::{
 };
 
 impl DirectionReport {
-    /// Judges a direction: `sigma` is that of the parameters, `systematic` the part of the misfit that is no
+    /// Judges a direction. `sigma` is that of the parameters, `systematic` the part of the misfit that is not
     /// noise.
     #[must_use]
     pub fn of<const B: usize>(found: &Found<B>, sigma: &[f64; B], systematic: f64) -> Self {
@@ -36,7 +36,7 @@ impl DirectionReport {
 }
 
 impl CauseReport {
-    /// A direction as the cause.
+    /// A direction as the likely cause.
     #[must_use]
     pub fn direction(kind: Kind, direction: &DirectionReport) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! Whole recordings as filtered rows in double precision, with everything that a direction of doubt changes.
+//! Whole recordings as filtered rows in double precision, and the changes that a direction makes to them.
 //!
 //! The filter chain is that of the identification: smoothing with twice the bandwidth, regressor, one
 //! low-pass for regressor and torque, 50 Hz. Windows are whole, so that a row's torque can be moved in time.
@@ -9,8 +9,8 @@
 //! weight            = sqrt(block weight) / s_j               s_j: one independent row, from the residual
 //! ```
 //!
-//! Blocks of 16 rows whose residual is far above the median lose their weight, so a push is no delay.
-//! Cost: one regressor for each 500 Hz sample, a few times. Memory: the rows.
+//! Blocks of 16 rows whose residual is far above the median lose their weight, so a push is not taken for a
+//! delay. Cost: a few regressors for each 500 Hz sample. Memory: the rows.
 
 use scarab::ident::{
     DECIMATION, Ends, FilteredRows, Kernel, KernelError, LARGEST_STILL_SHARE, LowPass, RowFilter, RowModel,
@@ -31,15 +31,15 @@ const DISTURBED: (f64, f64) = (3.0, 6.0);
 const LARGEST_CLUSTER_S: f64 = 2.0;
 /// Shortest length of a cluster, s.
 const SMALLEST_CLUSTER_S: f64 = 1.0;
-/// Clusters wanted at least.
+/// Least number of clusters.
 const CLUSTERS: f64 = 8.0;
-/// Rows of a joint below which nothing can be said, for each parameter.
+/// Least number of rows of a joint, for each parameter.
 const ROWS_PER_PARAMETER: usize = 5;
 
 /// One recording on the 500 Hz grid, chain angles and torques.
 #[derive(Clone, Debug)]
 pub struct Motion<const N: usize> {
-    /// Time from its start for which it is identified from, s; infinite for a training file.
+    /// Duration of its training part from the start, s; infinite for a training file.
     pub training_s: f64,
     /// Chain angles, rad.
     pub position: Vec<[f64; N]>,
@@ -47,7 +47,7 @@ pub struct Motion<const N: usize> {
     pub torque: Vec<[f64; N]>,
 }
 
-/// Smoothing and low-pass.
+/// Smoothing filter and low-pass filter.
 #[derive(Clone, Debug)]
 pub struct Filters {
     smoothing: Box<Kernel<f64, TAPS>>,
@@ -58,7 +58,7 @@ impl Filters {
     /// Filters of an identification at this bandwidth.
     ///
     /// # Errors
-    /// The bandwidth is not possible.
+    /// The filter cannot be built for the bandwidth.
     pub fn new(bandwidth_hz: f64) -> Result<Self, KernelError> {
         Ok(Self {
             smoothing: Box::new(Kernel::new(SMOOTHING_BANDWIDTHS * bandwidth_hz, SAMPLE_RATE_HZ)?),
@@ -83,7 +83,7 @@ impl Filters {
 #[derive(Clone, Debug)]
 struct Part<const N: usize> {
     instants: Vec<Smoothed<f64, N>>,
-    /// Low-passed torque at every grid point; zero where the window is not whole.
+    /// Low-passed torque at every grid point; zero where the window is incomplete.
     filtered: [Vec<f64>; N],
     /// Grid point of the first row's centre.
     first: usize,
@@ -164,25 +164,25 @@ impl<const N: usize> Part<N> {
     }
 }
 
-/// Place of an equation.
+/// Origin of an equation.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     part: usize,
     row: usize,
     /// Joint, from 0.
     pub joint: usize,
-    /// Whether it belongs to the motion identified from.
+    /// Whether it belongs to the training motion.
     pub training: bool,
     /// Segment of at most two seconds.
     pub cluster: usize,
-    /// Time from the start of its motion over its duration.
+    /// Time from the start of its motion, as a share of the motion's duration.
     pub share: f64,
-    /// Number of its motion.
+    /// Index of its motion.
     pub motion: usize,
 }
 
 impl Place {
-    /// Number of the row in its motion, at 50 Hz.
+    /// Index of the row in its motion, at 50 Hz.
     #[must_use]
     pub fn row(&self) -> usize {
         self.row
@@ -197,7 +197,7 @@ pub struct Equations<const N: usize, const B: usize> {
     model: RowModel<f64, N, B>,
     /// Columns that are estimated.
     pub active: [bool; B],
-    /// Place of each equation.
+    /// Origin of each equation.
     pub places: Vec<Place>,
     /// Regressor columns.
     pub columns: Vec<[f64; B]>,
@@ -209,12 +209,12 @@ pub struct Equations<const N: usize, const B: usize> {
     pub clusters: usize,
     /// Standard deviation of an independent row of each joint, N m, from the residual.
     pub row_sigma: [f64; N],
-    /// Rows of each joint's factor that count, in whole rows.
+    /// Rows of each joint's factor that count, in complete rows.
     pub rows: [f64; N],
 }
 
 impl<const N: usize, const B: usize> Equations<N, B> {
-    /// Filters the motions; `None` where a joint has too few rows.
+    /// Filters the motions; `None` if a joint has too few rows.
     #[must_use]
     pub fn new(
         model: &RowModel<f64, N, B>,
@@ -312,8 +312,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         self.places.iter().map(|place| parts[place.part][place.row].regressor[place.joint]).collect()
     }
 
-    /// Smoothed motion of every recording on the 500 Hz grid, with the time from its first instant for which
-    /// it is identified from, s.
+    /// Smoothed motion of every recording on the 500 Hz grid, with the duration of its training part, s.
     pub fn smoothed(&self) -> impl Iterator<Item = (&[Smoothed<f64, N>], f64)> {
         let late_s = self.filters.smoothing.reach() as f64 / SAMPLE_RATE_HZ;
         self.parts.iter().map(move |part| (&part.instants[..], part.training_s - late_s))
@@ -326,7 +325,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         segment_sigma(fit, &self.columns, &self.torque, &self.training_weight(), &segments)
     }
 
-    /// Columns at the places of equations of a motion with as many samples.
+    /// Columns for the equations of a motion with the same number of samples.
     #[must_use]
     pub fn columns_at(&self, places: &[Place]) -> Vec<[f64; B]> {
         let rows: Vec<_> =
@@ -334,13 +333,13 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         places.iter().map(|place| rows[place.part][place.row].regressor[place.joint]).collect()
     }
 
-    /// Row model, without any change.
+    /// Unchanged row model.
     #[must_use]
     pub fn model(&self) -> &RowModel<f64, N, B> {
         &self.model
     }
 
-    /// Torque of all equations, that of `joint` or of all joints taken `late_s` after the angle.
+    /// Torque of all equations; that of `joint`, or of all joints, taken `late_s` after the angle.
     #[must_use]
     pub fn delayed(&self, joint: Option<usize>, late_s: f64) -> Vec<f64> {
         let pairs = self.places.iter().zip(&self.torque);
@@ -355,15 +354,15 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             .collect()
     }
 
-    /// Columns of every row of every recording, those without an equation included.
+    /// Columns of every row of every recording, including rows without an equation.
     #[must_use]
     pub fn every_row(&self) -> Vec<Vec<[[f64; B]; N]>> {
         let rows = self.parts.iter().map(|part| part.rows(&self.filters, &self.model, &|_| {}));
         rows.map(|rows| rows.into_iter().map(|row| row.regressor).collect()).collect()
     }
 
-    /// Columns of all equations, those of `joint` or of all joints behind a first-order low-pass of this time
-    /// constant. Exact where the columns of `every_row` are straight between two rows.
+    /// Columns of all equations; those of `joint`, or of all joints, behind a first-order low-pass of this
+    /// time constant. Exact where the columns of `every_row` are straight between two rows.
     #[must_use]
     pub fn low_passed(
         &self,
@@ -391,7 +390,8 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         self.places.iter().map(|place| behind[place.part][place.row][place.joint]).collect()
     }
 
-    /// Torque of all equations in the other order of the joints: equation of joint `j` gets that of `of[j]`.
+    /// Torque of all equations in another order of the joints: the equation of joint `j` gets that of
+    /// `of[j]`.
     #[must_use]
     pub fn exchanged(&self, of: &[usize; N]) -> Vec<f64> {
         self.places
@@ -400,7 +400,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             .collect()
     }
 
-    /// Change per second of a series given at the equations, within each joint and motion; zero at gaps and
+    /// Rate of change of a series given at the equations, within each joint and motion; zero at gaps and
     /// ends.
     #[must_use]
     pub fn rate_of(&self, series: &[f64]) -> Vec<f64> {
@@ -448,14 +448,15 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         Self { weight, ..self.clone() }
     }
 
-    /// Weights of the equations of the motion identified from; zero for the others.
+    /// Weights of the equations of the training motion; zero for the others.
     #[must_use]
     pub fn training_weight(&self) -> Vec<f64> {
         let pairs = self.weight.iter().zip(&self.places);
         pairs.map(|(&weight, place)| if place.training { weight } else { 0.0 }).collect()
     }
 
-    /// Weights by the residual: first scales of the joints, then blocks that are far off.
+    /// Computes weights from the residual: first the scales of the joints, then the blocks with a large
+    /// residual.
     fn weigh(&mut self) {
         let mut trust = vec![1.0; self.torque.len()];
         for joint in 0..N {

@@ -1,7 +1,7 @@
 //! Samples that no sensor measured: torque at a limit, values that are held, frozen or coarse.
 //!
 //! Why: clipped or repeated values look like measurements to every later step, and bias the parameters with a
-//! small sigma. They leave traces in the columns themselves, before any model is fitted.
+//! small sigma. The columns themselves show them, before any model is fitted.
 //!
 //! ```text
 //! u  step of a column: 5 % quantile of its changes      R  range of a torque      D = max(0.01 R, 0.99 u)
@@ -18,14 +18,14 @@
 //! ```
 //!
 //! Only samples in which the leg moves count, since a leg at rest repeats its values rightly. A smooth peak
-//! has a = 2.4 b where it is a parabola and 5.3 b where it is of the fourth order; the limits lie above what
-//! such a peak can reach in each case. A sample beside none of its own size is an outlier, not a limit.
+//! has a = 2.4 b where it is a parabola and 5.3 b where it is of the fourth order; each limit lies above the
+//! ratio of such a peak. A sample without neighbours of its own size is an outlier, not a limit.
 //!
 //! Saturated and frozen stretches are excluded ([`Screened::spans`]) while they are few. A held column is
-//! late by half of its holding time on average, and is refused. Cost: linear in the samples, but for two
+//! late by half of its holding time on average, and is refused. Cost: linear in the samples, except two
 //! sorts. Known limits: a drive at its own limit gives the same torque column as a sensor at its limit; its
-//! rows are excluded although they are right. An angle that was interpolated keeps its count here, but
-//! may have none in `encoder.rs`; its sigma then lacks the bias by the encoder's steps.
+//! rows are excluded although they are right. The step of an interpolated angle is found here, but possibly
+//! not in `encoder.rs`; its sigma then lacks the bias by the encoder's steps.
 
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ use crate::run::doubt::encoder::Encoder;
 pub const SATURATION: &str = "saturation";
 /// Finding of values that are repeated.
 pub const HELD: &str = "held_samples";
-/// Finding of a coarse column; never a reason to refuse.
+/// Finding of a coarse column; never refuses.
 pub const QUANTISED: &str = "quantised";
 
 /// Speed above which a leg moves, rad/s, and half the time over which it is measured, s.
@@ -45,25 +45,25 @@ const MOVING_RADPS: f64 = 0.03;
 const MOVING_S: f64 = 0.025;
 /// Width of the bands at the extremes, share of the range.
 const BAND: f64 = 0.01;
-/// Samples at an extreme from which there is a limit.
+/// Least number of samples at an extreme that show a limit.
 const LEAST_AT_LIMIT: usize = 20;
-/// Time by which a saturated stretch is widened, s: a filter of 50 Hz has forgotten the limit then.
+/// Time by which a saturated stretch is widened, s: after it a filter of 50 Hz has settled.
 const WIDENED_S: f64 = 0.02;
-/// Stretches closer than this are one, s.
+/// Stretches closer than this are joined, s.
 const JOINED_S: f64 = 0.05;
-/// Time from which an unchanged value is frozen, s, and the fewest samples.
+/// Least time, s, and least number of samples of an unchanged value that count as frozen.
 const FROZEN_S: f64 = 0.025;
 const FROZEN_SAMPLES: usize = 5;
-/// Shares of held samples that are refused, of torque and angle.
+/// Shares of held samples that refuse a recording, of torque and angle.
 const HELD_TORQUE: f64 = 0.2;
 const HELD_ANGLE: f64 = 0.4;
-/// Holding time up to which a column is not refused, s: two periods of the firmware's log.
+/// Largest holding time of a column that is not refused, s: two periods of the firmware's log.
 const HARMLESS_HOLD_S: f64 = 0.0045;
 /// Longest time for which a column that is updated regularly holds a value, s.
 const LONGEST_HOLD_S: f64 = 0.1;
-/// Largest lost share of a recording: the rest would be a biased choice (as of disturbed rows).
+/// Largest lost share of a recording: beyond it the rest is a biased choice, as with disturbed rows.
 const LARGEST_LOSS: f64 = 1.0 / 3.0;
-/// Levels from which a column shows the step between them.
+/// Least number of levels from which a column shows the step between them.
 const LEAST_LEVELS: usize = 20;
 /// Steps from which a column is coarse: 12 bits at the joint, and a share of a torque's range.
 const COARSE_RAD: f64 = 1.5e-3;
@@ -72,14 +72,14 @@ const COARSE_SHARE: f64 = 0.01;
 /// Findings of one recording, and the stretches that must be excluded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Screened {
-    /// What was found.
+    /// Findings about the samples.
     pub findings: Vec<SampleFinding>,
-    /// Times without a valid sample in some column, on the recording's clock, s; ordered and apart.
+    /// Times without a valid sample in some column, on the recording's clock, s; ordered, not overlapping.
     pub spans: Vec<Range<f64>>,
 }
 
-/// Examines recordings of one machine. Limits of the torque are looked for in each by itself and in all of
-/// them. `described_rad` are the steps of the encoders by the leg file. `reach_s` is the time that is lost on
+/// Examines recordings of one machine. Limits of the torque are searched in each recording alone and in all
+/// together. `described_rad` are the steps of the encoders by the leg file. `reach_s` is the time lost on
 /// either side of an excluded stretch.
 #[must_use]
 pub fn screen(recordings: &[&Recording], described_rad: &[f64], reach_s: f64) -> Vec<Screened> {
@@ -100,7 +100,7 @@ struct Look<'a> {
     /// Step of each joint's angle, rad.
     angle_steps: Vec<f64>,
     is_moving: Vec<bool>,
-    /// Samples of a frozen column.
+    /// Marks samples of a frozen column.
     is_frozen: Vec<bool>,
     /// Joint, limit and samples of each saturated side.
     limits: Vec<Limit>,
@@ -145,7 +145,7 @@ impl<'a> Look<'a> {
         look
     }
 
-    /// Samples with valid values about them and motion on both sides. The edges of a rest are not among them.
+    /// Samples with valid neighbours and motion on both sides; the edges of a rest are excluded.
     fn usable(&self) -> Vec<bool> {
         let half = half_window(self.recording);
         let mut usable: Vec<bool> = self.is_frozen.iter().map(|&frozen| !frozen).collect();
@@ -156,7 +156,7 @@ impl<'a> Look<'a> {
         usable
     }
 
-    /// Looks for limits of every torque that is not held.
+    /// Searches limits of every torque that is not held.
     fn find_limits(&mut self) {
         let usable = self.usable();
         for (joint, series) in self.recording.joints.iter().enumerate() {
@@ -176,8 +176,8 @@ impl<'a> Look<'a> {
         1.0 / self.recording.median_step_s().max(1e-9)
     }
 
-    /// Share and median duration of held values of a column with steps `u`; samples marked in `known` do not
-    /// count.
+    /// Share and median duration of held values of a column with steps `u`; samples marked in `known` are
+    /// skipped.
     fn held(&self, values: &[f64], u: f64, known: &[bool]) -> Held {
         let counts = |sample: usize| self.is_moving[sample] && !known.get(sample).is_some_and(|&known| known);
         let longest = (LONGEST_HOLD_S / self.recording.median_step_s().max(1e-9)).round() as usize;
@@ -259,7 +259,7 @@ impl<'a> Look<'a> {
                 String::new()
             } else if refuses {
                 format!(
-                    ". {:.0} % of the recording would be lost, at most {:.0} % may be: {what}",
+                    ". {:.0} % of the recording would be lost, limit {:.0} %: {what}",
                     100.0 * lost,
                     100.0 * LARGEST_LOSS
                 )
@@ -298,7 +298,7 @@ impl<'a> Look<'a> {
                 share: frozen_s / self.recording.duration_s(),
                 refuses,
                 text: format!(
-                    "columns stand still for {frozen_s:.2} s in all while the leg moves{}",
+                    "columns are constant for {frozen_s:.2} s in all while the leg moves{}",
                     fate("the recorder loses samples")
                 ),
             });
@@ -306,7 +306,7 @@ impl<'a> Look<'a> {
         Screened { findings, spans }
     }
 
-    /// Marks torques that stand still, where the column is noisy and not at its limit.
+    /// Marks constant stretches of torque where the column is noisy and not at its limit.
     fn find_frozen_torque(&mut self, at_limit: &[bool]) {
         for joint in 0..self.recording.joints.len() {
             let values = &self.recording.joints[joint].torque_nm;
@@ -322,13 +322,13 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// Times to be excluded: frozen stretches as they are, saturated ones wider.
+    /// Times to be excluded: frozen stretches unchanged, saturated ones widened.
     fn spans(&self, at_limit: &[bool]) -> Vec<Range<f64>> {
         let time = &self.recording.time_s;
         let mut spans: Vec<Range<f64>> = Vec::new();
         for (marks, wider) in [(at_limit, WIDENED_S), (&self.is_frozen[..], 0.0)] {
             for run in runs(marks).filter(|run| marks[run.start]) {
-                // The sample after a run is measured again; between both, values are interpolated.
+                // The sample after a run is measured again; values between both are interpolated.
                 let end = time[run.end.min(time.len() - 1)];
                 spans.push(time[run.start] - wider..end + wider);
             }
@@ -362,7 +362,7 @@ fn lost_share(recording: &Recording, spans: &[Range<f64>], reach_s: f64) -> f64 
     1.0 - left / (last - first - 2.0 * reach_s).max(1e-9)
 }
 
-/// Column whose steps are coarse, without file and joint.
+/// Column with coarse steps; file and joint are added by the caller.
 fn coarse(values: &[f64], column: &str, unit: &'static str) -> Option<SampleFinding> {
     let u = step(values);
     let (low, high) = range(values);
@@ -383,7 +383,7 @@ fn coarse(values: &[f64], column: &str, unit: &'static str) -> Option<SampleFind
     })
 }
 
-/// Limits of the torque that only all recordings together show.
+/// Finds limits of the torque that only all recordings together show.
 fn find_common_limits(looks: &mut [Look]) {
     let joints = looks.iter().map(|look| look.recording.joints.len()).min().unwrap_or(0);
     let usable: Vec<Vec<bool>> = looks.iter().map(Look::usable).collect();
@@ -437,7 +437,7 @@ fn limit(parts: &[Part], upper: bool) -> Option<(f64, Vec<Vec<bool>>)> {
     }
     let u = parts.iter().map(|part| step(part.values)).fold(f64::INFINITY, f64::min);
     let band = (BAND * range).max(0.99 * u);
-    // Distance below the limit of one sample.
+    // Distance of one sample below the limit.
     let below = |part: &Part, sample: usize| top - sign * part.values[sample];
     // Samples at the limit, moving or not; those that count are usable as well.
     let at: Vec<Vec<bool>> = parts
@@ -508,7 +508,7 @@ fn limit(parts: &[Part], upper: bool) -> Option<(f64, Vec<Vec<bool>>)> {
     (is_exact || is_flat).then_some((sign * top, at))
 }
 
-/// Third difference, as a share of the range, from which a column is noisy.
+/// Third difference, as a share of the range, from which a column counts as noisy.
 const NOISY: f64 = 5e-4;
 
 fn third_difference(values: &[f64]) -> f64 {
@@ -518,7 +518,7 @@ fn third_difference(values: &[f64]) -> f64 {
     }
 }
 
-/// Whether neighbouring samples differ by noise. A coarse column that rarely changes does not.
+/// Whether neighbouring samples differ by noise. False for a coarse column that rarely changes.
 fn is_noisy(values: &[f64]) -> bool {
     let (low, high) = range(values);
     let repeated =
@@ -547,13 +547,13 @@ fn moving(recording: &Recording, steps: &[f64]) -> Vec<bool> {
         .collect()
 }
 
-/// Runs of unchanged values that are long enough to be frozen.
+/// Runs of unchanged values that are long enough to count as frozen.
 fn frozen_runs<'a>(recording: &Recording, values: &'a [f64]) -> impl Iterator<Item = Range<usize>> + use<'a> {
     let least = (FROZEN_S / recording.median_step_s().max(1e-9)).round() as usize;
     runs(values).filter(move |run| run.len() >= least.max(FROZEN_SAMPLES))
 }
 
-/// Whether an angle jumps after a run, by far more than the next step: the joint moved during the run.
+/// Whether an angle jumps after a run by far more than its next step: then the joint moved during the run.
 fn ends_in_jump(values: &[f64], run: &Range<usize>, u: f64) -> bool {
     let (Some(after), Some(next)) = (values.get(run.end), values.get(run.end + 1)) else { return false };
     let jump = (after - values[run.start]).abs();
@@ -592,8 +592,8 @@ pub(super) fn step(values: &[f64]) -> f64 {
     changes.get(changes.len() / 20).copied().unwrap_or(0.0)
 }
 
-/// Step between the levels of a column, which are its repeated values: the sensor's last bit. It is that also
-/// after interpolation to another clock, which leaves changes of parts of a bit. Zero with few levels.
+/// Step between the levels of a column, which are its repeated values: the sensor's last bit. Interpolation
+/// to another clock, which leaves fractions of a bit, does not change it. Zero with few levels.
 fn level_step(values: &[f64]) -> f64 {
     let levels: Vec<f64> = runs(values).filter(|run| run.len() > 1).map(|run| values[run.start]).collect();
     if levels.len() < LEAST_LEVELS { 0.0 } else { step(&levels) }

@@ -1,8 +1,8 @@
 //! Time stamps that are not the times of the samples.
 //!
-//! Why: many recorders stamp a row when it arrives, not when it was measured. A moving joint then seems to
-//! jump, and least squares takes the noisy acceleration for a small inertia. Irregular sampling with right
-//! stamps does no harm. The angles themselves tell the two apart.
+//! Why: many recorders stamp a row at its arrival, not at its measurement. A moving joint then seems to jump,
+//! and the noisy acceleration makes inertias too small in least squares. Irregular sampling with right stamps
+//! does no harm. The angles themselves distinguish the two.
 //!
 //! ```text
 //! r_i     = q_i minus the cubic through two neighbours on either side, over the deviation of unit noise
@@ -16,9 +16,9 @@
 //!
 //! Fast and slow are the upper and lower third of the speeds; r^2 is the square of a median absolute
 //! deviation, so outliers and encoder steps do not count. The share is the relative error of an inertia
-//! (errors in variables), by the pass band of the row filter. Cost: linear in the samples, but for sorts.
-//! Known limits: stamps that are wrong by a constant are a delay of all columns and change nothing; drifts
-//! slower than half a second do not show.
+//! (errors in variables), by the pass band of the row filter. Cost: linear in the samples, except sorts.
+//! Known limits: a constant error of the stamps delays all columns alike and changes nothing; drifts slower
+//! than half a second do not show.
 
 use std::f64::consts::TAU;
 
@@ -29,12 +29,12 @@ use crate::run::doubt::samples::median;
 /// Finding of wrong time stamps.
 pub const TIME_STAMPS: &str = "time_stamps";
 
-/// Error of the stamps that never matters, in median steps.
+/// Error of the stamps that is always negligible, in median steps.
 const HARMLESS_STEPS: f64 = 0.1;
-/// Error left on an even clock, over that of the stamps, below which the even clock is believed.
+/// Error on an even clock over that of the stamps, below which the even clock is used as the reference.
 const EVEN_SHARE: f64 = 0.7;
-/// Largest error of an inertia by the stamps. On recordings of 20 s an inertia is known to 0.3 % at best;
-/// with a share of 0.3 % parameters moved by 1.7 sigma, with 0.9 % by 4.3.
+/// Largest error of an inertia by the stamps. Recordings of 20 s determine an inertia to 0.3 % at best. With
+/// a share of 0.3 % parameters shifted by 1.7 sigma, with 0.9 % by 4.3.
 const LARGEST_SHARE: f64 = 0.004;
 /// Error of the stamps from which rows of different times are mixed, s: a period of the 500 Hz grid.
 const LARGEST_ERROR_S: f64 = 0.002;
@@ -94,7 +94,7 @@ pub fn examine(recording: &Recording, bandwidth_hz: f64) -> Option<SampleFinding
     })
 }
 
-/// Speed about each sample that has two neighbours on either side, rad/s.
+/// Speed at each sample that has two neighbours on either side, rad/s.
 fn speeds(time: &[f64], angle: &[f64], median_step: f64) -> Vec<f64> {
     let half = ((SPEED_S / median_step).round() as usize).max(2);
     (2..angle.len() - 2)
@@ -126,7 +126,7 @@ fn time_error(clock: &[f64], angle: &[f64], speeds: &[f64]) -> Option<f64> {
     (difference > 1e-6).then(|| ((noisy - quiet).max(0.0) / difference).sqrt())
 }
 
-/// Distance of a sample from the cubic through its four neighbours, over that of unit noise.
+/// Distance of a sample from the cubic through its four neighbours, relative to that of unit noise.
 fn residual(clock: &[f64], angle: &[f64], sample: usize) -> f64 {
     let neighbours = [sample - 2, sample - 1, sample + 1, sample + 2];
     let (mut distance, mut noise) = (0.0, 1.0);

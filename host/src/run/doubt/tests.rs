@@ -115,7 +115,7 @@ fn estimate(doubts: &Doubts<2, BASE>, name: &str, joint: Option<usize>) -> (f64,
 }
 
 #[test]
-fn a_right_recording_raises_no_doubt_and_its_misfit_is_noise() {
+fn a_right_recording_has_no_finding_and_its_misfit_is_noise() {
     for seed in 0..4 {
         let doubts = doubts(&question(vec![motion([0.0; 2], seed)]));
         assert!(refused(&doubts).is_empty(), "{:?}", refused(&doubts));
@@ -200,7 +200,7 @@ fn scales_and_gravity_are_found_at_their_size() {
 }
 
 #[test]
-fn a_sign_that_changes_midway_is_found_with_its_place() {
+fn a_sign_that_changes_midway_is_found_with_its_time() {
     for share in [0.25, 0.5, 0.75] {
         let mut flipped = motion([0.0; 2], 1);
         let from = (share * flipped.torque.len() as f64) as usize;
@@ -235,7 +235,7 @@ fn units_signs_and_columns_are_named() {
 }
 
 #[test]
-fn a_push_is_no_direction() {
+fn a_push_is_not_taken_for_a_direction() {
     let mut pushed = motion([0.0; 2], 1);
     for (index, torques) in pushed.torque[4000..4300].iter_mut().enumerate() {
         let pulse = 15.0 * (std::f64::consts::PI * index as f64 / 300.0).sin();
@@ -247,7 +247,7 @@ fn a_push_is_no_direction() {
 }
 
 #[test]
-fn a_short_motion_has_no_answer() {
+fn a_motion_with_too_few_rows_has_no_result() {
     let mut short = motion([0.0; 2], 1);
     short.position.truncate(600);
     short.torque.truncate(600);

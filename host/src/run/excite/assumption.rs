@@ -30,9 +30,9 @@ pub fn assumed(leg: &LegFile, assumption: Assumption) -> Result<(LegFile, &'stat
     if !prior && !has(&|joint| joint.truth.is_some()) {
         let missing = match assumption {
             Assumption::Best => {
-                "needs a prior for every joint (inertia and friction to reckon the torque with)"
+                "needs a `prior` for every joint: inertia and friction to compute the torque"
             }
-            Assumption::Truth => "has no truth for every joint",
+            Assumption::Truth => "needs a `truth` for every joint",
         };
         return Err(leg.error(missing));
     }

@@ -78,8 +78,8 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             estimator: Estimator::Plain,
             ..SimulationOptions::of_seed(1)
         };
-        // Noise belongs to the sensors, which already exist and can be measured at rest. The
-        // simulated leg's noise is therefore used even if its torque is not.
+        // Noise is a property of the sensors, which already exist and can be measured at rest. The simulated
+        // leg's noise is therefore used even if its torque is not.
         let simulated = file.joints.iter().all(|joint| joint.truth.is_some());
         let noise = if simulated {
             Context::<N, B>::new(file, &simulation)?.noise
@@ -115,7 +115,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         Ok(Self { leg, assumed: word, context, scorer, torque_limit, noise: origin })
     }
 
-    /// Rejects an expected sigma if the noise it follows from is not stated.
+    /// Rejects an expected sigma if the noise behind it is not stated.
     ///
     /// # Errors
     /// Names the joint, the keys and the option.
@@ -130,7 +130,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         )))
     }
 
-    /// Limits of a design.
+    /// Leg, scorer, configuration and limits of a design.
     #[must_use]
     pub fn frame(&self) -> Frame<'_, N, B> {
         Frame {
@@ -153,7 +153,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     /// keep the limits.
     ///
     /// # Errors
-    /// Describes the fault, without the file's name.
+    /// Describes the error, without the file's name.
     pub fn given(&self, given: &Excitation) -> Result<Candidate<N>, ToolError> {
         let (table, motion) = (given.table::<N>(&self.leg).map_err(ToolError::input)?, given.motion()?);
         let proof = self.context.configuration.prove(motion);
@@ -163,13 +163,13 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             let most = demand.high_nm.max(-demand.low_nm);
             if !(most <= self.torque_limit[joint]) {
                 return Err(ToolError::input(format!(
-                    "joint {}: the motion takes {most:.1} N m by the {}, the limit is {:.1}",
+                    "joint {}: the motion needs {most:.1} N m by the {}, limit {:.1} N m",
                     self.leg.joints[joint].name, self.assumed, self.torque_limit[joint]
                 )));
             }
             if demand.cut_nm > 0.0 {
                 return Err(ToolError::input(format!(
-                    "joint {}: too fast near an end of its range to stop there; the monitor would take {:.1} N m from it",
+                    "joint {}: too fast near an end of its range to stop there; the monitor would reduce its torque by {:.1} N m",
                     self.leg.joints[joint].name, demand.cut_nm
                 )));
             }
@@ -186,7 +186,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         let limits = self.context.configuration.envelope();
         let motion = random_excitation(&self.context.background.model, &limits, period, cycles)?;
         let table = table_of(&motion);
-        // One tick of rounding must not cost a cycle.
+        // One tick of rounding must not remove a cycle.
         let fitting = ((steady + 0.01) / f64::from(table.period_s)) as u32;
         let table = ExcitationTable { cycles: cycles.min(fitting.max(1)), ..table };
         let demand = demand(&self.scorer, &self.context.configuration, &motion);

@@ -8,8 +8,8 @@
 //! the most informative of them is the design
 //! ```
 //!
-//! Why several paces: the best speed is a trade-off of inertia, friction, limits and rows lost at
-//! reversals. A slow and a fast motion are different landscapes, and the swarm need not jump between them.
+//! Several paces are tried, because the best speed is a trade-off of inertia, friction, limits and rows lost
+//! at reversals. A slow and a fast motion have different costs, and the swarm need not jump between them.
 //! Cost: [`DesignOptions::evaluations`] curves of about 0.2 ms in all; one run on the assumed leg per pace.
 //!
 //! Known limits: the search ends by count, not at a proved optimum; another seed gives a similar
@@ -34,8 +34,8 @@ pub const BLEND_S: f32 = 1.0;
 /// Shortest cycle, s: its highest harmonic lies at a third of the position loop's 6 Hz, so the leg
 /// can follow.
 const SHORTEST_PERIOD_S: f64 = 3.0;
-/// Largest share of the rows' bandwidth for the highest harmonic: products of two harmonics still
-/// lie in the flat band, 0.55 of it.
+/// Largest share of the rows' bandwidth for the highest harmonic: products of two harmonics still lie in the
+/// flat band, 0.55 of the bandwidth.
 const BANDWIDTH_SHARE: f64 = 0.275;
 /// Longest cycle, s; slower ones hardly move.
 const LONGEST_PERIOD_S: f64 = 12.0;
@@ -49,9 +49,9 @@ const CAPACITY: usize = 3 * PER_JOINT;
 const TORQUE_PENALTY: f64 = 1e3;
 /// Evaluations between two updates of the progress bar.
 const SLICE: u32 = 100;
-/// Rounding of the coefficients, rad: the file holds exactly what was proved.
+/// Rounding of the coefficients, rad: the file contains exactly the proved values.
 const GRID_RAD: f64 = 1e-6;
-/// Factor per shrinking of a motion with too much torque, and limit of the steps.
+/// Factor per reduction of a motion with too much torque, and limit of the steps.
 const SHRINK: f32 = 0.98;
 const SHRINKINGS: u32 = 60;
 
@@ -69,7 +69,7 @@ pub struct DesignOptions {
 /// Limits of a design.
 #[derive(Clone, Debug)]
 pub struct Frame<'a, const N: usize, const B: usize> {
-    /// Leg, for messages.
+    /// Leg, named in messages.
     pub leg: &'a LegFile,
     /// Scores a curve.
     pub scorer: &'a Scorer<N, B>,
@@ -130,7 +130,7 @@ fn paces(duration_s: f64, bandwidth_hz: f64) -> Vec<(f64, u32)> {
         .filter(|(period, _)| *period <= LONGEST_PERIOD_S)
         .collect();
     let (Some(first), Some(last)) = (all.first(), all.last()) else { return Vec::new() };
-    // Even ratios from the slowest to the quickest.
+    // Even ratios from the slowest to the fastest.
     let ratio = (f64::from(last.1) / f64::from(first.1)).ln() / (MOST_PACES - 1) as f64;
     let mut paces: Vec<(f64, u32)> = Vec::new();
     for step in 0..MOST_PACES {

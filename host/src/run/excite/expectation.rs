@@ -6,14 +6,14 @@
 //! record --> the firmware's weights, covariance, status
 //! ```
 //!
-//! Why a whole run and not a formula: the rows that count depend on where friction holds a joint, and that
-//! on the position loop. One noise-free run with the real filter chain shows them in a tenth of a second.
-//! The mean residual from noise is known ((I5) read backwards) and is added. All later steps are the
-//! firmware's own code: this sigma is the one that an identification reports, without its scatter.
+//! A whole run replaces a formula: the rows that count depend on where friction holds a joint, and that
+//! depends on the position loop. One noise-free run with the real filter chain shows them in a tenth of a
+//! second. The mean residual from noise is known ((I5) read backwards) and is added. All later steps are the
+//! firmware's own code. This sigma is therefore the one that an identification reports, without its scatter.
 //!
-//! The run is undisturbed, so every row has the same weight (`Estimator::Plain`). Without noise the
-//! robust estimator would take each reversal for a disturbance. On data with noise only it costs
-//! less than a hundredth of sigma.
+//! The run is undisturbed, so every row has the same weight (`Estimator::Plain`). Without noise the robust
+//! estimator would treat each reversal as a disturbance. On data with noise only it costs less than a
+//! hundredth of sigma.
 //!
 //! The run also shows the error without noise (`systematic`): its parameters minus the assumed ones.
 //! Encoder steps, sticking and the drive's lag cause it. The value is one sample of an error that depends
@@ -42,7 +42,7 @@ pub struct Rehearsal<const N: usize, const B: usize> {
     assumed: [f64; B],
     /// Standard deviation of each joint's logged torque according to the leg file, N m.
     pub noise_nm: [f64; N],
-    /// Share of each joint's rows excluded because it stands still.
+    /// Share of each joint's rows excluded at standstill.
     pub lost_share: [f64; N],
     /// Extremes of the plant's motion.
     pub seen: [Seen; N],
@@ -106,7 +106,7 @@ pub fn rehearse<const N: usize, const B: usize>(
     let Some(solver) = pair.leg.identification().solver() else {
         return Err(assumed.error("the excitation ended without a record").into());
     };
-    // The selection from data is not known beforehand: every column counts.
+    // The selection by the data is not known in advance: every column counts.
     let record = Record { selection: Selection::all(), ..solver.record().convert::<f64>() };
     let model = context.background.model.clone();
     let assumed = context.background.truth.map_or([0.0; B], |truth| model.base.project(&truth));
@@ -133,8 +133,8 @@ impl<const N: usize, const B: usize> Rehearsal<N, B> {
     }
 }
 
-/// Adds the mean effect of white noise to the residual, so that the firmware's own estimate of the
-/// noise finds it.
+/// Adds the mean effect of white noise to the residual, so that the firmware's own estimate of the noise
+/// finds it.
 fn add_noise<const N: usize, const B: usize>(record: &mut Record<f64, N, B>, noise_nm: &[f64; N]) {
     let information = record.row_information;
     for joint in 0..N {

@@ -10,7 +10,7 @@
 //! | [`design`] | the swarm over the curves |
 //! | [`expectation`] | sigma and status of every parameter, through the firmware's own chain |
 //! | [`run`] | a designed or given motion with its report |
-//! | [`warnings`] | what to know before the motion is run |
+//! | [`warnings`] | read before the motion is run |
 
 pub mod assumption;
 pub mod bench;

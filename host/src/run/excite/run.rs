@@ -41,7 +41,7 @@ pub fn check<const N: usize, const B: usize>(
     motion: &Excitation,
     carried: &[Payload<f64>],
 ) -> Result<(), ToolError> {
-    // First: another leg's motion is the most likely mistake.
+    // First, because another leg's motion is the most likely mistake.
     motion.table::<N>(leg).map_err(|reason| FileError::new(file.display(), reason))?;
     let options = ExciteOptions {
         design: DesignOptions { duration_s: 0.0, seed: 0, evaluations: 0 },
@@ -65,7 +65,7 @@ pub fn excite<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ExciteOptions,
 ) -> Result<Excited, ToolError> {
-    // First: another leg's motion is the most likely mistake.
+    // First, because another leg's motion is the most likely mistake.
     if let Some((file, given)) = &options.given {
         given.table::<N>(leg).map_err(|reason| FileError::new(file.display(), reason))?;
     }
@@ -97,7 +97,7 @@ pub fn excite<const N: usize, const B: usize>(
     match (best, fault) {
         (Some((_, candidate, rehearsal)), _) => Ok(bench.excited(options, &candidate, &rehearsal)),
         (None, Some(error)) => Err(error),
-        (None, None) => Err(ToolError::input("no motion was found")),
+        (None, None) => Err(ToolError::input("no motion was found within the limits of the leg: choose another --duration or --seed")),
     }
 }
 
@@ -130,7 +130,7 @@ fn design<const N: usize, const B: usize>(
     options: &DesignOptions,
 ) -> Result<Vec<Candidate<N>>, ToolError> {
     let progress = ProgressBar::new(u64::from(options.evaluations));
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} curves, {elapsed} gone, {eta} left")
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} curves, {elapsed} elapsed, {eta} left")
     {
         progress.set_style(style);
     }
@@ -148,8 +148,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     ) -> Excited {
         let mut motion = Excitation::of(&self.leg, &candidate.table);
         let expectation = &rehearsal.at_noise(&rehearsal.noise_nm);
-        // All motions are compared at one noise; otherwise the motion with less torque would win by
-        // that alone.
+        // All motions are compared at one noise; otherwise the motion with less torque would always win.
         let designed = rehearsal.at_noise(&self.scorer.noise_nm);
         let at_same_noise =
             |(rehearsal, keeps): (Rehearsal<N, B>, bool)| (rehearsal.at_noise(&self.scorer.noise_nm), keeps);

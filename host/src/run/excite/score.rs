@@ -10,18 +10,18 @@
 //!
 //! `y_i` is the base row of joint i (N m per unit), at 50 Hz along one cycle of the commanded
 //! curve; `b` are the base parameters of the assumed leg. `noise_i` is the noise of the logged
-//! torque in N m, equal for every curve. Noise in percent of a curve's own torque would favour a
-//! leg that hangs where it needs none. This was tried: the hip stayed between 5 and 29 degrees.
+//! torque in N m, equal for every curve. Noise in percent of a curve's own torque would favour a leg that
+//! hangs where it needs no torque: when tried, the hip stayed between 5 and 29 degrees.
 //!
-//! A row counts unless the joint stands still in too much of its window, the rule of
-//! `ident::record::recorder`. Shares of stillness come from speeds at 100 Hz, linear in between, and the
-//! magnitude of the low-pass. The filters themselves are omitted: a curve's harmonics lie in their
-//! flat band ([`crate::run::excite::design`] ensures it).
+//! A row counts unless the joint is at rest in too much of its window, the rule of `ident::record::recorder`.
+//! Shares of standstill come from speeds at 100 Hz, linear in between, and the magnitude of the low-pass. The
+//! filters themselves are omitted: a curve's harmonics lie in their flat band ([`crate::run::excite::design`]
+//! ensures it).
 //!
 //! Source of D-optimality: J. Swevers et al., "Optimal robot excitation and identification", IEEE
 //! Trans. Robotics and Automation 13 (1997), section III.
-//!
-//! Known limits: blends are not counted, and friction holds a real joint a little longer at each
+//! Known limits: blends are not counted. At each reversal friction holds a real joint a little longer than
+//! its command; [`crate::run::excite::expectation`] includes both.
 //! reversal than its command; [`crate::run::excite::expectation`] includes both.
 
 use nalgebra::SMatrix;

@@ -24,12 +24,12 @@ pub fn warnings(
     let mut warnings = Vec::new();
     for ComparedBase { expected, .. } in base {
         let (Some(sigma), Some(systematic)) = (expected.sigma, expected.systematic) else {
-            warnings.push(format!("{}: this motion does not determine it", expected.name));
+            warnings.push(format!("{}: not determined by this motion", expected.name));
             continue;
         };
         if systematic.abs() > SYSTEMATIC_SIGMAS * sigma {
             warnings.push(format!(
-                "{}: off by {:.1} sigma without any noise (encoder steps, friction at reversals): its sigma says too little",
+                "{}: wrong by {:.1} sigma without any noise (encoder steps, friction at reversals): its sigma is too small",
                 expected.name,
                 systematic.abs() / sigma
             ));
@@ -38,37 +38,37 @@ pub fn warnings(
     for parameter in parameters.iter().filter(|parameter| parameter.status == "weak") {
         let sigma = number(parameter.sigma);
         warnings.push(format!(
-            "{}: weak, hardly distinguished from others in this range (sigma {sigma} {})",
+            "{}: weak, hardly distinguishable from others in this range (sigma {sigma} {})",
             parameter.name, parameter.unit
         ));
     }
     for joint in joints {
         if joint.lost_share > LOST_SHARE {
             let percent = 100.0 * joint.lost_share;
-            warnings.push(format!("{}: {percent:.0} % of its rows are lost to stillness", joint.name));
+            warnings.push(format!("{}: {percent:.0} % of its rows are excluded at standstill", joint.name));
         }
         if joint.torque_with_margin_nm > joint.torque_limit_nm {
             warnings.push(format!(
-                "{}: {:.1} N m with the margin, the limit is {:.1}",
+                "{}: {:.1} N m with the margin, limit {:.1} N m",
                 joint.name, joint.torque_with_margin_nm, joint.torque_limit_nm
             ));
         }
         if joint.simulated.limited_ticks > 0 {
             let seconds = f64::from(joint.simulated.limited_ticks) / f64::from(SERVO_RATE_HZ);
             warnings.push(format!(
-                "{}: the monitor takes torque from it for {seconds:.3} s: the motion is not the one that was designed",
+                "{}: the monitor reduces its torque for {seconds:.3} s: the motion differs from the design",
                 joint.name
             ));
         }
     }
     if noise.of == "prior" && noise.percent > 0.0 {
         warnings.push(
-            "the noise is a share of the assumed leg's torque, as wrong as that is: measure it at rest (--torque-noise-nm)"
+            "the noise is a share of the assumed leg's torque and as wrong as that torque: measure it at rest (--torque-noise-nm)"
                 .into(),
         );
     }
     if leg.pushes.is_some() {
-        warnings.push("the wearer's pushes are not in these figures".into());
+        warnings.push("these figures do not include pushes of the wearer".into());
     }
     warnings
 }

@@ -1,9 +1,9 @@
 //! Step to a target beyond the voltage limit, and the recovery.
 //!
-//! On a weak supply of 12 V, 50 A at the joint's top speed need more voltage than is available. At
-//! 1.3 times that speed the back-EMF alone does. The loop is held at the limit for 100 ms, then
-//! gets a target that it can reach. Integrator wind-up would delay the recovery; its time is
-//! compared with the same step at 48 V, where nothing limits.
+//! On a weak supply of 12 V, 50 A at the joint's top speed need more voltage than is available. At 1.3 times
+//! that speed the back-EMF alone exceeds it. The loop is held at the limit for 100 ms, then gets a target
+//! within the limit. Integrator wind-up would delay the recovery. Its time is compared with the same step at
+//! 48 V, where the voltage suffices.
 
 use scarab::units::Volt;
 

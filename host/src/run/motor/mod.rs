@@ -101,7 +101,7 @@ impl Bench {
     pub fn must_hold(&self, rig: &Rig, what: &str, speed: f64) -> Result<(), ToolError> {
         let Some(fault) = rig.axis.fault() else { return Ok(()) };
         Err(ToolError::Refused(format!(
-            "axis `{}` released its bridge ({what}, rotor at {speed:.0} rad/s): {}",
+            "axis `{}` turned its bridge off ({what}, rotor at {speed:.0} rad/s): {}",
             self.joint,
             words::axis_fault(fault)
         )))

@@ -46,7 +46,7 @@ fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
         let (bus, speed) = (rig.stand.supply().voltage(), rig.stand.rotor().speed);
         highest = highest.max(bus);
         let ended = speed < END * bench.top_speed || rig.axis.fault().is_some();
-        // The last period is included: its voltage is the highest if the axis switches off.
+        // The last period is included: where the axis turns off, its voltage is the highest.
         if ended || period.is_multiple_of(STRIDE) {
             time_ms.push(1e3 * period as f64 * PERIOD_S);
             bus_v.push(bus);

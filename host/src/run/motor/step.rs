@@ -115,12 +115,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_response_that_never_arrives_has_no_rise() {
+    fn a_response_below_its_target_has_no_rise_time() {
         assert_eq!(shape(&[0.0, 0.05, 0.3, 0.6]).rise_ms, None);
         assert_eq!(shape(&[0.0; 8]).rise_ms, None);
         // Crossings: 0.1 at 0.5 periods, 0.9 at 4.5.
         let line: Vec<_> = (0..8).map(|period| 0.2 * f64::from(period)).collect();
-        let rise = shape(&line).rise_ms.expect("it arrives");
+        let rise = shape(&line).rise_ms.expect("the response reaches its target");
         assert!((rise - 4e3 * PERIOD_S).abs() < 1e-12, "{rise}");
     }
 }

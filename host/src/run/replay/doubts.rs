@@ -1,4 +1,4 @@
-//! Doubts about the recordings of a replay, and their effect on its report.
+//! Checks the recordings of a replay for errors of the logging chain, and adds the results to its report.
 
 use std::ops::Range;
 
@@ -26,19 +26,19 @@ use crate::run::replay::screening::Screening;
 use crate::run::replay::{ReplayOptions, bandwidth_error, read_all};
 use crate::run::resample::{Resampled, TRUSTED_BANDWIDTH};
 
-/// Misfit over noise up to which the noise explains the misfit, and limits follow from it.
+/// Misfit over noise up to which noise explains the misfit, so that limits follow from the noise.
 const EXPLAINED_BY_NOISE: f64 = 1.3;
-/// Share of a limit of the prior from which a parameter is called at it.
+/// Share of a limit of the prior from which a parameter counts as at the limit.
 const AT_LIMIT: f64 = 0.98;
 
-/// Recordings as the doubts see them: whole, with the time for which each is identified from.
+/// Whole recording, with the duration of its training part.
 pub(super) struct Whole {
     pub recording: Recording,
     pub training_s: f64,
 }
 
-/// Recording with an even clock, and with the torque scaled and moved, as asked. `ratios` are the recorded
-/// torques over the true ones.
+/// Recording with an even clock, and with the torque scaled and delayed, as requested. `ratios` are the
+/// recorded torques over the true ones.
 pub(super) fn corrected(
     mut recording: Recording,
     options: &ReplayOptions,
@@ -61,7 +61,7 @@ pub(super) fn corrected(
     }
     if delays.len() != 1 && delays.len() != joints {
         return Err(ToolError::input(format!(
-            "--torque-delay: {} values; one for all joints, or one for each of {joints}",
+            "--torque-delay: {} values; give one for all joints, or one for each of {joints}",
             delays.len()
         )));
     }
@@ -70,7 +70,7 @@ pub(super) fn corrected(
     let duration = recording.duration_s();
     if let Some(wrong) = late_s.iter().find(|late| !(late.abs() < 0.1 * duration)) {
         return Err(ToolError::input(format!(
-            "--torque-delay {}: less than a tenth of the recording ({:.0} ms) is needed",
+            "--torque-delay {}: the limit is a tenth of the recording ({:.0} ms)",
             1e3 * wrong,
             100.0 * duration
         )));
@@ -118,7 +118,7 @@ pub(super) fn sample_noise<const N: usize>(density: &[Option<f64>; N]) -> [f32; 
         .map(|density| density.map_or(0.0, |density| (density * scarab::ident::SAMPLE_RATE_HZ).sqrt() as f32))
 }
 
-/// Whether noise explains what the best fit of every joint leaves. Only then limits follow from the noise.
+/// Whether noise explains the misfit of every joint's best fit. Only then limits follow from the noise.
 pub(super) fn is_explained_by_noise<const N: usize, const B: usize>(record: &Record<f32, N, B>) -> bool {
     let rows = noise(record);
     (0..N).all(|joint| {
@@ -170,7 +170,7 @@ fn motions<const N: usize>(
     wholes.iter().enumerate().flat_map(parts).unzip()
 }
 
-/// How the angles of the recordings were read: the coarsest of each joint, at the median time of the samples.
+/// Encoders of the recordings' angles: the coarsest of each joint, at the median time of the samples.
 pub(super) fn encoders<const N: usize>(wholes: &[Whole], leg: &LegFile) -> Encoders<N> {
     let steps_s = wholes.iter().map(|whole| whole.recording.median_step_s()).collect();
     let joints = core::array::from_fn(|joint| {
@@ -183,8 +183,8 @@ pub(super) fn encoders<const N: usize>(wholes: &[Whole], leg: &LegFile) -> Encod
     Encoders { joints, sample_s: quantile(steps_s, 0.5) }
 }
 
-/// Bandwidth for a replay that chooses it: the largest at which the encoders' steps do not matter, and which
-/// the recordings' rate allows.
+/// Bandwidth for `--bandwidth auto`: the largest at which the encoders' steps are negligible, and which the
+/// recordings' rate permits.
 pub(super) fn chosen_bandwidth<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
@@ -204,7 +204,7 @@ pub(super) fn chosen_bandwidth<const N: usize, const B: usize>(
     encoders.bandwidth_hz(largest_hz, rows).map_err(|error| bandwidth_error(options.bandwidth_hz, error))
 }
 
-/// Everything that the doubts change a report by.
+/// Data for all checks of the recordings.
 pub(super) struct Subject<'a, const N: usize, const B: usize> {
     pub leg: &'a LegFile,
     pub background: &'a Background<N, B>,
@@ -280,7 +280,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         RecordingsReport { count, sigma: kept.map(|base| scatter[base].into()).collect() }
     }
 
-    /// The question, and the file of each of its motions.
+    /// Input of the checks, and the file of each of its motions.
     fn question(&self) -> (Question<N, B>, Vec<usize>) {
         let (background, solver) = (self.background, self.solver);
         let dropped = &solver.record().selection.dropped;
@@ -295,7 +295,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         };
         let (sine, cosine) = self.leg.joints.first().map_or((0.0, 1.0), |joint| joint.dh.alpha.sin_cos());
         let load = self.load.map(f64::from);
-        // Recorded torque contains the load's.
+        // The recorded torque includes the load's.
         let prior = background.prior.as_ref().map(|prior| {
             let alone = model.base.project(&prior_parameters(prior));
             core::array::from_fn(|base| alone[base] + load[base])
@@ -371,7 +371,7 @@ fn at_prior_limit(run: &RunReport) -> Vec<String> {
     found
 }
 
-/// A wrong sign or unit of the torque is no torque computed from the angle.
+/// Removes the words "computed from the angle" where the sign or unit of the torque is wrong.
 fn correct_words(run: &mut RunReport, cause: &str) {
     if !matches!(
         cause,

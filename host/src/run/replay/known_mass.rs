@@ -1,9 +1,10 @@
-//! Known masses in recordings: a load that is taken off, and a mass that determines the scale of the torques.
+//! Known masses in recordings: a load that is subtracted, and a mass that determines the scale of the
+//! torques.
 //!
-//! A load is taken off the rows of the identification, as on the drive ([`crate::run::scale`]). The doubts
-//! keep it: their sigma and directions do not depend on a constant part of the parameters. A mass in a second
-//! set of recordings determines recorded over true torque ([`scarab::ident::torque_constant_ratio`]). All
-//! torques are then divided by it before anything else.
+//! A load is subtracted from the rows of the identification, as on the drive ([`crate::run::scale`]). The
+//! checks of the logging chain leave it in: their sigma and directions do not depend on a constant part of
+//! the parameters. A mass in a second set of recordings determines recorded over true torque
+//! ([`scarab::ident::torque_constant_ratio`]). All torques are divided by that ratio first.
 
 use std::path::PathBuf;
 
@@ -69,7 +70,7 @@ pub(super) fn load_base<const N: usize, const B: usize>(
     options.load.as_ref().map_or([0.0; B], |load| base_of(background, load))
 }
 
-/// Record of the training recordings as they are.
+/// Record of the unchanged training recordings.
 fn record<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,

@@ -1,18 +1,18 @@
-//! Scatter of the parameters between recordings: each recording is left out once (D3 of docs/method.md).
+//! Scatter of the parameters between recordings: each recording is excluded once (D3 of docs/method.md).
 //!
 //! ```text
 //! sigma^2 = (G - 1) / G sum_g (p_g - mean p)^2        jackknife (Tukey 1958)
 //! ```
 //!
 //! p_g are the parameters without recording g, by the weights of the fit to all G. Why: temperature, posture
-//! and mounting differ between recordings, and segments of one recording share them.
-//! Limit: with two or three recordings the scatter is itself known to a factor of two only.
+//! and mounting differ between recordings, but not between segments of one recording. Limit: two or three
+//! recordings determine the scatter only to a factor of two.
 
 use crate::run::doubt::fit::solve;
 use crate::run::doubt::rows::Equations;
 
-/// Number of recordings identified from, and the standard deviation of each base parameter; `None` where a
-/// recording alone determines a parameter.
+/// Number of training recordings, and the standard deviation of each base parameter; `None` if one recording
+/// alone determines a parameter.
 pub(super) fn leave_one_out<const N: usize, const B: usize>(
     equations: &Equations<N, B>,
     file_of: &[usize],

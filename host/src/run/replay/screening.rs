@@ -1,4 +1,4 @@
-//! Examination of the recordings before anything is identified: copies, and samples that no sensor measured.
+//! Examines the recordings before anything is identified: copies, and samples that no sensor measured.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::run::doubt::stamps;
 /// Reach of the smoothing to each side, in periods of the rows' bandwidth.
 const REACH_PERIODS: f64 = 0.983;
 
-/// What was found in the recordings, and their stretches to be excluded.
+/// Findings about the recordings, and their stretches to be excluded.
 pub(super) struct Screening {
     findings: Vec<SampleFinding>,
     spans: Vec<(PathBuf, Vec<Range<f64>>)>,
@@ -33,7 +33,7 @@ impl Screening {
         Self { findings, spans }
     }
 
-    /// Prints what was found and does not refuse.
+    /// Prints the findings that do not refuse.
     pub(super) fn warn(&self) {
         let findings = self.findings.iter().filter(|finding| !finding.refuses && finding.name != QUANTISED);
         findings.for_each(|finding| crate::run::replay::warn(Path::new(&finding.file), &finding.text));
@@ -41,7 +41,7 @@ impl Screening {
 
     /// Grid points of a recording, from `start_s` at 500 Hz, that touch an excluded stretch.
     pub(super) fn excluded(&self, recording: &Recording, start_s: f64) -> Vec<Range<usize>> {
-        // The interpolation of a point sees two samples on either side.
+        // The interpolation at a point uses two samples on either side.
         let margin_s = 2.0 * recording.median_step_s();
         let spans =
             self.spans.iter().filter(|(file, _)| *file == recording.file).flat_map(|(_, spans)| spans);
@@ -65,9 +65,8 @@ impl Screening {
     }
 }
 
-/// Refuses recordings that hold the same samples, whatever their names: twice the same data are no second
-/// measurement, and a motion that was identified from proves nothing when it is held out. `option` names
-/// the others.
+/// Refuses recordings that contain the same samples, whatever their names. The same data twice are not a
+/// second measurement, and a training motion proves nothing when it is held out. `option` names the others.
 pub(super) fn refuse_copies(
     training: &[Recording],
     others: &[Recording],
@@ -106,14 +105,14 @@ pub(super) fn refuse_copies(
     Ok(())
 }
 
-/// Where a stream of grid points breaks off: at another file, and behind an excluded stretch.
+/// Positions at which a stream of grid points breaks: at another file, and after an excluded stretch.
 #[derive(Default)]
 pub(super) struct Continuity {
     before: Option<(usize, f64)>,
 }
 
 impl Continuity {
-    /// Whether this point does not follow the one before it.
+    /// Whether this point does not continue the previous one.
     pub(super) fn breaks(&mut self, file: usize, time_s: f64) -> bool {
         let before = self.before.replace((file, time_s));
         before

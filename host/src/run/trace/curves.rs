@@ -1,7 +1,7 @@
 //! The log of a trace as curves, for figures: measured and predicted torque, residuals.
 //!
-//! The reported identification's samples pass the filter chain once more, as those of a simulated run do. A
-//! motion with a missing sample is not drawn: the filter would join samples that do not belong together.
+//! The reported identification's samples pass the filter chain once more, as in a simulated run. A motion
+//! with a missing sample is not drawn, because the filter would join separate samples.
 
 use scarab::ident::no_stribeck;
 use scarab::model::Parameter;
@@ -20,7 +20,7 @@ use crate::rig::pair::{PENDING, TAPS};
 use crate::run::trace::report::{TracedResult, known};
 use crate::with_leg_size;
 
-/// Curves of the last complete result; no motions where none was logged.
+/// Curves of the last complete result; empty where no motion was logged.
 ///
 /// # Errors
 /// The result belongs to another leg.

@@ -42,7 +42,7 @@ pub fn write(trace: &Trace, leg: &LegFile, motion: u8, path: &Path) -> Result<Wr
         of_motion().filter(|(results, _)| results == last).map(|(_, sample)| sample).collect();
     if let Some(sample) = samples.iter().find(|sample| sample.counts.len() != leg.joints.len()) {
         let (recorded, own) = (sample.counts.len(), leg.joints.len());
-        return Err(ToolError::input(format!("--csv: the log is of {recorded} joints, the leg has {own}")));
+        return Err(ToolError::input(format!("--csv: the log has {recorded} joints, the leg has {own}")));
     }
     // A restarted identification logs its motion twice: the last one counts.
     let begins = samples.windows(2).rposition(|pair| is_another_motion(pair[0].tick, pair[1].tick));
@@ -73,7 +73,7 @@ fn number(sample: &Sample) -> Option<u8> {
     }
 }
 
-/// Returns whether the ticks restarted, or the log paused for longer than a gap may last.
+/// Returns whether the ticks restarted, or the log paused for longer than a permitted gap.
 fn is_another_motion(before: u32, after: u32) -> bool {
     const LONGEST_TICKS: u32 = scarab::servo::SERVO_RATE_HZ;
     after <= before || after - before > LONGEST_TICKS

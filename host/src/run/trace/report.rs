@@ -73,7 +73,7 @@ fn check_leg(trace: &Trace, leg: &LegFile) -> Result<(), ToolError> {
 }
 
 fn other(leg: &LegFile, reason: impl std::fmt::Display) -> ToolError {
-    ToolError::input(format!("leg `{}` is not that of the trace: {reason} (--leg)", leg.name))
+    ToolError::input(format!("leg `{}` is not that of the trace: {reason}. Name the trace's leg with --leg", leg.name))
 }
 
 fn of_size<const N: usize, const B: usize>(
@@ -186,7 +186,7 @@ impl<const N: usize, const B: usize> TracedResult<'_, N, B> {
         }
         for record in &self.records.covariance {
             if record.row >= rank || record.column >= rank {
-                return Err(other(self.leg, "an element of the covariance lies beyond its base parameters"));
+                return Err(other(self.leg, "the covariance has more rows than there are base parameters"));
             }
             estimate.covariance[record.row][record.column] = record.value;
             estimate.covariance[record.column][record.row] = record.value;
@@ -330,7 +330,7 @@ fn finding(record: &crate::formats::trace::result_records::Finding) -> Result<Fi
     let tests = Test::ALL.into_iter().find(|test| test.name() == record.test);
     let reasons = Reason::ALL.into_iter().find(|reason| reason.name() == record.reason);
     let (Some(test), Some(reason)) = (tests, reasons) else {
-        let words = format!("the finding `{}` ({}) is of a later version", record.test, record.reason);
+        let words = format!("the finding `{}` ({}) is unknown: the trace comes from a later version", record.test, record.reason);
         return Err(ToolError::input(words));
     };
     let evidence = Evidence {
@@ -349,7 +349,7 @@ fn finding(record: &crate::formats::trace::result_records::Finding) -> Result<Fi
 fn word(record: &str, all: &[&'static str], what: &str) -> Result<&'static str, ToolError> {
     all.iter().find(|word| **word == record).copied().ok_or_else(|| {
         ToolError::input(format!(
-            "the {what} `{record}` is not one of {}: a later version's trace",
+            "the {what} `{record}` is not one of {}: the trace comes from a later version",
             all.join(", ")
         ))
     })

@@ -12,7 +12,7 @@ use crate::formats::trace::read::Trace;
 
 /// Bytes read at a time.
 const PIECE: usize = 64 * 1024;
-/// Limit of a line, bytes. A longer one is no record.
+/// Limit of a line, bytes. A longer line is skipped.
 const LONGEST_LINE: usize = 64 * 1024;
 
 /// Reads a file, or `-` for standard input; writes the records as lines to `text`.
@@ -89,8 +89,8 @@ impl StreamReader {
         Ok(())
     }
 
-    /// Adds the line to the trace. An over-long line counts as one without a record: its beginning could pass
-    /// for a whole record.
+    /// Adds the line to the trace. An over-long line counts as one without a record, because its beginning
+    /// could be read as a whole record.
     fn end_line(&mut self) -> Result<(), ToolError> {
         if self.line.len() > LONGEST_LINE {
             self.line.clear();
@@ -116,13 +116,13 @@ impl StreamReader {
         if self.trace.records == 0 {
             let hint = match &skipped {
                 Some(_) if decoded == 0 => {
-                    ": no frame of this image; is --image what ran there, and the input its stream and not text?"
+                    ": no frame of this image. Check that --image is the image that ran, and that the input is its stream, not text"
                 }
-                None if self.zeros > 0 => ": it is not text; a defmt stream needs --image ELF",
+                None if self.zeros > 0 => ": the input is not text; a defmt stream needs --image ELF",
                 _ => "",
             };
             let source = source.display();
-            return Err(ToolError::input(format!("{source}: holds no record of a trace{hint}")));
+            return Err(ToolError::input(format!("{source}: contains no trace record{hint}")));
         }
         if let Some(words) = skipped.and_then(|skipped| skipped.words()) {
             self.trace.events.push(Event { time_s: None, weight: Weight::Warning, words });
@@ -152,7 +152,7 @@ pub fn preface(trace: &Trace) -> String {
         "records: {} read, {} lost{}{}",
         trace.records,
         trace.lost(),
-        count(trace.unknown, "of a kind that is not known here"),
+        count(trace.unknown, "of an unknown kind"),
         count(lines_without, "lines without a record"),
     ));
     if trace.results.len() > 1 {

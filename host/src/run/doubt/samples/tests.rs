@@ -201,7 +201,7 @@ fn values_that_are_repeated_are_found_with_their_holding_time() {
 }
 
 #[test]
-fn a_column_at_half_the_rate_is_named_and_not_refused() {
+fn a_column_at_half_the_rate_is_reported_but_not_refused() {
     let mut held = recording(3.8e-4, 0.3);
     let torque = &mut held.joints[0].torque_nm;
     for sample in 0..torque.len() {
@@ -232,7 +232,7 @@ fn frozen_stretches_are_excluded() {
 }
 
 #[test]
-fn a_torque_that_stands_still_alone_is_frozen() {
+fn a_constant_torque_beside_a_moving_leg_is_frozen() {
     let mut frozen = recording(3.8e-4, 0.3);
     let torque = &mut frozen.joints[0].torque_nm;
     let value = torque[3_000];

@@ -34,26 +34,26 @@ fn recording(sampled_s: f64, stamped_s: f64) -> Recording {
 }
 
 #[test]
-fn irregular_sampling_with_right_stamps_is_no_fault() {
+fn irregular_sampling_with_right_stamps_raises_no_finding() {
     for sampled in [0.0, 1e-4, 3e-4] {
         assert_eq!(examine(&recording(sampled, 0.0), 16.0), None, "{sampled} s");
     }
 }
 
 #[test]
-fn stamps_off_by_less_than_a_tenth_of_a_sample_never_matter() {
+fn stamps_off_by_less_than_a_tenth_of_a_sample_raise_no_finding() {
     for stamped in [2e-5, 1e-4] {
         assert_eq!(examine(&recording(0.0, stamped), 25.0), None, "{stamped} s");
     }
 }
 
 #[test]
-fn the_error_of_wrong_stamps_is_found_within_its_sigma_and_refused_where_inertias_suffer() {
+fn the_error_of_wrong_stamps_is_estimated_and_refused_where_inertias_are_wrong() {
     let found = |stamped: f64, bandwidth_hz: f64| {
         examine(&recording(0.0, stamped), bandwidth_hz).expect("wrong stamps")
     };
     let finding = found(5e-4, 8.0);
-    // The line through each half second takes two of 250 degrees of freedom.
+    // The line through each half second uses two of 250 degrees of freedom.
     assert!((finding.value - 5e-4).abs() < 3.0 * finding.sigma.expect("known") + 2e-6, "{finding:?}");
     assert!(!found(5e-4, 4.0).refuses);
     assert!(found(5e-4, 25.0).refuses);
