@@ -139,7 +139,7 @@ pub fn main() -> ExitCode {
     perform(words, |cli: &Cli| run(&cli.command))
 }
 
-/// Parses these words, checks their files, runs the command and prints an error; returns the exit code.
+/// Parses these words, checks their files, and runs the command. Prints an error; returns the exit code.
 pub fn perform<C: CommandFactory + FromArgMatches>(
     words: Vec<OsString>,
     run: impl FnOnce(&C) -> Result<u8, ToolError>,
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn every_help_has_an_example_that_parses_and_lines_that_fit() {
+    fn every_help_has_a_valid_example_and_lines_within_100_columns() {
         let cli = Cli::command();
         for command in cli.get_subcommands() {
             let text = help(command.clone().max_term_width(super::HELP_WIDTH));
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn cargo_sim_passes_the_word_that_starts_the_main_job() {
+    fn the_alias_cargo_sim_starts_the_main_job() {
         let config: toml::Table = include_str!("../../.cargo/config.toml").parse().expect("a configuration");
         let alias = config["alias"]["sim"].as_str().expect("an alias");
         assert!(alias.ends_with(&format!("-- {BY_CARGO}")), "{alias}");

@@ -168,7 +168,7 @@ fn too_wide_a_bandwidth_is_named() {
     assert_eq!(resampled.bandwidth_warning(8.0), None);
     assert_eq!(
         resampled.bandwidth_warning(12.0).expect("a warning").to_string(),
-        "a bandwidth of 12 Hz is more than a recording at 50 Hz carries; up to 10.0 Hz can be trusted"
+        "a bandwidth of 12 Hz is too large for a recording at 50 Hz: choose at most 10.0 Hz"
     );
 }
 

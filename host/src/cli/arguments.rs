@@ -1,6 +1,6 @@
 //! Files on the command line.
 //!
-//! Why one place: a command that overwrites its own recording destroys data for good. The files of every
+//! Why in one place: a command that overwrites its own recording destroys the data. The files of every
 //! command are therefore checked before any computation.
 //!
 //! | part | contents |
@@ -8,8 +8,8 @@
 //! | [`role`] | types of arguments that define the use of a file |
 //! | [`mod@check`] | detects files that a command would overwrite or cannot write |
 //!
-//! Known limits: names that differ in case only count as different files, also on file systems that
-//! ignore case. Redirections of the shell are not checked.
+//! Known limits: names that differ in case only count as different files, even on file systems that ignore
+//! case. Redirections of the shell are not checked.
 
 pub mod check;
 pub mod role;

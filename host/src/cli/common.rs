@@ -38,9 +38,9 @@ impl From<PlanArgument> for Plan {
 /// Treatment of disturbances.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum EstimatorArgument {
-    /// Outliers are replaced, disturbed stretches weigh less, Stribeck friction is searched for.
+    /// Replace outliers, reduce the weight of disturbed stretches, and search Stribeck friction.
     Robust,
-    /// Every sample has the same weight.
+    /// Weight every sample alike.
     Plain,
 }
 
@@ -61,29 +61,29 @@ pub struct Common {
     /// Seed of the swarm's random numbers.
     #[arg(long, help_heading = "Identification")]
     pub swarm_seed: Option<u64>,
-    /// One-time or sequential.
+    /// Order of the estimate.
     #[arg(long, value_enum, default_value = "one-time", help_heading = "Identification")]
     pub plan: PlanArgument,
     /// Treatment of outliers and disturbances.
     #[arg(long, value_enum, default_value = "robust", help_heading = "Identification")]
     pub estimator: EstimatorArgument,
-    /// none, file, or wrong:PERCENT; the leg file's unless given.
+    /// Prior of the search: none, file, or wrong:PERCENT. Default: that of the leg file.
     #[arg(long, help_heading = "Identification")]
     pub prior: Option<PriorChoice>,
-    /// Temperature of the drives, degrees Celsius (-40 to 125), stored with the result; the leg
-    /// file's unless given.
+    /// Temperature of the drives, degrees Celsius (-40 to 125), stored with the result. Default: that of the
+    /// leg file.
     #[arg(long, value_name = "C", allow_negative_numbers = true, value_parser = temperature::parse, help_heading = "Identification")]
     temperature: Option<f64>,
-    /// Write the report here, for exit codes 0 and 3.
+    /// Write the report as JSON here, for exit codes 0 and 3.
     #[arg(long, help_heading = "Output")]
     pub json: Option<Output>,
     /// Print all fourteen parameters of every joint with their status.
     #[arg(long, help_heading = "Output")]
     pub parameters: bool,
-    /// Draw the run into this directory, as SVG; a run without any arguments draws into target/sim.
+    /// Draw the run into this directory, as SVG files.
     #[arg(long, help_heading = "Output")]
     pub figures: Option<OutputFolder>,
-    /// Write the run as one HTML page here: figures, tables, verdict; needs no network, can be printed.
+    /// Write the run as one HTML page here: figures, tables, verdict.
     #[arg(long, help_heading = "Output")]
     pub report: Option<Output>,
 }

@@ -30,7 +30,7 @@ pub fn run(arguments: &CompareArguments) -> Result<u8, ToolError> {
     let file = arguments.before.display().to_string();
     let temperature = after.conditions.temperature_c;
     let compared = comparison::compare(&before, &file, &after.base_set, temperature)
-        .ok_or_else(|| ToolError::input(format!("{file}: no base parameter is in both models")))?;
+        .ok_or_else(|| ToolError::input(format!("{file}: the models have no base parameter in common")))?;
     if let Some(path) = &arguments.json {
         write_json(path, &compared)?;
     }

@@ -27,21 +27,21 @@ pub struct EmulateArguments {
     /// Seed of noise and swarm.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
-    /// Keep the records here as the image sent them, for `cargo sim trace`.
+    /// Write the records here, as sent by the image, for `cargo sim trace`.
     #[arg(long, value_name = "FILE")]
     trace: Option<Output>,
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Write the 500 Hz log of the motion identified from here, in the format that replay reads;
-    /// the image then sends every sample.
+    /// Write the 500 Hz log of the training motion here, as a recording for replay; the image then sends
+    /// every sample.
     #[arg(long, value_name = "FILE")]
     csv: Option<Output>,
-    /// Crash while the leg identifies, and evaluate it. Exit code 0 if the bridges were off first,
-    /// the record survived and the next start refused to enable; else 1.
+    /// Crash while the leg identifies, and evaluate the crash. Exit code 0 if the bridges were off first, the
+    /// record survived, and the next start refused to enable; else 1.
     #[arg(long, value_name = "KIND", conflicts_with_all = ["json", "csv"])]
     crash: Option<CrashKind>,
-    /// Servo tick (of 4,000 per second) in which it crashes.
+    /// Servo tick of the crash, 4,000 per second.
     #[arg(long, value_name = "TICK", requires = "crash", default_value_t = 4_000)]
     crash_tick: u32,
 }
@@ -63,7 +63,7 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
         output::print(&format!("log: {}, {} samples\n\n", csv.display(), written.samples))?;
     }
     let Some(loops) = trace.statistics.loops() else {
-        return Err(ToolError::input(format!("the image told nothing of its loops\n{attention}")));
+        return Err(ToolError::input(format!("the image sent no record `loops`\n{attention}")));
     };
     let identification =
         run_report(&trace, &leg).map_err(|error| ToolError::input(format!("{error}\n{attention}")))?;

@@ -23,13 +23,13 @@ use crate::with_leg_size;
 pub struct ExciteArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// Write the motion here, as TOML that identify takes.
+    /// Write the motion here, as TOML for identify.
     #[arg(long)]
     out: Option<Output>,
-    /// Write the motion here, as Rust source with a constant for an image.
+    /// Write the motion here, as a Rust constant for an image.
     #[arg(long = "const")]
     constant: Option<Output>,
-    /// Seconds of motion, blends included.
+    /// Duration of the motion with its blends, s.
     #[arg(long, default_value_t = 22.0, allow_negative_numbers = true)]
     duration: f64,
     #[command(flatten)]
@@ -37,7 +37,7 @@ pub struct ExciteArguments {
     /// Assumed error of each base parameter in the bound on torque, percent.
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     torque_margin: f64,
-    /// Assume the truth of the leg file, not its prior.
+    /// Assume the truth of the leg file instead of its prior.
     #[arg(long)]
     assume_truth: bool,
     /// Check this motion instead of designing one.
@@ -46,10 +46,10 @@ pub struct ExciteArguments {
     /// Seed of the swarm's random numbers.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
-    /// Curves the swarm may evaluate.
+    /// Largest number of curves that the swarm evaluates.
     #[arg(long, default_value_t = EVALUATIONS, value_parser = clap::value_parser!(u32).range(600..=10_000_000))]
     evaluations: u32,
-    /// Write the report here.
+    /// Write the report as JSON here.
     #[arg(long)]
     json: Option<Output>,
 }
@@ -63,11 +63,11 @@ pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
     let torque_noise_percent = arguments.noise.percent()?;
     let percentage = |option: &str, value: f64, most: f64| {
         let fits = (0.0..=most).contains(&value);
-        if fits { Ok(()) } else { Err(ToolError::input(format!("{option}: a percentage from 0 to {most}"))) }
+        if fits { Ok(()) } else { Err(ToolError::input(format!("{option}: must be a percentage from 0 to {most}"))) }
     };
     percentage("--torque-margin", arguments.torque_margin, 200.0)?;
     if !(arguments.duration > 0.0 && arguments.duration <= LONGEST_S) {
-        return Err(ToolError::input(format!("--duration: above 0 and at most {LONGEST_S} s")));
+        return Err(ToolError::input(format!("--duration: must be above 0 and at most {LONGEST_S} s")));
     }
     let given = match &arguments.excitation {
         Some(file) => Some((file.to_path_buf(), Excitation::load(file)?)),

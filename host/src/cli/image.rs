@@ -18,13 +18,13 @@ use crate::leg::setup::DEFAULT_SEED;
 pub struct ImageOptions {
     #[command(flatten)]
     leg: LegOptions,
-    /// The image sends every sample of the 500 Hz log.
+    /// Send every sample of the 500 Hz log.
     #[arg(long)]
     log: bool,
-    /// A brake resistor is connected: the image uses it.
+    /// Use the brake resistor that is connected.
     #[arg(long)]
     brake_resistor: bool,
-    /// 24 or 56: voltage of a board without a factory version; a board with one keeps its own.
+    /// Voltage of a board without a factory version: 24 or 56. A board with a version keeps its own.
     #[arg(long, value_name = "V", value_parser = board_volts)]
     board_volts: Option<u8>,
 }
@@ -53,10 +53,10 @@ impl ImageOptions {
 pub struct FirmwareArguments {
     #[command(flatten)]
     image: ImageOptions,
-    /// Write the sizes here.
+    /// Write the sizes as JSON here.
     #[arg(long)]
     json: Option<Output>,
-    /// Only write the leg as the constant that an image holds, here.
+    /// Do not build; write the leg as the image's Rust constant here.
     #[arg(long, value_name = "FILE.rs")]
     source: Option<Output>,
 }
@@ -66,7 +66,7 @@ pub struct FirmwareArguments {
 pub struct FlashArguments {
     #[command(flatten)]
     image: ImageOptions,
-    /// Passed on to `probe-rs run`.
+    /// Arguments for `probe-rs run`.
     #[arg(last = true)]
     probe: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! `kept`: persistent data of a board, as TOML and back.
+//! `kept`: stored data of a board, as TOML and back.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -25,24 +25,24 @@ pub struct KeptArguments {
 
 #[derive(Subcommand, Debug)]
 enum Way {
-    /// Read a board's flash and write its stored data as TOML; exit code 3 if something is damaged.
+    /// Read a board's flash and write its stored data as TOML; exit code 3 if data is damaged.
     Export {
         /// Flash file of `serve --flash`: 256 KB per board.
         flash: Input,
-        /// Number of the board in the file.
+        /// Number of the board in the file, from 1.
         #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]
         board: u8,
-        /// Destination; standard output unless given.
+        /// Write here instead of to standard output.
         #[arg(long, value_name = "FILE.toml")]
         out: Option<Output>,
     },
-    /// Write the contents of a TOML file into a board's flash, all or nothing; parts not named stay.
+    /// Write a TOML file into a board's flash, all or nothing; data that the file does not name stays.
     Import {
         /// File written by `export`.
         file: Input,
         /// Flash file of `serve --flash`; created if missing.
         flash: Updated,
-        /// Number of the board in the file.
+        /// Number of the board in the file, from 1.
         #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]
         board: u8,
     },
@@ -73,7 +73,7 @@ fn read(path: &Path) -> Result<Option<Vec<u8>>, ToolError> {
 fn export(flash: &Path, board: usize, out: Option<&Path>) -> Result<u8, ToolError> {
     let file = flash.display();
     let Some(bytes) = read(flash)? else {
-        return Err(ToolError::input(format!("{file}: there is no such file")));
+        return Err(ToolError::input(format!("{file}: does not exist")));
     };
     let Some(own) = bytes.get((board - 1) * BYTES..board * BYTES) else {
         let boards = bytes.len() / BYTES;
@@ -98,7 +98,7 @@ fn import(file: &Path, flash: &Path, board: usize) -> Result<u8, ToolError> {
     let name = file.display().to_string();
     let bytes = std::fs::metadata(file).map_err(|error| FileError::unreadable(file, &error))?.len();
     if bytes > LARGEST_FILE_BYTES {
-        return Err(FileError::new(name, "too large for what a board keeps").into());
+        return Err(FileError::new(name, format!("{bytes} bytes, too large for stored data, limit {LARGEST_FILE_BYTES}")).into());
     }
     let kept = KeptFile::parse(&files::read_text(file)?, &name)?;
     let mut bytes = read(flash)?.unwrap_or_default();

@@ -20,22 +20,22 @@ pub enum SideArgument {
 /// Leg and its settings.
 #[derive(Args, Clone, Debug)]
 pub struct LegOptions {
-    /// Name of a shipped leg, or a leg file; x2-wearer-75kg unless given. Replay and flash-leg require it.
+    /// Name of a shipped leg, or a leg file. Default: x2-wearer-75kg; replay and flash-leg require it.
     #[arg(long)]
     leg: Option<LegName>,
-    /// Set the thigh to this length, m (0.402 to 0.505).
+    /// Length of the thigh, m (0.402 to 0.505).
     #[arg(long, value_name = "M", allow_negative_numbers = true, help_heading = "Simulated wearer")]
     thigh: Option<f64>,
-    /// Set the shank to this length, m (0.397 to 0.506).
+    /// Length of the shank, m (0.397 to 0.506).
     #[arg(long, value_name = "M", allow_negative_numbers = true, help_heading = "Simulated wearer")]
     shank: Option<f64>,
-    /// Body mass and height of the wearer; the height determines the lengths not given.
+    /// Body mass, kg, and height, m, of the wearer; the height sets the lengths not given.
     #[arg(long, value_name = "KG,M", help_heading = "Simulated wearer")]
     wearer: Option<Person>,
-    /// The leg's side of the body; the leg file's unless given.
+    /// Side of the body. Default: that of the leg file.
     #[arg(long, value_enum, help_heading = "Simulated wearer")]
     side: Option<SideArgument>,
-    /// The trunk leans forward by this angle, known to the firmware.
+    /// Angle by which the trunk leans forward, degrees; the firmware gets it too.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, help_heading = "Simulated wearer")]
     trunk_pitch: Option<f64>,
 }

@@ -11,19 +11,19 @@ use crate::leg::matching::refuse_another_leg;
 use crate::report::RunReport;
 use crate::run::compare_model as comparison;
 
-/// Model to be compared with, and destination of the result.
+/// Model to compare with, and destination of the result.
 #[derive(Args, Debug)]
 pub struct ModelArguments {
-    /// Store an accepted result here, for predict, export and comparison; a rejected one is not written.
+    /// Store an accepted result here, for predict, export and comparison; a refused one is not written.
     #[arg(long, help_heading = "Output")]
     save_model: Option<Output>,
-    /// Compare the result with this model, which must be one of the same leg.
+    /// Compare the result with this model of the same leg.
     #[arg(long, help_heading = "Output")]
     compare_model: Option<Input>,
 }
 
 impl ModelArguments {
-    /// Reads the model to compare with, if named; a model of another leg is rejected before anything runs.
+    /// Reads the model to compare with, if named; a model of another leg is refused before anything runs.
     pub fn kept(&self, leg: &LegFile) -> Result<Option<ModelFile>, ToolError> {
         let Some(path) = &self.compare_model else { return Ok(None) };
         let model = ModelFile::load(path)?;

@@ -21,32 +21,32 @@ use crate::with_leg_size;
 pub struct MonitorArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// Mass fixed to a link during the walk, KG@JOINT:X_M[:Y_M]; a minus removes one. Default: 3 kg
+    /// Mass fixed to a link during the walk, KG@JOINT:X_M[:Y_M]; a minus sign removes a mass. Default: 3 kg
     /// at 0.2 m of the last link.
     #[arg(long, allow_hyphen_values = true)]
     payload: Option<String>,
     /// Factor on Coulomb and viscous friction of all joints.
     #[arg(long, allow_hyphen_values = true)]
     friction: Option<f64>,
-    /// Duration of the change of friction, seconds.
+    /// Duration of the change of friction, s.
     #[arg(long, requires = "friction", default_value_t = 0.0)]
     over: f64,
-    /// Seconds of walking before the change.
+    /// Walking time before the change, s.
     #[arg(long, default_value_t = 20.0, allow_hyphen_values = true)]
     at: f64,
-    /// Hours of walking without a change, for false alarms.
+    /// Walking time without a change, hours: counts false alarms.
     #[arg(long, default_value_t = 0.0)]
     hours: f64,
-    /// Pushes of the wearer while walking, PER_MINUTE:PEAK_NM; half a second each on average.
+    /// Pushes of the wearer while walking, PER_MINUTE:PEAK_NM; each lasts half a second on average.
     #[arg(long)]
     pushes: Option<String>,
     /// Seed of noise and pushes.
     #[arg(long, conflicts_with = "seeds")]
     seed: Option<u64>,
-    /// A run for each seed, A..B with both ends.
+    /// Run each seed from A to B, both included: A..B.
     #[arg(long, value_parser = crate::cli::identify::parse_seeds)]
     seeds: Option<(u64, u64)>,
-    /// Write the report here, for exit codes 0 and 3.
+    /// Write the report as JSON here, for exit codes 0 and 3.
     #[arg(long)]
     json: Option<Output>,
 }
@@ -62,7 +62,7 @@ fn in_range(option: &str, value: f64, low: f64, high: f64) -> Result<f64, ToolEr
     if (low..=high).contains(&value) {
         return Ok(value);
     }
-    Err(ToolError::input(format!("{option}: {value} is not from {low} to {high}")))
+    Err(ToolError::input(format!("{option}: {value} is outside {low}..{high}")))
 }
 
 /// Parses a mass to be attached, or with a leading minus to be removed.
@@ -74,7 +74,7 @@ fn payload(leg: &LegFile, text: &str) -> Result<Disturbance, ToolError> {
     let link =
         leg.joints.get(payload.joint).and_then(|joint| joint.truth.as_ref()).map_or(0.0, |link| link.mass);
     if off && payload.mass >= link {
-        return Err(ToolError::input(format!("--payload {text}: the link has {link} kg")));
+        return Err(ToolError::input(format!("--payload {text}: removes more than the link's {link} kg")));
     }
     if off {
         payload.mass = -payload.mass;

@@ -16,16 +16,16 @@ use crate::view::{figures, motor as text};
 pub struct MotorArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// Joint whose motor is measured, its name or its number from 1.
+    /// Joint of the measured motor, by name or number from 1.
     #[arg(long, default_value = "1")]
     joint: String,
     /// Seed of the sensors' noise.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
-    /// Write the report here, with the curves.
+    /// Write the report with its curves as JSON here.
     #[arg(long)]
     json: Option<Output>,
-    /// Draw into this directory, as SVG.
+    /// Draw into this directory, as SVG files.
     #[arg(long)]
     figures: Option<OutputFolder>,
 }
@@ -39,7 +39,7 @@ pub fn run(arguments: &MotorArguments) -> Result<u8, ToolError> {
         let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
         let count = names.len();
         ToolError::input(format!(
-            "--joint: `{}` is no joint of {}: {} or 1 to {count}",
+            "--joint: `{}` is not a joint of {}: {} or 1 to {count}",
             arguments.joint,
             leg.name,
             names.join(", "),

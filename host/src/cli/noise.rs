@@ -8,11 +8,11 @@ use crate::formats::leg_file::LegFile;
 /// Noise of the logged torque, instead of the leg file's.
 #[derive(Args, Debug)]
 pub struct NoiseOptions {
-    /// Noise of the logged torque in percent of each joint's mean absolute torque on the default
-    /// motion; the leg file's unless given.
+    /// Noise of the logged torque, percent of each joint's mean absolute torque on the default motion.
+    /// Default: that of the leg file.
     #[arg(long, allow_negative_numbers = true, help_heading = "Simulation")]
     torque_noise: Option<f64>,
-    /// Noise in N m, one number or one for each joint: the standard deviation of the logged torque at rest.
+    /// Noise of the logged torque, standard deviation at rest, N m: one number or one for each joint.
     #[arg(
         long,
         value_name = "NM[,NM..]",
@@ -34,7 +34,7 @@ impl NoiseOptions {
     /// The value is not a valid percentage.
     pub fn percent(&self) -> Result<Option<f64>, ToolError> {
         if self.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
-            return Err(ToolError::input("--torque-noise: a percentage from 0 to 1000"));
+            return Err(ToolError::input("--torque-noise: must be a percentage from 0 to 1000"));
         }
         Ok(self.torque_noise)
     }
@@ -47,7 +47,7 @@ impl NoiseOptions {
         let (given, joints) = (&self.torque_noise_nm, leg.joints.len());
         if let Some(noise) = given.iter().find(|noise| !(0.0..=LARGEST_NM).contains(*noise)) {
             return Err(ToolError::input(format!(
-                "--torque-noise-nm: {noise} N m; it must be from 0 to {LARGEST_NM}"
+                "--torque-noise-nm: {noise} N m is outside 0..{LARGEST_NM}"
             )));
         }
         match given.len() {
@@ -55,7 +55,7 @@ impl NoiseOptions {
             1 => Ok(leg.with_torque_noise(&vec![given[0]; joints])),
             count if count == joints => Ok(leg.with_torque_noise(given)),
             count => Err(ToolError::input(format!(
-                "--torque-noise-nm: {count} numbers, the leg `{}` has {joints} joints",
+                "--torque-noise-nm: {count} numbers, but the leg `{}` has {joints} joints",
                 leg.name
             ))),
         }

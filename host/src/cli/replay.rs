@@ -18,24 +18,24 @@ use crate::with_leg_size;
 /// Recordings, and outputs.
 #[derive(Args, Debug)]
 pub struct ReplayArguments {
-    /// Recordings: t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several are one training set.
+    /// Recordings, CSV: t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several form one training set.
     #[arg(required = true)]
     files: Vec<Input>,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
     model: ModelArguments,
-    /// Held-out recordings.
+    /// Recordings held out for validation.
     #[arg(long, num_args = 1.., conflicts_with = "split", help_heading = "Recordings")]
     validate: Vec<Input>,
-    /// The first fraction of each file trains, the rest validates.
+    /// Share of each file that trains, above 0 and below 1; the rest validates.
     #[arg(long, allow_negative_numbers = true, help_heading = "Recordings")]
     split: Option<f64>,
-    /// -3 dB frequency of the filter chain's low-pass, Hz; the leg file's (8 by default) unless given. `auto`
-    /// takes the largest up to 16 Hz at which the encoders' steps do not matter.
+    /// Frequency at which the filter chain's low-pass is 3 dB down, Hz. Default: that of the leg file, else
+    /// 8. `auto`: the largest up to 16 Hz at which the encoders' steps are negligible.
     #[arg(long, value_name = "HZ|auto", allow_negative_numbers = true, help_heading = "Identification")]
     bandwidth: Option<Bandwidth>,
-    /// Take this delay of the torque against the angle out, ms: one value, or one for each joint by comma.
+    /// Remove this delay of the torque against the angle, ms: one value, or one for each joint, by comma.
     #[arg(
         long,
         value_name = "MS",
@@ -44,26 +44,26 @@ pub struct ReplayArguments {
         help_heading = "Identification"
     )]
     torque_delay: Vec<f64>,
-    /// Replace the stamps by an even clock from the first to the last.
+    /// Replace the time stamps by an even clock from the first to the last.
     #[arg(long, help_heading = "Identification")]
     even_stamps: bool,
-    /// Known mass that the leg carries in every recording, KG@JOINT:X_M[:Y_M]; the parameters are those of
+    /// Known mass that the leg carries in every recording, KG@JOINT:X_M[:Y_M]. The parameters are those of
     /// the leg without it.
     #[arg(long, help_heading = "Recordings")]
     load: Option<PlacedMass>,
-    /// Known mass that the leg also carries in the recordings of --with-payload, in the same format:
-    /// determines the scale of the torques.
+    /// Known mass that the leg carries in the recordings of --with-payload, in the same format; it determines
+    /// the scale of the torques.
     #[arg(long, requires = "with_payload", help_heading = "Recordings")]
     payload: Option<PlacedMass>,
     /// Recordings with the mass of --payload.
     #[arg(long, num_args = 1.., requires = "payload", help_heading = "Recordings")]
     with_payload: Vec<Input>,
-    /// Write measured and predicted torque of the validation part here.
+    /// Write measured and predicted torque of the validation part as CSV here.
     #[arg(long, help_heading = "Output")]
     csv: Option<Output>,
 }
 
-/// Bandwidth as asked for.
+/// Requested bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Bandwidth {
     Auto,
@@ -77,7 +77,7 @@ impl FromStr for Bandwidth {
         if text == "auto" {
             return Ok(Self::Auto);
         }
-        text.parse().map(Self::Hertz).map_err(|_| "a number of Hz, or `auto`".into())
+        text.parse().map(Self::Hertz).map_err(|_| "must be a number of Hz, or `auto`".into())
     }
 }
 
@@ -90,7 +90,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
     arguments.common.leg.require("cargo sim replay run.csv --leg my-leg.toml")?;
     let leg = &arguments.common.leg()?;
     if arguments.split.is_some_and(|fraction| !(fraction > 0.0 && fraction < 1.0)) {
-        return Err(ToolError::input("--split: a fraction above 0 and below 1"));
+        return Err(ToolError::input("--split: must be above 0 and below 1"));
     }
     let options = &ReplayOptions {
         files: paths(&arguments.files),

@@ -21,7 +21,7 @@ pub struct ServeArguments {
     /// Address and port of the simulated CAN adapter (slcan over TCP); port 0 selects a free one.
     #[arg(long, value_name = "HOST:PORT", value_parser = address)]
     slcan: SocketAddr,
-    /// Boards on the bus, each with this leg.
+    /// Number of boards on the bus, each with this leg.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
     legs: u8,
     /// Simulated seconds per second.
@@ -30,7 +30,7 @@ pub struct ServeArguments {
     /// Bit rate of the bus, kbit/s.
     #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
     bit_rate: u64,
-    /// File of the boards' flash; created if missing.
+    /// File with the boards' flash; created if missing.
     #[arg(long, value_name = "FILE")]
     flash: Option<Updated>,
     /// Seed of the noise.
@@ -54,7 +54,7 @@ fn bit_rates() -> impl TypedValueParser<Value = u64> {
 pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
     if !(arguments.speed > 0.0 && arguments.speed <= 100.0) {
-        return Err(ToolError::input(format!("--speed: {} is not from above 0 to 100", arguments.speed)));
+        return Err(ToolError::input(format!("--speed: {} must be above 0 and at most 100", arguments.speed)));
     }
     let options = ServeOptions {
         address: arguments.slcan,

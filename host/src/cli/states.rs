@@ -8,11 +8,11 @@ use crate::leg::states::Angles;
 /// States for `predict` and `regressor`.
 #[derive(Args, Debug)]
 pub struct StatesOptions {
-    /// States of motion, CSV: columns q1.. (or q1_rad..), qd1.., qdd1.. in rad and s, anatomical as
-    /// in recordings; predict copies t_s.
+    /// States of motion, CSV: columns q1.. (or q1_rad..), qd1.., qdd1.. in rad and s, anatomical; predict
+    /// copies t_s.
     #[arg(long)]
     pub states: Input,
-    /// Angles in and torques out are those of the D-H frames instead of anatomical ones.
+    /// Read angles and write torques of the D-H frames instead of anatomical ones.
     #[arg(long)]
     dh: bool,
 }

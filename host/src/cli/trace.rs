@@ -16,22 +16,22 @@ use crate::view::tables;
 /// Trace and outputs.
 #[derive(Args, Debug)]
 pub struct TraceArguments {
-    /// A recorded trace, or - for standard input: text as a debug probe prints it, or with --image
-    /// a defmt stream.
+    /// Recorded trace, or - for standard input: text as a debug probe prints it, or a defmt stream with
+    /// --image.
     file: Input,
-    /// The image (ELF) that sent the stream; it holds the texts of the records.
+    /// Image (ELF) that sent the stream; contains the texts of the records.
     #[arg(long, value_name = "ELF")]
     image: Option<Input>,
-    /// Name of a shipped leg, or a leg file; the one the image names unless given.
+    /// Name of a shipped leg, or a leg file. Default: the leg that the image names.
     #[arg(long)]
     leg: Option<LegName>,
-    /// Write the report here, for exit codes 0 and 3.
+    /// Write the report as JSON here, for exit codes 0 and 3.
     #[arg(long)]
     json: Option<Output>,
-    /// Write the 500 Hz log of one motion here, in the format that replay reads.
+    /// Write the 500 Hz log of one motion here, as a recording for replay.
     #[arg(long)]
     csv: Option<Output>,
-    /// Motion for --csv: 0 is the motion identified from, 1 and more are those that were only predicted.
+    /// Motion for --csv: 0 is the training motion, from 1 on the predicted motions.
     #[arg(long, value_name = "NUMBER", requires = "csv", default_value_t = log::TRAINING)]
     csv_motion: u8,
     /// Write the run as one HTML page here.
@@ -40,7 +40,7 @@ pub struct TraceArguments {
     /// Draw the contents of the trace into this directory, as SVG.
     #[arg(long)]
     figures: Option<OutputFolder>,
-    /// Write the records here as lines of text, which can be read without the image.
+    /// Write the records as lines of text here, readable without the image.
     #[arg(long)]
     text: Option<Output>,
     /// Print all fourteen parameters of every joint with their status.
@@ -66,11 +66,11 @@ fn report(arguments: &TraceArguments, trace: &Trace) -> Result<u8, ToolError> {
         let written = log::write(trace, leg, motion, path)?;
         let missing = match written.missing {
             0 => String::new(),
-            missing => format!(", {missing} between them are missing"),
+            missing => format!(", {missing} missing in between"),
         };
         let others = match log::others(trace, motion) {
             others if others.is_empty() => String::new(),
-            others => format!("; the trace holds motions {others} as well (--csv-motion)"),
+            others => format!("; the trace contains motions {others} as well (--csv-motion)"),
         };
         let (path, samples) = (path.display(), written.samples);
         output::print(&format!("log: {path}, {samples} samples of motion {motion}{missing}{others}\n\n"))?;
@@ -98,9 +98,9 @@ fn leg(arguments: &TraceArguments, trace: &Trace) -> Result<LegFile, ToolError> 
         return Ok(LegFile::load(name)?);
     }
     let Some(boot) = &trace.boot else {
-        return Err(ToolError::input("the trace does not tell which leg it is of (no record `boot`): --leg"));
+        return Err(ToolError::input("the trace does not name its leg (no record `boot`): add --leg FILE"));
     };
     LegFile::load(&boot.leg).map_err(|error| {
-        ToolError::input(format!("the trace is of the leg `{}`: --leg FILE is needed ({error})", boot.leg))
+        ToolError::input(format!("the trace comes from the leg `{}`: add --leg FILE ({error})", boot.leg))
     })
 }

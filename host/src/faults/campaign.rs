@@ -339,7 +339,7 @@ pub(super) fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), To
 fn length(leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -> Result<u64, ToolError> {
     let ideal = Context { complete: None, ..context.clone() };
     let mut pair = Pair::new(leg, &ideal, seed)?;
-    let refused = || leg.error("its identification does not come to an end");
+    let refused = || leg.error("its identification does not end");
     if !pair.enable(context.gravity) {
         return Err(refused().into());
     }

@@ -157,7 +157,7 @@ mod tests {
         assert!(text.contains("\nCreationDate=11-23-2026\nCreationTime=03:30PM\n"));
         let objects = text.split_once("[DummyUsage]").expect("its sections").1;
         let sum = objects.bytes().fold(Checksum::EMPTY, |sum, byte| sum.word(u32::from(byte)));
-        // Another dictionary: give CHANGED the day and put its sum here.
+        // Another dictionary: set CHANGED to the day of the change and write its sum here.
         assert_eq!(format!("{sum:?}"), SUM);
     }
 

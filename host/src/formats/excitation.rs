@@ -138,7 +138,7 @@ impl Excitation {
     /// Reads a file.
     ///
     /// # Errors
-    /// Names the file, and the line if one is at fault.
+    /// Names the file, and the line if the error has one.
     pub fn load(path: &Path) -> Result<Self, ToolError> {
         let file = path.display().to_string();
         let motion: Self = toml_file::parse(&files::read_text(path)?, &file)?;
@@ -157,7 +157,7 @@ impl Excitation {
             let (sines, cosines) = (joint.sine_rad.len(), joint.cosine_rad.len());
             if sines != cosines || !(1..=HARMONICS).contains(&sines) {
                 return Err(format!(
-                    "joint `{}`: {sines} sines and {cosines} cosines; as many of both, 1 to {HARMONICS}",
+                    "joint `{}`: {sines} sines and {cosines} cosines; needed are as many of both, 1 to {HARMONICS}",
                     joint.name
                 ));
             }
@@ -175,7 +175,7 @@ impl Excitation {
         }
         if self.cycles == 0 || self.duration_s() > LONGEST_S {
             return Err(format!(
-                "{} cycles of {} s and two blends of {} s last {:.1} s; at least one cycle, at most {LONGEST_S} s",
+                "{} cycles of {} s and two blends of {} s last {:.1} s; allowed are at least one cycle and at most {LONGEST_S} s",
                 self.cycles,
                 self.period_s,
                 self.blend_s,
@@ -207,7 +207,7 @@ impl Excitation {
             self.joints.iter().zip(&leg.joints).find(|(joint, own)| joint.name != own.name)
         {
             return Err(format!(
-                "the motion's joint `{}` is `{}` of the leg `{}`: not the same leg",
+                "the motion's joint `{}` is `{}` in the leg `{}`: not the same leg",
                 joint.name, own.name, leg.name
             ));
         }
@@ -252,7 +252,7 @@ impl Excitation {
     /// Motion for a leg of `N` joints; not yet proved, nor checked against the leg.
     ///
     /// # Errors
-    /// Describes the fault, without the file's name.
+    /// Describes the error, without the file's name.
     pub fn motion<const N: usize>(&self) -> Result<Periodic<N>, ToolError> {
         let table =
             self.numbers::<N>().ok_or_else(|| ToolError::input("the motion has another number of joints"))?;
@@ -283,9 +283,9 @@ const HEADER: &str = "\
 pub fn motion_error(error: MotionError) -> String {
     match error {
         MotionError::NotFinite { joint } => format!("joint {}: a coefficient is not finite", joint + 1),
-        MotionError::Period => "`period_s` makes no motion".into(),
-        MotionError::Blend => "`blend_s` makes no motion".into(),
-        MotionError::Cycles => "`cycles` makes no motion".into(),
+        MotionError::Period => "`period_s` is invalid".into(),
+        MotionError::Blend => "`blend_s` is invalid".into(),
+        MotionError::Cycles => "`cycles` is invalid".into(),
         MotionError::Rate { joint } | MotionError::Range { joint } => {
             format!("joint {}: its limits", joint + 1)
         }

@@ -15,7 +15,7 @@ pub fn source(motion: &Excitation) -> String {
         "//! Exciting motion of the leg {:?} (geometry {}), joints {}.\n\
          //! Written by `scarab excite`.\n\
          //!\n\
-         //! Model's (D-H) joint angles. A leg takes it only after `LegConfiguration::prove`.\n\n\
+         //! Model's (D-H) joint angles. A leg accepts it only after `LegConfiguration::prove`.\n\n\
          use scarab::motion::ExcitationTable;\n\n\
          /// {:.1} s, blends included.\n\
          #[rustfmt::skip]\n\

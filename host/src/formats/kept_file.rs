@@ -1,16 +1,16 @@
-//! Persistent data of a board as a readable file: objects of its nodes, calibrations, and the model.
+//! Stored data of a board as a readable file: objects of its nodes, calibrations, and the model.
 //!
-//! Why: the data can be moved to a replacement board, and calibrations can be viewed or compared
-//! without a bus. A board does not trust the file: it still checks a calibration at the motor and a
-//! model against the leg's fingerprint.
+//! Why: the data can be moved to a replacement board, and calibrations can be viewed or compared without a
+//! bus. A board does not trust the file: it still checks a calibration at the motor and a model against the
+//! leg's fingerprint.
 //!
 //! ```text
 //! flash image --Store::load, checks--> KeptFile --to_toml--> text   damaged or invalid parts: omitted
 //! flash image <--Store::save (drive off)-- KeptFile <--parse, checks-- text   all or nothing
 //! ```
 //!
-//! An export reports the parts that it omits. An import leaves the parts unchanged that its file
-//! does not name.
+//! An export reports the parts that it omits. An import does not change the parts that its file does not
+//! name.
 //!
 //! Both directions have the same checks, so every export can be imported. Floats are written with
 //! the digits that restore the f32 exactly, angles in radians with those that restore the unit of
@@ -227,7 +227,7 @@ impl KeptFile {
     /// Parses and checks a text; `file` is its name in error messages.
     ///
     /// # Errors
-    /// The file is invalid; the error names the line or the part at fault.
+    /// The file is invalid; the error names the line or part.
     pub fn parse(text: &str, file: &str) -> Result<Self, FileError> {
         let raw: toml::Table = toml_file::parse(text, file)?;
         match raw.get("schema") {
@@ -236,7 +236,7 @@ impl KeptFile {
                 let reason = format!("schema {schema} is unknown; this program reads {KEPT_SCHEMA}");
                 return Err(FileError::new(file, reason));
             }
-            None => return Err(FileError::new(file, "has no `schema`: not what a board keeps")),
+            None => return Err(FileError::new(file, "has no `schema`: not a file of stored data")),
         }
         let kept: Self = toml_file::parse(text, file)?;
         kept.check().map_err(|why| FileError::new(file, why))?;
@@ -265,10 +265,10 @@ fn once(what: &str, joints: impl Iterator<Item = Joint>) -> Result<(), String> {
     let mut seen = Vec::new();
     for joint in joints {
         if joint == Joint::Ankle {
-            return Err(format!("{what}: a board keeps none of the ankle"));
+            return Err(format!("{what}: a board does not store data of the ankle"));
         }
         if seen.contains(&joint) {
-            return Err(format!("{what}: the {} is there twice", joint.name()));
+            return Err(format!("{what}: the {} occurs twice", joint.name()));
         }
         seen.push(joint);
     }

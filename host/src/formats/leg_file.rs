@@ -1,7 +1,7 @@
 //! Leg files: a leg in TOML, as users write it.
 //!
-//! Why a file: simulation and identification must state their leg in one place that can be read, compared
-//! and shared. Keys are an interface; unknown ones are errors. Every error names file, line and reason.
+//! Why a file: simulation and identification state their leg in one place that can be read, compared and
+//! shared. Keys are an interface; unknown ones are errors. Every error names file, line and reason.
 //!
 //! | key | unit, meaning | default |
 //! | --- | --- | --- |
@@ -385,7 +385,7 @@ impl LegFile {
         }
         let text = std::fs::read_to_string(name_or_path).map_err(|fault| {
             let names = SHIPPED_LEGS.map(|(name, _)| name).join(", ");
-            let reason = format!("cannot be read ({fault}), and no shipped leg is called so ({names})");
+            let reason = format!("cannot be read ({fault}), and is not the name of a shipped leg ({names})");
             FileError::new(name_or_path, reason)
         })?;
         Ok((text, name_or_path.to_owned()))

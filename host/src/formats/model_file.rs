@@ -1,16 +1,16 @@
 //! Model files: results of an accepted identification, stored for later use.
 //!
-//! Why a separate file: a result is useful only together with its basis (leg, lengths, torque
-//! constants, gravity) and its covariance. With both, torque can be predicted with a band, two
-//! identifications can be compared, and a model of another leg can be rejected. Keys are an
-//! interface, see `docs/files.md`; unknown ones are errors.
+//! Why a separate file: a result is useful only together with its basis (leg, lengths, torque constants,
+//! gravity) and its covariance. With both, torque can be predicted with a band, two identifications can be
+//! compared, and a model of another leg can be refused. Keys are an interface, see `docs/files.md`; unknown
+//! ones are errors.
 //!
 //! ```text
 //! identify, replay --save-model--> file --predict, export, --compare-model-->
 //! ```
 //!
-//! Numbers are written with the digits that restore the f64 exactly. The checksum covers every key
-//! and value except itself and detects an edited file: the numbers belong together.
+//! Numbers are written with the digits that restore the f64 exactly. The checksum covers every key and value
+//! except itself, so that an edited file is detected.
 
 mod check;
 mod checksum;
@@ -230,13 +230,13 @@ impl ModelFile {
     /// Loads and checks a model.
     ///
     /// # Errors
-    /// [`FileError`] for an invalid file; [`ToolError::Refused`] for one that was edited or
-    /// never accepted.
+    /// [`ModelFileError`] for an invalid file; [`ToolError::Refused`] for an edited file or one without an
+    /// accepted verdict.
     pub fn load(path: &Path) -> Result<Self, ToolError> {
         let file = path.display().to_string();
         let bytes = std::fs::metadata(path).map_err(|error| FileError::unreadable(path, &error))?.len();
         if bytes > LARGEST_FILE_BYTES {
-            return Err(FileError::new(file, format!("{bytes} bytes are no model file")).into());
+            return Err(FileError::new(file, format!("{bytes} bytes, too large for a model file")).into());
         }
         Self::parse(&files::read_text(path)?, &file)
     }
@@ -250,7 +250,7 @@ impl ModelFile {
         match raw.get("schema").map(toml::Value::as_integer) {
             Some(Some(MODEL_SCHEMA)) => {}
             None if raw.is_empty() => return Err(FileError::new(file, "is empty").into()),
-            None => return Err(FileError::new(file, "has no `schema`: no model file").into()),
+            None => return Err(FileError::new(file, "has no `schema`: not a model file").into()),
             _ => {
                 let reason = format!("this schema is unknown; this program reads {MODEL_SCHEMA}");
                 let fault = Fault { steps: vec![Step::Key("schema")], reason };

@@ -1,8 +1,8 @@
 //! Recordings of a leg's motion: time, angle and torque of each joint, read from CSV and checked.
 //!
-//! An identification is only as good as its input, and the recording machine is unknown. Nothing is
-//! repaired silently. Invalid data are rejected with file, line and reason; plausible data pass
-//! unchanged ([`resample`](crate::run::resample) makes them uniform).
+//! An identification is only as good as its input, and the recording machine is unknown. Nothing is repaired
+//! silently. Invalid data are refused with file, line and reason; plausible data pass unchanged
+//! ([`resample`](crate::run::resample) makes them uniform).
 //!
 //! Format: a header, then one row per sample. Columns are found by name, in any order; others are ignored.
 //!
@@ -15,8 +15,8 @@
 //! The median time step corresponds to at least 10 Hz. No step exceeds 0.1 s or 20 median steps,
 //! whichever is longer.
 //!
-//! Limits: swapped columns, or a command recorded as a measurement, look like any other numbers
-//! here; only the fit can detect them. Cost: 16 bytes per joint and sample and 16 per sample.
+//! Limits: swapped columns, or a command recorded as a measurement, look like valid numbers here; only the
+//! fit can detect them. Cost: 16 bytes per joint and sample, and 16 per sample.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -40,11 +40,12 @@ pub const MINIMUM_DURATION_S: f64 = 1.0;
 pub const MINIMUM_RATE_HZ: f64 = 10.0;
 /// Tolerance on the rate for rounded time stamps.
 const RATE_TOLERANCE: f64 = 1.001;
-/// Time step up to which there is no gap, s.
+/// Longest step that is not a gap, s.
 pub const LARGEST_STEP_S: f64 = 0.1;
-/// Median steps up to which there is no gap either.
+/// Longest step in median steps that is not a gap.
 pub const LARGEST_STEP_IN_MEDIANS: f64 = 20.0;
-/// Largest plausible time stamp, s: seconds since 1970 are 2e9, and a microsecond is still resolved there.
+/// Largest plausible time stamp, s: seconds since 1970 are 2e9, and an f64 still resolves a microsecond
+/// there.
 pub const LARGEST_TIME_S: f64 = 1.0e10;
 /// Largest plausible angle, rad; larger ones are in another unit.
 pub const LARGEST_POSITION_RAD: f64 = 1.0e3;

@@ -1,4 +1,4 @@
-//! Temperature of the drives: stored with a model, and the effect of a difference.
+//! Temperature of the drives: stored with a model, with a warning about differences.
 //!
 //! ```text
 //! k_t(T) = k_t(T0) (1 - 0.0011 (T - T0))                       remanence of neodymium magnets, per kelvin
@@ -6,8 +6,8 @@
 //!
 //! A warm motor makes less torque from the same current, so every parameter, in the cold motor's
 //! units, becomes larger. Grease becomes thinner, and viscous friction falls by an unknown amount.
-//! Nothing is corrected: the behaviour of the leg's magnets and gears is unknown, and the housing
-//! does not have the magnets' temperature.
+//! Nothing is corrected: the behaviour of the leg's magnets and gears is unknown, and the housing's
+//! temperature is not that of the magnets.
 
 /// Range of a drive's temperature, degrees Celsius.
 pub const RANGE_C: (f64, f64) = (-40.0, 125.0);
@@ -37,9 +37,9 @@ pub fn warning(model: Option<f64>, leg: Option<f64>) -> Option<String> {
     let warmer = leg - model;
     (warmer.abs() > LARGEST_DIFFERENCE_K).then(|| {
         format!(
-            "the model was found at {model} degrees Celsius, the leg is at {leg}: over {warmer:+} K the magnets' torque per \
-             ampere changes by {:+.1} % and with it every parameter, the other way; viscous friction changes besides, \
-             falling where it gets warmer",
+            "the model was identified at {model} degrees Celsius, the leg is at {leg}: over {warmer:+} K the magnets' torque \
+             per ampere changes by {:+.1} %, and every parameter by the opposite; viscous friction changes too, it \
+             falls with temperature",
             100.0 * MAGNET_SHARE_PER_KELVIN * warmer
         )
     })
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn more_than_ten_kelvin_are_worth_a_warning_and_what_is_unknown_is_not() {
+    fn more_than_ten_kelvin_give_a_warning_and_unknown_temperatures_none() {
         assert_eq!((warning(Some(20.0), Some(30.0)), warning(Some(20.0), None)), (None, None));
         assert_eq!(warning(None, Some(90.0)), None);
         let warmer = warning(Some(20.0), Some(40.0)).expect("20 K");
@@ -59,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_drive_has_is_refused() {
+    fn implausible_temperatures_are_refused() {
         assert_eq!((parse("-40"), parse("125")), (Ok(-40.0), Ok(125.0)));
         for text in ["-40.1", "125.5", "nan", "inf", "", "warm"] {
             assert!(parse(text).expect_err(text).contains("-40 to 125"), "{text}");

@@ -1,9 +1,9 @@
 //! Exports a stored model as a robot description (URDF) for MuJoCo, Gazebo, Pinocchio and others.
 //!
-//! Why: an identified leg is simulated and planned for in other software. A robot description needs
-//! complete bodies, but torque determines only sums of their parameters. Each link therefore states
-//! in a comment which numbers were identified, which only in sums, and which come from the prior.
-//! Inconsistent bodies are rejected, not repaired.
+//! Why: an identified leg is simulated and planned for in other software. A robot description needs complete
+//! bodies, but torque determines only sums of their parameters. Each link therefore states in a comment which
+//! numbers were identified, which only in sums, and which come from the prior. Inconsistent bodies are
+//! refused, not repaired.
 //!
 //! ```text
 //! parent to joint: xyz = (a, -d sin alpha, d cos alpha), R = Rx(alpha) Rz(zero offset)   D-H at flexion 0
@@ -13,11 +13,11 @@
 //! ```
 //!
 //! The root is `world` with gravity along -z, as usual in these programs; a fixed joint rotates it to the
-//! leg's base. Values without a place in the format are written as comments: rotor inertia at the joint
-//! (MuJoCo: the joint's `armature`; Pinocchio: `model.armature`; Drake: its reflected inertia) and the
-//! torque offset. A friction coefficient identified below zero, within its sigma, is written as 0.
+//! leg's base. Values that the format lacks are written as comments: rotor inertia at the joint (MuJoCo: the
+//! joint's `armature`; Pinocchio: `model.armature`; Drake: its reflected inertia) and the torque offset. A
+//! friction coefficient identified below zero, within its sigma, is written as 0.
 //!
-//! Limits: no geometry, transmission or contact; the program's own meaning of `friction` applies to
+//! Limits: no geometry, transmission or contact. Each program applies its own meaning of `friction` to
 //! Coulomb friction.
 
 use std::borrow::Cow;
@@ -71,14 +71,14 @@ impl<'a> Link<'a> {
         let name = &joint.name;
         let parameters = model.joint_parameters(number).ok_or_else(|| {
             format!(
-                "a parameter of joint `{name}` is unknown: without a prior torque tells sums only, and no body"
+                "a parameter of joint `{name}` is unknown: without a prior torque determines only sums, not bodies"
             )
         })?;
         let ten = inertial(&parameters);
         let body = RigidBody::from_parameters(&ten).filter(|_| is_physically_consistent(&ten));
         let body = body.ok_or_else(|| {
             format!(
-                "no body can have the ten inertial parameters of joint `{name}` (mass {} kg): where torque tells only \
+                "no body can have the ten inertial parameters of joint `{name}` (mass {} kg): where torque determines only \
                  sums, the prior's share does not fit",
                 parameters[Parameter::M.index()]
             )
@@ -95,8 +95,8 @@ impl<'a> Link<'a> {
             if names.is_empty() { "none".to_owned() } else { names.join(" ") }
         };
         let standing = format!(
-            "measured: {}; measured weakly: {}; measured in sums only, split by the prior: {}; the prior's, torque never \
-             saw them: {}",
+            "measured: {}; measured weakly: {}; measured in sums only, split by the prior: {}; the prior's, without effect \
+             on torque: {}",
             of(&["identified"]),
             of(&["weak"]),
             of(&["grouped"]),
@@ -140,7 +140,7 @@ fn full_set_gives_the_base_set(model: &ModelFile) -> Result<(), String> {
         let deviation = sum.map_or(f64::NAN, |sum| (sum - base.value) / base.sigma);
         if !(deviation.abs() <= LARGEST_DEVIATION) {
             return Err(format!(
-                "the bodies' {} is {deviation:+.1} sigma from what torque told: the file contradicts itself",
+                "the bodies' {} is {deviation:+.1} sigma from the identified value: the file contradicts itself",
                 base.name
             ));
         }
@@ -181,7 +181,7 @@ fn write(model: &ModelFile, links: &[Link<'_>]) -> io::Result<String> {
 /// Writes the root, and the leg's base rotated so that gravity points along -z of the root.
 fn base(xml: &mut Xml, gravity: &Vector3<f64>) -> io::Result<()> {
     let turn = Rotation3::rotation_between(gravity, &-Vector3::z())
-        // Opposite directions: any half turn about a level axis.
+        // Opposite directions: any half turn about a horizontal axis.
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI));
     empty(xml, "link", &[("name", ROOT.into())])?;
     inside(xml, "joint", &[("name", "scarab_mount".into()), ("type", "fixed".into())], |xml| {

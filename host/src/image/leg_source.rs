@@ -27,7 +27,7 @@ pub type Described = (LegDescription<JOINTS>, LegConfiguration<JOINTS, BASE>);
 /// Description of a leg of two joints with up to 13 base parameters, the capacity of the board.
 pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, FileError> {
     if leg.joints.len() != JOINTS || base_rank(leg) > BASE {
-        return Err(leg.error("an image holds two joints with up to 13 base parameters"));
+        return Err(leg.error("an image supports two joints with up to 13 base parameters"));
     }
     let background = background::<JOINTS, BASE>(leg, PriorChoice::Default, swarm_seed)?;
     let (configuration, _) = configuration(leg, &background, Plan::default(), swarm_seed)?;

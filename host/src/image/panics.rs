@@ -1,8 +1,8 @@
 //! Finds the locations at which an image can panic, and those that its interrupts reach.
 //!
-//! Why: a panic of the current loops or the servo would stop the leg, so none may exist, and no
-//! compiler guarantees it. The image shows it: every branch to one of the language's panic
-//! functions is a location. Functions that the vectors reach by branches belong to the interrupts.
+//! Why: a panic of the current loops or the servo would stop the leg, so none may exist, and no compiler
+//! guarantees it. The image shows it: every branch to one of the language's panic functions is a location.
+//! Functions that the vectors reach by branches belong to the interrupts.
 //!
 //! ```text
 //! BL      11110 S imm10 | 11 J1 1 J2 imm11     target = pc + 4 + imm25, I = not(J xor S)   call
@@ -327,7 +327,7 @@ mod tests {
 
     /// From the disassembly of an image by `llvm-objdump`.
     #[test]
-    fn branches_lead_where_the_disassembler_says() {
+    fn branch_targets_equal_those_of_the_disassembler() {
         // 800022c: f000 f80b   bl 0x8000246
         assert_eq!(wide(0xF000, 0xF80B), Some(0x8000246 - 0x800022C - 4));
         // 8000254: f7ff fff7   bl 0x8000246
@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn a_location_is_what_the_disassembler_says_was_loaded() {
+    fn a_loaded_location_equals_that_of_the_disassembler() {
         // 80042c2: f24c 4028   movw r0, #50216
         // 80042c6: f6c0 0003   movt r0, #2051
         let halves: [u16; 6] = [0xF24C, 0x4028, 0xF6C0, 0x0003, 0xF7FC, 0xF839];

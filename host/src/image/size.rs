@@ -127,7 +127,7 @@ impl ImageSize {
             ("core-coupled memory", self.core_coupled(), CORE_COUPLED),
         ];
         let missed = goals.into_iter().filter(|(_, bytes, goal)| bytes > goal);
-        missed.map(|(name, bytes, goal)| format!("{name}: {bytes} bytes, at most {goal} may be")).collect()
+        missed.map(|(name, bytes, goal)| format!("{name}: {bytes} bytes, limit {goal}")).collect()
     }
 
     /// Formats the size as tables.
@@ -153,7 +153,7 @@ impl ImageSize {
             table.to_text()
         };
         format!(
-            "{}\nstack set aside: {} bytes\n\n{}\n{}",
+            "{}\n\nreserved stack: {} bytes\n\n{}\n\n{}\n",
             sections.to_text(),
             self.stack,
             list("largest functions and constants", &self.code),

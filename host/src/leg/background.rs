@@ -1,11 +1,11 @@
-//! What is known of a leg besides its data.
+//! Data about a leg besides its recordings: model, prior, truth.
 
 use scarab::ident::{LinkPrior, RowModel};
 use scarab::model::LegParameters;
 
 use crate::leg::model_choice::Asked;
 
-/// Knowledge of a leg besides the data.
+/// Data about a leg besides its recordings.
 #[derive(Clone, Debug)]
 pub struct Background<const N: usize, const B: usize> {
     /// Name in the leg file.

@@ -6,27 +6,27 @@ use scarab::motor::{AxisError, AxisFault, Phase, Refusal};
 #[must_use]
 pub fn axis_error(error: AxisError) -> String {
     let words = match error {
-        AxisError::Sense => "amplifiers, converter or bus divider make no sense",
+        AxisError::Sense => "the scales of amplifiers, converter or bus divider are implausible",
         AxisError::Timing => "dead time, settling and conversion leave less than half of a PWM period",
         AxisError::Encoder => {
-            "an encoder of 16 to 65,536 counts (`encoder.counts`) with more than four per pole pair (`motor.pole_pairs`) is needed"
+            "the encoder needs 16 to 65,536 counts (`encoder.counts`) and more than four per pole pair (`motor.pole_pairs`)"
         }
         AxisError::Speed => {
             "at twice the speed limit (`speed_limit_deg_s`) the rotor would turn by a quarter of an electrical turn per PWM period"
         }
         AxisError::Motor => {
-            "flux, resistance or inductance is none that its current loop can be set for (`torque_per_ampere`, `motor`)"
+            "no current loop can be designed for this flux, resistance or inductance (`torque_per_ampere`, `motor`)"
         }
         AxisError::Current => {
-            "its current limit (`current_limit_a`, or torque_limit_nm / torque_per_ampere) must be below the 61 A at which the bridge is released"
+            "its current limit (`current_limit_a`, or torque_limit_nm / torque_per_ampere) must be below the 61 A at which the bridge turns off"
         }
-        AxisError::Bus => "the bus borders lie beyond what the divider can measure",
+        AxisError::Bus => "the limits of the bus voltage exceed the range of the divider",
         AxisError::BackEmf => {
-            "at twice the speed limit a released bridge would rectify more than the greatest bus voltage of 58 V: lower `speed_limit_deg_s`, `torque_per_ampere` or `encoder.ratio`"
+            "at twice the speed limit the back-EMF of a motor with its bridge off exceeds the largest bus voltage of 58 V: lower `speed_limit_deg_s`, `torque_per_ampere` or `encoder.ratio`"
         }
         AxisError::Calibration => "its calibration was made for another configuration",
     };
-    format!("the firmware refuses its configuration: {words}")
+    format!("the firmware rejects its configuration: {words}")
 }
 
 /// Reason for a failed calibration.
@@ -39,14 +39,14 @@ pub fn refusal(reason: Refusal) -> String {
             "the bus voltage left 20 V..58 V (`supply.voltage_v`, `supply.resistance_ohm`)".into()
         }
         Refusal::ShuntZero(phase) => {
-            format!("the shunt of phase {} has its zero too far off, or too much noise", name(phase))
+            format!("the shunt of phase {} has too large an offset, or too much noise", name(phase))
         }
         Refusal::Turning => "the rotor turns although the bridge is off".into(),
         Refusal::PhaseOpen(phase) => format!("no current flows in phase {}", name(phase)),
         Refusal::ShuntInverted(phase) => format!("the shunt of phase {} reads with the wrong sign", name(phase)),
         Refusal::ShuntsInverted => "both shunts read with the wrong sign".into(),
         Refusal::ShuntsSwapped => "the shunts of phases B and C are exchanged".into(),
-        Refusal::CurrentDirection => "currents do not flow where the voltage points".into(),
+        Refusal::CurrentDirection => "currents do not flow in the direction of the voltage".into(),
         Refusal::PhaseImbalance => "the phases' resistances differ by more than 15 %".into(),
         Refusal::MotorConstants => {
             "resistance or inductance is out of range, or too large for 9.5 V at the calibration's current (`motor.resistance_ohm`, `motor.inductance_d_uh`, `motor.inductance_q_uh`)".into()
@@ -55,18 +55,18 @@ pub fn refusal(reason: Refusal) -> String {
             "the resistance is more than 40 % or an inductance more than 20 % from the stored one: another motor".into()
         }
         Refusal::TimeOut => "the current does not settle".into(),
-        Refusal::NoCounts => "the field turned, the counter did not: encoder, or a blocked rotor".into(),
+        Refusal::NoCounts => "the field turned, but the counter did not: check the encoder, or whether the rotor is blocked".into(),
         Refusal::Direction => {
             "the counter runs against the field: two motor leads or the encoder's A and B are exchanged".into()
         }
         Refusal::PolePairs(pairs) => format!("the counts fit {pairs} pole pairs (`motor.pole_pairs`)"),
         Refusal::CountsPerTurn(counts) => format!("the counts fit {counts} per turn (`encoder.counts`)"),
         Refusal::Slipped => {
-            "the rotor did not follow the field evenly: load, friction or cogging (`motor.cogging_nm`) take more than half of the holding torque".into()
+            "the rotor did not follow the field evenly: load, friction or cogging (`motor.cogging_nm`) need more than half of the holding torque".into()
         }
-        Refusal::NoIndex => "no index pulse came in a whole turn".into(),
-        Refusal::IndexMoved => "the index pulse came at different places of the turn".into(),
-        Refusal::StoredOffset => "the rotor does not stand where the stored offset says".into(),
+        Refusal::NoIndex => "no index pulse within a whole turn".into(),
+        Refusal::IndexMoved => "the index pulse came at different positions of the turn".into(),
+        Refusal::StoredOffset => "the rotor position contradicts the stored offset".into(),
     };
     format!("the calibration is refused: {words}")
 }
@@ -87,12 +87,12 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
         AxisFault::Overcurrent => "the current went beyond 61 A",
         AxisFault::BusVoltage => "the bus voltage left 20 V..58 V (`supply`)",
         AxisFault::Encoder => {
-            "its counts jumped or the index came at another place: the rotor's angle is lost"
+            "its counts jumped or the index came at another position: the rotor's angle is lost"
         }
-        AxisFault::NotANumber => "a current or voltage was not a number",
-        AxisFault::EncoderFrozen => "the counter stands still although the motor turns",
-        AxisFault::OpenPhase => "a phase takes voltage and no current",
-        AxisFault::CurrentZero => "a shunt's zero drifted",
+        AxisFault::NotANumber => "a current or voltage was not finite",
+        AxisFault::EncoderFrozen => "the counter is constant although the motor turns",
+        AxisFault::OpenPhase => "a phase has voltage but no current",
+        AxisFault::CurrentZero => "a shunt's offset drifted",
         AxisFault::Parameters => "its gains or limits changed in memory",
         AxisFault::StuckConversion => "a shunt's code does not change with its current",
     }

@@ -1,8 +1,9 @@
 //! Compares a model with a leg and describes the differences.
 //!
-//! A model of another leg predicts wrongly, and its numbers do not show it. Everything that defines the
-//! parameters' meaning is compared: side, names and order of the joints, lengths and axes, sense and zero,
-//! torque constants, gravity. The board compares the fingerprint alone; here the differences are described.
+//! A model of another leg predicts wrong torques, and its numbers do not show it. Everything that defines the
+//! parameters' meaning is compared: side, names and order of the joints, lengths and axes, direction and
+//! zero, torque constants, gravity. The board compares the fingerprint alone; here the differences are
+//! described.
 
 use nalgebra::Vector3;
 

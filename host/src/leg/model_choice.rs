@@ -1,4 +1,4 @@
-//! Model terms that a leg file asks for, as choices of the firmware.
+//! Model terms that a leg file requests, as choices of the firmware.
 
 use scarab::ident::{Choice, Constant, DriveChoice};
 

@@ -60,7 +60,7 @@ impl PlacedMass {
             .ok_or_else(|| {
                 let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
                 refused(format!(
-                    "`{}` is no joint of `{}`: {} or 1 to {}",
+                    "`{}` is not a joint of `{}`: {} or 1 to {}",
                     self.joint,
                     leg.name,
                     names.join(", "),
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_meant_is_refused_with_its_reason() {
+    fn implausible_masses_and_positions_are_refused_with_their_reason() {
         for (text, reason) in [
             ("0@knee:0.2", "a mass of 0 kg; it must be above 0 and at most 50"),
             ("-5@knee:0.2", "a mass of -5 kg"),
@@ -110,9 +110,9 @@ mod tests {
             ("5@knee:0.2:0:1", "is not KG@JOINT:X_M"),
             ("5 knee 0.2", "is not KG@JOINT:X_M"),
             ("5@:0.2", "is not KG@JOINT:X_M"),
-            ("5@ankle:0.2", "--payload: `ankle` is no joint of `x2-wearer-75kg`: hip, knee or 1 to 2"),
-            ("5@3:0.2", "`3` is no joint"),
-            ("5@0:0.2", "`0` is no joint"),
+            ("5@ankle:0.2", "--payload: `ankle` is not a joint of `x2-wearer-75kg`: hip, knee or 1 to 2"),
+            ("5@3:0.2", "`3` is not a joint"),
+            ("5@0:0.2", "`0` is not a joint"),
             ("5@hip:0.4", "--payload: x 0.4 m, y 0 m lies outside the link of `hip`, which is 0.390 m long"),
             ("5@knee:-0.1", "lies outside the link of `knee`"),
             ("5@knee:0.2:-0.6", "lies outside the link of `knee`"),

@@ -33,7 +33,7 @@ pub fn on_side(leg: &LegFile, side: BodySide) -> Result<LegFile, ToolError> {
     }
     if let Some(joint) = leg.joints.iter().find(|joint| joint.dh.alpha != 0.0) {
         return Err(ToolError::input(format!(
-            "--side: {}: joint `{}` is not parallel to the one before it (alpha {}); only legs with parallel axes are mirrored",
+            "--side: {}: joint `{}` is not parallel to the one before it (alpha {}); only legs with parallel axes can be mirrored",
             leg.name, joint.name, joint.dh.alpha
         )));
     }

@@ -58,7 +58,7 @@ impl core::str::FromStr for PriorChoice {
                 Ok(percent) if (0.0..100.0).contains(&percent) => Ok(Self::Wrong(percent)),
                 _ => Err(format!("`{percent}` is not a percentage from 0 to below 100")),
             },
-            _ => Err(format!("`{text}` is none of none, file, wrong:PERCENT")),
+            _ => Err(format!("`{text}` is not one of none, file, wrong:PERCENT")),
         }
     }
 }
@@ -128,7 +128,7 @@ pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowMod
     let (chain, gravity) = (chain(leg)?, Vector3::from(leg.gravity));
     let base = BaseParameters::analyse(&chain, &gravity, &column_mask(leg)).map_err(|error| {
         let reason = match error {
-            BaseError::TooMany { rank } => format!("{rank} base parameters, room for {B}"),
+            BaseError::TooMany { rank } => format!("{rank} base parameters, at most {B} are supported"),
             BaseError::NothingSeen => "no torque depends on any parameter".into(),
             BaseError::NotFinite => "a number is not finite".into(),
         };
@@ -144,7 +144,7 @@ pub fn device_model<const N: usize, const B: usize>(
 ) -> Result<RowModel<f32, N, B>, FileError> {
     let (chain, gravity) = (reference.chain.convert(), reference.gravity.map(|element| element as f32));
     let base = BaseParameters::analyse(&chain, &gravity, &column_mask(leg))
-        .map_err(|_| leg.error("base parameters cannot be told apart in single precision"))?;
+        .map_err(|_| leg.error("base parameters cannot be distinguished in single precision"))?;
     if (0..B).any(|index| base.independent(index) != reference.base.independent(index)) {
         return Err(leg.error("base parameters differ between single and double precision"));
     }
@@ -232,10 +232,10 @@ pub fn background<const N: usize, const B: usize>(
         PriorChoice::None => (None, "none".to_owned()),
         PriorChoice::Default => (from_file, if from_file.is_some() { "file" } else { "none" }.to_owned()),
         PriorChoice::File => {
-            (Some(from_file.ok_or_else(|| leg.error("has no prior for every joint"))?), "file".to_owned())
+            (Some(from_file.ok_or_else(|| leg.error("not every joint has a `prior`"))?), "file".to_owned())
         }
         PriorChoice::Wrong(percent) => {
-            let truth = truth.ok_or_else(|| leg.error("a wrong prior needs a truth to be wrong about"))?;
+            let truth = truth.ok_or_else(|| leg.error("`--prior wrong` distorts the `truth` of every joint, which is missing"))?;
             (Some(wrong_prior(&truth, percent, seed)), format!("wrong:{percent}"))
         }
     };
@@ -340,6 +340,6 @@ fn servo_inertia<const N: usize, const B: usize>(
     background: &Background<N, B>,
 ) -> Result<[f64; N], FileError> {
     let links = links::<N>(leg, |joint| joint.prior.as_ref().or(joint.truth.as_ref()))
-        .ok_or_else(|| leg.error("neither prior nor truth tells how heavy the leg is"))?;
+        .ok_or_else(|| leg.error("the servo's gains need `prior` or `truth` of every joint"))?;
     Ok(largest_inertia(&background.model.chain, &prior_parameters(&links)))
 }

@@ -90,7 +90,7 @@ impl Size {
         }
         let old = leg.segments.ok_or_else(|| {
             ToolError::input(format!(
-                "{}: --thigh, --shank and --wearer need a leg that says what its thigh and shank are, `segments` in its file",
+                "{}: --thigh, --shank and --wearer need the key `segments` in the leg file",
                 leg.name
             ))
         })?;
@@ -177,7 +177,7 @@ impl Change<'_> {
         let (kilogram, com, inertia) = joined(&(self.before)(mass));
         let machine = difference(&whole, &body(kilogram, com, inertia)).ok_or_else(|| {
             format!(
-                "its link is lighter than the {} of a wearer of {mass} kg, which `segments` says is in it",
+                "its link is lighter than the {} of a wearer of {mass} kg, which it contains by `segments`",
                 self.name
             )
         })?;

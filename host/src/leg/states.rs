@@ -1,7 +1,7 @@
 //! Reads states of motion from a CSV file, for `predict` and `regressor`, in the model's angles.
 //!
-//! Why one place: `replay` reads anatomical angles from columns of the same names. All user data
-//! are therefore anatomical unless `--dh` is given.
+//! Why in one place: `replay` reads anatomical angles from columns of the same names. All user data are
+//! therefore anatomical unless `--dh` is given.
 //!
 //! ```text
 //! D-H angle = direction * anatomical angle + zero offset     speed, acceleration, torque: direction only

@@ -1,4 +1,4 @@
-//! Describes the firmware's error codes in words that a user can act on.
+//! Describes the firmware's error codes so that a user can act on them.
 
 use scarab::ident::KernelError;
 use scarab::leg::LegError;
@@ -51,7 +51,7 @@ pub fn leg_error(leg: &LegFile, error: LegError) -> String {
                 violation.limit
             )
         }
-        LegError::Motion(error) => format!("a motion makes no sense: {error:?}"),
+        LegError::Motion(error) => format!("a motion is invalid: {error:?}"),
         LegError::Kernel(KernelError::TooLong { .. }) => {
             "bandwidth_hz must be at least 7.7 on the device".into()
         }

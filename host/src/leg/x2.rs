@@ -1,7 +1,7 @@
-//! The default leg, derived: a Fourier X2 exoskeleton leg with a wearer of a given mass.
+//! Derivation of the default leg: a Fourier X2 exoskeleton leg with a wearer of a given mass.
 //!
-//! Why derived: the leg file's numbers are sums over seven bodies. Here they can be checked against
-//! their sources and computed for another wearer.
+//! Why derived: the leg file's numbers are sums over seven bodies. This code checks them against their
+//! sources and computes them for another wearer.
 //!
 //! - Exoskeleton: masses, sagittal inertias, centres of mass, friction and rotor inertia after the parameter
 //!   file of CANOpenRobotController (University of Melbourne, Apache-2.0, `config/x2_params.yaml`); some are

@@ -4,9 +4,9 @@
 //! The firmware answers the plant's readings of a PWM period in the same period; the answer acts in
 //! the next. The servo's sample is the mean of the six periods since its last tick.
 //!
-//! A run begins with a ready drive. Every motor was calibrated on a stand, free of its gear and at
-//! rest, with rotor and counter at the leg's positions. The leg's initial pose is taken for the
-//! reference: with outputs off, the leg would swing for the half second that `StatedPose` waits.
+//! A run begins with a ready drive. Every motor was calibrated on a stand, free of its gear and at rest, with
+//! rotor and counter at the leg's positions. The leg's initial pose is used as the reference: with outputs
+//! off, the leg would swing for the half second that `StatedPose` waits.
 
 pub mod levels;
 mod locked;
@@ -67,8 +67,8 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
     drives::axis(&motor, Ampere(joint.current_limit() as f32), speed, DIVIDER)
 }
 
-/// Calibration settings of a motor on its stand. The current is limited by the axis and by what the
-/// resistance allows at the permitted voltage; the voltage follows from resistance and inductance.
+/// Calibration settings of a motor on its stand. The current is limited by the axis and by the resistance at
+/// the permitted voltage; the voltage follows from resistance and inductance.
 #[must_use]
 pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile) -> CalibrationSettings {
     let [usual, most] = CALIBRATION_VOLTAGE_V;
@@ -119,7 +119,7 @@ pub fn commission(
             }
         }
     }
-    Err(refused("the calibration did not end".into()))
+    Err(refused("the calibration did not end in time".into()))
 }
 
 /// Axes and chopper of a ready board: motors calibrated, counters at the initial pose of the simulated leg.
@@ -152,8 +152,8 @@ fn ready<const N: usize>(
         axes.push(axis);
     }
     let chopper = Chopper::new(BRAKE[0], BRAKE[1])
-        .ok_or_else(|| ToolError::input("the firmware refuses the chopper's voltages"))?;
-    let axes = axes.try_into().map_err(|_| ToolError::input("a motor for every joint is needed"))?;
+        .ok_or_else(|| ToolError::input("the firmware rejects the chopper's voltages"))?;
+    let axes = axes.try_into().map_err(|_| ToolError::input("every joint needs a motor (`[joint.motor]`)"))?;
     // The first period took the reference; outputs stay off for the rest of its servo tick.
     for _ in 1..PERIODS_PER_TICK {
         world.period(&[AxisCommand::RELEASED; N], 0.0);
@@ -163,7 +163,7 @@ fn ready<const N: usize>(
 
 /// Settings of the housekeeping for this leg.
 fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSettings<N>, ToolError> {
-    let unfit = || ToolError::input("a motor for every joint is needed");
+    let unfit = || ToolError::input("every joint needs a motor (`[joint.motor]`)");
     let mut parts = Vec::with_capacity(N);
     for joint in leg.joints.iter().take(N) {
         let motor = joint.motor.as_ref().ok_or_else(unfit)?;

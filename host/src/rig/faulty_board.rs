@@ -63,7 +63,7 @@ pub struct Rig<const N: usize, const B: usize> {
     pub period: u64,
     /// Hash of everything that has crossed the registers.
     pub hash: u64,
-    /// Faults whose detectors are disabled, to prove that the campaign notices their absence.
+    /// Faults whose detectors are disabled, to prove that the campaign detects their absence.
     pub blind: &'static [FaultCode],
     /// All levels of the board.
     pub board: Box<Levels<N>>,
@@ -171,7 +171,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         if self.injector.happens(Channel::Servo, 0, self.period) {
             return;
         }
-        // A disabled detector must have no effect: leg and levels continue from before.
+        // A disabled detector must have no effect: leg and levels continue from their previous state.
         let before = (!self.blind.is_empty()).then(|| (self.leg.clone(), self.board.clone()));
         let output = self.board.servo(self.leg.halves().0, self.gravity);
         if let Some((leg, board)) = before

@@ -1,7 +1,7 @@
 //! Leg and plant ticked together, and the data both are built from.
 //!
-//! One value that can be cloned at any tick and continued. The copies evolve bit for bit alike
-//! until they receive different requests.
+//! A pair can be cloned at any tick and continued. The copies stay equal bit for bit until they receive
+//! different requests.
 
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use hal_sim::world::{TICK_S, World};
@@ -36,7 +36,7 @@ pub const EVALUATIONS_PER_TICK: u32 = 2;
 /// Data from which a run is built.
 #[derive(Clone, Debug)]
 pub struct Context<const N: usize, const B: usize> {
-    /// Knowledge besides the data.
+    /// Data about the leg besides its recordings.
     pub background: Background<N, B>,
     /// Configuration of the firmware.
     pub configuration: LegConfiguration<N, B>,
@@ -67,8 +67,8 @@ impl<const N: usize, const B: usize> Context<N, B> {
         configuration.estimator = options.estimator;
         let world = World::<N>::new(&leg.description()?, options.seed);
         let percent = options.torque_noise_percent.unwrap_or(leg.torque_noise_percent);
-        // The percentage always refers to the default motion: noise of a sensor does not depend on
-        // its later use.
+        // The percentage always refers to the default motion, because a sensor's noise does not depend on its
+        // later use.
         let mean = mean_absolute_torque(leg, &world, &motions.excitation);
         if let Some(excitation) = &options.excitation {
             motions.excitation = excitation.motion()?;
@@ -181,8 +181,8 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             Some((believed, drives)) => {
                 let mut board = Levels::ready(believed, drives, &device, &mut world, seed)?;
                 board.queues().set_samples(&sample.joints);
-                // Requests come from the run. A switch that never opens requests nothing; an open
-                // one would stop the leg.
+                // Requests come from the run. A switch that never opens requests nothing; an open one would
+                // stop the leg.
                 board.registers.contacts.enabling = true;
                 Some(Box::new(board))
             }
@@ -257,7 +257,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             self.sample = self.world.observe(&Sample { joints });
             board.queues().set_samples(&self.sample.joints);
         }
-        self.output.expect("a board that is ready ticks its leg at once")
+        self.output.expect("a ready board ticks its leg at once")
     }
 
     /// Runs the exciting motion up to its record; `None` if the drive does not complete it.
@@ -283,7 +283,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             return drive_stop(leg, self.leg.control().state());
         };
         let name = leg.joints.get(joint).map_or("?", |joint| joint.name.as_str());
-        format!("axis `{name}` released its bridge, and with it all others: {}", axis_fault(fault))
+        format!("axis `{name}` turned its bridge off, and all others too: {}", axis_fault(fault))
     }
 
     /// Enables the drive and returns whether it is enabled.

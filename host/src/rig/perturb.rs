@@ -1,9 +1,9 @@
 //! Deliberate errors in a simulated identification, which the verdict must detect.
 //!
-//! Why: a verdict tested only on correct runs has proved nothing. Every perturbation acts through
-//! the whole firmware; none needs an interface that a board would not have.
+//! Why: correct runs alone do not test a verdict. Every perturbation acts through the whole firmware; none
+//! needs an interface that a board would not have.
 //!
-//! | `--perturb` | error | place |
+//! | `--perturb` | error | acts on |
 //! | --- | --- | --- |
 //! | `inertia=0.7` | factor on base parameters carried by an inertia, rotors included | result, see below |
 //! | `com=0.8` | factor on base parameters carried by a first moment | result, see below |
@@ -87,7 +87,7 @@ impl FromStr for Perturbation {
             text.split_once('=').map_or((text, None), |(name, value)| (name, Some(value.trim())));
         let joint = || match value {
             Some(joint) if !joint.is_empty() => Ok(joint.to_owned()),
-            _ => Err(format!("{name} needs a joint: {name}=JOINT, its name or its number from 1")),
+            _ => Err(format!("{name} needs a joint: {name}=JOINT, name or number from 1")),
         };
         Ok(match name {
             "inertia" => Self::Inertia(number(name, value, 0.7, 0.01, 100.0)?),
@@ -123,13 +123,13 @@ impl FromStr for Perturbation {
 }
 
 impl Perturbation {
-    /// Whether it changes the identified values before their validation.
+    /// Whether the perturbation changes the identified values before their validation.
     #[must_use]
     pub fn tampers(&self) -> bool {
         matches!(self, Self::Inertia(_) | Self::CentreOfMass(_))
     }
 
-    /// Whether it needs complete drives.
+    /// Whether the perturbation needs complete drives.
     fn needs_complete_drives(&self) -> bool {
         matches!(self, Self::Trigger(_) | Self::QuarterShift | Self::Coupling(_))
     }
@@ -173,7 +173,7 @@ fn joint_index(leg: &LegFile, joint: &str) -> Result<usize, ToolError> {
         .ok_or_else(|| {
             let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
             ToolError::input(format!(
-                "--perturb: `{joint}` is no joint of {}: {} or 1 to {}",
+                "--perturb: `{joint}` is not a joint of {}: {} or 1 to {}",
                 leg.name,
                 names.join(", "),
                 names.len()
@@ -181,7 +181,7 @@ fn joint_index(leg: &LegFile, joint: &str) -> Result<usize, ToolError> {
         })
 }
 
-/// Leg as assumed by the firmware.
+/// Leg assumed by the firmware.
 pub fn believed(leg: &LegFile, perturbations: &[Perturbation]) -> Result<LegFile, ToolError> {
     let mut believed = leg.clone();
     for perturbation in perturbations {
@@ -201,14 +201,14 @@ pub fn believed(leg: &LegFile, perturbations: &[Perturbation]) -> Result<LegFile
     Ok(believed)
 }
 
-/// Leg as simulated.
+/// Simulated leg.
 pub fn simulated(leg: &LegFile, perturbations: &[Perturbation]) -> Result<LegFile, ToolError> {
     let mut simulated = leg.clone();
     for perturbation in perturbations {
         match perturbation {
             Perturbation::TorqueConstant(factor) => {
                 for joint in &mut simulated.joints {
-                    // The limit of the drive is one of current.
+                    // The limit of the drive is a current limit.
                     joint.current_limit_a = Some(joint.current_limit());
                     joint.torque_per_ampere *= factor;
                 }

@@ -110,8 +110,8 @@ fn whatever_is_not_as_it_has_to_be_after_a_crash_is_said() {
     assert_eq!((good.released_after, good.kept_after), (100, 300));
     assert!(good.complaints.is_empty(), "{:?}", good.complaints);
     for (from, to, complaint) in [
-        ("cause=panic", "cause=hard_fault", "the cause that is told"),
-        ("released=1100", "released=1400", "the release came after the record"),
+        ("cause=panic", "cause=hard_fault", "the reported cause"),
+        ("released=1100", "released=1400", "the bridges turned off after the record"),
         ("why=crash", "why=watchdog", "not refused before"),
         ("accepted=false", "accepted=true", "not refused before"),
         (

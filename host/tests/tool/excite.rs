@@ -164,9 +164,9 @@ fn noise_is_the_sensors_own_whichever_leg_is_assumed_and_whatever_it_is_to_be_us
 #[test]
 fn a_motion_is_checked_with_the_mass_that_will_be_hung_on() {
     let message = scarab("identify --payload 30@knee:0.35 --excitation", &[Path::new(SHIPPED)]).refusal();
-    assert!(message.contains("the motion takes") && message.contains("the limit is 85.0"), "{message}");
+    assert!(message.contains("the motion needs") && message.contains("limit 85.0 N m"), "{message}");
     let message = scarab("identify --load 30@knee:0.35 --excitation", &[Path::new(SHIPPED)]).refusal();
-    assert!(message.contains("the motion takes"), "{message}");
+    assert!(message.contains("the motion needs"), "{message}");
 }
 
 #[test]
@@ -228,7 +228,7 @@ fn a_leg_without_truth_is_designed_for_by_its_prior() {
     assert!(value(&list(&report, "joints")[0], "torque_with_margin_nm") <= 12.0);
     assert!(value(&report, "duration_s") <= 12.01);
     let refused = scarab("excite --leg sp --assume-truth", &[]).refusal();
-    assert!(refused.contains("has no truth"), "{refused}");
+    assert!(refused.contains("needs a `truth`"), "{refused}");
 }
 
 #[test]
@@ -284,7 +284,7 @@ fn a_motion_that_takes_too_much_torque_is_refused_and_never_designed() {
     let frail = folder.write("frail.toml", &frail.to_toml());
     let arguments = ["identify --excitation", SHIPPED, "--leg"].join(" ");
     let message = scarab(&arguments, &[&frail]).refusal();
-    assert!(message.contains("the motion takes") && message.contains("the limit is 55.0"), "{message}");
+    assert!(message.contains("the motion needs") && message.contains("limit 55.0 N m"), "{message}");
     // Half the torque limit: the hip of the assumed leg alone needs 53 N m at the end of its range.
     let json = folder.path("report.json");
     let arguments = format!("excite {EFFORT} --torque-margin 5 --leg");
@@ -308,9 +308,9 @@ fn options_that_make_no_sense_are_refused_in_words() {
         ("excite --duration 3", "leave no room for a cycle"),
         ("excite --torque-noise -1", "--torque-noise"),
         ("excite --torque-margin inf", "--torque-margin"),
-        ("excite --torque-noise-nm 1,2,3", "3 numbers, the leg `x2-wearer-75kg` has 2 joints"),
-        ("excite --torque-noise-nm -1", "-1 N m; it must be from 0 to 1000"),
-        ("identify --torque-noise-nm nan", "NaN N m; it must be from 0 to 1000"),
+        ("excite --torque-noise-nm 1,2,3", "3 numbers, but the leg `x2-wearer-75kg` has 2 joints"),
+        ("excite --torque-noise-nm -1", "-1 N m is outside 0..1000"),
+        ("identify --torque-noise-nm nan", "NaN N m is outside 0..1000"),
         ("identify --torque-noise-nm 1 --torque-noise 7", "cannot be used with"),
         ("excite --leg paper-chain --evaluations 600", "no motion can be designed for this leg"),
         ("excite --evaluations 1", "evaluations"),

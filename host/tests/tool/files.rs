@@ -69,7 +69,7 @@ fn no_command_overwrites_what_it_reads() {
             let message = scarab(command, &line).refusal();
             let expected = format!("error: {output} {}: ", file.display());
             assert!(message.starts_with(&expected), "{command} {input}: {message}");
-            assert!(message.contains("that the command reads"), "{command} {input} {output}: {message}");
+            assert!(message.contains("which the command reads"), "{command} {input} {output}: {message}");
             assert_eq!(fs::read_to_string(&file).expect("there"), CONTENT, "{command} {input} {output}");
             tried += 1;
         }
@@ -77,7 +77,7 @@ fn no_command_overwrites_what_it_reads() {
     println!("{tried} pairs of an input and an output");
     // Both files are positional.
     let message = scarab("kept import", &[&file, &file]).refusal();
-    assert!(message.contains("that the command reads"), "{message}");
+    assert!(message.contains("which the command reads"), "{message}");
     assert_eq!(fs::read_to_string(&file).expect("there"), CONTENT);
 }
 
@@ -100,7 +100,7 @@ fn no_command_writes_one_file_twice() {
             line.extend(further.iter().map(Path::new));
             let message = scarab(command, &line).refusal();
             assert!(
-                message.contains("that the command writes as well"),
+                message.contains("which the command writes as well"),
                 "{command} {one} {other}: {message}"
             );
             assert!(message.contains(one) && message.contains(other), "{command} {one} {other}: {message}");
@@ -139,10 +139,10 @@ fn another_spelling_and_a_link_are_the_same_file() {
     for name in
         ["data.csv", "./data.csv", "inner/../data.csv", "inner/around/data.csv", "link.csv", "hard.csv"]
     {
-        refused(name, "torque.csv", "that the command reads");
+        refused(name, "torque.csv", "which the command reads");
     }
     for name in ["new.json", "./new.json", "inner/../new.json", "inner/around/new.json", "dangling.json"] {
-        refused(name, "new.json", "that the command writes as well");
+        refused(name, "new.json", "which the command writes as well");
     }
 }
 
@@ -164,17 +164,17 @@ fn an_output_that_cannot_be_written_is_found_before_the_input_is_read() {
     permissions.set_readonly(true);
     fs::set_permissions(&locked, permissions).expect("own file");
     let mut cases: Vec<(&str, PathBuf, &str)> = vec![
-        ("--json", folder.path("missing/run.json"), "there is no folder"),
-        ("--csv", folder.path("file/torque.csv"), "is no folder"),
+        ("--json", folder.path("missing/run.json"), "does not exist"),
+        ("--csv", folder.path("file/torque.csv"), "is not a folder"),
         ("--report", folder.path(""), "it is a folder"),
         ("--save-model", locked.clone(), "it is write-protected"),
         ("--figures", file.clone(), "it is a file, not a folder"),
-        ("--figures", folder.path("file/drawn"), "is no folder"),
+        ("--figures", folder.path("file/drawn"), "is not a folder"),
     ];
     // A place in which not even the superuser can create a file.
     if cfg!(target_os = "linux") {
-        cases.push(("--json", PathBuf::from("/proc/run.json"), "no file can be made in the folder /proc"));
-        cases.push(("--figures", PathBuf::from("/proc/drawn"), "no file can be made in the folder /proc"));
+        cases.push(("--json", PathBuf::from("/proc/run.json"), "no file can be created in the folder /proc"));
+        cases.push(("--figures", PathBuf::from("/proc/drawn"), "no file can be created in the folder /proc"));
     }
     for (option, path, reason) in cases {
         // The recording does not exist: the output is checked first.

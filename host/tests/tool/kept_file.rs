@@ -131,7 +131,7 @@ fn what_a_file_does_not_name_stays_and_one_calibration_is_not_mixed_with_an_olde
     let before = fs::read(&flash).expect("written");
     let alone = CALIBRATIONS.find("\n[[calibration]]\njoint = \"knee\"").expect("the second");
     let refused = import(&folder, &format!("schema = 1\n{}", &CALIBRATIONS[..alone]), &flash).ends_with(3);
-    assert!(refused.errors.contains("the knee keeps an older one"), "{}", refused.errors);
+    assert!(refused.errors.contains("the knee has an older one"), "{}", refused.errors);
     assert_eq!(fs::read(&flash).expect("still there"), before);
 }
 
@@ -174,11 +174,11 @@ fn what_is_damaged_is_said_and_the_rest_is_exported() {
     // calibrations are valid.
     let off = scarab::leg::DriveState::SwitchOnDisabled;
     for (bytes, why) in [
-        (&[0x17, 0x10, 0, 2, 50, 0, 0x17][..], "bytes that are no entry"),
-        (&[0x17, 0x10, 0, 4, 50, 0, 0, 0], "bytes that are no entry"),
+        (&[0x17, 0x10, 0, 2, 50, 0, 0x17][..], "bytes that are not an entry"),
+        (&[0x17, 0x10, 0, 4, 50, 0, 0, 0], "bytes that are not an entry"),
         (&[0x40, 0x60, 0, 2, 15, 0], "0x6040:0: is a command"),
         (&[0x55, 0x55, 0, 1, 1], "0x5555:0: there is no such object"),
-        (&[0x02, 0x20, 0, 2, 1, 0], "0x2002:0 (Bit rate after the next start): no node takes this value"),
+        (&[0x02, 0x20, 0, 2, 1, 0], "0x2002:0 (Bit rate after the next start): a node refuses this value"),
     ] {
         fs::remove_file(&flash).ok();
         import(&folder, &format!("schema = 1\n{CALIBRATIONS}"), &flash).ends_with(0);
@@ -200,7 +200,7 @@ fn what_is_damaged_is_said_and_the_rest_is_exported() {
     let run = export(&flash).ends_with(3);
     assert_eq!((content(&run.printed), run.errors.matches("damaged: ").count()), ("schema = 1\n", 1));
     let run = import(&folder, &text(), &flash).ends_with(3);
-    assert!(run.errors.contains("no record of it can be read: nothing was written"), "{}", run.errors);
+    assert!(run.errors.contains("no record in it can be read: nothing was written"), "{}", run.errors);
     assert_eq!(fs::read(&flash).expect("still there"), noise);
 
     // A damaged record (followed by zeros that fill the word) without a copy: the log has no
@@ -232,23 +232,23 @@ fn a_file_that_cannot_be_meant_is_refused_with_its_reason_and_the_flash_stays() 
         ("value = 50", "value = -1", "0x1017:0: -1 is not from 0 to 65535"),
         ("value = 50", "value = 50.5", ":6: "),
         ("0x1017,", "0x1717,", "0x1717:0: there is no such object"),
-        ("0x1017,", "0x6041,", "0x6041:0: can only be read"),
+        ("0x1017,", "0x6041,", "0x6041:0: is read-only"),
         ("0x1017,", "0x6040,", "0x6040:0: is a command"),
         ("\"Producer heartbeat time\"", "\"Device type\"", "is `Producer heartbeat time`, not `Device type`"),
-        ("value = 9", "value = 200", "0x2001:0 (Node-ID after the next start): no node takes this value"),
+        ("value = 9", "value = 200", "0x2001:0 (Node-ID after the next start): a node refuses this value"),
         (
             "value = 0x00000281",
             "value = 0x40000001",
-            "0x1800:1 (COB-ID used by TPDO 1): no node takes this value",
+            "0x1800:1 (COB-ID used by TPDO 1): a node refuses this value",
         ),
         ("value = -500000", "value = 1500001", "0x607D:1 is 1500001, above 0x607D:2 with 1500000"),
         (
             "0x607D, subindex = 2, name = \"Max",
             "0x607D, subindex = 1, name = \"Min",
-            "0x607D:1: is there twice",
+            "0x607D:1: occurs twice",
         ),
-        ("joint = \"knee\"\nobjects", "joint = \"hip\"\nobjects", "node: the hip is there twice"),
-        ("joint = \"knee\"\nobjects", "joint = \"ankle\"\nobjects", "a board keeps none of the ankle"),
+        ("joint = \"knee\"\nobjects", "joint = \"hip\"\nobjects", "node: the hip occurs twice"),
+        ("joint = \"knee\"\nobjects", "joint = \"ankle\"\nobjects", "a board does not store data of the ankle"),
         ("joint = \"knee\"\nobjects", "joint = \"toe\"\nobjects", "unknown variant `toe`"),
         (
             "resistance_ohm = 0.1\n",
@@ -256,7 +256,7 @@ fn a_file_that_cannot_be_meant_is_refused_with_its_reason_and_the_flash_stays() 
             "calibration of the knee: `resistance_ohm` is NaN",
         ),
         ("resistance_ohm = 0.1\n", "resistance_ohm = 0.0\n", "`resistance_ohm` is 0; it must be above 0"),
-        ("inductance_h = 0.0001\n", "inductance_h = 1e300\n", "no number a board can keep"),
+        ("inductance_h = 0.0001\n", "inductance_h = 1e300\n", "which a board cannot store"),
         ("offset_rad = -3.14", "offset_rad = -3.15", "it must be from -pi to pi"),
         ("pole_pairs = 20", "pole_pairs = 0", "pole pairs and counts per turn must be above 0"),
         ("pole_pairs = 20", "pole_pairs = 300", "expected u8"),
@@ -297,12 +297,12 @@ fn a_file_that_cannot_be_meant_is_refused_with_its_reason_and_the_flash_stays() 
         .collect();
     let many = format!("schema = 1\n[[node]]\njoint = \"hip\"\nobjects = [{}]\n", many.join(", "));
     let said = import(&folder, &many, &flash).refusal();
-    assert!(said.contains("more than the 400 bytes that a board keeps of a node"), "{said}");
+    assert!(said.contains("more than the 400 bytes that a board stores for a node"), "{said}");
     // A file of another size is not a flash and is not turned into one.
     fs::write(&flash, [0xFF; 100]).expect("a temporary file");
     let said = import(&folder, &whole, &flash).refusal();
     assert!(said.contains("100 bytes; the flash of 1 to 4 boards has 262144 each"), "{said}");
     assert_eq!(fs::read(&flash).expect("still there"), [0xFF; 100]);
     let said = export(&folder.path("none.bin")).refusal();
-    assert!(said.contains("there is no such file"), "{said}");
+    assert!(said.contains("does not exist"), "{said}");
 }

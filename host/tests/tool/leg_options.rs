@@ -94,9 +94,9 @@ fn what_a_leg_cannot_be_set_to_is_refused_by_option_and_reason() {
         ("--wearer 60,170", "a height of 170 m"),
         (
             "--leg sp --thigh 0.45",
-            "sp: --thigh, --shank and --wearer need a leg that says what its thigh and shank are",
+            "sp: --thigh, --shank and --wearer need the key `segments` in the leg file",
         ),
-        ("--leg paper-chain --side left", "only legs with parallel axes are mirrored"),
+        ("--leg paper-chain --side left", "only legs with parallel axes can be mirrored"),
         ("--trunk-pitch 91", "--trunk-pitch 91: degrees forward, from -90 to 90"),
         ("--trunk-pitch nan", "--trunk-pitch NaN: degrees forward"),
         ("--side middle", "invalid value 'middle'"),

@@ -90,7 +90,7 @@ fn hostile_files_are_refused_with_file_line_and_reason() {
     let covariance_line = |index: usize| good.lines().nth(row + index).expect("a row").to_owned();
 
     assert_eq!(refusal(""), "error: model.toml: is empty\n");
-    assert_eq!(refusal("name = \"x\"\n"), "error: model.toml: has no `schema`: no model file\n");
+    assert_eq!(refusal("name = \"x\"\n"), "error: model.toml: has no `schema`: not a model file\n");
     assert_eq!(
         changed("schema = 1", "schema = 2"),
         "error: model.toml:3: this schema is unknown; this program reads 1\n"
@@ -114,11 +114,11 @@ fn hostile_files_are_refused_with_file_line_and_reason() {
     );
     assert_eq!(
         changed("carrier = \"HX2\"", "carrier = \"HX3\""),
-        format!("error: model.toml:{at}: `HX3` is no parameter of this leg\n")
+        format!("error: model.toml:{at}: `HX3` is not a parameter of this leg\n")
     );
     assert_eq!(
         changed("carrier = \"HX2\"", "carrier = \"HY2\""),
-        format!("error: model.toml:{at}: `HY2` must stand in its own sum once\n")
+        format!("error: model.toml:{at}: `HY2` must occur once in its own sum\n")
     );
     let own = covariance_line(hx2);
     let variance = base.covariance[hx2][hx2].to_string();
@@ -160,7 +160,7 @@ fn hostile_files_are_refused_with_file_line_and_reason() {
     );
     assert!(changed("a = 0.39", "a = 0.40").contains("`fingerprint` is"));
     assert!(changed("[full_set]", "[full_set]\ncolour = 1").contains("unknown field `colour`"));
-    assert!(changed("name = \"M2\"", "name = \"M1\"").ends_with("`M1` where `M2` was expected\n"));
+    assert!(changed("name = \"M2\"", "name = \"M1\"").ends_with("`M1` instead of `M2`\n"));
     let missing = scarab("predict --states x.csv --model", &[&folder.path("none.toml")]).refusal();
     assert!(missing.contains("none.toml: cannot be read"), "{missing}");
 }

@@ -165,17 +165,17 @@ fn checks<const N: usize, const B: usize>(name: &str) {
 }
 
 #[test]
-fn bodies_of_a_planar_leg_come_back_and_move_as_torque_told() {
+fn bodies_of_a_planar_leg_come_back_and_move_as_identified() {
     checks::<2, 13>("x2-wearer-75kg");
 }
 
 #[test]
-fn bodies_of_a_chain_with_crossed_axes_come_back_and_move_as_torque_told() {
+fn bodies_of_a_chain_with_crossed_axes_come_back_and_move_as_identified() {
     checks::<3, 28>("paper-chain");
 }
 
 #[test]
-fn the_default_leg_as_shipped_is_exported_and_moves_as_torque_told() {
+fn the_default_leg_as_shipped_is_exported_and_moves_as_identified() {
     let folder = Folder::new();
     let path = folder.path("model.toml");
     scarab("identify --save-model", &[&path]).ends_with(0);
@@ -209,7 +209,7 @@ fn the_description_is_well_formed_and_says_what_torque_never_saw() {
         chosen.map(|one| one.name.as_str()).collect()
     };
     for joint in ['1', '2'] {
-        let unseen = format!("the prior's, torque never saw them: {}", of("prior", joint).join(" "));
+        let unseen = format!("the prior's, without effect on torque: {}", of("prior", joint).join(" "));
         let grouped =
             format!("measured in sums only, split by the prior: {};", of("grouped", joint).join(" "));
         assert!(
@@ -264,6 +264,6 @@ fn what_is_no_body_and_what_nobody_knows_is_not_exported() {
     let path = folder.path("bare.toml");
     scarab("identify --prior none --save-model", &[&path]).ends_with(0);
     let run = scarab("export --urdf none.urdf --model", &[&path]).ends_with(3);
-    assert!(run.errors.contains("without a prior torque tells sums only"), "{}", run.errors);
+    assert!(run.errors.contains("without a prior torque determines only sums"), "{}", run.errors);
     assert!(!std::path::Path::new("none.urdf").exists());
 }

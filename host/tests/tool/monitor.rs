@@ -22,8 +22,8 @@ fn a_payload_is_noticed_and_written_down_and_pushes_are_not_noticed() {
 #[test]
 fn bad_input_names_the_option() {
     for (arguments, words) in [
-        ("--payload 3@foot:0.2", "`foot` is no joint"),
-        ("--payload -50@knee:0.2", "--payload -50@knee:0.2: the link has 6.935 kg"),
+        ("--payload 3@foot:0.2", "`foot` is not a joint"),
+        ("--payload -50@knee:0.2", "--payload -50@knee:0.2: removes more than the link's 6.935 kg"),
         ("--payload nan@knee:0.2", "--payload nan@knee:0.2"),
         ("--friction nan", "--friction: NaN"),
         ("--hours 1e9", "--hours"),

@@ -111,7 +111,7 @@ fn figures_are_drawn_and_wrong_joints_refused() {
         assert!(document.descendants().count() > 50, "{file}");
     }
     let refusal = scarab("motor --joint ankle", &[]).refusal();
-    assert!(refusal.contains("`ankle` is no joint of x2-wearer-75kg: hip, knee or 1 to 2"), "{refusal}");
+    assert!(refusal.contains("`ankle` is not a joint of x2-wearer-75kg: hip, knee or 1 to 2"), "{refusal}");
     let refusal = scarab("motor --leg sp", &[]).refusal();
     assert!(refusal.contains("sp: the joint has no `[joint.motor]`"), "{refusal}");
 }
@@ -193,7 +193,7 @@ fn an_axis_that_releases_itself_and_a_supply_that_fails_are_named() {
     let weak = "supply = { voltage_v = 24.0, resistance_ohm = 1.0, capacitance_uf = 50.0, brake_ohm = 2.0 }\nsegments =";
     let leg = changed(&folder, &[("segments =", weak)]);
     let run = scarab("motor --leg", &[&leg]).ends_with(3);
-    assert!(run.errors.contains("axis `hip` released its bridge (steps"), "{}", run.errors);
+    assert!(run.errors.contains("axis `hip` turned its bridge off (steps"), "{}", run.errors);
     assert!(run.errors.contains("the bus voltage left 20 V..58 V (`supply`)"), "{}", run.errors);
     // With a leg the servo detects the falling supply before an axis does.
     let run = scarab("identify --drive full --leg", &[&leg]).ends_with(3);
@@ -221,7 +221,7 @@ fn what_the_firmware_would_refuse_is_told_with_the_key_that_mends_it() {
         ("torque_limit_nm = 85.0", "torque_limit_nm = 400.0"),
     ]);
     assert!(
-        strong.contains("a released bridge would rectify") && strong.contains("`speed_limit_deg_s`"),
+        strong.contains("the back-EMF of a motor with its bridge off") && strong.contains("`speed_limit_deg_s`"),
         "{strong}"
     );
     let cogging = refusal(&[("cogging_nm = 0.017", "cogging_nm = 0.3")]);

@@ -219,7 +219,7 @@ fn bad_states_are_refused_with_file_line_and_reason() {
     // Nothing is written before all states are valid; blank lines count.
     let states = folder.write("states.csv", "q1,qd1,qdd1\n0,0,1e30\n\n0,0,1e39\n");
     let message = scarab("regressor --leg sp --f32 --states", &[&states]).refusal();
-    let reason = ":4: the torque of this state is beyond the range of the numbers computed with\n";
+    let reason = ":4: the torque of this state exceeds the range of double precision\n";
     assert!(message.ends_with(reason), "{message}");
     let missing = folder.path("missing.csv");
     assert!(scarab("regressor --leg sp --states", &[&missing]).refusal().contains("cannot be read"));
@@ -227,7 +227,7 @@ fn bad_states_are_refused_with_file_line_and_reason() {
     assert!(
         scarab("regressor --leg nobody --states", &[&states])
             .refusal()
-            .contains("no shipped leg is called so")
+            .contains("is not the name of a shipped leg")
     );
 }
 

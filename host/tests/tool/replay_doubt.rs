@@ -280,11 +280,11 @@ fn torque_delays_that_cannot_be_are_refused() {
     };
     let message = refused("1,2,3");
     assert!(
-        message.contains("--torque-delay: 3 values; one for all joints, or one for each of 2"),
+        message.contains("--torque-delay: 3 values; give one for all joints, or one for each of 2"),
         "{message}"
     );
-    assert!(refused("nan").contains("less than a tenth of the recording"));
-    assert!(refused("9000").contains("less than a tenth of the recording"));
+    assert!(refused("nan").contains("the limit is a tenth of the recording"));
+    assert!(refused("9000").contains("the limit is a tenth of the recording"));
     assert!(refused("late").contains("invalid value 'late'"));
 }
 

@@ -69,7 +69,7 @@ fn absurd_options_are_refused_with_what_is_possible() {
     assert!(refused("--bandwidth fast").contains("invalid value 'fast' for '--bandwidth"));
     for split in ["0", "1", "-0.5", "1.5", "nan"] {
         let message = refused(&format!("--split {split}"));
-        assert_eq!(message, "error: --split: a fraction above 0 and below 1\n");
+        assert_eq!(message, "error: --split: must be above 0 and below 1\n");
     }
     let message = refused("--split 0.001");
     assert!(message.contains("fourier.csv: too short: 15 samples over 0.028 s"), "{message}");
@@ -118,7 +118,7 @@ fn legs_that_do_not_exist_or_cannot_be_are_refused() {
     let message = refused(Path::new("nobody"));
     assert!(message.starts_with("error: nobody: cannot be read"), "{message}");
     assert!(
-        message.contains("no shipped leg is called so (x2-wearer-75kg, x2-rough, mujoco-leg,"),
+        message.contains("is not the name of a shipped leg (x2-wearer-75kg, x2-rough, mujoco-leg,"),
         "{message}"
     );
     let message = refused(&folder.write("leg.toml", &leg("colour = \"red\"\n")));

@@ -61,7 +61,7 @@ fn a_load_that_is_stated_is_taken_off_and_one_that_is_not_is_found_in_the_parame
 fn masses_that_cannot_be_meant_are_refused_by_option_and_reason() {
     for (arguments, reason) in [
         ("identify --payload 0@knee:0.2", "above 0 and at most 50"),
-        ("identify --payload 5@ankle:0.2", "--payload: `ankle` is no joint of `x2-wearer-75kg`"),
+        ("identify --payload 5@ankle:0.2", "--payload: `ankle` is not a joint of `x2-wearer-75kg`"),
         ("identify --payload 5@hip:0.5", "--payload: x 0.5 m, y 0 m lies outside the link of `hip`"),
         ("identify --load 5@hip:0.5", "--load: x 0.5 m, y 0 m lies outside the link of `hip`"),
         ("identify --load 5@", "is not KG@JOINT:X_M"),

@@ -146,9 +146,9 @@ fn check_apart(files: &[Named]) -> Result<(), ToolError> {
             if written.is_same_file(other) {
                 return Err(written.refused(&match other.role {
                     Role::Input => format!(
-                        "is the file {argument} {path} that the command reads and would overwrite: name another file"
+                        "is the same file as {argument} {path}, which the command reads and would overwrite: name another file"
                     ),
-                    _ => format!("is the file {argument} {path} that the command writes as well: name another file"),
+                    _ => format!("is the same file as {argument} {path}, which the command writes as well: name another file"),
                 }));
             }
             if other.may_lie_in(written) {
@@ -184,11 +184,11 @@ fn check_writable(file: &Named, files: &[Named]) -> Result<(), ToolError> {
     }
     let name = folder.display();
     if !folder.exists() {
-        return Err(cannot(&format!("there is no folder {name}")));
+        return Err(cannot(&format!("the folder {name} does not exist")));
     }
     if !folder.is_dir() {
-        return Err(cannot(&format!("{name} is no folder")));
+        return Err(cannot(&format!("{name} is not a folder")));
     }
     can_write_in(&folder)
-        .map_err(|error| cannot(&format!("no file can be made in the folder {name}: {error}")))
+        .map_err(|error| cannot(&format!("no file can be created in the folder {name}: {error}")))
 }

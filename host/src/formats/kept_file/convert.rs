@@ -23,7 +23,7 @@ fn finite(name: &str, value: f64) -> Result<f32, String> {
     if single.is_finite() {
         Ok(single)
     } else {
-        Err(format!("`{name}` is {value}, no number a board can keep"))
+        Err(format!("`{name}` is {value}, which a board cannot store"))
     }
 }
 
@@ -193,7 +193,7 @@ impl ModelPart {
             let name = part.joint.name();
             if part.joint != expected {
                 return Err(format!(
-                    "`joint`: {name} where {} belongs: from the base, each once",
+                    "`joint`: {name} instead of {}: list each joint once, from the base",
                     expected.name()
                 ));
             }

@@ -28,13 +28,13 @@ pub struct FlashContents {
 
 fn load_words(why: LoadError) -> String {
     match why {
-        LoadError::Damaged => "the flash holds something else, or is damaged beyond repair".into(),
-        LoadError::Flash => "the flash does not answer".into(),
+        LoadError::Damaged => "the flash contains foreign data, or is damaged beyond repair".into(),
+        LoadError::Flash => "the flash cannot be read".into(),
         LoadError::Record(RecordError::Length) => "the record has another length than its schema".into(),
         LoadError::Record(RecordError::Newer { schema }) => {
-            format!("the record is of schema {schema}, which this program does not know")
+            format!("the record has the unknown schema {schema}")
         }
-        LoadError::Record(RecordError::Range) => "a value of the record is out of its range".into(),
+        LoadError::Record(RecordError::Range) => "a value of the record is outside its range".into(),
     }
 }
 
@@ -93,15 +93,15 @@ fn saved(done: Option<Result<Saved, SaveError>>, what: &str) -> Result<(), Strin
     match done {
         Some(Ok(_)) => Ok(()),
         Some(Err(SaveError::Damaged)) => Err(format!(
-            "{what}: the flash holds something else, or is damaged beyond repair: nothing was written"
+            "{what}: the flash contains foreign data, or is damaged beyond repair: nothing was written"
         )),
-        Some(Err(why)) => Err(format!("{what}: not kept ({why:?}): nothing was written")),
-        None => Err(format!("{what}: the flash does not answer: nothing was written")),
+        Some(Err(why)) => Err(format!("{what}: not stored ({why:?}): nothing was written")),
+        None => Err(format!("{what}: the flash cannot be read: nothing was written")),
     }
 }
 
-/// Reason why a flash is not the store's and must not be written. The store itself would take it
-/// for an interrupted write, repair it, and thereby erase it.
+/// Reason why a flash does not belong to the store and must not be written. The store itself would treat it
+/// as an interrupted write, and erase it as a repair.
 fn foreign(memory: &Memory) -> Option<String> {
     let mut readable = memory.clone().bytes().iter().all(|byte| *byte == 0xFF);
     for key in Key::ALL {
@@ -114,12 +114,12 @@ fn foreign(memory: &Memory) -> Option<String> {
             Err(why) => return Some(load_words(why)),
         }
     }
-    (!readable).then(|| "the flash is written on, and no record of it can be read".into())
+    (!readable).then(|| "the flash is not empty, but no record in it can be read".into())
 }
 
 impl KeptFile {
-    /// Contents of a board's flash. Each part is read from a copy: repairs by the store thus
-    /// neither hide another part nor get written.
+    /// Contents of a board's flash. Each part is read from a copy, so repairs by the store neither hide
+    /// another part nor are written.
     #[must_use]
     pub fn of_flash(memory: &Memory) -> FlashContents {
         let mut found = FlashContents {
@@ -144,7 +144,7 @@ impl KeptFile {
         found
     }
 
-    /// Stores everything that the file names. If this fails, discard the image.
+    /// Stores every part that the file names. If this fails, discard the image.
     ///
     /// # Errors
     /// Describes what cannot be stored, and why.
@@ -159,7 +159,7 @@ impl KeptFile {
             if !self.calibration.is_empty() && other_is_older {
                 let name = joint.name();
                 return Err(format!(
-                    "calibration: the {name} keeps an older one, which one of its neighbour alone would be mixed with: nothing was written"
+                    "calibration: the {name} has an older one, and one axis' new calibration must not be mixed with it: nothing was written"
                 ));
             }
         }

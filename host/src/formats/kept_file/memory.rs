@@ -1,6 +1,6 @@
 //! Persistent memory of a simulated board: `scarab::store` on a simulated flash, optionally saved to a file.
 //!
-//! As on the board, nothing is written unless the drive is off, and a damaged record is refused by name. The
+//! As on the board, nothing is written unless the drive is off, and a damaged record is reported by name. The
 //! file is an image of the flash: two sectors of 128 KB.
 
 use embassy_futures::block_on;
@@ -47,7 +47,7 @@ impl Memory {
         Some(answer)
     }
 
-    /// Lets the power fail after so many programmed or erased bytes; `None` restores it.
+    /// Makes the power fail after this number of programmed or erased bytes; `None` restores it.
     pub fn fail_after(&mut self, bytes: Option<u64>) {
         if let Some(flash) = &mut self.flash {
             flash.fail_after(bytes);
@@ -90,7 +90,7 @@ impl Memory {
         let Some(key) = KEYS.get(joint) else { return Ok(None) };
         let mut bytes = [0; LONGEST];
         let length = self.with(|store| block_on(store.load_bytes(*key, &mut bytes))).transpose();
-        let length = length.map_err(|why| format!("the kept objects of node {}: {why:?}", joint + 1))?;
+        let length = length.map_err(|why| format!("the stored objects of node {}: {why:?}", joint + 1))?;
         Ok(length.flatten().map(|length| bytes[..length].to_vec()))
     }
 
@@ -106,9 +106,9 @@ impl Memory {
         configuration: &LegConfiguration<N, B>,
     ) -> Result<Option<(IdentifiedModel<N>, u32)>, String> {
         let kept = self.with(|store| block_on(store.load::<KeptModel<N>>(Key::Model)));
-        let kept = kept.transpose().map_err(|why| format!("the kept model: {why:?}"))?.flatten();
+        let kept = kept.transpose().map_err(|why| format!("the stored model: {why:?}"))?.flatten();
         let Some(kept) = kept else { return Ok(None) };
-        let model = configuration.restore(&kept.model).map_err(|why| format!("the kept model: {why:?}"))?;
+        let model = configuration.restore(&kept.model).map_err(|why| format!("the stored model: {why:?}"))?;
         Ok(Some((model, kept.provenance.generation)))
     }
 

@@ -1,7 +1,7 @@
 //! Objects of a node: conversion between values and the bytes stored by the bus.
 //!
-//! A value is accepted if a node in its initial state accepts it, as a board would; this file has
-//! no rules of its own.
+//! A value is accepted if a node in its initial state accepts it, as on a board; this file has no rules of
+//! its own.
 
 use scarab::bus::dictionary::{Object, Type, find};
 use scarab::bus::drive::{Axis, AxisConstants, Mode};
@@ -54,8 +54,8 @@ pub(super) fn to_bytes(objects: &[ObjectValue], joint: Joint) -> Result<Vec<u8>,
         let row = find(object).map_err(|_| fault("there is no such object"))?;
         match write_kept(object, given.value as u32, &mut [0; 8]) {
             Ok(_) => {}
-            Err(Abort::ReadOnly) => return Err(fault("can only be read")),
-            Err(_) => return Err(fault("is a command or the leg's, which is never kept")),
+            Err(Abort::ReadOnly) => return Err(fault("is read-only")),
+            Err(_) => return Err(fault("is a command or belongs to the leg: never stored")),
         }
         if let Some(given) = given.name.as_deref().filter(|given| *given != name(object)) {
             return Err(fault(&format!("is `{}`, not `{given}`", name(object))));
@@ -65,7 +65,7 @@ pub(super) fn to_bytes(objects: &[ObjectValue], joint: Joint) -> Result<Vec<u8>,
             return Err(fault(&format!("{} is not from {least} to {most}", given.value)));
         }
         if known.iter().any(|(other, _)| *other == object) {
-            return Err(fault("is there twice"));
+            return Err(fault("occurs twice"));
         }
         known.push((object, given.value));
     }
@@ -81,7 +81,7 @@ pub(super) fn to_bytes(objects: &[ObjectValue], joint: Joint) -> Result<Vec<u8>,
     for (object, _) in kept_objects() {
         if let Some((_, value)) = known.iter().find(|(other, _)| *other == object) {
             length += write_kept(object, *value as u32, &mut bytes[length..])
-                .map_err(|_| format!("more than the {LONGEST} bytes that a board keeps of a node"))?;
+                .map_err(|_| format!("more than the {LONGEST} bytes that a board stores for a node"))?;
         }
     }
     try_on_a_node(&bytes[..length], joint)?;
@@ -101,7 +101,7 @@ fn try_on_a_node(bytes: &[u8], joint: Joint) -> Result<(), String> {
     });
     let refused = node.try_recall(bytes, &mut axis);
     refused.map_or(Ok(()), |object| {
-        Err(format!("{} ({}): no node takes this value", words(object), name(object)))
+        Err(format!("{} ({}): a node refuses this value", words(object), name(object)))
     })
 }
 
@@ -116,7 +116,7 @@ pub(super) fn of_bytes(bytes: &[u8], joint: Joint) -> Result<Vec<ObjectValue>, S
         })
         .collect();
     let again = to_bytes(&objects, joint)?;
-    if again.len() == bytes.len() { Ok(objects) } else { Err("bytes that are no entry".into()) }
+    if again.len() == bytes.len() { Ok(objects) } else { Err("bytes that are not an entry".into()) }
 }
 
 /// Whether the number is a bit pattern.

@@ -194,7 +194,7 @@ fn link(place: &Place<'_>, link: &LinkParameters) -> Result<(), Fault> {
     }
     if largest >= least + middle {
         let complaint = format!(
-            "belongs to no body: a principal moment of {largest:.6} is not below the sum {:.6} of the two others",
+            "is impossible: a principal moment of {largest:.6} is not below the sum {:.6} of the two others",
             least + middle
         );
         return Err(place.fault("inertia_com", &complaint));

@@ -14,7 +14,7 @@ pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, FileError> 
         .collect();
     let count = geometry.len();
     let geometry: [_; N] =
-        geometry.try_into().map_err(|_| leg.error(format!("{count} joints where {N} were expected")))?;
+        geometry.try_into().map_err(|_| leg.error(format!("{count} joints, expected {N}")))?;
     Chain::new(&geometry).map_err(|_| leg.error("a D-H number is not finite"))
 }
 
@@ -24,7 +24,7 @@ pub fn anatomy<const N: usize>(leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N
     for (slot, joint) in joints.iter_mut().zip(&leg.joints) {
         let direction = if joint.direction < 0 { -1 } else { 1 };
         *slot = AnatomicalJoint::new(direction, joint.zero_offset_deg.to_radians())
-            .map_err(|_| leg.error(format!("joint {}: direction or zero offset", joint.name)))?;
+            .map_err(|_| leg.error(format!("joint {}: `direction` or `zero_offset_deg` is invalid", joint.name)))?;
     }
     Ok(joints)
 }

@@ -1,5 +1,5 @@
-//! Keys that a leg file must state for an image: the board moves a person with these numbers, so
-//! none may be a default.
+//! Keys that a leg file must state for an image. Errors in these numbers can hurt a person, so none may be a
+//! default.
 //!
 //! Keys that only choose estimates (`bandwidth_hz`, `offset`, `rotor`, `stribeck_model`,
 //! `asymmetric_coulomb`) keep their defaults. `current_limit_a` follows from the torque limit.
@@ -28,8 +28,8 @@ const JOINT: [&str; 10] = [
 const PRIOR: [&str; 3] = ["rotor_inertia", "coulomb", "viscous"];
 
 impl LegFile {
-    /// Loads a shipped leg by name, or the file at a path, for an image. `side_is_given`: the side
-    /// is stated elsewhere.
+    /// Loads a shipped leg by name, or the file at a path, for an image. `side_is_given`: the command line
+    /// states the side.
     ///
     /// # Errors
     /// Names the missing keys, besides the errors of [`LegFile::load`].
@@ -44,10 +44,10 @@ impl LegFile {
 }
 
 /// Keys missing in a checked leg file.
-fn left_out(leg: &LegFile, text: &str, side_is_given: bool) -> Option<Fault> {
+fn missing_keys(leg: &LegFile, text: &str, side_is_given: bool) -> Option<Fault> {
     let table = text.parse::<Table>().ok()?;
     if !side_is_given && !table.contains_key("side") {
-        let reason = "`side` is missing: an image has to know whether the drives are mounted mirrored; it is \"right\" or \"left\"";
+        let reason = "`side` is missing: state whether the drives are mounted mirrored, \"right\" or \"left\"";
         return Some(Fault { steps: vec![Step::Key("side")], reason: reason.to_owned() });
     }
     let stated = table.get("joint").and_then(Value::as_array)?;
@@ -59,13 +59,13 @@ fn left_out(leg: &LegFile, text: &str, side_is_given: bool) -> Option<Fault> {
         let mut faults = Vec::new();
         if joint.encoder.side != Side::Motor {
             faults.push(
-                "`encoder.side` is \"joint\": the board commutates the motor by this encoder, which has to be at the motor"
+                "`encoder.side` is \"joint\": the board commutates the motor by this encoder, which must be at the motor"
                     .to_owned(),
             );
         }
         if !missing.is_empty() {
             let (verb, list) = (if missing.len() == 1 { "is" } else { "are" }, missing.join(", "));
-            faults.push(format!("{list} {verb} missing: an image takes no default for what moves a person"));
+            faults.push(format!("{list} {verb} missing: an image has no defaults for values that affect a person's safety"));
         }
         let reason = format!("joint `{}`: {}", joint.name, faults.join("; "));
         (!faults.is_empty()).then_some(Fault { steps: joint_steps(number), reason })

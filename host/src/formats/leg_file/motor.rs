@@ -119,7 +119,7 @@ impl SupplyFile {
         let [low, high] = SUPPLY_V;
         if !(low..=high).contains(&self.voltage_v) {
             let complaint = format!(
-                "is {}, outside {low}..{high}: the board's bridges switch from 20 V on, and from 50 V on its brake resistor would burn what the supply gives",
+                "is {}, outside {low}..{high}: the board's bridges switch from 20 V on, and from 50 V on its brake resistor would dissipate the supply's power",
                 self.voltage_v
             );
             return Err(place.fault("voltage_v", &complaint));
@@ -158,7 +158,7 @@ impl MotorFile {
             place.within(key, inductance, 1.0, 1e5)?;
             if inductance * 1e-6 / self.resistance_ohm < LEAST_TIME_CONSTANT_S {
                 let complaint = format!(
-                    "is {inductance}: with {} ohm its time constant is below {millisecond} ms, in which the board cannot measure it",
+                    "is {inductance}: with {} ohm its time constant is below {millisecond} ms, too short for the board to measure",
                     self.resistance_ohm
                 );
                 return Err(place.fault(key, &complaint));

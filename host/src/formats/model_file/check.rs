@@ -30,7 +30,7 @@ pub(super) fn model(model: &ModelFile) -> Checked {
     leg(model)?;
     let conditions = |key| [Step::Key("conditions"), Step::Key(key)];
     if model.created.parse::<jiff::Timestamp>().is_err() {
-        return Err(fault(&[Step::Key("created")], format!("`{}` is no time", model.created)));
+        return Err(fault(&[Step::Key("created")], format!("`{}` is not a time", model.created)));
     }
     for (key, value) in
         [("bandwidth_hz", model.conditions.bandwidth_hz), ("motion_s", model.conditions.motion_s)]
@@ -55,7 +55,7 @@ pub(super) fn model(model: &ModelFile) -> Checked {
         let steps = [Step::Key("conditions"), Step::Key("fits"), Step::Entry(number)];
         let numbers = [fit.rms_nm, fit.percent_of_mean_abs];
         if numbers.iter().flatten().chain(&model.conditions.condition).any(|value| !(*value >= 0.0)) {
-            return Err(fault(&steps, "an error must be a number, and not negative"));
+            return Err(fault(&steps, "an error must be finite and not negative"));
         }
     }
     base_set(model)?;
@@ -77,14 +77,14 @@ fn leg(model: &ModelFile) -> Checked {
 
 fn known(model: &ModelFile, name: &str, steps: &[Step]) -> Result<(usize, Parameter), Fault> {
     parameter_of(name, model.leg.joints.len())
-        .ok_or_else(|| fault(steps, format!("`{name}` is no parameter of this leg")))
+        .ok_or_else(|| fault(steps, format!("`{name}` is not a parameter of this leg")))
 }
 
 fn base_set(model: &ModelFile) -> Checked {
     let set = &model.base_set;
     let place = |number| [Step::Key("base_set"), Step::Key("parameters"), Step::Entry(number)];
     if !(1..=LARGEST_BASE_SET).contains(&set.parameters.len()) {
-        let reason = format!("{} base parameters; 1 to {LARGEST_BASE_SET} can be", set.parameters.len());
+        let reason = format!("{} base parameters; allowed are 1 to {LARGEST_BASE_SET}", set.parameters.len());
         return Err(fault(&place(0)[..2], reason));
     }
     for (number, base) in set.parameters.iter().enumerate() {
@@ -100,7 +100,7 @@ fn base_set(model: &ModelFile) -> Checked {
             }
         }
         if base.terms.get(&base.carrier) != Some(&1.0) {
-            return Err(fault(&steps, format!("`{}` must stand in its own sum once", base.carrier)));
+            return Err(fault(&steps, format!("`{}` must occur once in its own sum", base.carrier)));
         }
         if !base.value.is_finite() {
             return Err(fault(&steps, format!("`value` is {}", base.value)));
@@ -112,10 +112,10 @@ fn base_set(model: &ModelFile) -> Checked {
     for (number, found) in set.stribeck.iter().enumerate() {
         let steps = [Step::Key("base_set"), Step::Key("stribeck"), Step::Entry(number)];
         if !(1..=model.leg.joints.len()).contains(&found.joint) {
-            return Err(fault(&steps, format!("there is no joint {}", found.joint)));
+            return Err(fault(&steps, format!("joint {} does not exist", found.joint)));
         }
         if !(found.surplus_nm.is_finite() && found.speed_rad_s > 0.0 && found.speed_rad_s.is_finite()) {
-            return Err(fault(&steps, "a surplus must be a number, a speed one above 0"));
+            return Err(fault(&steps, "a surplus must be finite, a speed above 0"));
         }
         let sigmas = [found.surplus_sigma_nm, found.speed_sigma_rad_s];
         if let Some(sigma) = sigmas.into_iter().flatten().find(|sigma| !(*sigma >= 0.0 && sigma.is_finite()))
@@ -156,7 +156,7 @@ fn covariance(set: &BaseSet) -> Checked {
     let smallest = correlations.symmetric_eigenvalues().min();
     if !(smallest >= SMALLEST_EIGENVALUE) {
         let reason = format!(
-            "`covariance` is none: some sum of base parameters would have a negative variance (eigenvalue {smallest:.2e})"
+            "`covariance` is invalid: some sum of base parameters would have a negative variance (eigenvalue {smallest:.2e})"
         );
         return Err(fault(&place(0)[..2], reason));
     }
@@ -178,7 +178,7 @@ fn full_set(model: &ModelFile) -> Checked {
     let parameters = &model.full_set.parameters;
     let expected = model.leg.joints.len() * PARAMETERS_PER_JOINT;
     if parameters.len() != expected {
-        let reason = format!("{} parameters, {expected} were expected", parameters.len());
+        let reason = format!("{} parameters, expected {expected}", parameters.len());
         return Err(fault(&place(0)[..2], reason));
     }
     for (number, parameter) in parameters.iter().enumerate() {
@@ -193,10 +193,10 @@ fn full_set(model: &ModelFile) -> Checked {
 
 fn one_parameter(parameter: &StoredParameter, name: &str, symbol: Parameter) -> Result<(), String> {
     if parameter.name != name {
-        return Err(format!("`{}` where `{name}` was expected", parameter.name));
+        return Err(format!("`{}` instead of `{name}`", parameter.name));
     }
     if parameter.unit != symbol.unit() {
-        return Err(format!("{name} in `{}`, it is in {}", parameter.unit, symbol.unit()));
+        return Err(format!("{name} in `{}` instead of {}", parameter.unit, symbol.unit()));
     }
     if let Some(value) = parameter.value.filter(|value| !value.is_finite()) {
         return Err(format!("`value` of {name} is {value}"));
@@ -205,7 +205,7 @@ fn one_parameter(parameter: &StoredParameter, name: &str, symbol: Parameter) -> 
         return Err(format!("`sigma` of {name} is {sigma}; it must not be negative"));
     }
     if !STATUS.contains(&parameter.status.as_str()) {
-        return Err(format!("`status` of {name} is `{}`, none of {}", parameter.status, STATUS.join(", ")));
+        return Err(format!("`status` of {name} is `{}`, not one of {}", parameter.status, STATUS.join(", ")));
     }
     Ok(())
 }

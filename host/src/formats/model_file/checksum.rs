@@ -1,7 +1,7 @@
 //! Checksum of a file's content, independent of its formatting.
 //!
 //! Keys enter in alphabetical order, each value with its kind and length, floats by their bits.
-//! Spaces, comments and the order of keys do not matter; every number and word does.
+//! Spaces, comments and the order of keys have no effect; every number and word has.
 
 use crc::{CRC_64_XZ, Crc, Digest, Table};
 use toml::Value;

@@ -53,7 +53,7 @@ pub enum Fault {
         text: String,
     },
     /// The number is beyond any leg's range.
-    #[error("{} in column `{column}` is beyond {}: is it in another unit?", Short(*.value), Short(*.limit))]
+    #[error("{} in column `{column}` exceeds {}: is it in another unit?", Short(*.value), Short(*.limit))]
     Absurd {
         /// Column name.
         column: String,
@@ -63,7 +63,7 @@ pub enum Fault {
         limit: f64,
     },
     /// The numbers are finite, but their torque is not.
-    #[error("the torque of this state is beyond the range of the numbers computed with")]
+    #[error("the torque of this state exceeds the range of double precision")]
     OutOfRange,
     /// Time does not increase.
     #[error("time {} from {} s to {} s",

@@ -59,7 +59,7 @@ impl Decoder {
             return Err(ToolError::input("sends frames without an encoding; rzcobs is needed"));
         }
         if !table.raw_symbols().any(|symbol| symbol.contains("boot n={=u32}")) {
-            return Err(ToolError::input("holds no record of a Scarab trace: an image of another program"));
+            return Err(ToolError::input("contains no Scarab trace records: an image of another program"));
         }
         Ok(Self { table, frame: Vec::new(), overlong: 0, decoded: 0, skipped: Skipped::default() })
     }

@@ -129,7 +129,7 @@ impl Trace {
     #[must_use]
     pub fn without_result(&self) -> String {
         if self.records == 0 {
-            return "holds no record of a trace".into();
+            return "contains no trace record".into();
         }
         if let Some(why) = self.incomplete.last() {
             return format!("holds no complete result: the last one {why}");

@@ -1,8 +1,8 @@
 //! Evaluates a crash of the emulated board (`cargo emulate --crash`).
 //!
-//! Two sources: the records of three starts (before the crash, after it, after one more reset), and
-//! the emulator's log. The log contains every exception, reset, and write to a timer that the
-//! emulator does not model (the bridges' timers), in order.
+//! Two sources: the records of three starts (before the crash, after it, after one more reset), and the
+//! emulator's log. The log contains every exception, reset, and write to a timer that the emulator does not
+//! model (the bridges' timers), in order.
 //!
 //! Requirements:
 //!
@@ -111,12 +111,12 @@ impl CrashReport {
         let starts = starts(records);
         let [before, after, again] = starts.as_slice() else {
             return Err(ToolError::input(format!(
-                "the image started {} times: before the crash, after it and once more were expected",
+                "the image started {} times; expected are 3: before the crash, after it, and after one more reset",
                 starts.len()
             )));
         };
         let [crash] = all(after, "crash")[..] else {
-            return Err(ToolError::input("the start after the crash tells none, or more than one"));
+            return Err(ToolError::input("the start after the crash reports no crash, or more than one"));
         };
         let lacks = |key: &str| ToolError::input(format!("the record of the crash lacks `{key}`"));
         let clock = |key: &'static str| crash.value::<u32>(key).map_err(|_| lacks(key));
@@ -133,17 +133,17 @@ impl CrashReport {
             all(after, "board").first().and_then(|board| board.value("clock_hz").ok()).unwrap_or(0);
         let witness = Witness::of(log);
         let expected = [
-            (report.cause == kind.name(), "the cause that is told is another"),
+            (report.cause == kind.name(), "the reported cause is another"),
             (is_identifying(before), "the leg was not identifying when it crashed"),
-            (all(before, "crash").is_empty(), "a crash is told before there was one"),
-            (witness.released, "the emulator saw no release of both bridges"),
-            (witness.exceptions == 0, "the emulator saw exceptions between release and reset"),
-            (witness.resets == 2, "the emulator saw another number of resets than two"),
-            (report.released_after < clock_hz / LIMIT_PER_S, "the release took longer than 10 us"),
-            (released < kept, "the release came after the record"),
+            (all(before, "crash").is_empty(), "a crash is reported before it happened"),
+            (witness.released, "the emulator did not log both bridges turning off"),
+            (witness.exceptions == 0, "the emulator logged exceptions between bridges off and reset"),
+            (witness.resets == 2, "the emulator did not log exactly two resets"),
+            (report.released_after < clock_hz / LIMIT_PER_S, "the bridges turned off later than after 10 us"),
+            (released < kept, "the bridges turned off after the record"),
             (is_refused(after), "the drive was not refused before the fault was reset"),
             (is_identifying(after), "the drive was not enabled after the fault was reset"),
-            (all(again, "crash").is_empty(), "the crash is told a second time"),
+            (all(again, "crash").is_empty(), "the crash is reported a second time"),
             (is_identifying(again) && !is_refused(again), "the drive is refused without a crash"),
         ];
         let missed = expected.iter().filter(|(held, _)| !held);
@@ -157,7 +157,7 @@ impl CrashReport {
         let Self { cause, place, released_after, kept_after, complaints } = self;
         let mut text = format!(
             "\n{cause}: {place}\nbridges off {released_after} instructions after it was begun, record complete {kept_after}; no \
-             exception was taken between release and reset\n"
+             exception was taken between bridges off and reset\n"
         );
         if complaints.is_empty() {
             text += "the next start reported it and refused to enable until the fault was reset; the start after that had no record of it\n";
@@ -166,7 +166,7 @@ impl CrashReport {
             text.push('\n');
         }
         for complaint in complaints {
-            let _ = writeln!(text, "NOT AS IT HAS TO BE: {complaint}");
+            let _ = writeln!(text, "FAILED: {complaint}");
         }
         text
     }

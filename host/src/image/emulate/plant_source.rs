@@ -24,9 +24,9 @@ pub fn source(leg: &LegFile, seed: u64) -> Result<String, ToolError> {
          use hal_sim::description::{{*, EncoderSide::*}};\n\n\
          /// The leg.\n\
          pub const PLANT: LegDescription<{JOINTS}> = {plant:#?};\n\
-         /// Seed of its noise.\n\
+         /// Seed of the noise.\n\
          pub const SEED: u64 = {seed};\n\
-         /// Where it hangs at the beginning, rad.\n\
+         /// Initial joint angles [rad].\n\
          pub const START_RAD: [f64; {JOINTS}] = {:?};\n\
          /// Noise of a logged current sample, A.\n\
          pub const CURRENT_NOISE_A: [f64; {JOINTS}] = {noise:?};\n\

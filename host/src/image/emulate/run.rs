@@ -77,7 +77,7 @@ pub fn crash(image: &Path, trace: &Path, log: &Path, kind: CrashKind, tick: u32)
     let said = wait(emulator, trace)?;
     let begun = said.lines().find_map(|line| line.rsplit_once(" was begun at instruction ")?.1.parse().ok());
     begun.ok_or_else(|| {
-        ToolError::input(format!("the image does not tell when it crashed: `{}`", said.trim()))
+        ToolError::input(format!("the image does not report the instruction of its crash: `{}`", said.trim()))
     })
 }
 
@@ -107,7 +107,7 @@ fn wait(mut emulator: Command, trace: &Path) -> Result<String, ToolError> {
             let _ = emulator.wait();
             output.finish()?;
             return Err(ToolError::input(format!(
-                "{EMULATOR}: no end after {} s; what it told is in {}",
+                "{EMULATOR}: not finished after {} s; its records are in {}",
                 LONGEST.as_secs(),
                 trace.display()
             )));

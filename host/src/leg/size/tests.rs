@@ -45,7 +45,7 @@ fn stretching_is_close_to_a_telescope() {
 }
 
 #[test]
-fn lengths_alone_keep_the_mass_and_stretch_its_places() {
+fn lengths_alone_keep_the_mass_and_stretch_its_positions() {
     let (before, after) = (default_leg(), sized(Some(0.45), Some(0.44), None));
     assert_eq!(after.joints[1].dh.a, 0.45);
     assert_eq!(after.segments.expect("kept").shank_m, 0.44);
@@ -58,7 +58,7 @@ fn lengths_alone_keep_the_mass_and_stretch_its_places() {
             (old.com[1], old.rotor_inertia, old.coulomb),
             (new.com[1], new.rotor_inertia, new.coulomb)
         );
-        // About the long axis nothing changes but what lies across it.
+        // About the long axis only the inertia across it changes.
         assert!((new.inertia_com[0] - old.inertia_com[0]).abs() < 1e-12);
         // The integral of x2 dm about the centre of mass, (YY + ZZ - XX) / 2, is stretched twice.
         let spread = |link: &LinkParameters| link.inertia_com[3] + link.inertia_com[5] - link.inertia_com[0];
@@ -67,19 +67,19 @@ fn lengths_alone_keep_the_mass_and_stretch_its_places() {
 }
 
 #[test]
-fn the_prior_of_another_wearer_stays_as_wrong_as_it_was() {
+fn the_prior_of_another_wearer_keeps_its_relative_error() {
     let leg = sized(None, None, Some((90.0, 1.8)));
     let segments = leg.segments.expect("kept");
     assert_eq!(segments.wearer_kg, 90.0);
     assert!((segments.prior_wearer_kg - 84.0).abs() < 1e-12);
-    // The exoskeleton's 2.84 kg are in both; 10 % of 90 and of 84 kg are the wearer's.
+    // The exoskeleton's 2.84 kg are in both; 10 % of 90 kg and of 84 kg belong to the wearer.
     let mass = |link: &Option<LinkParameters>| link.expect("there").mass;
     assert!((mass(&leg.joints[0].truth) - 11.84).abs() < 1e-6);
     assert!((mass(&leg.joints[0].prior) - 11.24).abs() < 1e-6);
 }
 
 #[test]
-fn every_size_in_the_range_is_a_leg_that_the_reader_takes() {
+fn every_size_in_the_range_gives_a_valid_leg_file() {
     for thigh in [0.402, 0.45, 0.505] {
         for shank in [0.397, 0.506] {
             for wearer in [None, Some((30.0, 1.65)), Some((160.0, 2.05))] {
@@ -91,12 +91,12 @@ fn every_size_in_the_range_is_a_leg_that_the_reader_takes() {
 }
 
 #[test]
-fn nothing_asked_for_changes_nothing() {
-    assert_eq!(Size::default().of(&default_leg()).expect("as it is"), default_leg());
+fn without_options_the_leg_is_unchanged() {
+    assert_eq!(Size::default().of(&default_leg()).expect("unchanged"), default_leg());
 }
 
 #[test]
-fn what_cannot_be_set_is_refused_by_option_and_range() {
+fn impossible_sizes_are_refused_with_option_and_range() {
     let refusal = |size: Size, leg: &LegFile| size.of(leg).expect_err("refused").to_string();
     let leg = default_leg();
     for (size, reason) in [
@@ -115,7 +115,7 @@ fn what_cannot_be_set_is_refused_by_option_and_range() {
     }
     let sp = LegFile::load("sp").expect("shipped");
     let text = refusal(size(Some(0.45), None, None), &sp);
-    assert!(text.contains("sp: --thigh, --shank and --wearer need a leg that says"), "{text}");
+    assert!(text.contains("sp: --thigh, --shank and --wearer need the key `segments`"), "{text}");
     let mut heavy = default_leg();
     heavy.segments.as_mut().expect("there").wearer_kg = 150.0;
     let text = refusal(size(None, None, Some((80.0, 1.8))), &heavy);

@@ -1,6 +1,6 @@
 //! The firmware's levels composed as on the board, over simulated registers.
 //!
-//! Fault campaign, `serve` and complete drives run this one composition. It holds no decisions: each method
+//! Fault campaign, `serve` and complete drives run this one composition. It makes no decisions: each method
 //! runs one level of `scarab::operation`, and the owner of the plant calls them in this order:
 //!
 //! ```text
@@ -52,7 +52,7 @@ const BUS_CODE: u16 = 3136;
 pub struct BusLevel<const N: usize> {
     queues: Locked<BusQueues<N>>,
     round: BusRound,
-    /// Data that a host wants stored.
+    /// Request of a host to store data.
     pub storage: Handover<Keep<N>>,
 }
 
@@ -97,8 +97,8 @@ pub struct Levels<const N: usize> {
 }
 
 impl<const N: usize> Levels<N> {
-    /// Ready board: motors calibrated on a stand, counters at the initial pose of the world's leg.
-    /// `believed` is the leg as the firmware has it, `description` the simulated one.
+    /// Ready board: motors calibrated on a stand, counters at the initial pose of the world's leg. `believed`
+    /// is the leg assumed by the firmware, `description` the simulated one.
     pub fn ready<const B: usize>(
         believed: &LegFile,
         description: &CompleteDescription<N>,
@@ -206,7 +206,7 @@ impl<const N: usize> Levels<N> {
         let (_, identification) = leg.halves();
         self.identification.hear(identification, &mut ends, |_| {}, |_| {});
         while ends.notes.dequeue().is_some() {}
-        // Results are read directly: nothing is published.
+        // Results are read directly, so nothing is published.
         self.identification.published();
         self.identification.work(identification, evaluations, &mut ends, &self.signals, |_| {})
     }
@@ -256,7 +256,7 @@ impl<const N: usize> Levels<N> {
         (0..N).find_map(|axis| Some((axis, self.loops.axis_state(axis)?.fault()?)))
     }
 
-    /// Receives a frame, level 4; without space it is lost.
+    /// Receives a frame, level 4; without free space the frame is lost.
     pub fn receive(&mut self, frame: &Frame) {
         let Some(bus) = &mut self.bus else { return };
         if bus.queues.get().split().0.enqueue(*frame).is_err() {

@@ -9,8 +9,8 @@ use crate::rig::bus::wire::Mailbox;
 
 /// Thermistor code of a bridge at 41 degrees Celsius.
 pub const WARM_CODE: u16 = 1500;
-/// Time for the most expensive common frame of the bus: 2,403 instructions, interrupted by the
-/// levels above. Each reading of the clock within a round of the bus is later by this.
+/// Time for the most expensive common frame of the bus: 2,403 instructions, interrupted by the levels above.
+/// Each reading of the clock within a round of the bus is later by this time.
 const FRAME_US: u64 = 20;
 /// Factor on the watchdog's time during a flash write: 8 s instead of 16 ms.
 pub const STRETCHED: u64 = 500;

@@ -39,7 +39,7 @@ struct Waiting {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Plug {
     In,
-    /// The client is gone; its stops are being sent.
+    /// The client has disconnected; its stops are being sent.
     Leaving {
         since_ns: u64,
     },
@@ -109,11 +109,11 @@ impl Adapter {
         self.has_client = true;
     }
 
-    /// The client has closed the channel or is gone. Only its stops are still sent.
+    /// The client has closed the channel or disconnected. Only its stops are still sent.
     pub fn closed(&mut self, now_ns: u64) {
         self.has_client = false;
         if matches!(self.plug, Plug::Out { .. }) {
-            // These frames cannot be sent, and must not be sent for the next client.
+            // These frames cannot be sent any more, and must not be sent for the next client.
             self.queue.clear();
         }
         self.queue.retain(|waiting| waiting.is_stop);
@@ -133,7 +133,7 @@ impl Adapter {
             self.dropped.displaced += 1;
         }
         if is_stop && self.bits + length > self.most_bits {
-            // A host must never be refused a stop. There are few kinds of stops, so the queue stays bounded.
+            // A stop from a host is never refused. There are few kinds of stops, so the queue stays bounded.
             if let Some(older) = self.queue.iter().position(|waiting| supersedes(&frame, &waiting.frame)) {
                 self.remove(older);
                 self.dropped.displaced += 1;

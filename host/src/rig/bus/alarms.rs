@@ -1,4 +1,5 @@
-//! Lines about faults and emergency messages of the legs: each once, although every node of a leg sends it.
+//! Lines about faults and emergency messages of the legs. Each is printed once, although every node of a leg
+//! sends it.
 
 use scarab::bus::Frame;
 use scarab::leg::{FaultCode, NO_ERROR, NoticeCode, RefusalReason};
@@ -23,7 +24,7 @@ fn reason(bit: u8) -> &'static str {
         bit if bit == Reason::Moving as u8 => "too fast",
         bit if bit == Reason::Encoder as u8 => "encoder reading rejected",
         bit if bit == Reason::NoTransition as u8 => {
-            "no such step from this state; controlword 6 comes first, without bit 7"
+            "no such step from this state; send controlword 6 first, without bit 7"
         }
         _ => "unknown reason",
     }
@@ -45,7 +46,7 @@ fn words(code: u16, information: [u8; 5]) -> String {
         (_, Some(NoticeCode::Overrun)) => "received frames were lost".into(),
         (_, Some(NoticeCode::ShortPdo)) => "a received PDO is shorter than its mapping".into(),
         (_, Some(NoticeCode::StoreFailed)) => "objects could not be stored or read back".into(),
-        (_, Some(NoticeCode::Storing)) => "stores, and is silent meanwhile".into(),
+        (_, Some(NoticeCode::Storing)) => "writes its flash and sends nothing meanwhile".into(),
         (None, None) => "unknown code".into(),
     }
 }
@@ -58,7 +59,8 @@ impl Alarms {
         new.map(|code| format!("{} ({:#06x}): {}", code.name(), code.number(), code.words()))
     }
 
-    /// Takes an emergency message. Returns its line, unless the fault or another node's message said it.
+    /// Takes an emergency message. Returns its line, unless the fault or another node's message already gave
+    /// it.
     pub fn emergency(&mut self, message: &Frame) -> Option<String> {
         let [low, high, _, information @ ..] = message.full()?;
         let (node, code) = (message.id(), u16::from_le_bytes([low, high]));
@@ -78,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_emergency_is_said_once_per_leg_until_it_ends() {
+    fn each_emergency_is_reported_once_per_leg_until_it_ends() {
         let message = |id, code: u16, information: [u8; 5]| {
             let [low, high] = code.to_le_bytes();
             let [a, b, c, d, e] = information;
@@ -87,7 +89,7 @@ mod tests {
         let refused = |id| message(id, 0xFF0E, [1, 23, 0, 0, 0]);
         let words = Some(
             "emergency FF0E: a step towards enabled is refused: joint 1, no such step from this state; \
-             controlword 6 comes first, without bit 7"
+             send controlword 6 first, without bit 7"
                 .to_owned(),
         );
         let mut alarms = Alarms::default();

@@ -10,8 +10,8 @@
 //! While the flash is written the processor stalls ([`crate::rig::bus::storing`]). The plant continues, no
 //! level runs, and the controller holds three received frames.
 //!
-//! The enabling switch is a contact in the operator's hand, on the bus as without it. A simulated operator
-//! holds it from the start. The enable request of closing it has ended before the boot-up messages.
+//! The operator's enabling switch is a contact, with or without a bus. A simulated operator holds it from the
+//! start. The enable request of closing it has ended before the boot-up messages.
 
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use scarab::bus::device::Device;
@@ -147,7 +147,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
             Ok(Some((model, generation))) if self.rig.leg.adopt(model) => {
                 self.device.set_generation(generation);
             }
-            Ok(Some(_)) => lost.push("the kept model: not taken".into()),
+            Ok(Some(_)) => lost.push("the stored model: not accepted".into()),
             Ok(None) => {}
             Err(why) => lost.push(why),
         }
@@ -243,7 +243,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
         }
     }
 
-    /// Runs a step of storing and services the watchdog.
+    /// Runs a step of storing and serves the watchdog.
     fn keep(&mut self, now_ns: u64) {
         self.flashing.step(now_ns, &mut self.rig, &mut self.memory);
         self.rig.write_watchdog();

@@ -1,6 +1,6 @@
 //! Effect of a host's frame, found with a copy of each node, so that any mapping and SDO transfer is covered.
 //!
-//! Why: a frame that waited too long must not start a motion, but a stop must never be lost.
+//! Why: a frame that waited too long must not start a motion, and a stop must never be lost.
 
 use scarab::bus::dictionary::Object;
 use scarab::bus::{Abort, ErrorReport, Frame, Lost, Node, Objects};
@@ -25,7 +25,7 @@ const MOST_FRAMES: usize = 32;
 pub enum Effect {
     /// NMT command, or a controlword that disables, stops or resets.
     Stop,
-    /// Target, controlword that enables or continues, or SYNC that makes a waiting one effective.
+    /// Target, controlword that enables or continues, or SYNC that makes a waiting target effective.
     SetPoint,
     /// Neither stop nor set-point.
     Other,
@@ -89,7 +89,8 @@ impl Effect {
         let mut found = Recorder::default();
         for node in nodes {
             let sync = sync_of(*node, now_us);
-            // A node with a SYNC counter accepts the second, one without the first.
+            // A node with a SYNC counter accepts only SYNC frames with a counter; any other node accepts
+            // those without.
             let syncs = [Frame::new(sync, &[]), Frame::new(sync, &[1])];
             let mut node = *node;
             let synchronise = |node: &mut Node, objects: &mut Recorder| {

@@ -6,7 +6,7 @@
 //! at intervals      heartbeat, and the controlword again
 //! ```
 //!
-//! Each of them can be stopped ([`Speaks`]).
+//! Each kind of frame can be stopped ([`Speaks`]).
 
 use core::f64::consts::TAU;
 
@@ -316,7 +316,7 @@ impl Host {
         }
         let (state, causes) = (self.rig().state(), self.rig().causes());
         Err(refused(format!(
-            "a leg that its host does not enable: {state:?}, causes {causes:x}, told {:x?}",
+            "its host cannot enable it: {state:?}, inhibit reasons {causes:x}, emergencies {:x?}",
             self.told
         )))
     }
@@ -426,7 +426,7 @@ mod tests {
         let mut fallen = 0;
         for pose in 0..count {
             let words = format!("seed {seed}, pose {pose}");
-            // Earlier errors must not pass for the reason of a refusal.
+            // Earlier errors must not be taken for the reason of a refusal.
             NODES.into_iter().for_each(|node| host.write(node, 0x1003, 0, 0, 1).expect("a history"));
             host.told.clear();
             for tries in 0.. {

@@ -1,6 +1,6 @@
 //! Simulated legs on a CANopen bus, exact to the bit, for existing host software.
 //!
-//! | part | what it is |
+//! | part | content |
 //! | --- | --- |
 //! | [`board`] | firmware and plant of a leg, with its nodes |
 //! | [`wire`], [`network`] | arbitration and bit timing; several legs and a host on one bus |

@@ -143,11 +143,11 @@ pub fn judge(speed: f64, speeds: &[f64], legs: usize) -> Result<Option<String>, 
     let [quartile, median] = [4, 2].map(|part| speeds.get(speeds.len() / part).copied().unwrap_or(0.0));
     if speed > median {
         return Err(format!(
-            "--speed: {speed} cannot be held; this machine simulates {legs} leg{s} at {median:.1} times the clock's pace"
+            "--speed: {speed} cannot be held; this machine simulates {legs} leg{s} at {median:.1} times real time"
         ));
     }
     Ok((speed > quartile).then(|| {
-        format!("--speed {speed} may not be held: this machine simulates {legs} leg{s} at {quartile:.1} times the clock's pace at times")
+        format!("--speed {speed} is not always held: this machine sometimes simulates {legs} leg{s} at only {quartile:.1} times real time")
     }))
 }
 
@@ -206,11 +206,11 @@ mod tests {
         speeds[19] = 30.0;
         speeds[..6].fill(5.0);
         assert_eq!(judge(5.0, &speeds, 1), Ok(None));
-        assert!(judge(8.5, &speeds, 1).expect("held at times").is_some());
+        assert!(judge(8.5, &speeds, 1).expect("held most of the time").is_some());
         let refusal = judge(20.0, &speeds, 2).expect_err("not held");
         assert_eq!(
             refusal,
-            "--speed: 20 cannot be held; this machine simulates 2 legs at 9.0 times the clock's pace"
+            "--speed: 20 cannot be held; this machine simulates 2 legs at 9.0 times real time"
         );
     }
 

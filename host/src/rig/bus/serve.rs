@@ -1,4 +1,4 @@
-//! Serves legs on the bus in real time, until the process is asked to end.
+//! Serves legs on the bus in real time, until SIGTERM or SIGINT.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -63,11 +63,11 @@ pub fn network<const N: usize, const B: usize>(
     Ok(Network::new(boards, options.bits_per_s))
 }
 
-/// Serves until the process is asked to end.
+/// Serves until a termination signal.
 pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptions) -> Result<(), ToolError> {
     let flash = options.flash.as_deref().map(|path| read(path, options.legs)).transpose()?.flatten();
     let mut network = network::<N, B>(leg, options, flash.as_deref())?;
-    // Written before any client connects, so that a file error shows before a host stores anything.
+    // Written before any client connects, so that a file error appears before a host stores anything.
     write(options.flash.as_deref(), &mut network)?;
     if let Some(warning) =
         judge(options.speed, &reachable(&network), options.legs).map_err(ToolError::input)?
@@ -76,7 +76,7 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     }
     if !options.address.ip().is_loopback() {
         eprintln!(
-            "warning: {} can be reached from other machines, and slcan asks for no password: anybody who connects commands the legs",
+            "warning: {} can be reached from other machines, and slcan has no password: every client that connects commands the legs",
             options.address
         );
     }

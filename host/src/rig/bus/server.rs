@@ -1,7 +1,8 @@
 //! slcan over TCP for one client at a time.
 //!
-//! A connection becomes the client when it opens the channel, so a silent one blocks no other. A
-//! connection that arrives while another one has the channel is refused: a line with the reason, and a bell.
+//! A connection becomes the client when it opens the channel, so a silent connection does not block others.
+//! While a client has the channel, another connection is refused with a line that gives the reason, and a
+//! bell.
 
 use core::fmt::{Display, Formatter, Result as Formatted};
 use std::collections::VecDeque;
@@ -18,7 +19,7 @@ use crate::rig::bus::slcan::{BELL, DONE, Heard, Line, TAKEN, tell};
 const MOST_UNREAD: usize = 1 << 22;
 /// Bytes read from a connection at once: several times what the bus carries until the next read.
 const MOST_AT_ONCE: usize = 4096;
-/// Limit of connections without a channel, and of refused ones. A further one displaces the oldest.
+/// Limit of connections without a channel, and of refused ones. A further connection displaces the oldest.
 const MOST_CONNECTIONS: usize = 8;
 /// Time for a refused connection to read the reason.
 const REFUSED_FOR: Duration = Duration::from_secs(1);
@@ -52,7 +53,7 @@ pub struct Event {
 }
 
 impl Event {
-    /// Whether the client is gone.
+    /// Whether the client has disconnected.
     #[must_use]
     pub const fn ends(&self) -> bool {
         matches!(self.what, What::Closed | What::Gone(_, true))
@@ -160,8 +161,8 @@ impl Connection {
     }
 }
 
-/// Options of a connection. Without keep-alive a client whose machine or cable is gone would hold the channel
-/// for ever.
+/// Options of a connection. Without keep-alive, a client with a failed machine or cable would hold the
+/// channel for ever.
 fn set_up(stream: &TcpStream) -> std::io::Result<()> {
     stream.set_nonblocking(true)?;
     stream.set_nodelay(true)?;
@@ -214,7 +215,8 @@ impl Server {
                 }
             }
         }
-        // Accepted after the client was read, so that a client that has ended does not block the next one.
+        // Accepted after the client was read, so that a client that has disconnected does not block the next
+        // one.
         while let Ok((stream, peer)) = self.listener.accept() {
             if set_up(&stream).is_err() {
                 continue;
@@ -259,7 +261,7 @@ impl Server {
         events
     }
 
-    /// Sends the reason, and keeps the connection for a while: closing it at once would reset it.
+    /// Sends the reason, and holds the connection open for a while: closing it at once would reset it.
     fn refuse(&mut self, mut stream: TcpStream, client: SocketAddr, now: Instant) {
         let _ = stream.write_all(format!("#refused: {client} has the channel\r\u{7}").as_bytes());
         let _ = stream.shutdown(Shutdown::Write);
@@ -369,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn a_client_whose_cable_is_cut_is_missed() {
+    fn the_connection_of_a_client_with_a_cut_cable_ends() {
         let (server, _client, _) = opened();
         let socket = SockRef::from(&server.client.as_ref().expect("a client").stream);
         assert!(socket.keepalive().expect("a socket"));

@@ -78,7 +78,7 @@ pub struct Flashing<const N: usize> {
     lost: bool,
     /// Time to erase a sector.
     pub erasing_ns: u64,
-    /// For campaigns without announcement: the store's inhibit reason is not set in the firmware.
+    /// In campaigns without announcement, the inhibit reason of the store is not set in the firmware.
     pub unannounced: bool,
     unseen: Inhibit,
 }

@@ -116,7 +116,7 @@ fn untouched<const N: usize, const B: usize>(
         candidate = next;
     }
     Err(ToolError::input(format!(
-        "{}: no motion can be designed for this leg: however small, near an end of its range the monitor takes torque from it, \
+        "{}: no motion can be designed for this leg: even for the smallest motion the monitor reduces its torque near an end of its range, \
          for a joint that is slow to follow could not stop there; `identify` has the default motion",
         bench.leg.name
     )))

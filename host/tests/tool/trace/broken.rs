@@ -29,7 +29,7 @@ fn a_trace_cut_anywhere_says_how_far_it_went() {
                 assert_eq!(error.exit_code(), 2);
                 let text = error.to_string();
                 let kind = [
-                    "no record of a trace",
+                    "contains no trace record",
                     "holds no result",
                     "ends while searching at iteration",
                     "breaks off",
@@ -200,14 +200,14 @@ fn bad_input_is_refused_with_what_is_wrong() {
     };
     for (arguments, words) in [
         ("trace --leg sp", "the image is built for the leg `x2-wearer-75kg`"),
-        ("trace --leg none-such", "no shipped leg"),
+        ("trace --leg none-such", "not the name of a shipped leg"),
         ("trace --csv log.csv", "holds no log of a motion"),
     ] {
         let told = refused(arguments, &trace);
         assert!(told.contains(words), "{arguments}: {told}");
     }
     let empty = folder.write("empty.txt", "nothing here\n");
-    assert!(refused("trace", &empty).contains("holds no record of a trace"));
+    assert!(refused("trace", &empty).contains("contains no trace record"));
     assert!(refused("trace", &folder.path("none.txt")).contains("cannot be read"));
     // Image of another leg under this leg's name: joints or base parameters differ.
     let other: Vec<String> =

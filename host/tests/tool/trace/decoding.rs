@@ -236,7 +236,7 @@ fn an_image_that_cannot_have_sent_the_stream_is_refused() {
         (b"not an image".to_vec(), "cannot be used as an image"),
         (image("99", "rzcobs", Record::<2>::FORMATS), "defmt"),
         (image("4", "raw", Record::<2>::FORMATS), "rzcobs is needed"),
-        (image("4", "rzcobs", &["hello n={=u32}"]), "no record of a Scarab trace"),
+        (image("4", "rzcobs", &["hello n={=u32}"]), "no Scarab trace records"),
         (
             Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little).write().expect("an ELF"),
             "no section .defmt",

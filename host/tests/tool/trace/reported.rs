@@ -98,7 +98,7 @@ fn the_log_of_a_trace_is_the_log_of_the_run_and_replay_finds_the_same_parameters
     assert!(run.printed.contains("verdict: accepted"), "{}", run.printed);
     let same = std::fs::read(&own_log).expect("written") == std::fs::read(&log).expect("written");
     assert!(same, "the trace's log differs from the run's");
-    assert!(run.printed.contains("samples of motion 0; the trace holds motions 1, 2, 3"), "{}", run.printed);
+    assert!(run.printed.contains("samples of motion 0; the trace contains motions 1, 2, 3"), "{}", run.printed);
 
     // Another motion on request: the expected number of samples at its own angles.
     let other = folder.path("other.csv");
