@@ -34,7 +34,7 @@ fn lowest(world: &mut World<2>, seconds: f64) -> f64 {
 }
 
 #[test]
-fn the_floor_holds_a_falling_leg_and_lets_go_after_its_time() {
+fn the_floor_holds_a_falling_leg_for_its_duration() {
     // Heavy enough to fall against the friction of the drives.
     let heavy = || {
         let mut world = world();
@@ -43,17 +43,17 @@ fn the_floor_holds_a_falling_leg_and_lets_go_after_its_time() {
     };
     let start = foot_height(&heavy());
     let free = lowest(&mut heavy(), 1.0);
-    assert!(free < start - 0.05, "it falls by {} m without a floor", start - free);
+    assert!(free < start - 0.05, "without a floor the foot falls by only {} m", start - free);
     let mut standing = heavy();
     standing.touch(FOOT, 0.0, 1.0);
     let held = lowest(&mut standing, 1.0);
     // The foot sinks in until a stiffness of 10 kN/m carries it.
     assert!(held > start - 0.02, "{} m below", start - held);
-    assert!(lowest(&mut standing, 1.0) < start - 0.05, "the floor is gone");
+    assert!(lowest(&mut standing, 1.0) < start - 0.05, "the foot does not fall after the floor's time");
 }
 
 #[test]
-fn the_floor_pushes_and_never_pulls() {
+fn the_floor_pushes_but_never_pulls() {
     let lift = |mut world: World<2>| {
         for _ in 0..2000 {
             world.tick(&command([40.0, 20.0]));
@@ -68,7 +68,7 @@ fn the_floor_pushes_and_never_pulls() {
 }
 
 #[test]
-fn before_its_time_the_floor_does_nothing() {
+fn before_its_start_the_floor_has_no_effect() {
     let (mut free, mut later) = (world(), world());
     later.touch(FOOT, 0.5, 1.0);
     for _ in 0..1999 {
@@ -77,7 +77,7 @@ fn before_its_time_the_floor_does_nothing() {
 }
 
 #[test]
-fn a_blocked_joint_stays_where_it_is_whatever_pushes_while_the_other_moves() {
+fn a_blocked_joint_keeps_its_position_while_the_other_moves() {
     for joint in 0..2 {
         let mut world = world();
         world.block(joint);

@@ -13,7 +13,7 @@ fn leg(name: &str) -> LegFile {
 }
 
 #[test]
-fn the_board_makes_of_the_constant_the_configuration_the_simulation_runs_with() {
+fn the_image_constant_gives_the_configuration_of_the_simulation() {
     let left = on_side(&leg(DEFAULT_LEG), BodySide::Left).expect("parallel axes");
     let mut geared = leg(DEFAULT_LEG);
     for (joint, (pole_pairs, counts, ratio)) in
@@ -37,7 +37,7 @@ fn the_board_makes_of_the_constant_the_configuration_the_simulation_runs_with() 
                 * f64::from(made.motor.ratio);
             assert!((constant / joint.torque_per_ampere - 1.0).abs() < 1e-6, "{name}");
         }
-        let made = description.configuration::<13>().expect("the constant makes a leg");
+        let made = description.configuration::<13>().expect("the constant defines a leg");
         assert_eq!(made.joints, configuration.joints, "{name}");
         assert_eq!(made.model, configuration.model, "{name}");
         assert_eq!(made.prior, configuration.prior, "{name}");
@@ -60,7 +60,7 @@ fn the_board_makes_of_the_constant_the_configuration_the_simulation_runs_with() 
 
 /// The axis settings of the board equal those of the simulated complete drive.
 #[test]
-fn the_board_s_axes_are_those_of_the_simulated_drive() {
+fn the_axes_of_the_board_are_those_of_the_simulated_drive() {
     let file = leg(DEFAULT_LEG);
     let (description, _) = describe(&file, 1).expect("two joints");
     for (joint, axis) in file.joints.iter().zip(drives::axes(&description, 19.0)) {
@@ -81,7 +81,7 @@ fn the_board_s_axes_are_those_of_the_simulated_drive() {
 }
 
 #[test]
-fn the_shipped_constant_is_the_default_leg_s() {
+fn the_shipped_constant_equals_the_default_leg() {
     let (description, _) = describe(&leg(DEFAULT_LEG), 1).expect("two joints");
     let shipped = include_str!("../legs/x2-wearer-75kg.rs");
     assert!(
@@ -91,13 +91,13 @@ fn the_shipped_constant_is_the_default_leg_s() {
 }
 
 #[test]
-fn a_leg_that_no_image_holds_is_refused_by_name() {
+fn an_unsupported_leg_is_refused_by_name() {
     let refused = describe(&leg("sp"), 1).expect_err("one joint").to_string();
     assert!(refused.contains("two joints"), "{refused}");
 }
 
 #[test]
-fn a_motor_that_is_not_described_is_not_built_for() {
+fn an_image_without_a_described_motor_is_refused() {
     let refused = |leg: &LegFile| describe(leg, 1).expect_err("no motor").to_string();
     let mut bare = leg(DEFAULT_LEG);
     bare.joints[1].motor = None;
@@ -124,14 +124,14 @@ fn without(key: &str) -> String {
 }
 
 #[test]
-fn an_image_takes_no_default_for_what_moves_a_person() {
+fn an_image_has_no_defaults_for_safety_relevant_keys() {
     let refused = |text: &str| {
         let file = std::env::temp_dir().join(format!("scarab-image-{}.toml", std::process::id()));
         std::fs::write(&file, text).expect("a temporary file");
         LegFile::parse(text, "leg.toml").expect("a leg, but not one for an image");
         let fault =
             LegFile::load_for_image(&file.display().to_string(), false).expect_err("a key is missing");
-        std::fs::remove_file(&file).expect("the file is there");
+        std::fs::remove_file(&file).expect("the file exists");
         (fault.line, fault.reason)
     };
     for key in [
@@ -152,7 +152,7 @@ fn an_image_takes_no_default_for_what_moves_a_person() {
     let (_, after) = rest.split_once("[[joint]]").expect("another joint");
     let (_, reason) = refused(&format!("{before}[[joint]]{after}"));
     assert!(reason.starts_with("joint `hip`: `motor` is missing"), "{reason}");
-    // Without these keys the flux would be another motor's: the reader has no other default for a motor.
+    // Without these keys the flux would be another motor's; the reader has no other default for a motor.
     let unmotored =
         |text: String| format!("{}[[joint]]{after}", text.split_once("[joint.motor]").expect("a motor").0);
     for key in ["torque_per_ampere", "encoder"] {
@@ -170,7 +170,7 @@ fn an_image_takes_no_default_for_what_moves_a_person() {
         let (_, reason) = refused(&format!("{before}\nprior{first}{}", rest.trim_start()));
         assert!(reason.starts_with(&format!("joint `hip`: `prior.{key}` is missing")), "{reason}");
     }
-    // The shipped exoskeleton legs state everything; the one with an encoder at the joint does not.
+    // The shipped exoskeleton legs state every key; the leg with an encoder at the joint does not.
     for name in [DEFAULT_LEG, "x2-rough"] {
         LegFile::load_for_image(name, false).expect("states everything");
     }

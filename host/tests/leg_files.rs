@@ -1,4 +1,4 @@
-//! Leg files: the shipped ones, their meaning, and every fault with its line and message.
+//! Leg files: the shipped ones, their meaning, and every error with its line and message.
 
 use hal_sim::mechanism::Mechanism;
 use hal_sim::world::World;
@@ -34,7 +34,7 @@ fn every_shipped_leg_loads_under_its_name_and_survives_a_round_trip() {
 }
 
 #[test]
-fn the_default_leg_as_shipped_is_the_derived_one() {
+fn the_shipped_default_leg_equals_its_derivation() {
     assert_eq!(LegFile::load(DEFAULT_LEG), Ok(x2::leg_file(x2::DEFAULT_WEARER_KG)));
 }
 
@@ -54,7 +54,7 @@ fn a_complete_drive_makes_the_torque_of_the_ideal_one_per_ampere() {
 }
 
 #[test]
-fn keys_left_out_have_the_documented_defaults() {
+fn missing_keys_have_the_documented_defaults() {
     let leg = LegFile::parse(MINIMAL, "small.toml").expect("minimal");
     assert_eq!((leg.torque_noise_percent, leg.pushes), (0.0, None));
     let joint = &leg.joints[0];
@@ -72,7 +72,7 @@ fn keys_left_out_have_the_documented_defaults() {
 }
 
 #[test]
-fn every_fault_is_told_with_file_line_and_reason() {
+fn every_error_names_file_line_and_reason() {
     let joint = |lines: &str| format!("{MINIMAL}{lines}\n");
     let truth = |mass: &str, inertia: &str| {
         joint(&format!(
@@ -179,7 +179,7 @@ fn every_fault_is_told_with_file_line_and_reason() {
         (
             truth("2.0", "[0.01, 0.0, 0.0, 0.05, 0.0, 0.09]"),
             Some(8),
-            "`truth.inertia_com` belongs to no body: a principal moment of 0.090000 is not below the sum 0.060000",
+            "`truth.inertia_com` is impossible: a principal moment of 0.090000 is not below the sum 0.060000",
         ),
         (truth("2.0", "[0.01, 0.0, 0.0, 0.05, 0.0]"), Some(8), "length 5"),
         (truth("2.0", body).replace("truth", "prior").replace("2.0", "nan"), Some(8), "`prior.mass` is NaN"),
@@ -202,13 +202,13 @@ fn every_fault_is_told_with_file_line_and_reason() {
     for (text, line, words) in cases {
         let fault = LegFile::parse(&text, "bad.toml").expect_err(&text);
         assert_eq!(fault.line, line, "{fault}\n{text}");
-        assert!(fault.reason.contains(words), "{fault}\nshould say: {words}");
+        assert!(fault.reason.contains(words), "{fault}\nexpected: {words}");
         assert!(fault.to_string().starts_with(&format!("bad.toml:{}: ", line.unwrap_or(0))), "{fault}");
     }
 }
 
 #[test]
-fn a_file_that_is_not_there_is_told_with_the_names_of_the_shipped_legs() {
+fn the_error_of_a_missing_file_lists_the_shipped_legs() {
     let fault = LegFile::load("no-such-leg").expect_err("there is none").to_string();
     assert!(fault.starts_with("no-such-leg: cannot be read") && fault.contains("mujoco-leg"), "{fault}");
 }

@@ -11,7 +11,7 @@ use scarab_host::run::resample::{GRID_RATE_HZ, Method, Resampled};
 
 const HEADER: &str = "t_s,q1_rad,q2_rad,tau1_Nm,tau2_Nm";
 
-/// 200 samples at 100 Hz; sample k stands on line k + 2.
+/// 200 samples at 100 Hz; sample k is on line k + 2.
 fn rows() -> Vec<String> {
     (0..200)
         .map(|k| format!("{:.3},{:.4},{:.4},{:.3},{:.3}", f64::from(k) * 0.01, 0.1, -0.2, 3.0, -4.0))
@@ -25,7 +25,7 @@ fn text(header: &str, rows: &[String]) -> String {
 /// Message for a text read with two joints.
 fn refusal(text: &str) -> String {
     match Recording::parse(Path::new("walk.csv"), text, 2) {
-        Ok(_) => panic!("this was accepted:\n{text}"),
+        Ok(_) => panic!("accepted:\n{text}"),
         Err(error) => error.to_string(),
     }
 }
@@ -52,7 +52,7 @@ fn columns_are_found_by_name_and_others_ignored() {
 }
 
 #[test]
-fn fewer_joints_than_the_file_holds_can_be_read() {
+fn a_part_of_the_joints_of_a_file_can_be_read() {
     let recording = Recording::parse(Path::new("walk.csv"), &text(HEADER, &rows()), 1).expect("a recording");
     assert_eq!((recording.joints.len(), recording.joints_in_file), (1, 2));
 }
@@ -96,7 +96,7 @@ fn a_header_without_a_needed_column_is_refused() {
     assert!(refusal(&text(&header, &rows())).starts_with("walk.csv:1: the header has no column `q2_rad`;"));
     let header = HEADER.replace("tau1_Nm", "i1_A");
     assert!(refusal(&text(&header, &rows())).starts_with("walk.csv:1: the header has no column `tau1_Nm`;"));
-    // Without a header the first row of numbers counts as one and is shown.
+    // Without a header the first row of numbers is treated as one and shown.
     assert!(
         refusal(&rows().join("\n"))
             .contains("no column `t_s`; its columns are: 0.000, 0.1000, -0.2000, 3.000, -4.000; needed")
@@ -106,7 +106,7 @@ fn a_header_without_a_needed_column_is_refused() {
 }
 
 #[test]
-fn a_table_of_a_spreadsheet_that_writes_decimal_commas_is_refused_with_a_hint() {
+fn decimal_commas_are_refused_with_a_hint() {
     let lines: Vec<String> = rows().iter().map(|row| row.replace(',', ";").replace('.', ",")).collect();
     assert_eq!(
         refusal(&text(&HEADER.replace(',', ";"), &lines)),
@@ -136,7 +136,7 @@ fn a_message_does_not_repeat_the_file() {
 }
 
 #[test]
-fn a_field_that_is_no_finite_number_is_refused_with_its_line() {
+fn a_field_that_is_not_finite_is_refused_with_its_line() {
     assert_eq!(
         refusal_with("1.0,0.1,-0.2,three,-4"),
         "walk.csv:102: `three` in column `tau1_Nm` is not a number"
@@ -159,7 +159,7 @@ fn a_truncated_file_is_refused_with_its_last_line() {
 }
 
 #[test]
-fn blank_lines_are_skipped_and_still_counted() {
+fn blank_lines_are_skipped_but_counted() {
     let mut rows = rows();
     rows[50] += "\n\n\r\n";
     assert_eq!(
@@ -178,7 +178,7 @@ fn time_that_does_not_increase_is_refused() {
 }
 
 #[test]
-fn half_of_the_steps_may_not_be_longer_than_a_tenth_of_a_second() {
+fn a_median_step_above_a_tenth_of_a_second_is_refused() {
     let sampled = |rate_hz: f64| {
         let rows: Vec<String> = (0..60).map(|k| format!("{},0,0,0,{k}", f64::from(k) / rate_hz)).collect();
         Recording::parse(Path::new("walk.csv"), &text(HEADER, &rows), 2).map_err(|error| error.to_string())
@@ -217,34 +217,34 @@ fn too_few_samples_are_refused() {
 fn numbers_in_another_unit_are_refused() {
     assert_eq!(
         refusal_with("1.0,8192,-0.2,3,-4"),
-        "walk.csv:102: 8192 in column `q1_rad` is beyond 1000: is it in another unit?"
+        "walk.csv:102: 8192 in column `q1_rad` exceeds 1000: is it in another unit?"
     );
     assert_eq!(
         refusal_with("1.0,0.1,-0.2,3,-4e5"),
-        "walk.csv:102: -400000 in column `tau2_Nm` is beyond 100000: is it in another unit?"
+        "walk.csv:102: -400000 in column `tau2_Nm` exceeds 100000: is it in another unit?"
     );
     assert_eq!(
         refusal_with("1.0,1e300,-0.2,3,-4"),
-        "walk.csv:102: 1e300 in column `q1_rad` is beyond 1000: is it in another unit?"
+        "walk.csv:102: 1e300 in column `q1_rad` exceeds 1000: is it in another unit?"
     );
     // Unix time in milliseconds.
     assert_eq!(
         refusal_with("1.79e12,0.1,-0.2,3,-4"),
-        "walk.csv:102: 1.79e12 in column `t_s` is beyond 1e10: is it in another unit?"
+        "walk.csv:102: 1.79e12 in column `t_s` exceeds 1e10: is it in another unit?"
     );
 }
 
 #[test]
-fn bytes_that_are_no_text_are_refused() {
+fn bytes_that_are_not_text_are_refused() {
     let file = env::temp_dir().join(format!("scarab-not-text-{}.csv", std::process::id()));
     std::fs::write(&file, [0x74, 0xff, 0xfe, 0x00]).expect("a temporary file");
     let message = Recording::read(&file, 1).expect_err("not a text").to_string();
-    std::fs::remove_file(&file).expect("the file is there");
+    std::fs::remove_file(&file).expect("the file exists");
     assert!(message.ends_with(".csv: not a text file"), "{message}");
 }
 
 #[test]
-fn what_is_written_reads_back_bit_by_bit() {
+fn a_written_recording_reads_back_bit_by_bit() {
     let value = |k: u32| f64::from(k).mul_add(1.0 / 3.0, -20.0);
     let joint = |scale: f64| JointSeries {
         position_rad: (0..600).map(|k| scale * value(k)).collect(),
@@ -295,7 +295,7 @@ const REAL: [(&str, usize, usize, f64, Method); 12] = [
 fn recordings_of_real_machines_are_read_and_resampled() {
     let Some(folder) = env::var_os("SCARAB_RECORDINGS").map(PathBuf::from) else {
         // Bypasses the test harness, which suppresses the output of passing tests.
-        let notice = "SKIPPED recordings of real machines: SCARAB_RECORDINGS names no folder";
+        let notice = "SKIPPED recordings of real machines: SCARAB_RECORDINGS is not set";
         writeln!(std::io::stderr(), "{notice}").expect("standard error");
         return;
     };

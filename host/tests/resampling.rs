@@ -81,13 +81,13 @@ fn a_fifty_hertz_sine_is_interpolated_within_the_stated_error() {
 }
 
 #[test]
-fn a_jittered_sine_is_put_right() {
+fn a_jittered_sine_is_restored() {
     let resampled = Resampled::of(&sine(jittered_stamps(1)));
     let (_, amplitude, phase) = compare(&resampled);
     let interior = worst_between(&resampled, 0.01);
-    // Untreated, 0.8 ms of jitter are an error of up to 2 pi 3 Hz 0.8 ms = 1.5e-2. A slope over
-    // uneven steps is off by y''/2 times their difference. The error in the middle is 1/8 of the
-    // step times both ends' slope errors: 3.6 ms / 8 * 2 * 178 * 3.2 ms = 5.1e-4 at worst.
+    // Untreated, 0.8 ms of jitter are an error of up to 2 pi 3 Hz 0.8 ms = 1.5e-2. A slope over uneven steps
+    // is wrong by y''/2 times their difference. The error in the middle is 1/8 of the step times both ends'
+    // slope errors: 3.6 ms / 8 * 2 * 178 * 3.2 ms = 5.1e-4 at worst.
     assert!(interior < 5.1e-4, "error {interior:e}");
     // A share of that error follows the curvature: on average -4e-5 at 3 Hz, proportional to the
     // frequency squared.
@@ -96,7 +96,7 @@ fn a_jittered_sine_is_put_right() {
 }
 
 #[test]
-fn a_recording_on_the_grid_comes_back_unchanged() {
+fn a_recording_on_the_grid_is_unchanged() {
     let recording = sine((0..2000_u32).map(|sample| f64::from(sample) / GRID_RATE_HZ).collect());
     let resampled = Resampled::of(&recording);
     assert_eq!(resampled.joints, recording.joints);
@@ -111,7 +111,7 @@ fn a_recording_on_the_grid_comes_back_unchanged() {
 }
 
 #[test]
-fn noise_of_a_one_kilohertz_recording_drops_by_what_two_samples_allow() {
+fn noise_of_a_one_kilohertz_recording_drops_by_the_two_sample_mean() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(2);
     let time_s = uniform_stamps(1000.0);
     let torque_nm: Vec<f64> = time_s.iter().map(|_| StandardNormal.sample(&mut random)).collect();
@@ -141,7 +141,7 @@ fn angle_and_torque_go_through_the_same_operator() {
 }
 
 #[test]
-fn stamps_in_bursts_do_not_throw_noise_across_the_next_step() {
+fn stamps_in_bursts_do_not_amplify_noise() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(4);
     // Two samples 10 us apart every 10 ms: a parabola's slope would amplify the noise of the short step.
     let stamp = |k: u32| f64::from(k / 3) * 0.010 + [0.0, 1e-5, 5e-3][(k % 3) as usize];
@@ -163,7 +163,7 @@ fn stamps_in_bursts_do_not_throw_noise_across_the_next_step() {
 }
 
 #[test]
-fn too_wide_a_bandwidth_is_named() {
+fn too_large_a_bandwidth_gives_a_warning() {
     let resampled = Resampled::of(&sine(uniform_stamps(50.0)));
     assert_eq!(resampled.bandwidth_warning(8.0), None);
     assert_eq!(
@@ -173,7 +173,7 @@ fn too_wide_a_bandwidth_is_named() {
 }
 
 #[test]
-fn asking_beyond_the_last_point_or_joint_gives_nothing() {
+fn points_and_joints_beyond_the_last_are_none() {
     let resampled = Resampled::of(&sine(uniform_stamps(500.0)));
     assert_eq!(resampled.position_rad::<1>(resampled.len()), None);
     assert_eq!(resampled.torque_nm::<2>(0), None);

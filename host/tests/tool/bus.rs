@@ -179,7 +179,7 @@ fn cycles(bus: &mut Bus, mapping: Mapping, rate_hz: u64) -> Cycles {
 }
 
 #[test]
-fn the_compact_mapping_fits_a_kilohertz_and_the_standard_one_hardly_half_of_it() {
+fn the_compact_mapping_fits_a_kilohertz_the_standard_one_barely_500_hertz() {
     println!(
         "mapping, Hz: load; last feedback and last target after SYNC, us, mean and worst; cycles with all feedback"
     );
@@ -213,7 +213,7 @@ fn the_compact_mapping_fits_a_kilohertz_and_the_standard_one_hardly_half_of_it()
 }
 
 #[test]
-fn a_bus_that_is_full_of_others_frames_stops_a_leg_by_its_timers_and_nothing_else() {
+fn a_saturated_bus_stops_a_leg_by_its_timers_only() {
     // Lowest priority: all other frames wait for one frame at most.
     let mut bus = Bus::new();
     bus.enable();
@@ -223,7 +223,7 @@ fn a_bus_that_is_full_of_others_frames_stops_a_leg_by_its_timers_and_nothing_els
             bus.network.send_at(Frame::new(id, &[0x55; 8]), now + u64::from(number));
         }
     };
-    // Host without monitoring of late PDOs: the legs continue, whatever else is on the bus.
+    // Host without monitoring of late PDOs: the legs continue under any bus load.
     for id in [0x7F0, 0x001] {
         flood(&mut bus, id, 4000);
         let load = bus.load(1600);
@@ -252,7 +252,7 @@ fn a_bus_that_is_full_of_others_frames_stops_a_leg_by_its_timers_and_nothing_els
 }
 
 #[test]
-fn what_is_stored_is_there_after_a_reset_of_the_node_and_its_number_is_the_new_one() {
+fn stored_objects_and_the_new_node_id_apply_after_a_reset() {
     let mut bus = Bus::new();
     bus.write(1, 0x1017, 0, 50, 2);
     bus.write(1, 0x6065, 0, 12_345, 4);

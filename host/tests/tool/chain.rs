@@ -3,7 +3,7 @@
 use crate::command::{Folder, scarab};
 
 #[test]
-fn three_joints_without_a_prior_are_found_as_by_least_squares() {
+fn three_joints_without_a_prior_agree_with_least_squares() {
     let folder = Folder::new();
     scarab("identify --leg paper-chain --prior none --seeds 1..3 --json", &[&folder.path("runs.json")])
         .ends_with(0);

@@ -23,17 +23,17 @@ fn crashed(kind: &str) -> Run {
     let run = scarab("emulate --crash", &[kind.as_ref(), "--leg".as_ref(), &leg, "--trace".as_ref(), &kept]);
     println!("{}{}", run.printed, run.errors);
     let run = run.ends_with(0);
-    // The basis of the report's checks, as shown by the timeline.
-    let told = run.printed.matches("the image CRASHED before this start").count();
-    assert_eq!((told, run.printed.matches("start (software)").count()), (1, 2));
+    // Requirements behind the report's checks, as shown by the timeline.
+    let reported = run.printed.matches("the image CRASHED before this start").count();
+    assert_eq!((reported, run.printed.matches("start (software)").count()), (1, 2));
     assert_eq!(run.printed.matches("identify, REFUSED").count(), 1);
     run
 }
 
 #[test]
 #[ignore = "needs an emulator and a compiler for the microcontroller: a step of .ci/run"]
-fn an_emulated_panic_releases_the_bridges_first_and_tells_its_file_and_line() {
-    let line = 1 + REHEARSAL.lines().position(|line| line.ends_with("// here")).expect("it is marked");
+fn an_emulated_panic_turns_bridges_off_first_and_reports_file_and_line() {
+    let line = 1 + REHEARSAL.lines().position(|line| line.ends_with("// here")).expect("the marked line");
     let place = format!("panic: emulated/src/bin/emulated/rehearsal.rs line {line}\n");
     let run = crashed("panic");
     assert!(run.printed.contains(&place), "{}", run.printed);
@@ -41,7 +41,7 @@ fn an_emulated_panic_releases_the_bridges_first_and_tells_its_file_and_line() {
 
 #[test]
 #[ignore = "needs an emulator and a compiler for the microcontroller: a step of .ci/run"]
-fn an_emulated_hard_fault_in_the_servo_releases_the_bridges_first_and_tells_its_place() {
+fn an_emulated_hard_fault_turns_bridges_off_first_and_reports_its_address() {
     let run = crashed("hard_fault");
     let place = "hard_fault: in emulated::rehearsal::read_nowhere, address 0x10000000\n";
     assert!(run.printed.contains(place), "{}", run.printed);
@@ -49,20 +49,20 @@ fn an_emulated_hard_fault_in_the_servo_releases_the_bridges_first_and_tells_its_
 
 #[test]
 #[ignore = "needs an emulator and a compiler for the microcontroller: a step of .ci/run"]
-fn an_emulated_stack_overflow_faults_below_the_memory_and_releases_the_bridges_first() {
+fn an_emulated_stack_overflow_faults_and_turns_bridges_off_first() {
     let run = crashed("stack_overflow");
-    // The stack ends at the start of the memory: the overflowing word is within one call of it. Its
+    // The stack ends at the start of the memory, and the overflowing word is within one call of it. Its
     // caller may be a function that the compiler has outlined, so its name is not checked.
-    let told = run.printed.split_once("stack_overflow").map_or("", |(_, rest)| rest);
-    let address = told.split_once("address 0x");
-    let digits = address.and_then(|(_, rest)| rest.lines().next()).expect("its address is told");
+    let reported = run.printed.split_once("stack_overflow").map_or("", |(_, rest)| rest);
+    let address = reported.split_once("address 0x");
+    let digits = address.and_then(|(_, rest)| rest.lines().next()).expect("its address is reported");
     let address = u32::from_str_radix(digits, 16).expect("a number");
     assert!((0x2000_0000 - 0x800..0x2000_0000).contains(&address), "{address:#x}");
 }
 
 #[test]
 #[ignore = "needs an emulator and a compiler for the microcontroller: a step of .ci/run"]
-fn an_emulated_interrupt_that_nobody_handles_releases_the_bridges_first_and_tells_its_number() {
+fn an_unhandled_emulated_interrupt_turns_bridges_off_first_and_reports_its_number() {
     let run = crashed("interrupt");
     // Interrupt 49 is SDIO, RM0090 table 62.
     assert!(run.printed.contains("interrupt: number 49\n"), "{}", run.printed);
@@ -79,7 +79,7 @@ const LOG: [&str; 7] = [
 ];
 
 #[test]
-fn a_current_loop_that_runs_after_the_release_is_seen() {
+fn a_current_tick_after_bridges_off_is_detected() {
     let whole = LOG.join("\n");
     assert_eq!(Witness::of(&whole), Witness { released: true, exceptions: 0, resets: 2 });
     let interrupted = whole.replacen("\nCPU Reset", "\nTaking exception 5 [IRQ] on CPU 0\nCPU Reset", 1);
@@ -102,7 +102,7 @@ state n=1 drive=operation_enabled activity=identify
 ";
 
 #[test]
-fn whatever_is_not_as_it_has_to_be_after_a_crash_is_said() {
+fn every_violated_requirement_of_a_crash_is_reported() {
     let report = |records: &str, begun| {
         CrashReport::new(CrashKind::Panic, records, &LOG.join("\n"), begun, Path::new("-")).expect("complete")
     };

@@ -43,7 +43,7 @@ fn sections(text: &str) -> BTreeMap<String, BTreeMap<String, String>> {
     for line in text.lines().filter(|line| !line.is_empty()) {
         if let Some(title) = line.strip_prefix('[') {
             name = title.trim_end_matches(']').to_owned();
-            assert!(sections.insert(name.clone(), BTreeMap::new()).is_none(), "[{name}] stands twice");
+            assert!(sections.insert(name.clone(), BTreeMap::new()).is_none(), "[{name}] occurs twice");
         } else {
             let (key, value) = line.split_once('=').expect("key=value");
             sections.get_mut(&name).expect("a section").insert(key.into(), value.into());
@@ -61,11 +61,11 @@ fn number(text: &str) -> u32 {
         Some(digits) => u32::from_str_radix(digits, 16),
         None => rest.parse::<i64>().map(|value| value as u32),
     };
-    value.unwrap_or_else(|_| panic!("{text}: no number")) + plus
+    value.unwrap_or_else(|_| panic!("{text}: not a number")) + plus
 }
 
 #[test]
-fn every_object_of_the_sheet_is_there_with_its_size_and_default_and_no_other() {
+fn the_sheet_lists_exactly_the_node_s_objects_with_size_and_default() {
     let folder = Folder::new();
     let out = folder.path("sheets");
     let run = scarab("eds --out", &[&out]).ends_with(0);
@@ -109,7 +109,7 @@ fn every_object_of_the_sheet_is_there_with_its_size_and_default_and_no_other() {
                     4 | 7 | 8 => 4,
                     _ => continue,
                 };
-                // Objects that need a leg are not read from a joint alone.
+                // Objects that need a leg cannot be read from a joint alone.
                 if command == 0x80 && (0x2100..0x219A).contains(&index) {
                     assert_eq!(value, 0x0800_0024);
                     continue;

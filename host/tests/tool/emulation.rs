@@ -38,13 +38,13 @@ pub fn changed_leg(folder: &Folder) -> PathBuf {
 
 #[test]
 #[ignore = "needs an emulator and a compiler for the microcontroller: a step of .ci/run"]
-fn the_emulated_leg_finds_what_the_simulated_one_does_and_tells_the_same_bytes_every_time() {
+fn the_emulated_leg_agrees_with_the_simulated_one_and_repeats_its_bytes() {
     let _image = the_image();
     let folder = Folder::new();
     let leg = changed_leg(&folder);
     let [json, once, again, host] =
         ["emulated.json", "once", "again", "host.json"].map(|name| folder.path(name));
-    // Side by side: the second thread finds the image built.
+    // In parallel: the second thread finds the image built.
     std::thread::scope(|scope| {
         scope.spawn(|| scarab("emulate --leg", &[&leg, Path::new("--trace"), &again]).ends_with(0));
         let run = scarab("emulate --leg", &[&leg, Path::new("--json"), &json, Path::new("--trace"), &once])
@@ -52,7 +52,7 @@ fn the_emulated_leg_finds_what_the_simulated_one_does_and_tells_the_same_bytes_e
         assert!(run.printed.contains("verdict: accepted"), "{}", run.printed);
     });
     let bytes = std::fs::read(&once).expect("written");
-    assert!(bytes == std::fs::read(&again).expect("written"), "two runs tell different bytes");
+    assert!(bytes == std::fs::read(&again).expect("written"), "two runs send different bytes");
 
     let emulated = folder.json("emulated.json");
     assert_eq!(emulated["missed_ticks"], 0);

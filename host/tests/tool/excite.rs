@@ -20,7 +20,7 @@ mod shipped;
 const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/excitation/x2_wearer_75kg.toml");
 const SHIPPED_SOURCE: &str = include_str!("../data/excitation/x2_wearer_75kg.rs");
 
-/// An eighth of the default effort: within 1 of its ln det, and quick.
+/// An eighth of the default effort: within 1 of its ln det, and faster.
 const EFFORT: &str = "--evaluations 6000";
 
 /// Design for the default leg with its truth assumed, and its report.
@@ -47,7 +47,7 @@ fn value(entry: &Value, key: &str) -> f64 {
 }
 
 #[test]
-fn a_design_keeps_every_limit_in_simulation_and_on_paper() {
+fn a_design_keeps_every_limit_in_proof_and_simulation() {
     let (_, report) = designed();
     for joint in list(report, "joints") {
         let [low, high] = [0, 1].map(|end| joint["range_deg"][end].as_f64().expect("a number"));
@@ -70,7 +70,7 @@ fn a_design_keeps_every_limit_in_simulation_and_on_paper() {
 }
 
 #[test]
-fn a_design_tells_far_more_than_the_best_of_300_random_motions() {
+fn a_design_is_far_more_informative_than_300_random_motions() {
     let (_, report) = designed();
     let own = value(report, "log_determinant");
     let random = value(&report["random"], "log_determinant");
@@ -80,7 +80,7 @@ fn a_design_tells_far_more_than_the_best_of_300_random_motions() {
 }
 
 #[test]
-fn the_sigma_that_is_expected_is_the_sigma_that_is_reported_and_the_spread_that_is_seen() {
+fn the_expected_sigma_equals_reported_sigma_and_observed_spread() {
     let (folder, report) = designed();
     const SEEDS: u32 = 40;
     let (file, json) = (folder.path("motion.toml"), folder.path("runs.json"));
@@ -118,7 +118,7 @@ fn the_sigma_that_is_expected_is_the_sigma_that_is_reported_and_the_spread_that_
 }
 
 #[test]
-fn noise_is_the_sensors_own_whichever_leg_is_assumed_and_whatever_it_is_to_be_used_for() {
+fn the_noise_is_that_of_the_sensors_for_any_assumed_leg() {
     let folder = Folder::new();
     let json = folder.path("report.json");
     let report = |arguments: &str| {
@@ -133,8 +133,8 @@ fn noise_is_the_sensors_own_whichever_leg_is_assumed_and_whatever_it_is_to_be_us
     let (prior, truth) = (report(""), report("--assume-truth"));
     assert_eq!(noise(&prior), noise(&truth));
     assert_eq!((&prior["torque_noise_of"], &prior["assumed"]), (&"truth".into(), &"prior".into()));
-    // Stillness depends slightly on the assumed friction; noise as a share of the assumed torque
-    // changed it by 8 %.
+    // Standstill depends slightly on the assumed friction; noise as a share of the assumed torque changed it
+    // by 8 %.
     for (prior, truth) in list(&prior, "base_parameters").iter().zip(list(&truth, "base_parameters")) {
         let ratio = value(prior, "sigma") / value(truth, "sigma");
         println!("{}: sigma expected of the prior over that of the truth {ratio:.3}", prior["name"]);
@@ -162,7 +162,7 @@ fn noise_is_the_sensors_own_whichever_leg_is_assumed_and_whatever_it_is_to_be_us
 }
 
 #[test]
-fn a_motion_is_checked_with_the_mass_that_will_be_hung_on() {
+fn a_motion_is_checked_with_the_carried_mass() {
     let message = scarab("identify --payload 30@knee:0.35 --excitation", &[Path::new(SHIPPED)]).refusal();
     assert!(message.contains("the motion needs") && message.contains("limit 85.0 N m"), "{message}");
     let message = scarab("identify --load 30@knee:0.35 --excitation", &[Path::new(SHIPPED)]).refusal();
@@ -176,7 +176,7 @@ fn a_written_motion_is_read_back_unchanged() {
     let motion = Excitation::load(&file).expect("just written");
     assert_eq!(fs::read_to_string(&file).expect("a file"), motion.to_toml());
     assert_eq!(fs::read_to_string(folder.path("motion.rs")).expect("a file"), constant::source(&motion));
-    let expected = motion.expected.expect("a design says what it expects");
+    let expected = motion.expected.expect("a design states its expectation");
     assert_eq!(expected.assumed, "truth");
     assert_eq!(expected.base_parameter.len(), list(report, "base_parameters").len());
     // Checking the same motion gives an identical report.
@@ -211,14 +211,15 @@ fn every_parameter_has_a_status_before_anything_moves() {
     ] {
         assert_eq!(status(name), expected, "{name}");
     }
-    // A hip that cannot hang straight hardly separates an offset from a mass in front; the status says so.
+    // A hip that cannot hang straight hardly separates an offset from a mass in front of it; the status shows
+    // that.
     assert_eq!(status("OFF1"), "weak");
     let warnings = list(report, "warnings");
     assert!(warnings.iter().any(|line| line.as_str().is_some_and(|line| line.starts_with("OFF1: weak"))));
 }
 
 #[test]
-fn a_leg_without_truth_is_designed_for_by_its_prior() {
+fn a_leg_without_truth_is_designed_from_its_prior() {
     let folder = Folder::new();
     let (file, json) = (folder.path("motion.toml"), folder.path("report.json"));
     let arguments = format!("excite --leg sp --torque-noise 5 --duration 12 {EFFORT}");
@@ -232,7 +233,7 @@ fn a_leg_without_truth_is_designed_for_by_its_prior() {
 }
 
 #[test]
-fn a_motion_that_is_not_this_legs_or_leaves_its_limits_is_refused_in_words() {
+fn a_motion_of_another_leg_or_beyond_limits_is_refused() {
     let folder = Folder::new();
     let text = fs::read_to_string(SHIPPED).expect("shipped with the tests");
     let with = |from: &str, to: &str| {
@@ -274,7 +275,7 @@ fn a_motion_that_is_not_this_legs_or_leaves_its_limits_is_refused_in_words() {
 }
 
 #[test]
-fn a_motion_that_takes_too_much_torque_is_refused_and_never_designed() {
+fn a_motion_above_the_torque_limit_is_refused_and_never_designed() {
     let folder = Folder::new();
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
     let mut frail = leg.clone();
@@ -300,7 +301,7 @@ fn a_motion_that_takes_too_much_torque_is_refused_and_never_designed() {
 }
 
 #[test]
-fn options_that_make_no_sense_are_refused_in_words() {
+fn implausible_options_are_refused_with_a_reason() {
     for (arguments, reason) in [
         ("excite --duration 0", "--duration"),
         ("excite --duration nan", "--duration"),
@@ -314,7 +315,7 @@ fn options_that_make_no_sense_are_refused_in_words() {
         ("identify --torque-noise-nm 1 --torque-noise 7", "cannot be used with"),
         ("excite --leg paper-chain --evaluations 600", "no motion can be designed for this leg"),
         ("excite --evaluations 1", "evaluations"),
-        ("excite --leg nobody", "nobody"),
+        ("excite --leg none-such", "none-such"),
     ] {
         let message = scarab(arguments, &[]).refusal();
         assert!(message.contains(reason), "{arguments}: {message}");
@@ -322,7 +323,7 @@ fn options_that_make_no_sense_are_refused_in_words() {
 }
 
 #[test]
-fn no_sigma_is_expected_where_no_noise_is_stated() {
+fn no_sigma_is_expected_without_stated_noise() {
     for arguments in ["", "--torque-noise-nm 0", "--torque-noise 0", "--excitation"] {
         let folder = Folder::new();
         let json = folder.path("report.json");
@@ -341,7 +342,7 @@ fn no_sigma_is_expected_where_no_noise_is_stated() {
         for word in
             ["is not stated", "`current_noise_a`", "`torque_noise_percent`", "--torque-noise-nm", "joint `"]
         {
-            assert!(message.contains(word), "{arguments}: no {word} in {message}");
+            assert!(message.contains(word), "{arguments}: `{word}` missing in {message}");
         }
         assert!(!json.exists());
     }

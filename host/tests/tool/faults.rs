@@ -14,7 +14,7 @@ fn report(arguments: &str, code: i32) -> Value {
 }
 
 #[test]
-fn the_json_is_that_of_the_interface_and_its_numbers_add_up() {
+fn the_json_is_complete_and_its_numbers_add_up() {
     let report = report("--seeds 4 --sweep 20 --pairs 20", 0);
     assert_eq!((report["schema"].as_u64(), report["invariants_broken"].as_u64()), (Some(1), Some(0)));
     assert_eq!(report["failures"], Value::Array(vec![]));
@@ -26,8 +26,8 @@ fn the_json_is_that_of_the_interface_and_its_numbers_add_up() {
         assert_eq!(count("runs"), count("detected") + count("missed") + count("undetectable_by_design"));
         assert!(count("state_reached") <= count("runs") && count("false_alarms") == 0, "{row}");
         let (worst, deadline) = (&row["worst_ms"], &row["deadline_ms"]);
-        // One turn of a rotor, the end of an identification, the way back into the range, and events that
-        // must never happen have no time limit.
+        // One turn of a rotor, the end of an identification, the return into the range, and events that must
+        // never happen have no time limit.
         let timeless =
             ["E3", "E4", "E5", "V3", "B3", "B4", "X3", "F1", "F2", "F3", "J1", "J3", "H2", "H3", "H4", "I1"];
         assert_eq!(deadline.is_null(), timeless.iter().any(|fault| row["fault"] == *fault), "{row}");
@@ -48,7 +48,7 @@ fn the_json_is_that_of_the_interface_and_its_numbers_add_up() {
 }
 
 #[test]
-fn the_same_seeds_leave_the_same_trace_and_one_of_them_is_repeated_alone() {
+fn equal_seeds_give_equal_traces_and_single_runs_repeat() {
     let rows = "--fault X1 --fault C2 --fault E4";
     let [one, other] = [(); 2].map(|()| report(&format!("{rows} --seeds 3"), 0));
     assert_eq!(one, other);
@@ -62,9 +62,9 @@ fn the_same_seeds_leave_the_same_trace_and_one_of_them_is_repeated_alone() {
     assert!(all.printed.contains("trace hash"), "{}", all.printed);
 }
 
-/// The hash of all runs is made from those of single repeated runs: all of them agree bit for bit.
+/// The hash of all runs is computed from those of single repeated runs: all of them agree bit for bit.
 #[test]
-fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
+fn runs_of_sweep_and_pairs_can_be_repeated_alone() {
     for kind in ["sweep", "pairs"] {
         let all = report(&format!("--fault {kind} --seeds 3"), 0);
         assert_eq!((&all["rows"], &all["trials"][0]["runs"]), (&Value::Array(vec![]), &3.into()));
@@ -73,7 +73,7 @@ fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
             .map(|seed| {
                 let line = format!("faults --seconds 1 --fault {kind} --replay {seed} --report");
                 let printed = scarab(&line, &[&folder.path("run.html")]).ends_with(0).printed;
-                let told = printed.split_once(&format!("{kind} seed {seed}: ")).expect("it is told").1;
+                let told = printed.split_once(&format!("{kind} seed {seed}: ")).expect("it is reported").1;
                 told.split_once("hash ").expect("its hash").1[..16].to_owned()
             })
             .collect();
@@ -111,10 +111,10 @@ fn every_detector_that_is_switched_off_is_noticed() {
     }
 }
 
-/// The phase stays at zero current until the loop overcomes dead time; 1 in 500 runs took this for
-/// a stuck conversion.
+/// The phase stays at zero current until the loop overcomes dead time; in 1 of 500 runs this was taken for a
+/// stuck conversion.
 #[test]
-fn a_leg_that_its_host_holds_still_is_not_released() {
+fn a_leg_held_still_by_its_host_stays_enabled() {
     let report = report("--fault F3 --replay 894", 0);
     assert_eq!(report["rows"][0]["detected"], 1);
 }
@@ -122,7 +122,7 @@ fn a_leg_that_its_host_holds_still_is_not_released() {
 /// A hang of each monitored level is answered by a reset, within the tolerance of the watchdog's
 /// oscillator. The restarted firmware is inhibited for it.
 #[test]
-fn whoever_hangs_is_reset_and_refused() {
+fn a_hanging_level_leads_to_reset_and_refusal() {
     let report = report("--fault K3 --seeds 24", 0);
     let row = &report["rows"][0];
     assert_eq!((&row["detected"], &row["state_reached"]), (&24.into(), &24.into()));
@@ -132,7 +132,7 @@ fn whoever_hangs_is_reset_and_refused() {
 }
 
 #[test]
-fn normal_motion_with_a_pushing_wearer_raises_nothing() {
+fn normal_motion_with_a_pushing_wearer_raises_no_fault() {
     let report = report("--fault C2 --seeds 1 --hours 0.002", 0);
     let hours = &report["hours"];
     assert_eq!(hours["false_alarms"], Value::Array(vec![]));
@@ -140,7 +140,7 @@ fn normal_motion_with_a_pushing_wearer_raises_nothing() {
 }
 
 #[test]
-fn the_emergency_stop_is_tried_at_every_tick() {
+fn the_emergency_stop_is_tested_at_every_tick() {
     let report = report("--fault X1 --seeds 1 --every-tick", 0);
     // One second of servo ticks, including the first and the last.
     assert_eq!((report["every_tick"].as_u64(), report["rows"][0]["missed"].as_u64()), (Some(4001), Some(0)));

@@ -66,7 +66,7 @@ fn a_run_is_drawn_completely_and_small() {
 
 /// Overlaid curves refer to the same instant: each is compared with the one it must follow.
 #[test]
-fn curves_of_one_motion_are_of_the_same_instants() {
+fn curves_of_one_motion_share_their_time_base() {
     let (report, series) = identified();
     assert_eq!(series.motions.len(), 4);
     for motion in &series.motions {
@@ -108,7 +108,7 @@ fn curves_of_one_motion_are_of_the_same_instants() {
 }
 
 #[test]
-fn torques_that_a_known_mass_put_right_are_drawn_put_right() {
+fn torques_corrected_by_a_known_mass_are_drawn_corrected() {
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
     let options = SimulationOptions {
         with_series: true,

@@ -111,7 +111,7 @@ fn no_command_writes_one_file_twice() {
 
 #[cfg(unix)]
 #[test]
-fn another_spelling_and_a_link_are_the_same_file() {
+fn other_spellings_and_links_count_as_the_same_file() {
     use std::os::unix::fs::symlink;
     let folder = Folder::new();
     let file = folder.write("data.csv", CONTENT);
@@ -147,7 +147,7 @@ fn another_spelling_and_a_link_are_the_same_file() {
 }
 
 #[test]
-fn a_folder_of_drawings_holds_no_file_of_the_command() {
+fn a_folder_of_drawings_must_not_contain_other_outputs() {
     let folder = Folder::new();
     let (drawn, page) = (folder.path("drawn"), folder.path("drawn/identify.svg"));
     let line = [Path::new("--figures"), &drawn, Path::new("--report"), &page];
@@ -171,7 +171,7 @@ fn an_output_that_cannot_be_written_is_found_before_the_input_is_read() {
         ("--figures", file.clone(), "it is a file, not a folder"),
         ("--figures", folder.path("file/drawn"), "is not a folder"),
     ];
-    // A place in which not even the superuser can create a file.
+    // Folder in which not even the superuser can create a file.
     if cfg!(target_os = "linux") {
         cases.push(("--json", PathBuf::from("/proc/run.json"), "no file can be created in the folder /proc"));
         cases.push(("--figures", PathBuf::from("/proc/drawn"), "no file can be created in the folder /proc"));
@@ -185,7 +185,7 @@ fn an_output_that_cannot_be_written_is_found_before_the_input_is_read() {
     for kept in [&file, &locked] {
         assert_eq!(fs::read_to_string(kept).expect("there"), CONTENT);
     }
-    assert_eq!(fs::read_dir(folder.path("")).expect("a folder").count(), 2, "something is left behind");
+    assert_eq!(fs::read_dir(folder.path("")).expect("a folder").count(), 2, "a temporary file remains");
 }
 
 /// Flash of a board without stored data.
@@ -197,13 +197,13 @@ fn erased_flash(folder: &Folder) -> PathBuf {
 
 #[cfg(unix)]
 #[test]
-fn a_file_is_replaced_as_a_whole_and_a_link_to_it_stays_one() {
+fn a_file_is_replaced_as_a_whole_and_links_remain() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = Folder::new();
     let flash = erased_flash(&folder);
     let file = folder.write("kept.toml", CONTENT);
     fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("own file");
-    // The old file keeps its other name: it was replaced, not overwritten.
+    // The other hard link still has the old content: the file was replaced, not overwritten.
     fs::hard_link(&file, folder.path("old.toml")).expect("a link");
     symlink(&file, folder.path("link.toml")).expect("a link");
     scarab("kept export --out", &[&folder.path("link.toml"), &flash]).ends_with(0);
@@ -213,11 +213,11 @@ fn a_file_is_replaced_as_a_whole_and_a_link_to_it_stays_one() {
     assert!(folder.path("link.toml").is_symlink());
     assert_eq!(fs::metadata(&file).expect("there").permissions().mode() & 0o777, 0o640);
     let names: Vec<_> = fs::read_dir(folder.path("")).expect("a folder").flatten().collect();
-    assert_eq!(names.len(), 4, "a temporary file is left behind: {names:?}");
+    assert_eq!(names.len(), 4, "a temporary file remains: {names:?}");
 }
 
 #[test]
-fn a_run_that_fails_leaves_its_output_as_it_was() {
+fn a_failed_run_does_not_change_its_output_file() {
     let folder = Folder::new();
     let (file, flash) = (folder.write("kept.toml", CONTENT), folder.write("flash.bin", "too short"));
     let message = scarab("kept export --out", &[&file, &flash]).refusal();
@@ -237,7 +237,7 @@ fn a_stream_is_written_to_and_not_replaced() {
 }
 
 #[test]
-fn a_folder_that_the_command_makes_may_hold_its_other_files() {
+fn a_created_folder_may_contain_other_outputs() {
     let folder = Folder::new();
     let sheets = folder.path("new/sheets");
     scarab("eds --out", &[&sheets]).ends_with(0);

@@ -2,8 +2,8 @@
 //! result, never in a panic.
 //!
 //! Valid files are corrupted at random: bytes, lines, numbers, the end. The seed is fixed;
-//! `SCARAB_FUZZ_CASES` requests more than the few hundred cases of each kind in every test run. A
-//! failure is reduced to the fewest changes that cause it.
+//! `SCARAB_FUZZ_CASES` requests more than the few hundred cases of each kind in every test run. A failure is
+//! reduced to the fewest changes that cause it.
 
 use std::path::Path;
 
@@ -116,7 +116,7 @@ fn fuzz(files: &[String], read: impl Fn(&[u8]) -> Result<(), String>) {
     let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = (0..files.len(), changes());
     let result = runner.run(&strategy, |(file, changes)| match read(&spoilt(&files[file], &changes)) {
-        Err(words) if !words.contains(NAME) => Err(TestCaseError::fail(format!("names no file: {words}"))),
+        Err(words) if !words.contains(NAME) => Err(TestCaseError::fail(format!("does not name the file: {words}"))),
         _ => Ok(()),
     });
     if let Err(failure) = result {
@@ -124,13 +124,13 @@ fn fuzz(files: &[String], read: impl Fn(&[u8]) -> Result<(), String>) {
     }
 }
 
-/// Reads text as a program would; other bytes are rejected there.
+/// Decodes text as a program would; other bytes are rejected there.
 fn text(bytes: &[u8]) -> Option<&str> {
     std::str::from_utf8(bytes).ok()
 }
 
 #[test]
-fn spoilt_leg_files_are_refused_by_name_or_make_sense() {
+fn corrupted_leg_files_are_refused_by_name_or_valid() {
     let legs: Vec<String> = SHIPPED_LEGS.iter().map(|(_, text)| (*text).to_owned()).collect();
     fuzz(&legs, |bytes| {
         let Some(text) = text(bytes) else { return Ok(()) };
@@ -144,30 +144,30 @@ fn spoilt_leg_files_are_refused_by_name_or_make_sense() {
 }
 
 #[test]
-fn spoilt_recordings_are_refused_by_name_or_make_sense() {
+fn corrupted_recordings_are_refused_by_name_or_valid() {
     let whole = std::fs::read_to_string(MUJOCO).expect("shipped");
     let begin: String = whole.lines().take(60).map(|line| format!("{line}\n")).collect();
     fuzz(&[begin], |bytes| {
         let Some(text) = text(bytes) else { return Ok(()) };
         let recording = Recording::parse(Path::new(NAME), text, 2).map_err(|error| error.to_string())?;
         let finite = recording.time_s.iter().all(|time| time.is_finite());
-        if finite { Ok(()) } else { Err("a time that is none was believed".into()) }
+        if finite { Ok(()) } else { Err("a time that is not finite was accepted".into()) }
     });
 }
 
 #[test]
-fn spoilt_models_are_refused_by_name_or_are_the_same() {
+fn corrupted_models_are_refused_by_name_or_unchanged() {
     let good = kept::model();
     fuzz(&[kept::text()], |bytes| {
         let Some(text) = text(bytes) else { return Ok(()) };
         let model = ModelFile::parse(text, NAME).map_err(|error| error.to_string())?;
         // The checksum permits changes of comments and spaces only.
-        if model == good { Ok(()) } else { Err("an edited model was believed".into()) }
+        if model == good { Ok(()) } else { Err("an edited model was accepted".into()) }
     });
 }
 
 #[test]
-fn spoilt_motions_are_refused_by_name_or_make_sense() {
+fn corrupted_motions_are_refused_by_name_or_valid() {
     let folder = Folder::new();
     let path = folder.path(NAME);
     fuzz(&[EXCITATION.to_owned()], |bytes| {
@@ -179,7 +179,7 @@ fn spoilt_motions_are_refused_by_name_or_make_sense() {
 }
 
 #[test]
-fn spoilt_traces_are_refused_by_name_or_reported() {
+fn corrupted_traces_are_refused_by_name_or_reported() {
     let (whole, leg) = (session::text(&session::quiet()), session::default_leg());
     fuzz(&[whole], |bytes| {
         let mut reader = StreamReader::new(None);

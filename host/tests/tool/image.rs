@@ -3,7 +3,7 @@
 use crate::command::{Folder, scarab};
 
 #[test]
-fn no_image_is_built_for_a_motor_that_the_leg_file_does_not_describe() {
+fn no_image_is_built_without_a_described_motor() {
     let folder = Folder::new();
     let source = folder.path("leg.rs");
     for leg in ["mujoco-leg", "dp-a0"] {
@@ -23,7 +23,7 @@ fn no_image_is_built_for_a_motor_that_the_leg_file_does_not_describe() {
 }
 
 #[test]
-fn a_board_is_not_flashed_for_a_leg_that_is_not_named() {
+fn flashing_requires_a_named_leg() {
     let message = scarab("flash-leg", &[]).refusal();
     assert!(message.contains("--leg is missing"), "{message}");
     assert!(message.contains("cargo flash-leg --leg my-leg.toml"), "{message}");

@@ -73,7 +73,7 @@ fn text() -> String {
     format!("schema = 1\n{NODES}{CALIBRATIONS}{}", model(&own_fingerprint()))
 }
 
-/// Text without the leading comment.
+/// Text after the leading comment.
 fn content(exported: &str) -> &str {
     &exported[exported.find("schema").expect("a schema")..]
 }
@@ -88,7 +88,7 @@ fn import(folder: &Folder, text: &str, flash: &Path) -> Run {
 }
 
 #[test]
-fn what_was_exported_imported_and_exported_again_is_the_same_to_the_letter() {
+fn a_repeated_export_after_import_has_the_same_text() {
     let folder = Folder::new();
     let (first, second, out) = (folder.path("first.bin"), folder.path("second.bin"), folder.path("out.toml"));
     import(&folder, &text(), &first).ends_with(0);
@@ -112,7 +112,7 @@ fn what_was_exported_imported_and_exported_again_is_the_same_to_the_letter() {
 }
 
 #[test]
-fn what_a_file_does_not_name_stays_and_one_calibration_is_not_mixed_with_an_older_one() {
+fn unnamed_parts_stay_and_calibrations_of_different_age_are_not_mixed() {
     let folder = Folder::new();
     let flash = folder.path("flash.bin");
     let exported = import(&folder, "schema = 1\n", &flash).ends_with(0);
@@ -136,7 +136,7 @@ fn what_a_file_does_not_name_stays_and_one_calibration_is_not_mixed_with_an_olde
 }
 
 #[test]
-fn a_board_that_starts_with_an_imported_flash_uses_it_and_a_model_of_another_leg_it_refuses() {
+fn a_board_uses_an_imported_flash_but_refuses_another_leg_s_model() {
     let folder = Folder::new();
     let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     let start = |text: &str, name: &str| {
@@ -167,7 +167,7 @@ fn a_board_that_starts_with_an_imported_flash_uses_it_and_a_model_of_another_leg
 }
 
 #[test]
-fn what_is_damaged_is_said_and_the_rest_is_exported() {
+fn damaged_parts_are_reported_and_the_rest_is_exported() {
     let folder = Folder::new();
     let flash = folder.path("flash.bin");
     // The hip's key holds a truncated entry, a controlword, and a value that no node accepts; the
@@ -203,8 +203,8 @@ fn what_is_damaged_is_said_and_the_rest_is_exported() {
     assert!(run.errors.contains("no record in it can be read: nothing was written"), "{}", run.errors);
     assert_eq!(fs::read(&flash).expect("still there"), noise);
 
-    // A damaged record (followed by zeros that fill the word) without a copy: the log has no
-    // answer, and the file is not erased.
+    // A damaged record (followed by zeros that fill the word) without a copy: the log cannot repair it, and
+    // the file is not erased.
     fs::remove_file(&flash).ok();
     import(&folder, "schema = 1\n[[node]]\njoint = \"hip\"\nobjects = []\n", &flash).ends_with(0);
     let mut bytes = fs::read(&flash).expect("written");
@@ -216,7 +216,7 @@ fn what_is_damaged_is_said_and_the_rest_is_exported() {
 }
 
 #[test]
-fn a_file_that_cannot_be_meant_is_refused_with_its_reason_and_the_flash_stays() {
+fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
     let folder = Folder::new();
     let flash = folder.path("flash.bin");
     import(&folder, &text(), &flash).ends_with(0);
@@ -272,7 +272,7 @@ fn a_file_that_cannot_be_meant_is_refused_with_its_reason_and_the_flash_stays() 
         (
             "[[model.joint]]\njoint = \"hip\"",
             "[[model.joint]]\njoint = \"knee\"",
-            "`joint`: knee where hip belongs",
+            "`joint`: knee instead of hip",
         ),
         (&own_fingerprint(), "12345", "`fingerprint` is `12345`; it must be 16 hexadecimal digits"),
         ("[model]", "[model", ":"),
@@ -298,7 +298,7 @@ fn a_file_that_cannot_be_meant_is_refused_with_its_reason_and_the_flash_stays() 
     let many = format!("schema = 1\n[[node]]\njoint = \"hip\"\nobjects = [{}]\n", many.join(", "));
     let said = import(&folder, &many, &flash).refusal();
     assert!(said.contains("more than the 400 bytes that a board stores for a node"), "{said}");
-    // A file of another size is not a flash and is not turned into one.
+    // A file of another size is not a flash and stays unchanged.
     fs::write(&flash, [0xFF; 100]).expect("a temporary file");
     let said = import(&folder, &whole, &flash).refusal();
     assert!(said.contains("100 bytes; the flash of 1 to 4 boards has 262144 each"), "{said}");

@@ -46,7 +46,7 @@ fn left_and_right_leg_have_the_same_anatomical_parameters() {
 }
 
 #[test]
-fn a_known_trunk_pitch_turns_gravity_and_leaves_the_base_set_as_it_is() {
+fn a_known_trunk_pitch_turns_gravity_and_keeps_the_base_set() {
     let upright = identified("");
     for pitch in ["5", "-10"] {
         let leaning = identified(&format!("--trunk-pitch {pitch}"));
@@ -68,7 +68,7 @@ fn a_known_trunk_pitch_turns_gravity_and_leaves_the_base_set_as_it_is() {
 }
 
 #[test]
-fn legs_of_any_size_are_identified_and_say_so() {
+fn legs_of_any_size_are_identified_and_named_by_size() {
     for options in
         ["--thigh 0.505 --shank 0.506", "--wearer 95,1.95", "--wearer 55,1.65 --side left --trunk-pitch 5"]
     {
@@ -85,7 +85,7 @@ fn legs_of_any_size_are_identified_and_say_so() {
 }
 
 #[test]
-fn what_a_leg_cannot_be_set_to_is_refused_by_option_and_reason() {
+fn impossible_leg_options_are_refused_with_option_and_reason() {
     for (options, reason) in [
         ("--thigh 0.3", "--thigh 0.3 is outside 0.402..0.505 m"),
         ("--shank -1", "--shank -1 is outside 0.397..0.506 m"),

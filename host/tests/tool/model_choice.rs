@@ -1,4 +1,4 @@
-//! Model terms left to the data: found if present, dropped if absent, and reported in words.
+//! Model terms left to the data: used if present, dropped if absent, and reported in words.
 
 use crate::command::{Folder, base, scarab};
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile, Switch};
@@ -40,7 +40,7 @@ fn sigma(run: &RunReport, name: &str) -> f64 {
 }
 
 #[test]
-fn rotor_and_offset_that_are_not_there_are_dropped_and_the_rest_is_known_better() {
+fn absent_rotor_and_offset_are_dropped_and_other_sigmas_fall() {
     let kept_on = runs(&leg(Switch::On, true, 0.0), 1..=3);
     let chosen = runs(&leg(Switch::Auto, true, 0.0), 1..=20);
     let candidates = [(2, "rotor"), (1, "offset"), (2, "offset")];
@@ -70,14 +70,14 @@ fn rotor_and_offset_that_are_not_there_are_dropped_and_the_rest_is_known_better(
 }
 
 #[test]
-fn rotor_and_offset_that_are_there_are_kept_and_give_the_numbers_of_on() {
+fn present_rotor_and_offset_are_estimated_as_with_on() {
     // 6 N m are eight standard deviations of the hip's offset, the weakest of the terms.
     let of = |switch| runs(&leg(switch, false, 6.0), 1..=5);
     for (auto, on) in of(Switch::Auto).into_iter().zip(of(Switch::On)) {
         for (joint, option) in [(2, "rotor"), (1, "offset"), (2, "offset")] {
             assert_eq!(choice(&auto, joint, option).used, "on", "{option} of joint {joint}");
         }
-        // The choice takes a tick: the held-out motions begin one tick later and have another noise.
+        // The choice takes a tick, so the held-out motions begin one tick later and have another noise.
         let found = |run: &RunReport| {
             (run.base_parameters.clone(), run.parameters.clone(), run.least_squares.clone(), run.bso.clone())
         };
@@ -96,7 +96,7 @@ fn uneven(asked: Switch, half: f64) -> LegFile {
 }
 
 #[test]
-fn friction_that_differs_between_the_directions_is_found_in_both() {
+fn friction_that_differs_by_direction_is_identified_in_both() {
     for run in runs(&uneven(Switch::Auto, 0.8), 1..=5) {
         assert!(run.accepted(), "{:?}", run.reasons);
         assert_eq!(choice(&run, 2, "asymmetric_coulomb").used, "on");
@@ -117,7 +117,7 @@ fn friction_that_differs_between_the_directions_is_found_in_both() {
 }
 
 #[test]
-fn friction_of_two_directions_is_kept_exported_and_predicted_as_such() {
+fn friction_of_two_directions_is_stored_exported_and_predicted() {
     let folder = Folder::new();
     let (file, model) =
         (folder.write("leg.toml", &uneven(Switch::On, 0.8).to_toml()), folder.path("model.toml"));
@@ -141,7 +141,7 @@ fn friction_of_two_directions_is_kept_exported_and_predicted_as_such() {
     let friction = table.column("tau2_friction_Nm");
     // One rounding per number below 10.
     assert!((friction[0] + friction[1] - 2.0 * half).abs() < 1e-6, "{friction:?} {half}");
-    assert_eq!((friction[2], table.column("tau2_offset_Nm")), (0.0, vec![0.0; 3]), "nothing of it at rest");
+    assert_eq!((friction[2], table.column("tau2_offset_Nm")), (0.0, vec![0.0; 3]), "not zero at rest");
 
     let urdf = folder.path("leg.urdf");
     let arguments = format!("export --model {} --urdf", model.display());
@@ -151,7 +151,7 @@ fn friction_of_two_directions_is_kept_exported_and_predicted_as_such() {
 }
 
 #[test]
-fn a_dropped_column_is_not_in_the_kept_model_and_the_model_can_be_used() {
+fn a_dropped_column_is_not_in_the_stored_model() {
     let folder = Folder::new();
     let file = folder.write("leg.toml", &leg(Switch::Auto, true, 0.0).to_toml());
     let model = folder.path("model.toml");
@@ -175,7 +175,7 @@ fn a_dropped_column_is_not_in_the_kept_model_and_the_model_can_be_used() {
 }
 
 #[test]
-fn one_column_cannot_be_asked_for_twice_and_who_yields_is_said() {
+fn one_column_cannot_be_requested_twice() {
     let folder = Folder::new();
     let mut both = LegFile::load(DEFAULT_LEG).expect("shipped");
     both.joints[1].asymmetric_coulomb = Switch::On;
@@ -213,7 +213,7 @@ fn one_column_cannot_be_asked_for_twice_and_who_yields_is_said() {
 }
 
 #[test]
-fn the_temperature_is_kept_and_another_one_is_warned_of() {
+fn the_temperature_is_stored_and_another_one_gives_a_warning() {
     let folder = Folder::new();
     let (model, json) = (folder.path("model.toml"), folder.path("run.json"));
     scarab(&format!("identify --temperature 21.5 --json {} --save-model", json.display()), &[&model])

@@ -11,7 +11,7 @@ use scarab_host::leg::setup::{PriorChoice, background, configuration};
 use serde_json::Value;
 
 #[test]
-fn a_model_holds_the_report_number_by_number_and_reads_back_unchanged() {
+fn a_model_contains_the_report_s_numbers_and_reads_back_unchanged() {
     let (model, report) = (model(), &kept().report);
     // The test's JSON reader may miss the last bit; results of single precision must be equal after
     // rounding to it.
@@ -47,7 +47,7 @@ fn a_model_holds_the_report_number_by_number_and_reads_back_unchanged() {
 }
 
 #[test]
-fn the_fingerprint_is_the_one_the_board_computes() {
+fn the_fingerprint_equals_the_board_s() {
     let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     let known = background::<2, 13>(&leg, PriorChoice::Default, 1).expect("a base set");
     let (board, _) = configuration(&leg, &known, Plan::OneTime, 1).expect("simulated");
@@ -57,10 +57,10 @@ fn the_fingerprint_is_the_one_the_board_computes() {
 }
 
 #[test]
-fn a_refused_result_is_not_kept() {
+fn a_refused_result_is_not_stored() {
     let folder = Folder::new();
     let path = folder.path("model.toml");
-    // With 8 s of one resting joint nothing can be held out: rejected for many reasons.
+    // With 8 s of one resting joint no held-out part is possible: refused for many reasons.
     let rows: String = (0..4000).map(|row| format!("{},0.1,1.0\n", f64::from(row) * 0.002)).collect();
     let still = folder.write("still.csv", &format!("t_s,q1_rad,tau1_Nm\n{rows}"));
     let run = scarab("replay --leg sp --save-model", &[&path, &still]).ends_with(3);
@@ -166,7 +166,7 @@ fn hostile_files_are_refused_with_file_line_and_reason() {
 }
 
 #[test]
-fn a_covariance_by_which_a_sum_has_a_negative_variance_is_refused() {
+fn a_covariance_that_is_not_positive_definite_is_refused() {
     let mut model = model();
     let (one, other) = (0, 1);
     let together =
@@ -178,7 +178,7 @@ fn a_covariance_by_which_a_sum_has_a_negative_variance_is_refused() {
 }
 
 #[test]
-fn an_edited_number_is_noticed_and_an_added_comment_is_not() {
+fn an_edited_number_is_detected_an_added_comment_is_permitted() {
     let folder = Folder::new();
     let good = text();
     predict(&folder, &format!("# seen by a person\n\n{}", good.replace(" = ", "=")), "").ends_with(0);
@@ -201,7 +201,7 @@ fn an_edited_number_is_noticed_and_an_added_comment_is_not() {
 }
 
 #[test]
-fn a_model_of_another_leg_is_refused_in_words() {
+fn a_model_of_another_leg_is_refused_with_the_differences() {
     let folder = Folder::new();
     let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     let refusal = |leg: &LegFile| {
@@ -259,7 +259,7 @@ fn a_model_of_another_leg_is_refused_in_words() {
 }
 
 #[test]
-fn a_known_mass_makes_the_model_absolute_and_its_constants_the_identified_ones() {
+fn a_known_mass_makes_the_model_absolute_with_identified_constants() {
     let folder = Folder::new();
     let path = folder.path("model.toml");
     scarab("identify --payload 5@2:0.3 --save-model", &[&path]).ends_with(0);

@@ -42,7 +42,7 @@ fn predicted_torque_is_that_of_the_plant_for_true_parameters() {
 }
 
 #[test]
-fn the_band_is_the_covariance_seen_through_the_torque() {
+fn the_band_is_the_covariance_propagated_to_the_torque() {
     let model = model();
     let own = Predictor::<2>::new(&model).expect("two joints");
     for state in states() {
@@ -71,7 +71,7 @@ fn the_band_is_the_covariance_seen_through_the_torque() {
 }
 
 #[test]
-fn the_table_has_total_band_and_parts_and_knows_both_signs_of_an_angle() {
+fn the_table_has_total_band_and_parts_in_both_angle_conventions() {
     let folder = Folder::new();
     let out = folder.path("torque.csv");
     let run = predict(&folder, &text(), &format!("--out {}", out.display())).ends_with(0);

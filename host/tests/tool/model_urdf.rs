@@ -1,4 +1,4 @@
-//! Robot descriptions from models: read by another library, moved by other equations.
+//! Robot descriptions from models: read by another library, and moved by other equations.
 #![expect(clippy::disallowed_methods, reason = "runs on the host only and may use std's mathematics")]
 
 use crate::command::{Folder, scarab};
@@ -113,8 +113,8 @@ fn described<const N: usize>(robot: &urdf_rs::Robot, leg: &LegFile) -> LegDescri
 fn checks<const N: usize, const B: usize>(name: &str) {
     let folder = Folder::new();
     let model = true_model::<N, B>(&folder, name);
-    let text = text(&model, "model.toml").expect("bodies that can exist");
-    let robot = urdf_rs::read_from_string(&text).expect("another reader takes it");
+    let text = text(&model, "model.toml").expect("physically consistent bodies");
+    let robot = urdf_rs::read_from_string(&text).expect("another library reads it");
     assert_eq!((robot.name.as_str(), robot.joints.len(), robot.links.len()), (name, N + 1, N + 2));
 
     for (number, stored) in model.leg.joints.iter().enumerate() {
@@ -165,23 +165,23 @@ fn checks<const N: usize, const B: usize>(name: &str) {
 }
 
 #[test]
-fn bodies_of_a_planar_leg_come_back_and_move_as_identified() {
+fn exported_bodies_of_a_planar_leg_give_the_identified_torque() {
     checks::<2, 13>("x2-wearer-75kg");
 }
 
 #[test]
-fn bodies_of_a_chain_with_crossed_axes_come_back_and_move_as_identified() {
+fn exported_bodies_of_crossed_axes_give_the_identified_torque() {
     checks::<3, 28>("paper-chain");
 }
 
 #[test]
-fn the_default_leg_as_shipped_is_exported_and_moves_as_identified() {
+fn the_exported_default_leg_gives_the_identified_torque() {
     let folder = Folder::new();
     let path = folder.path("model.toml");
     scarab("identify --save-model", &[&path]).ends_with(0);
     let urdf = folder.path("leg.urdf");
     scarab("export --model", &[&path, "--urdf".as_ref(), &urdf]).ends_with(0);
-    let robot = urdf_rs::read_file(&urdf).expect("another reader takes it");
+    let robot = urdf_rs::read_file(&urdf).expect("another library reads it");
     let model = ModelFile::load(&path).expect("just written");
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
     let mechanism = Mechanism::new(&described::<2>(&robot, &leg));
@@ -197,7 +197,7 @@ fn the_default_leg_as_shipped_is_exported_and_moves_as_identified() {
 }
 
 #[test]
-fn the_description_is_well_formed_and_says_what_torque_never_saw() {
+fn the_description_is_well_formed_and_lists_unobservable_parameters() {
     let folder = Folder::new();
     let (model, text) = exported(&folder, "x2-wearer-75kg");
     let document = roxmltree::Document::parse(&text).expect("XML");
@@ -241,7 +241,7 @@ fn names_that_would_break_the_format_are_escaped() {
 }
 
 #[test]
-fn what_is_no_body_and_what_nobody_knows_is_not_exported() {
+fn impossible_or_unknown_bodies_are_not_exported() {
     let folder = Folder::new();
     let (model, _) = exported(&folder, "x2-wearer-75kg");
     let refusal = |change: &dyn Fn(&mut ModelFile)| {

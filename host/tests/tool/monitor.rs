@@ -3,7 +3,7 @@
 use crate::command::{Folder, scarab};
 
 #[test]
-fn a_payload_is_noticed_and_written_down_and_pushes_are_not_noticed() {
+fn a_payload_is_detected_and_estimated_while_pushes_raise_no_alarm() {
     let folder = Folder::new();
     let arguments = "monitor --payload 3@knee:0.2 --seed 2 --at 5 --hours 0.02 --pushes 6:20 --json";
     scarab(arguments, &[&folder.path("monitor.json")]).ends_with(0);

@@ -40,7 +40,7 @@ fn steps_of_current_rise_as_designed_at_every_speed() {
 }
 
 #[test]
-fn feedforward_takes_the_coupling_off_a_step_at_speed() {
+fn feedforward_removes_the_coupling_of_a_step_at_speed() {
     let fast: Vec<_> =
         entries("steps").iter().rev().take(2).map(|step| number(step, "coupling_percent")).collect();
     let [without, with] = fast[..] else { panic!("{fast:?}") };
@@ -48,7 +48,7 @@ fn feedforward_takes_the_coupling_off_a_step_at_speed() {
 }
 
 #[test]
-fn giving_dead_time_back_takes_its_sixth_harmonic_off_the_torque() {
+fn dead_time_compensation_removes_its_sixth_harmonic() {
     let sixth = |compensated: bool, speed: usize| {
         let quiet = entries("ripple").iter().filter(|entry| entry["noise"] == false);
         let of: Vec<_> = quiet
@@ -69,7 +69,7 @@ fn torque_ripple_and_mean_stay_small() {
 }
 
 #[test]
-fn a_voltage_limit_costs_no_more_than_a_step_to_come_back_from() {
+fn recovery_from_a_voltage_limit_is_as_fast_as_a_step() {
     for pair in entries("limit").chunks(2) {
         let [weak, strong] = pair else { panic!("pairs") };
         assert!(number(weak, "reached_a") < 47.0, "limited: {weak}");
@@ -78,7 +78,7 @@ fn a_voltage_limit_costs_no_more_than_a_step_to_come_back_from() {
             assert_eq!(entry["released"], false);
         }
         let (limited, free) = (number(weak, "recovery_ms"), number(strong, "recovery_ms"));
-        // Wind-up over 100 ms would take many milliseconds to recover.
+        // Wind-up over 100 ms would delay the recovery by many milliseconds.
         assert!(limited < free + 0.1 && limited < 0.35, "{limited} {free}");
         // The direct current stays at its target while the quadrature current falls.
         assert!(number(weak, "direct_a").abs() < 0.1, "{weak}");
@@ -86,12 +86,12 @@ fn a_voltage_limit_costs_no_more_than_a_step_to_come_back_from() {
 }
 
 #[test]
-fn the_chopper_keeps_the_bus_within_bounds_and_without_it_the_firmware_lets_go() {
+fn the_chopper_limits_the_bus_and_without_it_the_bridge_turns_off() {
     let [with, without] = entries("regeneration") else { panic!("two brakings") };
     assert!(number(with, "highest_bus_v") < 51.0 && with["fault"].is_null(), "{}", with["highest_bus_v"]);
     // The rest charged the capacitor and is drawn from it again at the end.
     let burnt = number(with, "brake_j") / number(with, "returned_j");
-    assert!((0.8..1.0).contains(&burnt), "what comes back is burnt, and only that: {burnt}");
+    assert!((0.8..1.0).contains(&burnt), "dissipated share of the returned energy: {burnt}");
     assert!(number(with, "returned_j") < number(with, "motion_j"));
     assert_eq!(without["fault"], "bus_voltage");
     // The curve includes the time at which the bridge is switched off.
@@ -154,7 +154,7 @@ fn changed(folder: &Folder, changes: &[(&str, &str)]) -> std::path::PathBuf {
 }
 
 #[test]
-fn motors_that_are_weak_slow_or_slow_to_follow_are_measured_within_their_limits() {
+fn weak_and_slow_motors_are_measured_within_their_limits() {
     for changes in [
         // Limit of 3.3 A.
         &[("torque_limit_nm = 85.0", "torque_limit_nm = 5.0")][..],
@@ -188,7 +188,7 @@ fn motors_that_are_weak_slow_or_slow_to_follow_are_measured_within_their_limits(
 }
 
 #[test]
-fn an_axis_that_releases_itself_and_a_supply_that_fails_are_named() {
+fn an_axis_turned_off_and_a_failing_supply_are_named() {
     let folder = Folder::new();
     let weak = "supply = { voltage_v = 24.0, resistance_ohm = 1.0, capacitance_uf = 50.0, brake_ohm = 2.0 }\nsegments =";
     let leg = changed(&folder, &[("segments =", weak)]);
@@ -202,7 +202,7 @@ fn an_axis_that_releases_itself_and_a_supply_that_fails_are_named() {
 }
 
 #[test]
-fn what_the_firmware_would_refuse_is_told_with_the_key_that_mends_it() {
+fn configuration_errors_name_the_key_that_corrects_them() {
     let refusal = |changes: &[(&str, &str)]| {
         let folder = Folder::new();
         scarab("motor --leg", &[&changed(&folder, changes)]).refusal()
@@ -234,7 +234,7 @@ fn what_the_firmware_would_refuse_is_told_with_the_key_that_mends_it() {
 }
 
 #[test]
-fn encoders_whose_counts_are_no_part_of_the_counters_range_run_a_leg() {
+fn encoder_counts_that_do_not_divide_the_counter_range_work() {
     for counts in ["10000", "30000"] {
         let folder = Folder::new();
         let leg = changed(&folder, &[("counts = 8192", &format!("counts = {counts}"))]);

@@ -86,7 +86,7 @@ fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_of
     assert_eq!(run.errors, "");
     let table = Table::parse(&run.printed);
     assert_eq!(table.header.join(","), header());
-    assert_eq!(table.column("k"), (0..50).map(f64::from).collect::<Vec<_>>(), "counted, not copied");
+    assert_eq!(table.column("k"), (0..50).map(f64::from).collect::<Vec<_>>(), "the rows are numbered, not copied");
     // The reference's files have 15 digits.
     let (torque, elements) = errors(&table);
     assert!(torque < 1e-12 && elements < 1e-12, "torque {torque:e}, regressor {elements:e}");
@@ -100,7 +100,7 @@ fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_of
 }
 
 #[test]
-fn angles_are_anatomical_unless_they_are_said_to_be_dh() {
+fn angles_are_anatomical_unless_the_option_dh_is_given() {
     let folder = Folder::new();
     // Direction -1, zero at 20 degrees.
     let file = folder.write("leg.toml", &leg("truth"));
@@ -147,7 +147,7 @@ fn single_precision_rounds_the_states_too() {
 }
 
 #[test]
-fn torque_comes_from_the_truth_else_from_the_prior_else_stays_empty() {
+fn torque_uses_the_truth_else_the_prior_else_is_empty() {
     let folder = Folder::new();
     let states = states();
     let printed = |name: &str, text: &str| {
@@ -172,7 +172,7 @@ fn torque_comes_from_the_truth_else_from_the_prior_else_stays_empty() {
 }
 
 #[test]
-fn columns_are_found_by_name_in_any_order_and_of_any_number_of_joints() {
+fn columns_are_found_by_name_for_any_number_of_joints() {
     let folder = Folder::new();
     let plain = folder.write("plain.csv", "q1,qd1,qdd1\n0.3,-1.5,20\n0.4,2,-3e1\n");
     let mixed =
@@ -225,14 +225,14 @@ fn bad_states_are_refused_with_file_line_and_reason() {
     assert!(scarab("regressor --leg sp --states", &[&missing]).refusal().contains("cannot be read"));
     let states = folder.write("states.csv", "q1,qd1,qdd1\n0,0,0\n");
     assert!(
-        scarab("regressor --leg nobody --states", &[&states])
+        scarab("regressor --leg none-such --states", &[&states])
             .refusal()
             .contains("is not the name of a shipped leg")
     );
 }
 
 #[test]
-fn a_reader_that_closes_the_pipe_early_is_no_fault() {
+fn a_closed_pipe_is_not_an_error() {
     let folder = Folder::new();
     // A megabyte: more than the capacity of any pipe.
     let text = "q1,qd1,qdd1\n".to_owned() + &"0.1,0.2,0.3\n".repeat(20_000);

@@ -37,7 +37,7 @@ fn folder_with(more: &str, recordings: &[(&str, Motion)]) -> Folder {
 fn finds_the_truth(report: &Value) -> f64 {
     let errors = TRUTH.map(|(name, truth)| {
         let (error, sigma) = (base(report, name, "value") - truth, base(report, name, "sigma"));
-        assert!(error.abs() < 3.5 * sigma + 3e-4 * truth, "{name}: off by {error}, sigma {sigma}");
+        assert!(error.abs() < 3.5 * sigma + 3e-4 * truth, "{name}: error {error}, sigma {sigma}");
         // Noise of 0.2 N m on 15 N m.
         assert!(sigma < 0.05 * truth, "{name}: sigma {sigma}");
         error.abs() / sigma
@@ -58,7 +58,7 @@ fn jittered_stamps_and_other_rates_give_the_same_parameters() {
 }
 
 #[test]
-fn direction_turns_angle_and_torque_and_the_zero_offset_only_the_angle() {
+fn direction_inverts_angle_and_torque_the_zero_offset_shifts_the_angle() {
     let plain = folder_with("", &[("a.csv", Motion::default())]);
     let (expected, _) = replay(&plain, &["a.csv"], "--split 0.5");
     let turned = Motion { direction: -1.0, zero_offset: 30_f64.to_radians(), ..Motion::default() };
@@ -79,7 +79,7 @@ fn direction_turns_angle_and_torque_and_the_zero_offset_only_the_angle() {
 }
 
 #[test]
-fn several_files_are_one_training_set_and_no_window_reaches_across() {
+fn several_files_form_one_training_set_without_windows_across_files() {
     // The pendulum jumps by two radians between the files.
     let (one, other) = (Motion::default(), Motion { centre: -1.6, seed: 2, ..Motion::default() });
     let folder = folder_with("", &[("a.csv", one), ("b.csv", other)]);
@@ -178,7 +178,7 @@ fn filtering_both_columns_of_the_table_gives_the_printed_error() {
 }
 
 #[test]
-fn a_file_with_more_joints_than_the_leg_is_warned_of() {
+fn a_file_with_more_joints_than_the_leg_gives_a_warning() {
     let folder = folder_with("", &[]);
     let rows: Vec<String> =
         Motion::default().samples().iter().map(|[t, q, tau]| format!("{t:.4},{q},{tau},0.1,0.2")).collect();
@@ -194,7 +194,7 @@ fn a_file_with_more_joints_than_the_leg_is_warned_of() {
 }
 
 #[test]
-fn angles_outside_the_range_of_the_leg_are_warned_of() {
+fn angles_outside_the_range_of_the_leg_give_a_warning() {
     let folder = folder_with("", &[("a.csv", Motion { centre: 9.0, ..Motion::default() })]);
     let (_, run) = replay(&folder, &["a.csv"], "");
     assert!(run.errors.contains("q1_rad goes from"), "{}", run.errors);
@@ -202,7 +202,7 @@ fn angles_outside_the_range_of_the_leg_are_warned_of() {
 }
 
 #[test]
-fn what_was_not_validated_says_so() {
+fn a_result_without_validation_is_reported_as_such() {
     let folder = folder_with("", &[("a.csv", Motion::default())]);
     let note = "not validated: no motion was held out";
     let (report, run) = replay(&folder, &["a.csv"], "");
@@ -277,7 +277,7 @@ fn reports_are_complete_and_free_of_nan_whatever_the_verdict() {
     // A parameter that is in no sum is its own base parameter.
     assert_eq!(base(&report, "HX2", "value"), report["parameters"][14 + 6]["value"]);
 
-    // No motion, prior or truth: nothing is known.
+    // Without motion, prior or truth all values are unknown.
     folder.write("leg.toml", &leg(""));
     let still: Vec<[f64; 3]> = (0..2500).map(|k| [f64::from(k) * 0.002, 0.3, 1.5]).collect();
     let (leg, still) = (folder.path("leg.toml"), folder.write("still.csv", &crate::pendulum::csv(&still)));
@@ -314,7 +314,7 @@ fn the_same_seed_gives_the_same_report_and_another_the_same_optimum() {
 }
 
 #[test]
-fn a_reader_that_closes_the_pipe_at_once_is_no_fault() {
+fn a_pipe_closed_at_once_is_not_an_error() {
     let folder = folder_with("", &[("a.csv", Motion::default())]);
     let mut tool = Command::new(env!("CARGO_BIN_EXE_scarab"))
         .args(["replay", "--parameters", "--leg"])

@@ -1,5 +1,4 @@
-//! Doubts about recordings: what is wrong with a logging chain is estimated, refused and named by `scarab
-//! replay`.
+//! Errors of a logging chain are estimated, refused and named by `scarab replay`.
 
 use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
 use serde_json::Value;
@@ -47,7 +46,7 @@ fn direction<'a>(report: &'a Value, name: &str, joint: usize) -> &'a Value {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 const NAMES: [&str; 13] =
@@ -66,7 +65,7 @@ fn quantised(bits: i32) -> Vec<[f64; 5]> {
 }
 
 #[test]
-fn coarse_encoders_widen_sigma_by_their_bias_and_are_refused_where_a_lower_bandwidth_is_needed() {
+fn coarse_encoders_widen_sigma_or_are_refused_with_a_lower_bandwidth() {
     let (clean, _) = replay(&samples(), "--bandwidth 8", 0);
     let (coarse, _) = replay(&quantised(12), "--bandwidth 8", 0);
     assert!(
@@ -159,7 +158,7 @@ fn sigma_states_its_parts_by_noise_and_by_misfit() {
     }
 }
 
-/// Where nothing touches the leg, other damage is no contact.
+/// Where nothing touches the leg, other damage is not reported as contact.
 #[test]
 fn damage_of_the_recording_is_not_called_contact() {
     let right = samples();
@@ -205,7 +204,7 @@ fn a_right_recording_is_accepted_and_reports_every_direction() {
         assert!(number(&found["value"]).abs() < 4.0 * number(&found["sigma"]), "{found}");
     }
     for ratio in report["misfit_over_noise"].as_array().expect("a list") {
-        // The model is right: the misfit is the noise, within the scatter of its estimate.
+        // The model is right, so the misfit is the noise, within the scatter of its estimate.
         assert!((number(ratio) - 1.0).abs() < 0.2, "{ratio}");
     }
     assert!(run.printed.contains("torque of joint 1: ") && run.printed.contains(" ms "), "{}", run.printed);
@@ -226,7 +225,7 @@ fn a_torque_20_ms_late_is_refused_with_its_joint_and_size() {
 }
 
 #[test]
-fn a_delay_that_is_taken_out_gives_the_parameters_back() {
+fn a_removed_delay_restores_the_parameters() {
     let (right, _) = replay(&samples(), "", 0);
     let (corrected, _) = replay(&late(1, 10), "--torque-delay 0,20", 0);
     for name in NAMES {
@@ -237,7 +236,7 @@ fn a_delay_that_is_taken_out_gives_the_parameters_back() {
 }
 
 #[test]
-fn stamps_that_move_by_a_tenth_of_a_sample_change_neither_verdict_nor_sigma() {
+fn small_stamp_errors_change_neither_verdict_nor_sigma() {
     let (right, _) = replay(&samples(), "", 0);
     let mut moved = samples();
     moved.iter_mut().step_by(2).for_each(|row| row[0] += 20e-6);
@@ -274,7 +273,7 @@ fn a_sign_that_flips_midway_is_named() {
 }
 
 #[test]
-fn torque_delays_that_cannot_be_are_refused() {
+fn impossible_torque_delays_are_refused() {
     let refused = |value: &str| {
         scarab(&format!("replay {MUJOCO} --leg mujoco-leg --torque-delay {value}"), &[]).refusal()
     };
@@ -291,13 +290,13 @@ fn torque_delays_that_cannot_be_are_refused() {
 fn recordings() -> Option<PathBuf> {
     let folder = env::var_os("SCARAB_RECORDINGS").map(PathBuf::from);
     if folder.is_none() {
-        println!("SCARAB_RECORDINGS is not set: the test says nothing");
+        println!("SKIPPED: SCARAB_RECORDINGS is not set");
     }
     folder
 }
 
 #[test]
-fn a_real_arm_whose_misfit_is_many_times_its_noise_stays_accepted() {
+fn a_real_arm_with_misfit_far_above_its_noise_is_accepted() {
     let Some(recordings) = recordings() else { return };
     let folder = Folder::new();
     let json = folder.path("report.json");
@@ -311,7 +310,7 @@ fn a_real_arm_whose_misfit_is_many_times_its_noise_stays_accepted() {
     let report = folder.json("report.json");
     let ratios = report["misfit_over_noise"].as_array().expect("a list");
     assert!(ratios.iter().all(|ratio| number(ratio) > 3.0), "{ratios:?}");
-    // The shoulder's torque is late by itself, and its scale differs from the elbow's.
+    // The shoulder's torque is really late, and its scale differs from the elbow's.
     let delay = direction(&report, "delay", 1);
     assert!((2.0..9.0).contains(&number(&delay["value"])), "{delay}");
     let scale = direction(&report, "torque_scale", 2);

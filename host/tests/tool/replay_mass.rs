@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::command::{Folder, Table, base, scarab};
 
-/// Mass on the shank of the default leg, kg, and its place along it, m.
+/// Mass on the shank of the default leg, kg, and its position along it, m.
 const MASS: &str = "3@knee:0.3";
 
 /// Logs a simulated run; returns the recording and the truth of the leg without any load.
@@ -39,7 +39,7 @@ fn distance(report: &Value, truth: &Value) -> f64 {
 }
 
 #[test]
-fn a_load_stated_to_replay_is_taken_off_and_else_is_in_the_parameters() {
+fn a_stated_load_is_subtracted_an_unstated_one_is_in_the_parameters() {
     let folder = Folder::new();
     let (file, truth) = logged(&folder, "loaded", &format!("--load {MASS}"));
     let (printed, report) = replay(&folder, &format!("--split 0.7 --load {MASS}"), &[&file]);
@@ -73,7 +73,7 @@ fn recordings_with_a_known_mass_determine_the_scale_of_the_torques() {
     let folder = Folder::new();
     let (bare, truth) = logged(&folder, "bare", "");
     let (loaded, _) = logged(&folder, "loaded", &format!("--load {MASS}"));
-    // Constants that are believed 10 % too large and 5 % too small.
+    // Constants that are assumed 10 % too large and 5 % too small.
     let factors = [1.1, 0.95];
     let (bare, loaded) =
         (scaled(&folder, "bare.csv", &bare, factors), scaled(&folder, "with.csv", &loaded, factors));
@@ -100,7 +100,7 @@ fn is_within(value: &Value, sigma: &Value, expected: f64) -> bool {
 }
 
 #[test]
-fn two_models_tell_mass_and_place_of_what_was_added() {
+fn two_models_determine_mass_and_position_of_an_added_load() {
     let folder = Folder::new();
     let (bare, _) = logged(&folder, "bare", "");
     let model = |name: &str, file: &Path| {
@@ -109,7 +109,7 @@ fn two_models_tell_mass_and_place_of_what_was_added() {
         path
     };
     let before = model("before.toml", &bare);
-    // Mass and place within three sigma: on the shank both, on the thigh the first moment alone.
+    // Mass and position within three sigma: on the shank both, on the thigh the first moment alone.
     let added = |mass: &str, name: &str| {
         let (file, _) = logged(&folder, name, &format!("--load {mass} --seed 2"));
         let after = model(&format!("{name}.toml"), &file);
@@ -129,7 +129,7 @@ fn two_models_tell_mass_and_place_of_what_was_added() {
     assert!(printed.contains("as a mass added to link 2: "), "{printed}");
     assert!(!printed.contains("added to link 1"), "{printed}");
 
-    // A replay against the stored model finds it too.
+    // A replay compared with the stored model finds the mass too.
     let (again, report) = replay(&folder, "--split 0.7", &[&file, Path::new("--compare-model"), &before]);
     assert_eq!(report["compared"]["added_mass"][0]["joint"], 2, "{again}");
 
@@ -142,7 +142,7 @@ fn two_models_tell_mass_and_place_of_what_was_added() {
 }
 
 #[test]
-fn models_of_one_leg_differ_by_no_mass() {
+fn models_of_one_leg_show_no_added_mass() {
     let folder = Folder::new();
     let models: Vec<PathBuf> = (1..=2)
         .map(|seed| {

@@ -14,7 +14,7 @@ fn recordings() -> Option<PathBuf> {
     let folder = std::env::var_os("SCARAB_RECORDINGS").map(PathBuf::from);
     if folder.is_none() {
         // Bypasses the test harness, which suppresses the output of passing tests.
-        let notice = "SKIPPED replay of recordings of real machines: SCARAB_RECORDINGS names no folder";
+        let notice = "SKIPPED replay of recordings of real machines: SCARAB_RECORDINGS is not set";
         writeln!(std::io::stderr(), "{notice}").expect("standard error");
     }
     folder
@@ -68,15 +68,15 @@ fn judged(table: &Table, joint: usize) -> f64 {
 }
 
 #[test]
-fn held_out_torque_of_real_machines_is_predicted_as_well_as_stated() {
+fn held_out_torque_of_real_machines_is_predicted_within_stated_errors() {
     let Some(recordings) = recordings() else { return };
     let double =
         "@dp_A0/00.csv @dp_A0/01.csv @dp_A0/03.csv @dp_A0/05.csv @dp_A0/13.csv --leg dp-a0 --bandwidth 5";
     let excitation = "--validate @dp_A0/02.csv @dp_A0/04.csv @dp_A0/12.csv";
-    // Limits in N m, 3 % above the measured values. First as printed: -3 dB at 5 Hz, rows in which
-    // the joint moves. Then from the table through the reference filter, over all rows. To beat:
-    // 0.100; 0.148, 0.098; 0.202, 0.135. The pendulum's file has 6 s; its three seconds of training
-    // hardly determine the estimated offset.
+    // Limits in N m, 3 % above the measured values. First the printed error: -3 dB at 5 Hz, rows in which the
+    // joint moves. Then the error of the table through the reference filter, over all rows. To beat: 0.100;
+    // 0.148, 0.098; 0.202, 0.135. The pendulum's file has 6 s; its three seconds of training hardly determine
+    // the estimated offset.
     let table: [(&str, String, &[f64], &[f64]); 3] = [
         (
             "sp/ddp, first half -> second",
@@ -116,7 +116,7 @@ fn held_out_torque_of_real_machines_is_predicted_as_well_as_stated() {
 }
 
 #[test]
-fn recordings_that_are_no_free_motion_are_refused() {
+fn recordings_of_constrained_motion_are_refused() {
     let Some(recordings) = recordings() else { return };
     // The torque column is the command m g l sin q: a perfect fit with a negative inertia, and no friction.
     let (report, _) = replay(&recordings, "@sp/gravcomp.csv --leg sp --split 0.5 --bandwidth 5", 3);
@@ -129,7 +129,7 @@ fn recordings_that_are_no_free_motion_are_refused() {
 }
 
 #[test]
-fn pushes_that_were_set_aside_do_not_make_a_recording_without_held_out_part_acceptable() {
+fn excluded_pushes_do_not_make_an_unvalidated_recording_acceptable() {
     let Some(recordings) = recordings() else { return };
     let whole = |report: &serde_json::Value| -> f64 {
         let findings = report["findings"].as_array().expect("a list").iter();

@@ -47,13 +47,13 @@ fn a_parameter_that_differs_between_recordings_has_that_scatter_as_sigma() {
     let (sigma, scatter) = (base(&report, "OFF2", "sigma"), &report["recordings"]["sigma"][index]);
     // Three equal recordings: standard deviation 1 N m over sqrt 3. Offsets also move the other parameters.
     assert!((0.4..1.2).contains(&sigma) && sigma >= scatter.as_f64().expect("known"), "{sigma}, {scatter}");
-    // Alike recordings keep the sigma of noise or segments.
+    // Equal recordings keep the sigma of noise or segments.
     let (_, alike) = replay(&folder, &periods(&folder, [0.0; 3]));
     assert!(base(&alike, "OFF2", "sigma") < 0.3 * sigma, "{alike}");
 }
 
 #[test]
-fn one_recording_says_that_the_scatter_between_recordings_is_not_in_sigma() {
+fn one_recording_reports_that_sigma_lacks_scatter_between_recordings() {
     let folder = Folder::new();
     let files = periods(&folder, [0.0; 3]);
     let (printed, report) = replay(&folder, &files[..1]);

@@ -5,7 +5,7 @@ use crate::command::{Folder, MUJOCO, reasons, scarab};
 use crate::pendulum::{Motion, leg};
 use std::path::Path;
 
-/// Message for a recording, without its folder. No report may be left behind.
+/// Message for a recording, without its folder. No report may remain.
 fn refusal(text: &str) -> String {
     let folder = Folder::new();
     let (file, leg) = (folder.write("walk.csv", text), folder.write("leg.toml", &leg("")));
@@ -50,7 +50,7 @@ fn bad_recordings_are_refused_with_file_line_and_reason() {
 }
 
 #[test]
-fn absurd_options_are_refused_with_what_is_possible() {
+fn implausible_options_are_refused_with_their_limits() {
     let refused =
         |arguments: &str| scarab(&format!("replay {MUJOCO} --leg mujoco-leg {arguments}"), &[]).refusal();
     for (bandwidth, reason) in [
@@ -86,7 +86,7 @@ fn absurd_options_are_refused_with_what_is_possible() {
 }
 
 #[test]
-fn a_replay_without_a_leg_is_refused_and_shown_how() {
+fn a_replay_without_a_leg_is_refused_with_an_example() {
     let message = scarab("replay", &[Path::new(MUJOCO)]).refusal();
     assert!(message.contains("--leg is missing"), "{message}");
     assert!(message.contains("cargo sim replay run.csv --leg my-leg.toml"), "{message}");
@@ -111,12 +111,12 @@ fn time_in_another_unit_is_refused_by_the_rate_with_the_likely_unit() {
 }
 
 #[test]
-fn legs_that_do_not_exist_or_cannot_be_are_refused() {
+fn missing_and_impossible_legs_are_refused() {
     let folder = Folder::new();
     let recording = folder.write("walk.csv", &Motion::default().csv());
     let refused = |leg: &Path| scarab("replay --leg", &[leg, &recording]).refusal();
     let message = refused(Path::new("nobody"));
-    assert!(message.starts_with("error: nobody: cannot be read"), "{message}");
+    assert!(message.starts_with("error: none-such: cannot be read"), "{message}");
     assert!(
         message.contains("is not the name of a shipped leg (x2-wearer-75kg, x2-rough, mujoco-leg,"),
         "{message}"

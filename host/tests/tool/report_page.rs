@@ -1,4 +1,4 @@
-//! Report page: complete, well-formed, explicit about unknowns, and safe against the contents of files.
+//! Report page: complete, well-formed, explicit about unknown values, and safe against the contents of files.
 
 use std::fs;
 
@@ -17,7 +17,7 @@ impl Page {
     fn read(folder: &Folder) -> Self {
         let text = fs::read_to_string(folder.path("report.html")).expect("the page was written");
         let document = Html::parse_document(&text);
-        assert_eq!(document.errors, Vec::<String>::new(), "HTML that a browser must mend");
+        assert_eq!(document.errors, Vec::<String>::new(), "invalid HTML");
         Self { text, document }
     }
 
@@ -48,7 +48,7 @@ fn a_page_shows_the_whole_run_and_fetches_nothing() {
     let report = folder.json("run.json");
     assert!(
         run.printed.trim_end().ends_with("report.html"),
-        "the last line says where it is: {}",
+        "the last line names the page: {}",
         run.printed
     );
     assert_eq!(page.one(".verdict .word"), "Accepted");
@@ -118,7 +118,7 @@ fn counts_are_whole_numbers_and_values_have_the_digits_of_their_sigma() {
 }
 
 #[test]
-fn every_section_has_a_title_in_words_and_no_reason_is_cut_off() {
+fn every_section_has_a_title_and_no_reason_is_truncated() {
     let (folder, _, page) = reported("identify --seed 1", 0);
     let titles = page.all("h2");
     for key in ["Validated", "Model choice", "Outliers", "Drive"] {
@@ -135,12 +135,12 @@ fn every_section_has_a_title_in_words_and_no_reason_is_cut_off() {
     }
     assert!(
         page.text.contains(".words, .any td:not(.n) { white-space: normal; }"),
-        "reasons are one line each"
+        "reasons may not wrap"
     );
 }
 
 #[test]
-fn what_a_leg_is_called_is_text_and_nothing_else() {
+fn the_name_of_a_leg_is_escaped() {
     let folder = Folder::new();
     let hostile = "</title></svg><script>alert(1)</script><b>&\\\"'";
     let text = LEG.replacen("name = \"x2-wearer-75kg\"", &format!("name = \"{hostile}\""), 1).replacen(
@@ -148,21 +148,21 @@ fn what_a_leg_is_called_is_text_and_nothing_else() {
         "name = \"<i>hip</i>\"",
         1,
     );
-    assert!(text.contains("<script>") && text.contains("<i>hip</i>"), "the leg file has other names by now");
+    assert!(text.contains("<script>") && text.contains("<i>hip</i>"), "the leg file has other names");
     let leg = folder.write("leg.toml", &text);
     let page = folder.path("report.html");
     scarab(&format!("identify --leg {} --report", leg.display()), &[&page]).ends_with(0);
     let page = Page::read(&folder);
     assert_eq!(page.one("h1"), "</title></svg><script>alert(1)</script><b>&\"'");
     assert_eq!((page.all("script").len(), page.all("b").len(), page.all("i").len()), (0, 0, 0));
-    assert!(page.one("head title").contains("<script>"), "it is shown as it is written");
+    assert!(page.one("head title").contains("<script>"), "the name is shown unchanged");
     assert!(page.all("figure svg text").iter().any(|words| words.contains("<i>hip</i>")));
 }
 
 #[test]
-fn a_refused_run_says_so_first_and_gives_every_reason() {
+fn a_refused_run_is_marked_first_and_gives_every_reason() {
     let folder = Folder::new();
-    // Recording with another joint's torque: nothing explains it.
+    // Recording with another joint's torque, which no model explains.
     let recording = fs::read_to_string(MUJOCO).expect("a recording");
     let mut lines = recording.lines();
     let header = lines.next().expect("a header");
@@ -187,7 +187,7 @@ fn a_refused_run_says_so_first_and_gives_every_reason() {
     assert_eq!(given.len(), reasons.len());
     for (words, reason) in given.iter().zip(reasons) {
         assert!(words.starts_with(&reason.replace('_', " ")), "{words}");
-        assert!(words.len() > reason.len() + 20, "no sentence: {words}");
+        assert!(words.len() > reason.len() + 20, "not a sentence: {words}");
     }
     let residual = given.iter().find(|words| words.starts_with("residual")).expect("a reason");
     assert!(residual.contains("joint 1 is off by") && residual.contains("at most"), "{residual}");
@@ -200,18 +200,18 @@ fn a_refused_run_says_so_first_and_gives_every_reason() {
 }
 
 #[test]
-fn what_a_recording_without_a_prior_does_not_tell_is_a_dash() {
+fn values_unknown_without_a_prior_are_dashes() {
     let folder = Folder::new();
     let (page, json) = (folder.path("report.html"), folder.path("run.json"));
     let arguments =
         format!("replay {MUJOCO} --leg mujoco-leg --prior none --json {} --report", json.display());
-    // The verdict is irrelevant here.
+    // The verdict is irrelevant in this test.
     scarab(&arguments, &[&page]);
     let page = Page::read(&folder);
     let report = folder.json("run.json");
     let unknown = report["parameters"].as_array().expect("a list").iter();
     let unknown: Vec<_> = unknown.filter(|parameter| parameter["value"].is_null()).collect();
-    assert!(unknown.len() > 10, "a planar leg without a prior knows few of its parameters");
+    assert!(unknown.len() > 10, "without a prior few parameters of a planar leg are known");
     // Name, value and sigma of each parameter; an unknown value has no bar.
     let rows = page.all("table.parameters tbody tr");
     assert_eq!((rows.len(), page.all("svg.bar").len()), (28, 28 - unknown.len()));
@@ -220,12 +220,12 @@ fn what_a_recording_without_a_prior_does_not_tell_is_a_dash() {
         let row = rows.iter().find(|row| row.starts_with(name)).expect("a row");
         assert!(row.starts_with(&format!("{name}\u{2013}\u{2013}")), "{row}");
     }
-    assert!(!page.text.contains("NaN") && !page.text.contains("null"), "a number that is not one");
+    assert!(!page.text.contains("NaN") && !page.text.contains("null"), "an unknown number is printed");
     assert!(page.all("table td").iter().any(|cell| cell.ends_with("fourier.csv")), "no source");
 }
 
 #[test]
-fn many_runs_are_a_page_of_how_they_lie_about_truth() {
+fn many_runs_are_a_page_of_their_errors() {
     let (folder, _, page) = reported("identify --seeds 1..6", 0);
     let report = folder.json("run.json");
     let runs = report["runs"].as_array().expect("a list");
@@ -251,14 +251,14 @@ fn many_runs_are_a_page_of_how_they_lie_about_truth() {
 }
 
 #[test]
-fn runs_that_were_refused_are_told_with_their_seeds() {
+fn refused_runs_are_reported_with_their_seeds() {
     let (_, _, page) = reported("identify --seeds 3..4 --perturb stuck=knee", 3);
     assert_eq!(page.one(".verdict.refused .word"), "0 of 2 accepted");
     assert!(page.one(".verdict.refused").contains("unexcited: 2 runs, seeds 3, 4"));
 }
 
 #[test]
-fn a_page_that_cannot_be_written_is_said_so() {
+fn an_unwritable_page_is_reported() {
     let folder = Folder::new();
     let nowhere = folder.path("no/such/folder/report.html");
     let run = scarab("identify --report", &[&nowhere]).ends_with(2);
@@ -266,7 +266,7 @@ fn a_page_that_cannot_be_written_is_said_so() {
 }
 
 #[test]
-fn an_accepted_recording_of_which_nothing_was_held_out_is_not_called_validated() {
+fn a_recording_without_held_out_part_is_not_called_validated() {
     let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg"), 0);
     assert!(page.one(".verdict.accepted").contains("Not validated"));
     let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg --split 0.7"), 0);

@@ -24,7 +24,7 @@ fn pooled_error(runs: &Value) -> f64 {
 }
 
 #[test]
-fn a_rough_leg_is_identified_three_times_closer_to_truth_than_by_plain_least_squares() {
+fn a_rough_leg_has_a_third_of_plain_least_squares_errors() {
     let run = |estimator: &str| {
         let folder = Folder::new();
         let path = folder.path("runs.json");
@@ -59,7 +59,7 @@ fn a_rough_leg_is_identified_three_times_closer_to_truth_than_by_plain_least_squ
 }
 
 #[test]
-fn no_joint_of_the_default_leg_shows_stribeck_friction_and_next_to_nothing_is_set_aside() {
+fn the_default_leg_shows_no_stribeck_friction_and_few_excluded_samples() {
     let folder = Folder::new();
     scarab("identify --seed 5 --json", &[&folder.path("run.json")]).ends_with(0);
     let run = folder.json("run.json");
@@ -150,10 +150,10 @@ fn distances(recording: &Path, arguments: &str, pushes_per_minute: f64, check: i
 }
 
 #[test]
-fn a_recording_corrupted_afterwards_gives_the_parameters_it_had_before() {
+fn a_corrupted_recording_gives_the_parameters_of_the_clean_one() {
     let [robust, plain] = distances(Path::new(MUJOCO), "--leg mujoco-leg --bandwidth 8", 8.0, |report| {
-        // Whether pushes in both joints count as contact with the floor is irrelevant here. 3 % of
-        // 15,000 angles and as many torques of each joint are 900; a few are missed or are false.
+        // Whether pushes in both joints count as contact with the floor is irrelevant in this test. 3 % of
+        // 15,000 angles and of as many torques of each joint are 900; a few are missed or are false.
         for count in report["outliers"]["replaced"].as_array().expect("a list") {
             assert!((800..1000).contains(&count.as_u64().expect("a count")), "{count}");
         }
@@ -164,10 +164,10 @@ fn a_recording_corrupted_afterwards_gives_the_parameters_it_had_before() {
 }
 
 #[test]
-fn wild_samples_are_replaced_at_the_rate_of_the_recording_not_after_resampling_smeared_them() {
+fn outliers_are_replaced_at_the_rate_of_the_recording_before_resampling() {
     let Some(recordings) = std::env::var_os("SCARAB_RECORDINGS").map(PathBuf::from) else {
         // Bypasses the test harness, which suppresses the output of passing tests.
-        let notice = "SKIPPED the corrupted pendulum: SCARAB_RECORDINGS names no folder";
+        let notice = "SKIPPED the corrupted pendulum: SCARAB_RECORDINGS is not set";
         writeln!(std::io::stderr(), "{notice}").expect("standard error");
         return;
     };
@@ -183,7 +183,7 @@ fn wild_samples_are_replaced_at_the_rate_of_the_recording_not_after_resampling_s
 }
 
 #[test]
-fn the_band_of_a_prediction_counts_what_is_not_known_of_stribeck_friction() {
+fn the_band_of_a_prediction_includes_uncertain_stribeck_friction() {
     let folder = Folder::new();
     // The rough leg without pushes and outliers.
     let mut calm = LegFile::load("x2-rough").expect("shipped");

@@ -1,5 +1,5 @@
-//! Recordings whose columns are not what the leg did: clipped, held, frozen, wrongly stamped, given twice;
-//! and the duration of a push.
+//! Recordings with faulty columns: clipped, held, frozen, wrongly stamped, or given twice; and the duration
+//! of a push.
 
 use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
 use serde_json::Value;
@@ -55,7 +55,7 @@ fn clip(table: &mut Table, name: &str, share: f64) {
 }
 
 #[test]
-fn saturated_torque_is_refused_with_limit_and_share_or_excluded_where_it_is_little() {
+fn saturated_torque_is_refused_or_where_short_excluded() {
     let folder = Folder::new();
     let (run, clean) = replay(&folder, Path::new(MUJOCO), "");
     run.ends_with(0);
@@ -104,11 +104,11 @@ fn held_torque_is_refused_and_frozen_stretches_are_excluded() {
 }
 
 #[test]
-fn wrong_time_stamps_are_refused_where_they_spoil_the_inertias() {
+fn wrong_time_stamps_are_refused_where_inertias_are_wrong() {
     let folder = Folder::new();
     let file = changed(&folder, |table| {
         let column = index(table, "t_s");
-        // Late by up to 1.9 ms, without pattern: rows arrive when the recorder has time.
+        // Late by up to 1.9 ms, irregularly: rows are stamped when the recorder has time.
         let mut random = 5_u64;
         for row in &mut table.rows {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -145,13 +145,13 @@ fn a_recording_given_twice_is_bad_input_under_any_name() {
 }
 
 #[test]
-fn a_push_on_both_joints_lasts_as_long_in_two_minutes_as_in_half_a_minute() {
+fn the_duration_of_a_push_does_not_depend_on_recording_length() {
     push_for(&[1, 4]);
 }
 
 #[test]
 #[ignore = "takes minutes: cargo test -p scarab-host --test tool forty_minutes -- --ignored"]
-fn a_push_on_both_joints_lasts_as_long_in_forty_minutes() {
+fn the_duration_of_a_push_is_right_in_forty_minutes() {
     push_for(&[2, 10, 20, 40, 80]);
 }
 
@@ -161,7 +161,7 @@ fn push_for(repetitions: &[usize]) {
     for &periods in repetitions {
         let file = changed(&folder, |table| {
             let once = table.rows.clone();
-            // The motion has a period of 10 s: it goes on where it ends.
+            // The motion has a period of 10 s, so it continues without a step.
             for turn in 1..periods {
                 table.rows.extend(once.iter().map(|row| {
                     let mut row = row.clone();
@@ -169,7 +169,7 @@ fn push_for(repetitions: &[usize]) {
                     row
                 }));
             }
-            // Both joints move then: friction at rest would hide a part of the push.
+            // Both joints move then; friction at rest would hide a part of the push.
             let first = 12.2;
             for name in ["tau1_Nm", "tau2_Nm"] {
                 let column = index(table, name);

@@ -3,7 +3,7 @@
 use crate::command::{Folder, scarab};
 
 #[test]
-fn without_a_known_mass_everything_is_relative_and_the_report_says_so() {
+fn without_a_known_mass_the_report_states_relative_scale() {
     let folder = Folder::new();
     let run = scarab("identify --json", &[&folder.path("run.json")]).ends_with(0);
     assert!(run.printed.contains("scale: relative to the torque constants used"), "{}", run.printed);
@@ -44,7 +44,7 @@ fn a_known_mass_makes_the_report_absolute_and_widens_sigma() {
 }
 
 #[test]
-fn a_load_that_is_stated_is_taken_off_and_one_that_is_not_is_found_in_the_parameters() {
+fn a_stated_load_is_subtracted_an_unstated_one_is_in_the_parameters() {
     let folder = Folder::new();
     let run = scarab("identify --load 3@knee:0.3 --json", &[&folder.path("run.json")]).ends_with(0);
     assert!(run.printed.contains("3 kg on link 2 at x 0.3, y 0 m taken off"), "{}", run.printed);
@@ -58,7 +58,7 @@ fn a_load_that_is_stated_is_taken_off_and_one_that_is_not_is_found_in_the_parame
 }
 
 #[test]
-fn masses_that_cannot_be_meant_are_refused_by_option_and_reason() {
+fn implausible_masses_are_refused_with_option_and_reason() {
     for (arguments, reason) in [
         ("identify --payload 0@knee:0.2", "above 0 and at most 50"),
         ("identify --payload 5@ankle:0.2", "--payload: `ankle` is not a joint of `x2-wearer-75kg`"),
@@ -72,9 +72,9 @@ fn masses_that_cannot_be_meant_are_refused_by_option_and_reason() {
 }
 
 #[test]
-fn geometry_is_asked_of_corrected_torques_too() {
-    // Without a known mass each of them is rejected; a constant that compensates a wrong length
-    // must not hide it.
+fn geometry_is_also_tested_with_corrected_torques() {
+    // Without a known mass each of them is refused; a constant that compensates a wrong length must not hide
+    // it.
     for options in [
         "--perturb length=1.1 --payload 5@knee:0.2",
         "--perturb length=1.05 --payload 5@knee:0.2",
@@ -94,7 +94,7 @@ fn geometry_is_asked_of_corrected_torques_too() {
 }
 
 #[test]
-fn a_mass_too_light_to_tell_is_called_that() {
+fn a_mass_too_light_for_the_constants_is_reported() {
     let run = scarab("identify --payload 0.001@knee:0.2", &[]).ends_with(0);
     assert!(
         run.printed.contains("too light to tell") && !run.printed.contains("contradicted"),
@@ -104,7 +104,7 @@ fn a_mass_too_light_to_tell_is_called_that() {
 }
 
 #[test]
-fn values_tampered_with_are_not_replaced_in_silence() {
+fn deliberate_errors_and_a_known_mass_exclude_each_other() {
     for mass in ["--payload 5@knee:0.2", "--load 3@knee:0.2"] {
         for tampering in ["inertia=0.7", "com=0.8"] {
             let refusal = scarab(&format!("identify --perturb {tampering} {mass}"), &[]).refusal();

@@ -1,4 +1,4 @@
-//! `serve` as a client at its port has it: what it says, whom it refuses, and what it does not carry out.
+//! `serve` as seen by a client at its port: messages, refusals, and discarded frames.
 
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -15,7 +15,7 @@ const OFF: u32 = 0x40;
 const SWITCHED_ON: u32 = 0x23;
 const ENABLED: u32 = 0x27;
 
-/// A `serve` that runs, and what it has printed.
+/// A running `serve` with its output.
 struct Serve {
     child: Child,
     address: String,
@@ -55,7 +55,7 @@ impl Serve {
     fn waits_for(&self, words: &str) {
         let begin = Instant::now();
         while !self.errors().contains(words) {
-            assert!(begin.elapsed() < PATIENCE, "no {words:?} in:\n{}", self.errors());
+            assert!(begin.elapsed() < PATIENCE, "{words:?} not found in:\n{}", self.errors());
             thread::sleep(5 * MS);
         }
     }
@@ -65,7 +65,7 @@ impl Serve {
         assert!(Command::new("kill").args([name, &id]).status().expect("kill").success());
     }
 
-    /// The largest share of memory so far, KB; 0 where the system does not say.
+    /// The largest share of memory so far, KB; 0 where the system does not report it.
     fn memory_kb(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
         let line = status.lines().find(|line| line.starts_with("VmHWM:"));
@@ -105,7 +105,7 @@ impl Client {
         self.stream.write_all(text.as_bytes()).expect("a connection");
     }
 
-    /// The next line without its end; `None` at the end of the connection.
+    /// The next line without its line ending; `None` at the end of the connection.
     fn line(&mut self) -> Option<String> {
         loop {
             if let Some(end) = self.heard.iter().position(|byte| *byte == b'\r' || *byte == 7) {
@@ -181,7 +181,7 @@ impl Client {
 }
 
 #[test]
-fn a_client_that_is_gone_is_a_pulled_plug_and_the_leg_stops() {
+fn a_disconnected_client_pulls_the_plug_and_stops_the_leg() {
     for closes in [false, true] {
         let serve = Serve::new();
         let mut client = Client::new(&serve);
@@ -204,7 +204,7 @@ fn a_client_that_is_gone_is_a_pulled_plug_and_the_leg_stops() {
         for node in [1, 2] {
             assert_eq!(client.read(node, 0x1003, 1) & 0xFFFF, 0x8120, "node {node}");
         }
-        // Nothing starts by itself.
+        // The leg must not restart by itself.
         thread::sleep(200 * MS);
         client.until(OFF);
     }
@@ -238,14 +238,14 @@ fn emergencies_are_printed_once_with_their_reason() {
 }
 
 #[test]
-fn a_second_client_is_refused_and_a_silent_connection_keeps_nobody_out() {
+fn a_second_client_is_refused_a_silent_connection_blocks_no_client() {
     let serve = Serve::at("localhost:0", "");
     let _silent: Vec<Client> = (0..3).map(|_| Client::silent(&serve)).collect();
     let mut late = Client::silent(&serve);
     let mut client = Client::new(&serve);
     assert_eq!(client.state(1), OFF);
     let peer = client.stream.local_addr().expect("connected");
-    // One that comes now, and one that was silent before.
+    // One connects now; the other one was silent before.
     let mut second = Client::silent(&serve);
     second.say("C\rS8\rO\r");
     late.say("O\r");
@@ -266,7 +266,7 @@ fn a_second_client_is_refused_and_a_silent_connection_keeps_nobody_out() {
 }
 
 #[test]
-fn what_waited_while_the_process_stood_enables_nothing_but_still_stops() {
+fn frames_delayed_by_a_stopped_process_still_stop_but_never_enable() {
     let serve = Serve::new();
     let mut client = Client::new(&serve);
     client.frame(0, &[1, 0]);
@@ -282,7 +282,7 @@ fn what_waited_while_the_process_stood_enables_nothing_but_still_stops() {
     client.until(SWITCHED_ON);
     serve.waits_for(" 2 set-points older than that");
     serve.waits_for(" ms not simulated");
-    // In time they enable.
+    // Fresh controlwords enable.
     [0x201, 0x202].into_iter().for_each(|id| client.frame(id, &[15, 0]));
     client.until(ENABLED);
     late(&mut client, 0);
@@ -336,14 +336,14 @@ fn a_flood_is_answered_by_bells_within_bounded_memory() {
     client.until(OFF);
 }
 
-/// Runs a command that is to be refused before it listens; what it said.
+/// Runs a command that must be refused before it listens; returns its messages.
 fn refusal(command: &mut Command) -> String {
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the tool runs");
     let begin = Instant::now();
     while child.try_wait().expect("a child").is_none() && begin.elapsed() < PATIENCE {
         thread::sleep(5 * MS);
     }
-    // One that serves is not refused.
+    // A serving process was not refused.
     let _ = child.kill();
     let output = child.wait_with_output().expect("a child");
     let errors = String::from_utf8(output.stderr).expect("text");
@@ -352,7 +352,7 @@ fn refusal(command: &mut Command) -> String {
 }
 
 #[test]
-fn what_cannot_be_held_reached_or_written_is_refused_before_anybody_listens() {
+fn impossible_options_are_refused_before_the_port_opens() {
     let tool = env!("CARGO_BIN_EXE_scarab");
     let serve = |arguments: &str| {
         let arguments = arguments.split_whitespace();
@@ -362,7 +362,7 @@ fn what_cannot_be_held_reached_or_written_is_refused_before_anybody_listens() {
     assert!(words.contains("100 cannot be held; this machine simulates 4 legs at "), "{words}");
     let words = serve("nowhere.invalid:0");
     assert!(words.contains("nowhere.invalid:0"), "{words}");
-    // Without an end.
+    // A file without an end.
     let words = serve("127.0.0.1:0 --flash /dev/zero");
     assert!(words.contains("/dev/zero: more than 262144 bytes"), "{words}");
     // Files may have 4 KB here; the flash has 256.
@@ -380,7 +380,7 @@ fn what_cannot_be_held_reached_or_written_is_refused_before_anybody_listens() {
 }
 
 #[test]
-fn an_address_that_others_reach_is_warned_about() {
+fn a_non_local_address_gives_a_warning() {
     let serve = Serve::at("0.0.0.0:0", "");
     serve.waits_for("warning: 0.0.0.0:0 can be reached from other machines");
     assert_eq!(Serve::new().errors(), "");

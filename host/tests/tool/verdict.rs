@@ -3,7 +3,7 @@
 use crate::command::{Folder, scarab};
 
 #[test]
-fn what_a_blocked_joint_does_not_show_has_neither_value_nor_sigma_nor_bound() {
+fn parameters_of_a_blocked_joint_have_neither_value_nor_sigma() {
     let folder = Folder::new();
     let json = folder.path("run.json");
     scarab("identify --perturb stuck=knee --json", &[&json]).ends_with(3);
@@ -20,7 +20,7 @@ fn what_a_blocked_joint_does_not_show_has_neither_value_nor_sigma_nor_bound() {
 }
 
 #[test]
-fn a_length_and_a_zero_that_hide_each_other_are_seen_beside_each_other() {
+fn compensating_errors_of_length_and_zero_are_detected_together() {
     // Their apparent misalignments cancel. In some seeds noise leaves too little of both (16 of 20 are
     // rejected).
     let folder = Folder::new();

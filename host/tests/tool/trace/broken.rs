@@ -1,17 +1,17 @@
-//! Traces from the field: late, with gaps, cut, with a logger's text around them, of another leg,
-//! with faults.
+//! Traces from the field: late, with gaps, truncated, with a logger's text around them, of another leg, with
+//! faults.
 
 use std::path::Path;
 
 use scarab_host::run::trace::run::StreamReader;
 use scarab_host::run::trace::run_report;
 
-use super::session::{Teller, accepted, default_leg, quiet, read, text};
+use super::session::{RecordWriter, accepted, default_leg, quiet, read, text};
 use crate::command::{Folder, scarab};
 use scarab::trace::Record;
 
 #[test]
-fn a_trace_cut_anywhere_says_how_far_it_went() {
+fn a_truncated_trace_reports_how_far_it_went() {
     const CUTS: usize = 200;
     let (whole, leg) = (text(&quiet()), default_leg());
     let result_end = whole.find("\nend n=").expect("an end");
@@ -39,11 +39,11 @@ fn a_trace_cut_anywhere_says_how_far_it_went() {
             }
         }
     }
-    assert_eq!(words.len(), 4, "every way to end was met: {words:?}");
+    assert_eq!(words.len(), 4, "not every way to end occurred: {words:?}");
 }
 
 #[test]
-fn the_beginning_of_an_overlong_line_is_no_record() {
+fn the_beginning_of_an_overlong_line_is_not_a_record() {
     let read = |lines: &[String]| {
         let mut reader = StreamReader::new(None);
         reader.feed(text(lines).as_bytes()).expect("nothing is written");
@@ -58,9 +58,9 @@ fn the_beginning_of_an_overlong_line_is_no_record() {
 }
 
 #[test]
-fn records_that_were_lost_are_told_by_number_and_a_result_with_a_gap_is_none() {
+fn lost_records_are_reported_by_number_and_invalidate_a_result() {
     let lines = quiet();
-    // Gap before the result: reported, and the result stands.
+    // Gap before the result: the gap is reported, and the result is valid.
     let mut gap = lines.clone();
     gap.drain(5..8);
     let trace = read(&gap);
@@ -84,7 +84,7 @@ fn records_that_were_lost_are_told_by_number_and_a_result_with_a_gap_is_none() {
 }
 
 #[test]
-fn what_surrounds_and_follows_the_records_is_passed_over() {
+fn text_around_the_records_is_skipped() {
     let mut lines = vec!["      Erasing done".to_owned(), String::new(), "\u{fffd}\u{0}garbage".to_owned()];
     for (index, line) in quiet().into_iter().enumerate() {
         lines.push(match index % 4 {
@@ -105,26 +105,26 @@ fn what_surrounds_and_follows_the_records_is_passed_over() {
 }
 
 #[test]
-fn a_line_that_cannot_be_read_is_told_with_its_number() {
+fn an_unreadable_line_is_reported_with_its_number() {
     let mut lines = quiet();
     lines.insert(3, "state n=3 tick=1x drive=a activity=b phase=c motion=0".into());
     lines.insert(4, "later_kind n=4 anything=1".into());
     lines.insert(5, "state n=5 tick=12 drive=".into());
     lines.insert(6, "state n=6 tick=12 drive=a activity=b".into());
     let trace = read(&lines);
-    let told = trace.problems.join("\n");
+    let reported = trace.problems.join("\n");
     for words in [
         "line 4: `state`: the value of `tick` cannot be read",
         "line 6: `state`: `drive=` is not key=value",
         "line 7: `state`: `phase` is missing",
     ] {
-        assert!(told.contains(words), "{told}");
+        assert!(reported.contains(words), "{reported}");
     }
     assert_eq!(trace.unknown, 1);
 }
 
 #[test]
-fn a_value_that_is_not_known_is_null_and_not_zero() {
+fn an_unknown_value_is_null_not_zero() {
     let lines: Vec<String> = quiet()
         .into_iter()
         .map(|line| match line.split_once(" symbol=FV ") {
@@ -143,13 +143,13 @@ fn a_value_that_is_not_known_is_null_and_not_zero() {
 }
 
 #[test]
-fn faults_and_crashes_stand_before_the_tables_and_behind_the_verdict() {
-    let mut teller = Teller { lines: quiet() };
-    teller.tell(&Record::Fault { tick: 400_000, code: 0x8400, name: "overspeed", joint: 2 });
-    teller.tell(&Record::AxisFault { tick: 400_004, joint: 0, name: "brake_resistor" });
-    teller.loops(3);
-    let boot = teller.lines.len();
-    let mut after = Teller::default();
+fn faults_and_crashes_are_printed_before_tables_and_after_verdict() {
+    let mut writer = RecordWriter { lines: quiet() };
+    writer.tell(&Record::Fault { tick: 400_000, code: 0x8400, name: "overspeed", joint: 2 });
+    writer.tell(&Record::AxisFault { tick: 400_004, joint: 0, name: "brake_resistor" });
+    writer.loops(3);
+    let boot = writer.lines.len();
+    let mut after = RecordWriter::default();
     after.boot();
     after.tell(&Record::Crash {
         cause: "panic",
@@ -162,11 +162,11 @@ fn faults_and_crashes_stand_before_the_tables_and_behind_the_verdict() {
         released: 1_000,
         kept: 1_300,
     });
-    let lines = [teller.lines, after.lines].concat();
+    let lines = [writer.lines, after.lines].concat();
     assert!(boot < lines.len());
     let folder = Folder::new();
-    let (trace, json) = (folder.write("trace.txt", &text(&lines)), folder.path("told.json"));
-    let page = folder.path("told.html");
+    let (trace, json) = (folder.write("trace.txt", &text(&lines)), folder.path("reported.json"));
+    let page = folder.path("reported.html");
     let run = scarab("trace --json", &[&json, &trace, "--report".as_ref(), &page]).ends_with(0);
     let page = std::fs::read_to_string(page).expect("written");
     let alarm = page.find("3 faults of the drive").expect("the page begins with the faults");
@@ -184,14 +184,14 @@ fn faults_and_crashes_stand_before_the_tables_and_behind_the_verdict() {
         behind.contains("ATTENTION, 3 faults") && behind.contains("3 servo ticks were MISSED"),
         "{behind}"
     );
-    let told = &folder.json("told.json")["trace"];
-    assert_eq!(told["faults"].as_array().map(Vec::len), Some(3), "{told}");
-    assert_eq!((&told["loops"]["servo_missed"], &told["loops"]["servo_worst"]), (&3.into(), &21_000.into()));
+    let reported = &folder.json("reported.json")["trace"];
+    assert_eq!(reported["faults"].as_array().map(Vec::len), Some(3), "{reported}");
+    assert_eq!((&reported["loops"]["servo_missed"], &reported["loops"]["servo_worst"]), (&3.into(), &21_000.into()));
     assert!(before.contains("worst servo tick 21000 of 42000 cycles (50.0 %)"), "{before}");
 }
 
 #[test]
-fn bad_input_is_refused_with_what_is_wrong() {
+fn bad_input_is_refused_with_its_reason() {
     let folder = Folder::new();
     let trace = folder.write("trace.txt", &text(&quiet()));
     let refused = |arguments: &str, path: &Path| {
@@ -203,8 +203,8 @@ fn bad_input_is_refused_with_what_is_wrong() {
         ("trace --leg none-such", "not the name of a shipped leg"),
         ("trace --csv log.csv", "holds no log of a motion"),
     ] {
-        let told = refused(arguments, &trace);
-        assert!(told.contains(words), "{arguments}: {told}");
+        let reported = refused(arguments, &trace);
+        assert!(reported.contains(words), "{arguments}: {reported}");
     }
     let empty = folder.write("empty.txt", "nothing here\n");
     assert!(refused("trace", &empty).contains("contains no trace record"));

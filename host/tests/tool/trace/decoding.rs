@@ -1,8 +1,8 @@
 //! Frames of a `defmt` stream from defmt's own encoder, decoded with an image that holds the
 //! records' formats.
 //!
-//! The image is made here: an ELF with symbols only, as a linker would write them for the formats
-//! of this version. The emulator tests cover a real image.
+//! The image is created here: an ELF with symbols only, as a linker would write them for the formats of this
+//! version. The emulator tests cover a real image.
 
 use std::path::Path;
 
@@ -141,7 +141,7 @@ fn meaning(line: &str) -> Vec<(String, Vec<String>)> {
 }
 
 #[test]
-fn what_was_sent_is_decoded_bit_for_bit_in_pieces_of_any_size() {
+fn sent_records_are_decoded_bit_for_bit_in_pieces_of_any_size() {
     let log = accepted().iter().filter(|line| line.starts_with("log ")).step_by(97).cloned();
     let mut sent: Vec<String> = quiet().into_iter().chain(log).collect();
     for value in ["NaN", "inf", "-inf", "1e-45", "-0.0", "3.4028235e38", "1.1754944e-38", "0.1", "16777217"] {
@@ -164,7 +164,7 @@ fn what_was_sent_is_decoded_bit_for_bit_in_pieces_of_any_size() {
 }
 
 #[test]
-fn a_listener_who_joins_late_or_loses_bytes_finds_the_next_frame() {
+fn decoding_resumes_at_the_next_frame_after_lost_bytes() {
     let lines = quiet();
     let whole = stream(&lines);
     // Rest of a frame, noise, then everything.
@@ -190,7 +190,7 @@ fn a_listener_who_joins_late_or_loses_bytes_finds_the_next_frame() {
         let left = decoded(&hole, 64).0.len();
         assert!(
             left + 90 / shortest + 2 >= lines.len(),
-            "a hole takes what it touches: {left} of {}",
+            "a gap loses only the frames it touches: {left} of {}",
             lines.len()
         );
         let mut turned = whole.clone();
@@ -224,14 +224,14 @@ fn a_stream_and_its_text_are_reported_alike() {
     let again = std::fs::read_to_string(lines_again).expect("written");
     assert!(again.lines().map(meaning).eq(lines.iter().map(|line| meaning(line))), "the lines need no image");
     // Stream without its image, text with one.
-    let told = scarab("trace", &[&bytes]).ends_with(2).errors;
-    assert!(told.contains("--image"), "{told}");
-    let told = scarab("trace --image", &[&elf, &plain]).ends_with(2).errors;
-    assert!(told.contains("no frame of this image"), "{told}");
+    let errors = scarab("trace", &[&bytes]).ends_with(2).errors;
+    assert!(errors.contains("--image"), "{errors}");
+    let errors = scarab("trace --image", &[&elf, &plain]).ends_with(2).errors;
+    assert!(errors.contains("no frame of this image"), "{errors}");
 }
 
 #[test]
-fn an_image_that_cannot_have_sent_the_stream_is_refused() {
+fn an_image_of_another_stream_is_refused() {
     for (bytes, words) in [
         (b"not an image".to_vec(), "cannot be used as an image"),
         (image("99", "rzcobs", Record::<2>::FORMATS), "defmt"),
@@ -246,7 +246,7 @@ fn an_image_that_cannot_have_sent_the_stream_is_refused() {
         assert!(error.to_string().contains(words), "{error}");
         assert_eq!(error.exit_code(), 2);
     }
-    // Right image with bytes of another: none of it is a record.
+    // Right image with foreign bytes, which contain no record.
     let mut reader = StreamReader::new(Some(Decoder::new(&own_image()).expect("an image")));
     reader.feed(&[1, 2, 3, 0, 9, 9, 9, 9, 0, 0, 0, 7]).expect("nothing is written");
     assert!(reader.finish(Path::new("stream")).is_err());

@@ -39,12 +39,12 @@ const NOT_TOLD: [&str; 25] = [
     "FS2",
 ];
 
-/// Every reported value equals the run's own to the last bit. Both sides use single precision,
-/// numbers are written so that reading restores their bits, and sums are computed alike.
-fn compare(path: &str, told: &Value, own: &Value, compared: &mut usize) {
-    match (told, own) {
-        (Value::Object(told), Value::Object(own)) => {
-            for key in told.keys().chain(own.keys()) {
+/// Every reported value equals the run's own to the last bit. Both sides use single precision, numbers are
+/// written so that reading restores their bits, and sums have the same order.
+fn compare(path: &str, reported: &Value, own: &Value, compared: &mut usize) {
+    match (reported, own) {
+        (Value::Object(reported), Value::Object(own)) => {
+            for key in reported.keys().chain(own.keys()) {
                 let path = format!("{path}.{key}");
                 let is_nested =
                     ["parameters", "consistent"].contains(&key.as_str()) && !path.contains("consistent.");
@@ -53,46 +53,46 @@ fn compare(path: &str, told: &Value, own: &Value, compared: &mut usize) {
                 {
                     continue;
                 }
-                let (Some(told), Some(own)) = (told.get(key), own.get(key)) else {
+                let (Some(reported), Some(own)) = (reported.get(key), own.get(key)) else {
                     panic!("{path} is in one report only");
                 };
-                compare(&path, told, own, compared);
+                compare(&path, reported, own, compared);
             }
         }
-        (Value::Array(told), Value::Array(own)) => {
-            assert_eq!(told.len(), own.len(), "{path}");
-            for (index, (told, own)) in told.iter().zip(own).enumerate() {
-                compare(&format!("{path}[{index}]"), told, own, compared);
+        (Value::Array(reported), Value::Array(own)) => {
+            assert_eq!(reported.len(), own.len(), "{path}");
+            for (index, (reported, own)) in reported.iter().zip(own).enumerate() {
+                compare(&format!("{path}[{index}]"), reported, own, compared);
             }
         }
         _ => {
-            assert_eq!(told.to_string(), own.to_string(), "{path}");
+            assert_eq!(reported.to_string(), own.to_string(), "{path}");
             *compared += 1;
         }
     }
 }
 
 #[test]
-fn the_report_of_a_trace_is_that_of_the_run_that_told_it() {
+fn the_report_of_a_trace_equals_that_of_its_run() {
     let leg = default_leg();
     let own = simulate::<2, 13>(&leg, &SimulationOptions::of_seed(1)).expect("simulated").report;
-    let told = run_report(&read(accepted()), &leg).expect("a complete result");
+    let reported = run_report(&read(accepted()), &leg).expect("a complete result");
     let json = |run| serde_json::to_value(run).expect("JSON");
     let mut compared = 0;
-    compare("", &json(&told), &json(&own), &mut compared);
+    compare("", &json(&reported), &json(&own), &mut compared);
     // At least 28 parameters, 13 base parameters with their terms, 8 fits and the findings.
     assert!(compared > 600, "{compared}");
-    assert_eq!(told.detail, own.detail, "what a model file keeps");
-    assert_eq!((told.validated, told.verdict), (true, "accepted"));
+    assert_eq!(reported.detail, own.detail, "data of a model file");
+    assert_eq!((reported.validated, reported.verdict), (true, "accepted"));
 }
 
 #[test]
-fn the_log_of_a_trace_is_the_log_of_the_run_and_replay_finds_the_same_parameters() {
+fn the_log_of_a_trace_equals_the_run_s_and_replay_agrees() {
     let folder = Folder::new();
     let trace = folder.write("trace.txt", &text(accepted()));
     let [own_log, own_json] = ["own.csv", "own.json"].map(|name| folder.path(name));
     scarab("identify --seed 1 --log", &[&own_log, "--json".as_ref(), &own_json]).ends_with(0);
-    let [log, json, page] = ["log.csv", "told.json", "told.html"].map(|name| folder.path(name));
+    let [log, json, page] = ["log.csv", "reported.json", "reported.html"].map(|name| folder.path(name));
     let run = scarab("trace --csv", &[&log, &trace, "--json".as_ref(), &json, "--report".as_ref(), &page])
         .ends_with(0);
     assert!(run.printed.contains("verdict: accepted"), "{}", run.printed);
@@ -103,27 +103,27 @@ fn the_log_of_a_trace_is_the_log_of_the_run_and_replay_finds_the_same_parameters
     // Another motion on request: the expected number of samples at its own angles.
     let other = folder.path("other.csv");
     scarab("trace --csv-motion 2 --csv", &[&other, &trace]).ends_with(0);
-    let told = accepted().iter().filter(|line| line.contains("segment=validation motion=2 ")).count();
+    let reported = accepted().iter().filter(|line| line.contains("segment=validation motion=2 ")).count();
     let (first, other) = (folder.table("log.csv"), folder.table("other.csv"));
-    assert_eq!((&other.header, other.rows.len()), (&first.header, told));
+    assert_eq!((&other.header, other.rows.len()), (&first.header, reported));
     assert_ne!(other.rows[100], first.rows[100]);
     let none = scarab("trace --csv-motion 9 --csv", &[&folder.path("none.csv"), &trace]).ends_with(2).errors;
     assert!(none.contains("no log of motion 9, but of 0, 1, 2, 3"), "{none}");
     let page = std::fs::read_to_string(page).expect("written");
-    assert!(page.contains("emulated board") && page.contains("trace of a board"), "it is the board's page");
+    assert!(page.contains("emulated board") && page.contains("trace of a board"), "not the page of a board");
     for figure in ["motions.svg", "torque-1.svg", "torque-2.svg", "residuals.svg", "base-parameters.svg"] {
         assert!(page.contains(figure), "{figure} is drawn from the log");
     }
 
-    // The host resamples and filters anew: its result from the log is the board's within a quarter
-    // of a sigma.
+    // The host resamples and filters again: its result from the log differs from the board's by less than a
+    // quarter of a sigma.
     let replayed = folder.path("replayed.json");
     scarab("replay --leg x2-wearer-75kg --json", &[&replayed, &log]).ends_with(0);
-    let (told, replayed) = (folder.json("told.json"), folder.json("replayed.json"));
-    for entry in told["base_parameters"].as_array().expect("a list") {
+    let (reported, replayed) = (folder.json("reported.json"), folder.json("replayed.json"));
+    for entry in reported["base_parameters"].as_array().expect("a list") {
         let name = entry["name"].as_str().expect("a name");
         let Some(sigma) = entry["sigma"].as_f64() else { continue };
-        let off = base(&told, name, "value") - base(&replayed, name, "value");
+        let off = base(&reported, name, "value") - base(&replayed, name, "value");
         assert!(off.abs() < 0.25 * sigma, "{name}: {off} of {sigma}");
     }
 }
@@ -132,9 +132,9 @@ fn the_log_of_a_trace_is_the_log_of_the_run_and_replay_finds_the_same_parameters
 fn a_refused_result_exits_with_three_and_its_reasons() {
     let folder = Folder::new();
     let trace = folder.write("trace.txt", &text(refused()));
-    let json = folder.path("told.json");
+    let json = folder.path("reported.json");
     let run = scarab("trace --json", &[&json, &trace]).ends_with(3);
-    let report = folder.json("told.json");
+    let report = folder.json("reported.json");
     let reasons = reasons(&report);
     assert!(!reasons.is_empty());
     assert!(run.printed.contains(&format!("verdict: refused, {}", reasons.join(", "))), "{}", run.printed);
@@ -147,7 +147,7 @@ fn a_refused_result_exits_with_three_and_its_reasons() {
 }
 
 #[test]
-fn of_two_identifications_the_last_is_reported_and_both_are_kept() {
+fn the_last_of_two_identifications_is_reported() {
     let (first, second) = (refused(), quiet());
     // Without a start between them the numbering continues.
     let all = renumbered(first.iter().chain(second.iter().filter(|line| !line.starts_with("boot "))));
@@ -162,10 +162,10 @@ fn of_two_identifications_the_last_is_reported_and_both_are_kept() {
 }
 
 #[test]
-fn a_model_that_the_board_found_can_be_kept() {
+fn a_model_identified_by_the_board_can_be_stored() {
     let folder = Folder::new();
     let trace = folder.write("trace.txt", &text(&quiet()));
-    let [model, own] = ["told.toml", "own.toml"].map(|name| folder.path(name));
+    let [model, own] = ["reported.toml", "own.toml"].map(|name| folder.path(name));
     scarab("trace --save-model", &[&model, &trace]).ends_with(0);
     scarab("identify --seed 1 --save-model", &[&own]).ends_with(0);
     let compared = scarab("identify --seed 1 --compare-model", &[&model]).ends_with(0);
@@ -178,7 +178,7 @@ fn a_model_that_the_board_found_can_be_kept() {
 }
 
 #[test]
-fn every_kind_and_key_is_documented_and_none_that_there_is_not() {
+fn the_documented_kinds_and_keys_are_exactly_those_of_the_code() {
     let document = include_str!("../../../../docs/files.md");
     let (_, section) = document.split_once("\n## Trace\n").expect("a section of the trace");
     let (section, _) = section.split_once("\n## ").expect("a section after it");
@@ -205,19 +205,19 @@ fn the_curves_of_a_trace_are_those_of_the_run() {
     let leg = default_leg();
     let options = SimulationOptions { with_series: true, ..SimulationOptions::of_seed(1) };
     let own = simulate::<2, 13>(&leg, &options).expect("simulated").series;
-    let told = curves(&read(accepted()), &leg).expect("of this leg");
-    assert_eq!((told.motions.len(), &told.white_correlation), (4, &own.white_correlation));
-    for (told, own) in told.motions.iter().zip(&own.motions) {
-        assert_eq!((&told.name, told.role, &told.time_s), (&own.name, own.role, &own.time_s));
-        for (told, own) in told.joints.iter().zip(&own.joints) {
-            assert!(!told.measured_nm.is_empty());
-            assert_eq!((&told.measured_nm, &told.predicted_nm), (&own.measured_nm, &own.predicted_nm));
-            assert_eq!((&told.measured_deg, &told.still), (&own.measured_deg, &own.still));
+    let reported = curves(&read(accepted()), &leg).expect("a trace of this leg");
+    assert_eq!((reported.motions.len(), &reported.white_correlation), (4, &own.white_correlation));
+    for (reported, own) in reported.motions.iter().zip(&own.motions) {
+        assert_eq!((&reported.name, reported.role, &reported.time_s), (&own.name, own.role, &own.time_s));
+        for (reported, own) in reported.joints.iter().zip(&own.joints) {
+            assert!(!reported.measured_nm.is_empty());
+            assert_eq!((&reported.measured_nm, &reported.predicted_nm), (&own.measured_nm, &own.predicted_nm));
+            assert_eq!((&reported.measured_deg, &reported.still), (&own.measured_deg, &own.still));
         }
     }
     // The noise is the residual; the identification subtracts its parameters, thirteen of a thousand rows.
-    for (told, own) in told.noise_nm.iter().zip(&own.noise_nm) {
-        assert!((told / own - 1.0).abs() < 0.02, "{told} {own}");
+    for (reported, own) in reported.noise_nm.iter().zip(&own.noise_nm) {
+        assert!((reported / own - 1.0).abs() < 0.02, "{reported} {own}");
     }
     // A motion with a missing sample is not drawn.
     let hole =
@@ -225,7 +225,7 @@ fn the_curves_of_a_trace_are_those_of_the_run() {
     let mut lines = accepted().to_vec();
     lines.remove(hole + 500);
     let names: Vec<_> = curves(&read(&lines), &leg)
-        .expect("of this leg")
+        .expect("a trace of this leg")
         .motions
         .into_iter()
         .map(|motion| motion.name)

@@ -27,19 +27,19 @@ pub fn default_leg() -> LegFile {
 
 /// Lines with their record numbers.
 #[derive(Default)]
-pub struct Teller {
+pub struct RecordWriter {
     pub lines: Vec<String>,
 }
 
-impl Teller {
-    pub fn tell(&mut self, record: &Record<JOINTS>) {
+impl RecordWriter {
+    pub fn write(&mut self, record: &Record<JOINTS>) {
         let mut line = String::new();
-        record.write(self.lines.len() as u32, &mut line).expect("a string takes everything");
+        record.write(self.lines.len() as u32, &mut line).expect("writing to a string cannot fail");
         self.lines.push(line);
     }
 
     pub fn boot(&mut self) {
-        self.tell(&Record::Boot {
+        self.write(&Record::Boot {
             grammar: GRAMMAR,
             version: "0.1.0",
             leg: DEFAULT_LEG,
@@ -49,7 +49,7 @@ impl Teller {
             log_hz: 500,
             reset: "power_on",
         });
-        self.tell(&Record::Board {
+        self.write(&Record::Board {
             uid0: 0,
             uid1: 0,
             uid2: 0,
@@ -63,13 +63,13 @@ impl Teller {
     fn state(&mut self, pair: &Pair) {
         let (activity, phase, motion) = words::activity(pair.leg.control().activity());
         let drive = words::drive(pair.leg.control().state());
-        self.tell(&Record::State { tick: pair.ticks as u32, drive, activity, phase, motion });
+        self.write(&Record::State { tick: pair.ticks as u32, drive, activity, phase, motion });
     }
 
     fn log(&mut self, logged: &LoggedSample<JOINTS>) {
         let (segment, motion) = words::segment(logged.segment);
         let sample = &logged.sample;
-        self.tell(&Record::Log {
+        self.write(&Record::Log {
             tick: sample.tick,
             segment,
             motion,
@@ -81,7 +81,7 @@ impl Teller {
 
     fn progress(&mut self, pair: &Pair) {
         if let Some(solver) = pair.leg.identification().solver() {
-            self.tell(&Record::Progress {
+            self.write(&Record::Progress {
                 tick: pair.ticks as u32,
                 iterations: solver.search().iterations(),
                 evaluations: solver.search().evaluations(),
@@ -91,7 +91,7 @@ impl Teller {
     }
 
     pub fn loops(&mut self, missed: u32) {
-        self.tell(&Record::Loops {
+        self.write(&Record::Loops {
             tick: 200_000,
             current_worst: 690,
             servo_worst: 21_000,
@@ -110,22 +110,22 @@ impl Teller {
 fn told_by(simulated: &LegFile, seed: u64) -> Vec<String> {
     let context = Context::new(&default_leg(), &SimulationOptions::of_seed(seed))
         .expect("the default leg is simulated");
-    let mut pair = Pair::new(simulated, &context, seed).expect("the firmware takes the default leg");
-    let mut teller = Teller::default();
-    teller.boot();
+    let mut pair = Pair::new(simulated, &context, seed).expect("the firmware accepts the default leg");
+    let mut writer = RecordWriter::default();
+    writer.boot();
     assert!(pair.enable(context.gravity));
-    teller.state(&pair);
-    teller.tell(&Record::Request { tick: pair.ticks as u32, name: "identify", accepted: true });
+    writer.state(&pair);
+    writer.write(&Record::Request { tick: pair.ticks as u32, name: "identify", accepted: true });
     let mut request = Some(ControlRequest::Identify);
     let mut before = Activity::Idle;
     for _ in 0..LONGEST {
         let output = pair.tick(request.take(), context.gravity);
         if let Some(logged) = output.logged.filter(|logged| logged.segment.is_some()) {
-            teller.log(&logged);
+            writer.log(&logged);
         }
         let activity = pair.leg.control().activity();
         if activity != before {
-            teller.state(&pair);
+            writer.state(&pair);
             before = activity;
             if activity == Activity::Idle {
                 break;
@@ -134,16 +134,16 @@ fn told_by(simulated: &LegFile, seed: u64) -> Vec<String> {
         // The search begins while the leg settles.
         let searching = ["settle", "solve"].contains(&words::activity(activity).1);
         if searching && pair.ticks.is_multiple_of(PROGRESS_TICKS) {
-            teller.progress(&pair);
+            writer.progress(&pair);
         }
     }
-    assert!(pair.leg.control().verdict().is_some(), "it came to its end");
+    assert!(pair.leg.control().verdict().is_some(), "the identification did not end");
     let mut report = Report::default();
     while let Some(record) = report.advance(pair.leg.identification()) {
-        teller.tell(&record);
+        writer.write(&record);
     }
-    teller.loops(0);
-    teller.lines
+    writer.loops(0);
+    writer.lines
 }
 
 /// Records of the default leg with seed 1, including the log.

@@ -41,14 +41,14 @@ fn irregular_sampling_with_right_stamps_raises_no_finding() {
 }
 
 #[test]
-fn stamps_off_by_less_than_a_tenth_of_a_sample_raise_no_finding() {
+fn stamp_errors_below_a_tenth_of_a_sample_raise_no_finding() {
     for stamped in [2e-5, 1e-4] {
         assert_eq!(examine(&recording(0.0, stamped), 25.0), None, "{stamped} s");
     }
 }
 
 #[test]
-fn the_error_of_wrong_stamps_is_estimated_and_refused_where_inertias_are_wrong() {
+fn wrong_stamps_are_estimated_and_refused_where_inertias_are_wrong() {
     let found = |stamped: f64, bandwidth_hz: f64| {
         examine(&recording(0.0, stamped), bandwidth_hz).expect("wrong stamps")
     };
