@@ -1,7 +1,7 @@
 //! The chip without its processor core: address map, clock gates, interrupt lines, events in their order.
 //!
-//! Every part says when its next event is due; the earliest is processed first, at its own instant. So the
-//! processor may run on until the earliest of them without asking.
+//! Every part states the time of its next event; the earliest is processed first, at its own instant. The
+//! processor may therefore run until that instant without polling.
 
 use crate::findings::{Access, Findings, NOT_MODELLED};
 use crate::load::Load;
@@ -98,7 +98,7 @@ pub struct Sampling {
     pub edges: u32,
 }
 
-/// All of the chip and the board but the processor core.
+/// The chip and the board, except the processor core.
 #[derive(Clone, Debug)]
 pub struct Chip {
     /// Present time.
@@ -110,7 +110,7 @@ pub struct Chip {
     pub nvic: Nvic,
     /// System control block.
     pub system: System,
-    /// What silicon would refuse.
+    /// Accesses that silicon would refuse.
     pub findings: Findings,
     /// Use of the processor.
     pub load: Load,
@@ -143,12 +143,12 @@ pub struct Chip {
     pub event: bool,
     /// A reset was requested.
     pub reset_request: Option<ResetReason>,
-    /// Last conversions of both axes' shunts, if they are to be recorded.
+    /// Last conversions of both axes' shunts, if recorded.
     pub samplings: Option<Vec<Sampling>>,
     triggers: [Ticks; JOINTS],
-    /// Converter that does not convert any more.
+    /// Converters that no longer convert.
     pub silent_adc: [bool; adc::COUNT],
-    /// Channels whose pins have another mode were reported.
+    /// Channels reported because their pins have another mode.
     reported: u32,
 }
 

@@ -21,7 +21,7 @@ use crate::session::{Session, Step};
 use crate::time::seconds;
 use crate::{drivers, faults, hangs, sampling, serve, situations, stops, store_cuts};
 
-/// Runs the flash image on a model of its microcontroller.
+/// Run the flash image on a model of its microcontroller.
 #[derive(Parser, Debug)]
 #[command(name = "cargo chip", version)]
 struct Arguments {
@@ -31,7 +31,7 @@ struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Start the board and operate it at its contacts.
+    /// Start the board and operate it by its contacts.
     Run(RunArguments),
     /// Open the emergency stop's contact at many phases of the PWM period.
     Stops(StopArguments),
@@ -41,13 +41,13 @@ enum Command {
     StoreCuts(Common),
     /// Measure the load in each situation: idle, calibrating, holding, identifying, following a host.
     Load(LoadArguments),
-    /// Put the image on the simulated bus, for existing host software.
+    /// Connect the image to the simulated bus, for existing host software.
     Serve(ServeArguments),
     /// Inject rows of the fault catalogue.
     Faults(FaultArguments),
-    /// Let each level hang and watch the watchdog.
+    /// Let each level hang and check the watchdog.
     Hangs(HangArguments),
-    /// Check the model with a program of embassy-stm32's drivers alone.
+    /// Check the model by a program that uses embassy-stm32's drivers only.
     Drivers(DriverArguments),
 }
 
@@ -57,7 +57,7 @@ struct Common {
     /// Shipped leg or leg file, for image and plant.
     #[arg(long, default_value = DEFAULT_LEG)]
     leg: String,
-    /// Image (ELF) for that leg; built unless given.
+    /// Image (ELF) of that leg; built unless given.
     #[arg(long)]
     image: Option<PathBuf>,
     /// Seed of the sensors' noise.
@@ -81,7 +81,7 @@ struct RunArguments {
     /// Write the image's records as text here.
     #[arg(long, value_name = "FILE")]
     records: Option<PathBuf>,
-    /// Run on for so many seconds after the last step.
+    /// Time to run after the last step, s.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     seconds: f64,
 }
@@ -108,10 +108,10 @@ struct LoadArguments {
 struct ServeArguments {
     #[command(flatten)]
     common: Common,
-    /// Address of the port that speaks slcan.
+    /// Address of the TCP port with the slcan protocol.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:29536")]
     slcan: SocketAddr,
-    /// Serve for so many simulated seconds instead of for ever.
+    /// Simulated time to serve, s; without it until the process ends.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
 }
@@ -262,7 +262,7 @@ fn print_run(report: &ChipReport, wall_s: f64) {
     for base in &report.base_parameters {
         let show = |number: Number| number.known().map_or("-".to_owned(), |value| format!("{value:.6}"));
         println!(
-            "{:>6} {:>11} +- {} {}, off by {:+.2} of the leg file's sigma",
+            "{:>6} {:>11} +- {} {}, error {:+.2} of the leg file's sigma",
             base.name,
             show(base.value),
             show(base.sigma),
@@ -322,7 +322,7 @@ fn run_stops(arguments: &StopArguments) -> Result<bool, ToolError> {
     let report = stops::run(&mut session, arguments.phases, common.time_factor)?;
     for situation in &report.situations {
         println!(
-            "{:<12} {} stops, a bridge on at {}: off after {:.2} us mean, {:.2} us worst, for good {:.2} us; on again {} ({:.2} us), stayed on {}",
+            "{:<12} {} stops, a bridge on at {}: off after {:.2} us mean, {:.2} us worst, permanently {:.2} us; on again {} ({:.2} us), stayed on {}",
             situation.name,
             situation.phases,
             situation.armed,
@@ -354,7 +354,7 @@ fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
     let report = store_cuts::run(&mut session)?;
     for save in &report.saves {
         println!(
-            "{} of {} words, power cut at each and once after: {} starts with the value before, {} with the new one",
+            "{} of {} words, power cut at each and once after: {} starts with the old value, {} with the new one",
             save.save, save.words, save.found[0], save.found[1]
         );
     }
@@ -370,7 +370,7 @@ fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
 fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
     let mut session = arguments.common.session()?;
     let found = situations::run(&mut session, arguments.profile.is_some())?;
-    println!("mean and most instructions of each interrupt, and shares of the processor");
+    println!("mean and largest instructions of each interrupt, and shares of the processor");
     let names: Vec<String> = found.iter().map(|situation| format!("{:>14}", situation.name)).collect();
     println!("{:<18}{}", "", names.concat());
     for (name, _) in LEVELS {
@@ -413,7 +413,7 @@ fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
     for step in [Step::Calibrate, Step::Reference] {
         session.step(step)?;
     }
-    // A host enables; the leg is let go where it was moved to.
+    // A host enables the drive; the leg is let go at its last position.
     session.hold_switch(true);
     session.machine.chip_mut().can.connected = false;
     serve::serve(&mut session, arguments.slcan, arguments.seconds)?;
@@ -462,7 +462,7 @@ fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {
     let rows = drivers::check(&built)?;
     println!(
         "{:<10} | {:<56} | {:<56} | verdict",
-        "peripheral", "what the driver was asked for", "what the model shows"
+        "peripheral", "request to the driver", "what the model shows"
     );
     for row in &rows {
         println!("{:<10} | {:<56} | {:<56} | {}", row.peripheral, row.asked, row.shown, row.verdict());

@@ -1,4 +1,4 @@
-//! A foreign program on the model: embassy-stm32's drivers against what the model's pins and registers show.
+//! A foreign program on the model: embassy-stm32's drivers compared with the model's pins and registers.
 //!
 //! Why: the model and the firmware come from one reading of the reference manual. The program
 //! (`emulated/src/bin/drivers`) sets registers only through another project's drivers. Each row of the result
@@ -38,7 +38,7 @@ const PACKAGE: &str = "--quiet --profile image --package scarab-emulated --bin d
 const IMAGE: &str = "firmware/thumbv7em-none-eabihf/image/drivers";
 const EMULATOR: &str = "qemu-system-arm";
 const MACHINE: &str = "-M netduinoplus2 -display none -serial null -monitor stdio -icount shift=3 -kernel";
-/// Interval between two looks at the program's step, s.
+/// Interval between two polls of the program's step, s.
 const POLL_S: f64 = 1e-5;
 /// Processor clock that the program sets, Hz.
 const CLOCK_HZ: f64 = 168e6;
@@ -48,18 +48,19 @@ const CLOCK_HZ: f64 = 168e6;
 pub struct Row {
     /// Peripheral.
     pub peripheral: &'static str,
-    /// What the driver was asked for.
+    /// Request to the driver.
     pub asked: String,
-    /// What the model shows.
+    /// Behaviour of the model.
     pub shown: String,
     /// Whether both agree.
     pub agrees: bool,
-    /// Reason where they need not: the driver breaks its own promise on silicon too, or nothing was compared.
+    /// Reason for a permitted difference: the driver breaks its own promise on silicon too, or nothing was
+    /// compared.
     pub reason: Option<&'static str>,
 }
 
 impl Row {
-    /// Whether model and promise agree, or need not.
+    /// Whether model and promise agree, or may differ.
     #[must_use]
     pub const fn is_sound(&self) -> bool {
         self.agrees || self.reason.is_some()
@@ -75,7 +76,7 @@ impl Row {
 /// Builds the program.
 ///
 /// # Errors
-/// The compiler is missing or refuses.
+/// The compiler is missing or fails.
 pub fn build() -> Result<PathBuf, ToolError> {
     run(firmware_build(false).args(PACKAGE.split(' ')), "scripts/firmware-build")?;
     Ok(target_directory().join(IMAGE))
@@ -84,7 +85,7 @@ pub fn build() -> Result<PathBuf, ToolError> {
 /// Runs the program and compares.
 ///
 /// # Errors
-/// The program cannot be read or lacks a symbol, or the model does not know what the processor does.
+/// The program cannot be read or lacks a symbol, or the model does not support an action of the processor.
 pub fn check(path: &Path) -> Result<Vec<Row>, ToolError> {
     let mut check = Check::new(path)?;
     if let Err(error) = check.run(path) {
@@ -157,7 +158,7 @@ impl Check {
         core::array::from_fn(|index| self.word(self.symbols.results + 4 * (first + index as u32)))
     }
 
-    /// Lets the program go on until its next step, at most for a time, s; `with` is added to the release.
+    /// Lets the program run until its next step, at most for a time, s; `with` is added to the release.
     fn next(&mut self, longest: f64, with: u32) -> Result<(), ToolError> {
         self.machine.set_memory(self.symbols.go, &(self.step | with).to_le_bytes());
         let end = self.machine.chip().now + ticks(longest);
@@ -169,7 +170,7 @@ impl Check {
             }
         }
         self.note_findings("last step");
-        Err(ToolError::input(format!("step {} is not reached within {longest} s", self.step + 1)))
+        Err(ToolError::input(format!("step {} was not reached within {longest} s", self.step + 1)))
     }
 
     /// Runs for a time, s.
@@ -188,7 +189,7 @@ impl Check {
         }
     }
 
-    /// Adds a row for findings since the last call.
+    /// Adds a row for the findings since the last call.
     fn note_findings(&mut self, peripheral: &str) {
         let image = self.machine.image();
         let list = self.machine.chip().findings.list(|pc| image.function(pc));
@@ -208,7 +209,7 @@ impl Check {
         let words: [u32; WORDS] = self.take();
         self.results = self.word(self.symbols.count);
         if self.results as usize > WORDS {
-            return Err(ToolError::input(format!("{} results, room for {WORDS}", self.results)));
+            return Err(ToolError::input(format!("{} results, at most {WORDS} are supported", self.results)));
         }
         let (count, expected) = (self.results as usize, [computation::integers(), computation::floats()]);
         let shown = format!("{:08x?}, host {expected:08x?}", &words[..2]);
@@ -261,7 +262,7 @@ impl Check {
         chip.set_pin(('A', 1), false);
         self.next(0.1, 0)?;
         let [levels] = self.take();
-        // Open drain: low while driven, then as the outside.
+        // Open drain: low while driven, otherwise the level from outside.
         let asked = "pulled up 1, down 0, PB2 0 then 1, PA1 0 then 0 from outside, PA0 set 1";
         self.row("GPIO", asked, format!("read {levels:07b} from the last"), levels == 0b100_1001);
         self.machine.set_memory(self.symbols.go, &self.step.to_le_bytes());
@@ -492,7 +493,7 @@ fn emulated(path: &Path, symbols: Symbols) -> Result<Option<Vec<u32>>, ToolError
             return Ok(Some(words[1..].to_vec()));
         }
     }
-    Err(ToolError::input(format!("{EMULATOR} does not reach the end of the processor's step")))
+    Err(ToolError::input(format!("{EMULATOR} did not reach the end of the processor's step")))
 }
 
 /// Sends commands to the emulator's monitor and returns all that it prints.

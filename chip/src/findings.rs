@@ -1,8 +1,8 @@
 //! Findings: accesses that silicon refuses or leaves undefined.
 //!
-//! A peripheral reports what an access violates; the program counter of the basic block is added here. Equal
-//! findings are counted once per place. Findings that are known and harmless are listed in [`KNOWN`] with
-//! their reason, and reported apart.
+//! A peripheral reports the violated rule; the program counter of the basic block is added here. Equal
+//! findings at one location are counted. Known harmless findings are listed in [`KNOWN`] with their reason,
+//! and reported separately.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub const KNOWN: [Known; 2] = [
     },
 ];
 
-/// Finding with its place in the image.
+/// Finding with its location in the image.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
     /// Violated rule.
@@ -53,7 +53,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Reason why a finding is harmless, if it is known to be.
+    /// Reason why a finding is harmless, if known.
     #[must_use]
     pub fn known(&self) -> Option<&'static str> {
         let same = |known: &&Known| {
@@ -74,7 +74,7 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Adds a finding at the present place.
+    /// Adds a finding at the present location.
     pub fn add(&mut self, what: &'static str, register: impl Into<String>) {
         *self.found.entry((self.pc, what, register.into())).or_default() += 1;
     }
@@ -97,20 +97,20 @@ impl Findings {
         self.found.keys().any(|(_, found, _)| *found == what)
     }
 
-    /// Number of different findings.
+    /// Number of distinct findings.
     #[must_use]
     pub fn len(&self) -> usize {
         self.found.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no findings.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
 }
 
-/// Access to a register: when, and where findings go.
+/// Access to a register: its time, and the list of findings.
 #[derive(Debug)]
 pub struct Access<'a> {
     /// Present time.
@@ -134,7 +134,7 @@ impl Access<'_> {
     }
 }
 
-/// Text of findings about registers that the chip does not have.
+/// Text of findings about registers that the chip lacks.
 pub const NO_REGISTER: &str = "register does not exist on an STM32F405";
-/// Text of findings about functions of the chip that the model does not have.
+/// Text of findings about functions that the model lacks.
 pub const NOT_MODELLED: &str = "not modelled";

@@ -1,7 +1,7 @@
-//! Hangs of each level: the watchdog must reset the board within its time, bridges off at the latest then.
+//! Hangs of each level: the watchdog must reset the board in time, with bridges off at the latest then.
 //!
-//! The thread identifies and sends records. Nothing that keeps the leg safe runs there, so its hang is no
-//! reason for a reset.
+//! The thread identifies and sends records. No safety function runs there, so its hang does not require a
+//! reset.
 
 use serde::Serialize;
 
@@ -23,7 +23,7 @@ const LEVELS: [(&str, u8); 7] = [
     ("housekeeping", 16 + 72),
     ("thread", 0),
 ];
-/// Longest time that is watched, s.
+/// Longest observed time, s.
 const LONGEST_S: f64 = 0.2;
 /// Clocks of the oscillator from a feed to the reset, and longest time between two feeds, ms.
 const WATCHDOG_CLOCKS: f64 = 512.0;
@@ -40,12 +40,12 @@ pub struct HangReport {
     pub reset_ms: Option<f64>,
     /// Longest time until the reset with this oscillator, ms.
     pub longest_ms: f64,
-    /// A bridge went on again after the first release and before the reset.
+    /// Whether a bridge was on again after the first turn-off and before the reset.
     pub on_again: bool,
 }
 
 impl HangReport {
-    /// Whether the board was reset in time with its bridges off, or went on if only the thread hung.
+    /// Whether the board was reset in time with its bridges off, or continued if only the thread hung.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         if self.level == "thread" {
@@ -59,7 +59,7 @@ impl HangReport {
 /// Lets each level hang, from a saved machine that is enabled.
 ///
 /// # Errors
-/// The model does not know what the processor does.
+/// The model does not support an action of the processor.
 pub fn run(
     session: &mut Session,
     enabled: &Snapshot,
@@ -85,7 +85,7 @@ fn hang(
     chip.reschedule();
     chip.plant.switchings = Some(Vec::new());
     session.machine.hang(Some(exception));
-    // The level that receives runs only when a frame comes.
+    // The receiving level runs only when a frame arrives.
     session.machine.chip_mut().send_frame(Frame::new(0x80, &[]));
     let end = session.machine.run(begun + ticks(LONGEST_S))?;
     let reset = session.now();

@@ -36,7 +36,7 @@ impl Image {
     /// Reads an image.
     ///
     /// # Errors
-    /// The file cannot be read or is no image of the board.
+    /// The file cannot be read, or is not an image of the board.
     pub fn load(path: &Path) -> Result<Rc<Self>, ToolError> {
         let elf = std::fs::read(path)
             .map_err(|error| FileError::unreadable(path, &error))?;
@@ -48,7 +48,7 @@ impl Image {
     /// Parses an ELF file.
     ///
     /// # Errors
-    /// Names what is missing.
+    /// Names the missing part.
     pub fn parse(elf: Vec<u8>) -> Result<Self, String> {
         let mut flash = vec![0xFF; FLASH_BYTES];
         let (mut functions, mut objects) = (Vec::new(), Vec::new());

@@ -1,8 +1,8 @@
 //! A model of the STM32F405 that runs Scarab's unmodified flash image over hal-sim's motors and leg.
 //!
 //! Why: the board layer, the tasks and the interrupts run nowhere else before a real board. The image's own
-//! instructions execute on the Unicorn engine; peripherals, interrupt controller and time are modelled here,
-//! from the reference manual and not from the firmware. Whatever silicon would refuse is a finding.
+//! instructions execute on the Unicorn engine. Peripherals, interrupt controller and time are modelled here,
+//! from the reference manual and not from the firmware. Every access that silicon would refuse is a finding.
 //!
 //! | module | content |
 //! | --- | --- |

@@ -12,7 +12,7 @@ pub struct Use {
     pub entries: u64,
     /// Own time.
     pub ticks: Ticks,
-    /// Own instructions, all and the most of one entry.
+    /// Own instructions in all.
     pub instructions: u64,
     /// Most instructions of one entry.
     pub worst: u64,
@@ -47,7 +47,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// Nothing used yet.
+    /// Without any use.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -62,14 +62,14 @@ impl Load {
         }
     }
 
-    /// Starts a new period of measurement; exceptions in progress go on.
+    /// Starts a new measurement; exceptions in progress continue.
     pub fn clear(&mut self, now: Ticks) {
         self.settle(now);
         self.uses.fill(Use::default());
         (self.asleep, self.cleared) = (0, now);
     }
 
-    /// Forgets exceptions in progress, as a reset does.
+    /// Discards exceptions in progress, as a reset does.
     pub fn reset(&mut self, now: Ticks) {
         self.settle(now);
         self.frames.clear();
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_interrupts_time_is_without_those_that_preempt_it() {
+    fn the_time_of_an_interrupt_excludes_preempting_ones() {
         let mut load = Load::new();
         load.enter(77, 90, 100);
         load.instructions = 10;

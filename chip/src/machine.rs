@@ -45,7 +45,7 @@ const FRACTION: u32 = 16;
 /// Floating point is in use (FPCA). Unicorn's Cortex-M4 also looks at the bit of larger cores (SFPA). Without
 /// it the next floating-point instruction would begin a new context and clear the status register's flags.
 const FLOATS: u32 = 1 << 2 | 1 << 3;
-/// Instructions that are found by their code: send event, wait for event.
+/// Instructions found by their code: send event, wait for event.
 const SEND_EVENT: u16 = 0xBF40;
 const WAIT_FOR_EVENT: u16 = 0xBF20;
 /// Instruction at which Unicorn stops.
@@ -59,7 +59,7 @@ struct State {
     image: Rc<Image>,
     /// Size and number of instructions of each block in flash, by half its address.
     blocks: Vec<(u16, u16)>,
-    /// Time of an instruction, fractions of a tick, and the part of a tick that has passed.
+    /// Time of an instruction, fractions of a tick, and the elapsed part of a tick.
     cost: u64,
     rest: u64,
     cycle: Ticks,
@@ -72,7 +72,7 @@ struct State {
     asleep: bool,
     fault: Option<(u32, u32)>,
     locked_up: bool,
-    /// Exception whose code makes no progress any more; 0 is the thread.
+    /// Exception whose code hangs; 0 is the thread.
     hung: Option<u8>,
     broken: Option<String>,
     /// Instructions by exception and block, if they are counted.
@@ -130,14 +130,14 @@ impl Default for Options {
 }
 
 fn broken(what: &str) -> impl Fn(unicorn_engine::uc_error) -> ToolError + '_ {
-    move |error| ToolError::input(format!("the processor model refuses {what}: {error:?}"))
+    move |error| ToolError::input(format!("the processor model rejects {what}: {error:?}"))
 }
 
 impl Machine {
     /// A machine after power-on.
     ///
     /// # Errors
-    /// Unicorn cannot be set up.
+    /// Unicorn cannot be initialised.
     pub fn new(image: &Rc<Image>, chip: Chip, options: &Options) -> Result<Self, ToolError> {
         let state = State::new(Rc::clone(image), chip, options.time_factor);
         let mut core = Unicorn::new_with_data(Arch::ARM, Mode::THUMB | Mode::MCLASS, state)
@@ -245,7 +245,7 @@ impl Machine {
     /// Runs until an instant.
     ///
     /// # Errors
-    /// The model does not know what the processor does.
+    /// The model does not support an action of the processor.
     pub fn run(&mut self, until: Ticks) -> Result<End, ToolError> {
         loop {
             let state = self.core.get_data_mut();
@@ -264,7 +264,7 @@ impl Machine {
         }
     }
 
-    /// Runs until something stops the processor.
+    /// Runs until an event stops the processor.
     fn step(&mut self) -> Result<(), ToolError> {
         let state = self.core.get_data_mut();
         let mut pc = state.resume.take().unwrap_or(0);
@@ -349,7 +349,7 @@ impl Machine {
     /// Returns to a saved state, of this machine or of another with the same image.
     ///
     /// # Errors
-    /// Unicorn refuses a register or the memory.
+    /// Unicorn rejects a register or the memory.
     pub fn restore(&mut self, saved: &Snapshot) -> Result<(), ToolError> {
         let (ram, ccm) = saved.memory.split_at(RAM_BYTES);
         self.core.mem_write(RAM.into(), ram).map_err(broken("a write of its memory"))?;
@@ -582,7 +582,7 @@ fn interrupt(core: &mut Core<'_>, pc: u32) -> Option<u32> {
     Some(enter(core, exception, pc))
 }
 
-/// Registers of a frame but for PC and status.
+/// Registers of a frame, except PC and status.
 const STACKED: [Register; 6] =
     [Register::R0, Register::R1, Register::R2, Register::R3, Register::R12, Register::LR];
 
@@ -751,9 +751,9 @@ fn leave(core: &mut Core<'_>, link: u32) -> u32 {
 
 /// End of a sleep.
 enum Woken {
-    /// The program goes on.
+    /// The program continues.
     Continues,
-    /// An interrupt's handler goes on.
+    /// An interrupt's handler continues.
     Entered(u32),
     /// The run ends while asleep.
     Stopped,
@@ -785,15 +785,15 @@ fn on_invalid(core: &mut Core<'_>) -> bool {
     true
 }
 
-/// Sleeps until an event, or an interrupt that would preempt but for its mask (ARMv7-M B1.5.17, B1.5.18);
-/// `pc` is the address after the instruction.
+/// Sleeps until an event, or until an interrupt that would preempt without its mask (ARMv7-M B1.5.17,
+/// B1.5.18); `pc` is the address after the instruction.
 fn sleep(core: &mut Core<'_>, pc: u32) -> Woken {
     let for_interrupt = code_before(core, pc) == Some(WAIT_FOR_INTERRUPT);
     loop {
         let state = core.get_data_mut();
         state.asleep = false;
         if state.locked_up {
-            // Only a reset helps.
+            // Only a reset ends this state.
         } else if !for_interrupt && core::mem::take(&mut state.chip.event) || state.hung == Some(0) {
             return Woken::Continues;
         } else if state.chip.nvic.ready() != 0 {

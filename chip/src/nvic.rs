@@ -85,8 +85,8 @@ impl Nvic {
     }
 
     /// Interrupt control and state register (B3.2.4): active and first pending exception, pending system
-    /// exceptions. Known limit, also QEMU's: the base priority does not hide the pending one, as silicon
-    /// does.
+    /// exceptions. Known limit, also QEMU's: the base priority does not hide the pending exception, as on
+    /// silicon.
     #[must_use]
     pub fn state(&self) -> u32 {
         let pending = |exception: u8| u32::from(self.is_pending(exception));
@@ -149,7 +149,7 @@ impl Nvic {
         self.active.push(exception);
     }
 
-    /// Leaves the newest exception and returns it. One whose line is still up becomes pending again.
+    /// Leaves the newest exception and returns it. If its line is still high, it becomes pending again.
     pub fn leave(&mut self, now: u64) -> Option<u8> {
         let exception = self.active.pop()?;
         if self.lines >> exception & 1 == 1 {
@@ -198,7 +198,7 @@ impl Nvic {
         let bits = |first: u32| u128::from(value) << (16 + 8 * (offset - first));
         match offset {
             0x100..0x110 => {
-                // The latency of an interrupt that waited for its enable counts from there.
+                // The latency of an interrupt that waited for its enable counts from that moment.
                 let mut waiting = bits(0x100) & !self.enabled & self.pending;
                 self.enabled |= bits(0x100);
                 while waiting != 0 {

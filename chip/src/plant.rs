@@ -10,8 +10,8 @@
 //! ```
 //!
 //! A calibration needs motors that are free of their gears. So the plant begins with free rotors and a leg
-//! that a fixture holds; [`Plant::couple`] mounts the gears. A hand holds joints, or moves them. Known
-//! limits: a hand is stronger than every motor.
+//! held by a fixture; [`Plant::couple`] mounts the gears. A hand holds joints, or moves them. Known limits: a
+//! hand is stronger than every motor.
 
 use core::f64::consts::{PI, TAU};
 
@@ -42,16 +42,16 @@ pub const STEP: Ticks = TICK_HZ / 24_000;
 const QUARTER: Ticks = STEP / 4;
 /// Free rotor: inertia, kg m^2; dry friction, N m; viscous friction, N m s/rad.
 const FREE: [f64; 3] = [1e-4, 0.01, 1e-4];
-/// Conduction time at which an amplifier has long settled, s.
+/// Conduction time after which an amplifier has settled completely, s.
 const SETTLED: f64 = 1.0;
 /// Code of a thermistor at 38 degrees Celsius.
 const WARM: u16 = 1400;
-/// Edges of a bridge that are remembered.
+/// Number of stored edges of a bridge.
 const REMEMBERED: usize = 16;
 /// Standard deviation of the bus voltage's code.
 const BUS_NOISE_CODES: f64 = 1.0;
 
-/// Falsification of a shunt's code.
+/// Fault of a shunt's code.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShuntFault {
     /// Always this code.
@@ -60,10 +60,10 @@ pub enum ShuntFault {
     Offset(f64),
 }
 
-/// Falsification of an encoder.
+/// Fault of an encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EncoderFault {
-    /// Position at which the counter stands.
+    /// Position of the frozen counter.
     pub frozen: Option<u16>,
     /// Counts added to every position.
     pub added: i32,
@@ -71,7 +71,7 @@ pub struct EncoderFault {
     pub no_index: bool,
 }
 
-/// Main output of a bridge that went on or off at the pins.
+/// Main output of a bridge that was turned on or off at the pins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Switching {
     /// Instant.
@@ -82,7 +82,7 @@ pub struct Switching {
     pub on: bool,
 }
 
-/// Pins of a bridge that changed: when, and the edges of its references.
+/// Change of a bridge's pins: its time, and the edges of its references.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edges {
     /// Instant.
@@ -119,11 +119,11 @@ pub struct Axis {
     is_armed: bool,
     /// Last instant at which a high side was on.
     pub last_high: Ticks,
-    /// Pins that changed, if they are to be recorded.
+    /// Pin changes, if recorded.
     pub pin_changes: Option<Vec<(Ticks, [Pins; 3])>>,
-    /// Falsified shunts B and C.
+    /// Faults of shunts B and C.
     pub shunt_faults: [Option<ShuntFault>; 2],
-    /// Falsified encoder.
+    /// Fault of the encoder.
     pub encoder_fault: EncoderFault,
     /// Output with a broken wire.
     pub open: Option<usize>,
@@ -327,7 +327,7 @@ struct Hand {
 /// Timer and outputs of one bridge.
 pub type Bridge<'a> = (&'a Timer, &'a mut Outputs);
 
-/// The board's surroundings.
+/// Board and leg around the chip.
 #[derive(Clone, Debug)]
 pub struct Plant {
     /// Axes with their motors.
@@ -356,7 +356,7 @@ pub struct Plant {
     gates: bool,
     /// A half bridge had both switches requested.
     pub shoot_through: u64,
-    /// Main outputs that went on or off, if they are to be recorded.
+    /// Main outputs turned on or off, if recorded.
     pub switchings: Option<Vec<Switching>>,
 }
 
@@ -369,7 +369,7 @@ impl Plant {
             angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(0.0)),
             rates: [0.0; JOINTS],
         };
-        // Rotors at some angle that is no special one.
+        // Rotors at arbitrary angles.
         let axes = core::array::from_fn(|axis| Axis::new(&drives.axes[axis], 0.4 + 0.7 * axis as f64));
         Self {
             axes,
@@ -410,7 +410,7 @@ impl Plant {
         self.hand = Some(Hand { from: self.position(), to, begun: now, duration });
     }
 
-    /// Lets the leg go.
+    /// Releases the leg from the hand.
     pub fn let_go(&mut self) {
         self.hand = None;
     }
@@ -536,7 +536,7 @@ impl Plant {
         edge.min(self.mechanic + STEP)
     }
 
-    /// Processes what is due: an edge of an index line (axis, level), or a mechanical step.
+    /// Processes the due event: an edge of an index line (axis, level), or a mechanical step.
     pub fn pass(&mut self, now: Ticks, bridges: &mut [Bridge<'_>; JOINTS]) -> Option<(usize, bool)> {
         if let Some(&(at, axis, level)) = self.index_edges.first()
             && at <= now
@@ -627,7 +627,7 @@ impl Plant {
         let this = &self.axes[axis];
         let channel = if this.description.wiring.shunts_exchanged { 1 - channel } else { channel };
         let mut shunts = this.description.shunts;
-        // The state is that of the hold itself.
+        // The state is that at the hold.
         (shunts.delay, shunts.gain) = (0.0, gains[axis]);
         let fault = this.shunt_faults[channel];
         if let Some(ShuntFault::Offset(codes)) = fault {

@@ -69,9 +69,9 @@ pub struct ChipReport {
     pub reasons: Vec<String>,
     /// Base parameters.
     pub base_parameters: Vec<BaseReport>,
-    /// Error of each base parameter against the plant, over the sigma that the leg file's torque noise gives.
+    /// Error of each base parameter against the plant, over the sigma for the leg file's torque noise.
     pub errors: BTreeMap<String, f64>,
-    /// Findings that are not known to be harmless.
+    /// Findings that are not listed as harmless.
     pub findings: Vec<Finding>,
     /// Harmless findings with their reason.
     pub known_findings: Vec<(Finding, &'static str)>,
@@ -157,8 +157,8 @@ pub fn interrupts(session: &Session) -> BTreeMap<&'static str, InterruptReport> 
     LEVELS.into_iter().map(|(name, exception)| (name, report(exception))).collect()
 }
 
-/// Errors of base parameters. Truth and sigma are those of an identification of the simulated leg: a trace
-/// does not hold the truth, and the plant of this model has less noise than a machine.
+/// Errors of base parameters. Truth and sigma are those of an identification of the simulated leg, because a
+/// trace does not contain the truth, and the plant of this model has less noise than a machine.
 fn errors(leg: &LegFile, run: &RunReport, seed: u64) -> Result<BTreeMap<String, f64>, ToolError> {
     let options = &SimulationOptions::of_seed(seed);
     let (simulated, _) = with_leg_size!(leg, identify_one(leg, options, None))?;

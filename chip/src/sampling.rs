@@ -32,7 +32,8 @@ const SAMPLING_NS: f64 = 3e9 / 21e6;
 const CLOCK_NS: f64 = 6.0;
 
 impl SamplingReport {
-    /// Whether every conversion began at the documented instant, without an edge of the other bridge before.
+    /// Whether every conversion began at the documented instant, without a preceding edge of the other
+    /// bridge.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let are_right =
@@ -51,7 +52,7 @@ fn nanoseconds(difference: Ticks) -> f64 {
 /// Measures for a time, s.
 ///
 /// # Errors
-/// The model does not know what the processor does.
+/// The model does not support an action of the processor.
 pub fn measure(
     session: &mut Session,
     situation: &'static str,

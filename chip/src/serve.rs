@@ -15,15 +15,15 @@ use crate::time::seconds;
 
 /// Simulated time between two polls of the port, s.
 const SLICE_S: f64 = 1e-3;
-/// Most frames that wait for the wire.
+/// Largest number of frames that wait for the wire.
 const QUEUE: usize = 64;
-/// Lag beyond which lost time is not made up for.
+/// Lag beyond which lost time is skipped.
 const MOST_LAG: Duration = Duration::from_millis(50);
 
-/// Serves for a time, s, or until the process is ended.
+/// Serves for a time, s, or until the process ends.
 ///
 /// # Errors
-/// The port cannot be opened, or the model does not know what the processor does.
+/// The port cannot be opened, or the model does not support an action of the processor.
 pub fn serve(session: &mut Session, address: SocketAddr, duration: Option<f64>) -> Result<(), ToolError> {
     let refused = |error: std::io::Error| ToolError::input(format!("{address}: {error}"));
     let mut server = Server::new(address).map_err(refused)?;
@@ -52,7 +52,7 @@ pub fn serve(session: &mut Session, address: SocketAddr, duration: Option<f64>) 
         }
         frames.into_iter().for_each(|frame| session.machine.chip_mut().send_frame(frame));
         session.run(SLICE_S)?;
-        // The hand lets go once the drive holds the leg.
+        // The hand releases the leg once the drive holds it.
         let plant = &mut session.machine.chip_mut().plant;
         if plant.is_held() && plant.axes.iter().all(|axis| axis.is_armed()) {
             plant.let_go();

@@ -50,11 +50,11 @@ pub struct Session {
     pub leg: LegFile,
     /// Resets so far.
     pub resets: Vec<ResetReason>,
-    /// Whether records of the timeline are printed as they come.
+    /// Whether records of the timeline are printed when they arrive.
     pub prints: bool,
 }
 
-/// Records that are printed as they come.
+/// Records that are printed when they arrive.
 const TIMELINE: [&str; 9] =
     ["boot", "crash", "refused", "gate_driver", "state", "not_enabled", "fault", "axis_fault", "calibration"];
 
@@ -80,7 +80,7 @@ impl Session {
     /// Runs for a time, s.
     ///
     /// # Errors
-    /// The model does not know what the processor does.
+    /// The model does not support an action of the processor.
     pub fn run(&mut self, duration: f64) -> Result<(), ToolError> {
         self.run_until(self.now() + ticks(duration))
     }
@@ -88,14 +88,14 @@ impl Session {
     /// Runs until an instant.
     ///
     /// # Errors
-    /// The model does not know what the processor does.
+    /// The model does not support an action of the processor.
     pub fn run_until(&mut self, end: Ticks) -> Result<(), ToolError> {
         while self.now() < end {
             let next = end.min(self.now() + ticks(POLL_S));
             match self.machine.run(next)? {
                 End::Reset(reason) => self.resets.push(reason),
                 End::Time => {}
-                // Nothing runs until the power is back.
+                // Nothing runs before the power returns.
                 End::PowerCut => return Ok(()),
             }
             let from = self.probe.lines.len();
@@ -115,10 +115,10 @@ impl Session {
         }
     }
 
-    /// Runs until a record of this kind with these words comes.
+    /// Runs until a record of this kind with these words arrives.
     ///
     /// # Errors
-    /// No such record comes in time.
+    /// No such record arrives in time.
     pub fn wait(&mut self, kind: &str, words: &[&str], longest: f64) -> Result<String, ToolError> {
         let (from, end) = (self.probe.lines.len(), self.now() + ticks(longest));
         while self.now() < end {
@@ -147,7 +147,7 @@ impl Session {
     /// Presses the start button for 0.1 s.
     ///
     /// # Errors
-    /// The model does not know what the processor does.
+    /// The model does not support an action of the processor.
     pub fn press_start(&mut self) -> Result<(), ToolError> {
         self.set(START, true);
         self.run(0.1)?;
@@ -155,7 +155,7 @@ impl Session {
         Ok(())
     }
 
-    /// Starts the board and waits until its contacts were seen open.
+    /// Starts the board and waits until it has read its contacts as open.
     ///
     /// # Errors
     /// The image sends no record of its start.
@@ -175,7 +175,7 @@ impl Session {
     /// Runs a step.
     ///
     /// # Errors
-    /// The image refuses it, or does not answer.
+    /// The image refuses the step, or does not answer.
     pub fn step(&mut self, step: Step) -> Result<(), ToolError> {
         match step {
             Step::Calibrate => self.calibrate(),
@@ -240,7 +240,7 @@ impl Session {
     /// Sends a request to a node's object dictionary and returns the answer.
     ///
     /// # Errors
-    /// No answer comes in time.
+    /// No answer arrives in time.
     pub fn ask(&mut self, node: u16, request: [u8; 8], longest: f64) -> Result<[u8; 8], ToolError> {
         self.machine.chip_mut().can.sent.clear();
         self.machine.chip_mut().send_frame(Frame::new(0x600 + node, &request));
@@ -261,7 +261,7 @@ impl Session {
     /// Writes a value of four bytes to an object.
     ///
     /// # Errors
-    /// The node refuses it or does not answer.
+    /// The node refuses the value or does not answer.
     pub fn write_object(
         &mut self,
         node: u16,
@@ -276,7 +276,7 @@ impl Session {
     /// Writes a value of 1, 2 or 4 bytes to an object.
     ///
     /// # Errors
-    /// The node refuses it or does not answer.
+    /// The node refuses the value or does not answer.
     pub fn write_sized(
         &mut self,
         node: u16,
@@ -297,10 +297,10 @@ impl Session {
     }
 
     /// Writes a request that changes the flash ("save", "load") and waits for its emergency messages: FF0D
-    /// while it is under way, 0000 at its end. Returns at a power cut too.
+    /// during the write, 0000 at its end. Also returns at a power cut.
     ///
     /// # Errors
-    /// The node refuses the request, fails, or does not end in time.
+    /// The node refuses the request, fails, or does not finish in time.
     pub fn store(&mut self, index: u16, word: [u8; 4], longest: f64) -> Result<(), ToolError> {
         self.write_object(1, index, 1, u32::from_le_bytes(word), 0.5)?;
         let end = self.now() + ticks(longest);
@@ -320,13 +320,13 @@ impl Session {
         if self.machine.chip().flash.is_cut {
             return Ok(());
         }
-        Err(ToolError::input(format!("{index:04x} does not end within {longest} s")))
+        Err(ToolError::input(format!("{index:04x} did not finish within {longest} s")))
     }
 
     /// Reads a value of up to four bytes from an object.
     ///
     /// # Errors
-    /// The node refuses it or does not answer.
+    /// The node refuses the request or does not answer.
     pub fn read_object(&mut self, node: u16, index: u16, sub: u8, longest: f64) -> Result<u32, ToolError> {
         let [low, high] = index.to_le_bytes();
         let answer = self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0], longest)?;

@@ -23,7 +23,7 @@ const FILLINGS: i32 = 8;
 /// Amplitude of the targets, increments of 6064, and frequency, Hz.
 const WAY: f64 = 20_000.0;
 const MOTION_HZ: f64 = 0.5;
-/// COB-ID of frames that concern no node of this board.
+/// COB-ID of frames that no node of this board uses.
 const OTHER: u16 = 0x5FF;
 /// Longest time for an answer, s.
 const ANSWER_S: f64 = 0.5;
@@ -37,12 +37,12 @@ pub struct Situation {
     pub load: LoadReport,
     /// Use by interrupt.
     pub interrupts: BTreeMap<&'static str, InterruptReport>,
-    /// Instructions by exception and function, most first, if they were counted.
+    /// Instructions by exception and function, most first, if counted.
     #[serde(skip)]
     pub profile: Vec<(u8, String, u64)>,
 }
 
-/// Measures idle, calibrating, holding, identifying and following, from a session that has just been powered.
+/// Measures idle, calibrating, holding, identifying and following, from a session that was just powered.
 ///
 /// # Errors
 /// The image does not reach a situation.
@@ -160,7 +160,7 @@ fn follow(session: &mut Session, start: [i32; 2], cycles: Range<u32>) -> Result<
     let sent = &session.machine.chip().can.sent;
     let feedback = sent.iter().filter(|(_, frame)| frame.id() & !3 == 0x180).count();
     if feedback + 4 < expected {
-        return Err(ToolError::Refused(format!("{feedback} of {expected} feedback frames came")));
+        return Err(ToolError::Refused(format!("{feedback} of {expected} feedback frames arrived")));
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Emergency stops at all phases of the PWM period: at rest, in motion, during a calibration.
 //!
-//! Each stop starts from the same saved machine. The contact opens at a phase; measured at the pins are the
+//! Each stop starts from the same saved machine. The contact opens at a phase. Measured at the pins are the
 //! time until both bridges are off, and whether one is on again afterwards.
 
 use serde::Serialize;
@@ -13,9 +13,9 @@ use crate::plant::{STEP, Switching};
 use crate::session::{Session, Step};
 use crate::time::{Ticks, microseconds, ticks};
 
-/// Time that is watched after the contact opened, s.
+/// Observed time after the contact opened, s.
 const WATCHED_S: f64 = 2e-3;
-/// Longest time until both bridges are off for good, us, at up to two cycles per instruction. A tick alone
+/// Longest time until both bridges are permanently off, us, at up to two cycles per instruction. A tick alone
 /// takes up to a PWM period of 42 us.
 const LONGEST_US: f64 = 1.0;
 
@@ -30,15 +30,15 @@ pub struct Situation {
     pub armed: u32,
     /// Stops after which a bridge stayed on.
     pub stayed_on: u32,
-    /// Stops after which a bridge was on again, and the longest time for which it was, us.
+    /// Stops after which a bridge was on again.
     pub on_again: u32,
     /// Longest time for which a bridge was on again, us.
     pub longest_again_us: f64,
-    /// Mean and worst time to the first release of both bridges, us.
+    /// Mean time until both bridges were first off, us.
     pub mean_us: f64,
-    /// Worst time to the first release of both bridges, us.
+    /// Worst time until both bridges were first off, us.
     pub worst_us: f64,
-    /// Worst time until both bridges were off for good, us.
+    /// Worst time until both bridges were permanently off, us.
     pub worst_final_us: f64,
 }
 
@@ -52,7 +52,7 @@ pub struct StopReport {
 }
 
 impl StopReport {
-    /// Whether every stop ended with both bridges off, by its own interrupt and not by a later tick.
+    /// Whether every stop turned both bridges off by its own interrupt, not by a later tick.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         self.situations.iter().all(|situation| {
@@ -72,7 +72,7 @@ pub fn run(session: &mut Session, phases: u32, time_factor: f64) -> Result<StopR
     session.hold_switch(true);
     session.run(0.2)?;
     session.press_start()?;
-    // The first motor's field turns.
+    // The field of the first motor turns.
     session.run(3.5)?;
     let calibrating = session.save()?;
     report.situations.push(stops(session, "calibration", &calibrating, phases)?);
@@ -132,7 +132,7 @@ fn stops(
     Ok(situation)
 }
 
-/// What happened after a stop.
+/// Result of a stop.
 struct Outcome {
     /// First instant with both bridges off, and the last.
     first: Option<Ticks>,
@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bridge_that_is_on_again_is_seen_with_its_time() {
+    fn a_bridge_that_is_on_again_is_detected_with_its_time() {
         let switching = |at, axis, on| Switching { at, axis, on };
         let mut armed = [true; 2];
         let log = [

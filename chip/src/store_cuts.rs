@@ -9,7 +9,7 @@ use crate::peripherals::flash::Cut;
 use crate::session::Session;
 use crate::time::ticks;
 
-/// Object that is stored: following error window of the first node.
+/// Stored object: following error window of the first node.
 const OBJECT: u16 = 0x6065;
 const OLD: u32 = 1000;
 const NEW: u32 = 2000;
@@ -25,9 +25,9 @@ const ERASURES: u32 = 20;
 /// Cuts within one save.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SaveReport {
-    /// What is saved.
+    /// Saved data.
     pub save: &'static str,
-    /// Words of the save, each of which was cut once.
+    /// Words of the save; the power is cut at each.
     pub words: u64,
     /// Starts that found the value before, and the new one.
     pub found: [u32; 2],
@@ -42,7 +42,7 @@ pub struct CutReport {
     pub erasures: u32,
     /// Starts that found the old value, and the default one, after a cut erase.
     pub found_after_erasure: [u32; 2],
-    /// Starts that found anything else.
+    /// Starts that found another value.
     pub violations: Vec<String>,
 }
 
@@ -65,7 +65,7 @@ impl Session {
     }
 }
 
-/// Cuts the power everywhere, from a session that has just started with an empty flash.
+/// Cuts the power everywhere, from a session that was just started with an empty flash.
 ///
 /// # Errors
 /// The image does not store at all.

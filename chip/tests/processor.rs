@@ -17,7 +17,7 @@ const STIR: u32 = 0xE000_EF00;
 const ISER: u32 = 0xE000_E100;
 const IPR: u32 = 0xE000_E400;
 
-/// Only one Unicorn at a time: several in threads of one process crash.
+/// Only one Unicorn instance at a time: several in threads of one process crash.
 static ONE: Mutex<()> = Mutex::new(());
 
 fn alone() -> MutexGuard<'static, ()> {
@@ -136,7 +136,7 @@ fn a_higher_level_preempts_and_a_masked_one_waits() {
     enable(&mut program, 12, 0x20);
     // movs r2, #0x30; msr basepri, r2
     program.put(&[0x2230, 0xF382, 0x8811]).store(STIR, 8).store(STIR, 12);
-    // A branch ends the block: interrupts come between blocks.
+    // A branch ends the block, because interrupts are taken between blocks.
     program.put(&[0xE7FF]).store(RAM, 1);
     // movs r2, #0; msr basepri, r2
     program.put(&[0x2200, 0xF382, 0x8811]).halt();
@@ -147,7 +147,7 @@ fn a_higher_level_preempts_and_a_masked_one_waits() {
     machine.set_memory(RAM, &[0; 16]);
     run(&mut machine, 1e-4);
     assert_eq!(word(&machine, RAM + 4), 2);
-    assert_eq!(word(&machine, RAM + 8), 0, "level 0x20 came before the store, in spite of the mask");
+    assert_eq!(word(&machine, RAM + 8), 0, "level 0x20 ran before the store, in spite of the mask");
     assert_eq!((machine.chip().load.of(24).entries, machine.chip().load.of(28).entries), (1, 1));
 }
 
@@ -179,7 +179,7 @@ fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
 }
 
 #[test]
-fn a_wait_for_an_interrupt_ends_though_it_is_masked() {
+fn a_masked_interrupt_still_ends_a_wait() {
     let _alone = alone();
     let mut program = every_millisecond();
     // cpsid i; wfi; the mark; cpsie i
@@ -194,7 +194,7 @@ fn a_wait_for_an_interrupt_ends_though_it_is_masked() {
 }
 
 #[test]
-fn frequent_interrupts_leave_a_computation_alone() {
+fn frequent_interrupts_do_not_change_a_computation() {
     let _alone = alone();
     let mut program = Program::new();
     program.store(0x4002_3840, 1 << 3);
@@ -289,7 +289,7 @@ fn a_fault_within_a_hard_fault_locks_up() {
 }
 
 #[test]
-fn a_restored_machine_runs_as_the_first_one_did() {
+fn a_restored_machine_repeats_the_first_run() {
     let _alone = alone();
     let mut program = Program::new();
     // adds r4, #1; str r4, [r0]; b

@@ -7,7 +7,7 @@
 //!    vectors from the previous joint's point and to the centre of mass, and the inertia tensor. Let A(i) =
 //!    A(i-1) Rx(alpha_i) be the link's orientation at the reference pose. Then axis = A e_z, point = previous
 //!    point + A(i-1) e_x a + axis d, and A turns all other quantities of the link. At other poses a link has
-//!    been turned about its own axis and all axes before it; no frame is carried along.
+//!    been turned about its own axis and all axes before it, so no frame needs to be stored.
 //! 2. **Signs.** Ports use anatomical angles (flexion positive), the plant joint angles. Joint angle =
 //!    direction * anatomical angle + zero offset; torques have no offset.
 

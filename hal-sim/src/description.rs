@@ -2,7 +2,7 @@
 //!
 //! A host tool fills these structures from a leg file, an emulated image from constants. Bodies are given as
 //! the firmware's users state them, in modified Denavit-Hartenberg frames; `conventions` translates. Nothing
-//! is checked here: readers of external numbers check them (`tool::leg_file` does).
+//! is checked here; readers of external numbers check them (the host's `formats::leg_file` does).
 
 /// One leg of `N` joints (1 to 3), proximal first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,8 +11,8 @@ pub struct LegDescription<const N: usize> {
     pub gravity: [f64; 3],
     /// Joints, proximal first.
     pub joints: [JointDescription; N],
-    /// Whether drives are mounted mirrored, as on a left leg: motors and encoders turn against
-    /// the anatomical sense.
+    /// Whether drives are mounted mirrored, as on a left leg: motors and encoders turn against the anatomical
+    /// direction.
     pub mirrored: bool,
     /// Pushes by the wearer, if any.
     pub pushes: Option<PushDescription>,
@@ -67,7 +67,7 @@ pub struct BodyDescription {
 
 impl BodyDescription {
     /// The body with a point mass (kg) fixed at a position (m) in its D-H frame. The inertia follows from the
-    /// parallel axis theorem about the common centre of mass. A negative mass removes one.
+    /// parallel axis theorem about the common centre of mass. A negative mass removes a point mass.
     #[must_use]
     pub fn with_point_mass(&self, mass: f64, at: [f64; 3]) -> Self {
         let whole = self.mass + mass;
@@ -94,7 +94,7 @@ pub struct FrictionDescription {
     pub viscous: f64,
     /// Constant torque that the motor must add at any motion, N m.
     pub offset: f64,
-    /// Higher level at rest, if there is one.
+    /// Higher level at rest, if any.
     pub stribeck: Option<Stribeck>,
 }
 
@@ -112,7 +112,7 @@ pub struct Stribeck {
 pub struct DriveDescription {
     /// Torque at the joint per ampere of motor current, N m/A.
     pub torque_per_ampere: f64,
-    /// Greatest magnitude of the current, A.
+    /// Largest magnitude of the current, A.
     pub current_limit: f64,
     /// Time constant of the first-order lag, s; 0 for none.
     pub lag: f64,

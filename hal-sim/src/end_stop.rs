@@ -1,6 +1,6 @@
 //! The mechanical end stops of a joint.
 //!
-//! Why: a leg whose drive is off falls. The end stop decides where it rests and whether it can be enabled
+//! Why: a leg with its drive off falls. The end stop decides where it rests and whether it can be enabled
 //! there.
 //!
 //! ```text
@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stop_pushes_back_and_never_pulls() {
+    fn a_stop_pushes_back_but_never_pulls() {
         let stops = Some([-0.1, 1.0]);
         for (angle, rate, expected) in [
             (0.99, 9.0, 0.0),

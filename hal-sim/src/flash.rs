@@ -7,9 +7,9 @@
 //! power fails at byte k: below k done, above k unchanged, k a random mix of both
 //! ```
 //!
-//! Why: persistence over a power cut can only be tested by cutting everywhere. A byte that was caught in the
-//! middle always reads the same; a real half-programmed cell may read differently each time, which is not
-//! modelled. Wear is counted, not modelled: erasures of each sector, and all bytes programmed or erased.
+//! Why: persistence over a power cut can only be tested by cutting at every byte. A byte that was cut in the
+//! middle always reads the same here. A real half-programmed cell may read differently each time, which is
+//! not modelled. Wear is counted, not modelled: erasures of each sector, and all bytes programmed or erased.
 
 use embedded_storage_async::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
@@ -67,8 +67,8 @@ impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
         }
     }
 
-    /// Makes the power fail after so many more bytes have been programmed or erased, in the middle of the
-    /// next one. `None` keeps it on.
+    /// Makes the power fail after this number of further bytes, in the middle of the next one. `None` keeps
+    /// the power on.
     pub fn fail_after(&mut self, bytes: Option<u64>) {
         self.left = bytes;
     }
@@ -106,7 +106,7 @@ impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
         Ok(())
     }
 
-    /// Changes one byte to `aim`; fails with the power.
+    /// Changes one byte to `aim`; fails when the power fails.
     fn work(&mut self, address: usize, aim: u8) -> Result<(), FlashError> {
         let Some(cell) = self.cells.as_flattened_mut().get_mut(address) else {
             return Err(NorFlashErrorKind::OutOfBounds.into());

@@ -11,9 +11,9 @@
 //! ```
 //!
 //! Up is against gravity. The foot is a point of the last link in its D-H frame. The trunk is fixed here, so
-//! the rise of the floor stands for the weight with which the wearer presses the foot down. That is up to 300
-//! N on a leg at rest. Stiffness, damping and friction are assumptions about a soft shoe, not measurements.
-//! SI units.
+//! the rise of the floor represents the weight with which the wearer presses the foot down: up to 300 N on a
+//! leg at rest. Stiffness, damping and friction are assumptions about a soft shoe, not measurements. SI
+//! units.
 //! Source: penalty contact (Moore and Wilhelms 1988) with regularised Coulomb friction.
 //! Cost: one pose of the mechanism per tick, only during contact.
 //! Known limits: one point, no rolling foot.
@@ -28,7 +28,7 @@ use crate::mechanism::Mechanism;
 const STIFFNESS: f64 = 10e3;
 /// Damping, N s/m: critical for some 15 kg.
 const DAMPING: f64 = 700.0;
-/// Friction coefficient of rubber on a hall's floor.
+/// Friction coefficient of rubber on an indoor floor.
 const FRICTION: f64 = 0.7;
 /// Speed at which friction has reached 71 % of its level, m/s.
 const SLIP: f64 = 0.01;

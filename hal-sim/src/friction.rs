@@ -9,13 +9,13 @@
 //! at rest    |applied| <= static: v stays 0 and friction balances the applied torque
 //! ```
 //!
-//! Joints are coupled: one that breaks away may drag another along or set it free. Over one time step the
-//! end rates u obey A u = b - f with friction impulses f. Each joint slides (f = level sign(u)) or sticks (u
-//! = 0 and the magnitude of f at most static). For N <= 3 the 3^N assignments are few, so the consistent one
-//! is found exactly. The search begins with the one that continues the present motion. A is the inertia
-//! matrix with small additions of the order of the step, so exactly one assignment is consistent where
-//! static = coulomb. With Stribeck's surplus both sticking and sliding may be consistent, and then the
-//! present motion continues.
+//! Joints are coupled: one that breaks away may drag another along or set it free. Over one time step the end
+//! rates u obey A u = b - f with friction impulses f. Each joint slides (f = level sign(u)) or sticks (u = 0
+//! and the magnitude of f at most static). For N <= 3 the 3^N assignments are few, so the consistent one is
+//! found exactly. The search begins with the one that continues the present motion. A is the inertia matrix
+//! with small additions of the order of the step, so exactly one assignment is consistent where static =
+//! coulomb. With Stribeck's surplus both sticking and sliding may be consistent; then the present motion
+//! continues.
 //!
 //! Source: Moreau's time stepping in its box-constrained form (Stewart and Trinkle, 1996); Stribeck's curve
 //! in the Gaussian form of Armstrong-Helouvry et al. (1994).
@@ -85,15 +85,15 @@ pub(crate) struct Slide<const N: usize> {
     pub momentum: [f64; N],
     /// Impulse of the dry friction of a sliding joint, N m s.
     pub sliding: [f64; N],
-    /// Greatest impulse that dry friction can hold at a resting joint, N m s.
+    /// Largest impulse that dry friction can hold at a resting joint, N m s.
     pub breakaway: [f64; N],
-    /// Joints with dry friction known in advance, because they are moving already.
+    /// Joints whose dry friction is known in advance, because they are already moving.
     pub committed: [bool; N],
 }
 
 impl<const N: usize> Slide<N> {
-    /// Solves for the rates; those of sticking joints are exactly 0. Tries `present` first; committed joints
-    /// stay with it.
+    /// Solves for the rates; those of sticking joints are exactly 0. Tries `present` first; the state of
+    /// committed joints is fixed.
     #[inline(always)]
     pub(crate) fn solve(&self, present: &[Contact; N]) -> [f64; N] {
         let (rates, violation) = self.attempt(present);

@@ -5,9 +5,9 @@
 //! ```
 //!
 //! Why: a resisting wearer is a spring-damper, not a fixed torque pulse: the reaction depends on the drive.
-//! The held position is the joint's at the start of the grip; a hand that is too weak is pulled along and
-//! goes on pulling. Stiffness and damping are assumptions about a firm grip. N m, rad, s, anatomical.
-//! Cost: a few operations per step during the grip.
+//! The held position is the joint's at the start of the grip; a hand that is too weak is moved and continues
+//! to pull. Stiffness and damping are assumptions about a firm grip. N m, rad, s, anatomical. Cost: a few
+//! operations per step during the grip.
 
 /// Stiffness, N m/rad: a degree at 35 N m.
 const STIFFNESS: f64 = 2000.0;
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hand_opposes_what_moves_its_joint_and_no_other_and_no_harder_than_it_can() {
+    fn a_hand_opposes_motion_of_its_joint_up_to_its_strength() {
         let mut grip = Grip::new(1, 50.0, 1.0, 2.0);
         assert_eq!(grip.torque(&[0.3, 0.5], &[1.0, 1.0], 0.9), [0.0; 2]);
         assert_eq!(grip.torque(&[0.3, 0.5], &[0.0, 0.0], 1.0), [0.0; 2]);

@@ -34,7 +34,7 @@ pub const FINE_STEPS: u32 = 8;
 pub struct Leg<const N: usize> {
     mechanism: Mechanism<N>,
     friction: [FrictionDescription; N],
-    /// Blocked joints: no torque moves them.
+    /// Blocked joints, which no torque moves.
     blocked: [bool; N],
 }
 

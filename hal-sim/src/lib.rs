@@ -1,6 +1,6 @@
 //! Scarab's simulated hardware: the physical world of a leg's drive board, in double precision.
 //!
-//! Why separate mathematics: a firmware tested against its own equations proves nothing. So the plant uses
+//! Why separate mathematics: a test of firmware against its own equations proves nothing. So the plant uses
 //! another formulation: Lagrange instead of Newton-Euler. Its frames are axes and points in the world instead
 //! of Denavit-Hartenberg frames, and it has its own access to `libm`. From the firmware it imports only
 //! `scarab::hal` and `scarab::units`.

@@ -1,29 +1,28 @@
 //! The plant's own access to `libm`, separate from the firmware's.
 //!
 //! Double precision throughout. The functions are identical on the host, in the emulator and without `std`,
-//! so a
-//! seed gives identical bits everywhere.
+//! so a seed gives identical bits everywhere.
 
 /// Sine and cosine of an angle in rad.
-#[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
+#[expect(clippy::disallowed_methods, reason = "this file is the plant's only access to libm")]
 pub(crate) fn sin_cos(angle: f64) -> (f64, f64) {
     libm::sincos(angle)
 }
 
 /// Exponential function.
-#[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
+#[expect(clippy::disallowed_methods, reason = "this file is the plant's only access to libm")]
 pub(crate) fn exp(value: f64) -> f64 {
     libm::exp(value)
 }
 
 /// Natural logarithm.
-#[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
+#[expect(clippy::disallowed_methods, reason = "this file is the plant's only access to libm")]
 pub(crate) fn ln(value: f64) -> f64 {
     libm::log(value)
 }
 
 /// Square root.
-#[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
+#[expect(clippy::disallowed_methods, reason = "this file is the plant's only access to libm")]
 pub(crate) fn sqrt(value: f64) -> f64 {
     libm::sqrt(value)
 }

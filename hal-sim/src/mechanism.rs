@@ -1,7 +1,7 @@
 //! Rigid bodies of a leg by Lagrange's equations, in world coordinates.
 //!
-//! Why another formulation than the firmware's: an error in Newton-Euler recursion or in a D-H frame cannot
-//! repeat itself in energies and world vectors.
+//! Why another formulation than the firmware's: an error in the Newton-Euler recursion or in a D-H frame
+//! cannot repeat itself in energies and world vectors.
 //!
 //! Quantities at joint angles q, all in the world frame. The vector z_j is the unit vector of axis j, p_j a
 //! point on it, c_i the centre of mass of link i. Further, I_i is the link's tensor about c_i, and g

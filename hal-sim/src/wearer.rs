@@ -32,7 +32,7 @@ pub struct Wearer {
 }
 
 impl Wearer {
-    /// A wearer at time 0, with a separate generator.
+    /// A wearer at time 0, with a random generator of its own.
     #[must_use]
     pub fn new(habits: Option<PushDescription>, joints: usize, generator: Xoshiro256PlusPlus) -> Self {
         let mut wearer = Self { habits, next: None, generator };
@@ -40,7 +40,7 @@ impl Wearer {
         wearer
     }
 
-    /// Changes the habits from this time (s) on; a push in progress ends.
+    /// Changes rate and strength of the pushes from this time (s) on; a push in progress ends.
     pub fn change_habits(&mut self, habits: Option<PushDescription>, now: f64, joints: usize) {
         (self.habits, self.next) = (habits, None);
         self.plan(now, joints);

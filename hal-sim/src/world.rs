@@ -1,7 +1,7 @@
 //! World: a leg with drives, sensors and wearer as one seeded value.
 //!
 //! Why one value: a test runs the firmware against a world, clones both at any time, lets the copies continue
-//! differently, and compares copies bit for bit. A world holds no clock, no file and no shared state. The
+//! differently, and compares copies bit for bit. A world contains no clock, no file and no shared state. The
 //! same seed and commands give the same bits.
 //!
 //! One exchange per servo tick of 250 us: read [`LegDrives::sample`] (sensors now), set
@@ -161,7 +161,7 @@ impl<const N: usize> World<N> {
         self.leg = Leg::new(&self.description).with_blocked(self.blocked);
     }
 
-    /// Changes the wearer's pushes from now on; `None` for a wearer who holds still.
+    /// Changes the wearer's pushes from now on; `None` stops them.
     pub fn set_pushes(&mut self, pushes: Option<PushDescription>) {
         self.description.pushes = pushes;
         self.wearer.change_habits(pushes, self.tick as f64 * TICK_S, N);
@@ -308,7 +308,7 @@ impl<const N: usize> World<N> {
     }
 
     /// Motor torque, N m, for a motion (rad, rad/s, rad/s^2), with friction and offset. Dry friction of a
-    /// joint at rest is undetermined and left out.
+    /// joint at rest is undetermined and omitted.
     #[must_use]
     pub fn inverse_dynamics(
         &self,

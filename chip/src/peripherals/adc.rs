@@ -51,7 +51,7 @@ struct Running {
     code: Option<u16>,
 }
 
-/// What a converter asks for at an instant.
+/// Request of a converter at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// Read the input of a channel now.
@@ -187,7 +187,7 @@ impl Adc {
         Some(Event::Result)
     }
 
-    /// Gives the code of the held input.
+    /// Sets the code of the held input.
     pub fn hold(&mut self, code: u16) {
         if let Some(running) = &mut self.running {
             running.code = Some(code);
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn a_result_that_nobody_read_is_counted_when_it_is_overwritten() {
+    fn an_unread_result_is_counted_when_it_is_overwritten() {
         let mut bench = Bench::new(&[(0x34, 13), (0x08, 1 | 14 << 24 | 1 << 28)]);
         for now in [2000, 9000] {
             bench.trigger(now, Trigger::Second);

@@ -79,7 +79,7 @@ pub struct Can {
     bus_off: bool,
     initialising: bool,
     asleep: bool,
-    /// Instant at which a change of mode, or the recovery from bus-off, is complete.
+    /// Instant at which a change of mode, or the recovery from bus-off, ends.
     joins: Ticks,
     recovers: Ticks,
     mailboxes: [Mailbox; 3],
@@ -101,7 +101,7 @@ pub struct Can {
     pub connected: bool,
     /// Bit rate of the partner, bit/s.
     pub partner_rate: u64,
-    /// Received frames that did not fit.
+    /// Received frames that were lost because the queue was full.
     pub overruns: u64,
 }
 
@@ -336,7 +336,7 @@ impl Can {
             | receive << 24
     }
 
-    /// Transmit status register. Its code names an empty mailbox, or the one that is sent last.
+    /// Transmit status register. Its code names an empty mailbox, or the one to be sent last.
     fn transmit_status(&self) -> u32 {
         let empty = |index: &usize| self.mailboxes[*index].order.is_none();
         let code = (0..3).find(empty).or_else(|| (0..3).max_by_key(|index| self.turn(*index))).unwrap_or(0);
@@ -634,7 +634,7 @@ mod tests {
     }
 
     #[test]
-    fn the_code_names_the_mailbox_that_is_sent_last_and_an_abort_waits_for_the_wire() {
+    fn the_code_names_the_last_mailbox_and_an_abort_waits_for_the_wire() {
         let mut bench = Bench::new();
         bench.can.connected = false;
         bench.write(0x00, 0);

@@ -1,7 +1,7 @@
 //! Debug unit, cycle counter, unique number and one-time programmable memory (RM0090 38, 39; ARMv7-M C1.8).
 //!
-//! The cycle counter stands in sleep unless DBGMCU_CR keeps the clock on (DBG_SLEEP). A processor is never
-//! held here, so the freeze bits have no effect.
+//! The cycle counter stops in sleep unless DBGMCU_CR keeps the clock on (DBG_SLEEP). A processor is never
+//! halted here, so the freeze bits have no effect.
 
 use crate::findings::{Access, NO_REGISTER};
 use crate::time::Ticks;
@@ -119,7 +119,7 @@ mod tests {
     use crate::findings::Findings;
 
     #[test]
-    fn the_cycle_counter_stands_in_sleep_without_its_debug_bit() {
+    fn the_cycle_counter_stops_in_sleep_without_its_debug_bit() {
         let mut debug = Debug::new();
         debug.set_cycle(2, 0);
         debug.enable(Some(true), Some(true), 0);

@@ -40,7 +40,7 @@ pub struct Drivers {
     released: Ticks,
     /// Frames of each driver.
     pub frames: [u64; 2],
-    /// A driver that lost its supply: it answers with zeros.
+    /// Whether a driver has lost its supply: it answers with zeros.
     pub silent: [bool; 2],
 }
 
@@ -145,7 +145,7 @@ mod tests {
     const FRAME: Sent = Sent { word: 0, wide: true, mode: 1, hz: 2_625_000 };
 
     #[test]
-    fn a_driver_answers_with_the_next_frame_and_forgets_when_it_is_disabled() {
+    fn a_driver_answers_with_the_next_frame_and_loses_registers_when_disabled() {
         let (mut drivers, mut findings) = (Drivers::default(), Findings::default());
         let access = &mut Access { now: 1000, findings: &mut findings };
         drivers.set_enabled(true, access);

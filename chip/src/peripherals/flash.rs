@@ -71,7 +71,7 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// Erased sectors; `noise` decides how cells look after a power cut.
+    /// Erased sectors; `noise` sets the state of cells after a power cut.
     #[must_use]
     pub fn new(noise: Xoshiro256PlusPlus) -> Self {
         Self {
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_is_programmed_with_keys_mode_and_width_only() {
+    fn a_word_is_programmed_only_with_keys_mode_and_width() {
         let mut bench = Bench::new();
         bench.store(8, 4, 0x1234_5678);
         assert_eq!((bench.load(8), bench.flash.status), (u32::MAX, SEQUENCE));
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn an_erase_sets_one_sector_and_stalls_for_a_second_by_words_or_two_by_bytes() {
+    fn an_erase_sets_one_sector_and_stalls_one_or_two_seconds() {
         let mut bench = Bench::new();
         bench.flash.cells_mut().fill(0);
         bench.unlock();
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_power_cut_mixes_a_word_and_makes_noise_of_a_sector() {
+    fn a_power_cut_mixes_a_word_and_randomises_a_sector() {
         let mut bench = Bench::new();
         bench.unlock();
         bench.write(0x10, PROGRAM | 2 << 8);

@@ -42,7 +42,7 @@ impl Port {
             let bit = match self.mode >> (2 * pin) & 3 {
                 // An analog pin's input is off.
                 3 => 0,
-                // An open drain that is not pulled down follows the outside.
+                // An open drain that is not pulled down follows the level from outside.
                 1 if self.kind >> pin & 1 == 0 || self.output >> pin & 1 == 0 => self.output >> pin & 1,
                 _ if self.driven >> pin & 1 == 1 => self.levels >> pin & 1,
                 _ => u32::from(self.pull >> (2 * pin) & 3 == 1),
@@ -191,7 +191,7 @@ mod tests {
     use crate::findings::Findings;
 
     #[test]
-    fn an_input_sees_the_outside_else_its_pull_and_an_output_itself() {
+    fn an_input_reads_the_outside_or_its_pull_an_output_itself() {
         let (mut gpio, mut findings) = (Gpio::new(), Findings::default());
         let mut write = |gpio: &mut Gpio, offset: u32, value: u32| {
             gpio.write(0x800 + offset, value, &mut Access { now: 0, findings: &mut findings });

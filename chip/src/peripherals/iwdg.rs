@@ -23,9 +23,9 @@ pub struct Iwdg {
     since: Ticks,
     /// Instants until which prescaler and reload are busy.
     busy: [Ticks; 2],
-    /// Number of feeds, and least time that was left at one.
+    /// Number of feeds, and least remaining time at a feed.
     pub feeds: u64,
-    /// Least time left at a feed.
+    /// Least remaining time at a feed.
     pub least: Ticks,
 }
 

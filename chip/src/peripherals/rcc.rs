@@ -163,7 +163,8 @@ impl Rcc {
         self.interrupts & 1 << 7 != 0
     }
 
-    /// Stops the crystal. Returns whether the clock security noticed and switched to the internal oscillator.
+    /// Stops the crystal. Returns whether the clock security detected it and switched to the internal
+    /// oscillator.
     pub fn stop_crystal(&mut self) -> bool {
         self.crystal_works = false;
         (self.crystal_ready, self.pll_ready) = (NEVER, NEVER);
@@ -173,7 +174,8 @@ impl Rcc {
             self.configuration &= !3;
             self.interrupts |= 1 << 7;
         }
-        // Without clock security a PLL without reference runs on at its lowest frequency; here as with it.
+        // Without clock security a PLL without reference runs at its lowest frequency; here as with clock
+        // security.
         self.system_hz = HSI_HZ;
         watched
     }

@@ -23,7 +23,7 @@ pub struct Spi {
     overrun: bool,
 }
 
-/// Frame that begins.
+/// Frame that starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sent {
     /// Bits sent.
@@ -74,7 +74,7 @@ impl Spi {
         }
     }
 
-    /// Writes a register; returns the frame that begins, which must be answered by [`Self::answer`].
+    /// Writes a register; returns the frame that starts, which must be answered by [`Self::answer`].
     pub fn write(
         &mut self,
         offset: u32,
@@ -103,7 +103,7 @@ impl Spi {
 
     fn write_control(&mut self, value: u32, access: &mut Access<'_>) {
         let before = self.control[0];
-        // Speed, phase, polarity, frame and format are set while the peripheral is off.
+        // Speed, phase, polarity, frame and format may only be set while the peripheral is off.
         if before & value & ENABLE != 0 && (before ^ value) & 0x08BB != 0 {
             access.refuse("format changed while the peripheral is enabled", "SPI3_CR1");
         }

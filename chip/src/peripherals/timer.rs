@@ -66,7 +66,7 @@ pub enum Event {
     Match,
 }
 
-/// Place of a running counter: start and phase of the present count.
+/// State of a running counter: start and phase of the present count.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     begun: Ticks,
@@ -109,7 +109,7 @@ pub struct Timer {
     /// Phase at an instant.
     phase: u64,
     origin: Ticks,
-    /// Part of a count that had passed when the counter was stopped.
+    /// Elapsed part of a count when the counter was stopped.
     rest: Ticks,
     /// Instants up to which ends and compare flags were processed.
     processed: Ticks,
@@ -220,7 +220,7 @@ impl Timer {
         self.place(after).next(phase)
     }
 
-    /// Place of a running counter at an instant, from which several instants are computed.
+    /// State of a running counter at an instant, from which several instants are computed.
     #[must_use]
     pub fn place(&self, at: Ticks) -> Place {
         let (length, period) = (self.count_length(), self.period());
@@ -458,7 +458,7 @@ impl Timer {
         }
     }
 
-    /// Whether the interrupt for updates, or the one for the rest, is requested.
+    /// Whether the interrupt for updates, or the one for other events, is requested.
     #[must_use]
     pub fn requests(&self) -> [bool; 2] {
         let raised = self.sr & self.dier;
@@ -717,7 +717,7 @@ impl Timer {
             access.refuse("locked bits written", self.named("BDTR"));
         }
         self.bdtr = value & !locked | self.bdtr & locked;
-        // Silicon obeys; a half-bridge behind the pins would not survive it.
+        // Silicon accepts this; a half bridge behind the pins would be destroyed.
         let pairs = self.ccer & self.ccer >> 2 & 0x111;
         if self.bdtr & MOE != 0 && self.bdtr & 0xFF == 0 && pairs != 0 {
             access.refuse("complementary outputs enabled without dead time", self.named("BDTR"));
@@ -764,7 +764,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_changes_between_two_events_goes_on_from_there() {
+    fn a_clock_changed_between_two_events_continues_from_there() {
         let mut bench = Bench::new(Kind::General);
         for (offset, value) in [(PSC, 9), (ARR, 99), (EGR, 1), (SR, 0), (DIER, 1), (CR1, 1)] {
             bench.write(0, offset, value);
@@ -823,7 +823,7 @@ mod tests {
     }
 
     #[test]
-    fn buffered_compare_values_wait_for_the_update_and_mode_2_rises_at_them() {
+    fn buffered_compare_values_wait_for_the_update() {
         let mut bench = Bench::new(Kind::Advanced);
         let setup = [(CR1, 0xE0), (ARR, 100), (CCMR1, 0x78), (0x34, 40), (EGR, 1), (CR1, 0xE1)];
         setup.into_iter().for_each(|(offset, value)| bench.write(0, offset, value));

@@ -27,7 +27,7 @@ pub const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
 pub const QUARTERS: u32 = 4;
 /// Length of a quarter, s.
 pub const QUARTER_S: f64 = PERIOD_S / QUARTERS as f64;
-/// Conduction time at which an amplifier has long settled, s.
+/// Conduction time after which an amplifier has settled completely, s.
 const SETTLED: f64 = 1.0;
 
 /// Transfers during a time step.
@@ -142,7 +142,7 @@ impl Axis {
         self.bridge.edges(now + from, now + to)
     }
 
-    /// Falsifies both shunts at the next sample by so many amperes.
+    /// Adds an error, A, to both shunts at the next sample.
     pub fn disturb(&mut self, ampere: f64) {
         self.disturbance = ampere;
     }

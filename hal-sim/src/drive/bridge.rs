@@ -97,11 +97,11 @@ pub struct Bridge {
     schedule: Schedule,
 }
 
-/// A time long enough for amplifiers to settle, s.
+/// Time that is sufficient for amplifiers to settle, s.
 const LONG: f64 = 1.0;
 
 impl Bridge {
-    /// A bridge with outputs off, for a period of so many s.
+    /// A bridge with outputs off, for a period of this length, s.
     #[must_use]
     pub fn new(description: &BridgeDescription, period: f64) -> Self {
         let leg =
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_duty_less_the_dead_time_is_what_the_high_side_conducts() {
+    fn the_high_side_conducts_for_the_duty_minus_the_dead_time() {
         let description = BridgeDescription::default();
         let mut bridge = Bridge::new(&description, PERIOD);
         shares(&mut bridge, [0.5; 3]);
@@ -249,11 +249,11 @@ mod tests {
     }
 
     #[test]
-    fn extreme_duties_never_switch_and_short_pulses_are_swallowed() {
+    fn extreme_duties_never_switch_and_short_pulses_vanish() {
         let mut bridge = Bridge::new(&BridgeDescription::default(), PERIOD);
         let changes = shares(&mut bridge, [1.0, 0.0, f32::NAN]);
         let steady = shares(&mut bridge, [1.0, 0.0, f32::NAN]);
-        assert!((changes[0][2] - 20.0 / 168e6).abs() < 1e-15, "turned on after the dead time: {changes:?}");
+        assert!((changes[0][2] - 20.0 / 168e6).abs() < 1e-15, "not turned on after the dead time: {changes:?}");
         assert_eq!(steady, [[PERIOD, 0.0, 0.0], [0.0, PERIOD, 0.0], [0.0, PERIOD, 0.0]]);
         // 5 of 3500 steps are 60 ns, half of the dead time.
         shares(&mut bridge, [5.0 / 3500.0, 1.0 - 5.0 / 3500.0, 0.5]);
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_released_bridge_is_off_in_all_outputs() {
+    fn a_disabled_bridge_is_off_in_all_outputs() {
         let mut bridge = Bridge::new(&BridgeDescription::default(), PERIOD);
         bridge.begin(&AxisCommand::RELEASED);
         assert_eq!(bridge.next_edge(PERIOD), PERIOD);

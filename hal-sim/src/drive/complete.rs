@@ -12,7 +12,7 @@
 //! axis, bus voltage within a quarter.
 //!
 //! **Coupling.** Where coupling is described, an edge of another axis' bridge shortly before an axis'
-//! converter holds falsifies both of its shunts.
+//! converter holds adds an error to both of its shunts.
 //! Known limit: an axis that begins at the same instant does not disturb.
 
 use super::axis::{Axis, AxisFlow, PERIOD_S, QUARTER_S, QUARTERS};

@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn the_index_comes_once_per_turn_at_the_same_place_from_both_sides() {
+    fn the_index_comes_once_per_turn_at_one_position_from_both_sides() {
         let mut counter = counter(EncoderWiring::Forward);
         let mut seen = [(0, 0); 7];
         let mut pulses = 0;

@@ -91,8 +91,8 @@ impl Default for ShuntDescription {
 }
 
 impl ShuntDescription {
-    /// Delay from the middle of the lower zero vector to the hold, s, for a trigger so many timer clocks
-    /// after that middle. The converter samples for three of its clocks of 21 MHz.
+    /// Delay from the middle of the lower zero vector to the hold, s, for a trigger this number of timer
+    /// clocks after that middle. The converter samples for three of its clocks of 21 MHz.
     #[must_use]
     pub fn delay_of(trigger_clocks: f64) -> f64 {
         trigger_clocks / f64::from(BRIDGE_CLOCK_HZ) + 3.0 / 21e6

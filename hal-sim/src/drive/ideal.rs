@@ -5,10 +5,10 @@
 //! torque at the joint = torque per ampere * current
 //! ```
 //!
-//! Why no more: this drive tests servo and identification apart from a current loop. Between servo ticks the
-//! current is the straight line between its exact values at the ticks. So the current read at the ticks and
-//! the torque on the leg belong together without a time shift. (The exponential would shift the torque by 4 %
-//! of a tick at the default lag.)
+//! This drive tests servo and identification apart from a current loop. Between servo ticks the current is
+//! the straight line between its exact values at the ticks. So the current read at the ticks and the torque
+//! on the leg match without a time shift. (The exponential would shift the torque by 4 % of a tick at the
+//! default lag.)
 //! Known limits: no bus voltage, no back-EMF limit, no saturation.
 //! Cost: 4 operations per tick.
 

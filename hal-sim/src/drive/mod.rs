@@ -8,7 +8,7 @@
 //! | [`bridge`] | conduction of each switch: centred pulses, dead time |
 //! | [`shunts`] | amplifiers and converter: the codes that the firmware reads |
 //! | [`counter`] | encoder counter with its index pulse |
-//! | [`supply`] | bus capacitor, source that takes nothing back, brake resistor |
+//! | [`supply`] | bus capacitor, source that absorbs no energy, brake resistor |
 //! | [`axis`] | motor, bridge, shunts and counter as one axis, a quarter of a PWM period at a time |
 //! | [`complete`] | all axes on their supply |
 //! | [`stand`] | one axis on a test stand |

@@ -293,7 +293,7 @@ impl Motor {
         self.flow(&half, &currents, duration)
     }
 
-    /// Whether the magnets' voltage alone opens no diode.
+    /// Whether the magnets' voltage alone conducts through no diode.
     fn stays_dark(&self, terminals: &[Terminal; 3], speed: f64) -> bool {
         let between = 2.0 * SIN_60 * self.description.flux * speed.abs();
         terminals.iter().all(|terminal| match terminal {

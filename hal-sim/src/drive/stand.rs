@@ -102,7 +102,7 @@ impl Stand {
         self.torque
     }
 
-    /// Present currents along and across the magnets' axis, A; no sensor of the board measures them.
+    /// Present currents along and across the magnets' axis, A; the board has no sensor for them.
     #[must_use]
     pub fn rotor_currents(&self) -> [f64; 2] {
         self.axis().motor().rotor_currents()

@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_back_stays_in_the_capacitor_until_the_brake_takes_it() {
+    fn returned_energy_stays_in_the_capacitor_until_the_brake_takes_it() {
         let mut bus = Supply::new(&supply());
         let energy = |voltage: f64| 0.5 * 1.5e-3 * voltage * voltage;
         for _ in 0..1000 {
@@ -124,7 +124,7 @@ mod tests {
             bus.advance(0.0, 1.0, 1e-6);
         }
         let held = 48.0 * 2.0 / 2.05;
-        assert!((bus.voltage() - held).abs() < 1e-6, "the source feeds the resistor: {}", bus.voltage());
+        assert!((bus.voltage() - held).abs() < 1e-6, "the source should feed the resistor: {}", bus.voltage());
     }
 
     #[test]

@@ -25,13 +25,13 @@ pub enum Form {
     Stuck,
     /// Random values over the channel's range.
     Garbage,
-    /// Constant value; also NaN where the channel can carry it.
+    /// Constant value; NaN where the channel can carry it.
     Rail(f64),
     /// Adds this value.
     Offset(f64),
     /// Scales the distance from the channel's middle.
     Scale(f64),
-    /// Delays by so many readings, at most 31.
+    /// Delays by this number of readings, at most 31.
     Delayed(u8),
     /// First-order lag: this share of the difference per reading.
     Slow(f64),
@@ -51,13 +51,13 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// From a tick on, for ever.
+    /// From a tick on, permanently.
     #[must_use]
     pub const fn from(begin: u64) -> Self {
         Self { begin, duration: u64::MAX, on: 1, off: 0 }
     }
 
-    /// From a tick on, for so many ticks.
+    /// From a tick on, for a number of ticks.
     #[must_use]
     pub const fn lasting(begin: u64, duration: u64) -> Self {
         Self { begin, duration, on: 1, off: 0 }
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn every_form_spoils_from_its_tick_on_and_nothing_before() {
+    fn every_form_acts_from_its_tick_on_and_not_before() {
         let from = |form| seen(form, Timing::from(3));
         assert_eq!(from(Form::Off), [10.0, 11.0, 12.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(from(Form::Stuck), [10.0, 11.0, 12.0, 12.0, 12.0, 12.0, 12.0, 12.0]);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_ends_and_an_intermittent_one_comes_and_goes() {
+    fn a_fault_ends_and_an_intermittent_one_alternates() {
         let twice = seen(Form::Rail(0.0), Timing { begin: 1, duration: 5, on: 1, off: 2 });
         assert_eq!(twice, [10.0, 0.0, 12.0, 13.0, 0.0, 15.0, 16.0, 17.0]);
         assert_eq!(seen(Form::Off, Timing::lasting(6, 1))[5..], [15.0, 0.0, 17.0]);

@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisSample, JointSample};
 use scarab::units::Ampere;
 
-/// Greatest number of simultaneous injections.
+/// Largest number of simultaneous injections.
 pub const MOST: usize = 4;
 
 /// Faulted signal.
@@ -55,7 +55,7 @@ pub enum Channel {
 pub struct Injection {
     /// Faulted signal.
     pub channel: Channel,
-    /// Joint of the signal; ignored for signals that the board has once.
+    /// Joint of the signal; ignored for signals that the board has only once.
     pub joint: usize,
     /// Form of the fault; for contacts and timing every form means that the event occurs.
     pub form: Form,
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_channel_and_the_joint_named_are_spoilt() {
+    fn only_the_named_channel_and_joint_are_faulted() {
         let lost = spoilt(Channel::Counter, Form::Offset(-12.0));
         let moved = AxisSample { encoder_count: 65_534, index_count: Some(65_532), ..SAMPLE };
         assert_eq!(lost, [SAMPLE, moved]);
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_room_for_so_many_and_no_more() {
+    fn the_number_of_injections_is_limited() {
         let mut injector = Injector::new(1);
         let open = |tick| Injection {
             channel: Channel::EmergencyStop,

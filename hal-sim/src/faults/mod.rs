@@ -1,8 +1,8 @@
 //! Faults of sensors, contacts, timing and commands, injected into the ports of a board.
 //!
-//! Why as middleware: world and firmware stay unchanged. Every value that crosses a port passes through an
-//! [`Injector`], and leaves unchanged unless an [`Injection`] names its channel at that tick. An injector is
-//! a value: it is cloned with its world, and the same seed changes the same bits.
+//! The injector stands between the ports, so world and firmware stay unchanged. Every value that crosses a
+//! port passes through an [`Injector`], and leaves unchanged unless an [`Injection`] names its channel at
+//! that tick. An injector is a value: it is cloned with its world, and the same seed changes the same bits.
 //!
 //! ```text
 //! world -- AxisSample --> injector --> axis -- JointSample --> injector --> servo

@@ -1,7 +1,6 @@
 //! Calibration of many motors and wirings: the firmware's procedure against the simulated hardware.
 //!
-//! Everything varies with the seed: motor, encoder, shunts, friction, cogging, and rotated motor
-//! leads.
+//! Everything varies with the seed: motor, encoder, shunts, friction, cogging, and rotated motor leads.
 //! Figures: `cargo test -p hal-sim --test calibration -- --nocapture`.
 
 mod trial;
@@ -21,7 +20,7 @@ fn errors(seed: u64) -> [f64; 4] {
     let (mut stand, result, _) = trial.run(seed);
     let found = result.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{trial:?}"));
     let motor = &trial.axis.motor;
-    // The on-resistance of a switch is part of what the modulator's voltage sees.
+    // The on-resistance of a switch is part of the resistance that the modulator's voltage acts on.
     let resistance = motor.resistance + trial.axis.bridge.on_resistance;
 
     // The rotor turns slowly over many counts (2,400 counts and 21 pole pairs are 3 degrees each)
@@ -71,12 +70,12 @@ fn sound(seeds: core::ops::RangeInclusive<u64>) {
     assert!(worst[..3].iter().all(|error| *error < 0.02) && worst[3] < 1.0, "{worst:?}");
 }
 
-/// Number of kinds of [`spoil`].
+/// Number of kinds of wiring faults.
 const KINDS: u64 = 18;
 
 /// Applies each wiring fault in turn and returns the expected refusal. The axis keeps its settings;
 /// the hardware changes.
-fn spoil(trial: &mut Trial, seed: u64) -> Refusal {
+fn apply_wiring_fault(trial: &mut Trial, seed: u64) -> Refusal {
     let holding = trial.holding();
     let wiring = &mut trial.axis.wiring;
     match seed % KINDS {
@@ -156,7 +155,7 @@ fn spoil(trial: &mut Trial, seed: u64) -> Refusal {
 fn wrong(seeds: core::ops::RangeInclusive<u64>) {
     for seed in seeds {
         let mut trial = Trial::sound(seed);
-        let expected = spoil(&mut trial, seed);
+        let expected = apply_wiring_fault(&mut trial, seed);
         let (stand, result, furthest) = trial.run(seed);
         assert_eq!(result.err(), Some(expected), "seed {seed}\n{trial:?}");
         // No runaway: the rotor moved no further than the field's path plus half an electrical turn
@@ -167,14 +166,14 @@ fn wrong(seeds: core::ops::RangeInclusive<u64>) {
     }
 }
 
-/// Calibration of a faultless trial, as stored while the power is off.
+/// Calibration of a faultless trial, as stored before the power was turned off.
 fn stored(trial: &Trial, seed: u64) -> StoredCalibration {
     let (_, found, _) = trial.run(seed);
     found.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{trial:?}")).stored().expect("an index")
 }
 
 #[test]
-fn what_was_stored_is_accepted_by_the_same_motor_and_by_no_wrong_wiring() {
+fn a_stored_calibration_is_accepted_by_the_same_motor_only() {
     for seed in 101..=100 + 2 * KINDS {
         let mut trial = Trial::sound(seed);
         let stored = stored(&trial, seed);
@@ -192,14 +191,14 @@ fn what_was_stored_is_accepted_by_the_same_motor_and_by_no_wrong_wiring() {
         // The value is measured, not taken from the store.
         assert!(shares.iter().any(|share| *share != 1.0), "seed {seed}");
 
-        let expected = spoil(&mut trial, seed);
+        let expected = apply_wiring_fault(&mut trial, seed);
         let (_, result, _) = trial.run_stored(seed, stored);
         assert_eq!(result.err(), Some(expected), "seed {seed}\n{trial:?}");
     }
 }
 
 #[test]
-fn a_motor_of_another_inductance_is_seen_at_the_next_power_up() {
+fn another_inductance_is_detected_at_the_next_power_up() {
     for (seed, share, seen) in [(1, 1.3, true), (2, 0.75, true), (3, 1.12, false), (4, 0.88, false)] {
         for across in [false, true] {
             let mut trial = Trial::sound(seed);
@@ -213,7 +212,7 @@ fn a_motor_of_another_inductance_is_seen_at_the_next_power_up() {
 }
 
 #[test]
-fn an_encoder_that_turned_on_its_shaft_is_seen_at_the_next_power_up() {
+fn an_encoder_turned_on_its_shaft_is_detected_at_power_up() {
     for (seed, degrees, seen) in [(1, 8.0, true), (2, -8.0, true), (3, 60.0, true), (4, 2.0, false)] {
         let mut trial = Trial::sound(seed);
         let stored = stored(&trial, seed);
@@ -224,17 +223,17 @@ fn an_encoder_that_turned_on_its_shaft_is_seen_at_the_next_power_up() {
 }
 
 #[test]
-fn sound_motors_are_measured_and_their_torque_has_the_right_sign() {
+fn faultless_motors_are_measured_with_the_right_sign_of_torque() {
     sound(1..=100);
 }
 
 #[test]
-fn every_wrong_wiring_is_refused_by_name_and_no_rotor_runs_away() {
+fn every_wrong_wiring_is_refused_by_name_without_runaway() {
     wrong(1..=100);
 }
 
 #[test]
-fn counts_per_turn_that_are_not_the_encoders_are_refused() {
+fn wrong_counts_per_turn_are_refused() {
     for seed in 1..=12 {
         let mut trial = Trial::sound(seed);
         // Far from the true value, and 2.4 % from it.

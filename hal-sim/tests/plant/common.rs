@@ -6,7 +6,7 @@ use hal_sim::description::{
     EncoderSide, FrictionDescription, JointDescription, LegDescription,
 };
 
-/// A joint with an ideal drive (1 N m/A, no lag), a fine encoder, no rotor, no friction and no noise.
+/// A joint with an ideal drive (1 N m/A, no lag), a fine encoder, and without rotor, friction or noise.
 pub fn joint(frame: [f64; 3], mass: f64, com: [f64; 3], inertia_com: [f64; 6]) -> JointDescription {
     let [alpha, a, d] = frame;
     JointDescription {

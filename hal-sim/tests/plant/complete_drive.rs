@@ -66,7 +66,7 @@ fn held(voltages: [f64; 3]) -> [Terminal; 3] {
 }
 
 #[test]
-fn a_locked_rotor_takes_current_by_each_inductance_and_the_resistance() {
+fn current_of_a_locked_rotor_follows_inductances_and_resistance() {
     let angle = 0.9;
     for (turn, inductance) in [(0.0, MOTOR.inductance_d), (PI / 2.0, MOTOR.inductance_q)] {
         let mut motor = cold(angle);
@@ -80,7 +80,7 @@ fn a_locked_rotor_takes_current_by_each_inductance_and_the_resistance() {
         let index = usize::from(turn > 0.0);
         // Midpoint steps of 0.1 us against a time constant of 0.4 ms.
         assert!((found[index] - expected).abs() < 1e-6, "{found:?} {expected}");
-        assert!(found[1 - index].abs() < 1e-9, "the axes do not couple at rest: {found:?}");
+        assert!(found[1 - index].abs() < 1e-9, "the axes couple at rest: {found:?}");
     }
 }
 
@@ -105,7 +105,7 @@ fn torque_is_that_of_magnets_and_reluctance() {
 
 /// Steady state of a motor with connected terminals, by the textbook's equations.
 #[test]
-fn a_short_circuit_brakes_with_the_current_and_the_torque_of_the_textbook() {
+fn a_short_circuit_brakes_with_the_textbook_s_current_and_torque() {
     for speed in [50.0, 600.0, 3000.0] {
         let mut motor = cold(0.0);
         let mut mean = 0.0;
@@ -130,7 +130,7 @@ fn a_short_circuit_brakes_with_the_current_and_the_torque_of_the_textbook() {
 }
 
 #[test]
-fn open_terminals_show_the_magnets_voltage_and_make_no_torque() {
+fn open_terminals_have_the_magnets_voltage_and_no_torque() {
     let off = [Terminal::Off(f64::NEG_INFINITY, f64::INFINITY); 3];
     let mut motor = cold(0.0);
     let speed = 1500.0;
@@ -189,7 +189,7 @@ fn turning(
 }
 
 #[test]
-fn what_the_bus_gives_is_heat_work_and_field() {
+fn energy_from_the_bus_is_heat_work_and_field() {
     // Motoring and braking at a speed with a back-EMF of 3.0 V.
     let speed = 150.0;
     for lead in [PI / 2.0, 2.3, -PI / 2.0] {
@@ -212,7 +212,7 @@ fn what_the_bus_gives_is_heat_work_and_field() {
 }
 
 #[test]
-fn a_dead_time_costs_its_share_of_the_bus_against_the_current() {
+fn dead_time_reduces_the_voltage_against_the_current() {
     let mut with = axis();
     with.bridge.diode_drop = 0.0;
     let mut without = with;
@@ -259,7 +259,7 @@ fn codes_are_the_currents_at_the_middle_of_the_lower_zero_vector() {
 
 /// Comparison with every step between edges divided by a hundred.
 #[test]
-fn edges_alone_are_steps_fine_enough() {
+fn steps_at_edges_alone_are_fine_enough() {
     let description = axis();
     let speed = 225.0;
     let (coarse, flows) = turning(&description, speed, 6.6, 1.95, 240);
@@ -327,7 +327,7 @@ fn braking_charges_the_capacitor_and_the_brake_resistor_discharges_it() {
 }
 
 #[test]
-fn an_axis_answers_a_command_half_a_period_after_the_one_before() {
+fn an_axis_applies_a_command_half_a_period_after_the_previous_axis() {
     let mut drives = CompleteDrives::new(&board(), &[0.0; 2], 1);
     let command = duties(3.0, 0.3);
     let bus = |drives: &CompleteDrives<2>| drives.axes().map(|axis| axis.currents()[0]);
@@ -354,7 +354,7 @@ fn codes_beside(volt: f64, shift_quarters: u32, ampere_per_edge: f64) -> [[u16; 
 }
 
 #[test]
-fn edges_of_the_other_bridge_disturb_a_sample_a_quarter_of_a_period_apart_and_not_half() {
+fn edges_of_the_other_bridge_disturb_at_quarter_but_not_half_period() {
     let step = axis().shunts.ampere_per_code();
     let errors = |volt: f64, shift: u32, ampere: f64| {
         let [with, without] = [ampere, 0.0].map(|ampere| codes_beside(volt, shift, ampere));
@@ -387,7 +387,7 @@ fn edges_of_the_other_bridge_disturb_a_sample_a_quarter_of_a_period_apart_and_no
 }
 
 #[test]
-fn wires_lead_where_they_are_connected() {
+fn wiring_connects_outputs_to_the_described_phases() {
     let current = |wiring: Wiring| {
         let mut description = axis();
         description.wiring = wiring;
@@ -414,11 +414,11 @@ fn wires_lead_where_they_are_connected() {
     let open = current(Wiring { open: Some(1), ..Wiring::default() });
     assert!(open[0].abs() < 0.1, "{open:?}");
     let swapped = current(Wiring { phases: [0, 2, 1], ..Wiring::default() });
-    assert!((swapped[0] - plain[0]).abs() < 0.5, "the bridge's output carries the same: {swapped:?}");
+    assert!((swapped[0] - plain[0]).abs() < 0.5, "the current of the bridge's output differs: {swapped:?}");
 }
 
 #[test]
-fn a_loaded_winding_warms_towards_its_resistance_times_its_power() {
+fn a_loaded_winding_warms_by_thermal_resistance_times_power() {
     let mut description = axis();
     description.motor.thermal_time = 0.05;
     let mut axis = Axis::new(&description, 0.0, 0);
@@ -436,13 +436,13 @@ fn a_loaded_winding_warms_towards_its_resistance_times_its_power() {
 }
 
 #[test]
-fn a_free_rotor_on_the_stand_gains_what_the_torque_gives_it_and_sticks_at_rest() {
+fn a_free_rotor_accelerates_by_the_torque_and_sticks_at_rest() {
     let load = |torque: f64| Load::Free { inertia: 2e-4, coulomb: 0.02, viscous: 0.0, torque };
     let mut stand = Stand::new(&axis(), &SupplyDescription::default(), load(0.015), 0.3, 1);
     for _ in 0..1000 {
         stand.period(&AxisCommand::RELEASED, 0.0);
     }
-    assert_eq!(stand.rotor(), Rotor { angle: 0.3, speed: 0.0 }, "the load is less than the friction");
+    assert_eq!(stand.rotor(), Rotor { angle: 0.3, speed: 0.0 }, "a load below the friction moves the rotor");
     stand.set_load(load(0.05));
     for _ in 0..2400 {
         stand.period(&AxisCommand::RELEASED, 0.0);
@@ -458,7 +458,7 @@ fn shaken(world: &mut World<2>, periods: core::ops::Range<u32>) -> Vec<[AxisSamp
 }
 
 #[test]
-fn a_world_with_complete_drives_repeats_to_the_bit_and_copies_go_on_alike() {
+fn a_world_with_complete_drives_and_its_copies_repeat_bit_for_bit() {
     let noisy = || {
         let mut board = board();
         for axis in &mut board.axes {
@@ -483,7 +483,7 @@ fn a_world_with_complete_drives_repeats_to_the_bit_and_copies_go_on_alike() {
 }
 
 #[test]
-fn a_coasting_leg_swings_as_with_ideal_drives_that_are_released() {
+fn a_coasting_leg_swings_as_with_ideal_drives_off() {
     // Without current the electrical part has no effect; only the step of the mechanics differs, 42
     // instead of 250 us.
     let mut ideal = World::new(&worn_leg(), 1);

@@ -7,13 +7,13 @@ use scarab::hal::DriveCommand;
 use scarab::units::Ampere;
 
 const STOPS: [[f64; 2]; 2] = [[-0.2, 2.0], [-0.1, 2.4]];
-/// The falls of these poses press a joint into its buffer by less than that, rad.
+/// Largest penetration of a buffer in the falls from these poses, rad.
 const DEEPEST: f64 = 0.06;
 /// Integration error between two contacts, J; the legs have some 10 J.
 const ERROR_J: f64 = 5e-3;
 
 #[test]
-fn a_falling_leg_ends_at_its_stops_and_gains_no_energy() {
+fn a_falling_leg_ends_at_its_stops_without_gaining_energy() {
     let mut leg = planar_leg();
     leg.joints.iter_mut().zip(STOPS).for_each(|(joint, stops)| joint.stops = Some(stops));
     let mechanism = Mechanism::new(&leg);

@@ -19,7 +19,7 @@ fn flywheel(friction: FrictionDescription) -> LegDescription<1> {
 }
 
 #[test]
-fn a_leg_held_off_its_equilibrium_by_friction_does_not_move_by_one_bit() {
+fn a_leg_held_by_friction_does_not_move_by_one_bit() {
     let mut held = planar_leg();
     held.joints[0].friction = dry(12.0);
     held.joints[1].friction = dry(5.0);
@@ -50,7 +50,7 @@ fn a_resting_joint_breaks_away_at_its_level_and_not_before() {
 }
 
 #[test]
-fn a_sliding_joint_comes_to_rest_after_the_time_and_way_of_its_friction() {
+fn a_sliding_joint_stops_after_the_analytic_time_and_distance() {
     let wheel = Leg::new(&flywheel(dry(3.0)));
     let mut state = LegState { angles: [0.0], rates: [1.5003] };
     let mut ticks = 0;
@@ -83,7 +83,7 @@ fn friction_that_falls_with_speed_is_integrated_to_second_order() {
 }
 
 #[test]
-fn viscous_friction_and_offset_settle_where_they_balance_the_torque() {
+fn speed_settles_where_viscous_friction_and_offset_balance_the_torque() {
     let friction = FrictionDescription { coulomb: 1.0, viscous: 4.0, offset: 0.5, stribeck: None };
     let wheel = Leg::new(&flywheel(friction));
     let mut state = LegState { angles: [0.0], rates: [0.0] };
@@ -108,7 +108,7 @@ fn stribeck_holds_to_its_static_level_and_falls_to_coulomb_with_speed() {
     for _ in 0..8000 {
         wheel.advance(&mut sliding, &[5.01], &[5.01], TICK_S);
     }
-    assert!(sliding.rates[0] > 1.0, "broken away, the wheel speeds up: {}", sliding.rates[0]);
+    assert!(sliding.rates[0] > 1.0, "the wheel does not speed up after breaking away: {}", sliding.rates[0]);
     // 4 N m cannot start the wheel but keep it turning.
     let mut kept = LegState { angles: [0.0], rates: [0.5] };
     for _ in 0..400 {
@@ -122,7 +122,7 @@ fn stribeck_holds_to_its_static_level_and_falls_to_coulomb_with_speed() {
 }
 
 #[test]
-fn coupled_joints_stick_and_slide_as_inverse_dynamics_of_their_motion_demands() {
+fn coupled_joints_stick_and_slide_consistently_with_inverse_dynamics() {
     // The chain is shaken hard enough that each joint starts, stops and turns many times.
     let mut chain = spatial_chain();
     for (joint, coulomb) in chain.joints.iter_mut().zip([12.0, 14.0, 5.0]) {
@@ -140,12 +140,12 @@ fn coupled_joints_stick_and_slide_as_inverse_dynamics_of_their_motion_demands() 
             let difference = torque[joint] - demanded[joint];
             let level = chain.joints[joint].friction.coulomb;
             if state.rates[joint] != 0.0 {
-                assert!(difference.abs() < 1e-9, "a sliding joint's torque is determined: {difference}");
+                assert!(difference.abs() < 1e-9, "torque error of a sliding joint: {difference}");
             } else if acceleration[joint] == 0.0 {
                 resting[joint] += 1;
                 assert!(
                     difference.abs() <= level + 1e-9,
-                    "a stuck joint holds at most its level: {difference}"
+                    "a stuck joint holds more than its level: {difference}"
                 );
             } else {
                 assert!((difference - level * acceleration[joint].signum()).abs() < 1e-9, "{difference}");
@@ -153,7 +153,7 @@ fn coupled_joints_stick_and_slide_as_inverse_dynamics_of_their_motion_demands() 
         }
         leg.advance(&mut state, &torque, &torque, TICK_S);
     }
-    assert!(resting.iter().all(|&ticks| ticks > 200), "every joint has been stuck for a while: {resting:?}");
+    assert!(resting.iter().all(|&ticks| ticks > 200), "a joint was hardly ever stuck: {resting:?}");
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn no_friction_makes_a_step_unstable() {
 }
 
 #[test]
-fn a_leg_whose_bridges_are_released_swings_out_and_hangs() {
+fn a_leg_with_bridges_off_swings_out_and_hangs() {
     let mut world = World::new(&worn_leg(), 5);
     world.place(&[0.9, 0.3]);
     let pushing = DriveCommand { enabled: true, currents: [Ampere(40.0), Ampere(5.0)] };

@@ -35,7 +35,7 @@ fn energy_deviation(step: f64) -> (f64, f64) {
 }
 
 #[test]
-fn energy_of_a_frictionless_leg_is_kept_to_second_order() {
+fn energy_of_a_frictionless_leg_is_conserved_to_second_order() {
     let (largest, late) = energy_deviation(TICK_S);
     let (largest_at_half, _) = energy_deviation(0.5 * TICK_S);
     println!("energy deviation: largest {largest:e} J, mean of the last second {late:e} J");
@@ -46,7 +46,7 @@ fn energy_of_a_frictionless_leg_is_kept_to_second_order() {
 }
 
 #[test]
-fn a_frictionless_leg_runs_back_to_where_it_started() {
+fn a_frictionless_leg_returns_to_its_start_in_reversed_time() {
     let leg = Leg::new(&planar_leg());
     let mut state = START;
     for _ in 0..8000 {

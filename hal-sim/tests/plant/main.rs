@@ -1,4 +1,4 @@
-//! Simulated hardware against the textbook.
+//! Simulated hardware against textbook formulas.
 
 mod common;
 mod complete_drive;

@@ -28,14 +28,14 @@ fn run(world: &mut World<2>, ticks: core::ops::Range<u32>) -> Vec<Sample<2>> {
 }
 
 #[test]
-fn equal_seeds_give_equal_bits_and_others_do_not() {
+fn equal_seeds_give_equal_bits_and_different_seeds_do_not() {
     let samples = |seed: u64| run(&mut World::new(&noisy_leg(), seed), 0..8000);
     assert!(samples(7) == samples(7));
     assert!(samples(7) != samples(8));
 }
 
 #[test]
-fn copies_of_a_world_go_on_alike() {
+fn copies_of_a_world_continue_identically() {
     let mut world = World::new(&noisy_leg(), 7);
     run(&mut world, 0..3000);
     let mut copy = world.clone();
@@ -90,13 +90,13 @@ fn current_noise_has_its_stated_size_in_the_mean_of_eight_samples() {
         }
         sum += mean / f64::from(rows);
         squares += mean * mean / f64::from(rows);
-        assert_eq!(world.sample().joints[1].current, Ampere(0.0), "the other joint's sensor is noiseless");
+        assert_eq!(world.sample().joints[1].current, Ampere(0.0), "the other joint's sensor must be noise-free");
     }
     // 10,000 rows determine a standard deviation to 0.7 %, a mean to 0.007 A; the tolerance is four
     // times that.
     assert!((squares.sqrt() / 0.7 - 1.0).abs() < 0.028, "{}", squares.sqrt());
     assert!(sum.abs() < 0.028, "{sum}");
-    assert!((single_squares.sqrt() / (0.7 * 8.0_f64.sqrt()) - 1.0).abs() < 0.01, "white: {single_squares}");
+    assert!((single_squares.sqrt() / (0.7 * 8.0_f64.sqrt()) - 1.0).abs() < 0.01, "the noise is not white: {single_squares}");
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn drive_follows_its_target_with_the_exact_lag_and_never_beyond_its_limit() {
 }
 
 #[test]
-fn a_mirrored_and_turned_joint_behaves_alike_at_its_ports() {
+fn a_mirrored_or_turned_description_behaves_identically_at_the_ports() {
     let plain = worn_leg();
     // Equivalent description of the leg. The knee's axis is reversed (its frame turned by half a turn about
     // x). The hip's angle is counted from another zero (the base turned about the hip's axis).
@@ -151,7 +151,7 @@ fn a_mirrored_and_turned_joint_behaves_alike_at_its_ports() {
         other.tick(&shaken(tick));
     }
     let (one, other) = (one.truth(), other.truth());
-    assert!(one.position[1].abs() > 0.01, "the leg moved: {one:?}");
+    assert!(one.position[1].abs() > 0.01, "the leg did not move: {one:?}");
     assert_eq!(one.sticking, other.sticking);
     for joint in 0..2 {
         // Rounding differs by the turned frames; two seconds of motion hardly amplify it.
@@ -162,7 +162,7 @@ fn a_mirrored_and_turned_joint_behaves_alike_at_its_ports() {
 }
 
 #[test]
-fn pushes_move_the_leg_without_showing_in_the_motor_torque_and_only_when_asked_for() {
+fn pushes_move_the_leg_without_motor_torque() {
     let mut pushed = worn_leg();
     pushed.pushes = Some(PushDescription { rate: 5.0, torque: 60.0, duration: 0.2 });
     let mut quiet = World::new(&worn_leg(), 2);
@@ -181,7 +181,7 @@ fn pushes_move_the_leg_without_showing_in_the_motor_torque_and_only_when_asked_f
 }
 
 #[test]
-fn a_mass_fixed_to_a_link_costs_its_own_weight_and_inertia() {
+fn a_mass_fixed_to_a_link_adds_its_own_weight_and_inertia() {
     let description = worn_leg();
     let bare = World::new(&description, 1);
     let mut loaded = bare.clone();
