@@ -1,4 +1,4 @@
-//! Links images for the emulated microcontroller; programs of the host need nothing.
+//! Links images for the emulated microcontroller; host programs need no settings.
 
 use std::env;
 

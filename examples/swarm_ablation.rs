@@ -1,4 +1,4 @@
-//! Ablation study of the default beetle swarm: one part left out at a time (results in
+//! Ablation study of the default beetle swarm: one part is disabled at a time (results in
 //! `docs/results/bso.md`).
 //!
 //! `cargo run --release --example swarm_ablation -- [runs] [first seed]`
@@ -67,7 +67,7 @@ fn main() -> Result<(), SwarmError> {
     rugged(runs, first_seed)
 }
 
-/// The whole and everything that can be left out of it.
+/// The complete swarm, and every part that can be disabled.
 fn variants<T: Real>() -> Vec<(&'static str, AdaptiveSettings<T>)> {
     let whole = AdaptiveSettings::default();
     let without = |part| AdaptiveSettings { without: Some(part), ..whole };
@@ -168,7 +168,7 @@ fn plane(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
     Ok(())
 }
 
-/// A test function whose every call is wrong by something else.
+/// A test function with independent noise in every call.
 struct Noisy {
     problem: TestProblem,
     size: f64,
@@ -190,7 +190,7 @@ impl Objective<f64> for Noisy {
     }
 }
 
-/// How far the true value at the reported best is above the minimum after 150 iterations, median.
+/// Median of the true value at the reported best, above the minimum, after 150 iterations.
 fn noise(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
     const SIZES: [f64; 4] = [0.0, 0.01, 0.1, 1.0];
     println!("\n| standard deviation of the noise | 0 | 0.01 | 0.1 | 1 |\n| --- | --- | --- | --- | --- |");
@@ -254,7 +254,7 @@ impl Objective<f64> for Rugged {
     }
 }
 
-/// How far the leaps reach.
+/// Prints how far the leaps reach on rugged functions.
 fn rugged(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
     println!("\n| Rastrigin, shifted | iterations | evaluations, median |\n| --- | --- | --- |");
     for (name, dimension, scale, slanted) in [

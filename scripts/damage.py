@@ -176,7 +176,7 @@ def hold_angle(recordings, size, joint):
 
 
 def quantise(recordings, size, joint):
-    """Angles of an encoder at the joint with so many bits; a whole count stays one, whatever its last digit."""
+    """Angles of an encoder at the joint with this number of bits; a whole count stays one, whatever its last digit."""
     step = 2.0 * np.pi / 2.0**size
     for r in recordings:
         for c in columns(r, joint):
@@ -260,7 +260,7 @@ class Kind:
     changes_leg: bool = False
     # Words in the message of exit code 2 that name the fault.
     words: str = ""
-    # A disturbance that robust identification has to tolerate: a refusal is wrong.
+    # A disturbance that robust identification must tolerate: a refusal is wrong.
     must_accept: bool = False
     # False where torque does not identify the joint: ratio of two torque scales, mirrored planar leg.
     tells_joint: bool = True

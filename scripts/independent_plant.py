@@ -425,7 +425,7 @@ def main():
     parser.add_argument("--draws", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--rate", type=float, default=500.0, help="of the recordings, Hz; divides 4000 (500)")
-    parser.add_argument("--encoder-bits", type=int, help="encoder at the joint with so many bits, else at the motor")
+    parser.add_argument("--encoder-bits", type=int, help="bits of an encoder at the joint; without it the encoder is at the motor")
     parser.add_argument("--stribeck", type=float, default=0.0, help="surplus of friction at rest, share of Coulomb friction (0)")
     parser.add_argument("--noise", type=float, help="torque noise per 500 Hz sample, share of rms torque (0.02 to 0.06 by draw)")
     parser.add_argument("--self-check", action="store_true", help="check the equations and stop")

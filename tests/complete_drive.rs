@@ -43,7 +43,7 @@ fn complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
     // The noise of the logged torque is identical in both runs: only drives and sensors differ.
     let found = deviations(&ideal, &full);
     assert!(largest(&found) < 0.5, "{found:?}");
-    // A trigger 40 clocks before the middle of the zero vector reads as viscous friction of the knee.
+    // A trigger 40 clocks before the middle of the zero vector appears as viscous friction of the knee.
     let early = SimulationOptions {
         perturbations: vec!["trigger=-40".parse().expect("a perturbation")],
         ..options(DriveModel::Full)
@@ -78,7 +78,7 @@ fn twenty_complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
     let early = compared(&runs(DriveModel::Full, &[Perturbation::Trigger(-40.0)]));
     let friction =
         early.iter().filter(|(name, _)| name == "FV2").map(|(_, deviation)| deviation).sum::<f64>();
-    println!("trigger 40 clocks before the middle: FV2 off by {:.2} sigma on average", friction / 20.0);
+    println!("trigger 40 clocks before the middle: FV2 wrong by {:.2} sigma on average", friction / 20.0);
     assert_eq!(accepted, 20);
     assert!(largest(&found) < 0.5);
     assert!((3.0..6.0).contains(&(friction / 20.0)));
@@ -103,7 +103,7 @@ fn a_leg_with_its_board_repeats_bit_for_bit() {
     let torque = pair.world.motor_torque();
     let held = pair.world.inverse_dynamics(&pair.world.anatomical_position(), &[0.0; 2], &[0.0; 2]);
     for joint in 0..2 {
-        // The drive holds the leg against gravity; friction may take its share.
+        // The drive holds the leg against gravity; friction may carry a part.
         assert!((torque[joint] - held[joint]).abs() < 6.0, "{torque:?} {held:?}");
     }
     assert!(pair.board.as_ref().is_some_and(|board| board.fault().is_none()));

@@ -112,7 +112,7 @@ fn a_wrong_link_length_is_found_with_sign_and_size() {
 }
 
 #[test]
-fn the_first_joints_zero_is_detected_and_the_last_ones_is_not() {
+fn the_first_joint_s_zero_is_detected_and_the_last_one_s_is_not() {
     let found = look(LENGTH_M, [0.087, 0.0], NOISE_NM, 1, |_| 0.0);
     println!("{:?}", found.misalignments);
     let (delta, sigma) = of(&found, Direction::Zero, 0).expect("seen");
@@ -139,19 +139,19 @@ fn a_correct_leg_shows_no_misalignment() {
 }
 
 #[test]
-fn a_disturbance_of_both_joints_is_timed() {
+fn the_duration_of_a_disturbance_of_both_joints_is_measured() {
     let pushed = |time: f64| if (4.0..6.0).contains(&time) { 30.0 } else { 0.0 };
     let found = look(LENGTH_M, [0.0; 2], NOISE_NM, 3, pushed);
     let seen = f64::from(found.residual.longest_common_s);
     println!("{seen} s");
-    // Rows of a resting joint are excluded; the filter adds its flanks.
+    // Rows of a resting joint are excluded; the filter adds its own length.
     assert!((1.5..=2.6).contains(&seen), "{seen} s");
     let quiet = look(LENGTH_M, [0.0; 2], NOISE_NM, 3, |_| 0.0);
     assert!(quiet.residual.longest_common_s < 0.1);
 }
 
 #[test]
-fn noise_is_not_slow_and_an_unmodelled_swing_is() {
+fn only_an_unmodelled_swing_counts_as_slow_residual() {
     let by_chance = |joint: usize, found: &Found| {
         f64::from(found.residual.joints[joint].slow_by_chance(5.2, Some(NOISE_NM[joint] as f32)))
     };
@@ -211,12 +211,12 @@ fn pushed(duration_s: u32) -> (f64, f64) {
 }
 
 #[test]
-fn a_push_lasts_as_long_as_its_rows_in_any_duration() {
+fn the_duration_of_a_push_does_not_depend_on_the_motion() {
     for duration_s in [30, 120, 600] {
         let (blocks, rows) = pushed(duration_s);
         println!("{duration_s} s: {blocks:.2} s by blocks, {rows:.2} s by rows");
         assert!((0.48..=0.72).contains(&rows), "{duration_s} s: {rows} s");
-        // Why the second pass exists: blocks of ten minutes are longer than a second.
+        // Reason for the second pass: blocks of ten minutes are longer than a second.
         assert!(duration_s < 600 || blocks > 1.0, "{blocks} s");
     }
 }

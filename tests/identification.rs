@@ -1,6 +1,6 @@
 //! Identification on synthetic motion: torque from Newton-Euler in double precision, noise of known size.
 //!
-//! Without a plant: these tests check the filter chain, the information factor and the statistics alone.
+//! There is no plant: these tests check the filter chain, the information factor and the statistics alone.
 
 use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};
@@ -102,7 +102,7 @@ fn true_base() -> [f64; BASE] {
 }
 
 #[test]
-fn noise_free_torque_gives_the_base_parameters_back() {
+fn noise_free_torque_restores_the_base_parameters() {
     for plan in [Plan::OneTime, Plan::Sequential] {
         let found = estimate(22.0, 0.0, 1, plan);
         for (value, truth) in found.values.iter().zip(true_base()) {
@@ -114,7 +114,7 @@ fn noise_free_torque_gives_the_base_parameters_back() {
 }
 
 #[test]
-fn reported_sigma_has_the_coverage_it_claims() {
+fn reported_sigma_has_its_nominal_coverage() {
     for plan in [Plan::OneTime, Plan::Sequential] {
         let (mut within_one, mut within_three, mut all) = (0, 0, 0);
         for seed in 0..60 {
@@ -207,7 +207,7 @@ fn a_joint_that_does_not_move_is_refused_as_unexcited() {
 }
 
 #[test]
-fn torque_that_feeds_itself_is_refused_as_unphysical() {
+fn a_negated_torque_is_refused_as_unphysical() {
     let (mut recorder, model) = (LegRecorder::new(8.0).expect("fits"), model());
     for index in 0..10_000 {
         let state = motion(f64::from(index) / 500.0);

@@ -33,7 +33,7 @@ fn samples() -> Vec<Sample> {
         .zip(rows.chunks(2))
         .map(|(line, rows)| {
             let pair = |first: usize| [line[first], line[first + 1]];
-            assert_eq!((rows[0][0], rows[0][1], rows[1][1]), (line[0], 1.0, 2.0), "files out of step");
+            assert_eq!((rows[0][0], rows[0][1], rows[1][1]), (line[0], 1.0, 2.0), "the files have different rows");
             Sample {
                 state: JointState { q: pair(1), qd: pair(3), qdd: pair(5) },
                 rigid: pair(7),
@@ -71,8 +71,8 @@ fn leg() -> (Chain<f64, 2>, LegParameters<f64, 2>, Vector3<f64>) {
     (Chain::new(&geometry).unwrap(), parameters, gravity)
 }
 
-/// Greatest deviations from the reference in precision `T`, relative to the greatest torque and
-/// the greatest entry.
+/// Largest deviations from the reference in precision `T`, relative to the largest torque and the largest
+/// entry.
 fn deviations<T: Real>() -> (f64, f64) {
     let (chain, parameters, gravity) = leg();
     let chain = chain.convert::<T>();
@@ -114,7 +114,7 @@ fn torque_and_regressor_agree_with_the_reference_in_double_precision() {
 #[test]
 fn torque_and_regressor_agree_with_the_reference_in_single_precision() {
     let (torque, entry) = deviations::<f32>();
-    // Tolerance: about ten roundings of 6e-8, on angles that are rounded themselves.
+    // Tolerance: about ten roundings of 6e-8, on angles that are themselves rounded.
     assert!(torque < 1e-4 && entry < 1e-4, "torque {torque:e}, regressor {entry:e}");
 }
 

@@ -12,7 +12,7 @@ use scarab::store::{
 };
 use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
 
-/// Short sectors, so that every byte of every operation can be the last one.
+/// Short sectors, so that the power can be cut at every byte of every operation.
 const SECTOR: usize = 2048;
 type Small = Flash<SECTOR, 2>;
 /// Flash as on the board: two sectors of 128 KB.
@@ -109,13 +109,13 @@ fn stored_data_is_present_after_a_start() {
 }
 
 #[test]
-fn an_empty_flash_holds_no_data() {
+fn an_empty_flash_contains_no_data() {
     let (found, _) = content(Small::new(1)).unwrap();
     assert_eq!(found, Content { calibrations: [None; 2], model: None, objects: [None, None] });
 }
 
 #[test]
-fn only_a_drive_that_is_off_may_be_written_to() {
+fn writing_needs_a_drive_that_is_off() {
     let fault = Fault { code: FaultCode::Overspeed, joint: 0 };
     for state in [
         DriveState::NotReadyToSwitchOn,
@@ -135,7 +135,7 @@ fn only_a_drive_that_is_off_may_be_written_to() {
     }
 }
 
-/// Every operation of a history that turns both sectors over, cut at every byte it programs or erases.
+/// Every operation of a history that uses both sectors twice, cut at every byte that it programs or erases.
 #[test]
 fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
     let mut flash = Small::new(7);
@@ -181,7 +181,7 @@ fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
 
 /// A second cut during the repair after the first one.
 #[test]
-fn a_cut_during_a_repair_leaves_the_old_or_the_new() {
+fn a_power_cut_during_a_repair_leaves_the_old_or_the_new() {
     let mut flash = Small::new(11);
     let mut state = 1_u64;
     let mut draw = |below: u64| {
@@ -257,7 +257,7 @@ fn corrupt_flash_gives_stored_data_or_an_error() {
 }
 
 #[test]
-fn a_foreign_flash_is_usable_once_it_was_erased() {
+fn a_foreign_flash_is_usable_after_an_erase() {
     let mut foreign = Small::new(1);
     foreign.bytes_mut().fill(0x5A);
     let mut store = store(foreign);
@@ -294,7 +294,7 @@ fn a_stored_value_is_not_written_again() {
 }
 
 #[test]
-fn ranges_that_hold_no_store_are_refused() {
+fn ranges_too_small_for_a_store_are_refused() {
     for range in [0..SECTOR as u32, 0..3 * SECTOR as u32, 4..2 * SECTOR as u32 + 4, 2 * SECTOR as u32..0] {
         assert_eq!(Store::new(Small::new(1), range.clone()).err(), Some(UnfitRange), "{range:?}");
     }
@@ -302,7 +302,7 @@ fn ranges_that_hold_no_store_are_refused() {
 }
 
 #[test]
-fn a_flash_without_power_is_an_error_of_the_flash() {
+fn a_flash_without_power_gives_a_flash_error() {
     let mut dead = Small::new(1);
     dead.fail_after(Some(0));
     let mut store = store(dead);
@@ -322,7 +322,7 @@ fn ten_thousand_models_need_few_erasures() {
     let worked =
         flash.worked() - flash.erasures().iter().map(|&erased| u64::from(erased)).sum::<u64>() * 128 * 1024;
     println!(
-        "10,000 models: {worked} bytes programmed, erasures {:?} of 10,000 that a sector stands",
+        "10,000 models: {worked} bytes programmed, erasures {:?} of 10,000 permitted for a sector",
         flash.erasures()
     );
     // A record with its log's header has 204 bytes: some 640 in a sector.
@@ -333,7 +333,7 @@ fn keeper(flash: Small) -> Keeper<Small, 2> {
     Keeper::new(store(flash))
 }
 
-/// Data found by a keeper after a start: calibrations, generation of the model, bytes of the first node.
+/// Data that a start finds: calibrations, generation of the model, bytes of the first node.
 fn found(flash: Small) -> ([Option<StoredCalibration>; 2], Option<u32>, Vec<u8>, Small) {
     let mut keeper = keeper(flash);
     let calibrations = [0, 1].map(|axis| block_on(keeper.calibration(axis)));

@@ -70,7 +70,7 @@ fn settings() -> BTreeMap<String, f64> {
         leaps,
         without,
     } = AdaptiveSettings::<f64>::default();
-    assert_eq!(without, None, "the default leaves nothing out");
+    assert_eq!(without, None, "the default disables no part");
     [
         ("inertia_weight", inertia_weight),
         ("individual_learning", individual_learning),
@@ -87,7 +87,7 @@ fn settings() -> BTreeMap<String, f64> {
 }
 
 #[test]
-fn the_document_names_every_constant_of_the_default_swarm_with_its_value() {
+fn the_document_lists_every_constant_of_the_default_swarm() {
     let mut code = constants();
     assert_eq!(code.len(), 25, "{:?}", code.keys());
     code.extend(settings());

@@ -1,8 +1,8 @@
 //! The searches compared with their published tables: iterations to within 0.1 of the known minimum.
 //!
-//! Known figures (median / 95 % iterations of 200 to 1,000 runs on other seeds) stand beside each gate. Gates
-//! leave a margin for the spread of the few runs made here: about half as many iterations again for a 95th
-//! percentile. All swarms have 20 beetles and capacity for 30 coordinates in every dimension.
+//! Known figures (median / 95 % iterations of 200 to 1,000 runs on other seeds) stand beside each limit.
+//! Limits leave a margin for the spread of the few runs made here: about half as many iterations again for a
+//! 95th percentile. All swarms have 20 beetles and capacity for 30 coordinates in every dimension.
 
 use scarab::real::Real;
 use scarab::swarm::{
@@ -44,7 +44,7 @@ impl Tally {
         self.iterations.len() as f64 / self.runs as f64
     }
 
-    /// Iterations that a share of all runs does not exceed; failed runs count as endless.
+    /// Iterations that a share of all runs does not exceed; failed runs count as infinite.
     fn quantile(&self, share: f64) -> u32 {
         let rank = (share * self.runs as f64).ceil() as usize;
         self.iterations.get(rank - 1).copied().unwrap_or(u32::MAX)
@@ -114,20 +114,20 @@ fn rotation_and_shift_do_not_stop_the_adaptive_swarm() {
 }
 
 #[test]
-fn learned_metric_copes_with_bad_scaling_valleys_and_coupling() {
+fn the_learned_metric_solves_bad_scaling_valleys_and_coupling() {
     gate_both(TestFunction::ShiftedEllipsoid, 30, 15, 85, 115); // 68 / 76, condition 1e4
     gate_both(TestFunction::Rosenbrock, 10, 40, 105, 145); // 82 / 96
     gate_both(TestFunction::ShiftedSchwefel, 30, 15, 75, 100); // 60 / 67
 }
 
 #[test]
-fn restarts_leave_local_minima() {
+fn restarts_escape_local_minima() {
     gate_both(TestFunction::Levy, 10, 60, 25, 160); // 15 / 77, the tail being restarted runs
     gate_both(TestFunction::Rastrigin, 2, 60, 30, 120); // 15 / 64
 }
 
 #[test]
-fn leaps_leave_ripples_that_restarts_do_not() {
+fn leaps_escape_ripples_that_restarts_do_not() {
     // Known: 320 to 390 / 500 to 720 iterations, 97 to 100 %; without leaps 0 of 200 runs.
     let problem = TestProblem::new(TestFunction::Rastrigin, 10);
     let scattered =
@@ -143,7 +143,7 @@ fn leaps_leave_ripples_that_restarts_do_not() {
 }
 
 #[test]
-fn double_precision_goes_on_to_a_millionth() {
+fn double_precision_reaches_a_millionth() {
     // Known medians: sphere 31, Ackley 61, Rosenbrock 105 iterations. Single precision cannot reach this
     // tolerance on Ackley's function, with terms of about 20.
     for (function, dimension, most) in
@@ -169,7 +169,7 @@ fn adaptive_swarm_needs_fewer_evaluations_than_a_particle_swarm() {
 }
 
 #[test]
-fn in_the_plane_moving_the_best_only_saves_evaluations() {
+fn moving_only_the_best_saves_evaluations_in_the_plane() {
     // Known medians, best against all: 106 and 173, 362 and 772. The test requires three quarters. From 10
     // dimensions on all beetles move.
     let all = BsoSettings::Adaptive(AdaptiveSettings {

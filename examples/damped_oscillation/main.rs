@@ -16,9 +16,9 @@ const SAMPLES: usize = 100;
 const INTERVAL_S: f32 = 0.02;
 /// Standard deviation of the samples' noise.
 const NOISE: f32 = 0.05;
-/// Evaluations between two looks at the clock and at the operator.
+/// Evaluations between two checks of the clock and of a cancellation.
 const SLICE: u32 = 16;
-/// A fit by then or none.
+/// Limit of the evaluations; a fit that needs more has failed.
 const BUDGET: u32 = 20_000;
 
 fn main() -> Result<(), SwarmError> {
@@ -31,7 +31,7 @@ fn main() -> Result<(), SwarmError> {
     let cost = DampedOscillation { samples: &samples, interval: INTERVAL_S };
     let mut swarm = Bso::<f32, 20, UNKNOWNS>::new(&cost, BsoSettings::default(), seed)?;
 
-    // Cancelled after a tenth of a second of a slow processor: whatever was found until then can be used.
+    // Cancelled after a tenth of a second of a slow processor: the best values found until then can be used.
     swarm.advance(&cost, 3 * SLICE);
     let early = swarm.best().map(|best| best.value);
     println!("after {} evaluations: cost {early:?}", swarm.evaluations());

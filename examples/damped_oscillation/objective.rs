@@ -1,4 +1,4 @@
-//! A user's own objective: the five numbers of a damped oscillation, from samples of it.
+//! A user's own objective: the five parameters of a damped oscillation, from samples.
 //!
 //! Generic, without `std` and without a heap: the example on the host, a test and the image that counts
 //! instructions on the emulated microcontroller all use this file.

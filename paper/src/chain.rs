@@ -1,9 +1,9 @@
 //! Runs the whole firmware on the paper's three-joint chain: one identification, then the paper's
 //! verification motion.
 //!
-//! Why a separate runner: `identify` validates on its own motions, the paper verifies on Equations (31) and
-//! (32). Here these replace the first validation motion. Everything else is as in `identify`: the plant of
-//! this crate under the firmware's servo, its logging, identification and verdict.
+//! A separate runner is needed because `identify` validates on its own motions, while the paper verifies on
+//! Equations (31) and (32). Here these replace the first validation motion. Everything else is as in
+//! `identify`: the plant of hal-sim under the firmware's servo, its logging, identification and verdict.
 //!
 //! Every sample has the same weight (`identify --estimator plain`), as in the paper. The data have
 //! no outliers; the robust estimator would reject the servo motion of the slow first joint.
@@ -47,7 +47,7 @@ pub const NOISE_PERCENT: f64 = 7.0;
 /// Both methods, in the order of all tables.
 pub const PLANS: [Plan; 2] = [Plan::OneTime, Plan::Sequential];
 
-/// The chain as plant and as model: friction without a Stribeck curve, and none is searched for.
+/// The chain as plant and as model: friction without a Stribeck curve, and no search for one.
 pub fn leg() -> Result<LegFile, ToolError> {
     let mut leg = LegFile::load(LEG)?;
     leg.joints.iter_mut().for_each(|joint| joint.stribeck_model = Switch::Off);
@@ -123,13 +123,13 @@ pub struct Fit {
     pub percent_filtered: f64,
     /// Error against every measured sample as logged, percent.
     pub percent_of_samples: f64,
-    /// Share of the rows excluded because the joint stood still.
+    /// Share of the rows excluded because the joint was at rest.
     pub still_share: f64,
 }
 
 impl Verification {
-    /// Torque predicted by these base parameters against the actual one, Equation (33). Rows in
-    /// which the joint stands still are excluded: friction at rest is undetermined.
+    /// Torque predicted by these base parameters against the actual one, Equation (33). Rows with the joint
+    /// at rest are excluded, because friction at rest is undetermined.
     #[must_use]
     pub fn fit(&self, model: &RowModel<f32, JOINTS, ROOM>, values: &[f32; ROOM]) -> [Fit; JOINTS] {
         core::array::from_fn(|joint| {
@@ -269,7 +269,7 @@ pub fn run_all<O: Sync, R: Send>(
     run: impl Fn(&O) -> Result<R, ToolError> + Sync,
 ) -> Result<Vec<R>, ToolError> {
     let progress = ProgressBar::new(options.len() as u64).with_message(what.to_owned());
-    let style = "{msg:28} {bar:32} {pos}/{len} runs, {elapsed} gone, {eta} left";
+    let style = "{msg:28} {bar:32} {pos}/{len} runs, {elapsed} elapsed, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(style) {
         progress.set_style(style);
     }

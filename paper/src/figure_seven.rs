@@ -5,8 +5,8 @@
 //! with the torque of the plant's motors. The error against the noise-free torque is that of the
 //! parameters. The error against the measured torque includes noise, which cannot be predicted.
 //!
-//! Limits: the plant differs from the paper's, whose geometry, motion of joint 1, noise and samples
-//! are not printed. The paper's percentages are therefore listed for information only.
+//! Limits: the plant differs from the paper's, whose geometry, motion of joint 1, noise and samples are not
+//! printed. The paper's percentages are therefore listed for information only.
 
 use scarab::ident::Plan;
 use scarab_host::base::error::ToolError;
@@ -76,7 +76,7 @@ pub struct FitLine {
     pub percent_filtered: Number,
     /// Against every measured sample, median.
     pub percent_of_samples: Number,
-    /// Share of rows excluded because the joint stood still.
+    /// Share of rows excluded because the joint was at rest.
     pub still_share: Number,
 }
 

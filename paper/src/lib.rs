@@ -1,6 +1,6 @@
 //! The experiments of the paper, reproduced and compared with its printed results. `cargo paper` runs them.
 //!
-//! Why one command: each statement about the paper needs a run behind it. Each part yields one
+//! Why one command: each statement about the paper needs a run that supports it. Each part yields one
 //! [`Section`], the source of terminal output, JSON report, figures and `docs/results/paper.md`.
 //!
 //! | part | contents |
@@ -79,7 +79,7 @@ impl Part {
         Self::LoadChange,
     ];
 
-    /// Name of the part's place in a document ([`scarab_host::view::document`]).
+    /// Name of the part's section in a document ([`scarab_host::view::document`]).
     #[must_use]
     pub const fn section_name(self) -> &'static str {
         match self {
@@ -106,7 +106,7 @@ pub struct PaperOptions {
 /// Results of one part.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Name of the section's place in a document ([`scarab_host::view::document`]).
+    /// Name of the section in a document ([`scarab_host::view::document`]).
     pub name: &'static str,
     /// Tables and text, Markdown.
     pub markdown: String,

@@ -1,8 +1,8 @@
 //! Load-change experiment: the paper argues from it but does not show it.
 //!
-//! The paper says that combined values "are susceptible to load changes" and have to be identified again,
-//! single values not. Here the chain is identified, a mass unknown to the firmware is fixed to its third
-//! link, and the chain is identified again. The identified changes are compared with the true ones.
+//! The paper states that combined values "are susceptible to load changes" and have to be identified again,
+//! and that single values are not. Here the chain is identified, a mass unknown to the firmware is fixed to
+//! its third link, and the chain is identified again. The identified changes are compared with the true ones.
 //!
 //! ```text
 //! base' = base + K p_load       K: terms of the base parameters, p_load: the load's ten parameters

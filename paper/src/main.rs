@@ -25,10 +25,10 @@ enum TableArgument {
     /// The searches on the test functions.
     #[value(name = "IV")]
     Four,
-    /// The chain's parameters one by one; always with VI.
+    /// The chain's parameters one by one; always printed with VI.
     #[value(name = "V")]
     Five,
-    /// The combinations of the chain's parameters that torque determines; always with V.
+    /// The combinations of the chain's parameters that torque determines; always printed with V.
     #[value(name = "VI")]
     Six,
     /// The chain identified before and after its load changes; no table of the paper, but its argument.
@@ -48,29 +48,29 @@ enum FigureArgument {
     Seven,
 }
 
-/// Reproduces the paper's tables and figures and compares them with its printed results.
+/// Reproduce the paper's tables and figures, and compare them with its printed results.
 #[derive(Parser, Debug)]
 #[command(name = "scarab-paper", version)]
 struct Arguments {
-    /// A table; may be repeated. Without a table and a figure everything is made.
+    /// Table to compute; may be repeated. Default: all tables and figures.
     #[arg(long, value_enum, ignore_case = true)]
     table: Vec<TableArgument>,
-    /// A figure; may be repeated.
+    /// Figure to draw; may be repeated.
     #[arg(long, value_enum)]
     figure: Vec<FigureArgument>,
     /// Runs of each row, each with its own seed.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     seeds: Option<u64>,
-    /// A search of Table IV; may be repeated. All of them unless given.
+    /// Search of Table IV; may be repeated. Default: all.
     #[arg(long, value_parser = algorithms())]
     algorithm: Vec<Algorithm>,
-    /// Draw into this directory, as SVG.
+    /// Draw into this directory, as SVG files.
     #[arg(long)]
     out: Option<OutputFolder>,
-    /// Write the rows here.
+    /// Write the rows as JSON here.
     #[arg(long)]
     json: Option<Output>,
-    /// Put the tables into this document, each between its markers.
+    /// Write the tables into this document, each between its markers.
     #[arg(long)]
     docs: Option<Updated>,
 }
@@ -78,7 +78,7 @@ struct Arguments {
 /// Searches by their names in the report.
 fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
     PossibleValuesParser::new(Algorithm::ALL.map(Algorithm::id)).try_map(|id| {
-        Algorithm::ALL.into_iter().find(|algorithm| algorithm.id() == id).ok_or("is no search of Table IV")
+        Algorithm::ALL.into_iter().find(|algorithm| algorithm.id() == id).ok_or("is not a search of Table IV")
     })
 }
 
@@ -117,13 +117,13 @@ fn run(arguments: &Arguments) -> Result<u8, ToolError> {
     let options = PaperOptions { seeds: arguments.seeds, algorithms: arguments.algorithm.clone() };
     let parts = arguments.parts();
     if !arguments.algorithm.is_empty() && !parts.contains(&Part::TableFour) {
-        return Err(ToolError::input("--algorithm: searches are chosen for table IV only"));
+        return Err(ToolError::input("--algorithm: applies to --table IV only"));
     }
     if let Some(path) = &arguments.docs {
         parts.iter().try_for_each(|part| document::check(path, "paper", part.section_name()))?;
     }
     let sections = scarab_paper::run(&parts, &options)?;
-    // Outputs that cannot fail come first: runs take minutes.
+    // Outputs are checked first, because runs take minutes.
     for section in &sections {
         output::print(&format!("{}\n", section.markdown))?;
     }

@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn printed_errors_follow_from_printed_values_but_where_they_are_dashes_or_negative() {
+    fn printed_errors_follow_from_printed_values_except_dashes_and_negatives() {
         let mut dashes = Vec::new();
         for line in TABLE_FIVE.iter().chain(&TABLE_SIX) {
             match (line.error(), line.error_percent) {

@@ -1,7 +1,7 @@
 //! Test functions by their names in the report, in their readings and dimensions.
 //!
-//! Why beside `scarab::swarm::TestProblem`: the functions are the firmware's, so the device evaluates the
-//! same ones. Names, readings, and a new shift and rotation for every run belong to the report.
+//! The functions are those of `scarab::swarm::TestProblem`, so the device evaluates the same ones. Names,
+//! readings, and a new shift and rotation for every run belong to the report.
 //!
 //! `f4-shifted-rotated` is f(x) = Ackley(R (x - c)). The shift c is uniform within half of the half-box,
 //! the rotation R uniform over the orthogonal matrices (Haar). Both are drawn from the run's seed. Source
@@ -19,7 +19,7 @@ use super::seeds::ReportSeed;
 /// Most coordinates of any problem.
 pub const MOST_COORDINATES: usize = 30;
 
-/// Reading of a function: as the paper prints it, or as it must have meant it.
+/// Reading of a function: as printed in the paper, or as intended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Reading {
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_moved_function_keeps_its_minimum_and_its_lengths_and_moves_with_the_run() {
+    fn a_shifted_rotated_function_keeps_minimum_and_lengths_per_run() {
         let case = moved_case();
         let plain = TestProblem::new(TestFunction::Ackley, 30);
         let mut centres = Vec::new();
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn both_precisions_meet_the_same_problem() {
+    fn both_precisions_have_the_same_problem() {
         let (single, double) = (
             moved_case().problem::<f32>(ReportSeed::of_run(7)),
             moved_case().problem::<f64>(ReportSeed::of_run(7)),

@@ -1,9 +1,9 @@
 //! Number of combinations of the chain's parameters that torque determines, for joint motion
 //! together and one by one.
 //!
-//! The rank is that of the regressor over random motions, in double precision. The paper's method
-//! is *joint by joint*: one joint moves at a time while the others stand in some posture. Only the
-//! moving joint's torque is measured.
+//! The rank is that of the regressor over random motions, in double precision. The paper's method is *joint
+//! by joint*: one joint moves at a time while the others rest in some posture. Only the moving joint's torque
+//! is measured.
 
 use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};

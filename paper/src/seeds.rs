@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_run_of_a_report_has_a_seed_that_anything_was_chosen_with() {
+    fn report_seeds_differ_from_all_tuning_seeds() {
         for run in [0, 1, 99_999, u64::MAX] {
             let seed = ReportSeed::of_run(run);
             assert!(REPORT.contains(&seed.search()) && !CHOOSING.contains(&seed.search()), "{seed:?}");

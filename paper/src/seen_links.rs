@@ -6,8 +6,8 @@
 //! centre of mass. Alpha, half the logarithm of its mass, stays free and scales its inertia. The
 //! paper's chain keeps 27 of 36 coordinates.
 //!
-//! Why this loses nothing: the set of reachable torques stays the same if the inertia covers the
-//! prior's range. The inertia goes with exp(2 alpha), from a fifth to five times the ball's.
+//! The set of reachable torques stays the same if the inertia covers the prior's range. The inertia scales
+//! with exp(2 alpha), from a fifth to five times the ball's.
 
 use scarab::ident::FullObjective;
 use scarab::model::{BaseParameters, INERTIAL_PARAMETERS, LegParameters, Parameter, Standing};

@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn failed_runs_are_endless() {
+    fn failed_runs_count_as_infinite() {
         let counts = [3, 5, 7];
         assert_eq!(quantile(&counts, 0.5, 3), Some(5));
         assert_eq!(quantile(&counts, 0.5, 4), Some(5));

@@ -1,7 +1,7 @@
 //! Compares the default swarm with the optimum on one record, for several sets of unknowns.
 //!
-//! The swarm sees the device's cost in single precision; its result is evaluated in double
-//! precision. See [`super::convergence`] for the unknowns and the definition of reached.
+//! The swarm uses the device's cost in single precision; its result is evaluated in double precision. See
+//! [`super::convergence`] for the unknowns and the definition of reached.
 
 use scarab::ident::{
     DECIMATION, Effort, Factor, FullObjective, FullSearch, LegCost, Limits, ParameterBox, Plan, Problem,

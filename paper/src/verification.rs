@@ -6,9 +6,9 @@
 //! hip rotation   10 degrees sin(2 pi t / 6.5 s), ours
 //! ```
 //!
-//! Why a motion of joint 1: (31) and (32) do not define one. Axis 1 lies along gravity. The other
-//! joints change its torque only through masses beside the plane of the leg. Friction holds a
-//! standing joint against that small torque, which would then be no test.
+//! A motion of joint 1 is added because (31) and (32) do not define one. Axis 1 lies along gravity. The other
+//! joints change its torque only through masses beside the plane of the leg. Friction holds a resting joint
+//! against that small torque, which then would not test it.
 
 use scarab::ident::{Smoothed, prior_parameters};
 use scarab::motion::gait::{self, GaitJoint};

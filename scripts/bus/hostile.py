@@ -63,8 +63,8 @@ class Port:
         received = self.socket.recv(1 << 18)
         if not received:
             raise SystemExit("the port closed the connection")
-        *told, self.rest = (self.rest + received).replace(b"\x07", b"\x07\r").split(b"\r")
-        for line in told:
+        *answers, self.rest = (self.rest + received).replace(b"\x07", b"\x07\r").split(b"\r")
+        for line in answers:
             if line in (b"z", b"\x07") and self.sent:
                 may_stop = self.sent.popleft()[:4] in STOPS
                 self.stops += line == b"z" and may_stop

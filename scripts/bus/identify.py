@@ -178,7 +178,7 @@ def main():
     hip.write(0x1010, 1, int.from_bytes(b"save", "little"))
     until("how the store ended", lambda: hip.emergencies[-1:] in ([0x0000], [0x5530]))
     assert hip.emergencies == [0xFF0D, 0x0000], hip.emergencies
-    print("generation kept:", hip.read(0x2100, 7))
+    print("stored generation:", hip.read(0x2100, 7))
     assert hip.read(0x2100, 7) > 0
     network.disconnect()
     print("identify: ok")

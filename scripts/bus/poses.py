@@ -124,7 +124,7 @@ def stop(leg, way):
 
 
 def forget(joints):
-    """Clears the errors of the past, so that they do not pass for the reason of a later refusal."""
+    """Clears old errors, so that they are not taken for the reason of a later refusal."""
     for joint in joints:
         joint.write(0x1003, 0, 0, "<B")
         joint.emergencies.clear()
@@ -147,7 +147,7 @@ def outside(joints, limits):
 
 
 def arrive(joints, limits, where):
-    """Commands the nearest place within the range; the leg must arrive there. A hand may be needed if it cannot."""
+    """Commands the nearest position within the range, which the leg must reach. Otherwise a hand may be needed."""
     for joint, (low, high) in zip(joints, limits):
         joint.write(0x6060, 0, 0, "<b")
         middle = min(max(joint.position(), low + 0.1), high - 0.1)

@@ -33,10 +33,10 @@ class Complaints(logging.Handler):
 
     def __init__(self):
         super().__init__(logging.WARNING)
-        self.told = []
+        self.messages = []
 
     def emit(self, record):
-        self.told.append(record.getMessage())
+        self.messages.append(record.getMessage())
 
 
 def load(folder, joint, number, complaints):
@@ -45,7 +45,7 @@ def load(folder, joint, number, complaints):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         dictionary = canopen.import_od(path, node_id=number)
-    assert not complaints.told, complaints.told
+    assert not complaints.messages, complaints.messages
     # The library has read every object of the file.
     sheet = configparser.RawConfigParser()
     sheet.optionxform = str
@@ -90,7 +90,7 @@ def check(node, variable):
     assert variable.access_type in ("ro", "rw", "const"), f"{where}: {variable.access_type}"
     # Writes the value that was read. A refusal for another reason is not one for read-only.
     code = aborts(lambda: node.sdo.download(variable.index, variable.subindex, data or b"\0"))
-    assert (code == READ_ONLY) == (not variable.writable), f"{where}, {variable.access_type} in the sheet: writing told {code}"
+    assert (code == READ_ONLY) == (not variable.writable), f"{where}, {variable.access_type} in the sheet: writing gave {code}"
     return True
 
 
@@ -131,7 +131,7 @@ def main():
         # Access by name, as a user of the sheet does.
         assert node.sdo["Statusword"].raw & 0x6F == 0x40
         assert struct.unpack("<I", node.sdo["Device type"].data)[0] == 0x00020192
-        assert not complaints.told, complaints.told
+        assert not complaints.messages, complaints.messages
         print(f"{joint}: {len(found)} variables as in the sheet, {found.count(False)} of them without a value yet; {pdos} PDOs; "
               f"{len(beside - known)} others refused")
     network.disconnect()

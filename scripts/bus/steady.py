@@ -122,9 +122,9 @@ def enable(port):
 
 def emergency(frames):
     """Node and code of the emergency messages among these frames, except those that end an error."""
-    told = [(frame[0] - 0x80, struct.unpack_from("<H", frame[1])[0]) for frame in frames
+    found = [(frame[0] - 0x80, struct.unpack_from("<H", frame[1])[0]) for frame in frames
             if frame and 0x81 <= frame[0] < 0x100]
-    return [(node, code) for node, code in told if code]
+    return [(node, code) for node, code in found if code]
 
 
 class Second:
@@ -197,9 +197,9 @@ def main(address, seconds, path):
             while time.monotonic() < end:
                 emergencies += emergency(port.read(0.02))
             longest = max([second.gap for second, _ in found[-3:]] + [now.gap])
-            told = ", ".join(f"node {node}: {code:04X}" for node, code in emergencies) or "no emergency"
+            codes = ", ".join(f"node {node}: {code:04X}" for node, code in emergencies) or "no emergency"
             is_lost = bool(emergencies) and all(code in LOST for _, code in emergencies)
-            print(f"after {clock - begin:.0f} s: state {word:02X}, {told}; longest gap of this process {longest * 1e3:.0f} ms", flush=True)
+            print(f"after {clock - begin:.0f} s: state {word:02X}, {codes}; longest gap of this process {longest * 1e3:.0f} ms", flush=True)
             stops.append((is_lost and longest >= 0.9 * WATCHDOG_S, clock - begin))
             emergencies = []
             port.send((0, b"\x01\x00"))

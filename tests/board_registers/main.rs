@@ -1,6 +1,6 @@
-//! The board's registers after the start, from the record of writes, compared with the board's facts.
+//! The board's registers after the start, from the record of writes, compared with known values of the board.
 //!
-//! `cargo test --test board_registers -- --nocapture` prints the record. The facts are those of ODrive's
+//! `cargo test --test board_registers -- --nocapture` prints the record. The values are those of ODrive's
 //! firmware v0.5.6 (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is RM0090's. The
 //! silicon's behaviour needs a test on the board.
 
@@ -67,7 +67,7 @@ const TIM4: u32 = 0x4000_0800;
 const ADC: [u32; 3] = [0x4001_2000, 0x4001_2100, 0x4001_2200];
 
 #[test]
-fn the_record_of_writes_is_what_the_start_does() {
+fn the_record_of_writes_is_that_of_the_start() {
     let registers = started();
     println!("register            address       mask      value");
     for write in &registers.record {
@@ -96,7 +96,7 @@ fn bridges_start_off_at_24_khz_with_119_ns_dead_time() {
         assert_eq!(
             registers.bits(base + 0x44, 12, 1),
             0,
-            "no break circuit: its pins are taken, so a failed crystal releases by the interrupt"
+            "no break circuit: its pins are taken, so a failed crystal turns outputs off by the interrupt"
         );
         for channel in 0..3 {
             let shift = 8 * (channel % 2);
@@ -153,7 +153,7 @@ fn the_converters_sample_the_shunts_of_the_board() {
 }
 
 #[test]
-fn a_silent_converter_is_shown_by_the_other_one() {
+fn a_silent_converter_is_detected_by_the_other_one() {
     let (injected, regular) = (converters::JEOC, converters::EOC);
     for (ends, axes) in [
         ([0, 0], [None, None]),
@@ -168,7 +168,7 @@ fn a_silent_converter_is_shown_by_the_other_one() {
 }
 
 #[test]
-fn currents_volts_and_degrees_are_the_board_s() {
+fn currents_voltages_and_temperatures_are_those_of_the_board() {
     let sense = analog::sense(19.0);
     assert_eq!(sense, scarab::motor::SenseScale::ODRIVE_3_6);
     // 500 uOhm, 40 V/V, 3.3 V of 4096 codes: 0.0403 A per code, 60.75 A at 0.9 of 1.35 V.
@@ -282,7 +282,7 @@ const BOARD_PINS: &str = "A8:1 A9:1 A10:1 B13:1 B14:1 B15:1 C6:3 C7:3 C8:3 A7:3 
      B4:2 B5:2 B6:2 B7:2 C9:i C15:i D2:i C4:i A2:i A3:i B10:1 B11:1 B12:o C13:o C14:o";
 
 #[test]
-fn every_pin_is_what_the_board_wires_it_to() {
+fn every_pin_has_the_function_of_the_board_s_wiring() {
     let registers = started();
     let mut expected = 0;
     for entry in BOARD_PINS.split_whitespace() {
@@ -322,7 +322,7 @@ fn a_duty_is_the_share_of_the_period_above_its_compare_value() {
 }
 
 #[test]
-fn gate_driver_frames_carry_register_and_data_where_the_driver_reads_them() {
+fn gate_driver_frames_have_the_driver_s_format() {
     use gate_driver::{CONTROL_1, CONTROL_2, Register, data, read, write};
     assert_eq!(CONTROL_1, 0x0550, "number 21, latched shutdown, six inputs, 1.7 A");
     assert_eq!(CONTROL_2, 0x0008, "40 V/V");
@@ -334,7 +334,7 @@ fn gate_driver_frames_carry_register_and_data_where_the_driver_reads_them() {
 }
 
 #[test]
-fn clocks_and_caches_are_on_and_a_failed_crystal_is_noticed() {
+fn clocks_and_caches_are_on_and_a_failed_crystal_is_detected() {
     let registers = started();
     assert_eq!(CLOCK_HZ, 8_000_000 / 4 * 168 / 2);
     assert_eq!(registers.bits(0x4002_3C00, 8, 3), 0b111, "prefetch, instruction and data cache");

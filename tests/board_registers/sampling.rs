@@ -20,7 +20,8 @@ use super::{ADC, TIM1, TIM8, started};
 const PERIOD: i64 = 7000;
 /// Bus voltage, V.
 const BUS: f64 = 48.0;
-/// Time before the hold in which an edge still shows, clocks: 1.2 us, in which an amplifier settles to 1 %.
+/// Time before the hold in which an edge affects the sample, clocks: 1.2 us, in which an amplifier settles to
+/// 1 %.
 const WINDOW: i64 = 202;
 /// Delay from a timer's edge to the turning-on switch, clocks: the dead time.
 const DEAD: i64 = 20;
@@ -127,7 +128,7 @@ fn converters_start_119_ns_after_the_middle_of_the_lower_zero_vector() {
 }
 
 #[test]
-fn a_trigger_before_the_middle_is_seen_as_negative() {
+fn a_trigger_before_the_middle_is_measured_as_negative() {
     // Previous setting of the board: mode 1, compare value 40, which the falling counter reaches first.
     let old = [TIM1, TIM8]
         .map(|base| [Write::whole("CCMR2", base + 0x1C, 0x6878), Write::whole("CCR4", base + 0x40, 40)])
@@ -243,7 +244,7 @@ impl Count {
         let steps = (10.0 * self.limit()) as u32;
         let shares: Vec<f64> = (0..=steps).map(|step| self.share(0.1 * f64::from(step))).collect();
         let quiet = shares.iter().take_while(|share| **share == 0.0).count();
-        assert!(quiet > 0, "disturbed without a voltage");
+        assert!(quiet > 0, "disturbed even at zero voltage");
         (
             0.1 * (quiet - 1) as f64,
             shares[quiet..].iter().fold(self.share(self.limit()), |most, share| most.max(*share)),
@@ -252,7 +253,7 @@ impl Count {
 }
 
 #[test]
-fn the_other_bridges_edges_miss_the_sample_up_to_24_volts() {
+fn the_other_bridge_s_edges_miss_the_sample_up_to_24_volts() {
     let board = Count::of_the_board();
     let (quiet, most) = board.quiet_up_to();
     println!(

@@ -47,7 +47,7 @@ impl Timer {
         Self { base, ..Self::default() }
     }
 
-    /// Applies a write; one to another peripheral has no effect. Returns whether it was for this timer.
+    /// Applies a write; a write to another peripheral has no effect. Returns whether it was for this timer.
     pub fn apply(&mut self, write: &Write) -> bool {
         let Some(offset) = write.address.checked_sub(self.base).filter(|offset| *offset < 0x400) else {
             return false;
@@ -88,7 +88,7 @@ impl Timer {
             return;
         }
         self.counter = if self.falling { self.counter - 1 } else { self.counter + 1 };
-        assert!(self.counter <= 0xFFFF, "the counter left its range");
+        assert!(self.counter <= 0xFFFF, "the counter is outside its range");
         let (at_top, at_zero) = (!self.falling && self.counter == self.top, self.counter == 0);
         if at_top || at_zero {
             self.falling = at_top;

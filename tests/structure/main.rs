@@ -1,8 +1,8 @@
 //! Checks of the architecture: allowed dependencies between modules, and a few rules that no compiler checks.
 //!
 //! A module here is one at the top of `src/` or `host/src/`, or a folder of `src/ident/`. The tables below
-//! are the design's; a change to them is a change of the architecture and belongs in a commit of its own.
-//! Comments do not count as a use, unit tests do. A test that needs more modules than its own may use lives
+//! are the design's. A change to them is a change of the architecture and belongs in a commit of its own.
+//! Comments do not count as a use, unit tests do. A test that needs more modules than its own may use belongs
 //! in `tests/`.
 
 mod tokens;
@@ -72,7 +72,7 @@ const SOURCES: [&str; 6] = ["src", "hal-sim/src", "host/src", "paper/src", "emul
 const PLANT: [&str; 2] = ["hal", "units"];
 
 /// Files that may name the maths library, relative to the workspace.
-const MATHS_DOORS: [&str; 2] = ["src/real.rs", "hal-sim/src/maths.rs"];
+const MATHS_MODULES: [&str; 2] = ["src/real.rs", "hal-sim/src/maths.rs"];
 
 /// Files (and folders) that may contain `unsafe`: the hardware square root, in-place construction, the
 /// boards' layers, the two images for the emulator, and the program that checks the chip model.
@@ -97,7 +97,7 @@ const CODE_LIST: &str = "src/safety/fault.rs";
 const LARGEST_LINE_COUNT: usize = 900;
 
 #[test]
-fn every_module_uses_only_the_modules_that_the_design_allows() {
+fn every_module_uses_only_permitted_modules() {
     let mut offences = Vec::new();
     for (folder, root, table, open) in [
         ("src", "crate", &FIRMWARE[..], &OPEN[..]),
@@ -126,7 +126,7 @@ fn every_module_uses_only_the_modules_that_the_design_allows() {
 }
 
 #[test]
-fn every_module_of_the_host_tool_and_of_ident_stands_below_those_that_it_uses() {
+fn modules_of_host_and_ident_are_listed_below_those_they_use() {
     for table in [&HOST[..], &IDENT] {
         for (place, (module, allowed)) in table.iter().enumerate() {
             for used in *allowed {
@@ -138,7 +138,7 @@ fn every_module_of_the_host_tool_and_of_ident_stands_below_those_that_it_uses() 
 }
 
 #[test]
-fn the_swarm_needs_the_maths_door_and_nothing_else_of_the_crate() {
+fn the_swarm_uses_only_the_maths_module_of_the_crate() {
     let mut offences = Vec::new();
     for file in source_files("src/swarm") {
         for used in modules_used(&file.text, module_depth(&file.path["src/".len()..]), "crate", &FIRMWARE) {
@@ -151,7 +151,7 @@ fn the_swarm_needs_the_maths_door_and_nothing_else_of_the_crate() {
 }
 
 #[test]
-fn the_plant_sees_only_the_ports_and_the_units_of_the_firmware() {
+fn the_plant_uses_only_ports_and_units_of_the_firmware() {
     let mut offences = Vec::new();
     for file in source_files("hal-sim/src") {
         let all = tokens(&file.text);
@@ -164,12 +164,12 @@ fn the_plant_sees_only_the_ports_and_the_units_of_the_firmware() {
 }
 
 #[test]
-fn only_the_doors_name_the_maths_library_and_unsafe_code() {
+fn only_listed_files_name_the_maths_library_or_unsafe_code() {
     let mut offences = Vec::new();
     for file in SOURCES.into_iter().flat_map(source_files) {
         for token in tokens(&file.text) {
             let doors: &[&str] = match token.text {
-                "libm" => &MATHS_DOORS,
+                "libm" => &MATHS_MODULES,
                 "unsafe" => &UNSAFE_ALLOWED,
                 _ => continue,
             };
@@ -181,7 +181,7 @@ fn only_the_doors_name_the_maths_library_and_unsafe_code() {
     assert_none(&offences);
 }
 
-/// Elsewhere an output could be an input of the same command, or be left half written.
+/// Elsewhere an output could be an input of the same command, or remain incomplete.
 #[test]
 fn only_one_module_of_the_tool_writes_files() {
     const WRITERS: [[&str; 3]; 8] = [
@@ -208,7 +208,7 @@ fn only_one_module_of_the_tool_writes_files() {
 }
 
 #[test]
-fn no_file_but_the_list_writes_a_fault_or_emergency_code() {
+fn fault_and_emergency_codes_are_written_in_one_file_only() {
     let faults = FaultCode::ALL.map(FaultCode::number).into_iter();
     let codes: Vec<u16> = faults.chain(NoticeCode::ALL.map(NoticeCode::number)).collect();
     let mut offences = Vec::new();
@@ -237,7 +237,7 @@ fn hexadecimals(source: &str) -> Vec<(u32, usize)> {
 }
 
 #[test]
-fn a_hexadecimal_number_is_seen_with_its_line() {
+fn a_hexadecimal_number_is_found_with_its_line() {
     assert_eq!(hexadecimals("let a = 0x8130;\n// 0x2310\nf(0xFF_01_u16, x81)"), [(0x8130, 1), (0xFF01, 3)]);
 }
 
@@ -274,7 +274,7 @@ fn comments_begin_with_their_subject_and_are_at_most_110_columns_wide() {
     assert_none(&offences);
 }
 
-/// Why a line is no good comment, if it is a comment.
+/// Reason why a line is a bad comment; `None` for other lines.
 fn comment_offence(line: &str) -> Option<String> {
     let text = line.trim_start().strip_prefix("//")?;
     let width = line.chars().count();
@@ -416,7 +416,7 @@ fn a_use_is_found_in_groups_paths_and_through_super() {
 }
 
 #[test]
-fn a_use_inside_ident_is_found_and_so_is_an_item_that_is_not_named_by_its_folder() {
+fn uses_inside_ident_are_found_by_folder_and_by_item() {
     let used = |source: &str, depth| -> Vec<String> {
         modules_used(source, depth, "ident", &IDENT).iter().map(|token| token.text.to_owned()).collect()
     };
@@ -432,7 +432,7 @@ fn a_use_inside_ident_is_found_and_so_is_an_item_that_is_not_named_by_its_folder
 }
 
 #[test]
-fn a_machine_path_is_told_from_an_address() {
+fn a_machine_path_is_distinguished_from_a_web_address() {
     let path = |folder: &str| ["/", folder, "/x"].concat();
     assert_eq!(machine_path(&format!("see {}", path("tmp"))), Some(FOLDERS_OF_ONE_MACHINE[0]));
     assert_eq!(machine_path(&format!("\"{}\"", path("root"))), Some(FOLDERS_OF_ONE_MACHINE[2]));
@@ -445,7 +445,7 @@ struct File {
     text: String,
 }
 
-/// Rust files below a folder of the workspace; at least one, or the test would check nothing.
+/// Rust files below a folder of the workspace; fails if there are none, because nothing would be checked.
 fn source_files(folder: &str) -> Vec<File> {
     let mut files = Vec::new();
     collect(&workspace().join(folder), &["rs"], &mut files);

@@ -1,4 +1,4 @@
-//! An identification that was refused, aborted or overtaken leaves no trace.
+//! A refused, aborted or overtaken identification has no lasting effect.
 
 use scarab::safety::PowerRequest;
 use scarab_host::formats::leg_file::StribeckFile;
@@ -19,7 +19,7 @@ fn after_a_stop_the_model_returns_without_a_torque_step() {
     }
     let in_motion = tick(&mut pair, None).servo.wanted_torque.map(|torque| torque.0.abs());
     tick(&mut pair, Some(ControlRequest::Power(PowerRequest::QuickStop)));
-    // Wait until the leg hangs still: the damping due to its speed is not the model's.
+    // Wait until the leg hangs still: the damping by its speed does not come from the model.
     for _ in 0..DAMPING + 5 * SECOND {
         tick(&mut pair, None);
     }
@@ -28,14 +28,14 @@ fn after_a_stop_the_model_returns_without_a_torque_step() {
     for ticks in 0..SECOND {
         let torque = tick(&mut pair, None).servo.decision.torque.map(|torque| torque.0);
         for joint in 0..JOINTS {
-            // The whole torque of the model, gravity above all, fades in over 2000 ticks: 0.02 N m in each.
-            // One encoder count adds the feedback's response.
+            // The whole torque of the model, mostly gravity, fades in over 2000 ticks: 0.02 N m in each. One
+            // encoder count adds the feedback's response.
             let step = (torque[joint] - before[joint]).abs();
             assert!(step < 0.6, "joint {joint}, tick {ticks}: {step} N m, {in_motion:?} in motion");
         }
         before = torque;
     }
-    // The model does hold the leg in the end.
+    // At the end the model holds the leg.
     assert!(before[0].abs() > 1.0 || before[1].abs() > 1.0, "{before:?}");
 }
 
@@ -49,30 +49,30 @@ fn an_identification_begun_before_the_verdict_keeps_both_halves_consistent() {
     let output = tick(&mut pair, Some(ControlRequest::Identify));
     assert!(!output.refused);
     assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Approach));
-    // The verdict was due within eight ticks.
+    // The verdict was expected within eight ticks.
     for _ in 0..100 {
         tick(&mut pair, None);
     }
     assert_eq!(pair.leg.control().verdict(), None);
     assert_eq!(pair.leg.control().model().copied(), model);
-    assert_eq!(*pair.leg.identification().model_monitor(), watched, "it watches what is not in use");
+    assert_eq!(*pair.leg.identification().model_monitor(), watched, "it monitors a model that is not in use");
 }
 
 #[test]
-fn a_refused_result_leaves_no_friction_curve_in_what_is_watched() {
+fn a_refused_result_does_not_change_the_monitored_friction() {
     let mut leg = default_leg();
     for joint in &mut leg.joints {
         joint.stribeck = Some(StribeckFile { static_nm: 6.5, speed_rad_s: 0.1 });
     }
     let context =
         Context::new(&leg, &SimulationOptions::of_seed(1)).expect("the default leg with another friction");
-    let mut pair = Pair::new(&leg, &context, 1).expect("the firmware takes it");
+    let mut pair = Pair::new(&leg, &context, 1).expect("the firmware accepts the leg");
     assert!(pair.enable(context.gravity));
     assert!(identify(&mut pair).is_some_and(Verdict::is_accepted));
     let accepted = pair.leg.identification().model().stribeck;
     assert!(accepted.iter().all(|curve| curve.excess > 0.1), "{accepted:?}");
 
-    // Identify again, with a current sensor that shows twice the current of the slow passages.
+    // Identify again, with a current sensor that reads twice the current in slow passages.
     tick(&mut pair, Some(ControlRequest::Identify));
     while matches!(activity(&pair), Activity::Identify(_)) {
         if activity(&pair) == Activity::Identify(IdentifyPhase::Excite) {
@@ -82,9 +82,9 @@ fn a_refused_result_leaves_no_friction_curve_in_what_is_watched() {
         }
         tick(&mut pair, None);
     }
-    let verdict = pair.leg.control().verdict().expect("it ran to its end");
+    let verdict = pair.leg.control().verdict().expect("the identification did not end");
     assert!(!verdict.is_accepted());
-    assert_ne!(pair.leg.identification().model().stribeck, accepted, "the refused result has its own");
+    assert_ne!(pair.leg.identification().model().stribeck, accepted, "the refused result has another curve");
 
     let gait = context.configuration.prove(context.motions.validation[1]).expect("proved at the start");
     tick(&mut pair, Some(ControlRequest::Track { motion: gait, with_model: true }));

@@ -1,4 +1,4 @@
-//! Legs that differ from the firmware's assumptions, and wearers who move.
+//! Legs that differ from the firmware's assumptions, and moving wearers.
 
 use scarab::ident::Reason;
 use scarab_host::base::number::Number;
@@ -58,10 +58,9 @@ fn pushed(per_minute: f64, torque_nm: f64) -> Result<RunReport, String> {
 }
 
 #[test]
-fn a_wearer_who_pushes_hard_is_refused_with_every_number_known() {
+fn hard_pushes_are_refused_with_every_number_known() {
     let report = pushed(60.0, 60.0).expect("the drive holds against 60 N m");
-    // With a push every second, too much of the training motion is excluded; of the held-out motions
-    // it is not.
+    // With a push every second, too much of the training motion is excluded, but not of the held-out motions.
     assert_eq!(report.reasons, ["outliers"]);
     let known = |number: &Number| number.known().is_some();
     for base in &report.base_parameters {
@@ -78,7 +77,7 @@ fn a_wearer_who_pushes_hard_is_refused_with_every_number_known() {
 }
 
 #[test]
-fn a_wearer_who_overpowers_the_drive_causes_a_reported_fault() {
+fn pushes_above_the_drive_s_torque_cause_a_reported_fault() {
     let report = pushed(200.0, 400.0).expect("it ends");
     assert_eq!(report.reasons, ["input"]);
     let words = &report.findings.first().expect("the stop is reported").words;
@@ -86,7 +85,7 @@ fn a_wearer_who_overpowers_the_drive_causes_a_reported_fault() {
 }
 
 #[test]
-fn a_leg_outside_the_prior_is_refused_and_not_clamped() {
+fn a_leg_outside_the_prior_is_refused_not_clamped() {
     let mut leg = default_leg();
     // The box reaches 5 times the prior's Coulomb friction of 4 N m.
     leg.joints[1].truth.as_mut().expect("simulated").offset = 25.0;

@@ -9,7 +9,7 @@ use super::*;
 /// Ticks of damping: 300 ms.
 const DAMPING: u64 = 1200;
 
-/// During the swarm's search, made slow enough for the test to reach it.
+/// During the swarm's search, which is slowed down for the test.
 fn during_the_search() -> Pair {
     let mut pair = before_the_search();
     pair.evaluations = 1;
@@ -34,7 +34,7 @@ fn identifying_again() -> Pair {
     .clone()
 }
 
-/// Ticks on and checks that the aborted identification has no effect and no command is absurd.
+/// Continues and checks that the aborted identification has no effect and no command is implausible.
 fn nothing_comes_of_it(pair: &mut Pair, ticks: u64) {
     let before = (pair.leg.control().model().copied(), pair.leg.control().verdict());
     let found = pair.leg.identification().clone();
@@ -44,7 +44,7 @@ fn nothing_comes_of_it(pair: &mut Pair, ticks: u64) {
         assert_eq!(activity(pair), Activity::Idle);
     }
     assert_eq!((pair.leg.control().model().copied(), pair.leg.control().verdict()), before);
-    // Not a single evaluation is spent on the aborted run.
+    // The aborted run gets no evaluation.
     assert_eq!(*pair.leg.identification(), found);
 }
 
@@ -104,7 +104,7 @@ fn implausible_counts_end_the_identification_and_keep_the_old_model() {
                 assert!(output.servo.drive().currents.iter().all(|current| current.is_finite()));
             }
             // One or two impossible readings are bridged; the third damps.
-            let fault = pair.leg.control().state().fault().expect("it is seen");
+            let fault = pair.leg.control().state().fault().expect("the fault is detected");
             assert_eq!((fault.code, usize::from(fault.joint)), (FaultCode::EncoderStep, joint));
             assert_eq!(activity(&pair), Activity::Idle);
             for _ in 0..=DAMPING {
@@ -120,7 +120,7 @@ fn implausible_counts_end_the_identification_and_keep_the_old_model() {
 }
 
 #[test]
-fn a_single_absurd_count_is_bridged_and_never_accepted_wrong() {
+fn a_single_implausible_count_is_bridged_and_never_harmful() {
     // 30,000 counts are 26 degrees: a mean of eight with such a reading would move parameters by 20 sigma.
     for (joint, glitch) in [(1, i32::MAX), (0, 30_000), (1, -30_000), (0, 10_000), (1, 3_000)] {
         glitch_is_bridged(joint, glitch);
@@ -135,7 +135,7 @@ fn glitch_is_bridged(joint: usize, glitch: i32) {
     assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Excite));
     assert!(run_until(&mut pair, |pair| !matches!(activity(pair), Activity::Identify(_))));
     assert!(is_enabled(&pair));
-    let verdict = pair.leg.control().verdict().expect("the motion went on");
+    let verdict = pair.leg.control().verdict().expect("the motion did not continue");
     if verdict.is_accepted() {
         let estimate = pair.leg.identification().solver().expect("solved").estimate();
         let background = &context().background;
@@ -151,7 +151,7 @@ fn glitch_is_bridged(joint: usize, glitch: i32) {
 }
 
 #[test]
-fn a_refused_result_leaves_the_model_that_was_there() {
+fn a_refused_result_keeps_the_previous_model() {
     let mut pair = identified();
     let model = pair.leg.control().model().copied();
     assert!(model.is_some());
@@ -163,7 +163,7 @@ fn a_refused_result_leaves_the_model_that_was_there() {
         }
         tick(&mut pair, None);
     }
-    let verdict = pair.leg.control().verdict().expect("it ran to its end");
+    let verdict = pair.leg.control().verdict().expect("the identification did not end");
     assert!(verdict.has(scarab::ident::Reason::Validation));
     assert_eq!(pair.leg.control().model().copied(), model);
 }

@@ -32,7 +32,7 @@ struct Hosted {
 
 impl Hosted {
     fn new() -> Self {
-        let pair = Pair::new(&default_leg(), context(), 1).expect("the firmware takes the default leg");
+        let pair = Pair::new(&default_leg(), context(), 1).expect("the firmware accepts the default leg");
         let mut hosted = Self { pair, commands: [HOLD; JOINTS], status: [JointStatus::NONE; JOINTS] };
         hosted.pair.leg.command(&[HOLD; JOINTS]);
         assert!(hosted.pair.enable(context().gravity));
@@ -41,7 +41,7 @@ impl Hosted {
         hosted
     }
 
-    /// A leg that is enabled where its drive was off, rad.
+    /// A leg that is enabled in its rest position, rad.
     fn enabled_at(position: [f64; JOINTS]) -> Self {
         let mut hosted = Self::resting_at(position);
         hosted.pair.leg.command(&[HOLD; JOINTS]);
@@ -51,7 +51,7 @@ impl Hosted {
     }
 
     fn resting_at(position: [f64; JOINTS]) -> Self {
-        let mut pair = Pair::new(&default_leg(), context(), 1).expect("the firmware takes the default leg");
+        let mut pair = Pair::new(&default_leg(), context(), 1).expect("the firmware accepts the default leg");
         pair.world.place(&position);
         pair.sample = scarab::hal::LegDrives::sample(&mut pair.world);
         Self { pair, commands: [HOLD; JOINTS], status: [JointStatus::NONE; JOINTS] }
@@ -201,7 +201,7 @@ fn the_torque_limit_holds_in_every_mode_without_windup() {
         assert!(hosted.status[0].torque_demand.0.abs() <= weight + 1.001, "{:?}", hosted.status[0]);
     }
     assert!(limited);
-    // Once the torque is allowed again, the joint arrives without overshoot.
+    // When the torque is permitted again, the joint arrives without overshoot.
     hosted.commands[0].largest_torque = NewtonMetre(1000.0);
     let mut farthest = 0.0_f32;
     for _ in 0..2 * SECOND {
@@ -212,10 +212,10 @@ fn the_torque_limit_holds_in_every_mode_without_windup() {
 }
 
 #[test]
-fn a_joint_that_is_held_again_keeps_the_torque_it_had() {
+fn a_joint_held_again_keeps_its_torque() {
     let mut hosted = Hosted::new();
     hosted.run(2 * SECOND);
-    // The host commands the torque that holds the joint up.
+    // The host commands the torque that holds the joint against gravity.
     let weight = hosted.status[0].torque_demand;
     hosted.commands[0].target = Target::CyclicTorque(weight);
     hosted.run(200);
@@ -258,8 +258,8 @@ fn cyclic_positions_of_two_milliseconds_are_followed_by_both_joints() {
 }
 
 #[test]
-fn a_target_beyond_the_window_is_a_fault_and_never_a_jump() {
-    // At once when the mode begins, and after the time-out later.
+fn a_target_beyond_the_window_is_a_fault_without_a_jump() {
+    // Immediately when the mode begins, and after the timeout later.
     for later in [false, true] {
         let mut hosted = Hosted::new();
         let from = hosted.position(0);
@@ -293,7 +293,7 @@ fn a_target_beyond_the_window_is_a_fault_and_never_a_jump() {
 }
 
 #[test]
-fn homing_takes_the_place_for_the_offset_and_moves_nothing() {
+fn homing_sets_the_position_to_the_offset_without_motion() {
     let mut hosted = Hosted::new();
     let (place, truth) = (hosted.position(1), hosted.truth(1));
     hosted.commands[1].target = Target::Homing { offset: Radian(place + 0.05) };
@@ -313,7 +313,7 @@ fn homing_takes_the_place_for_the_offset_and_moves_nothing() {
 }
 
 #[test]
-fn what_was_asked_before_the_leg_was_enabled_is_not_done_afterwards() {
+fn requests_before_enabling_have_no_later_effect() {
     let mut hosted = Hosted::new();
     hosted.tick(Some(ControlRequest::Power(PowerRequest::DisableVoltage)));
     hosted.run(10);
@@ -375,12 +375,12 @@ fn beyond(joint: usize, angle: f64) -> f64 {
     (low - angle).max(angle - high).max(0.0)
 }
 
-/// Poses outside the range: joint, angles, and the sign of the return. Gravity pulls the hip little at its
-/// lower end, and the bent knee inwards.
+/// Poses outside the range: joint, angles, and the sign of the return. Gravity hardly loads the hip at its
+/// lower end, and pulls the bent knee inwards.
 const OUTSIDE: [(usize, [f64; JOINTS], f32); 3] =
     [(0, [-0.04, 0.6], 1.0), (1, [0.3, 0.04], 1.0), (1, [0.3, 1.75], -1.0)];
 
-/// Watches a joint on its way back for so long: farthest out and fastest while it is outside.
+/// Observes a returning joint for a time; returns its farthest excursion and largest speed outside.
 fn watch(hosted: &mut Hosted, joint: usize, ticks: u64) -> [f64; 2] {
     let mut most = [0.0_f64; 2];
     for _ in 0..ticks {
@@ -403,7 +403,7 @@ fn every_inward_command_returns_a_joint_into_its_range() {
         |hosted, joint, sign| {
             hosted.commands[joint].target = Target::ProfileVelocity(RadianPerSecond(0.4 * sign))
         },
-        // A host that lets the joint stay where it is.
+        // A host that commands the joint's present position.
         |hosted, joint, _| hosted.cyclic(joint, hosted.position(joint)),
         |hosted, joint, sign| {
             hosted.commands[joint].target = Target::CyclicTorque(NewtonMetre(16.0 * sign));
@@ -437,7 +437,7 @@ fn every_inward_command_returns_a_joint_into_its_range() {
 }
 
 #[test]
-fn nothing_that_a_host_commands_leads_a_joint_farther_out() {
+fn no_host_command_moves_a_joint_farther_out() {
     let targets: [fn(&mut Hosted, usize, f32); 5] = [
         |_, _, _| {},
         |hosted, joint, sign| hosted.point(joint, hosted.position(joint) - sign, true),
@@ -489,7 +489,7 @@ fn an_identification_outside_the_range_returns_slowly_too() {
         let mut hosted = Hosted::resting_at(pose);
         assert!(hosted.pair.enable(context().gravity));
         let from = beyond(joint, hosted.truth(joint));
-        // The switch alone moves nothing.
+        // The switch alone causes no motion.
         (0..SECOND).for_each(|_| {
             tick(&mut hosted.pair, None);
         });
@@ -507,7 +507,7 @@ fn an_identification_outside_the_range_returns_slowly_too() {
 }
 
 #[test]
-fn homing_without_a_method_is_an_error_and_moves_no_zero() {
+fn homing_without_a_method_is_an_error_and_keeps_the_zero() {
     let mut hosted = Hosted::new();
     hosted.run(2 * SECOND);
     let before = hosted.position(0);
@@ -519,9 +519,9 @@ fn homing_without_a_method_is_an_error_and_moves_no_zero() {
     assert!((hosted.position(0) - before).abs() < 1e-3 && is_enabled(&hosted.pair));
 }
 
-/// Published host software looks for a mechanical stop: it moves a joint outwards until 50 N m are measured.
+/// Published host software searches a mechanical stop: it moves a joint outwards until 50 N m are measured.
 #[test]
-fn a_host_that_looks_for_a_mechanical_stop_comes_to_the_end_of_the_range_and_no_farther() {
+fn a_host_s_search_for_a_stop_ends_at_the_range() {
     for (joint, velocity) in [(0, -0.2), (1, -0.2), (1, 0.4)] {
         let mut hosted = Hosted::new();
         hosted.commands[joint].target = Target::ProfileVelocity(RadianPerSecond(velocity));

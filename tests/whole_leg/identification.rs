@@ -60,7 +60,7 @@ fn text(mut report: RunReport) -> String {
 }
 
 #[test]
-fn equal_seeds_give_equal_reports_and_others_do_not() {
+fn equal_seeds_give_equal_reports_and_different_seeds_do_not() {
     let first = text(run(7));
     assert_eq!(first, text(run(7)));
     assert_ne!(first, text(run(8)));
@@ -73,7 +73,7 @@ fn equal_seeds_give_equal_reports_and_others_do_not() {
 }
 
 #[test]
-fn a_cloned_leg_and_world_run_on_identically() {
+fn a_cloned_leg_and_world_continue_identically() {
     let mut original = during_excitation();
     let mut copy = original.clone();
     for _ in 0..LONGEST_IDENTIFICATION {
@@ -152,7 +152,7 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
         payload: None,
         with_payload: Vec::new(),
     };
-    let replayed = replay::<JOINTS, BASE>(&leg, &options).expect("what the tool writes it reads");
+    let replayed = replay::<JOINTS, BASE>(&leg, &options).expect("the tool reads its own log");
     for (online, offline) in report.base_parameters.iter().zip(&replayed.run.base_parameters) {
         assert_eq!(online.name, offline.name);
         let sigma = online.sigma.known().expect("determined");
@@ -168,7 +168,7 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
 }
 
 #[test]
-fn the_papers_chain_of_three_joints_is_identified() {
+fn the_paper_s_chain_of_three_joints_is_identified() {
     let leg = LegFile::load("paper-chain").expect("shipped");
     let report = simulate::<3, 28>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report;
     assert!(report.accepted(), "{:?}", report.reasons);

@@ -51,7 +51,7 @@ fn context() -> &'static Context {
 
 /// A pair that is enabled and at rest, in a world with this seed.
 fn enabled(leg: &LegFile, seed: u64) -> Pair {
-    let mut pair = Pair::new(leg, context(), seed).expect("the firmware takes the default leg");
+    let mut pair = Pair::new(leg, context(), seed).expect("the firmware accepts the default leg");
     assert!(pair.enable(context().gravity));
     pair
 }
@@ -64,7 +64,7 @@ fn activity(pair: &Pair) -> Activity {
     pair.leg.control().activity()
 }
 
-/// Ticks until `reached`, at most as long as an identification takes; returns whether it was.
+/// Ticks until `reached`, at most for the duration of an identification; returns whether it was reached.
 fn run_until(pair: &mut Pair, reached: impl Fn(&Pair) -> bool) -> bool {
     for _ in 0..LONGEST_IDENTIFICATION {
         if reached(pair) {
@@ -75,7 +75,7 @@ fn run_until(pair: &mut Pair, reached: impl Fn(&Pair) -> bool) -> bool {
     false
 }
 
-/// Identifies; `None` where the leg gave up without a verdict.
+/// Identifies; `None` if the leg stopped without a verdict.
 fn identify(pair: &mut Pair) -> Option<Verdict> {
     tick(pair, Some(ControlRequest::Identify));
     assert!(run_until(pair, |pair| !matches!(activity(pair), Activity::Identify(_))), "without end");

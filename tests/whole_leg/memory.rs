@@ -18,7 +18,7 @@ const WINDOW_BYTES: usize = size_of::<Window<f32, JOINTS, BASE, ROOM>>();
 const _: () = assert!(WINDOW_BYTES <= 34 * 1024);
 
 #[test]
-fn a_leg_fits_the_memory_set_aside_for_it() {
+fn a_leg_fits_its_reserved_memory() {
     let sizes = [
         ("Leg", size_of::<Leg<JOINTS, BASE, TAPS, PENDING>>(), 47_500 + WINDOW_BYTES),
         ("Control", size_of::<Control<JOINTS>>(), 2_000),

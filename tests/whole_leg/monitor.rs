@@ -58,13 +58,13 @@ fn seconds_until(pair: &mut Pair, reached: impl Fn(&Pair) -> bool) -> f64 {
 }
 
 #[test]
-fn a_payload_is_noticed_in_seconds_and_found() {
+fn a_payload_is_detected_in_seconds_and_identified() {
     let mut pair = walking();
     pair.world.attach(1, MASS, [PLACE, 0.0, 0.0]);
     let noticed = seconds_until(&mut pair, |pair| pair.leg.control().change().is_some());
     let change = *pair.leg.control().change().expect("noticed");
-    println!("noticed after {noticed} s, {change:?}");
-    // Expected: six seconds of persistence, of which the knee rests a part, and the filter's length.
+    println!("detected after {noticed} s, {change:?}");
+    // Expected: six seconds of persistence, during which the knee partly rests, and the filter's length.
     assert!((6.0..9.0).contains(&noticed), "{noticed} s");
     assert!((f64::from(change.since_s) - noticed).abs() < 1.5, "{change:?}");
     assert!(change.joints[1]);
@@ -81,12 +81,12 @@ fn a_payload_is_noticed_in_seconds_and_found() {
         assert!((f64::from(found.values[index]) - truth).abs() < 3.0 * sigma, "{found:?}");
         assert!(sigma < 0.01 * truth, "sigma {sigma} of {truth}");
     }
-    // No update was taken into use without a request.
+    // No update was applied without a request.
     assert_eq!(pair.leg.control().model(), identified().leg.control().model());
 }
 
 #[test]
-fn an_update_is_taken_without_a_torque_step_and_then_watched() {
+fn an_update_is_applied_without_a_torque_step_and_then_monitored() {
     let mut pair = offered();
     let old = *pair.leg.control().model().expect("accepted");
     let torque = |output: &ServoOutput<JOINTS>| output.wanted_torque.map(|torque| torque.0);
@@ -111,7 +111,7 @@ fn an_update_is_taken_without_a_torque_step_and_then_watched() {
     let mut pair = same_phase;
     assert_ne!(pair.leg.control().model(), Some(&old));
     assert_eq!(pair.leg.control().change(), None);
-    // An update can be taken only once.
+    // An update can be applied only once.
     assert!(tick(&mut pair, Some(ControlRequest::TakeUpdate)).refused);
     for _ in 0..60 * SECOND {
         tick(&mut pair, None);
@@ -120,7 +120,7 @@ fn an_update_is_taken_without_a_torque_step_and_then_watched() {
 }
 
 #[test]
-fn there_is_nothing_to_take_before_a_change() {
+fn no_update_is_available_before_a_change() {
     let mut pair = walking();
     let output = tick(&mut pair, Some(ControlRequest::TakeUpdate));
     assert!(output.refused && !output.took_update);
@@ -128,7 +128,7 @@ fn there_is_nothing_to_take_before_a_change() {
 }
 
 #[test]
-fn a_leg_that_was_never_identified_is_not_watched() {
+fn a_leg_that_was_never_identified_is_not_monitored() {
     let mut pair = enabled(&default_leg(), 1);
     tick(&mut pair, Some(walk(false)));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
@@ -140,7 +140,7 @@ fn a_leg_that_was_never_identified_is_not_watched() {
 }
 
 #[test]
-fn a_stop_while_rows_are_collected_forgets_them() {
+fn a_stop_discards_the_collected_rows() {
     let mut pair = walking();
     pair.world.attach(1, MASS, [PLACE, 0.0, 0.0]);
     assert!(run_until(&mut pair, |pair| pair.leg.control().change().is_some()));
@@ -157,7 +157,7 @@ fn a_stop_while_rows_are_collected_forgets_them() {
 }
 
 #[test]
-fn a_stored_model_has_no_uncertainty_and_is_not_watched() {
+fn a_stored_model_has_no_uncertainty_and_is_not_monitored() {
     let mut pair = identified();
     let kept = *pair.leg.control().model().expect("accepted");
     assert!(pair.leg.identification().model_monitor().baseline().is_some());

@@ -1,4 +1,4 @@
-//! Deliberate errors: each is refused for its reason, and honest runs are accepted.
+//! Deliberate errors are each refused for their reason, and honest runs are accepted.
 
 use scarab_host::base::number::Number;
 use scarab_host::formats::leg_file::PushesFile;
@@ -11,7 +11,7 @@ use super::*;
 fn perturbed(perturbation: &str, seed: u64) -> RunReport {
     let perturbations = vec![perturbation.parse::<Perturbation>().expect("known")];
     let options = SimulationOptions { perturbations, ..SimulationOptions::of_seed(seed) };
-    simulate::<JOINTS, BASE>(&default_leg(), &options).expect("it ends in a verdict").report
+    simulate::<JOINTS, BASE>(&default_leg(), &options).expect("a verdict").report
 }
 
 /// Checks that the run is refused for exactly these reasons, each with a finding as a sentence.
@@ -41,7 +41,7 @@ fn changed_inertia_com_or_mass_are_refused_by_validation_alone() {
 }
 
 #[test]
-fn floor_contact_is_refused_as_contact_and_a_short_touch_is_not() {
+fn floor_contact_is_refused_as_contact_but_not_a_short_touch() {
     refused("contact=2", &["contact"]);
     let report = perturbed("contact=0.5", 1);
     assert!(report.accepted(), "{:?}", report.reasons);
@@ -64,13 +64,13 @@ fn wrong_parameters_are_never_accepted_with_a_pushing_wearer() {
 }
 
 #[test]
-fn pushes_while_motions_are_predicted_are_set_aside_and_hide_nothing() {
+fn pushes_during_validation_are_excluded_and_hide_no_error() {
     let leg = LegFile::load("x2-rough").expect("shipped");
     let run = |perturbations: &[&str], seed: u64| {
         let perturbations =
             perturbations.iter().map(|word| word.parse::<Perturbation>().expect("known")).collect();
         let options = SimulationOptions { perturbations, ..SimulationOptions::of_seed(seed) };
-        simulate::<JOINTS, BASE>(&leg, &options).expect("it ends in a verdict").report
+        simulate::<JOINTS, BASE>(&leg, &options).expect("a verdict").report
     };
     for seed in [1, 2] {
         let report = run(&[], seed);
@@ -79,7 +79,7 @@ fn pushes_while_motions_are_predicted_are_set_aside_and_hide_nothing() {
             report.validation.iter().filter_map(|fit| fit.disturbed_share.known()).fold(0.0, f64::max);
         // Some twenty pushes a minute of up to 0.6 s on one of two joints: a tenth of the time.
         assert!((0.05..0.34).contains(&largest), "{largest}");
-        assert!(report.validation.iter().all(|fit| fit.replaced > 0), "3 % of the samples are wild");
+        assert!(report.validation.iter().all(|fit| fit.replaced > 0), "3 % of the samples are outliers");
         for (perturbation, reason) in [
             ("inertia=0.7", "validation"),
             ("com=0.8", "validation"),
@@ -118,7 +118,7 @@ fn exchanged_connectors_and_wrong_directions_are_refused() {
 }
 
 #[test]
-fn what_torque_cannot_see_is_accepted() {
+fn errors_without_effect_on_torque_are_accepted() {
     // A wrong torque constant scales everything; an error of the last joint's zero turns that
     // link's own frame.
     for perturbation in ["torque-constant=1.2", "zero=5@knee"] {

@@ -79,11 +79,11 @@ fn a_wrong_torque_constant_is_found_only_with_a_known_mass() {
         assert_eq!(run.verdict, Some(Verdict::ACCEPTED), "undetectable in one run");
         let relative = run.pair.leg.identification().solver().expect("solved").estimate().values;
         let rotor = BASE - 1;
-        // Everything is too small by the factor; sigma of this rotor's inertia is 0.3 %.
+        // All values are too small by the factor; sigma of this rotor's inertia is 0.3 %.
         assert!((f64::from(relative[rotor]) * 1.2 / true_base()[rotor] - 1.0).abs() < 0.02);
 
         let (scale, corrected) = corrected(&run, &ON_THE_KNEE);
-        let ratios = scale.trusted().expect("both joints feel the mass");
+        let ratios = scale.trusted().expect("the mass loads both joints");
         for ratio in ratios {
             let constant = 1.5 / f64::from(ratio.ratio);
             println!(
@@ -93,26 +93,26 @@ fn a_wrong_torque_constant_is_found_only_with_a_known_mass() {
             // Expected 1.8 N m/A within 1 %: four sigma of 0.22 %.
             assert!((constant / 1.8 - 1.0).abs() < 0.01, "{constant}");
         }
-        let corrected = corrected.expect("to be corrected");
+        let corrected = corrected.expect("a correction");
         assert!(corrected.verdict.is_accepted());
-        // Among 39 pulls, one beyond 4 has a probability of 0.2 %.
+        // Among 39 errors in sigma, one beyond 4 has a probability of 0.2 %.
         assert!(worst_pull(&corrected) < 4.0, "{}", worst_pull(&corrected));
     }
 }
 
 #[test]
-fn constants_that_differ_from_joint_to_joint_are_found_each() {
+fn different_constants_of_the_joints_are_each_identified() {
     let run = first_run([0.8, 1.15], 4);
     let (scale, corrected) = corrected(&run, &ON_THE_KNEE);
-    let ratios = scale.trusted().expect("both joints feel the mass").map(|ratio| f64::from(ratio.ratio));
+    let ratios = scale.trusted().expect("the mass loads both joints").map(|ratio| f64::from(ratio.ratio));
     assert!((ratios[0] * 0.8 - 1.0).abs() < 0.01 && (ratios[1] * 1.15 - 1.0).abs() < 0.01, "{ratios:?}");
-    let corrected = corrected.expect("to be corrected");
+    let corrected = corrected.expect("a correction");
     assert!(corrected.verdict.is_accepted(), "{:?}", corrected.verdict.reasons().collect::<Vec<_>>());
     assert!(worst_pull(&corrected) < 4.0);
 }
 
 #[test]
-fn a_wrong_mass_scales_the_result_and_a_wrong_position_is_noticed() {
+fn a_wrong_mass_scales_the_result_a_wrong_position_is_detected() {
     let run = first_run([1.0; JOINTS], 5);
     let (heavy, _) = corrected(&run, &Payload { mass: 5.5, ..ON_THE_KNEE });
     for ratio in heavy.trusted().expect("nothing contradicts") {
@@ -147,9 +147,9 @@ fn a_model_with_a_known_load_predicts_like_one_identified_with_it() {
         [*model, model.with_load(&load.convert()), *again].map(|model| prediction_error(&model, &plant));
     println!("N m rms without {without:?}, added {with:?}, identified again {identified_again:?}");
     for joint in 0..JOINTS {
-        // Both are estimates at one noise level; they may differ by that noise, never by several times.
+        // Both are estimates at one noise level; they may differ by that noise, but not by several times it.
         assert!(with[joint] < 2.0 * identified_again[joint], "joint {joint}");
-        assert!(without[joint] > 10.0 * with[joint], "the load is felt, or this shows nothing");
+        assert!(without[joint] > 10.0 * with[joint], "the load has too small an effect for this test");
     }
 }
 
@@ -178,7 +178,7 @@ fn prediction_error(model: &IdentifiedModel<JOINTS>, plant: &World<JOINTS>) -> [
 #[test]
 fn the_firmware_of_a_right_leg_refuses_to_drive_a_left_one() {
     let left = on_side(&default_leg(), BodySide::Left).expect("parallel axes");
-    let mut pair = Pair::new(&left, context(), 1).expect("the firmware takes the default leg");
+    let mut pair = Pair::new(&left, context(), 1).expect("the firmware accepts the default leg");
     // A bent leg reads as bent backwards, outside its range.
     assert!(!pair.enable(context().gravity) && !is_enabled(&pair));
 }

@@ -56,7 +56,7 @@ fn feedback_alone_follows_four_hertz_by_more_than_half_the_power() {
     for joint in 0..JOINTS {
         let ratio = amplitude_ratio(joint, 4.0);
         println!("joint {joint}: {ratio:.3}");
-        // Measured: 1.11 and 1.10, as the commanded speed leads; above 1.3 the loop would ring.
+        // Measured: 1.11 and 1.10, because the commanded speed leads; above 1.3 the loop would oscillate.
         assert!(ratio > 0.707 && ratio < 1.3, "joint {joint}: {ratio}");
     }
 }

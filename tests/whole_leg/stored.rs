@@ -1,4 +1,4 @@
-//! A stored model that is offered to a leg again.
+//! A stored model offered to a leg after a restart.
 
 use scarab::leg::{RestoreError, StoredModel};
 use scarab::units::{NewtonMetrePerAmpere, Radian};
@@ -51,7 +51,7 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
 
     let mut configuration = context().configuration.clone();
     configuration.joints.iter_mut().for_each(|joint| joint.scale.mirrored = true);
-    assert!(matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })), "the other side");
+    assert!(matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })), "a model of the other side");
 
     // Changes that leave the parameters' meaning unchanged do not refuse the model.
     let mut configuration = context().configuration.clone();
@@ -64,7 +64,7 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
 }
 
 #[test]
-fn a_model_with_a_number_that_is_none_is_refused_by_joint() {
+fn a_model_with_a_number_not_finite_is_refused_with_its_joint() {
     for (joint, value) in [(0, f32::NAN), (1, f32::INFINITY)] {
         let mut stored = kept();
         stored.parameters[joint][7] = value;
@@ -73,7 +73,7 @@ fn a_model_with_a_number_that_is_none_is_refused_by_joint() {
 }
 
 #[test]
-fn a_stribeck_curve_that_is_none_is_refused_by_joint() {
+fn an_invalid_stribeck_curve_is_refused_with_its_joint() {
     // A speed of 0 makes the torque of a joint at rest NaN.
     for (joint, excess, velocity) in
         [(0, 0.0, 0.0), (1, -0.1, 0.1), (0, f32::NAN, 0.1), (1, 0.4, f32::INFINITY)]
@@ -85,7 +85,7 @@ fn a_stribeck_curve_that_is_none_is_refused_by_joint() {
 }
 
 #[test]
-fn a_model_is_not_exchanged_while_the_leg_moves_or_uses_one() {
+fn a_model_is_not_exchanged_in_motion_or_while_in_use() {
     let restored = context().configuration.restore(&kept()).expect("the same leg");
     let mut pair = during_excitation();
     assert!(!pair.leg.adopt(restored));

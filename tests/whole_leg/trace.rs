@@ -11,14 +11,14 @@ fn told(pair: &Pair) -> Vec<String> {
     let mut lines = Vec::new();
     while let Some(record) = report.advance(pair.leg.identification()) {
         let mut line = String::new();
-        Record::<JOINTS>::write(&record, lines.len() as u32, &mut line).expect("a string takes everything");
+        Record::<JOINTS>::write(&record, lines.len() as u32, &mut line).expect("writing to a string cannot fail");
         lines.push(line);
     }
     lines
 }
 
 #[test]
-fn a_report_tells_every_parameter_finding_and_fit_and_its_own_length() {
+fn a_report_contains_every_parameter_finding_and_fit_and_its_length() {
     let pair = identified();
     let identification = pair.leg.identification();
     let lines = told(&pair);
@@ -71,7 +71,7 @@ fn a_report_tells_every_parameter_finding_and_fit_and_its_own_length() {
     let word = if verdict.is_accepted() { "accepted" } else { "refused" };
     assert_eq!(of("verdict")[0].text("verdict"), Ok(word));
     assert_eq!(of("reason").len(), verdict.reasons().count());
-    let end = lines.last().expect("something was told");
+    let end = lines.last().expect("a record");
     assert_eq!((end.kind(), end.value("records")), ("end", Ok(lines.len() - 1)));
     for (number, line) in lines.iter().enumerate() {
         assert_eq!(line.number(), Ok(number as u32));
@@ -79,9 +79,9 @@ fn a_report_tells_every_parameter_finding_and_fit_and_its_own_length() {
 }
 
 #[test]
-fn nothing_is_told_before_there_is_something() {
+fn no_report_before_there_is_a_result() {
     assert_eq!(told(&during_excitation()), [""; 0]);
-    // Before the end of the search values are present, a verdict is not.
+    // Before the end of the search there are values but no verdict.
     let lines = told(&before_the_search());
     assert!(lines.iter().any(|line| line.starts_with("solver ") && line.contains(" state=running ")));
     assert!(!lines.iter().any(|line| line.starts_with("verdict ")));

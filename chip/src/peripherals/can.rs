@@ -634,7 +634,7 @@ mod tests {
     }
 
     #[test]
-    fn the_code_names_the_last_mailbox_and_an_abort_waits_for_the_wire() {
+    fn the_code_names_the_last_mailbox_and_aborts_wait() {
         let mut bench = Bench::new();
         bench.can.connected = false;
         bench.write(0x00, 0);

@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn currents_beyond_the_rails_read_as_the_rail_and_zero_without_low_side() {
+    fn currents_beyond_the_rails_read_as_the_rail() {
         // 3.15 V and 0.15 V of 3.3 V.
         assert_eq!((code(500.0, 1e-3), code(-500.0, 1e-3)), (3910, 186));
         assert_eq!(code(50.0, 0.0), 2048);

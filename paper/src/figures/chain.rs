@@ -36,7 +36,7 @@ pub struct JointTorque<'n> {
     pub name: &'n str,
     /// Time, s.
     pub time_s: Vec<f64>,
-    /// Samples excluded because the joint stands still.
+    /// Samples excluded because the joint is at rest.
     pub still: Vec<bool>,
     /// Measured torque, N m.
     pub measured: Vec<f64>,

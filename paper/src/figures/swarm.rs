@@ -37,7 +37,7 @@ pub struct Walk {
     /// Name of the search.
     pub name: &'static str,
     /// Position after each iteration.
-    pub places: Vec<[f64; 2]>,
+    pub positions: Vec<[f64; 2]>,
 }
 
 /// Evaluations between two points of a curve.
@@ -137,11 +137,11 @@ fn key(name: &str) -> Key {
 
 /// Square window with all positions and the nearest minima, no larger than the box.
 fn window(half: f64, minimisers: &[[f64; 2]], walks: &[Walk]) -> [Range<f64>; 2] {
-    let places = || walks.iter().flat_map(|walk| &walk.places).chain(minimisers);
+    let positions = || walks.iter().flat_map(|walk| &walk.positions).chain(minimisers);
     let reach = |axis: usize| {
         let of = |place: &[f64; 2]| place[axis];
-        let low = places().map(of).fold(f64::INFINITY, f64::min);
-        let high = places().map(of).fold(f64::NEG_INFINITY, f64::max);
+        let low = positions().map(of).fold(f64::INFINITY, f64::min);
+        let high = positions().map(of).fold(f64::NEG_INFINITY, f64::max);
         ((low + high) / 2.0, high - low)
     };
     let (x, y) = (reach(0), reach(1));
@@ -160,7 +160,7 @@ fn map(
     minimisers: &[[f64; 2]],
     walk: &Walk,
 ) -> Result<(), DrawingError> {
-    let steps = walk.places.len().saturating_sub(1);
+    let steps = walk.positions.len().saturating_sub(1);
     text(
         area,
         (LEFT, 10),
@@ -172,10 +172,10 @@ fn map(
     let [x, y] = window.clone();
     let mut chart = axes(&area, &Axes { x, y, x_label: "x", y_label: "y", x_ticks: 7, y_ticks: 7 })?;
     contours(&mut chart, problem, window)?;
-    let places = || walk.places.iter().map(|[x, y]| (*x, *y));
-    chart.draw_series([PathElement::new(places().collect::<Vec<_>>(), look(walk.name).0)])?;
-    chart.draw_series(places().skip(1).map(|place| Circle::new(place, px(2), DARK.filled())))?;
-    chart.draw_series(places().take(1).map(|place| Circle::new(place, px(6), line(DARK, 6))))?;
+    let positions = || walk.positions.iter().map(|[x, y]| (*x, *y));
+    chart.draw_series([PathElement::new(positions().collect::<Vec<_>>(), look(walk.name).0)])?;
+    chart.draw_series(positions().skip(1).map(|place| Circle::new(place, px(2), DARK.filled())))?;
+    chart.draw_series(positions().take(1).map(|place| Circle::new(place, px(6), line(DARK, 6))))?;
     let inside = minimisers.iter().filter(|[x, y]| window[0].contains(x) && window[1].contains(y));
     chart.draw_series(inside.map(|[x, y]| Cross::new((*x, *y), px(7), line(DARK, 7))))?;
     Ok(())
@@ -219,10 +219,10 @@ fn contours(
 
 /// Draws both coordinates of the best beetle over the iterations.
 fn trace(area: &Area<'_>, walks: &[Walk]) -> Result<(), DrawingError> {
-    text(area, (LEFT, 10), 12, HPos::Left, "place of the best: x full, y dotted")?;
+    text(area, (LEFT, 10), 12, HPos::Left, "position of the best: x solid, y dotted")?;
     let (_, area) = area.split_vertically(px(20));
-    let settled = walks.iter().map(|walk| settled(&walk.places)).max().unwrap_or(1).max(4) as f64;
-    let values: Vec<f64> = walks.iter().flat_map(|walk| walk.places.iter().flatten()).copied().collect();
+    let settled = walks.iter().map(|walk| settled(&walk.positions)).max().unwrap_or(1).max(4) as f64;
+    let values: Vec<f64> = walks.iter().flat_map(|walk| walk.positions.iter().flatten()).copied().collect();
     let mut chart = axes(
         &area,
         &Axes {
@@ -238,7 +238,7 @@ fn trace(area: &Area<'_>, walks: &[Walk]) -> Result<(), DrawingError> {
         let (style, _) = look(walk.name);
         for axis in 0..2 {
             let points: Vec<_> =
-                (0..).map(f64::from).zip(walk.places.iter().map(|place| place[axis])).collect();
+                (0..).map(f64::from).zip(walk.positions.iter().map(|place| place[axis])).collect();
             let shown: Vec<_> = points.into_iter().filter(|(iteration, _)| *iteration <= settled).collect();
             if axis == 0 {
                 chart.draw_series([PathElement::new(shown, style)])?;
@@ -251,11 +251,11 @@ fn trace(area: &Area<'_>, walks: &[Walk]) -> Result<(), DrawingError> {
 }
 
 /// Iteration after which no movement is visible.
-fn settled(places: &[[f64; 2]]) -> usize {
-    let Some(end) = places.last() else { return 0 };
+fn settled(positions: &[[f64; 2]]) -> usize {
+    let Some(end) = positions.last() else { return 0 };
     let distance = |place: &[f64; 2]| (place[0] - end[0]).hypot(place[1] - end[1]);
-    let seen = 0.01 * places.iter().map(distance).fold(0.0, f64::max);
-    places.iter().rposition(|place| distance(place) > seen).map_or(0, |last| last + 3)
+    let seen = 0.01 * positions.iter().map(distance).fold(0.0, f64::max);
+    positions.iter().rposition(|place| distance(place) > seen).map_or(0, |last| last + 3)
 }
 
 type LogChart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, LogCoord<f64>>>;
@@ -297,8 +297,8 @@ fn descent(
         let band = band(curve);
         let (style, dashes) = look(curve.name);
         let points = |values: &[f64]| {
-            let places = (0..).map(|index: usize| (index * band.spacing) as f64);
-            places.zip(values.iter().copied()).collect::<Vec<_>>()
+            let positions = (0..).map(|index: usize| (index * band.spacing) as f64);
+            positions.zip(values.iter().copied()).collect::<Vec<_>>()
         };
         let outline = points(&band.low).into_iter().chain(points(&band.high).into_iter().rev());
         chart.draw_series([Polygon::new(outline.collect::<Vec<_>>(), style.color.mix(0.13).filled())])?;

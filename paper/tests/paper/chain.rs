@@ -9,10 +9,10 @@ use scarab_paper::{convergence, figure_seven, load_change, tables_five_six};
 use crate::command::{Folder, scarab};
 
 #[test]
-fn torque_tells_nine_of_twenty_parameters_and_fifteen_sums() {
+fn torque_determines_nine_of_twenty_parameters_and_fifteen_sums() {
     let report = tables_five_six::report(1).expect("the chain is identified");
     assert_eq!((report.rank.of_table_v, report.rank.of_all_inertial), (15, 15));
-    assert_eq!(report.rank.joint_by_joint, 15, "one joint at a time tells neither more nor less");
+    assert_eq!(report.rank.joint_by_joint, 15, "one joint at a time determines neither more nor less");
     assert_eq!((report.rank.of_the_leg, report.rank.columns), (25, 42));
     assert_eq!(report.accepted, [1, 1]);
     let names: Vec<_> = report.table_v.iter().map(|line| line.name.as_str()).collect();
@@ -57,15 +57,15 @@ fn the_verification_torque_is_predicted_within_two_percent_of_its_mean() {
     let one_time = of("one-time");
     assert_eq!(one_time.len(), 3);
     assert!(one_time.iter().all(|percent| *percent < figure_seven::GOAL_PERCENT), "{one_time:?}");
-    // Joint 1's small torque follows from the link parameters of joints 2 and 3: the sequential
-    // plan misses it.
+    // Joint 1's small torque follows from the link parameters of joints 2 and 3: the sequential plan
+    // determines it worse.
     assert!(of("sequential")[0] > one_time[0], "{:?}", of("sequential"));
     // Axis along gravity: less than a thousandth of the hip's torque.
     assert!(report.links_alone_nm[0] < 1e-3 * report.links_alone_nm[1], "{:?}", report.links_alone_nm);
 }
 
 #[test]
-fn a_changed_load_is_found_where_it_is_and_nowhere_else() {
+fn a_changed_load_is_found_on_its_link_only() {
     let report = load_change::report(1).expect("the chain is identified");
     assert_eq!(report.changed_of_table_v, ["XX3", "YY3", "YZ3", "ZZ3", "HY3", "HZ3", "M3"]);
     for line in &report.lines {
@@ -87,7 +87,7 @@ fn a_changed_load_is_found_where_it_is_and_nowhere_else() {
 }
 
 #[test]
-fn the_swarm_arrives_on_single_base_and_consistent_parameters_of_the_leg() {
+fn the_swarm_converges_on_all_sets_of_unknowns_of_the_leg() {
     let report = convergence::report(1).expect("both legs are recorded");
     let rows: Vec<_> = report.rows.iter().map(|row| (row.problem.as_str(), row.dimension)).collect();
     // 21 and 10 combinations with friction, 25 and 13 with rotors and offsets. All of Table V but

@@ -33,7 +33,7 @@ fn find(function: &str, dimension: u64, algorithm: &str, tolerance: f64, precisi
             && row["tolerance"] == tolerance
             && row["precision"] == precision
     };
-    rows().iter().find(is_meant).unwrap_or_else(|| panic!("no {function} {dimension} {algorithm}"))
+    rows().iter().find(is_meant).unwrap_or_else(|| panic!("{function} {dimension} {algorithm} is missing"))
 }
 
 #[test]
@@ -72,11 +72,11 @@ fn rows_have_every_function_search_reading_and_precision() {
             .map(|key| row[key].to_string())
     };
     let distinct: BTreeSet<_> = rows().iter().map(identity).collect();
-    assert_eq!(distinct.len(), rows().len(), "a row is there twice");
+    assert_eq!(distinct.len(), rows().len(), "a row occurs twice");
 }
 
 #[test]
-fn a_count_is_null_where_too_few_runs_succeed_and_a_number_elsewhere() {
+fn a_count_is_null_if_too_few_runs_succeed() {
     for row in rows() {
         assert_eq!(row["runs"], 2, "{row}");
         let success = row["success_rate"].as_f64().expect("a number");
@@ -162,13 +162,13 @@ fn figure_five_is_drawn_for_each_function_small_and_well_formed() {
         // Suitable size for a repository.
         assert!(svg.len() < 250_000, "{function}: {} bytes", svg.len());
         for word in ["bso-paper", "pso", "bas", "iterations", "evaluations"] {
-            assert!(svg.contains(word), "{function}: no {word}");
+            assert!(svg.contains(word), "{function}: `{word}` is missing");
         }
     }
 }
 
 #[test]
-fn a_document_keeps_all_but_what_stands_between_the_markers() {
+fn a_document_changes_only_between_its_markers() {
     let folder = Folder::new();
     let text = "before\n<!-- paper: table-iii -->\nold\n<!-- end of table-iii -->\nafter\n";
     let document = folder.write("a.md", text);
@@ -183,7 +183,7 @@ fn a_document_keeps_all_but_what_stands_between_the_markers() {
 }
 
 #[test]
-fn what_cannot_be_made_is_refused() {
+fn impossible_requests_are_refused() {
     for (arguments, named) in [
         ("--seeds 0", "--seeds"),
         ("--seeds 100001", "--seeds"),

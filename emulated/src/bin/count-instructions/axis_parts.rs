@@ -1,7 +1,7 @@
 //! Costs of the parts of one axis' tick: each part called by itself, over the angles of an electrical turn.
 //!
 //! A part called by itself passes its arguments and its result through memory, which the tick avoids. So the
-//! parts look somewhat dearer than they are, and the remainder somewhat cheaper.
+//! parts appear somewhat more expensive than they are, and the remainder somewhat cheaper.
 
 use core::hint::black_box;
 

@@ -16,9 +16,9 @@ use crate::motor::{CONFIGURATION, Motor};
 /// Design bound of one axis' tick.
 const MOST_INSTRUCTIONS: u32 = 700;
 
-/// Mechanical speeds and target currents: nearly at rest, a joint's greatest speed behind 50:1, and near the
-/// voltage limit. Not quite at rest, because a rotor that a current of either sign does not move counts as a
-/// frozen encoder.
+/// Mechanical speeds and target currents: nearly at rest, a joint's largest speed behind 50:1, and near the
+/// voltage limit. Not fully at rest, because a rotor that does not move under a current of either sign counts
+/// as a frozen encoder.
 pub const SPEEDS: [(f32, f32); 4] = [(1.0, 10.0), (225.0, 30.0), (-225.0, 30.0), (820.0, 40.0)];
 /// Ticks counted at each speed; an electrical turn at the slowest moving speed takes 96.
 const TICKS: u32 = 1200;
@@ -42,7 +42,7 @@ pub fn report() -> bool {
     kept
 }
 
-/// Calibrates a motor and counts the ticks' instructions; `None` where it is refused.
+/// Calibrates a motor and counts the ticks' instructions; `None` if the calibration is refused.
 pub fn calibrated(
     motor: &mut Motor,
     configuration: &AxisConfiguration,
@@ -91,7 +91,7 @@ fn ticks(motor: &mut Motor, configuration: &AxisConfiguration, calibration: &Cal
             }
         }
         if let Some(fault) = axis.fault() {
-            hprintln!("axis released itself at {} rad/s: {:?}", speed as i32, fault);
+            hprintln!("axis turned off at {} rad/s: {:?}", speed as i32, fault);
             return None;
         }
         hprintln!("{:<41} {:>6} {:>8} {:>8}", "axis tick at rad/s", speed as i32, tally.mean(), tally.most());

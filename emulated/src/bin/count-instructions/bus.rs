@@ -1,4 +1,4 @@
-//! Cost of one bus node per frame: cyclic frames, rare frames, and the dearest of random frames.
+//! Cost of one bus node per frame: cyclic frames, rare frames, and the most expensive random frames.
 
 use core::hint::black_box;
 
@@ -66,7 +66,7 @@ impl Bench {
     }
 }
 
-/// Prints the table; `None` where there is no node.
+/// Prints the table; `None` if the node cannot be created.
 #[inline(never)]
 pub fn report() -> Option<()> {
     heading("a node of the bus");

@@ -1,6 +1,6 @@
 //! Cost of a board's bus rounds on a full wire.
 //!
-//! Counted is the interrupt of level 5 with its queues, without the controller's registers.
+//! The interrupt of level 5 is counted with its queues, without the controller's registers.
 //!
 //! Each received frame raises a round, each sent frame another, and every second servo tick a third. A wire
 //! at 1 Mbit/s limits the number: frames without data have 47 bits, those of eight bytes 111, stuff bits not
@@ -139,7 +139,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Prints the table; returns whether all bounds are met, `None` where there is no device.
+/// Prints the table; returns whether all bounds are met, `None` if the device cannot be created.
 #[inline(never)]
 pub fn report() -> Option<bool> {
     hprintln!(

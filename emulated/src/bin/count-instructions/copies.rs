@@ -7,15 +7,15 @@ use cortex_m_semihosting::hprintln;
 use crate::counter::{Tally, count, heading};
 
 const WORDS: usize = 48;
-/// Covers every path through the copies: rounds of 32 and of 16 bytes, and all remainders.
+/// Length that covers every path through the copies: rounds of 32 and of 16 bytes, and all remainders.
 const LONGEST: usize = 100;
 const ALIGNMENTS: usize = 4;
 /// Fill around a copy.
 const UNTOUCHED: u8 = 0xEE;
-/// Greatest instructions of a copy of 144 bytes, aligned and unaligned.
+/// Largest instructions of a copy of 144 bytes, aligned and unaligned.
 const MOST: [u32; 2] = [80, 140];
 
-/// Prints the table; returns whether every copy is right and cheap enough.
+/// Prints the table; returns whether every copy is correct and within its bound.
 pub fn report() -> bool {
     heading("copies of 144 bytes");
     let words: [u32; WORDS] = core::array::from_fn(|place| 0x0302_0100 + 0x0404_0404 * place as u32);

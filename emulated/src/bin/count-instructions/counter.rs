@@ -2,8 +2,8 @@
 //!
 //! The timer runs at 1 GHz without being enabled, which at `-icount shift=0` is one count per instruction.
 //!
-//! No documentation promises that, so [`start`] first counts a hundred `nop`, and nothing is measured where
-//! they are not a hundred.
+//! This is not documented, so [`start`] first counts a hundred `nop`. If they are not counted as a hundred,
+//! the program stops.
 
 use core::hint::black_box;
 
@@ -24,12 +24,12 @@ pub fn start() -> bool {
     }
     let (hundred, ()) = count(hundred_nops);
     if hundred != 100 {
-        hprintln!("100 instructions were counted as {}: wants QEMU with -icount shift=0", hundred);
+        hprintln!("100 instructions were counted as {}: run QEMU with -icount shift=0", hundred);
     }
     hundred == 100
 }
 
-#[expect(unsafe_code, reason = "instructions that do nothing, in a known number")]
+#[expect(unsafe_code, reason = "a known number of `nop` instructions")]
 #[inline(always)]
 fn hundred_nops() {
     // SAFETY: `nop` changes neither registers nor memory.
@@ -42,8 +42,8 @@ pub fn now() -> u32 {
     unsafe { TIM5_CNT.read_volatile() }
 }
 
-/// Counts the instructions of `work` and returns its result too; the counting itself is subtracted. Never
-/// inlined: the compiler must not move surrounding code between the two readings.
+/// Counts the instructions of `work` and also returns its result; the counting itself is subtracted. Never
+/// inlined, so the compiler cannot move surrounding code between the two readings.
 #[inline(never)]
 pub fn count<R>(work: impl FnOnce() -> R) -> (u32, R) {
     let before = now();

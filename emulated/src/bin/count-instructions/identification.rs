@@ -37,7 +37,7 @@ fn noise(seed: &mut u32) -> f32 {
     sum
 }
 
-/// Prints the table; returns whether the bounds are met. `None` where the motion cannot be made or recorded.
+/// Prints the table; returns whether the bounds are met. `None` if the motion cannot be created or recorded.
 #[inline(never)]
 pub fn report(model: &Model, account: &mut Account) -> Option<bool> {
     heading("identification of two joints, 500 Hz");

@@ -3,9 +3,9 @@
 //! Counted work: read converters, contacts and counters, decide, run both axes' current loops, update queues
 //! and counters of the levels, write compare values and outputs.
 //!
-//! Why: one axis' tick alone is little more than half of it. The handler is the flash image's own, with
-//! memory words in place of registers ([`crate::machine`]). Since this machine has no such converters, the
-//! handler serves an exception that the program raises.
+//! One axis' tick alone is little more than half of it. The handler is the flash image's own, with memory
+//! words instead of registers ([`crate::machine`]). This machine lacks such converters, so the handler serves
+//! an exception that the program raises.
 
 use cortex_m::asm::isb;
 use cortex_m::peripheral::SCB;
@@ -125,7 +125,7 @@ fn PendSV() {
     }
 }
 
-/// Instructions of the handler alone: with the exception raised, less the same instructions without.
+/// Instructions of the handler alone: with the exception raised, minus the same instructions without it.
 fn interrupt() -> u32 {
     let (with, ()) = count(|| {
         SCB::set_pendsv();
@@ -172,8 +172,8 @@ impl Bench {
         Self { motors, samples: [AxisSample::default(); AXES], ends, tally: Tally::default() }
     }
 
-    /// Sets the motors' speed and starts the axes with bridges off. Returns the dearest interrupt
-    /// with an order.
+    /// Sets the motors' speed and starts the axes with bridges off. Returns the most expensive interrupt with
+    /// an order.
     fn begin(&mut self, calibrations: &[Calibration; AXES], speed_rad_per_s: f32) -> Option<u32> {
         SIGNALS.set_targets(&DriveCommand::RELEASED);
         self.tally = Tally::default();

@@ -25,7 +25,7 @@ const TORQUE_PER_AMPERE: f32 = 1.5;
 
 pub type Model = RowModel<f32, JOINTS, BASE>;
 
-/// Made by `cargo sim excite --const`: 22.0 s, blends included.
+/// Created by `cargo sim excite --const`: 22.0 s, blends included.
 #[rustfmt::skip]
 const EXCITATION: ExcitationTable<2, 6> = ExcitationTable {
     period_s: 3.333,
@@ -46,7 +46,7 @@ pub fn excitation() -> Option<Periodic<JOINTS>> {
     EXCITATION.motion(SERVO_RATE_HZ).ok()
 }
 
-/// Row model of the default leg: rotor and offset estimated, Stribeck friction searched for.
+/// Row model of the default leg: rotor and offset estimated, Stribeck friction searched.
 #[inline(never)]
 pub fn model() -> Option<Model> {
     let joint = |a| DenavitHartenberg { alpha: 0.0, a, d: 0.0 };

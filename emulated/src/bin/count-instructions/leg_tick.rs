@@ -2,7 +2,7 @@
 //!
 //! The tick comprises motion, model, observers, controllers, monitor and log.
 //!
-//! One function does all of it, as in the image: code with a second caller would be compiled differently.
+//! One function contains all of it, as in the image: code with a second caller would be compiled differently.
 
 use core::hint::black_box;
 
@@ -43,7 +43,7 @@ fn follow(motion: &MotionState<JOINTS>, currents: [Ampere; JOINTS]) -> Sample<JO
     }
 }
 
-/// As in the image: one function, with a host or without.
+/// One function, with a host or without, as in the image.
 #[inline(never)]
 fn tick(
     control: &mut Control<JOINTS>,
@@ -54,7 +54,7 @@ fn tick(
     control.tick_with(sample, request, GRAVITY, host)
 }
 
-/// Prints the table; adds the bounds to the account. `None` where the leg cannot be built or does not follow.
+/// Prints the table; adds the bounds to the account. `None` if the leg cannot be built or does not follow.
 #[inline(never)]
 pub fn report(model: &Model, account: &mut Account) -> Option<()> {
     heading("a leg of two joints, 4 kHz");
@@ -155,7 +155,7 @@ fn follow_a_host(
     let (mut tally, mut place) = (Tally::default(), [0.5, 1.0]);
     for number in 0..TICKS {
         if number > 100 && number % 8 == 0 {
-            // Forth and back within the range.
+            // Back and forth within the range.
             let step = if number / 1000 % 2 == 0 { 0.0005 } else { -0.0005 };
             place = place.map(|place| place + step);
             command.target = Target::CyclicPosition {

@@ -39,7 +39,7 @@ pub struct Registers {
     pub converters: [Converter; 3],
     /// Cycle counter of the processor.
     pub cycles: Word,
-    /// Levels of the contacts' port and of the gate drivers' fault line; all ones is good.
+    /// Levels of the contacts' port and of the gate drivers' fault line; all ones means no fault.
     pub ports: [Word; 2],
     /// Encoder counters.
     pub counters: [Word; 2],

@@ -1,12 +1,12 @@
 //! Counts instructions on the emulated microcontroller.
 //!
-//! Counted work: one axis' tick and its parts, the whole current interrupt, a leg's 4 kHz tick, the steps of
-//! its identification, the iterations of the default swarm, the frames of the bus.
+//! The program counts one axis' tick and its parts, the whole current interrupt, a leg's 4 kHz tick, the
+//! steps of its identification, the iterations of the default swarm, and the frames of the bus.
 //!
-//! Why instructions: the emulator executes exactly the same number every time, and models neither flash wait
-//! states nor pipeline. `scripts/count-instructions` builds and runs this image
+//! Instructions are counted because the emulator executes exactly the same number every time, and models
+//! neither flash wait states nor pipeline. `scripts/count-instructions` builds and runs this image
 //! (`qemu-system-arm -M netduinoplus2 -icount shift=0`, where one count of TIM5 is one instruction). The
-//! script fails where a design bound is not met.
+//! script fails if a design bound is exceeded.
 #![no_std]
 #![no_main]
 

@@ -1,6 +1,6 @@
 //! Motor model for counting instructions, in single precision.
 //!
-//! The model is just good enough for a calibration to pass and for realistic currents, speeds and noise. The
+//! The model is accurate enough for a calibration to pass and for realistic currents, speeds and noise. The
 //! current loop is verified on the simulated hardware, not here.
 
 use scarab::hal::{AxisCommand, AxisSample};

@@ -10,7 +10,7 @@ use crate::objective::{DampedOscillation, UNKNOWNS, oscillation};
 
 const BEETLES: usize = 20;
 
-/// Prints one line; `None` where the oscillation was not found.
+/// Prints one line; `None` if the oscillation was not found.
 #[inline(never)]
 pub fn report() -> Option<()> {
     const TRUTH: [f32; UNKNOWNS] = [2.0, 0.8, 9.0, 0.7, 0.2];

@@ -1,7 +1,7 @@
 //! Cost of the default beetle swarm by itself: an iteration, and a search for the sphere's minimum to 0.1.
 //!
 //! The sphere costs 2 to 3 instructions per coordinate, so nearly the whole count is the swarm's. On the
-//! sphere the metric learns in every iteration, which is the swarm's dearest work.
+//! sphere the metric learns in every iteration, which is the swarm's most expensive work.
 
 use core::hint::black_box;
 
@@ -18,7 +18,7 @@ const MOST_ITERATIONS: u32 = 40;
 /// Least number of counted iterations: the first one has no gradient yet.
 const LEAST_ITERATIONS: u32 = 10;
 
-/// Prints the table; `None` where a search does not end.
+/// Prints the table; `None` if a search does not end.
 #[inline(never)]
 pub fn report() -> Option<()> {
     heading("default swarm of 20 beetles, sphere");

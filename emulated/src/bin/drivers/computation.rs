@@ -1,7 +1,7 @@
 //! Integer and floating-point computation that gives the same words on every machine.
 //!
-//! The host computes them too, so a mistake that both emulators share would be seen. Products are not added
-//! in one operation, and results that are not numbers count as one word: both may differ between machines.
+//! The host computes the words too, so an error shared by both emulators would be detected. Products and sums
+//! are not fused, and results that are not finite count as one word: both may differ between machines.
 
 /// Operands: ordinary, huge, tiny, subnormal and special.
 const FLOATS: [f32; 12] = [

@@ -1,8 +1,8 @@
 //! Agreement between the program and its check (`cargo chip drivers`).
 //!
-//! The program counts its steps in `DRIVERS_STEP` and waits at each until `DRIVERS_GO` has caught up. Results
-//! go to `DRIVERS_RESULTS`, their number to `DRIVERS_COUNT`. The first step, the processor's, runs
-//! in QEMU too.
+//! The program counts its steps in `DRIVERS_STEP` and waits at each until `DRIVERS_GO` has the same value.
+//! Results go to `DRIVERS_RESULTS`, their number to `DRIVERS_COUNT`. The first step, that of the processor,
+//! also runs in QEMU.
 
 /// Capacity for results.
 pub const WORDS: usize = 128;

@@ -1,8 +1,8 @@
 //! A foreign program for the model of the chip (`cargo chip drivers`): embassy-stm32's drivers alone.
 //!
-//! Why: model and firmware were written from the same reading of the reference manual, so a shared mistake
-//! would not show. Here the drivers of another project set the registers, and the check compares what their
-//! documentation promises with what the model's pins show. Nothing of the crate `scarab` is used.
+//! Model and firmware were written from the same reading of the reference manual, so a shared error would not
+//! show. Here the drivers of another project set the registers, and the check compares what their
+//! documentation promises with the model's pins. The program does not use the crate `scarab`.
 //!
 //! | module | content |
 //! | --- | --- |
@@ -15,7 +15,7 @@
 
 mod computation;
 mod contract;
-#[expect(unsafe_code, reason = "exceptions are requested, masked and looked into")]
+#[expect(unsafe_code, reason = "exceptions are requested, masked and inspected")]
 mod processor;
 mod steps;
 
@@ -66,7 +66,7 @@ fn give(value: u32) {
     }
 }
 
-/// Ends the program: the check waits in vain for its next step.
+/// Ends the program; the check times out at its next step.
 fn stop() -> ! {
     loop {
         core::hint::spin_loop();

@@ -1,4 +1,4 @@
-//! Exceptions: what runs when, and what each handler sees (ARMv7-M Architecture Reference Manual, B1.5).
+//! Order of exceptions, and the state that each handler reads (ARMv7-M Architecture Reference Manual, B1.5).
 //!
 //! Every handler gives its number and the interrupt control register as it enters and leaves: the order of
 //! preemption and tail-chaining. Barriers after each request make that order defined.
@@ -19,7 +19,7 @@ use super::{computation, give};
 const STATE: *const u32 = 0xE000_ED04 as *const u32;
 const LEAVES: u32 = 1 << 31;
 
-/// Runs everything; their words are the results.
+/// Runs all checks; their words are the results.
 pub fn run(core: &mut Peripherals) {
     give(computation::integers());
     give(computation::floats());
@@ -55,7 +55,7 @@ fn pend_system() {
     barrier();
 }
 
-/// Instructions that the compiler seldom chooses: saturation, packed halves, fused products, roots.
+/// Instructions that the compiler rarely chooses: saturation, packed halves, fused products, roots.
 fn special() -> u32 {
     let (mut sum, flags): (u32, u32);
     // SAFETY: registers only; the status register is written back as it was after a reset.
@@ -217,7 +217,7 @@ fn SPI1() {
     pend(Interrupt::USART1);
     give(u32::from(NVIC::is_pending(Interrupt::USART1)) | u32::from(NVIC::is_active(Interrupt::SPI1)) << 1);
     pend(Interrupt::SPI2);
-    // Another value in the registers of the interrupted code.
+    // Set other values in the registers of the interrupted code.
     // SAFETY: declared as changed; those that a callee keeps are untouched.
     unsafe { asm!("vmov s0, {0}", "vcmp.f32 s0, #0", in(reg) 7, out("s0") _) };
     give(LEAVES | 0x101);
@@ -250,7 +250,8 @@ extern "C" fn supervisor_call() {
     naked_asm!("mrs r0, msp", "mov r1, lr", "push {{r0, lr}}", "bl {called_with}", "pop {{r0, pc}}", called_with = sym called_with)
 }
 
-/// Gives return code, alignment, stacked registers and the call's number; the caller's r0 becomes their sum.
+/// Reports return code, alignment, stacked registers and the call's number; the caller's r0 becomes their
+/// sum.
 extern "C" fn called_with(frame: *mut u32, code: u32) {
     see(0x105);
     give(code);

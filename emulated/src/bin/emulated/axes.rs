@@ -1,7 +1,7 @@
 //! Current loops of both axes, ticked with sensor values of a drive that follows its target.
 //!
-//! Their commands are discarded: their cost is real, their effect on a motor is tested elsewhere. Their
-//! calibration is real as well, on a small motor in single precision.
+//! Their commands are discarded: the cost of the loops is real, and their effect on a motor is tested
+//! elsewhere. Their calibration is real as well, on a small motor in single precision.
 
 use scarab::hal::AxisSample;
 use scarab::motor::{Axis, AxisRequest, CalibrationSettings, CalibrationStep, Calibrator};
@@ -64,7 +64,7 @@ impl Axes {
         }
     }
 
-    /// Whether an axis has faulted, for which the samples here give no reason.
+    /// Whether an axis has faulted, which these samples never cause.
     pub fn has_fault(&self) -> bool {
         self.axes.iter().any(|(axis, _)| axis.fault().is_some())
     }

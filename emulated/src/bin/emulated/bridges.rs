@@ -1,7 +1,7 @@
 //! Both bridges as far as the emulator models them: QEMU logs writes to their timers' registers.
 //!
-//! The current loops' commands are discarded here ([`super::axes`]), so nothing is ever switched on. A crash
-//! writes the board's values to the board's registers, and QEMU's log (`-d unimp`) shows when.
+//! The current loops' commands are discarded here ([`super::axes`]), so no bridge is ever turned on. A crash
+//! writes the board's values to the board's registers, and QEMU's log (`-d unimp`) shows the time.
 #![expect(unsafe_code, reason = "device registers, and a name that the crash handler finds at link time")]
 
 use scarab::board::odrive_v3_6::settings::timers::{BASES, BDTR, bridge};

@@ -1,8 +1,8 @@
 //! Time base: SysTick at 24 kHz drives everything, TIM5 counts instructions.
 //!
-//! Why SysTick: among this part's timers it is the only one that QEMU interrupts at the right rate. Its count
-//! stands still while it is stopped, so the plant runs with SysTick stopped and costs the firmware no time.
-//! The plant's instructions are subtracted from the clock as well.
+//! SysTick is the only timer of this part that QEMU interrupts at the right rate. Its count does not change
+//! while it is stopped, so the plant runs with SysTick stopped and costs the firmware no time. The plant's
+//! instructions are subtracted from the clock as well.
 //!
 //! ```text
 //! executor's time = ticks of 24 kHz * 125 / 3  us
@@ -10,7 +10,7 @@
 //! ```
 //!
 //! TIM5 wraps after 4.3 s; the instruction count at the last tick extends it beyond that.
-#![expect(unsafe_code, reason = "device registers, and what the executor's time links to")]
+#![expect(unsafe_code, reason = "device registers, and symbols that the executor's time links to")]
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -90,7 +90,7 @@ pub fn start() {
     }
 }
 
-/// Runs `work` without cost in firmware time.
+/// Runs `work` without using firmware time.
 #[inline(never)]
 pub fn stopped<R>(work: impl FnOnce() -> R) -> R {
     // SAFETY: called at level 0 only, so no other code writes this register meanwhile.

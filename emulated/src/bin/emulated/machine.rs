@@ -1,4 +1,4 @@
-//! Board functions of the emulated machine: it can only request the servo.
+//! Board functions of the emulated machine, which can only request the servo.
 
 use scarab::hal::{Contacts, Controller, Frame, Hardware};
 use scarab::task::leg::JOINTS;

@@ -1,7 +1,7 @@
 //! The whole firmware over a simulated leg, for the emulated microcontroller (`cargo emulate`).
 //!
-//! Why: leg code, executors, priorities, search and records can run on a Cortex-M4F without a board. Crate
-//! and tasks are those of the flash image; only a small board layer differs.
+//! Leg code, executors, priorities, search and records can run on a Cortex-M4F without a board. Crate and
+//! tasks are those of the flash image; only a small board layer differs.
 //!
 //! | module | replaces |
 //! | --- | --- |
@@ -63,11 +63,11 @@ fn main() -> ! {
     if let Ok(task) = identify::run(thread) {
         spin(task);
     }
-    refuse("the task of the identification runs already")
+    refuse("the task of the identification is already running")
 }
 
-/// Polls the thread's executor without end. `embassy_executor::Executor::run` sleeps in between; the emulator
-/// is six times slower for a processor that sleeps and is woken 24,000 times per second.
+/// Polls the thread's executor in an endless loop. `embassy_executor::Executor::run` sleeps in between; the
+/// emulator is six times slower for a processor that sleeps and wakes 24,000 times per second.
 #[expect(unsafe_code, reason = "an executor is polled")]
 fn spin<S>(task: SpawnToken<S>) -> ! {
     static EXECUTOR: StaticCell<raw::Executor> = StaticCell::new();
@@ -102,19 +102,19 @@ const SURROUNDINGS: Surroundings = Surroundings {
 /// Builds both halves of the leg in place. A separate function like [`hand_out`], so that its stack is freed.
 #[inline(never)]
 fn halves() -> (Control<{ leg::JOINTS }>, &'static mut leg::LegIdentification) {
-    let Ok(configuration) = leg::LEG.configuration() else { refuse("the leg's constants make no sense") };
+    let Ok(configuration) = leg::LEG.configuration() else { refuse("the leg's constants are invalid") };
     let Ok(filters) = Filters::new(configuration.bandwidth_hz) else {
-        refuse("the leg's filter does not fit")
+        refuse("the leg's filter does not fit the device")
     };
     static WINDOW: ConstStaticCell<leg::LegWindow> = ConstStaticCell::new(leg::LegWindow::EMPTY);
     static IDENTIFICATION: StaticCell<leg::LegIdentification> = StaticCell::new();
     let place = IDENTIFICATION.uninit();
     let identification = leg::LegIdentification::place(place, &configuration, &filters, WINDOW.take());
-    let Ok(control) = Control::new(&configuration) else { refuse("the leg's limits and motions do not fit") };
+    let Ok(control) = Control::new(&configuration) else { refuse("the leg's limits and motions are inconsistent") };
     (control, identification)
 }
 
-/// Hands every value to its level.
+/// Passes every value to its level.
 #[inline(never)]
 fn hand_out(start: Start) -> identify::Thread {
     let (control, identification) = halves();

@@ -1,4 +1,5 @@
-//! Level 0: both axes' current ticks, and once per servo tick the leg's 250 us, which cost no firmware time.
+//! Level 0: both axes' current ticks, and once per servo tick the plant's 250 us, which cost no firmware
+//! time.
 //!
 //! The order is that of the simulation on the host. The servo's command of this tick acts until the next;
 //! then the sensors are read and the servo is pended. The operator's actions are simulated here, on the same
@@ -56,11 +57,11 @@ pub struct Plant {
     began: u32,
 }
 
-/// State of level 0, once it is built.
+/// State of level 0, after it is built.
 pub static PLANT: spin::Mutex<Option<Plant>> = spin::Mutex::new(None);
 
 impl Plant {
-    /// The described leg in its start position; `None` where the axes cannot be calibrated.
+    /// The described leg in its start position; `None` if the axes cannot be calibrated.
     pub fn new(
         samples: [Producer<'static, JointSample>; JOINTS],
         requests: Producer<'static, ControlRequest<JOINTS>>,
@@ -131,7 +132,7 @@ impl Plant {
             self.look_ahead(&before);
         }
         for (queue, sample) in self.samples.iter_mut().zip(self.seen.joints) {
-            // A servo that does not fetch is counted as missed.
+            // A servo that does not fetch its sample counts as missed.
             let _ = queue.enqueue(sample);
         }
         self.operate();
@@ -142,7 +143,7 @@ impl Plant {
         }
         self.servo_ticks += 1;
         if self.axes.has_fault() {
-            refuse("an axis released itself");
+            refuse("an axis turned its bridge off");
         }
         if self.servo_ticks > self.last {
             end(false);

@@ -1,8 +1,8 @@
 //! One crash per run, selected on the emulator's command line (`cargo emulate --crash`).
 //!
-//! Why in this image: current loops, servo, executors and identification run as usual, and the crash handler
-//! must work at their levels. After the crash the image starts again, as on the board. This module determines
-//! the kind of start, and the operator's actions that follow.
+//! The crashes run in this image because current loops, servo, executors and identification run as usual, and
+//! the crash handler must work at their levels. After the crash the image starts again, as on the board. This
+//! module determines the kind of start, and the operator's actions that follow.
 //!
 //! | start | detected by | operator's actions |
 //! | --- | --- | --- |
@@ -12,7 +12,7 @@
 //!
 //! **The worst instant** is chosen. A crash at thread level comes such that a tick falls due during its
 //! handling. A stack overflow comes right after a tick, so that no tick interrupts it.
-#![expect(unsafe_code, reason = "memory that outlives a reset, semihosting, an address where nothing is")]
+#![expect(unsafe_code, reason = "memory preserved over a reset, semihosting, an unmapped address")]
 
 use core::hint::black_box;
 use core::mem::MaybeUninit;
@@ -30,7 +30,7 @@ use super::{clock, end};
 
 /// Longest command line that is parsed. Without arguments the command line is the path of the image.
 const COMMAND_LINE: usize = 64;
-/// Memory that the board has and this machine does not.
+/// Memory of the board that this machine lacks.
 const NOWHERE: *const u32 = 0x1000_0000 as *const u32;
 /// Interrupt without a handler.
 const UNHANDLED: Interrupt = Interrupt::SDIO;
@@ -52,7 +52,7 @@ struct Kept {
     begun: u32,
     /// Consecutive starts that found a crash.
     crashes: u32,
-    /// The image was restarted on purpose.
+    /// Whether the image was restarted on purpose.
     restarted: bool,
 }
 
@@ -122,7 +122,7 @@ pub fn start(crashed: bool) -> Start {
     if crashed {
         heprintln!("emulated: crash {} was begun at instruction {}", before.crashes + 1, before.begun);
         if before.crashes > 0 {
-            // A second crash in a row would repeat for ever.
+            // A second crash in a row would repeat endlessly.
             end(false);
         }
         return Start::Crashed;
@@ -196,7 +196,7 @@ fn read_nowhere() {
 }
 
 #[inline(never)]
-#[expect(unconditional_recursion, reason = "the stack's end stops it")]
+#[expect(unconditional_recursion, reason = "the end of the stack stops it")]
 fn fill_the_stack(depth: u32) -> u32 {
     begin();
     let mut frame = MaybeUninit::<[u8; FRAME]>::uninit();
