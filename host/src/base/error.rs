@@ -10,7 +10,7 @@ pub const EXIT_REFUSED: u8 = 3;
 /// Exit code of bad input.
 pub const EXIT_INPUT: u8 = 2;
 
-/// Reason for a missing result; names file, line and cause.
+/// Reason for a missing result, with file, line and cause.
 #[derive(Debug, thiserror::Error)]
 pub enum ToolError {
     /// Well-formed input that must not be used: exit code [`EXIT_REFUSED`], not [`EXIT_INPUT`].

@@ -52,7 +52,7 @@ pub fn folder_of(path: &Path) -> PathBuf {
     }
 }
 
-/// Whether the path is a terminal, pipe or other device: these are written directly and may be shared.
+/// Whether the path is a terminal, pipe or other device, which is written directly and may be shared.
 #[must_use]
 pub fn is_device(path: &Path) -> bool {
     OPEN_STREAMS.iter().any(|stream| path.starts_with(stream))

@@ -1,4 +1,4 @@
-//! Means that every module uses: errors, numbers and their formatting, files that are written.
+//! Basics that every module uses: errors, numbers and their formatting, output files.
 
 pub mod error;
 pub mod files;

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_without_sigma_has_three_digits_and_rounding_is_zero() {
+    fn a_value_without_sigma_has_three_digits_and_rounding_errors_are_zero() {
         let shown = |found: f64| value(found.into(), Number::UNKNOWN);
         for (found, text) in [
             (4.176_224e-17, "0"),

@@ -69,7 +69,7 @@ pub struct Invariants<const N: usize> {
     /// Counts beyond those of the joints' angles, counts per rad, and tolerated deviation in counts.
     rotor_positions: [f64; N],
     counts_per_rad: [f64; N],
-    doubt: [f64; N],
+    tolerance: [f64; N],
     /// Whether positions are checked; periods for which a joint has been driven with a wrong one.
     watched: bool,
     wrong_periods: u64,
@@ -97,7 +97,7 @@ impl<const N: usize> Invariants<N> {
             judging: is_judging(rig),
             rotor_positions: core::array::from_fn(|joint| rotor_position(rig, joint, counts_per_rad[joint])),
             counts_per_rad,
-            doubt: core::array::from_fn(|joint| doubt(&leg.joints[joint])),
+            tolerance: core::array::from_fn(|joint| eighth_of_an_electrical_turn(&leg.joints[joint])),
             watched: false,
             wrong_periods: 0,
             enabled_at: [0.0; N],

@@ -27,7 +27,7 @@ impl OutliersReport {
     #[must_use]
     pub fn line(&self) -> Option<String> {
         if self.estimator == "plain" {
-            return Some("estimator: plain least squares, nothing set aside".into());
+            return Some("estimator: plain least squares, nothing excluded".into());
         }
         let joints: Vec<String> = self
             .replaced
@@ -37,14 +37,14 @@ impl OutliersReport {
             .enumerate()
             .map(|(joint, ((replaced, share), longest))| {
                 format!(
-                    "joint {}: {replaced} wild samples replaced, {:.1} % of the rows disturbed, {:.2} s at a stretch",
+                    "joint {}: {replaced} outliers replaced, {:.1} % of the rows disturbed, longest {:.2} s",
                     joint + 1,
                     100.0 * share.known().unwrap_or(f64::NAN),
                     longest.known().unwrap_or(f64::NAN),
                 )
             })
             .collect();
-        Some(format!("set aside of {} samples: {}", self.samples, joints.join("; ")))
+        Some(format!("excluded of {} samples: {}", self.samples, joints.join("; ")))
     }
 }
 

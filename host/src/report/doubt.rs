@@ -1,11 +1,11 @@
-//! Doubts about a recording, as data and in words.
+//! Errors of the logging chain of a recording, as data and in words.
 
 use serde::Serialize;
 
 use crate::base::number::Number;
 use crate::report::findings::FindingReport;
 
-/// Results of the doubts about a recording.
+/// Estimated errors of the logging chain of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DoubtReport {
     /// Most likely reason of a refusal; `null` where nothing was refused.
@@ -43,7 +43,7 @@ impl BandwidthReport {
         if self.is_chosen {
             format!(
                 "bandwidth: {hz} Hz, chosen from 3.2 to 16 Hz: the largest that the recording's rate allows and at which the \
-                 encoders' steps shift no parameter by more than its sigma, or the smallest where none is"
+                 encoders' steps shift no parameter by more than its sigma, or the smallest if none qualifies"
             )
         } else if let Some(larger) = self.proposed_hz {
             format!(
@@ -55,7 +55,7 @@ impl BandwidthReport {
     }
 }
 
-/// Scatter of the parameters between recordings, by leaving one out.
+/// Scatter of the parameters between recordings, by excluding one at a time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RecordingsReport {
     /// Number of recordings identified from.
@@ -70,13 +70,13 @@ impl RecordingsReport {
     pub fn line(&self) -> String {
         match (self.count, self.sigma.is_empty()) {
             (0, _) => "sigma does not contain the scatter between recordings: too few rows".into(),
-            (1, _) => "sigma does not contain the scatter between recordings: there is one recording".into(),
+            (1, _) => "sigma does not contain the scatter between recordings: only one recording was given".into(),
             (count, true) => format!(
                 "sigma does not contain the scatter between the {count} recordings: without one of them the others do not \
                  determine every parameter"
             ),
             (count, false) => {
-                format!("sigma contains the scatter between {count} recordings (each left out once)")
+                format!("sigma contains the scatter between {count} recordings (each excluded once)")
             }
         }
     }
@@ -97,43 +97,43 @@ pub struct CauseReport {
     pub words: String,
 }
 
-/// One direction of doubt.
+/// One direction: an error of the logging chain with its estimate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionReport {
     /// `delay`, `encoder_scale`, `torque_scale`, `gravity`.
     pub name: &'static str,
     /// Joint, from 1; `null` for gravity.
     pub joint: Option<usize>,
-    /// Estimate; `null` where the motion does not show it.
+    /// Estimate; `null` where the motion does not determine it.
     pub value: Number,
     /// Standard deviation: the larger of noise and scatter over segments.
     pub sigma: Number,
-    /// `noise` or `segments`: which one that is.
+    /// Source of the standard deviation: `noise` or `segments`.
     pub sigma_from: &'static str,
     /// `ms`, `%` or `deg`.
     pub unit: &'static str,
-    /// Magnitude beyond which it is no chance.
+    /// Largest magnitude that chance explains.
     pub limit: Number,
-    /// Share of the misfit that it explains, 0..1.
+    /// Share of the misfit that the direction explains, 0..1.
     pub explained: Number,
-    /// Share of the misfit from which it refuses.
+    /// Share of the misfit from which the direction refuses.
     pub explained_limit: Number,
-    /// Largest shift of a parameter in its sigma when it is fitted.
+    /// Largest shift of a parameter, in its sigma, when the direction is fitted.
     pub largest_shift: Number,
-    /// False where the recording is refused for it.
+    /// False where the recording is refused for this direction.
     pub passed: bool,
-    /// Names of what cannot be distinguished from it.
+    /// Directions and parameters that cannot be distinguished from this one.
     pub alike: Vec<String>,
 }
 
-/// A fault of a recording's columns.
+/// A fault in a recording's columns.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SampleFinding {
     /// `saturation`, `held_samples`, `quantised` or `time_stamps`.
     pub name: &'static str,
     /// File, as named.
     pub file: String,
-    /// Joint, from 1; `null` if it concerns all columns.
+    /// Joint, from 1; `null` for a fault of all columns.
     pub joint: Option<usize>,
     /// Limit of the torque in N m, holding time in s, step in rad or N m, error of the stamps in s.
     pub value: f64,

@@ -81,7 +81,7 @@ pub struct JointReport {
     pub torque_limit_nm: f64,
     /// Standard deviation of the logged torque, N m.
     pub torque_noise_nm: f64,
-    /// Share of its rows excluded because the joint stands still, 0..1.
+    /// Share of the joint's rows excluded at standstill, 0..1.
     pub lost_share: f64,
     /// Extremes of the simulated assumed leg, approach included.
     pub simulated: Seen,

@@ -14,6 +14,6 @@ pub struct FaultCurves {
     pub torque: [Vec<f64>; JOINTS],
     /// Bus voltage, V.
     pub bus: Vec<f64>,
-    /// Both bridges are off.
+    /// Whether both bridges are off.
     pub released: Vec<bool>,
 }

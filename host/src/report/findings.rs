@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::base::number::Number;
 
-/// One test of the verdict, passed or not.
+/// One test of the verdict, with its result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FindingReport {
     /// Reason for rejection if the test failed: a word of the closed list.
@@ -14,7 +14,7 @@ pub struct FindingReport {
     pub test: &'static str,
     /// Joint, from 1; `null` if the test does not concern one joint.
     pub joint: Option<usize>,
-    /// Name of the unused motion; `null` for the motion identified from, or for all.
+    /// Name of the unused motion; `null` for the training motion, or for all.
     pub motion: Option<String>,
     /// Tested value.
     pub value: Number,
@@ -47,7 +47,7 @@ impl FindingReport {
         }
     }
 
-    /// Report of a drive that stopped before the end of the identification; `words` say why.
+    /// Report of a drive that stopped before the end of the identification; `words` give the reason.
     #[must_use]
     pub fn stopped(words: String) -> Self {
         Self {
@@ -73,93 +73,90 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
         Test::Rows => {
             format!("joint {joint} moved in {value:.0} of the filtered rows, at least {limit:.0} are needed")
         }
-        Test::NotFinite => format!("{value:.0} samples or rows{on} were not finite, none may be"),
+        Test::NotFinite => format!("{value:.0} samples or rows{on} are not finite"),
         Test::Torque => format!("the torque of joint {joint} is always zero"),
-        Test::Search => "the search did not come to its end".into(),
+        Test::Search => "the search did not finish".into(),
         Test::Drive => "the drive stopped during the identification".into(),
         Test::Speed => {
             format!("joint {joint} hardly moved: {value:.4} rad/s rms, at least {limit:.3} are needed")
         }
         Test::EncoderPulse => format!(
-            "encoder too coarse at this bandwidth: one count of joint {joint} is a pulse of {value:.3} rad/s, at most \
-             {limit:.3} may be; {:.2} times this bandwidth is low enough",
+            "encoder too coarse at this bandwidth: one count of joint {joint} is a pulse of {value:.3} rad/s, limit \
+             {limit:.3} rad/s; {:.2} times this bandwidth is low enough",
             limit / value
         ),
         Test::Determined => format!("the motion determines {value:.0} of {limit:.0} base parameters"),
         Test::Condition if known => format!(
-            "the motion hardly tells the parameters apart: condition {value:.0}, at most {limit:.0} is allowed"
+            "the motion hardly distinguishes the parameters: condition {value:.0}, limit {limit:.0}"
         ),
-        Test::Condition => "the motion does not tell the parameters apart".into(),
+        Test::Condition => "the motion does not distinguish the parameters".into(),
         Test::PredictedUncertainty => format!(
-            "the excitation leaves the torque of joint {joint}{on} uncertain by {:.1} % of its rms, at most {:.1} % \
-             is allowed",
+            "the excitation leaves the torque of joint {joint}{on} uncertain by {:.1} % of its rms, limit {:.1} %",
             100.0 * value,
             100.0 * limit
         ),
-        Test::Finite => format!("a parameter of joint {joint} is not a number"),
+        Test::Finite => format!("a parameter of joint {joint} is not finite"),
         Test::NegativeParameter => format!(
-            "a parameter of joint {joint} that no body has below zero is {value:.1} sigma below it, {limit:.0} may be \
-             noise"
+            "a parameter of joint {joint} that must be positive is {value:.1} sigma below zero, limit {limit:.0} sigma"
         ),
         Test::NegativeEnergy => format!(
-            "kinetic energy would be negative in some posture, by {value:.1} sigma where {limit:.0} may be noise"
+            "kinetic energy is negative in some posture, by {value:.1} sigma, limit {limit:.0} sigma"
         ),
         Test::PriorBox => format!(
-            "every leg that the prior allows misses the data: {value:.0} chi-square units above least squares, at most \
-             {limit:.0} may be noise"
+            "every leg that the prior allows misses the data: {value:.0} chi-square units above least squares, limit \
+             {limit:.0}"
         ),
         Test::DynamicShare => format!(
-            "inertia and friction make {:.2} % of the torque of joint {joint}, at least {:.0} % are in any measured \
-             one: it was computed from the angle",
+            "inertia and friction make {:.2} % of the torque of joint {joint}, a measured torque has at least \
+             {:.0} %: it was computed from the angle",
             100.0 * value,
             100.0 * limit
         ),
         Test::TrainingError if known => format!(
-            "joint {joint} is off by {value:.3} N m rms on the motion identified from, at most {limit:.3} are explained"
+            "joint {joint}: torque error of {value:.3} N m rms on the training motion, limit {limit:.3} N m"
         ),
         Test::TrainingError => format!("no torque of joint {joint} could be compared with the model"),
         Test::WholeError => format!(
-            "what was found misses the motion identified from, rows set aside included, by {:.0} % of the torque of joint \
-             {joint}, at most {:.0} % may be: hold a motion out",
+            "joint {joint}: torque error of {:.0} % on the training motion, excluded rows included, limit {:.0} %: hold a \
+             motion out",
             100.0 * value,
             100.0 * limit
         ),
         Test::ValidationError if known => {
             format!(
-                "the torque of joint {joint}{on} is off by {value:.3} N m rms, at most {limit:.3} are explained"
+                "joint {joint}: torque error of {value:.3} N m rms{on}, limit {limit:.3} N m"
             )
         }
         Test::ValidationError => format!("no torque of joint {joint}{on} could be compared with the model"),
         Test::SlowResidual => format!(
-            "what is left of the torque of joint {joint}{on} is no noise: {value:.3} N m last longer than half a \
-             second, at most {limit:.3} may"
+            "joint {joint}: slow residual of {value:.3} N m{on}, longer than half a second, limit {limit:.3} N m"
         ),
         Test::LinkLength => format!(
-            "the torque asks for another geometry: a link before joint {joint} {:.1} % {} than believed, or what resembles \
-             it, a zero that is off or a trunk that leans; {:.1} % may be",
+            "the torque indicates another geometry: a link before joint {joint} {:.1} % {} than configured, limit {:.1} %; a \
+             wrong zero or a leaning trunk looks alike",
             100.0 * value.abs(),
             if value < 0.0 { "shorter" } else { "longer" },
             100.0 * limit
         ),
         Test::EncoderZero => format!(
-            "the torque asks for another geometry: the zero of joint {joint} {:+.1} degrees from where it is believed, or \
-             what resembles it, another length or a trunk that leans; {:.1} may be",
+            "the torque indicates another geometry: the zero of joint {joint} {:+.1} degrees from the configured one, limit \
+             {:.1} degrees; another length or a leaning trunk looks alike",
             value.to_degrees(),
             limit.to_degrees()
         ),
         Test::CommonDisturbance => {
-            let on = if motion.is_empty() { " on the motion identified from" } else { on.as_str() };
+            let on = if motion.is_empty() { " on the training motion" } else { on.as_str() };
             format!(
-                "something held the leg{on}: all joints missed together for {value:.2} s, at most {limit:.2} s may"
+                "something held the leg{on}: the torques of all joints deviate together for {value:.2} s, limit {limit:.2} s"
             )
         }
         Test::ReplacedShare => format!(
-            "{:.1} % of the samples of joint {joint}{on} were wild, at most {:.0} % may be",
+            "joint {joint}: {:.1} % of the samples{on} are outliers, limit {:.0} %",
             100.0 * value,
             100.0 * limit
         ),
         Test::DisturbedShare => format!(
-            "{:.0} % of the rows of joint {joint}{on} were disturbed, at most {:.0} % may be",
+            "joint {joint}: {:.0} % of the rows{on} are disturbed, limit {:.0} %",
             100.0 * value,
             100.0 * limit
         ),

@@ -67,7 +67,7 @@ pub struct BaseReport {
     pub unit: &'static str,
     /// Standard deviation.
     pub sigma: Number,
-    /// What it is from: `noise`; in a replay also `segments`, `recordings` or `doubt`.
+    /// Largest part of sigma: `noise`; in a replay also `segments`, `recordings`, `doubt` or `encoder`.
     pub sigma_from: &'static str,
     /// Standard deviation by the noise of the torque.
     pub sigma_noise: Number,
@@ -171,12 +171,12 @@ pub struct DifferenceReport {
     pub sigmas: f64,
 }
 
-/// The difference of two models as a mass added to one link; negative for one that was taken off.
+/// The difference of two models as a mass added to one link; negative for a removed mass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AddedMassReport {
     /// Joint of the link, from 1.
     pub joint: usize,
-    /// Mass, kg; unknown where torque does not show it.
+    /// Mass, kg; unknown if torque does not determine it.
     pub mass_kg: Number,
     /// Standard deviation of the mass.
     pub mass_sigma_kg: Number,
@@ -184,11 +184,11 @@ pub struct AddedMassReport {
     pub moment_kgm: [Number; 2],
     /// Standard deviations of the moments.
     pub moment_sigma_kgm: [Number; 2],
-    /// Place along X and Y of the joint's frame, m; unknown unless the mass exceeds three of its sigma.
+    /// Position along X and Y of the joint's frame, m; unknown unless the mass exceeds three of its sigma.
     pub place_m: [Number; 2],
-    /// Standard deviations of the place.
+    /// Standard deviations of the position.
     pub place_sigma_m: [Number; 2],
-    /// Chi-square of what the mass does not explain; friction and offset are not compared.
+    /// Chi-square that the mass does not explain; friction and offset are not compared.
     pub chi2: f64,
     /// Limit that noise exceeds in 1 of 1000 cases.
     pub chi2_limit: f64,
@@ -281,7 +281,7 @@ pub struct RunReport {
     pub plan: &'static str,
     /// `accepted` or `refused`.
     pub verdict: &'static str,
-    /// Whether unused motions were predicted; if not, `accepted` refers to the motion identified from.
+    /// Whether unused motions were predicted; if not, `accepted` refers to the training motion.
     pub validated: bool,
     /// Reasons for rejection, from the closed list.
     pub reasons: Vec<&'static str>,
@@ -305,9 +305,9 @@ pub struct RunReport {
     pub asymmetric_coulomb: Vec<DirectionsReport>,
     /// Temperature of the drives, degrees Celsius; unknown unless stated.
     pub temperature_c: Number,
-    /// Rows and samples excluded from the motion identified from.
+    /// Rows and samples excluded from the training motion.
     pub outliers: OutliersReport,
-    /// Residuals on the motion identified from.
+    /// Residuals on the training motion.
     pub training: Vec<FitReport>,
     /// Residuals on unused motions.
     pub validation: Vec<FitReport>,
@@ -329,7 +329,7 @@ pub struct RunReport {
     pub simulated_s: f64,
     /// Computing time, s.
     pub wall_s: f64,
-    /// Doubts about the recordings of a replay.
+    /// Errors of the logging chain of a replay's recordings.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub doubt: Option<DoubtReport>,
     /// Faults of the recordings' columns; absent for a simulated leg.
@@ -369,7 +369,7 @@ pub struct Source {
     pub rate_hz: f64,
     /// Filtered rows at 50 Hz, equal for all joints.
     pub rows: u32,
-    /// Rows used for each joint; it stood still in the others.
+    /// Rows used for each joint; in the others the joint was at rest.
     pub used: Vec<u32>,
 }
 

@@ -16,7 +16,7 @@ pub struct ModelChoiceReport {
     pub asked: &'static str,
     /// `on` or `off`.
     pub used: &'static str,
-    /// Chi-square explained by the term; unknown if the data were not asked.
+    /// Chi-square explained by the term; unknown if the data did not decide.
     pub gain_chi2: Number,
     /// Limit below which the term is dropped.
     pub limit_chi2: Number,
@@ -39,7 +39,7 @@ pub struct DirectionsReport {
     pub backward_sigma_nm: Number,
 }
 
-/// Decisions that were left to the data, a line each.
+/// One line for each decision that was left to the data.
 #[must_use]
 pub fn lines(choices: &[ModelChoiceReport], directions: &[DirectionsReport]) -> Vec<String> {
     let open = choices.iter().filter(|choice| choice.asked == "auto");

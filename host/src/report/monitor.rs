@@ -32,7 +32,7 @@ pub struct MonitorRun {
     pub hours: f64,
     /// Alarms without a change, seconds of walking.
     pub false_alarms_at_s: Vec<f64>,
-    /// Whether anything was changed.
+    /// Whether a change was made.
     pub changed: bool,
     /// Alarm after the change.
     pub alarm: Option<AlarmReport>,
@@ -82,7 +82,7 @@ pub struct UpdateReport {
     pub energy_before: Vec<Number>,
     /// Residual energy with the update.
     pub energy_after: Vec<Number>,
-    /// Changes of parameters under the identified cause; empty if nothing explains the change.
+    /// Changes of parameters under the identified cause; empty if no cause explains the change.
     pub values: Vec<ValueReport>,
 }
 
@@ -140,8 +140,8 @@ impl MonitorRun {
         Self { refused: reasons, ..Self::new(seed) }
     }
 
-    /// Whether all went as required: a model, no false alarm, and a change that was detected and
-    /// correctly explained. After the update there is no alarm unless the change went on.
+    /// Whether the run met its requirements: a model, no false alarm, and a change that was detected and
+    /// correctly explained. After the update there is no alarm, unless the change continued.
     #[must_use]
     pub fn is_as_it_should_be(&self) -> bool {
         let quiet = self.still_changing || !self.alarm_after_update;

@@ -69,7 +69,7 @@ pub fn lines(run: &RunReport) -> Vec<String> {
     let mut lines = if scale.torque_constant.is_empty() { Vec::new() } else { constant_lines(scale) };
     if let Some(load) = &scale.load {
         lines.push(format!(
-            "load: {} kg on link {} at x {}, y {} m taken off; the parameters are those of the leg without it",
+            "load: {} kg on link {} at x {}, y {} m subtracted; the parameters are those of the leg without it",
             load.mass, load.joint, load.place[0], load.place[1]
         ));
     }
@@ -83,16 +83,15 @@ fn constant_lines(scale: &ScaleReport) -> Vec<String> {
     lines.push(match (scale.scale, &scale.payload) {
         ("absolute", _) => "scale: absolute, every torque corrected; sigma includes the constants' own".into(),
         (_, None) => "scale: relative to the torque constants used; a wrong constant scales every parameter and does not \
-                      show in one run (--payload tells)"
+                      show in one run (--payload determines it)"
             .into(),
         (_, Some(_)) if scale.torque_constant.iter().any(|joint| joint.consistent == Some(false)) => {
             "scale: relative to the torque constants used; the two runs do not differ by the stated mass at the stated \
-             place of a leg with these lengths and zeros, so what they say is not used"
+             position of a leg with these lengths and zeros, so the constants are not used"
                 .into()
         }
         (_, Some(mass)) if scale.torque_constant.iter().any(|joint| joint.consistent.is_some() && !joint.determined) => format!(
-            "scale: relative to the torque constants used; {} kg at that place are too light to tell, what they say is not \
-             used",
+            "scale: relative to the torque constants used; {} kg at that position are too light to determine the constants",
             mass.mass
         ),
         (_, Some(mass)) => format!(
@@ -113,7 +112,7 @@ fn constant(joint: &TorqueConstantReport) -> String {
             sigma(joint.sigma),
             match (consistent, joint.determined) {
                 (false, _) => " (contradicted)",
-                (true, false) => " (too light a mass to tell)",
+                (true, false) => " (mass too light)",
                 (true, true) => "",
             }
         ),

@@ -1,7 +1,7 @@
 //! Curves of a run over time, for figures: anatomical angles and torques.
 //!
-//! Every motion passes the filter chain of the identification once more, whole windows only, and
-//! its rows are multiplied by the result. The figures thus show what least squares saw.
+//! Every motion passes the filter chain of the identification once more, complete windows only, and its rows
+//! are multiplied by the result. The figures thus show the data of least squares.
 
 use scarab::ident::{
     DECIMATION, Ends, KernelError, LARGEST_STILL_SHARE, LowPass, Recorder, RowModel, SAMPLE_RATE_HZ, Solver,
@@ -72,12 +72,12 @@ pub struct JointCurves {
     pub predicted_nm: Vec<f64>,
     /// Torque of the plant's motor, filtered, N m.
     pub noise_free_nm: Vec<f64>,
-    /// Whether the joint stands still; such rows are excluded.
+    /// Whether the joint is at rest; such rows are excluded.
     pub still: Vec<bool>,
 }
 
 impl JointCurves {
-    /// Measured minus predicted torque; `None` where the joint stands still.
+    /// Measured minus predicted torque; `None` while the joint is at rest.
     pub fn residual_nm(&self) -> impl Iterator<Item = Option<f64>> + '_ {
         let errors = self.measured_nm.iter().zip(&self.predicted_nm).map(|(measured, own)| measured - own);
         errors.zip(&self.still).map(|(error, still)| (!still).then_some(error))
@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_at_rest_break_the_autocorrelation_and_nothing_else() {
+    fn rows_at_rest_only_exclude_pairs_from_the_autocorrelation() {
         // Alternating signs: -1 at odd lags, 1 at even ones, whatever is excluded.
         let mut alternating: Vec<Option<f64>> =
             (0..40).map(|index| Some(if index % 2 == 0 { 2.0 } else { -2.0 })).collect();
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_stays_correlated_as_long_as_the_filter_is_and_no_longer() {
+    fn white_noise_is_correlated_over_the_length_of_the_filter() {
         let correlation = white_correlation(&[1.0; 20]);
         assert_eq!(&correlation[..3], [1.0, 0.5, 0.0]);
     }

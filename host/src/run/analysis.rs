@@ -278,11 +278,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
         for finding in findings.iter_mut().filter(|finding| !finding.passed && finding.test == "prior_box") {
             if consistent.base.settled == Some(false) {
                 finding.words = format!(
-                    "the search for a possible leg has not converged: it ended {} chi-square units above the optimum",
+                    "the search for a physically consistent leg has not converged: it ended {} chi-square units above the optimum",
                     plain(consistent.base.excess_chi2)
                 );
             } else if self.prior.is_none() {
-                finding.words = finding.words.replace("leg that the prior allows", "possible leg");
+                finding.words = finding.words.replace("leg that the prior allows", "physically consistent leg");
             }
         }
         findings

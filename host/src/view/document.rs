@@ -9,14 +9,14 @@ use std::path::Path;
 use crate::base::error::{FileError, ToolError};
 use crate::base::files;
 
-/// Replaces one place of a document; a document without it is an error.
+/// Replaces one section of a document; a document without its markers is an error.
 pub fn replace(path: &Path, kind: &str, name: &str, content: &str) -> Result<(), ToolError> {
     let text =
         replaced(&files::read_text(path)?, kind, name, content).ok_or_else(|| no_place(path, kind, name))?;
     files::write(path, text)
 }
 
-/// Returns an error if the document lacks the place.
+/// Returns an error if the document lacks the markers.
 pub fn check(path: &Path, kind: &str, name: &str) -> Result<(), ToolError> {
     replaced(&files::read_text(path)?, kind, name, "").map(drop).ok_or_else(|| no_place(path, kind, name))
 }
@@ -37,7 +37,7 @@ mod tests {
     use super::replaced;
 
     #[test]
-    fn only_what_stands_between_the_markers_is_replaced() {
+    fn only_text_between_the_markers_is_replaced() {
         let text = "a\n<!-- paper: x -->\nold\n<!-- end of x -->\nb\n<!-- paper: y -->\n<!-- end of y -->\n";
         let once = replaced(text, "paper", "x", "new\n").expect("a place");
         assert_eq!(

@@ -1,9 +1,9 @@
 //! Report of a run as one HTML page: results, their uncertainty, and their limits.
 //!
-//! Why one page: a result must be easy to view, print, share and archive. The page needs no
-//! network, font or script; its figures are the SVG drawings of [`crate::view::figures`]. All text from
-//! files, for example a leg's name, is escaped by maud. Only the drawings are inserted unescaped;
-//! the backend has escaped their texts.
+//! Why one page: a result must be easy to view, print, share and archive. The page needs no network, font or
+//! script; its figures are the SVG drawings of [`crate::view::figures`]. All text from files, for example a
+//! leg's name, is escaped by maud. Only the drawings are inserted unescaped, because the backend has escaped
+//! their texts.
 //!
 //! Keys without a section of their own, for example from a later report, are shown in a generic
 //! table (`html/generic.rs`).
@@ -32,7 +32,7 @@ use crate::view::figures::{Figure, Group};
 
 /// Colours, print rules, narrow screens.
 const STYLE: &str = include_str!("html/style.css");
-/// Content policy: nothing is fetched or executed, whatever a file's text contains.
+/// Content policy: nothing is fetched or executed, independent of a file's text.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
 /// Circumstances of a run.

@@ -9,7 +9,7 @@ use crate::report::monitor::{MonitorRun, MonitorRuns};
 /// Prints a run in a few lines.
 fn print_run(run: &MonitorRun) -> Result<(), ToolError> {
     if !run.refused.is_empty() {
-        say!("seed {}: refused, {}: there is no model to watch", run.seed, run.refused.join(", "));
+        say!("seed {}: refused, {}: no model to monitor", run.seed, run.refused.join(", "));
         return Ok(());
     }
     if run.hours > 0.0 {
@@ -19,11 +19,11 @@ fn print_run(run: &MonitorRun) -> Result<(), ToolError> {
         return Ok(());
     }
     let Some(alarm) = &run.alarm else {
-        say!("seed {}: the change was not noticed", run.seed);
+        say!("seed {}: the change was not detected", run.seed);
         return Ok(());
     };
     say!(
-        "seed {}: noticed after {:.1} s at {} (sums {}, limit {})",
+        "seed {}: detected after {:.1} s at {} (sums {}, limit {})",
         run.seed,
         alarm.after_s,
         alarm.joints.join(" and "),
@@ -108,7 +108,7 @@ pub fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
     delays.sort_by(f64::total_cmp);
     let at = |share: f64| delays.get((share * delays.len().saturating_sub(1) as f64) as usize).copied();
     say!(
-        "noticed: {} of {}, after {} s in the median, {} s at worst",
+        "detected: {} of {}, after {} s in the median, {} s at worst",
         noticed.len(),
         changed.len(),
         number(at(0.5).into()),

@@ -162,7 +162,7 @@ pub fn sources(sources: &[Source]) -> Table {
 }
 
 /// Meaning of the rows in the table of the files.
-pub const SOURCES: &str = "rows: filtered to 50 a second and used for that joint's torque; still: left out, because \
+pub const SOURCES: &str = "rows: filtered to 50 Hz and used for that joint's torque; still: excluded, because \
                            friction at rest is undetermined.";
 
 /// Prints one run.
@@ -249,7 +249,7 @@ fn added_mass_line(found: &AddedMassReport) -> String {
         format!("{}, {}", one(0, "x"), one(1, "y"))
     };
     format!(
-        "  as a mass added to link {}: {}; place: {}; first moment: {}",
+        "  as a mass added to link {}: {}; position: {}; first moment: {}",
         found.joint,
         with_sigma(found.mass_kg, found.mass_sigma_kg, "kg"),
         pair(&found.place_m, &found.place_sigma_m, "m"),
@@ -285,13 +285,13 @@ fn consistent_line(run: &RunReport) -> String {
     };
     let Some(full) = &found.full else {
         return format!(
-            "legs that can exist: the result costs {} chi-square units more than least squares ({} steps)",
+            "physically consistent legs: the result costs {} chi-square units more than least squares ({} steps)",
             plain(found.result_over_least_squares),
             found.base.steps
         );
     };
     format!(
-        "legs that can exist: the best of them costs {} chi-square units more than least squares. base values, completed \
+        "physically consistent legs: the best costs {} chi-square units more than least squares. base values, completed \
          (the result): {}. whole legs: {}",
         plain(found.optimum_over_least_squares),
         search(&found.base),
@@ -304,12 +304,12 @@ fn consistent_line(run: &RunReport) -> String {
 pub fn explanation(reason: &str) -> &'static str {
     match reason {
         "unphysical" => {
-            "no leg can have these parameters (negative friction, inertia or kinetic energy), or none that the prior allows"
+            "no physically consistent leg has these parameters (friction, inertia, kinetic energy), or none within the prior's limits"
         }
-        "unexcited" => "a joint hardly moved, or the motion does not tell the parameters apart",
-        "residual" => "what the model leaves unexplained is not noise",
+        "unexcited" => "a joint hardly moved, or the motion does not distinguish the parameters",
+        "residual" => "the residual of the model is not noise",
         "validation" => {
-            "torque of the motion held out is predicted worse than the training lets expect, or not at all"
+            "the held-out torque is predicted worse than the training fit permits, or not at all"
         }
         "not_a_measurement" => "the torque was computed, not measured",
         "outliers" => "too many outliers",

@@ -43,7 +43,7 @@ fn a_stated_load_is_subtracted_an_unstated_one_is_in_the_parameters() {
     let folder = Folder::new();
     let (file, truth) = logged(&folder, "loaded", &format!("--load {MASS}"));
     let (printed, report) = replay(&folder, &format!("--split 0.7 --load {MASS}"), &[&file]);
-    assert!(printed.contains("load: 3 kg on link 2 at x 0.3, y 0 m taken off"), "{printed}");
+    assert!(printed.contains("load: 3 kg on link 2 at x 0.3, y 0 m subtracted"), "{printed}");
     assert!(distance(&report, &truth) < 3.0, "{}", distance(&report, &truth));
     assert_eq!((&report["load"]["mass"], &report["scale"]), (&Value::from(3.0), &Value::from("relative")));
     let (_, whole) = replay(&folder, "--split 0.7", &[&file]);

@@ -190,7 +190,7 @@ fn a_refused_run_is_marked_first_and_gives_every_reason() {
         assert!(words.len() > reason.len() + 20, "not a sentence: {words}");
     }
     let residual = given.iter().find(|words| words.starts_with("residual")).expect("a reason");
-    assert!(residual.contains("joint 1 is off by") && residual.contains("at most"), "{residual}");
+    assert!(residual.contains("joint 1: ") && residual.contains("limit"), "{residual}");
     // Every failure is listed, and the table marks it.
     for finding in report["findings"].as_array().expect("a list") {
         let words = finding["words"].as_str().expect("a sentence");

@@ -47,7 +47,7 @@ fn a_known_mass_makes_the_report_absolute_and_widens_sigma() {
 fn a_stated_load_is_subtracted_an_unstated_one_is_in_the_parameters() {
     let folder = Folder::new();
     let run = scarab("identify --load 3@knee:0.3 --json", &[&folder.path("run.json")]).ends_with(0);
-    assert!(run.printed.contains("3 kg on link 2 at x 0.3, y 0 m taken off"), "{}", run.printed);
+    assert!(run.printed.contains("3 kg on link 2 at x 0.3, y 0 m subtracted"), "{}", run.printed);
     let json = folder.json("run.json");
     assert_eq!(json["scale"], "relative");
     for base in json["base_parameters"].as_array().expect("thirteen") {
@@ -97,7 +97,7 @@ fn geometry_is_also_tested_with_corrected_torques() {
 fn a_mass_too_light_for_the_constants_is_reported() {
     let run = scarab("identify --payload 0.001@knee:0.2", &[]).ends_with(0);
     assert!(
-        run.printed.contains("too light to tell") && !run.printed.contains("contradicted"),
+        run.printed.contains("too light to determine") && !run.printed.contains("contradicted"),
         "{}",
         run.printed
     );

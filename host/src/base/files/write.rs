@@ -25,7 +25,7 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), ToolError> {
     file.finish()
 }
 
-/// File that takes its place when finished, and leaves no trace otherwise.
+/// File that replaces its destination when finished; without that it leaves no file.
 #[derive(Debug)]
 pub struct NewFile {
     out: BufWriter<File>,

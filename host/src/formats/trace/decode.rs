@@ -1,13 +1,13 @@
 //! Decodes a `defmt` stream into lines.
 //!
-//! The device sends indices and bare values; the texts are in the image that runs there. Frames end
-//! with a zero byte and contain none (rzCOBS). A listener that joins late or loses bytes therefore
-//! finds the next frame. Frames that do not decode are counted and skipped. Single-precision values
-//! return with the same bits, since `defmt-decoder` writes the shortest digits that do so.
+//! The device sends indices and bare values; the texts are in its image. Frames end with a zero byte and
+//! contain none (rzCOBS). A listener that joins late or loses bytes therefore finds the next frame. Frames
+//! that do not decode are counted and skipped. Single-precision values return with the same bits, since
+//! `defmt-decoder` writes the shortest digits that do so.
 //!
-//! Cost: memory for one frame, however long the stream is. Limits: an image that sends frames without an
-//! encoding is rejected, since decoding could not resume after a gap. A damaged frame that still decodes is
-//! reported as it reads; its record number then rarely continues the sequence.
+//! Cost: memory for one frame, independent of the length of the stream. Limits: an image that sends frames
+//! without an encoding is refused, since decoding could not resume after a gap. A damaged frame that still
+//! decodes is reported unchanged; its record number then rarely continues the sequence.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

@@ -1,7 +1,7 @@
 //! The timeline in words: events in the order in which they were reported.
 //!
-//! Faults, crashes and refusals have a weight of their own: the person who straps the leg on must
-//! not overlook them. They are printed before the tables and again behind the verdict.
+//! Faults, crashes and refusals have their own weight, because an operator must not overlook them. They are
+//! printed before the tables and again behind the verdict.
 
 use scarab::trace::{GRAMMAR, Line, LineError};
 
@@ -168,7 +168,7 @@ fn crash(line: &Line<'_>) -> Read<String> {
         }
         _ => String::new(),
     };
-    // Zero means unknown: a panic has its file and line instead.
+    // Zero means unknown; a panic has its file and line instead.
     let known = |words: &str, key| match hex(line, key)? {
         0 => Read::Ok(String::new()),
         known => Ok(format!(", {words} {known:#010x}")),

@@ -23,7 +23,7 @@ pub fn value<V: std::str::FromStr>(line: &Line<'_>, key: &'static str) -> Result
 
 /// Reads a word.
 pub fn text(line: &Line<'_>, key: &'static str) -> Result<String, LineError<'static>> {
-    // The line's own lookup ties the error to the line's text; only the key is needed here.
+    // The line's own lookup returns an error tied to the line's text; only the key is needed here.
     line.text(key).map(str::to_owned).map_err(|_| LineError::Missing(key))
 }
 

@@ -129,7 +129,7 @@ impl Statistics {
         lines
     }
 
-    /// Complaints: missed ticks, lost samples and records.
+    /// Warnings: missed ticks, lost samples and records.
     #[must_use]
     pub fn complaints(&self) -> Vec<String> {
         let Some(loops) = self.loops() else { return Vec::new() };

@@ -1,8 +1,7 @@
-//! Reads lines into a [`Trace`]: records in order, with what was lost on the way.
+//! Reads lines into a [`Trace`]: records in order, with the losses between them.
 //!
-//! The board never waits for a listener, so a trace may begin late, have gaps and end anywhere. The
-//! records' numbers show what is missing. Records that cannot be read are reported with their line;
-//! unknown kinds are skipped.
+//! The board never waits for a listener, so a trace may begin late, have gaps and end anywhere. Gaps in the
+//! records' numbers show losses. Unreadable records are reported with their line; unknown kinds are skipped.
 //!
 //! Cost: the records of a result, the log (60 bytes per sample) and the timeline are stored;
 //! everything else is counted.
@@ -17,7 +16,7 @@ use crate::formats::trace::text;
 
 /// Servo rate, Hz, unless the board reports another.
 const SERVO_HZ: f64 = scarab::servo::SERVO_RATE_HZ as f64;
-/// Limit of stored complaints about lines; further ones are only counted.
+/// Limit of stored messages about unreadable lines; further lines are only counted.
 const MOST_PROBLEMS: usize = 20;
 
 /// Range of lost records, by number.
@@ -173,7 +172,7 @@ impl Trace {
         self.next = Some(number.saturating_add(1));
     }
 
-    /// Ends whatever was running when the image restarted.
+    /// Ends the running result when the image restarted.
     fn restart(&mut self) {
         self.abandon();
         self.statistics.restart();
@@ -275,7 +274,7 @@ impl Trace {
         }
     }
 
-    /// Description of what was lost on the way.
+    /// Describes the losses.
     fn loss(&self) -> Vec<String> {
         let mut words = Vec::new();
         if self.unheard > 0 {

@@ -1,8 +1,8 @@
 //! Records of one identification's result.
 //!
-//! A result is complete when the count in its `end` equals the records read, and its verdict came
-//! with all reasons. Incomplete results are not reported. A lost value must not look like an
-//! unknown one, nor a rejection like an acceptance.
+//! A result is complete when the count in its `end` equals the records read, and its verdict came with all
+//! reasons. Incomplete results are not reported. A lost value must not look like an unknown one, and a lost
+//! rejection not like an acceptance.
 
 use scarab::trace::{Line, LineError};
 
@@ -98,9 +98,9 @@ told! {
     }
 }
 told! {
-    /// A recorded motion.
+    /// Index of the motion; 0 is the training motion.
     Motion {
-        /// 0 is the motion identified from.
+        /// Index of the motion; 0 is the training motion.
         motion: usize = value,
         /// Recorded samples, at 500 Hz.
         samples: u32 = value,

@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_record_is_found_behind_what_loggers_write() {
+    fn a_record_is_found_behind_a_logger_s_prefix() {
         let plain = "fault n=7 tick=12 code=0x8400 name=overspeed joint=1";
         for line in [
             plain.to_owned(),
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_record_is_not_taken_for_one() {
+    fn text_that_is_not_a_record_is_rejected() {
         for line in [
             "",
             "      Erasing sectors [00:00:01]",

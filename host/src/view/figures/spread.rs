@@ -9,7 +9,7 @@ use crate::report::spread::Spread;
 use crate::view::figures::canvas::{Area, BLUE, DARK, DrawingError, Key, legend, line, px, text};
 use crate::view::figures::parameters::{ONE_SIGMA, THREE_SIGMA, frame, labels, sigma_axis};
 
-/// Most dots that remain readable; the numbers count all runs.
+/// Largest number of dots that remains readable; the printed numbers count all runs.
 pub const LARGEST_RUNS: usize = 500;
 
 /// Most runs that are drawn with larger dots.

@@ -90,7 +90,7 @@ pub fn outliers(run: &RunReport, leg: &LegFile) -> Markup {
         section {
             h2 { "Outliers and disturbances" }
             @if found.estimator == "plain" {
-                p { "Plain least squares: no sample was replaced and no row set aside." }
+                p { "Plain least squares: no sample was replaced and no row excluded." }
             } @else {
                 p { "Of " (found.samples) " samples of the motion identified from. Isolated outliers are replaced before the \
                     filter. Rows count as disturbed if the robust estimator gives them less than half of their weight. All joints \

@@ -146,7 +146,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn a_key_nobody_foresaw_is_shown_with_its_names_units_and_numbers() {
+    fn an_unknown_key_is_shown_with_names_units_and_numbers() {
         let value = json!({"replaced": [3, 0], "longest_s": 0.25, "joints": [{"joint": 1, "note": "<b>"}, {"joint": 2}]});
         let shown = section("outliers", &value).into_string();
         for part in ["<h2>Outliers</h2>", "Longest, s", "0.250", "3, 0", ">1<", "&lt;b&gt;", "\u{2013}"] {
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_empty_is_left_out() {
+    fn empty_values_are_omitted() {
         assert!(is_empty(&json!({"a": [], "b": null})) && !is_empty(&json!({"a": false})));
     }
 }

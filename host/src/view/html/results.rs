@@ -67,7 +67,7 @@ pub fn search(run: &RunReport) -> Markup {
     if run.trace.is_some() {
         return html! { p {
             "The beetle swarm started cold and took " (run.bso.iterations) " iterations and " (run.bso.evaluations)
-            " evaluations. How far it ends above the optimum of its box a board does not tell: that takes double precision."
+            " evaluations. A board does not report the excess over the optimum, which needs double precision."
         } };
     }
     let half = run.bso.iterations_to_half_chi2;

@@ -43,7 +43,7 @@ pub fn alarms(run: &RunReport) -> Markup {
         @if !faults.is_empty() {
             section.verdict.refused {
                 p.word { (count(faults.len(), "fault")) " of the drive" }
-                p { "Whatever the verdict on the model, the board told:" }
+                p { "Independent of the verdict on the model, the board reported:" }
                 ul { @for words in faults { li { (words) } } }
             }
         }
@@ -81,26 +81,26 @@ fn meaning(test: &str) -> (bool, &str) {
         "rows" => (true, "filtered rows in which the joint moves"),
         "not_finite" => (false, "samples and rows that are not finite"),
         "torque" => (true, "rms torque, N m"),
-        "search" => (true, "the search came to its end"),
+        "search" => (true, "the search finished"),
         "drive" => (true, "the drive stayed enabled"),
         "speed" => (true, "rms speed, rad/s"),
         "determined" => (true, "base parameters that are determined"),
         "condition" => (false, "condition of the scaled problem"),
         "predicted_uncertainty" => (false, "uncertainty of the predicted torque over its rms"),
-        "finite" => (false, "parameters that are not numbers"),
+        "finite" => (false, "parameters that are not finite"),
         "negative_parameter" => (false, "sigma by which a parameter is below what a body can have"),
         "negative_energy" => (false, "sigma by which kinetic energy is negative"),
         "prior_box" => (false, "chi-square that the prior's limits cost"),
         "dynamic_share" => (true, "share of the torque that inertia and friction make"),
         "training_error" => (false, "rms error on the motion identified from, N m"),
-        "whole_error" => (false, "error of all rows over their torque, those set aside included"),
+        "whole_error" => (false, "error of all rows over their torque, excluded rows included"),
         "validation_error" => (false, "rms error on an unused motion, N m"),
         "slow_residual" => (false, "residual that lasts, N m"),
         "link_length" => (false, "share by which the link before seems longer"),
         "encoder_zero" => (false, "angle by which the zero seems off, rad"),
-        "common_disturbance" => (false, "time for which all joints missed together, s"),
+        "common_disturbance" => (false, "time for which all joints deviate together, s"),
         "replaced_share" => (false, "share of samples replaced as outliers"),
-        "disturbed_share" => (false, "share of rows set aside as disturbed"),
+        "disturbed_share" => (false, "share of rows excluded as disturbed"),
         "delay" => (false, "delay of the torque against the angle, ms"),
         "encoder_scale" => (false, "error of the angle's scale, %"),
         "torque_scale" => (false, "torque scale against that of joint 1, %"),
@@ -113,13 +113,13 @@ fn meaning(test: &str) -> (bool, &str) {
     }
 }
 
-/// Directions of doubt, the misfit over noise, and parameters at a limit of the prior.
+/// Errors of the logging chain, the misfit over noise, and parameters at a limit of the prior.
 pub fn doubts(run: &RunReport) -> Markup {
     html! { @if let Some(doubt) = &run.doubt {
         section {
-            h2 { "Doubts about the recording" }
-            p { "Errors of a logging chain, each fitted beside the parameters. One is refused where it is certain, moves a \
-                parameter by more than two sigma and explains what the model misses." }
+            h2 { "Errors of the logging chain" }
+            p { "Each error is fitted beside the parameters. The recording is refused where an error is significant, shifts a \
+                parameter by more than two sigma, and explains part of the misfit." }
             ul { @for line in doubt.lines() { li { (line) } } }
         }
     } }
