@@ -19,7 +19,7 @@ use crate::formats::leg_file::LegFile;
 use crate::view::html::{self, Circumstances};
 use crate::view::{document, figures};
 
-/// Kind and name of the table's place in a document.
+/// Kind and name of the table's markers in a document.
 const DOCUMENT: [&str; 2] = ["faults", "table"];
 /// Limit of the runs of one fault.
 const MOST_SEEDS: u64 = 1_000_000;
@@ -49,19 +49,19 @@ pub struct FaultsArguments {
     /// Simulated hours of normal motion with noise and a pushing wearer; no fault may be raised.
     #[arg(long, value_name = "H", default_value_t = 0.0)]
     hours: f64,
-    /// The full campaign: 1,000 runs of each fault, every tick, a sweep of 8,000, 10,000 pairs, 10
-    /// hours; options given beside override these.
+    /// The full campaign: 1,000 runs of each fault, every tick, a sweep of 8,000, 10,000 pairs, 10 hours;
+    /// options given as well override these.
     #[arg(long, conflicts_with_all = ["blind", "replay"])]
     full: bool,
     /// Switch the detectors of each fault off. The campaign must then fail for each fault; exit
     /// code 0 if it does.
     #[arg(long, conflicts_with = "every_tick")]
     blind: bool,
-    /// Only the run of this seed of each fault, reported in full; `--fault sweep` and `--fault pairs` name
-    /// runs of those. The run repeats bit for bit for equal --seconds, leg and program.
+    /// Repeat only the run with this seed of each fault and report it in full; with `--fault sweep` or
+    /// `--fault pairs`, a run of those. The run repeats bit for bit for equal --seconds, leg and program.
     #[arg(long, value_name = "SEED", conflicts_with_all = ["seeds", "every_tick", "sweep", "pairs"], value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     replay: Option<u64>,
-    /// Inject only in the first seconds of each identification.
+    /// Inject only in the first S seconds of each identification.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
     /// Write the table here, for exit codes 0 and 3.
@@ -133,14 +133,14 @@ impl FaultsArguments {
             let named = |name: &String| rows.iter().any(|entry| entry.head().id == name);
             if rows.is_empty() || !self.fault.iter().all(named) {
                 return Err(ToolError::input(format!(
-                    "--blind: of --fault {} not every one has detectors that can be switched off",
+                    "--blind: some rows of --fault {} have no detectors that can be switched off",
                     self.fault.join(" --fault ")
                 )));
             }
         }
         if self.every_tick && !rows.iter().any(|entry| entry.head().id == "X1") {
             return Err(ToolError::input(
-                "--every-tick: is about the emergency stop, and --fault leaves X1 out",
+                "--every-tick: tests the emergency stop (row X1), which --fault excludes",
             ));
         }
         if let Some(seconds) = self.seconds
@@ -182,7 +182,7 @@ impl FaultsArguments {
 pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     let options = arguments.options()?;
     let leg = arguments.leg.load()?;
-    // Checked first: hours of runs must not end without a place for their table.
+    // Checked first: hours of runs must not end without a document for their table.
     if let Some(path) = &arguments.docs {
         document::check(path, DOCUMENT[0], DOCUMENT[1])?;
     }
@@ -226,7 +226,7 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
             report.rows.iter().filter(|row| !row.is_noticed()).map(|row| row.fault).collect();
         if options.seeds.len() < FEWEST_BLIND {
             output::print(&format!(
-                "fewer than {FEWEST_BLIND} seeds may be too few for rows that are seldom seen\n"
+                "fewer than {FEWEST_BLIND} seeds may be too few for rows whose faults are rarely detectable\n"
             ))?;
         }
         for detector in &report.detectors {
@@ -243,7 +243,7 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
             )
             .collect();
         let words = if unnoticed.is_empty() { "none" } else { &unnoticed.join(", ") };
-        output::print(&format!("detectors that no run would miss: {words}\n"))?;
+        output::print(&format!("detectors without which every run still passes: {words}\n"))?;
         let all = unnoticed.is_empty() && report.base_alarms.is_empty();
         return Ok(if all { EXIT_ACCEPTED } else { EXIT_REFUSED });
     }

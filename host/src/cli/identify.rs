@@ -101,8 +101,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     let load = on_leg(&arguments.load, "--load")?;
     if (payload.is_some() || load.is_some()) && arguments.perturb.iter().any(Perturbation::tampers) {
         return Err(ToolError::input(
-            "--perturb inertia and com tamper with the values that are validated; --payload and --load put others in their \
-             place: one of the two",
+            "--perturb inertia and com change the validated values, and --payload and --load replace them: \
+             give one of the two",
         ));
     }
     let excitation = arguments.excitation.as_deref().map(Excitation::load).transpose()?;

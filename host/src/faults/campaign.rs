@@ -220,7 +220,7 @@ fn based(
     Ok(campaign)
 }
 
-/// Returns whether the stop comes in this period: every servo tick, and every period of the second second.
+/// Returns whether the stop comes in this period: every servo tick, and every period from 1 s to 2 s.
 fn is_stopped_at(period: u64) -> bool {
     period.is_multiple_of(u64::from(PERIODS_PER_TICK)) || (PERIODS_PER_S..2 * PERIODS_PER_S).contains(&period)
 }
@@ -294,7 +294,7 @@ impl Setting<'_> {
         let of = |(rig, job): &(Rig<JOINTS, BASE>, Job)| match job {
             Job::Row { row, scenario, seed, manner } => {
                 let outcome = run(self.leg, row, scenario, *seed, *manner, rig);
-                // Its period must not be read as a seed, which would draw another run.
+                // Its period must not be used as a seed, which would draw another run.
                 (Some(manner.blind), Outcome { seed: if manner.brief { 0 } else { *seed }, ..outcome })
             }
             Job::Trial { trial, seed } => (None, trial.run(self.leg, *seed, self.manner.recorded, rig)),

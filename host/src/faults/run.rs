@@ -175,13 +175,13 @@ impl<'a, const B: usize> Watched<'a, B> {
         self.swing = if self.rig.period > self.begun + SETTLED {
             [self.swing[0].min(asked), self.swing[1].max(asked)]
         } else {
-            // A joint that is brought to rest gives back the braking current.
+            // The braking current of a joint that comes to rest vanishes, which is not a swing.
             let before = if self.swing[0].is_finite() { self.swing[0] } else { asked };
             [asked.clamp(before.min(0.0), before.max(0.0)); 2]
         };
         match (self.onset, self.has_begun()) {
             (None, true) => self.onset = Some(self.rig.period),
-            // A fault that exists only under a condition, which no longer holds.
+            // A fault under a condition that no longer holds.
             (Some(_), false) if self.rig.alarm().is_none() => self.onset = None,
             _ => {}
         }
