@@ -33,7 +33,11 @@ fn samples() -> Vec<Sample> {
         .zip(rows.chunks(2))
         .map(|(line, rows)| {
             let pair = |first: usize| [line[first], line[first + 1]];
-            assert_eq!((rows[0][0], rows[0][1], rows[1][1]), (line[0], 1.0, 2.0), "the files have different rows");
+            assert_eq!(
+                (rows[0][0], rows[0][1], rows[1][1]),
+                (line[0], 1.0, 2.0),
+                "the files have different rows"
+            );
             Sample {
                 state: JointState { q: pair(1), qd: pair(3), qdd: pair(5) },
                 rigid: pair(7),

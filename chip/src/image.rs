@@ -38,8 +38,7 @@ impl Image {
     /// # Errors
     /// The file cannot be read, or is not an image of the board.
     pub fn load(path: &Path) -> Result<Rc<Self>, ToolError> {
-        let elf = std::fs::read(path)
-            .map_err(|error| FileError::unreadable(path, &error))?;
+        let elf = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
         Self::parse(elf).map(Rc::new).map_err(|reason| {
             ToolError::input(format!("{}: not an image of the board: {reason}", path.display()))
         })

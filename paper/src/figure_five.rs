@@ -69,7 +69,7 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
                 by_evaluation: Band::over_evaluations(&curves(|way| &way.by_evaluation)),
             });
             if let (Algorithm::BsoPaper | Algorithm::Bso, Some(first)) = (search, ways.into_iter().next()) {
-                walks.push(Walk { name: search.id(), places: first.places });
+                walks.push(Walk { name: search.id(), positions: first.places });
             }
         }
         figures.push(swarm::figure(

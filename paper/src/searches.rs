@@ -28,7 +28,9 @@ pub fn rows(algorithms: &[Algorithm], runs: u64) -> Result<Vec<Row>, ToolError> 
     let precisions = |algorithm: &Algorithm| if *algorithm == Algorithm::Bso { 2 } else { 1 };
     let in_all: usize = algorithms.iter().map(precisions).sum();
     let progress = ProgressBar::new(runs * (CASES.len() * in_all) as u64);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} elapsed, {eta} left") {
+    if let Ok(style) =
+        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} elapsed, {eta} left")
+    {
         progress.set_style(style);
     }
     let mut rows = Vec::new();

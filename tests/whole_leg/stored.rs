@@ -51,7 +51,10 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
 
     let mut configuration = context().configuration.clone();
     configuration.joints.iter_mut().for_each(|joint| joint.scale.mirrored = true);
-    assert!(matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })), "a model of the other side");
+    assert!(
+        matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })),
+        "a model of the other side"
+    );
 
     // Changes that leave the parameters' meaning unchanged do not refuse the model.
     let mut configuration = context().configuration.clone();

@@ -253,7 +253,10 @@ mod tests {
         let mut bridge = Bridge::new(&BridgeDescription::default(), PERIOD);
         let changes = shares(&mut bridge, [1.0, 0.0, f32::NAN]);
         let steady = shares(&mut bridge, [1.0, 0.0, f32::NAN]);
-        assert!((changes[0][2] - 20.0 / 168e6).abs() < 1e-15, "not turned on after the dead time: {changes:?}");
+        assert!(
+            (changes[0][2] - 20.0 / 168e6).abs() < 1e-15,
+            "not turned on after the dead time: {changes:?}"
+        );
         assert_eq!(steady, [[PERIOD, 0.0, 0.0], [0.0, PERIOD, 0.0], [0.0, PERIOD, 0.0]]);
         // 5 of 3500 steps are 60 ns, half of the dead time.
         shares(&mut bridge, [5.0 / 3500.0, 1.0 - 5.0 / 3500.0, 0.5]);

@@ -124,7 +124,11 @@ mod tests {
             bus.advance(0.0, 1.0, 1e-6);
         }
         let held = 48.0 * 2.0 / 2.05;
-        assert!((bus.voltage() - held).abs() < 1e-6, "the source should feed the resistor: {}", bus.voltage());
+        assert!(
+            (bus.voltage() - held).abs() < 1e-6,
+            "the source should feed the resistor: {}",
+            bus.voltage()
+        );
     }
 
     #[test]

@@ -90,13 +90,20 @@ fn current_noise_has_its_stated_size_in_the_mean_of_eight_samples() {
         }
         sum += mean / f64::from(rows);
         squares += mean * mean / f64::from(rows);
-        assert_eq!(world.sample().joints[1].current, Ampere(0.0), "the other joint's sensor must be noise-free");
+        assert_eq!(
+            world.sample().joints[1].current,
+            Ampere(0.0),
+            "the other joint's sensor must be noise-free"
+        );
     }
     // 10,000 rows determine a standard deviation to 0.7 %, a mean to 0.007 A; the tolerance is four
     // times that.
     assert!((squares.sqrt() / 0.7 - 1.0).abs() < 0.028, "{}", squares.sqrt());
     assert!(sum.abs() < 0.028, "{sum}");
-    assert!((single_squares.sqrt() / (0.7 * 8.0_f64.sqrt()) - 1.0).abs() < 0.01, "the noise is not white: {single_squares}");
+    assert!(
+        (single_squares.sqrt() / (0.7 * 8.0_f64.sqrt()) - 1.0).abs() < 0.01,
+        "the noise is not white: {single_squares}"
+    );
 }
 
 #[test]

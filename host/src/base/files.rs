@@ -1,5 +1,5 @@
-//! Texts that are read, and files that are written: a temporary file in the same folder, then renamed. No other
-//! module writes files.
+//! Texts that are read, and files that are written: a temporary file in the same folder, then renamed. No
+//! other module writes files.
 
 pub mod write;
 

@@ -1,7 +1,7 @@
 //! Tables, with three renderers: plain text, HTML and Markdown.
 //!
-//! A column states once what its cells are and whether it is shown; a row gives one cell per column. Cells are
-//! plain text; HTML typesets minus signs and units.
+//! A column states once what its cells are and whether it is shown; a row gives one cell per column. Cells
+//! are plain text; HTML typesets minus signs and units.
 
 use maud::{Markup, Render, html};
 use unicode_width::UnicodeWidthStr;

@@ -63,7 +63,11 @@ pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
     let torque_noise_percent = arguments.noise.percent()?;
     let percentage = |option: &str, value: f64, most: f64| {
         let fits = (0.0..=most).contains(&value);
-        if fits { Ok(()) } else { Err(ToolError::input(format!("{option}: must be a percentage from 0 to {most}"))) }
+        if fits {
+            Ok(())
+        } else {
+            Err(ToolError::input(format!("{option}: must be a percentage from 0 to {most}")))
+        }
     };
     percentage("--torque-margin", arguments.torque_margin, 200.0)?;
     if !(arguments.duration > 0.0 && arguments.duration <= LONGEST_S) {

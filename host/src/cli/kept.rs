@@ -98,7 +98,11 @@ fn import(file: &Path, flash: &Path, board: usize) -> Result<u8, ToolError> {
     let name = file.display().to_string();
     let bytes = std::fs::metadata(file).map_err(|error| FileError::unreadable(file, &error))?.len();
     if bytes > LARGEST_FILE_BYTES {
-        return Err(FileError::new(name, format!("{bytes} bytes, too large for stored data, limit {LARGEST_FILE_BYTES}")).into());
+        return Err(FileError::new(
+            name,
+            format!("{bytes} bytes, too large for stored data, limit {LARGEST_FILE_BYTES}"),
+        )
+        .into());
     }
     let kept = KeptFile::parse(&files::read_text(file)?, &name)?;
     let mut bytes = read(flash)?.unwrap_or_default();

@@ -54,7 +54,10 @@ fn bit_rates() -> impl TypedValueParser<Value = u64> {
 pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
     if !(arguments.speed > 0.0 && arguments.speed <= 100.0) {
-        return Err(ToolError::input(format!("--speed: {} must be above 0 and at most 100", arguments.speed)));
+        return Err(ToolError::input(format!(
+            "--speed: {} must be above 0 and at most 100",
+            arguments.speed
+        )));
     }
     let options = ServeOptions {
         address: arguments.slcan,

@@ -235,7 +235,9 @@ pub fn background<const N: usize, const B: usize>(
             (Some(from_file.ok_or_else(|| leg.error("not every joint has a `prior`"))?), "file".to_owned())
         }
         PriorChoice::Wrong(percent) => {
-            let truth = truth.ok_or_else(|| leg.error("`--prior wrong` distorts the `truth` of every joint, which is missing"))?;
+            let truth = truth.ok_or_else(|| {
+                leg.error("`--prior wrong` distorts the `truth` of every joint, which is missing")
+            })?;
             (Some(wrong_prior(&truth, percent, seed)), format!("wrong:{percent}"))
         }
     };

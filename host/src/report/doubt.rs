@@ -70,7 +70,9 @@ impl RecordingsReport {
     pub fn line(&self) -> String {
         match (self.count, self.sigma.is_empty()) {
             (0, _) => "sigma does not contain the scatter between recordings: too few rows".into(),
-            (1, _) => "sigma does not contain the scatter between recordings: only one recording was given".into(),
+            (1, _) => {
+                "sigma does not contain the scatter between recordings: only one recording was given".into()
+            }
             (count, true) => format!(
                 "sigma does not contain the scatter between the {count} recordings: without one of them the others do not \
                  determine every parameter"

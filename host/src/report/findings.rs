@@ -86,9 +86,9 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
             limit / value
         ),
         Test::Determined => format!("the motion determines {value:.0} of {limit:.0} base parameters"),
-        Test::Condition if known => format!(
-            "the motion hardly distinguishes the parameters: condition {value:.0}, limit {limit:.0}"
-        ),
+        Test::Condition if known => {
+            format!("the motion hardly distinguishes the parameters: condition {value:.0}, limit {limit:.0}")
+        }
         Test::Condition => "the motion does not distinguish the parameters".into(),
         Test::PredictedUncertainty => format!(
             "the excitation leaves the torque of joint {joint}{on} uncertain by {:.1} % of its rms, limit {:.1} %",
@@ -99,9 +99,9 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
         Test::NegativeParameter => format!(
             "a parameter of joint {joint} that must be positive is {value:.1} sigma below zero, limit {limit:.0} sigma"
         ),
-        Test::NegativeEnergy => format!(
-            "kinetic energy is negative in some posture, by {value:.1} sigma, limit {limit:.0} sigma"
-        ),
+        Test::NegativeEnergy => {
+            format!("kinetic energy is negative in some posture, by {value:.1} sigma, limit {limit:.0} sigma")
+        }
         Test::PriorBox => format!(
             "every leg that the prior allows misses the data: {value:.0} chi-square units above least squares, limit \
              {limit:.0}"
@@ -123,9 +123,7 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
             100.0 * limit
         ),
         Test::ValidationError if known => {
-            format!(
-                "joint {joint}: torque error of {value:.3} N m rms{on}, limit {limit:.3} N m"
-            )
+            format!("joint {joint}: torque error of {value:.3} N m rms{on}, limit {limit:.3} N m")
         }
         Test::ValidationError => format!("no torque of joint {joint}{on} could be compared with the model"),
         Test::SlowResidual => format!(

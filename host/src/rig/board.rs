@@ -153,7 +153,8 @@ fn ready<const N: usize>(
     }
     let chopper = Chopper::new(BRAKE[0], BRAKE[1])
         .ok_or_else(|| ToolError::input("the firmware rejects the chopper's voltages"))?;
-    let axes = axes.try_into().map_err(|_| ToolError::input("every joint needs a motor (`[joint.motor]`)"))?;
+    let axes =
+        axes.try_into().map_err(|_| ToolError::input("every joint needs a motor (`[joint.motor]`)"))?;
     // The first period took the reference; outputs stay off for the rest of its servo tick.
     for _ in 1..PERIODS_PER_TICK {
         world.period(&[AxisCommand::RELEASED; N], 0.0);

@@ -282,7 +282,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
                     plain(consistent.base.excess_chi2)
                 );
             } else if self.prior.is_none() {
-                finding.words = finding.words.replace("leg that the prior allows", "physically consistent leg");
+                finding.words =
+                    finding.words.replace("leg that the prior allows", "physically consistent leg");
             }
         }
         findings

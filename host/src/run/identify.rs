@@ -37,7 +37,9 @@ pub fn identify_many<const N: usize, const B: usize>(
     options: &[SimulationOptions],
 ) -> Result<RunsReport, ToolError> {
     let progress = ProgressBar::new(options.len() as u64);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} elapsed, {eta} left") {
+    if let Ok(style) =
+        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} elapsed, {eta} left")
+    {
         progress.set_style(style);
     }
     let runs = options

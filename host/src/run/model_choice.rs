@@ -162,7 +162,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
         };
         let (gain, surplus) = (f64::from(gain), f64::from(surplus));
         if asked == Switch::On {
-            let why = if used { "requested by the leg file" } else { "requested by the leg file, but the best curve explains nothing" };
+            let why = if used {
+                "requested by the leg file"
+            } else {
+                "requested by the leg file, but the best curve explains nothing"
+            };
             return Decision { gain: Some(gain), ..decided(used, why) };
         }
         let limit = stribeck::SMALLEST_GAIN;

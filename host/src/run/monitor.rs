@@ -210,7 +210,9 @@ pub fn watch<const N: usize, const B: usize>(
         Err(reasons) => return Ok(MonitorRun::refused(options.seed, reasons)),
     };
     let model_monitor = pair.leg.identification().model_monitor();
-    let baseline = model_monitor.baseline().ok_or_else(|| leg.error("the firmware does not monitor the accepted model"))?;
+    let baseline = model_monitor
+        .baseline()
+        .ok_or_else(|| leg.error("the firmware does not monitor the accepted model"))?;
     let mut run = MonitorRun {
         row_sigma_nm: baseline
             .row_variance

@@ -162,7 +162,7 @@ pub fn sources(sources: &[Source]) -> Table {
 }
 
 /// Meaning of the rows in the table of the files.
-pub const SOURCES: &str = "rows: filtered to 50 Hz and used for that joint's torque; still: excluded, because \
+pub const SOURCES: &str = "rows: decimated to 50 a second and used for that joint's torque; still: excluded, because \
                            friction at rest is undetermined.";
 
 /// Prints one run.
@@ -308,9 +308,7 @@ pub fn explanation(reason: &str) -> &'static str {
         }
         "unexcited" => "a joint hardly moved, or the motion does not distinguish the parameters",
         "residual" => "the residual of the model is not noise",
-        "validation" => {
-            "the held-out torque is predicted worse than the training fit permits, or not at all"
-        }
+        "validation" => "the held-out torque is predicted worse than the training fit permits, or not at all",
         "not_a_measurement" => "the torque was computed, not measured",
         "outliers" => "too many outliers",
         "contact" => "the leg touched something",

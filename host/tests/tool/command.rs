@@ -98,7 +98,8 @@ impl Table {
     pub fn parse(text: &str) -> Self {
         let mut lines = text.lines();
         let header: Vec<String> = lines.next().expect("a header").split(',').map(str::to_owned).collect();
-        let number = |field: &str| field.parse::<f64>().unwrap_or_else(|_| panic!("`{field}` is not a number"));
+        let number =
+            |field: &str| field.parse::<f64>().unwrap_or_else(|_| panic!("`{field}` is not a number"));
         let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(number).collect()).collect();
         assert!(rows.iter().all(|row| row.len() == header.len()), "lines of different lengths");
         Self { header, rows }

@@ -116,7 +116,9 @@ fn fuzz(files: &[String], read: impl Fn(&[u8]) -> Result<(), String>) {
     let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = (0..files.len(), changes());
     let result = runner.run(&strategy, |(file, changes)| match read(&spoilt(&files[file], &changes)) {
-        Err(words) if !words.contains(NAME) => Err(TestCaseError::fail(format!("does not name the file: {words}"))),
+        Err(words) if !words.contains(NAME) => {
+            Err(TestCaseError::fail(format!("does not name the file: {words}")))
+        }
         _ => Ok(()),
     });
     if let Err(failure) = result {

@@ -248,7 +248,11 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
             "0x607D:1: occurs twice",
         ),
         ("joint = \"knee\"\nobjects", "joint = \"hip\"\nobjects", "node: the hip occurs twice"),
-        ("joint = \"knee\"\nobjects", "joint = \"ankle\"\nobjects", "a board does not store data of the ankle"),
+        (
+            "joint = \"knee\"\nobjects",
+            "joint = \"ankle\"\nobjects",
+            "a board does not store data of the ankle",
+        ),
         ("joint = \"knee\"\nobjects", "joint = \"toe\"\nobjects", "unknown variant `toe`"),
         (
             "resistance_ohm = 0.1\n",

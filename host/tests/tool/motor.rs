@@ -221,7 +221,8 @@ fn configuration_errors_name_the_key_that_corrects_them() {
         ("torque_limit_nm = 85.0", "torque_limit_nm = 400.0"),
     ]);
     assert!(
-        strong.contains("the back-EMF of a motor with its bridge off") && strong.contains("`speed_limit_deg_s`"),
+        strong.contains("the back-EMF of a motor with its bridge off")
+            && strong.contains("`speed_limit_deg_s`"),
         "{strong}"
     );
     let cogging = refusal(&[("cogging_nm = 0.017", "cogging_nm = 0.3")]);

@@ -86,7 +86,11 @@ fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_of
     assert_eq!(run.errors, "");
     let table = Table::parse(&run.printed);
     assert_eq!(table.header.join(","), header());
-    assert_eq!(table.column("k"), (0..50).map(f64::from).collect::<Vec<_>>(), "the rows are numbered, not copied");
+    assert_eq!(
+        table.column("k"),
+        (0..50).map(f64::from).collect::<Vec<_>>(),
+        "the rows are numbered, not copied"
+    );
     // The reference's files have 15 digits.
     let (torque, elements) = errors(&table);
     assert!(torque < 1e-12 && elements < 1e-12, "torque {torque:e}, regressor {elements:e}");

@@ -57,9 +57,6 @@ fn one_recording_reports_that_sigma_lacks_scatter_between_recordings() {
     let folder = Folder::new();
     let files = periods(&folder, [0.0; 3]);
     let (printed, report) = replay(&folder, &files[..1]);
-    assert!(
-        printed.contains("sigma does not contain the scatter between recordings: only one"),
-        "{printed}"
-    );
+    assert!(printed.contains("sigma does not contain the scatter between recordings: only one"), "{printed}");
     assert_eq!(report["recordings"], serde_json::json!({ "count": 1, "sigma": [] }));
 }

@@ -46,11 +46,7 @@ fn reported(arguments: &str, code: i32) -> (Folder, Run, Page) {
 fn a_page_shows_the_whole_run_and_fetches_nothing() {
     let (folder, run, page) = reported("identify --seed 2", 0);
     let report = folder.json("run.json");
-    assert!(
-        run.printed.trim_end().ends_with("report.html"),
-        "the last line names the page: {}",
-        run.printed
-    );
+    assert!(run.printed.trim_end().ends_with("report.html"), "the last line names the page: {}", run.printed);
     assert_eq!(page.one(".verdict .word"), "Accepted");
     assert!(page.all("tr.failed").is_empty() && page.all("table.tests tbody tr").len() > 10);
     let names = page.all("tbody th");
@@ -133,10 +129,7 @@ fn every_section_has_a_title_and_no_reason_is_truncated() {
     for (reason, choice) in reasons.iter().zip(choices) {
         assert_eq!(choice["why"], reason.as_str());
     }
-    assert!(
-        page.text.contains(".words, .any td:not(.n) { white-space: normal; }"),
-        "reasons may not wrap"
-    );
+    assert!(page.text.contains(".words, .any td:not(.n) { white-space: normal; }"), "reasons may not wrap");
 }
 
 #[test]

@@ -110,7 +110,9 @@ fn halves() -> (Control<{ leg::JOINTS }>, &'static mut leg::LegIdentification) {
     static IDENTIFICATION: StaticCell<leg::LegIdentification> = StaticCell::new();
     let place = IDENTIFICATION.uninit();
     let identification = leg::LegIdentification::place(place, &configuration, &filters, WINDOW.take());
-    let Ok(control) = Control::new(&configuration) else { refuse("the leg's limits and motions are inconsistent") };
+    let Ok(control) = Control::new(&configuration) else {
+        refuse("the leg's limits and motions are inconsistent")
+    };
     (control, identification)
 }
 

@@ -52,7 +52,8 @@ fn one(head: &Head, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, To
     let drives = leg.complete_description::<2>()?;
     let index = random.below(drives.axes.len() as u64) as usize;
     let joint = &leg.joints[index];
-    let motor = joint.motor.as_ref().ok_or_else(|| leg.error("every joint needs a motor (`[joint.motor]`)"))?;
+    let motor =
+        joint.motor.as_ref().ok_or_else(|| leg.error("every joint needs a motor (`[joint.motor]`)"))?;
     if random.below(5) < 2 {
         return loose(head, joint, motor, &drives.axes[index], &drives.supply, seed, &mut random, blind);
     }

@@ -3,7 +3,7 @@
 //!
 //! | where | machine | requirement |
 //! | --- | --- | --- |
-//! | boot, to the start of an identification | whole board, operator continues | off in the tick, not enabled |
+//! | boot, to the start of an identification | whole board, as operated | off in the tick, not enabled |
 //! | calibration | motor on a test stand, tick checks | off in the tick, calibration ended without result |
 
 use core::f64::consts::TAU;
@@ -84,7 +84,8 @@ fn boot(
     let pressed = begin + random.below(BOOTED) * random.below(1000).min(1);
     let lasting = 1 + random.below(PERIODS_PER_S / 100);
     rig.injector.add(at(Channel::EmergencyStop, 0, Form::Off, Timing::lasting(pressed, lasting)));
-    let mut invariants = Invariants::new(leg, Scope { torque: true, range: true, rotor_position: true }, &rig);
+    let mut invariants =
+        Invariants::new(leg, Scope { torque: true, range: true, rotor_position: true }, &rig);
     let (mut seen, mut came_back) = (None, false);
     for since in 0..BOOTED + CLOSED {
         rig.hand.start = rig.state() == DriveState::OperationEnabled && since >= PRESSED;

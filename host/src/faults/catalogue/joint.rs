@@ -18,9 +18,7 @@ pub static ROWS: [Row; 2] = [
         codes: &[FaultCode::PositionLimit, FaultCode::Overspeed],
         deadline_ms: f64::INFINITY,
         unit: "N m",
-        lacking: Some(
-            "pushes above half of the torque cap, which no torque-limited drive can stop",
-        ),
+        lacking: Some("pushes above half of the torque cap, which no torque-limited drive can stop"),
         draw: pushed,
     },
     Row {

@@ -23,8 +23,9 @@ pub fn anatomy<const N: usize>(leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N
     let mut joints = [AnatomicalJoint::identity(); N];
     for (slot, joint) in joints.iter_mut().zip(&leg.joints) {
         let direction = if joint.direction < 0 { -1 } else { 1 };
-        *slot = AnatomicalJoint::new(direction, joint.zero_offset_deg.to_radians())
-            .map_err(|_| leg.error(format!("joint {}: `direction` or `zero_offset_deg` is invalid", joint.name)))?;
+        *slot = AnatomicalJoint::new(direction, joint.zero_offset_deg.to_radians()).map_err(|_| {
+            leg.error(format!("joint {}: `direction` or `zero_offset_deg` is invalid", joint.name))
+        })?;
     }
     Ok(joints)
 }

@@ -36,7 +36,7 @@ impl LegFile {
     pub fn load_for_image(name_or_path: &str, side_is_given: bool) -> Result<Self, FileError> {
         let (text, file) = Self::text(name_or_path)?;
         let leg = Self::parse(&text, &file)?;
-        match left_out(&leg, &text, side_is_given) {
+        match missing_keys(&leg, &text, side_is_given) {
             Some(fault) => Err(fault.in_file(&file, &text)),
             None => Ok(leg),
         }
@@ -47,7 +47,8 @@ impl LegFile {
 fn missing_keys(leg: &LegFile, text: &str, side_is_given: bool) -> Option<Fault> {
     let table = text.parse::<Table>().ok()?;
     if !side_is_given && !table.contains_key("side") {
-        let reason = "`side` is missing: state whether the drives are mounted mirrored, \"right\" or \"left\"";
+        let reason =
+            "`side` is missing: state whether the drives are mounted mirrored, \"right\" or \"left\"";
         return Some(Fault { steps: vec![Step::Key("side")], reason: reason.to_owned() });
     }
     let stated = table.get("joint").and_then(Value::as_array)?;

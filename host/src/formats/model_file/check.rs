@@ -205,7 +205,11 @@ fn one_parameter(parameter: &StoredParameter, name: &str, symbol: Parameter) -> 
         return Err(format!("`sigma` of {name} is {sigma}; it must not be negative"));
     }
     if !STATUS.contains(&parameter.status.as_str()) {
-        return Err(format!("`status` of {name} is `{}`, not one of {}", parameter.status, STATUS.join(", ")));
+        return Err(format!(
+            "`status` of {name} is `{}`, not one of {}",
+            parameter.status,
+            STATUS.join(", ")
+        ));
     }
     Ok(())
 }

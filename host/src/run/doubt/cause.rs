@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! remaining     misfit of the refit over the torque, root mean square over the joints
-//! plausible     no parameter negative by more than 5 sigma that must be positive; torque of the prior's sign and size
+//! plausible     no parameter negative by more than 5 sigma that must be positive; torque of the prior's sign
+//!               and size
 //! ```
 //!
 //! Ranking: findings about samples first, then the plausible correction that leaves least of the misfit.
@@ -152,9 +153,7 @@ fn encoder_steps<const N: usize, const B: usize>(
         if !is_right {
             return None;
         }
-        format!(
-            "encoder too coarse at this bandwidth: with `--bandwidth {hz}` the recording is accepted"
-        )
+        format!("encoder too coarse at this bandwidth: with `--bandwidth {hz}` the recording is accepted")
     };
     let (joint, share) = bias.largest_share();
     Some(CauseReport {

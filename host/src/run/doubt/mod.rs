@@ -78,7 +78,7 @@ impl<const N: usize, const B: usize> Question<N, B> {
         self.anatomy.map(|joint| joint.zero_offset())
     }
 
-    /// The same input with every column and without Stribeck friction; `None` if nothing changes.
+    /// This input with every column and without Stribeck friction; `None` if nothing changes.
     #[must_use]
     pub fn with_all_columns(&self) -> Option<Self> {
         let active = core::array::from_fn(|base| base < self.model.base.rank());

@@ -29,9 +29,7 @@ pub fn assumed(leg: &LegFile, assumption: Assumption) -> Result<(LegFile, &'stat
     let prior = assumption == Assumption::Best && has(&|joint| joint.prior.is_some());
     if !prior && !has(&|joint| joint.truth.is_some()) {
         let missing = match assumption {
-            Assumption::Best => {
-                "needs a `prior` for every joint: inertia and friction to compute the torque"
-            }
+            Assumption::Best => "needs a `prior` for every joint: inertia and friction to compute the torque",
             Assumption::Truth => "needs a `truth` for every joint",
         };
         return Err(leg.error(missing));

@@ -97,7 +97,9 @@ pub fn excite<const N: usize, const B: usize>(
     match (best, fault) {
         (Some((_, candidate, rehearsal)), _) => Ok(bench.excited(options, &candidate, &rehearsal)),
         (None, Some(error)) => Err(error),
-        (None, None) => Err(ToolError::input("no motion was found within the limits of the leg: choose another --duration or --seed")),
+        (None, None) => Err(ToolError::input(
+            "no motion was found within the limits of the leg: choose another --duration or --seed",
+        )),
     }
 }
 
@@ -130,7 +132,8 @@ fn design<const N: usize, const B: usize>(
     options: &DesignOptions,
 ) -> Result<Vec<Candidate<N>>, ToolError> {
     let progress = ProgressBar::new(u64::from(options.evaluations));
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} curves, {elapsed} elapsed, {eta} left")
+    if let Ok(style) =
+        ProgressStyle::with_template("{bar:40} {pos}/{len} curves, {elapsed} elapsed, {eta} left")
     {
         progress.set_style(style);
     }

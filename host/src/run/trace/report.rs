@@ -73,7 +73,10 @@ fn check_leg(trace: &Trace, leg: &LegFile) -> Result<(), ToolError> {
 }
 
 fn other(leg: &LegFile, reason: impl std::fmt::Display) -> ToolError {
-    ToolError::input(format!("leg `{}` is not that of the trace: {reason}. Name the trace's leg with --leg", leg.name))
+    ToolError::input(format!(
+        "leg `{}` is not that of the trace: {reason}. Name the trace's leg with --leg",
+        leg.name
+    ))
 }
 
 fn of_size<const N: usize, const B: usize>(
@@ -330,7 +333,10 @@ fn finding(record: &crate::formats::trace::result_records::Finding) -> Result<Fi
     let tests = Test::ALL.into_iter().find(|test| test.name() == record.test);
     let reasons = Reason::ALL.into_iter().find(|reason| reason.name() == record.reason);
     let (Some(test), Some(reason)) = (tests, reasons) else {
-        let words = format!("the finding `{}` ({}) is unknown: the trace comes from a later version", record.test, record.reason);
+        let words = format!(
+            "the finding `{}` ({}) is unknown: the trace comes from a later version",
+            record.test, record.reason
+        );
         return Err(ToolError::input(words));
     };
     let evidence = Evidence {

@@ -186,7 +186,10 @@ fn faults_and_crashes_are_printed_before_tables_and_after_verdict() {
     );
     let reported = &folder.json("reported.json")["trace"];
     assert_eq!(reported["faults"].as_array().map(Vec::len), Some(3), "{reported}");
-    assert_eq!((&reported["loops"]["servo_missed"], &reported["loops"]["servo_worst"]), (&3.into(), &21_000.into()));
+    assert_eq!(
+        (&reported["loops"]["servo_missed"], &reported["loops"]["servo_worst"]),
+        (&3.into(), &21_000.into())
+    );
     assert!(before.contains("worst servo tick 21000 of 42000 cycles (50.0 %)"), "{before}");
 }
 

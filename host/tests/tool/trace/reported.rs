@@ -98,7 +98,11 @@ fn the_log_of_a_trace_equals_the_run_s_and_replay_agrees() {
     assert!(run.printed.contains("verdict: accepted"), "{}", run.printed);
     let same = std::fs::read(&own_log).expect("written") == std::fs::read(&log).expect("written");
     assert!(same, "the trace's log differs from the run's");
-    assert!(run.printed.contains("samples of motion 0; the trace contains motions 1, 2, 3"), "{}", run.printed);
+    assert!(
+        run.printed.contains("samples of motion 0; the trace contains motions 1, 2, 3"),
+        "{}",
+        run.printed
+    );
 
     // Another motion on request: the expected number of samples at its own angles.
     let other = folder.path("other.csv");
@@ -211,7 +215,10 @@ fn the_curves_of_a_trace_are_those_of_the_run() {
         assert_eq!((&reported.name, reported.role, &reported.time_s), (&own.name, own.role, &own.time_s));
         for (reported, own) in reported.joints.iter().zip(&own.joints) {
             assert!(!reported.measured_nm.is_empty());
-            assert_eq!((&reported.measured_nm, &reported.predicted_nm), (&own.measured_nm, &own.predicted_nm));
+            assert_eq!(
+                (&reported.measured_nm, &reported.predicted_nm),
+                (&own.measured_nm, &own.predicted_nm)
+            );
             assert_eq!((&reported.measured_deg, &reported.still), (&own.measured_deg, &own.still));
         }
     }
