@@ -145,13 +145,13 @@ fn an_unknown_value_is_null_not_zero() {
 #[test]
 fn faults_and_crashes_are_printed_before_tables_and_after_verdict() {
     let mut writer = RecordWriter { lines: quiet() };
-    writer.tell(&Record::Fault { tick: 400_000, code: 0x8400, name: "overspeed", joint: 2 });
-    writer.tell(&Record::AxisFault { tick: 400_004, joint: 0, name: "brake_resistor" });
+    writer.write(&Record::Fault { tick: 400_000, code: 0x8400, name: "overspeed", joint: 2 });
+    writer.write(&Record::AxisFault { tick: 400_004, joint: 0, name: "brake_resistor" });
     writer.loops(3);
     let boot = writer.lines.len();
     let mut after = RecordWriter::default();
     after.boot();
-    after.tell(&Record::Crash {
+    after.write(&Record::Crash {
         cause: "panic",
         pc: 0x0800_1234,
         lr: 0x0800_0420,
