@@ -1,8 +1,7 @@
 //! Flexion angles and the chain's angles: all conversions are here.
 //!
-//! Outside this module angles are anatomical: hip and knee flexion positive, zero when standing
-//! straight. Inside the model they are those of the Denavit-Hartenberg frames. A joint may turn the
-//! other way and start elsewhere.
+//! Outside this module angles are anatomical: hip and knee flexion positive, zero when standing straight.
+//! Inside the model they are those of the Denavit-Hartenberg frames, whose direction and zero may differ.
 //!
 //! ```text
 //! q = direction q_anatomical + zero_offset

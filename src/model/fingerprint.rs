@@ -1,8 +1,8 @@
-//! Fingerprint of a leg: tells whether a stored model belongs to the leg that is to use it.
+//! Fingerprint of a leg: shows whether a stored model belongs to the leg that is to use it.
 //!
-//! Parameters of one leg move another one wrongly, and the numbers themselves do not show
-//! it. The leg's description is therefore condensed to 64 bits, stored beside the
-//! parameters, and compared before their use.
+//! The parameters of one leg move another one wrongly, and the numbers themselves do not show it. The leg's
+//! description is therefore condensed to 64 bits, stored beside the parameters, and compared before their
+//! use.
 //!
 //! ```text
 //! fingerprint = CRC-64/XZ of  version, N, then per joint from the base:
@@ -16,14 +16,13 @@
 //! | sense and zero of each joint's angle, side of the body | encoder counts, gear ratio |
 //! | torque constants: all parameters are in their units | limits, gains, prior, names, estimated columns |
 //!
-//! Sines are in steps because a board may compute them in `f32` and the host in `f64`. All other numbers
-//! are rounded to `f32` once and compared exactly; -0 equals 0. A twist close to the edge of a step,
-//! with the two precisions on either side, is refused, not accepted. That is one in a hundred, and none
-//! of the multiples of 5 degrees.
+//! Sines are in steps because a board may compute them in `f32` and the host in `f64`. All other numbers are
+//! rounded to `f32` once and compared exactly; -0 equals 0. A twist close to the edge of a step, with the two
+//! precisions on either side, is refused: one in a hundred, but no multiple of 5 degrees.
 //!
 //! Source of the code: ECMA-182, reflected (the catalogue's CRC-64/XZ), by the crate `crc` without its table.
-//! The code detects mistakes, not malice. Cost: 25 bytes a joint, some 10 instructions a bit; once per model,
-//! outside the tick.
+//! The code detects mistakes, not manipulation. Cost: 25 bytes a joint, some 10 instructions a bit; once per
+//! model, outside the tick.
 
 use crc::{CRC_64_XZ, Crc, Digest, NoTable};
 

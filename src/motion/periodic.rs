@@ -24,7 +24,7 @@ use core::num::NonZeroU32;
 /// Phase of a motion on its curve, and the phase's speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
-    /// Phase in turns (periods); any number, best small.
+    /// Phase in turns (periods); any number, most precise if small.
     pub turn: f32,
     /// Speed of the phase relative to the steady one, 0..=1.
     pub speed: f32,

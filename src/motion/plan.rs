@@ -6,7 +6,7 @@ use crate::units::{Radian, RadianPerSecond, RadianPerSecondSquared};
 /// Motion of `N` joints with at most `H` harmonics; starts and ends at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion<const N: usize, const H: usize = HARMONICS> {
-    /// Stand in a pose, rad, until another command.
+    /// Hold a pose, rad, until another command.
     Hold([f32; N]),
     /// Move from a pose to a pose.
     Ramp(Ramp<N>),

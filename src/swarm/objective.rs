@@ -1,6 +1,6 @@
 //! Interface of a search to its problem: a cost over a box.
 //!
-//! Why a trait: the swarm is independent of the leg, and the identification of the swarm.
+//! Why a trait: the swarm does not depend on the leg, nor the identification on the swarm.
 
 use crate::real::{Real, is_finite};
 

@@ -3,7 +3,7 @@
 //! Why: three rules hold for every search, so they are written once. No evaluation leaves the box, a cost
 //! that is not finite is dropped, and the best so far is available whenever a run is cancelled.
 //!
-//! Vocabulary: searches walk in box coordinates u, 0..1 per coordinate; the objective sees
+//! Terms: searches work in box coordinates u, 0..1 per coordinate; the objective gets
 //! x = low + (high - low) clip(u, 0, 1), limited to low..high once more against rounding.
 //! Cost: 5 D operations per evaluation beside the objective's own; memory 3 D + 1 scalars.
 

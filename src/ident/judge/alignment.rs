@@ -1,4 +1,4 @@
-//! Test of link lengths and encoder zeros: does the held-out torque ask for values other than the model's?
+//! Test of link lengths and encoder zeros: does the held-out torque indicate values other than the model's?
 //!
 //! Why: with a link assumed ten per cent too long, the identified model still predicts the torque
 //! within two per cent. Masses and moments make up for most of the error. The rest is small but
@@ -13,11 +13,10 @@
 //! ```
 //!
 //! delta is the share by which a link is longer than assumed, or the angle by which a zero is off. For a
-//! correct leg it is zero within sigma (score test, Rao 1948). It is computed for each direction alone, with
-//! the parameters free to follow, and for each direction beside the others. Alone is the sharper test where
-//! one thing is wrong. A wrong length and a wrong zero resemble each other enough to cancel there; they show
-//! only beside each other. The motion used for the identification takes no part: while it streams by, the
-//! parameters and hence z are unknown.
+//! correct leg it is zero within sigma (score test, Rao 1948). It is computed twice: for each direction
+//! alone, with the parameters free to follow, and for all directions together. The first is sharper for a
+//! single error. A wrong length and a wrong zero can cancel there; only the second shows them. The motion
+//! used for the identification is not tested: while it is recorded, the parameters and hence z are unknown.
 //!
 //! A push by the wearer is not a geometry error, but z'r would read it as one. Rows within [`HELD`] rows of
 //! an unexpectedly large residual are therefore excluded. A wrong length or zero misses by a few per cent of
@@ -67,15 +66,16 @@ pub struct Misalignment<T> {
     pub direction: Direction,
     /// Joint index.
     pub joint: usize,
-    /// Error in the unit of [`Direction`], from this direction alone.
+    /// Error in the unit of [`Direction`], estimated from this direction alone.
     pub delta: T,
     /// Standard deviation of `delta`.
     pub sigma: T,
-    /// Error and standard deviation beside all other directions; `None` where those absorb it.
+    /// Error and standard deviation, estimated together with all other directions; `None` where those absorb
+    /// it.
     pub beside: Option<(T, T)>,
 }
 
-/// One entry per direction; `None` where the torque does not show it.
+/// One entry per direction; `None` where the torque does not determine it.
 pub type Misalignments<T> = [Option<Misalignment<T>>; DIRECTIONS];
 
 /// One row of each joint, held back until it is known to be undisturbed.

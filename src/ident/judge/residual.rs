@@ -1,8 +1,8 @@
 //! Residual of a known model while a motion streams by: its size, its slow part, its duration.
 //!
-//! Why: a factor gives the size of the residual of any parameters, but not its order in time. Noise has no
-//! order; a wrong model, a foot on the floor and a changed load do. In predicted motions the parameters are
-//! known, so the residual can be examined row by row in constant memory.
+//! Why: a factor gives the size of the residual of any parameters, but not its order in time. Noise is
+//! uncorrelated in time; the errors of a wrong model, a foot on the floor or a changed load are not. In
+//! predicted motions the parameters are known, so the residual can be examined row by row in constant memory.
 //!
 //! ```text
 //! r_k    = tau_k - y_k p                          filtered rows at 50 Hz, without those of a joint at rest
@@ -106,8 +106,8 @@ impl<T: Real> JointResidual<T> {
     }
 
     /// Limit of [`Self::slow`] for noise alone, at a quantile of the standard normal distribution. `noise` is
-    /// the standard deviation of a 500 Hz sample. Without it nothing is forgiven and the blocks' own scatter
-    /// takes its place; with fewer than `quantile^2` pairs the result is then meaningless.
+    /// the standard deviation of a 500 Hz sample. Without it no disturbance is forgiven and the limit follows
+    /// from the blocks' own scatter; with fewer than `quantile^2` pairs the result is then meaningless.
     #[must_use]
     pub fn slow_by_chance(&self, quantile: T, noise: Option<T>) -> T {
         let judged = self.judged(noise.is_some());

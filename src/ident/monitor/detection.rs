@@ -26,18 +26,18 @@
 //! two joints.
 //!
 //! **Persistence.** One block adds at most h/P, so an alarm needs P disturbed blocks, and more to make up for
-//! calm ones between them. A calm block takes off `nu/2 (ln rho - 1 + 1/rho)`, 1.7 of 20 at 16 Hz. A push of
-//! 0.3 s touches three blocks; 6 s of persistence ask for twelve. A wearer who pushes half of the time has
-//! changed the load.
+//! undisturbed ones between them. An undisturbed block subtracts `nu/2 (ln rho - 1 + 1/rho)`, 1.7 of 20 at 16
+//! Hz. A push of 0.3 s touches three blocks; a persistence of 6 s requires twelve. A wearer who pushes half
+//! of the time has changed the load.
 //!
 //! **Delay.** `h / min(nu/2 (E (1 - 1/rho) - ln rho), h/P)` blocks for an energy E. No energy below
-//! `E = rho ln rho / (rho - 1)` is noticed: 1.39 for rho = 2, a torque error of 0.62 standard deviations of a
+//! `E = rho ln rho / (rho - 1)` is detected: 1.39 for rho = 2, a torque error of 0.62 standard deviations of a
 //! row.
 //!
 //! Sources: E. S. Page, Continuous inspection schemes, 1954; G. Lorden, Procedures for reacting to a change
 //! in distribution, 1971; D. Siegmund, Sequential Analysis, 1985; nu: Satterthwaite 1946.
 //! Cost: beside the baseline's, some 10 operations a row. Memory: `4 N + 4` numbers.
-//! Limits: a joint at rest gives no usable rows, so a load hung on a resting leg is noticed once it moves.
+//! Limits: a joint at rest gives no usable rows, so a load hung on a resting leg is detected once it moves.
 
 use super::baseline::Baseline;
 use crate::ident::record::recorder::{LARGEST_STILL_SHARE, SAMPLE_RATE_HZ};
@@ -48,7 +48,7 @@ use crate::real::{self, Real};
 /// Moving rows of a joint in a block: half a second.
 pub const ROWS_PER_BLOCK: u32 = 25;
 const ROW_RATE_HZ: f64 = SAMPLE_RATE_HZ / DECIMATION as f64;
-/// Duration of a block for a joint that never stands still, s.
+/// Duration of a block for a joint that is never at rest, s.
 const BLOCK_S: f64 = ROWS_PER_BLOCK as f64 / ROW_RATE_HZ;
 /// Bisections for the root of (W3): to the last bit of single precision.
 const HALVINGS: u32 = 30;
@@ -165,8 +165,8 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         self.charts.map(|chart| chart.sum)
     }
 
-    /// Time to an alarm, s, once a joint's residual has `energy` times that at acceptance and never stands
-    /// still; `None` for an energy that raises no alarm.
+    /// Time to an alarm, s, once a joint that is never at rest has a residual with `energy` times that at
+    /// acceptance; `None` for an energy that raises no alarm.
     #[must_use]
     pub fn delay_s(&self, energy: T) -> Option<T> {
         let step = real::min(self.step(energy), self.largest_step);

@@ -1,4 +1,4 @@
-//! Notices that an accepted model no longer fits, and finds the cause.
+//! Detects that an accepted model no longer fits, and finds the cause.
 //!
 //! | file | content | source |
 //! | --- | --- | --- |

@@ -1,7 +1,8 @@
 //! Cause of a change, found from gait alone with the rest of the model unchanged.
 //!
-//! Why not a new identification: a wearer does not lie down for an exciting motion because a bag was hung on
-//! the shank. Walking determines a few parameters if all others are held at the accepted model's values.
+//! Why not a new identification: it needs an exciting motion, which a wearer cannot repeat whenever a bag is
+//! hung on the shank. Walking determines a few parameters if all others are held at the accepted model's
+//! values.
 //!
 //! ```text
 //! beta = beta_0 + sum_k theta_k d_k          d_k: base values of one unit of parameter k alone
@@ -14,13 +15,13 @@
 //!
 //! ```text
 //! chi2 <= f + 5 sqrt(2 f)         f = rank - k degrees of freedom, as in the verdict                    (W6)
-//! E_i  <= rho ln rho / (rho - 1)  energy of every joint's residual: where the monitor would stay silent (W7)
+//! E_i  <= rho ln rho / (rho - 1)  energy of every joint's residual: no alarm at this value           (W7)
 //! ```
 //!
 //! and it is physically possible: no negative parameter that cannot be negative, and for the payload
-//! `M ZZ >= HX^2 + HY^2` within three standard deviations. That holds for every body put on and, with both
-//! signs turned, for every body taken off. Of several valid hypotheses the one with the smallest `chi2 + 2 k`
-//! (Akaike 1974) wins.
+//! `M ZZ >= HX^2 + HY^2` within three standard deviations. That holds for every body added and, with both
+//! signs reversed, for every body removed. Of several valid hypotheses the one with the smallest `chi2 + 2 k`
+//! (Akaike 1974) is chosen.
 //!
 //! Nothing changed if the old model passes both tests and no hypothesis improves on it by more than
 //! `k + 5 sqrt(2 k)`. The alarm was then false, or its cause has passed. Without any explanation a full
@@ -43,7 +44,8 @@ use crate::model::Parameter;
 use crate::real::{self, Real};
 use hypothesis::{Comparison, DIRECTIONS, Explanation, Hypothesis};
 
-/// Parameters of the payload, most important first: where the motion cannot separate all, the later ones go.
+/// Parameters of the payload, most important first: where the motion cannot separate all, the later ones are
+/// dropped.
 pub const PAYLOAD_PARAMETERS: [Parameter; DIRECTIONS] = [
     Parameter::M,
     Parameter::HX,
@@ -60,7 +62,7 @@ pub const PAYLOAD_PARAMETERS: [Parameter; DIRECTIONS] = [
 /// Cause of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// Mass was put on a link or taken off.
+    /// Mass was added to a link or removed.
     Payload {
         /// Link, counted from 0.
         link: usize,

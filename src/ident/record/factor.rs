@@ -7,7 +7,7 @@
 //! Givens rotations enter each row into `R` (Golub and Van Loan, Matrix Computations, 5.1.8). The cost of any
 //! parameter vector is then exact and independent of the number of rows. One factor fed for hours in single
 //! precision loses accuracy (a diagonal of 1e3 swallows rows of 1). A motion is therefore recorded in small
-//! factors, merged with their like (`window`), so that only numbers of similar size ever meet.
+//! factors, merged with factors of similar size (`window`), so that only numbers of similar size are added.
 //!
 //! Cost of one row: about `2 B^2` multiplications and `B` square roots. Memory: `B (B + 1) + 2` numbers a
 //! factor.

@@ -10,7 +10,7 @@
 //! | `window` | the motion as blocks of rows | |
 //! | `packed` | factors of a few columns, without zeros | |
 //! | `factor` | square-root information factor | Golub and Van Loan, 5.1.8 |
-//! | `sum` | a long sum that keeps its digits | |
+//! | `sum` | sum of many terms without loss of digits | |
 //! | `reweighting` | weights of the blocks | Huber and Ronchetti 2009 |
 //! | `stribeck` | Stribeck friction from one record | Armstrong-Helouvry 1994; Golub and Pereyra 1973 |
 //! | `assembly` | window to record: weights, Stribeck friction, one factor per joint | |

@@ -1,7 +1,7 @@
 //! Statistics of excluded data in one motion: replaced samples and disturbed stretches.
 //!
-//! Silent cleaning would hide what a result rests on. The record of a motion therefore says how many samples
-//! were replaced ([`crate::ident::signal::hampel`]) and how much of the motion got less weight
+//! Silent cleaning would hide the data that a result is based on. The record of a motion therefore says how
+//! many samples were replaced ([`crate::ident::signal::hampel`]) and how much of the motion got less weight
 //! ([`super::reweighting`]).
 
 use crate::real::Real;

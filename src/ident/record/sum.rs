@@ -1,8 +1,8 @@
-//! A long sum that keeps its digits.
+//! Sum of many terms without loss of digits.
 
 use crate::real::{self, Real};
 
-/// A sum that keeps its digits over millions of terms (Neumaier 1974).
+/// Sum without loss of digits over millions of terms (Neumaier 1974).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sum<T> {
     total: T,

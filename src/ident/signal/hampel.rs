@@ -12,11 +12,11 @@
 //! outlier  |x - p| > L  and  x outside [third smallest - L, third largest + L] of neighbours; then x := p
 //! ```
 //!
-//! The second condition spares real steps, ramps and jittered recordings: where a signal moves steadily,
-//! each sample lies within the range of its neighbours. Past neighbours are already clean, so of the
-//! four to come two may be outliers: up to three in a row are found. A longer run is not isolated and
-//! passes; reweighting handles it later. At the ends of a motion neighbours are missing; there the range
-//! is widened by its own width.
+//! The second condition spares real steps, ramps and jittered recordings: where a signal moves steadily, each
+//! sample lies within the range of its neighbours. Past neighbours are already clean, so two of the four
+//! later ones may be outliers: up to three in a row are found. A longer run is not isolated and passes;
+//! reweighting handles it later. At the ends of a motion neighbours are missing; there the range is widened
+//! by its own width.
 //!
 //! | symbol | meaning | here |
 //! | --- | --- | --- |
@@ -77,7 +77,7 @@ pub struct Hampel<T> {
 }
 
 impl<T: Real> Hampel<T> {
-    /// A filter that has seen no sample.
+    /// A filter without samples.
     #[must_use]
     pub fn new(quantity: Quantity) -> Self {
         Self {

@@ -12,8 +12,8 @@
 //! into the box of the base set. The box contains every leg that the ranges allow, and more. Two kinds of
 //! range are replaced by the most that the measured torque could need: those of zero width (a prior of zero)
 //! and all without a prior. That limit is ten times the torque over the size of its column, for the joint
-//! that allows least: one parameter alone must not exceed any joint's torque tenfold. The largest over the
-//! joints lets an inertia that hardly shows in one joint move 1e5 N m of another.
+//! that allows least: one parameter alone must not exceed any joint's torque tenfold. With the largest over
+//! the joints, an inertia with little effect on one joint could change another joint's torque by 1e5 N m.
 
 use super::constrained::ParameterBox;
 use crate::ident::record::recorder::{Record, RowModel};

@@ -42,8 +42,8 @@ impl Status {
     }
 }
 
-/// Limit for a weak base parameter: share of a joint's torque that an error of one standard deviation would
-/// move, with the others unchanged. Only because others make up for it does such an error stay hidden.
+/// Limit for a weak base parameter: share of a joint's torque that changes with an error of one standard
+/// deviation, the others unchanged. Such an error stays hidden only because the others compensate it.
 const WEAK_SHARE: f64 = 0.02;
 
 /// True if the data hardly separate base parameter `base` from the others.

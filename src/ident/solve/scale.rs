@@ -56,8 +56,8 @@ const LARGEST_MISMATCH_SPREADS: f64 = 5.0;
 const LARGEST_SIGMA_SHARE: f64 = 0.05;
 
 impl<T: Real> ConstantRatio<T> {
-    /// True if the two runs differ by the stated mass at the stated position, within noise. Nothing but noise
-    /// is excused. A link assumed 5 % too long makes a constant 4.5 % wrong and adds at most 90 units of
+    /// True if the two runs differ by the stated mass at the stated position, within noise; only noise is
+    /// tolerated. A link assumed 5 % too long makes a constant 4.5 % wrong and adds at most 90 units of
     /// chi-square, where correct runs have eight.
     #[must_use]
     pub fn is_consistent(&self) -> bool {

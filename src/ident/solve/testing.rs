@@ -1,4 +1,4 @@
-//! Records of random states for tests: a leg whose candidates for dropping are there or not.
+//! Records of random states for tests: a leg with or without the parameters that may be dropped.
 
 use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};

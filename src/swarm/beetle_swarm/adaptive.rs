@@ -108,8 +108,8 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.waited = 0;
     }
 
-    /// Wished direction of a beetle: downhill for the first. Some follow the difference of two personal bests
-    /// (such differences point into narrow valleys); the others have no wish.
+    /// Preferred direction of a beetle: downhill for the first. Some follow the difference of two personal
+    /// bests (such differences point into narrow valleys); the others have none.
     fn wish(&self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) -> Option<[T; D]> {
         match beetle {
             _ if self.leap.under_way => Some(self.axis(beetle, beetles.dimension())),

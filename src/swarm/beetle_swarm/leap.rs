@@ -68,7 +68,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.leap.under_way
     }
 
-    /// Wished whisker direction in a leap, metric coordinates: another axis in every leap.
+    /// Preferred whisker direction in a leap, metric coordinates: another axis in every leap.
     pub(super) fn axis(&self, beetle: usize, dimension: usize) -> [T; D] {
         let mut axis = [T::zero(); D];
         let turn = beetle.wrapping_add(self.round as usize) % dimension.max(1);
@@ -78,7 +78,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.metric.to_metric(&axis)
     }
 
-    /// Ends a leap: the landing positions are all the beetles know.
+    /// Ends a leap: the landing positions replace everything that the beetles learned.
     pub(super) fn land(&mut self, beetles: &mut Particles<T, N, D>, found: &[T]) {
         self.forget();
         self.leap.under_way = false;

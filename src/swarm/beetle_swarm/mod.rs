@@ -7,7 +7,7 @@
 //! ```text
 //! Place 0..N --> [ Right 0, Left 0, Right 1, Left 1, ... --> Move 0, 1, ... ] --> next round
 //!     ^                                                                         |
-//!     +------------------- leaps led nowhere: scatter anew ---------------------+
+//!     +------------------- leaps failed: scatter once more ---------------------+
 //! ```
 //!
 //! A mode decides how many beetles have whiskers and how many move in a round. An iteration takes as many

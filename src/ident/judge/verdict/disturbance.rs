@@ -1,4 +1,4 @@
-//! Tests for a disturbed motion: for long and in all joints at once, or too often.
+//! Tests for a disturbed motion: in all joints for too long, or too often.
 //!
 //! Rows that robust identification excluded ([`Outliers`]) do not corrupt the result. But data with many
 //! exclusions are not trusted, and a leg that stood on the floor was not an open chain.
@@ -8,9 +8,9 @@ use crate::ident::record::outliers::Outliers;
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
-    /// Judges the parameters from the weighted rows on all rows of the motion. Used only without any held-out
-    /// motion. A push is rightly excluded. But a machine that was pushed for most of its motion leaves a few
-    /// calm rows, and a model that fits nothing else.
+    /// Judges the parameters from the weighted rows on all rows of the motion; used only without held-out
+    /// motions. It is right to exclude a push. But a machine that was pushed for most of its motion leaves a
+    /// few undisturbed rows, and a model that fits nothing else.
     pub fn judge_whole<const N: usize>(
         &self,
         outliers: &Outliers<T, N>,

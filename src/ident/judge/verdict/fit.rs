@@ -198,7 +198,7 @@ mod tests {
         // A harmless share of 2 % of 6 N m.
         let both = real::sqrt(noise + 0.12 * 0.12);
         assert!((allowed(0.25, 0.02) / both - 1.0).abs() < 4e-3);
-        // No row is worth more than one.
+        // A row has at most the information of one independent row.
         assert_eq!(allowed(3.0, 0.0).to_bits(), allowed(1.0, 0.0).to_bits());
     }
 }

@@ -5,8 +5,8 @@ use crate::ident::judge::alignment::{Direction, Misalignment};
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
-    /// Judges the slow part of a held-out residual: noise, or small. With much noise this is the sharper
-    /// test: the part that neighbouring half seconds share contains no noise.
+    /// Judges the slow part of a held-out residual: it must be noise, or small. With much noise this is the
+    /// sharper test: the part that neighbouring half seconds share contains no noise.
     pub fn judge_colour<const N: usize, const B: usize>(
         &self,
         motion: usize,
@@ -58,9 +58,9 @@ impl<T: Real> Thresholds<T> {
         });
     }
 
-    /// Judges the lengths and zeros that the held-out motions ask for: significant, and larger than the
-    /// tolerance with which lengths and zeros are known. The worse of the two values counts, alone or beside
-    /// the other directions.
+    /// Judges the errors of lengths and zeros that the held-out motions show. They fail if they are
+    /// significant and larger than the tolerance with which lengths and zeros are known. The worse of the two
+    /// estimates counts, alone or together with the other directions.
     ///
     /// With unknown noise, sigma comes from the model's own errors, which are not white; the tolerance is
     /// then three times as wide.
@@ -98,7 +98,8 @@ impl<T: Real> Thresholds<T> {
 mod tests {
     use super::*;
 
-    /// Value, limit and pass for a link's length, from its estimates alone and beside the other directions.
+    /// Value, limit and pass for a link's length, from its estimates alone and together with the other
+    /// directions.
     fn judged(alone: [f64; 2], beside: Option<[f64; 2]>, noise_is_known: bool) -> (f64, f64, bool) {
         let thresholds =
             Thresholds { noise_quantile: 5.0, largest_length_error: 0.03, ..Thresholds::default() };
