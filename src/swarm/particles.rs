@@ -6,7 +6,8 @@
 //!   v = w v + c1 r1 (P_i - x) + c2 r2 (G - x)
 //! Inertia weight (Eq. 20): w = w_max - (w_max - w_min) t / M
 //! Symbols: x position, v velocity, P_i personal best, G best of the personal bests, all in box coordinates
-//! (0..1 per coordinate); w inertia weight, c1 and c2 individual and global learning factor; t iteration of M.
+//! (0..1 per coordinate); w inertia weight, c1 and c2 individual and global learning factor; t iteration of
+//! M.
 //! Source: Kennedy, Eberhart (1995); the paper, Eqs (18)-(20). Cost: 8 D operations and 2 D random numbers
 //! per particle; memory N (3 D + 2) scalars.
 

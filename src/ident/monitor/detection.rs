@@ -31,8 +31,8 @@
 //! of the time has changed the load.
 //!
 //! **Delay.** `h / min(nu/2 (E (1 - 1/rho) - ln rho), h/P)` blocks for an energy E. No energy below
-//! `E = rho ln rho / (rho - 1)` is detected: 1.39 for rho = 2, a torque error of 0.62 standard deviations of a
-//! row.
+//! `E = rho ln rho / (rho - 1)` is detected: 1.39 for rho = 2, a torque error of 0.62 standard deviations of
+//! a row.
 //!
 //! Sources: E. S. Page, Continuous inspection schemes, 1954; G. Lorden, Procedures for reacting to a change
 //! in distribution, 1971; D. Siegmund, Sequential Analysis, 1985; nu: Satterthwaite 1946.

@@ -15,7 +15,7 @@
 //!
 //! ```text
 //! chi2 <= f + 5 sqrt(2 f)         f = rank - k degrees of freedom, as in the verdict                    (W6)
-//! E_i  <= rho ln rho / (rho - 1)  energy of every joint's residual: no alarm at this value           (W7)
+//! E_i  <= rho ln rho / (rho - 1)  energy of every joint's residual: no alarm at this value              (W7)
 //! ```
 //!
 //! and it is physically possible: no negative parameter that cannot be negative, and for the payload
