@@ -58,7 +58,7 @@ pub fn serve(session: &mut Session, address: SocketAddr, duration: Option<f64>) 
             plant.let_go();
         }
         for (_, frame) in session.machine.chip_mut().can.sent.drain(..) {
-            server.tell(&frame);
+            server.send(&frame);
         }
         server.flush().iter().for_each(|event| eprintln!("{event}"));
         due += Duration::from_secs_f64(SLICE_S);

@@ -3,7 +3,7 @@
 use scarab::ident::{LinkPrior, RowModel};
 use scarab::model::LegParameters;
 
-use crate::leg::model_choice::Asked;
+use crate::leg::model_choice::TermSwitches;
 
 /// Data about a leg besides its recordings.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct Background<const N: usize, const B: usize> {
     /// Parameters of the simulated leg.
     pub truth: Option<LegParameters<f64, N>>,
     /// Model requested by the leg file, by joint.
-    pub asked: Vec<Asked>,
+    pub requested: Vec<TermSwitches>,
     /// Temperature of the drives, degrees Celsius, if known.
     pub temperature_c: Option<f64>,
     /// Stribeck curves of the simulated joints.

@@ -6,14 +6,14 @@ use crate::formats::leg_file::{JointFile, Switch};
 
 /// Model requested for one joint by the leg file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Asked {
+pub struct TermSwitches {
     pub rotor: Switch,
     pub offset: Switch,
     pub stribeck: Switch,
     pub asymmetric: Switch,
 }
 
-impl Asked {
+impl TermSwitches {
     /// Reads the request of a joint.
     #[must_use]
     pub fn of(joint: &JointFile) -> Self {

@@ -25,7 +25,7 @@ use crate::base::error::FileError;
 use crate::formats::leg_file::geometry::{anatomy, chain};
 use crate::formats::leg_file::{BodySide, JointFile, LegFile, LinkParameters};
 use crate::leg::background::{Background, StribeckTruth};
-use crate::leg::model_choice::{Asked, drive_choice, stribeck_choice};
+use crate::leg::model_choice::{TermSwitches, drive_choice, stribeck_choice};
 use crate::leg::motions::{Motions, motions};
 
 /// Bandwidth of the position loop.
@@ -251,7 +251,7 @@ pub fn background<const N: usize, const B: usize>(
         prior_name,
         truth: truth.map(|truth| prior_parameters(&truth)),
         temperature_c: leg.temperature_c,
-        asked: leg.joints.iter().map(Asked::of).collect(),
+        requested: leg.joints.iter().map(TermSwitches::of).collect(),
         stribeck_truth: core::array::from_fn(|joint| stribeck_truth(leg.joints.get(joint)?)),
     })
 }

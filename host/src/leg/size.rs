@@ -125,7 +125,7 @@ impl Size {
         let mut sized = leg.clone();
         let weight = after.mass / before.mass;
         let with = |wearer: Wearer, mass: f64| Wearer { mass, ..wearer };
-        let told = self.wearer.is_some();
+        let is_given = self.wearer.is_some();
         let (thigh_before, thigh_after) = (
             |mass: f64| vec![with(before, mass).thigh()],
             |mass: f64| vec![with(after, weight * mass).thigh()],
@@ -139,13 +139,13 @@ impl Size {
                 name: "thigh",
                 stretch: thigh / before.thigh,
                 before: &thigh_before,
-                after: told.then_some(&thigh_after),
+                after: is_given.then_some(&thigh_after),
             },
             Change {
                 name: "shank",
                 stretch: shank / before.shank,
                 before: &shank_before,
-                after: told.then_some(&shank_after),
+                after: is_given.then_some(&shank_after),
             },
         ];
         for (joint, change) in sized.joints.iter_mut().skip(knee.saturating_sub(1)).zip(&changes) {

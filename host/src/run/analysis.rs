@@ -123,13 +123,13 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     /// Sets the estimator. Plain least squares disables every choice left to the data.
     pub fn use_estimator(&mut self, estimator: Estimator) {
-        let unasked = |choice: &mut Choice| {
+        let rule_out = |choice: &mut Choice| {
             if *choice == Choice::Auto && estimator == Estimator::Plain {
                 *choice = Choice::Off;
             }
         };
-        self.model.stribeck_choice.iter_mut().for_each(unasked);
-        self.device.stribeck_choice.iter_mut().for_each(unasked);
+        self.model.stribeck_choice.iter_mut().for_each(rule_out);
+        self.device.stribeck_choice.iter_mut().for_each(rule_out);
     }
 
     fn terms(&self, base: usize) -> impl Iterator<Item = (usize, Parameter, f64)> + '_ {

@@ -37,7 +37,7 @@ impl<const N: usize> Information<N> {
     }
 
     /// Column of a joint's surplus.
-    fn place(&self, joint: usize) -> Option<usize> {
+    fn index(&self, joint: usize) -> Option<usize> {
         self.curves[joint].map(|_| self.rank + 2 * self.curves[..joint].iter().flatten().count())
     }
 
@@ -48,11 +48,11 @@ impl<const N: usize> Information<N> {
         for (slot, element) in row.iter_mut().zip(regressor).take(self.rank) {
             *slot = element * weight;
         }
-        if let (Some(place), Some(curve)) = (self.place(joint), self.curves[joint]) {
+        if let (Some(index), Some(curve)) = (self.index(joint), self.curves[joint]) {
             let ratio = velocity / curve.speed;
             let column = weight * sign(velocity) * exp(-ratio * ratio);
-            row[place] = column;
-            row[place + 1] = column * curve.surplus * 2.0 * ratio * ratio;
+            row[index] = column;
+            row[index + 1] = column * curve.surplus * 2.0 * ratio * ratio;
         }
         packed::rotate(&mut self.factor, self.columns, &mut row);
     }
@@ -63,8 +63,8 @@ impl<const N: usize> Information<N> {
         let mut factor = [0.0; LARGEST_SIZE];
         for (column, kept) in packed::rows(&self.factor, self.columns) {
             let mut row: Row<f64> = [0.0; LARGEST_COLUMNS + 1];
-            for (place, &element) in (column..).zip(kept) {
-                row[place] = if dropped.get(place) == Some(&true) { 0.0 } else { element };
+            for (index, &element) in (column..).zip(kept) {
+                row[index] = if dropped.get(index) == Some(&true) { 0.0 } else { element };
             }
             packed::rotate(&mut factor, self.columns, &mut row);
         }
@@ -89,6 +89,6 @@ impl<const N: usize> Information<N> {
             }
         }
         let base = core::array::from_fn(|base| if base < self.rank { sqrt(variance[base]) } else { 0.0 });
-        (base, core::array::from_fn(|joint| self.place(joint).map(|place| sqrt(variance[place]))))
+        (base, core::array::from_fn(|joint| self.index(joint).map(|index| sqrt(variance[index]))))
     }
 }

@@ -21,7 +21,7 @@ use crate::base::number::Number;
 use crate::base::precision::plain;
 use crate::formats::leg_file::Switch;
 use crate::leg::background::Background;
-use crate::leg::model_choice::Asked;
+use crate::leg::model_choice::TermSwitches;
 use crate::report::model_choice::{DirectionsReport, ModelChoiceReport};
 
 /// Decision with its reason.
@@ -59,28 +59,28 @@ impl<const N: usize, const B: usize> Background<N, B> {
         found: &Selection<f32, N, B>,
         stribeck: &[(bool, f32); N],
     ) -> Vec<ModelChoiceReport> {
-        let of = |(joint, asked): (usize, &Asked)| {
-            let report = |option, asked: Switch, decision: Decision| ModelChoiceReport {
+        let of = |(joint, requested): (usize, &TermSwitches)| {
+            let report = |option, requested: Switch, decision: Decision| ModelChoiceReport {
                 joint: joint + 1,
                 option,
-                asked: asked.name(),
+                asked: requested.name(),
                 used: if decision.used { "on" } else { "off" },
                 gain_chi2: decision.gain.into(),
                 limit_chi2: decision.limit.into(),
                 why: decision.why,
             };
             [
-                report("rotor", asked.rotor, self.column(found, joint, Parameter::IA, asked.rotor)),
-                report("offset", asked.offset, self.offset(found, joint, asked)),
+                report("rotor", requested.rotor, self.column(found, joint, Parameter::IA, requested.rotor)),
+                report("offset", requested.offset, self.offset(found, joint, requested)),
                 report(
                     "stribeck",
-                    asked.stribeck,
-                    self.stribeck_decision(found, stribeck[joint], joint, asked.stribeck),
+                    requested.stribeck,
+                    self.stribeck_decision(found, stribeck[joint], joint, requested.stribeck),
                 ),
-                report("asymmetric_coulomb", asked.asymmetric, self.asymmetry(found, joint, asked)),
+                report("asymmetric_coulomb", requested.asymmetric, self.asymmetry(found, joint, requested)),
             ]
         };
-        self.asked.iter().enumerate().flat_map(of).collect()
+        self.requested.iter().enumerate().flat_map(of).collect()
     }
 
     fn column(
@@ -88,9 +88,9 @@ impl<const N: usize, const B: usize> Background<N, B> {
         found: &Selection<f32, N, B>,
         joint: usize,
         parameter: Parameter,
-        asked: Switch,
+        requested: Switch,
     ) -> Decision {
-        match asked {
+        match requested {
             Switch::Off => return decided(false, "disabled by the leg file"),
             Switch::On => return decided(true, "requested by the leg file"),
             Switch::Auto => {}
@@ -120,11 +120,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
         Decision { used, gain: Some(gain), limit: Some(limit), why }
     }
 
-    fn offset(&self, found: &Selection<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
+    fn offset(&self, found: &Selection<f32, N, B>, joint: usize, requested: &TermSwitches) -> Decision {
         if self.meaning(joint) == Constant::Asymmetry {
             return decided(
                 false,
-                match asked.offset {
+                match requested.offset {
                     Switch::Off => "disabled by the leg file",
                     Switch::Auto if self.device.stribeck_choice(joint) == Choice::Off => {
                         "not searched: the encoder is too coarse at this bandwidth"
@@ -133,11 +133,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 },
             );
         }
-        self.column(found, joint, Parameter::OFF, asked.offset)
+        self.column(found, joint, Parameter::OFF, requested.offset)
     }
 
-    fn asymmetry(&self, found: &Selection<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
-        match (asked.asymmetric, self.meaning(joint)) {
+    fn asymmetry(&self, found: &Selection<f32, N, B>, joint: usize, requested: &TermSwitches) -> Decision {
+        match (requested.asymmetric, self.meaning(joint)) {
             (Switch::Off, _) => decided(false, "disabled by the leg file"),
             (_, Constant::Offset) => decided(false, "not distinguishable from the offset, which includes it"),
             (asymmetric, Constant::Asymmetry) => self.column(found, joint, Parameter::OFF, asymmetric),
@@ -149,12 +149,12 @@ impl<const N: usize, const B: usize> Background<N, B> {
         found: &Selection<f32, N, B>,
         (used, size): (bool, f32),
         joint: usize,
-        asked: Switch,
+        requested: Switch,
     ) -> Decision {
         let Some((gain, surplus)) = found.stribeck[joint] else {
             return decided(
                 used,
-                match asked {
+                match requested {
                     Switch::Off => "disabled by the leg file",
                     _ => "not searched: plain least squares, or nothing was recorded",
                 },

@@ -36,10 +36,10 @@ fn bad_recordings_are_refused_with_file_line_and_reason() {
          are: t_s, q1_rad, tau1_Nm\n"
     );
     assert_eq!(refusal_with("0.2,NaN,1.0"), "error: walk.csv:102: `NaN` in column `q1_rad` is not finite\n");
-    assert_eq!(refusal_with("0.1,0.2,1.0"), "error: walk.csv:102: time goes back from 0.198 s to 0.1 s\n");
+    assert_eq!(refusal_with("0.1,0.2,1.0"), "error: walk.csv:102: time 0.1 s does not exceed the previous 0.198 s\n");
     assert_eq!(
         refusal_with("0.198,0.2,1.0"),
-        "error: walk.csv:102: time stands still from 0.198 s to 0.198 s\n"
+        "error: walk.csv:102: time 0.198 s does not exceed the previous 0.198 s\n"
     );
     let whole = Motion::default().csv();
     let truncated = &whole[..whole.len() - 12];
@@ -115,7 +115,7 @@ fn missing_and_impossible_legs_are_refused() {
     let folder = Folder::new();
     let recording = folder.write("walk.csv", &Motion::default().csv());
     let refused = |leg: &Path| scarab("replay --leg", &[leg, &recording]).refusal();
-    let message = refused(Path::new("nobody"));
+    let message = refused(Path::new("none-such"));
     assert!(message.starts_with("error: none-such: cannot be read"), "{message}");
     assert!(
         message.contains("is not the name of a shipped leg (x2-wearer-75kg, x2-rough, mujoco-leg,"),

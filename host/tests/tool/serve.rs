@@ -35,7 +35,7 @@ impl Serve {
         let (lines, kept) = (child.stderr.take().expect("piped"), Arc::clone(&errors));
         thread::spawn(move || {
             for line in BufReader::new(lines).lines().map_while(Result::ok) {
-                kept.lock().expect("nobody panics").push_str(&format!("{line}\n"));
+                kept.lock().expect("no thread panics").push_str(&format!("{line}\n"));
             }
         });
         let mut line = String::new();
@@ -49,7 +49,7 @@ impl Serve {
     }
 
     fn errors(&self) -> String {
-        self.errors.lock().expect("nobody panics").clone()
+        self.errors.lock().expect("no thread panics").clone()
     }
 
     fn waits_for(&self, words: &str) {
@@ -82,14 +82,14 @@ impl Drop for Serve {
 
 struct Client {
     stream: TcpStream,
-    heard: Vec<u8>,
+    received: Vec<u8>,
 }
 
 impl Client {
     fn silent(serve: &Serve) -> Self {
         let stream = TcpStream::connect(&serve.address).expect("it listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
-        Self { stream, heard: Vec::new() }
+        Self { stream, received: Vec::new() }
     }
 
     fn new(serve: &Serve) -> Self {
@@ -108,14 +108,14 @@ impl Client {
     /// The next line without its line ending; `None` at the end of the connection.
     fn line(&mut self) -> Option<String> {
         loop {
-            if let Some(end) = self.heard.iter().position(|byte| *byte == b'\r' || *byte == 7) {
-                let line: Vec<u8> = self.heard.drain(..=end).collect();
+            if let Some(end) = self.received.iter().position(|byte| *byte == b'\r' || *byte == 7) {
+                let line: Vec<u8> = self.received.drain(..=end).collect();
                 return Some(String::from_utf8(line).expect("ASCII").trim_end_matches('\r').to_owned());
             }
             let mut bytes = [0; 4096];
             match self.stream.read(&mut bytes).expect("an answer") {
                 0 => return None,
-                count => self.heard.extend(&bytes[..count]),
+                count => self.received.extend(&bytes[..count]),
             }
         }
     }

@@ -162,9 +162,9 @@ fn error_percent(
                 &core::array::from_fn(|joint| sign(joint) * f64::from(qd[joint])),
                 &core::array::from_fn(|joint| sign(joint) * f64::from(qdd[joint])),
             );
-            let told = model.torques(&q, &qd, &qdd, context.gravity);
+            let predicted = model.torques(&q, &qd, &qdd, context.gravity);
             for joint in 0..JOINTS {
-                error[joint] += (sign(joint) * f64::from(told[joint]) - truth[joint]).abs();
+                error[joint] += (sign(joint) * f64::from(predicted[joint]) - truth[joint]).abs();
                 mean[joint] += truth[joint].abs();
             }
         }

@@ -325,9 +325,9 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
     let windows = [host.read(1, WINDOW, 0)?, host.read(2, WINDOW, 0)?];
     let whole = [0, 1].map(|joint| after.objects[joint].as_deref().map_or(UNTOUCHED, window));
     let lost = is_foreign || !told_apart;
-    let tells = [1, 2].map(|node| host.told().contains(&(node, LOST)));
+    let reports = [1, 2].map(|node| host.emergencies().contains(&(node, LOST)));
     let enabled = host.is_enabled();
-    let holds = is_own && was_kept && windows == whole && tells == [lost; 2] && !enabled;
+    let holds = is_own && was_kept && windows == whole && reports == [lost; 2] && !enabled;
     let mut found = outcome(head, seed, holds.then_some("Refuse"));
     // The corruption hit no data in use, or the previous intact record is read, as after a power cut. Neither
     // is detectable.

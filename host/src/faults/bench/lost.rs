@@ -36,7 +36,7 @@ const BACK: u64 = 400;
 /// Servo ticks between two attempts of a returned host.
 const TRIES: u64 = 40;
 /// Servo ticks within which an emergency message has to be on the wire.
-const TOLD: u64 = 40;
+const REPORT_TICKS: u64 = 40;
 const NODES: [u16; 2] = [1, 2];
 const HOST: u32 = 0x70;
 /// Value of 6007: fault.
@@ -85,9 +85,9 @@ pub(super) struct Patience {
 
 impl Patience {
     /// Time of the host's timeout, ns.
-    pub(super) fn due_ns(&self, heard_ns: [u64; 2]) -> u64 {
+    pub(super) fn due_ns(&self, sent_ns: [u64; 2]) -> u64 {
         let due = (0..2).filter(|way| self.silent[*way]);
-        due.map(|way| heard_ns[way] + u64::from(self.times_ms[way]) * MS).min().unwrap_or(u64::MAX)
+        due.map(|way| sent_ns[way] + u64::from(self.times_ms[way]) * MS).min().unwrap_or(u64::MAX)
     }
 
     /// Shortest timeout, ms.
@@ -123,7 +123,7 @@ pub(super) fn watched(fork: &mut Fork<'_>, silent: [bool; 2], blind: bool) -> Re
 pub(super) fn until_safe(fork: &mut Fork<'_>, patience: &Patience) -> (Option<&'static str>, Option<f64>) {
     loop {
         let command_ns = fork.tick() + (PERIOD_MS * 1e6) as u64;
-        let due_ns = patience.due_ns(fork.host.heard_ns());
+        let due_ns = patience.due_ns(fork.host.sent_ns());
         if let Some(state) = fork.safe_state() {
             return (Some(state), Some((command_ns as f64 - due_ns as f64) * 1e-6));
         }
@@ -135,10 +135,10 @@ pub(super) fn until_safe(fork: &mut Fork<'_>, patience: &Patience) -> (Option<&'
 
 /// Checks that both nodes report the event soon.
 fn check_report(fork: &mut Fork<'_>, state: Option<&str>, codes: [FaultCode; 2]) {
-    fork.run(TOLD);
+    fork.run(REPORT_TICKS);
     let codes = codes.map(FaultCode::number);
-    let told = |node: &u16| fork.host.told().iter().any(|(from, code)| from == node && codes.contains(code));
-    if state.is_some() && !NODES.iter().all(told) {
+    let has_reported = |node: &u16| fork.host.emergencies().iter().any(|(from, code)| from == node && codes.contains(code));
+    if state.is_some() && !NODES.iter().all(has_reported) {
         fork.broken("no emergency message reports it");
     }
 }

@@ -122,9 +122,9 @@ fn is_refused(fork: &mut Fork<'_>) -> Result<bool, ToolError> {
         fork.host.write(node, 0x2012, 0, 0, 1)?;
     }
     let is_enabled = enable(fork);
-    let told = |node: &u16| fork.host.told().contains(&(*node, REFUSED));
-    let all_told = NODES.iter().all(told);
-    Ok(!is_enabled && all_told && fork.host.read(1, 0x603F, 0)? == u32::from(REFUSED))
+    let has_reported = |node: &u16| fork.host.emergencies().contains(&(*node, REFUSED));
+    let all_reported = NODES.iter().all(has_reported);
+    Ok(!is_enabled && all_reported && fork.host.read(1, 0x603F, 0)? == u32::from(REFUSED))
 }
 
 fn begins(fork: &mut Fork<'_>) -> bool {

@@ -27,7 +27,7 @@ const TIME_NS: u64 = 100_000_000;
 /// Longest pause, servo ticks: 95 ms.
 const PAUSE: u64 = 380;
 /// Servo ticks within which an emergency message has to be on the wire.
-const TOLD: u64 = 40;
+const REPORT_TICKS: u64 = 40;
 const NOTHING: Speaks = Speaks { targets: false, words: false, heartbeat: 0 };
 
 pub(super) const BENCH: Bench = Bench {
@@ -79,7 +79,7 @@ fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let (mut state, mut after_ms) = (None, None);
     loop {
         let command_ns = fork.tick() + (PERIOD_MS * 1e6) as u64;
-        let due_ns = fork.host.spoke_ns().into_iter().min().unwrap_or(0) + TIME_NS;
+        let due_ns = fork.host.cyclic_ns().into_iter().min().unwrap_or(0) + TIME_NS;
         if let Some(safe) = fork.safe_state() {
             (state, after_ms) = (Some(safe), Some((command_ns as f64 - due_ns as f64) * 1e-6));
             break;
@@ -89,9 +89,9 @@ fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
         }
     }
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
-    fork.run(TOLD);
+    fork.run(REPORT_TICKS);
     let silent = FaultCode::HostSilent.number();
-    if state.is_some() && !fork.host.told().iter().any(|(_, code)| *code == silent) {
+    if state.is_some() && !fork.host.emergencies().iter().any(|(_, code)| *code == silent) {
         fork.broken("no emergency message reports it");
     }
     comes_back(&mut fork, speaks, option == 1);

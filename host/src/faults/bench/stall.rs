@@ -31,9 +31,9 @@ const OFF: DriveState = DriveState::SwitchOnDisabled;
 /// More records than fill a sector.
 const MOST_RECORDS: u32 = 1000;
 /// Servo ticks until a request is in progress, of the longest flash write, and until hosts are informed.
-const ASKED: u64 = 16;
+const START_TICKS: u64 = 16;
 const LONGEST: u64 = 20_000;
-const TOLD: u64 = 40;
+const REPORT_TICKS: u64 = 40;
 const NS_PER_S: f64 = 1e9;
 /// Servo ticks for each step of enabling.
 const ENABLING: u64 = 400;
@@ -94,7 +94,7 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     let flashing = fork.host.board().flashing();
     (flashing.erasing_ns, flashing.unannounced) = (erasing_ns, blind);
     fork.host.write(1 + fork.random.below(2) as u16, 0x1010, 1, SAVE, 4)?;
-    fork.run(ASKED);
+    fork.run(START_TICKS);
     for _ in 0..LONGEST {
         if !fork.host.board().flashing().is_under_way() {
             break;
@@ -102,12 +102,12 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
         fork.tick();
     }
     let erased = fork.host.board().memory().worked().1 > before;
-    fork.run(TOLD);
-    let told = NODES.map(|node| {
-        fork.host.told().iter().filter(|(from, _)| *from == node).map(|told| told.1).collect::<Vec<_>>()
+    fork.run(REPORT_TICKS);
+    let reports = NODES.map(|node| {
+        fork.host.emergencies().iter().filter(|(from, _)| *from == node).map(|(_, code)| *code).collect::<Vec<_>>()
     });
     // Frames sent during the stall may be lost, which is reported; nothing else may be.
-    let tells = told.iter().all(|codes| {
+    let is_reported = reports.iter().all(|codes| {
         let first = codes.strip_prefix(&[STORING]);
         first.is_some_and(|rest| rest == [CLEAR] || rest == [LOST, CLEAR, CLEAR])
     });
@@ -115,15 +115,15 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     let calm = alarm.is_none() && !fork.host.rig().is_restarted();
     // The leg is commanded to keep its position, which takes some cycles to send.
     fork.host.speaks.targets = true;
-    fork.run(ASKED);
+    fork.run(START_TICKS);
     for word in [6, 7, 15] {
         NODES.into_iter().for_each(|node| fork.host.command(node, word));
         fork.run(ENABLING);
     }
     let enabled = fork.host.is_enabled();
     fork.host.board().power_on();
-    fork.run(TOLD);
+    fork.run(REPORT_TICKS);
     let windows = [fork.host.read(1, WINDOW, 0)?, fork.host.read(2, WINDOW, 0)?];
-    let safe = tells && calm && enabled != erased && erased == erases && windows == [window; 2];
+    let safe = is_reported && calm && enabled != erased && erased == erases && windows == [window; 2];
     Ok(fork.ended(safe.then_some("-"), alarm))
 }

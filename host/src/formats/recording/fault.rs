@@ -66,8 +66,7 @@ pub enum Fault {
     #[error("the torque of this state exceeds the range of double precision")]
     OutOfRange,
     /// Time does not increase.
-    #[error("time {} from {} s to {} s",
-        if *.time < *.previous { "goes back" } else { "stands still" }, Short(*.previous), Short(*.time))]
+    #[error("time {} s does not exceed the previous {} s", Short(*.time), Short(*.previous))]
     TimeNotIncreasing {
         /// Previous stamp.
         previous: f64,

@@ -141,7 +141,7 @@ impl Statistics {
             words.push(format!("identification LOST {} samples of the log", loops.samples_lost));
         }
         if loops.records_lost > 0 {
-            words.push(format!("the board gave up {} records because nobody read", loops.records_lost));
+            words.push(format!("the board dropped {} records because no host read them", loops.records_lost));
         }
         words
     }

@@ -105,8 +105,8 @@ impl Trace {
     /// Servo ticks per second.
     #[must_use]
     pub fn servo_hz(&self) -> f64 {
-        let told = self.boot.as_ref().map(|boot| f64::from(boot.servo_hz)).filter(|rate| *rate > 0.0);
-        told.unwrap_or(SERVO_HZ)
+        let announced = self.boot.as_ref().map(|boot| f64::from(boot.servo_hz)).filter(|rate| *rate > 0.0);
+        announced.unwrap_or(SERVO_HZ)
     }
 
     /// Faults, crashes and refusals to be enabled, in order.
@@ -180,8 +180,8 @@ impl Trace {
     }
 
     fn abandon(&mut self) {
-        if let Some(told) = self.pending.take() {
-            self.lacks(told.lacks().unwrap_or_else(|| "breaks off before its end".into()));
+        if let Some(records) = self.pending.take() {
+            self.lacks(records.lacks().unwrap_or_else(|| "breaks off before its end".into()));
         }
     }
 
@@ -240,26 +240,26 @@ impl Trace {
         if line.kind() == "solver" {
             self.abandon();
         }
-        let told = self.pending.get_or_insert_default();
-        let taken = told.take(line);
+        let records = self.pending.get_or_insert_default();
+        let taken = records.take(line);
         if line.kind() == "end" {
-            let told = self.pending.take().unwrap_or_default();
-            match told.lacks() {
+            let records = self.pending.take().unwrap_or_default();
+            match records.lacks() {
                 Some(why) => self.lacks(why),
-                None => self.complete(told),
+                None => self.complete(records),
             }
         }
         taken
     }
 
-    fn complete(&mut self, told: ResultRecords) {
-        let reasons: Vec<&str> = told.reasons.iter().map(|found| found.reason.as_str()).collect();
+    fn complete(&mut self, records: ResultRecords) {
+        let reasons: Vec<&str> = records.reasons.iter().map(|found| found.reason.as_str()).collect();
         let words = match reasons.as_slice() {
             [] => "identification ACCEPTED".to_owned(),
             _ => format!("identification REFUSED: {}", reasons.join(", ")),
         };
         self.event(Weight::Note, words);
-        self.results.push(told);
+        self.results.push(records);
         self.progress = None;
     }
 
@@ -289,7 +289,7 @@ impl Trace {
             let shown: Vec<String> = shown.collect();
             let more = if self.gaps.len() > SHOWN { ", ..." } else { "" };
             words.push(format!(
-                "{} records are LOST (n = {}{more}): what they told, a fault perhaps, is not known",
+                "{} records are LOST (n = {}{more}): their content, possibly a fault, is not known",
                 self.lost(),
                 shown.join(", ")
             ));

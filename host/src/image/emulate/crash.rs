@@ -199,9 +199,9 @@ fn is_identifying(start: &[Line<'_>]) -> bool {
 
 /// Whether the inhibit reason was reported before any enabling, and the request refused.
 fn is_refused(start: &[Line<'_>]) -> bool {
-    let told = all(start, "refused").iter().any(|refused| refused.text("why") == Ok("crash"));
+    let is_reported = all(start, "refused").iter().any(|refused| refused.text("why") == Ok("crash"));
     let mut until = start.iter().take_while(|line| line.text("drive") != Ok("operation_enabled"));
-    told && until.any(|line| line.kind() == "request" && line.text("accepted") == Ok("false"))
+    is_reported && until.any(|line| line.kind() == "request" && line.text("accepted") == Ok("false"))
 }
 
 /// Location of the crash.

@@ -70,9 +70,9 @@ pub fn run(image: &Path, trace: &Path) -> Result<Duration, ToolError> {
 /// the clock at the start of the crash.
 pub fn crash(image: &Path, trace: &Path, log: &Path, kind: CrashKind, tick: u32) -> Result<u32, ToolError> {
     let [option, semihosting] = SEMIHOSTING;
-    let asked = format!("{semihosting},arg=scarab,arg=crash={}@{tick}", kind.name());
+    let crash = format!("{semihosting},arg=scarab,arg=crash={}@{tick}", kind.name());
     let mut emulator = Command::new(EMULATOR);
-    emulator.args(MACHINE).args([option, &asked]).args(LOGGED).arg("-D").arg(log).arg("-kernel").arg(image);
+    emulator.args(MACHINE).args([option, &crash]).args(LOGGED).arg("-D").arg(log).arg("-kernel").arg(image);
     emulator.stderr(Stdio::piped());
     let said = wait(emulator, trace)?;
     let begun = said.lines().find_map(|line| line.rsplit_once(" was begun at instruction ")?.1.parse().ok());

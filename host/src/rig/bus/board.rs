@@ -164,8 +164,8 @@ impl<const N: usize, const B: usize> Board<N, B> {
     }
 
     /// Receives a frame of another controller at its end.
-    pub fn hear(&mut self, frame: &Frame, now_ns: u64) {
-        if self.mailbox().is_off || !self.flashing.hear(frame, now_ns) {
+    pub fn receive(&mut self, frame: &Frame, now_ns: u64) {
+        if self.mailbox().is_off || !self.flashing.receive(frame, now_ns) {
             return;
         }
         self.rig.board.receive(frame);
@@ -233,7 +233,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
 
     /// Resumes after a stall: delivers the controller's frames and signals a loss.
     fn wake(&mut self, now_ns: u64) {
-        let (frames, lost) = self.flashing.take_heard();
+        let (frames, lost) = self.flashing.take_queued();
         self.rig.board.registers.can.overrun |= lost;
         for frame in &frames {
             self.rig.board.receive(frame);

@@ -122,18 +122,18 @@ mod tests {
         let number = NodeId::new(1).expect("a number");
         let mut node = Node::new(number, Identity::scarab(1, "test"));
         let _ = node.poll(0, &mut Recorder::default());
-        hear(&mut node, 0, &[1, 0]);
+        receive(&mut node, 0, &[1, 0]);
         node
     }
 
-    fn hear(node: &mut Node, id: u16, data: &[u8]) {
+    fn receive(node: &mut Node, id: u16, data: &[u8]) {
         let _ = node.on_frame(&Frame::new(id, data), 0, &mut Recorder::default());
     }
 
     /// Writes an object of the node and discards the answer.
     fn write(node: &mut Node, index: u16, sub: u8, value: u32, size: u8) {
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
-        hear(node, 0x601, &[0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]);
+        receive(node, 0x601, &[0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]);
         while let Some(frame) = node.poll(0, &mut Recorder::default()) {
             assert!(frame.id() != 0x581 || frame.data()[0] == 0x60, "{frame:?}");
         }
@@ -191,10 +191,10 @@ mod tests {
         assert_eq!(of(&node, 0x201, &[0, 0]), Effect::Other);
         assert_eq!(of(&node, 0x6A0, &[]), Effect::Other);
         // A waiting controlword is an effect of the SYNC, not of the next frame.
-        hear(&mut node, 0x345, &[1, 2, 3, 4, 15, 0]);
+        receive(&mut node, 0x345, &[1, 2, 3, 4, 15, 0]);
         assert_eq!(of(&node, 0x6A0, &[]), Effect::SetPoint);
         assert_eq!(of(&node, 0x80, &[]), Effect::Other);
-        hear(&mut node, 0x345, &[1, 2, 3, 4, 0, 0]);
+        receive(&mut node, 0x345, &[1, 2, 3, 4, 0, 0]);
         assert_eq!(of(&node, 0x6A0, &[]), Effect::Stop);
         assert_eq!(of(&node, 0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), Effect::Other);
     }

@@ -93,12 +93,12 @@ pub struct Host {
     from: Option<[f64; JOINTS]>,
     way: [f64; JOINTS],
     /// End of the last heartbeat and of the last targets on the wire.
-    heard_ns: [u64; 2],
+    sent_ns: [u64; 2],
     /// End of the last cyclic frame to each node on the wire.
-    spoke_ns: [u64; JOINTS],
+    cyclic_ns: [u64; JOINTS],
     answer: Option<Frame>,
     /// Emergency messages: node and code.
-    told: Vec<(u16, u16)>,
+    emergencies: Vec<(u16, u16)>,
 }
 
 fn refused(words: String) -> ToolError {
@@ -117,10 +117,10 @@ impl Host {
             from: None,
             way: [0.0; JOINTS],
             cycle: CYCLE,
-            heard_ns: [0; 2],
-            spoke_ns: [0; JOINTS],
+            sent_ns: [0; 2],
+            cyclic_ns: [0; JOINTS],
             answer: None,
-            told: Vec::new(),
+            emergencies: Vec::new(),
         }
     }
 
@@ -160,23 +160,23 @@ impl Host {
         if self.speaks.heartbeat > 0 && self.ticks.is_multiple_of(self.speaks.heartbeat) {
             self.network.send(Frame::new(HEARTBEAT + NUMBER, &[5]));
         }
-        let (heard_ns, answer, spoke_ns) = (&mut self.heard_ns, &mut self.answer, &mut self.spoke_ns);
-        let (told, places) = (&mut self.told, &mut self.places);
+        let (sent_ns, answer, cyclic_ns) = (&mut self.sent_ns, &mut self.answer, &mut self.cyclic_ns);
+        let (emergencies, places) = (&mut self.emergencies, &mut self.places);
         let show = |sent: &Sent| {
             let id = sent.frame.id();
             match (sent.sender, id) {
-                (0, SYNC | TARGETS) => *spoke_ns = [sent.end_ns; JOINTS],
-                (0, 0x201) => spoke_ns[0] = sent.end_ns,
-                (0, 0x202) => spoke_ns[1] = sent.end_ns,
+                (0, SYNC | TARGETS) => *cyclic_ns = [sent.end_ns; JOINTS],
+                (0, 0x201) => cyclic_ns[0] = sent.end_ns,
+                (0, 0x202) => cyclic_ns[1] = sent.end_ns,
                 _ => {}
             }
             match (sent.sender, id) {
-                (0, TARGETS) => heard_ns[1] = sent.end_ns,
-                (0, _) if id == HEARTBEAT + NUMBER => heard_ns[0] = sent.end_ns,
+                (0, TARGETS) => sent_ns[1] = sent.end_ns,
+                (0, _) if id == HEARTBEAT + NUMBER => sent_ns[0] = sent.end_ns,
                 (0, _) => {}
                 (_, 0x81..=0xFF) => {
                     if let [low, high, ..] = sent.frame.data() {
-                        told.push((id & 0x7F, u16::from_le_bytes([*low, *high])));
+                        emergencies.push((id & 0x7F, u16::from_le_bytes([*low, *high])));
                     }
                 }
                 (_, 0x181 | 0x182) => {
@@ -206,14 +206,14 @@ impl Host {
 
     /// End of the last heartbeat and of the last targets on the wire.
     #[must_use]
-    pub fn heard_ns(&self) -> [u64; 2] {
-        self.heard_ns
+    pub fn sent_ns(&self) -> [u64; 2] {
+        self.sent_ns
     }
 
     /// End of the last cyclic frame to each node on the wire: SYNC, targets, controlword.
     #[must_use]
-    pub fn spoke_ns(&self) -> [u64; JOINTS] {
-        self.spoke_ns
+    pub fn cyclic_ns(&self) -> [u64; JOINTS] {
+        self.cyclic_ns
     }
 
     /// Steps the motion back by `ticks`, after a pause of the host.
@@ -228,8 +228,8 @@ impl Host {
 
     /// Emergency messages so far: node and code.
     #[must_use]
-    pub fn told(&self) -> &[(u16, u16)] {
-        &self.told
+    pub fn emergencies(&self) -> &[(u16, u16)] {
+        &self.emergencies
     }
 
     /// Sends an SDO request and returns the answer.
@@ -317,7 +317,7 @@ impl Host {
         let (state, causes) = (self.rig().state(), self.rig().causes());
         Err(refused(format!(
             "its host cannot enable it: {state:?}, inhibit reasons {causes:x}, emergencies {:x?}",
-            self.told
+            self.emergencies
         )))
     }
 }
@@ -342,7 +342,7 @@ mod tests {
         let mut host = host(&LegFile::load(DEFAULT_LEG).expect("shipped"));
         host.begin().expect("nodes that answer");
         let mut ask = |window: u32, (object, word): (u16, &[u8; 4]), fails: bool| {
-            host.told.clear();
+            host.emergencies.clear();
             host.write(1, WINDOW, 0, window, 4).expect("a window");
             host.board().memory().fail_after(fails.then_some(1));
             host.write(2, object, 1, u32::from_le_bytes(*word), 4).expect("a drive that is off");
@@ -352,7 +352,7 @@ mod tests {
             }
             host.run(8);
             host.board().memory().fail_after(None);
-            let codes: Vec<u16> = host.told.iter().map(|(_, code)| *code).collect();
+            let codes: Vec<u16> = host.emergencies.iter().map(|(_, code)| *code).collect();
             host.network.send(Frame::new(START, &[129, 0]));
             host.run(40);
             (codes, host.read(1, WINDOW, 0).expect("an answer"))
@@ -428,16 +428,16 @@ mod tests {
             let words = format!("seed {seed}, pose {pose}");
             // Earlier errors must not be taken for the reason of a refusal.
             NODES.into_iter().for_each(|node| host.write(node, 0x1003, 0, 0, 1).expect("a history"));
-            host.told.clear();
+            host.emergencies.clear();
             for tries in 0.. {
                 if enable(&mut host) {
                     break;
                 }
                 // A refused enable is explained by FF0E and ends when the leg stops swinging.
                 let code = host.read(1, 0x603F, 0).expect("an error code");
-                assert_eq!(code, 0xFF0E, "{words}: {:?} {:x?}", host.rig().state(), host.told);
-                assert!(host.told.contains(&(1, 0xFF0E)), "{words}: {:x?}", host.told);
-                assert!(tries < 20, "{words}: {:x?}", host.told);
+                assert_eq!(code, 0xFF0E, "{words}: {:?} {:x?}", host.rig().state(), host.emergencies);
+                assert!(host.emergencies.contains(&(1, 0xFF0E)), "{words}: {:x?}", host.emergencies);
+                assert!(tries < 20, "{words}: {:x?}", host.emergencies);
                 host.run(SECOND / 4);
             }
             let outside = |host: &mut Host| {
@@ -454,7 +454,7 @@ mod tests {
                 host.is_enabled() && !outside(&mut host),
                 "{words}: {:?} {:x?}",
                 host.rig().state(),
-                host.told
+                host.emergencies
             );
             let places = [0, 1].map(|joint| micro(joint, random.uniform(0.02, 0.98)));
             point(&mut host, places);

@@ -98,7 +98,7 @@ impl<const N: usize, const B: usize> Network<N, B> {
                 if sent.sender == 1 + place {
                     board.sent(sent.end_ns);
                 } else {
-                    board.hear(&sent.frame, sent.end_ns);
+                    board.receive(&sent.frame, sent.end_ns);
                 }
             }
             show(&sent);

@@ -101,7 +101,7 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
         for _ in 0..due {
             adapter.tick(&mut network, Instant::now(), |sent| {
                 if sent.sender > 0 {
-                    server.tell(&sent.frame);
+                    server.send(&sent.frame);
                     sent_by_boards.push(*sent);
                 }
             });

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use scarab::bus::Frame;
 use socket2::{SockRef, TcpKeepalive};
 
-use crate::rig::bus::slcan::{BELL, DONE, Heard, Line, TAKEN, tell};
+use crate::rig::bus::slcan::{BELL, DONE, Received, Line, TAKEN, encode};
 
 /// Unread bytes after which a client is disconnected.
 const MOST_UNREAD: usize = 1 << 22;
@@ -79,7 +79,7 @@ struct Connection {
     peer: SocketAddr,
     line: Line,
     /// Bytes read but not processed.
-    heard: VecDeque<u8>,
+    received: VecDeque<u8>,
     out: Vec<u8>,
 }
 
@@ -96,7 +96,7 @@ pub struct Server {
 impl Connection {
     /// Reads and processes bytes. Returns whether no more are pending: a read that does not fill its buffer
     /// has emptied the socket.
-    fn hear(
+    fn receive(
         &mut self,
         client: Option<SocketAddr>,
         mut take: impl FnMut(Frame) -> bool,
@@ -105,12 +105,12 @@ impl Connection {
         let is_client = client == Some(self.peer);
         let gone = |why| Err(What::Gone(why, is_client));
         let (mut ended, mut is_drained) = (None, false);
-        if self.heard.is_empty() {
+        if self.received.is_empty() {
             match self.stream.read(&mut bytes) {
                 Ok(0) => ended = Some("end of the connection"),
                 Ok(count) => {
                     is_drained = count < MOST_AT_ONCE;
-                    self.heard.extend(&bytes[..count]);
+                    self.received.extend(&bytes[..count]);
                 }
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                     return Ok(error.kind() == ErrorKind::WouldBlock);
@@ -121,21 +121,21 @@ impl Connection {
                 Err(_) => ended = Some("error of the connection"),
             }
         }
-        while let Some(byte) = self.heard.pop_front() {
-            match self.line.hear(byte, &mut self.out) {
+        while let Some(byte) = self.received.pop_front() {
+            match self.line.receive(byte, &mut self.out) {
                 None => {}
-                Some(Heard::Frame(frame)) => {
+                Some(Received::Frame(frame)) => {
                     let answer = if take(frame) { TAKEN } else { BELL };
                     self.out.extend_from_slice(answer);
                 }
-                Some(Heard::Open) => {
+                Some(Received::Open) => {
                     if let Some(client) = client.filter(|_| !is_client) {
                         return Err(What::Refused(client));
                     }
                     self.out.extend_from_slice(DONE);
                     return Err(What::Opened);
                 }
-                Some(Heard::Close) => {
+                Some(Received::Close) => {
                     self.out.extend_from_slice(DONE);
                     return Err(What::Closed);
                 }
@@ -204,7 +204,7 @@ impl Server {
         let mut is_drained = true;
         if let Some(client) = &mut self.client {
             let peer = client.peer;
-            match client.hear(Some(peer), |frame| take(frame, since)) {
+            match client.receive(Some(peer), |frame| take(frame, since)) {
                 Ok(all) => is_drained = all,
                 Err(what) => {
                     if let (What::Closed, Some(client)) = (&what, self.client.take()) {
@@ -234,13 +234,13 @@ impl Server {
                 events.push(Event { peer: oldest.peer, what });
             }
             events.push(Event { peer, what: What::Connected });
-            let (heard, out) = (VecDeque::new(), Vec::new());
-            self.waiting.push_back(Connection { stream, peer, line: Line::default(), heard, out });
+            let (received, out) = (VecDeque::new(), Vec::new());
+            self.waiting.push_back(Connection { stream, peer, line: Line::default(), received, out });
         }
         for _ in 0..self.waiting.len() {
             let Some(mut connection) = self.waiting.pop_front() else { break };
             let (peer, client) = (connection.peer, self.client.as_ref().map(|client| client.peer));
-            match connection.hear(client, |_| false) {
+            match connection.receive(client, |_| false) {
                 Ok(_) => self.waiting.push_back(connection),
                 Err(What::Opened) => {
                     self.client = Some(connection);
@@ -283,9 +283,9 @@ impl Server {
     }
 
     /// Sends a frame to the client, if there is one.
-    pub fn tell(&mut self, frame: &Frame) {
+    pub fn send(&mut self, frame: &Frame) {
         if let Some(client) = &mut self.client {
-            tell(frame, &mut client.out);
+            encode(frame, &mut client.out);
         }
     }
 

@@ -15,7 +15,7 @@ use scarab::bus::Frame;
 
 /// A line that the caller must decide and answer. All other lines are answered here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum Received {
     /// A frame for the bus: [`TAKEN`] or [`BELL`].
     Frame(Frame),
     /// Request to open the channel: [`DONE`], or a refusal.
@@ -50,7 +50,7 @@ impl Line {
     }
 
     /// Processes a byte from the client. Answers go to `out`, except the one to a returned line.
-    pub fn hear(&mut self, byte: u8, out: &mut Vec<u8>) -> Option<Heard> {
+    pub fn receive(&mut self, byte: u8, out: &mut Vec<u8>) -> Option<Received> {
         match byte {
             b'\r' => {
                 let bytes = std::mem::take(&mut self.bytes);
@@ -58,8 +58,8 @@ impl Line {
                     out.extend_from_slice(BELL);
                     return None;
                 }
-                match self.obey(&bytes) {
-                    Ok(heard) => return Some(heard),
+                match self.execute(&bytes) {
+                    Ok(received) => return Some(received),
                     Err(answer) => out.extend_from_slice(answer),
                 }
             }
@@ -70,16 +70,16 @@ impl Line {
         None
     }
 
-    fn obey(&mut self, line: &[u8]) -> Result<Heard, &'static [u8]> {
+    fn execute(&mut self, line: &[u8]) -> Result<Received, &'static [u8]> {
         match line {
             [b'S' | b's', ..] if self.is_open => Err(BELL),
             [b'O' | b'L'] if !self.is_open => {
                 self.is_open = true;
-                Ok(Heard::Open)
+                Ok(Received::Open)
             }
             [b'C'] if self.is_open => {
                 self.is_open = false;
-                Ok(Heard::Close)
+                Ok(Received::Close)
             }
             // Clients begin with a few empty lines.
             [] | [b'O' | b'L' | b'C'] | [b'S' | b's' | b'Z' | b'M' | b'm', ..] => Err(DONE),
@@ -87,7 +87,7 @@ impl Line {
             [b'v'] => Err(b"v1013\r"),
             [b'N'] => Err(b"N5CA2\r"),
             [b'F'] => Err(b"F00\r"),
-            [b't', rest @ ..] if self.is_open => frame(rest).map(Heard::Frame).ok_or(BELL),
+            [b't', rest @ ..] if self.is_open => frame(rest).map(Received::Frame).ok_or(BELL),
             [b'T' | b'r' | b'R', ..] if self.is_open => Err(TAKEN),
             _ => Err(BELL),
         }
@@ -115,7 +115,7 @@ fn frame(text: &[u8]) -> Option<Frame> {
 }
 
 /// Appends a frame from the bus as a line.
-pub fn tell(frame: &Frame, out: &mut Vec<u8>) {
+pub fn encode(frame: &Frame, out: &mut Vec<u8>) {
     out.extend_from_slice(format!("t{:03X}{}", frame.id(), frame.data().len()).as_bytes());
     for byte in frame.data() {
         out.extend_from_slice(format!("{byte:02X}").as_bytes());
@@ -127,16 +127,16 @@ pub fn tell(frame: &Frame, out: &mut Vec<u8>) {
 mod tests {
     use super::*;
 
-    fn say(line: &mut Line, text: &str) -> (Vec<Frame>, String) {
+    fn exchange(line: &mut Line, text: &str) -> (Vec<Frame>, String) {
         let mut out = Vec::new();
         let mut frames = Vec::new();
         for byte in text.bytes() {
-            match line.hear(byte, &mut out) {
-                Some(Heard::Frame(frame)) => {
+            match line.receive(byte, &mut out) {
+                Some(Received::Frame(frame)) => {
                     frames.push(frame);
                     out.extend_from_slice(TAKEN);
                 }
-                Some(Heard::Open | Heard::Close) => out.extend_from_slice(DONE),
+                Some(Received::Open | Received::Close) => out.extend_from_slice(DONE),
                 None => {}
             }
         }
@@ -146,27 +146,27 @@ mod tests {
     #[test]
     fn frames_pass_unchanged_once_the_channel_is_open() {
         let mut line = Line::default();
-        assert_eq!(say(&mut line, "t0000\r"), (Vec::new(), "\x07".into()));
-        assert_eq!(say(&mut line, "C\rS8\rO\r"), (Vec::new(), "\r\r\r".into()));
+        assert_eq!(exchange(&mut line, "t0000\r"), (Vec::new(), "\x07".into()));
+        assert_eq!(exchange(&mut line, "C\rS8\rO\r"), (Vec::new(), "\r\r\r".into()));
         let frame = Frame::new(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
-        assert_eq!(say(&mut line, "t60184041600000000000\r"), (vec![frame], "z\r".into()));
+        assert_eq!(exchange(&mut line, "t60184041600000000000\r"), (vec![frame], "z\r".into()));
         let mut text = Vec::new();
-        tell(&frame, &mut text);
+        encode(&frame, &mut text);
         assert_eq!(text, b"t60184041600000000000\r");
-        assert_eq!(say(&mut line, "C\r").1, "\r");
+        assert_eq!(exchange(&mut line, "C\r").1, "\r");
         assert!(!line.is_open());
     }
 
     #[test]
     fn an_invalid_line_gets_a_bell_and_has_no_further_effect() {
         let mut line = Line::default();
-        assert_eq!(say(&mut line, "O\r").1, "\r");
+        assert_eq!(exchange(&mut line, "O\r").1, "\r");
         for text in ["x", "t60", "t6019", "tFFF0", "t60110", "t6011xx", "t6010Z", "O1", &"t".repeat(300)] {
-            assert_eq!(say(&mut line, &format!("{text}\r")), (Vec::new(), "\x07".into()), "{text}");
+            assert_eq!(exchange(&mut line, &format!("{text}\r")), (Vec::new(), "\x07".into()), "{text}");
         }
-        assert_eq!(say(&mut line, "t0010\r").0, [Frame::new(1, &[])]);
+        assert_eq!(exchange(&mut line, "t0010\r").0, [Frame::new(1, &[])]);
         // Frames that this bus does not carry are acknowledged and dropped.
-        assert_eq!(say(&mut line, "T000000012AABB\rr0012\r"), (Vec::new(), "z\rz\r".into()));
+        assert_eq!(exchange(&mut line, "T000000012AABB\rr0012\r"), (Vec::new(), "z\rz\r".into()));
     }
 
     #[test]
@@ -177,7 +177,7 @@ mod tests {
         let letters = b"tTrROCSVvNFZMm0123456789ABCDEFabcdef\r\r\r\n\x00\xFF";
         for _ in 0..200_000 {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let _ = line.hear(letters[(state >> 16) as usize % letters.len()], &mut out);
+            let _ = line.receive(letters[(state >> 16) as usize % letters.len()], &mut out);
             out.clear();
         }
     }

@@ -74,7 +74,7 @@ pub struct Flashing<const N: usize> {
     /// End of the stall.
     until_ns: u64,
     /// Frames received during the stall, and whether one was lost.
-    heard: Vec<Frame>,
+    queued: Vec<Frame>,
     lost: bool,
     /// Time to erase a sector.
     pub erasing_ns: u64,
@@ -94,7 +94,7 @@ impl<const N: usize> Flashing<N> {
             has_kept: false,
             due_ns: 0,
             until_ns: 0,
-            heard: Vec::new(),
+            queued: Vec::new(),
             lost: false,
             erasing_ns: ERASING_NS,
             unannounced: false,
@@ -120,10 +120,10 @@ impl<const N: usize> Flashing<N> {
     }
 
     /// Receives a frame during a stall. Returns whether the processor runs.
-    pub(super) fn hear(&mut self, frame: &Frame, now_ns: u64) -> bool {
+    pub(super) fn receive(&mut self, frame: &Frame, now_ns: u64) -> bool {
         let stands = self.stands(now_ns);
-        if stands && self.heard.len() < QUEUE {
-            self.heard.push(*frame);
+        if stands && self.queued.len() < QUEUE {
+            self.queued.push(*frame);
         } else if stands {
             self.lost = true;
         }
@@ -131,8 +131,8 @@ impl<const N: usize> Flashing<N> {
     }
 
     /// Takes the frames received during the stall, and whether one was lost.
-    pub(super) fn take_heard(&mut self) -> (Vec<Frame>, bool) {
-        (core::mem::take(&mut self.heard), core::mem::take(&mut self.lost))
+    pub(super) fn take_queued(&mut self) -> (Vec<Frame>, bool) {
+        (core::mem::take(&mut self.queued), core::mem::take(&mut self.lost))
     }
 
     /// Whether the flash was changed since the last call.

@@ -346,7 +346,7 @@ fn corrections<const N: usize>() -> Vec<Correction<N>> {
     if N > 1 {
         subjects.extend((0..N).map(Some));
     }
-    let who =
+    let joints =
         |joint: Option<usize>| joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
     all.push(Correction {
         name: "torque_unit",
@@ -358,7 +358,7 @@ fn corrections<const N: usize>() -> Vec<Correction<N>> {
         all.push(Correction {
             name: "torque_sign",
             joint,
-            words: format!("torque of {} negated", who(joint)),
+            words: format!("torque of {} negated", joints(joint)),
             apply: Box::new(move |_, torques| {
                 let each = torques.iter_mut().enumerate();
                 each.filter(|(at, _)| chosen(joint, *at)).for_each(|(_, torque)| *torque = -*torque);
@@ -367,7 +367,7 @@ fn corrections<const N: usize>() -> Vec<Correction<N>> {
         all.push(Correction {
             name: "angle_unit",
             joint,
-            words: format!("angle of {} read as degrees", who(joint)),
+            words: format!("angle of {} read as degrees", joints(joint)),
             apply: Box::new(move |angles, _| {
                 let each = angles.iter_mut().enumerate();
                 each.filter(|(at, _)| chosen(joint, *at)).for_each(|(_, angle)| *angle = angle.to_radians());

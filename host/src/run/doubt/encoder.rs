@@ -364,8 +364,8 @@ fn prediction_noise<const N: usize, const B: usize>(
 
 /// Step of an encoder from the changes of its angle in ascending order. The change at `index` must be one
 /// step, and the other small ones whole steps.
-fn step(changes: &[f64], place: usize) -> Option<f64> {
-    let smallest = *changes.get(place)?;
+fn step(changes: &[f64], index: usize) -> Option<f64> {
+    let smallest = *changes.get(index)?;
     // A mean, because numbers in text are rounded.
     let single: Vec<f64> =
         changes.iter().copied().filter(|change| (change / smallest - 1.0).abs() < EXACT).collect();
@@ -381,9 +381,9 @@ fn step(changes: &[f64], place: usize) -> Option<f64> {
 
 /// Position of a time between two grid points: the first of them, and the share of the way to the second.
 fn between(time_s: f64, points: usize) -> (usize, f64) {
-    let place = (time_s * SAMPLE_RATE_HZ).clamp(0.0, points.saturating_sub(1) as f64);
-    let first = (place.floor() as usize).min(points.saturating_sub(2));
-    (first, place - first as f64)
+    let position = (time_s * SAMPLE_RATE_HZ).clamp(0.0, points.saturating_sub(1) as f64);
+    let first = (position.floor() as usize).min(points.saturating_sub(2));
+    (first, position - first as f64)
 }
 
 fn linear<const N: usize>(series: &[[f64; N]], joint: usize, time_s: f64) -> f64 {

@@ -153,15 +153,15 @@ fn least(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f64 {
 }
 
 fn cause(kind: Kind, joint: Option<usize>, time_s: f64, sigma_s: f64, remaining: f64) -> CauseReport {
-    let who = joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
+    let joints = joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
     let (time_ms, sigma_ms) = (1e3 * time_s, 1e3 * sigma_s);
     let explained = 100.0 * (1.0 - remaining);
     let (name, words) = match kind {
-        Kind::Delay => ("delay", format!("torque of {who}: {time_ms:.1} +- {sigma_ms:.1} ms late")),
+        Kind::Delay => ("delay", format!("torque of {joints}: {time_ms:.1} +- {sigma_ms:.1} ms late")),
         Kind::Filter => (
             "torque_filter",
             format!(
-                "torque of {who} behind a low-pass of {:.1} Hz (time constant {time_ms:.1} +- {sigma_ms:.1} ms): log it \
+                "torque of {joints} behind a low-pass of {:.1} Hz (time constant {time_ms:.1} +- {sigma_ms:.1} ms): log it \
                  before the filter, or filter the angle alike",
                 1.0 / (std::f64::consts::TAU * time_s)
             ),

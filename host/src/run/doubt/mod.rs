@@ -342,14 +342,14 @@ pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
 /// Message about a change midway.
 #[must_use]
 pub fn midway_words(midway: &Midway) -> String {
-    let who = midway.joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
+    let joints = midway.joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
     let what = if midway.change < -1.0 {
         "changes its sign".into()
     } else {
         format!("changes by {:+.0} +- {:.0} %", 100.0 * midway.change, 100.0 * midway.sigma)
     };
     format!(
-        "the torque of {who} {what} after {:.0} % of the recording, which explains {:.0} % of the misfit",
+        "the torque of {joints} {what} after {:.0} % of the recording, which explains {:.0} % of the misfit",
         100.0 * midway.share,
         100.0 * midway.explained
     )

@@ -149,9 +149,9 @@ impl<const N: usize> Part<N> {
     /// Low-passed torque of a joint at a row, measured `late_s` later than its angle: cubic between grid
     /// points.
     fn torque(&self, joint: usize, row: usize, late_s: f64) -> f64 {
-        let place = (self.first + DECIMATION * row) as f64 + late_s * SAMPLE_RATE_HZ;
-        let base = place.floor();
-        let (at, share) = (base as usize, place - base);
+        let position = (self.first + DECIMATION * row) as f64 + late_s * SAMPLE_RATE_HZ;
+        let base = position.floor();
+        let (at, share) = (base as usize, position - base);
         let series = &self.filtered[joint];
         if share == 0.0 {
             return series[at];

@@ -62,13 +62,13 @@ pub fn demand<const N: usize, const B: usize>(
     let leaving = motion.duration_ticks() - motion.blend_ticks();
     for tick in (0..=period).chain(leaving..=motion.duration_ticks()) {
         let state = motion.state_at(tick);
-        for (joint, (torque, doubt)) in torques(scorer, &state).into_iter().enumerate() {
+        for (joint, (torque, uncertainty)) in torques(scorer, &state).into_iter().enumerate() {
             let (position, velocity) = (state.position_rad[joint], state.velocity_rad_per_s[joint]);
             demand[joint].cut_nm =
-                demand[joint].cut_nm.max(scorer.cut(joint, position, velocity, torque, doubt));
+                demand[joint].cut_nm.max(scorer.cut(joint, position, velocity, torque, uncertainty));
             demand[joint].low_nm = demand[joint].low_nm.min(torque);
             demand[joint].high_nm = demand[joint].high_nm.max(torque);
-            demand[joint].bound_nm = demand[joint].bound_nm.max(torque.abs() + doubt);
+            demand[joint].bound_nm = demand[joint].bound_nm.max(torque.abs() + uncertainty);
         }
     }
     let (speed, acceleration) = configuration.approach();
@@ -88,8 +88,8 @@ pub fn demand<const N: usize, const B: usize>(
             continue;
         };
         for tick in (0..=ramp.duration_ticks()).step_by(APPROACH_STEP) {
-            for (joint, (torque, doubt)) in torques(scorer, &ramp.state_at(tick)).into_iter().enumerate() {
-                demand[joint].approach_nm = demand[joint].approach_nm.max(torque.abs() + doubt);
+            for (joint, (torque, uncertainty)) in torques(scorer, &ramp.state_at(tick)).into_iter().enumerate() {
+                demand[joint].approach_nm = demand[joint].approach_nm.max(torque.abs() + uncertainty);
             }
         }
     }

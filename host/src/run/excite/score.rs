@@ -108,8 +108,8 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
     /// Reduction of a joint's torque by the monitor at one instant, N m; the monitor must still be
     /// able to stop the joint.
     #[must_use]
-    pub fn cut(&self, joint: usize, position: f32, velocity: f32, torque: f64, doubt: f64) -> f64 {
-        [torque + doubt, torque - doubt].into_iter().fold(0.0, |cut: f64, wanted| {
+    pub fn cut(&self, joint: usize, position: f32, velocity: f32, torque: f64, uncertainty: f64) -> f64 {
+        [torque + uncertainty, torque - uncertainty].into_iter().fold(0.0, |cut: f64, wanted| {
             let (position, velocity) = (Radian(position), RadianPerSecond(velocity));
             let (allowed, _) =
                 self.barriers[joint].bound(position, velocity, NewtonMetre(wanted as f32), false);
@@ -138,10 +138,10 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
                 state.acceleration_rad_per_s2.map(f64::from),
             );
             for (joint, row) in regressor.iter().enumerate() {
-                let (value, doubt) = self.torque(row);
-                torque[joint] = torque[joint].max(value.abs() + doubt);
+                let (value, uncertainty) = self.torque(row);
+                torque[joint] = torque[joint].max(value.abs() + uncertainty);
                 let (position, velocity) = (state.position_rad[joint], state.velocity_rad_per_s[joint]);
-                cut[joint] = cut[joint].max(self.cut(joint, position, velocity, value, doubt));
+                cut[joint] = cut[joint].max(self.cut(joint, position, velocity, value, uncertainty));
                 if still[joint][index] <= LARGEST_STILL_SHARE {
                     add_square(&mut information[joint], row);
                 }

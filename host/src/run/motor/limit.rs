@@ -29,17 +29,17 @@ const BAND_SHARE: f64 = 0.03;
 /// Measures both speeds on both supplies.
 pub fn measure(bench: &Bench) -> Result<Vec<LimitReport>, ToolError> {
     let mut reports = Vec::new();
-    let asked = bench.within_limit(BEYOND);
+    let requested = bench.within_limit(BEYOND);
     for (share, sign) in [(1.0, 1.0), (1.3, -1.0)] {
         for supply in [WEAK, bench.supply.voltage] {
-            let currents = [asked, sign * WITHIN_SHARE * asked];
+            let currents = [requested, sign * WITHIN_SHARE * requested];
             reports.push(one(bench, share * bench.top_speed, supply, currents)?);
         }
     }
     Ok(reports)
 }
 
-fn one(bench: &Bench, speed: f64, supply: f64, [asked, target]: [f64; 2]) -> Result<LimitReport, ToolError> {
+fn one(bench: &Bench, speed: f64, supply: f64, [requested, target]: [f64; 2]) -> Result<LimitReport, ToolError> {
     let mut bench = bench.clone();
     bench.supply.voltage = supply;
     bench.configuration.bus[0] = Volt(8.0);
@@ -47,12 +47,12 @@ fn one(bench: &Bench, speed: f64, supply: f64, [asked, target]: [f64; 2]) -> Res
     let limited = (LIMITED_S / PERIOD_S) as usize;
     let mut currents = Vec::with_capacity(limited + PERIODS);
     for _ in 0..limited {
-        currents.push(rig.period(asked));
+        currents.push(rig.period(requested));
     }
     for _ in 0..PERIODS {
         currents.push(rig.period(target));
     }
-    bench.must_hold(&rig, &format!("{asked:.0} A on a supply of {supply:.0} V"), speed)?;
+    bench.must_hold(&rig, &format!("{requested:.0} A on a supply of {supply:.0} V"), speed)?;
     let mean = |index: usize| -> f64 {
         let last = &currents[limited - PERIODS..limited];
         last.iter().map(|current| current[index]).sum::<f64>() / last.len() as f64
@@ -60,13 +60,13 @@ fn one(bench: &Bench, speed: f64, supply: f64, [asked, target]: [f64; 2]) -> Res
     let after: Vec<f64> = currents[limited..].iter().map(|current| current[1]).collect();
     let outside = after
         .iter()
-        .rposition(|current| (current - target).abs() > BAND_SHARE * asked)
+        .rposition(|current| (current - target).abs() > BAND_SHARE * requested)
         .map_or(0, |last| last + 1);
     let shown = limited - BEFORE..limited + PERIODS / 4;
     Ok(LimitReport {
         speed_rad_s: speed,
         supply_v: supply,
-        asked_a: asked,
+        asked_a: requested,
         target_a: target,
         reached_a: mean(1),
         direct_a: mean(0),

@@ -222,14 +222,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_axis_has_three_labels_and_at_most_four_more_than_asked_for() {
-        for asked in 3..=11 {
+    fn every_axis_has_three_labels_and_at_most_four_more_than_requested() {
+        for requested in 3..=11 {
             for step in 0..400 {
                 let end = 10_f64.powf(f64::from(step) / 50.0 - 4.0);
                 for range in [-end..end, 0.0..end, 48.0..48.0 + end, -0.3 * end..end] {
                     let axis = RangedCoordf64::from(range.clone());
-                    let drawn = axis.key_points(BoldPoints(labels(&range, asked))).len();
-                    assert!((LEAST_LABELS..=asked + 4).contains(&drawn), "{asked} {range:?}: {drawn}");
+                    let drawn = axis.key_points(BoldPoints(labels(&range, requested))).len();
+                    assert!((LEAST_LABELS..=requested + 4).contains(&drawn), "{requested} {range:?}: {drawn}");
                 }
             }
         }
