@@ -5,7 +5,7 @@ pub mod analysis;
 pub mod compare_model;
 pub mod consistent;
 pub mod disturbances;
-pub mod doubt;
+pub mod logging_errors;
 pub mod excite;
 pub mod identify;
 pub mod information;

@@ -1,7 +1,7 @@
 //! `replay`: the firmware's identification on recordings.
 
 mod cleaning;
-mod doubts;
+mod logging_errors;
 mod known_mass;
 mod predictions;
 mod recordings;
@@ -28,10 +28,10 @@ use crate::report::scale::{MassReport, ScaleReport};
 use crate::report::series::{Anatomy, Reader, Role, Series};
 use crate::report::{RunReport, Source};
 use crate::run::analysis::{Circumstances, Motion};
-use crate::run::doubt::encoder::Encoders;
+use crate::run::logging_errors::encoder::Encoders;
 use crate::run::resample::Resampled;
 use cleaning::cleaned;
-use doubts::{
+use logging_errors::{
     Subject, Whole, chosen_bandwidth, corrected, encoders, is_explained_by_noise, noise_density, sample_noise,
 };
 use known_mass::{load_base, settled};
@@ -199,7 +199,7 @@ fn identified<const N: usize, const B: usize>(
     let (training, held_out) = (on_grid(&training), on_grid(&held_out));
 
     let mut sources = feed(&mut recorder, &background, &training, "training", |_, _, _| {});
-    // The bias of the parameters is judged instead (`doubt::encoder`).
+    // The bias of the parameters is judged instead (`logging_errors::encoder`).
     let thresholds = Thresholds { largest_pulse_share: f32::INFINITY, ..Thresholds::default() };
     let mut record = recorder.finish();
     for (count, joint) in record.outliers.replaced.iter_mut().zip(0..) {

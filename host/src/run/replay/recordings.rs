@@ -8,8 +8,8 @@
 //! and mounting differ between recordings, but not between segments of one recording. Limit: two or three
 //! recordings determine the scatter only to a factor of two.
 
-use crate::run::doubt::fit::solve;
-use crate::run::doubt::rows::Equations;
+use crate::run::logging_errors::fit::solve;
+use crate::run::logging_errors::rows::Equations;
 
 /// Number of training recordings, and the standard deviation of each base parameter; `None` if one recording
 /// alone determines a parameter.

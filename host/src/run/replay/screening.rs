@@ -7,8 +7,8 @@ use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
-use crate::run::doubt::samples::{self, QUANTISED};
-use crate::run::doubt::stamps;
+use crate::run::logging_errors::samples::{self, QUANTISED};
+use crate::run::logging_errors::stamps;
 
 /// Reach of the smoothing to each side, in periods of the rows' bandwidth.
 const REACH_PERIODS: f64 = 0.983;

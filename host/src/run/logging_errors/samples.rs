@@ -31,7 +31,7 @@ use std::ops::Range;
 
 use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
-use crate::run::doubt::encoder::Encoder;
+use crate::run::logging_errors::encoder::Encoder;
 
 /// Finding of saturated torque.
 pub const SATURATION: &str = "saturation";

@@ -8,7 +8,7 @@ use scarab::model::{
     AnatomicalJoint, BaseParameters, Chain, DenavitHartenberg, PARAMETERS_PER_JOINT, RigidBody,
 };
 
-use crate::run::doubt::*;
+use crate::run::logging_errors::*;
 
 const BASE: usize = 13;
 const NOISE_NM: f64 = 0.3;
@@ -93,23 +93,23 @@ fn question(motions: Vec<Motion<2>>) -> Question<2, BASE> {
     }
 }
 
-fn doubts(question: &Question<2, BASE>) -> Doubts<2, BASE> {
-    Doubts::of(question).expect("a bandwidth").expect("enough rows")
+fn errors(question: &Question<2, BASE>) -> LoggingErrors<2, BASE> {
+    LoggingErrors::of(question).expect("a bandwidth").expect("enough rows")
 }
 
 /// Refused directions by name and joint.
-fn refused(doubts: &Doubts<2, BASE>) -> Vec<(&'static str, Option<usize>)> {
-    let failed = doubts.directions.iter().filter(|direction| !direction.passed);
+fn refused(errors: &LoggingErrors<2, BASE>) -> Vec<(&'static str, Option<usize>)> {
+    let failed = errors.directions.iter().filter(|direction| !direction.passed);
     failed.map(|direction| (direction.name, direction.joint)).collect()
 }
 
 fn cause_of(question: &Question<2, BASE>) -> CauseReport {
-    let doubts = doubts(question);
-    cause::likely(question, Some(&doubts), &[], &[])
+    let errors = errors(question);
+    cause::likely(question, Some(&errors), &[], &[])
 }
 
-fn estimate(doubts: &Doubts<2, BASE>, name: &str, joint: Option<usize>) -> (f64, f64) {
-    let found = doubts.directions.iter().find(|one| one.name == name && one.joint == joint);
+fn estimate(errors: &LoggingErrors<2, BASE>, name: &str, joint: Option<usize>) -> (f64, f64) {
+    let found = errors.directions.iter().find(|one| one.name == name && one.joint == joint);
     let found = found.expect("reported");
     (found.value.known().expect("seen"), found.sigma.known().expect("seen"))
 }
@@ -117,15 +117,15 @@ fn estimate(doubts: &Doubts<2, BASE>, name: &str, joint: Option<usize>) -> (f64,
 #[test]
 fn a_right_recording_has_no_finding_and_its_misfit_is_noise() {
     for seed in 0..4 {
-        let doubts = doubts(&question(vec![motion([0.0; 2], seed)]));
-        assert!(refused(&doubts).is_empty(), "{:?}", refused(&doubts));
-        assert!(!doubts.midway.is_some_and(|midway| midway.refuses()));
-        for direction in &doubts.directions {
+        let errors = errors(&question(vec![motion([0.0; 2], seed)]));
+        assert!(refused(&errors).is_empty(), "{:?}", refused(&errors));
+        assert!(!errors.midway.is_some_and(|midway| midway.refuses()));
+        for direction in &errors.directions {
             let (value, sigma) = (direction.value.known(), direction.sigma.known());
             let (Some(value), Some(sigma)) = (value, sigma) else { panic!("{direction:?}") };
             assert!(value.abs() < 4.5 * sigma, "{}", direction.words());
         }
-        for ratio in doubts.misfit_over_noise {
+        for ratio in errors.misfit_over_noise {
             assert!((ratio.expect("known") - 1.0).abs() < 0.15, "{ratio:?}");
         }
     }
@@ -135,11 +135,11 @@ fn a_right_recording_has_no_finding_and_its_misfit_is_noise() {
 fn a_late_torque_is_found_at_its_size_and_refused_with_its_joint() {
     for late in [0.010, 0.020, 0.060] {
         let question = question(vec![motion([0.0, late], 1)]);
-        let doubts = doubts(&question);
-        let (value, sigma) = estimate(&doubts, "delay", Some(2));
+        let errors = errors(&question);
+        let (value, sigma) = estimate(&errors, "delay", Some(2));
         // 1 % for the slope at 50 Hz and the interpolation.
         assert!((value - 1e3 * late).abs() < 4.0 * sigma + 0.01 * 1e3 * late, "{value} +- {sigma}");
-        assert!(refused(&doubts).contains(&("delay", Some(2))), "{:?}", refused(&doubts));
+        assert!(refused(&errors).contains(&("delay", Some(2))), "{:?}", refused(&errors));
         let cause = cause_of(&question);
         assert_eq!((cause.name, cause.joint), ("delay", Some(2)), "{}", cause.words);
     }
@@ -177,15 +177,15 @@ fn a_low_pass_of_the_torque_is_not_called_a_delay() {
 fn scales_and_gravity_are_found_at_their_size() {
     let mut scaled = motion([0.0; 2], 1);
     scaled.position.iter_mut().for_each(|angles| angles[1] *= 1.05);
-    let doubts_of = |motion: Motion<2>| doubts(&question(vec![motion]));
-    let found = doubts_of(scaled);
+    let errors_of = |motion: Motion<2>| errors(&question(vec![motion]));
+    let found = errors_of(scaled);
     let (value, sigma) = estimate(&found, "encoder_scale", Some(2));
     assert!((value - 5.0).abs() < 4.0 * sigma + 0.1, "{value} +- {sigma}");
     assert!(refused(&found).contains(&("encoder_scale", Some(2))));
 
     let mut gain = motion([0.0; 2], 1);
     gain.torque.iter_mut().for_each(|torques| torques[1] *= 1.3);
-    let found = doubts_of(gain);
+    let found = errors_of(gain);
     let (value, sigma) = estimate(&found, "torque_scale", Some(2));
     assert!((value - 30.0).abs() < 4.0 * sigma + 0.3, "{value} +- {sigma}");
     assert!(refused(&found).contains(&("torque_scale", Some(2))));
@@ -193,7 +193,7 @@ fn scales_and_gravity_are_found_at_their_size() {
     let mut turned = question(vec![motion([0.0; 2], 1)]);
     let (sine, cosine) = 30_f64.to_radians().sin_cos();
     turned.model.gravity = Vector3::new(9.81 * cosine, 9.81 * sine, 0.0);
-    let found = doubts(&turned);
+    let found = errors(&turned);
     let (value, sigma) = estimate(&found, "gravity", None);
     assert!((value - 30.0).abs() < 4.0 * sigma + 0.3, "{value} +- {sigma}");
     assert_eq!(cause_of(&turned).name, "gravity");
@@ -206,7 +206,7 @@ fn a_sign_that_changes_midway_is_found_with_its_time() {
         let from = (share * flipped.torque.len() as f64) as usize;
         flipped.torque[from..].iter_mut().flatten().for_each(|torque| *torque = -*torque);
         let question = question(vec![flipped]);
-        let midway = doubts(&question).midway.expect("looked for");
+        let midway = errors(&question).midway.expect("looked for");
         assert!(midway.refuses() && midway.change < -1.5, "{midway:?}");
         assert!((midway.share - share).abs() < 0.05, "{midway:?}");
         assert_eq!(cause_of(&question).name, "changed_midway");
@@ -241,9 +241,9 @@ fn a_push_is_not_taken_for_a_direction() {
         let pulse = 15.0 * (std::f64::consts::PI * index as f64 / 300.0).sin();
         torques.iter_mut().for_each(|torque| *torque += pulse);
     }
-    let doubts = doubts(&question(vec![pushed]));
-    assert!(refused(&doubts).is_empty(), "{:?}", refused(&doubts));
-    assert!(!doubts.midway.is_some_and(|midway| midway.refuses()));
+    let errors = errors(&question(vec![pushed]));
+    assert!(refused(&errors).is_empty(), "{:?}", refused(&errors));
+    assert!(!errors.midway.is_some_and(|midway| midway.refuses()));
 }
 
 #[test]
@@ -251,5 +251,5 @@ fn a_motion_with_too_few_rows_has_no_result() {
     let mut short = motion([0.0; 2], 1);
     short.position.truncate(600);
     short.torque.truncate(600);
-    assert!(Doubts::of(&question(vec![short])).expect("a bandwidth").is_none());
+    assert!(LoggingErrors::of(&question(vec![short])).expect("a bandwidth").is_none());
 }

@@ -2,7 +2,7 @@
 
 use crate::base::number::Number;
 use crate::report::doubt::{CauseReport, DirectionReport};
-use crate::run::doubt::directions::{
+use crate::run::logging_errors::directions::{
     CHANCE, EXPLAINED_SHARE, Found, Kind, SMALLEST_SYSTEMATIC, TOLERATED_SHIFT,
 };
 

@@ -9,9 +9,9 @@
 //! The change comes at the same share of every recording, or within one recording; the best of a grid counts.
 //! sigma is that of s with the columns of the parameters: the larger of noise and segments.
 
-use crate::run::doubt::directions::CHANCE;
-use crate::run::doubt::fit::{Fit, score};
-use crate::run::doubt::rows::{Equations, Place};
+use crate::run::logging_errors::directions::CHANCE;
+use crate::run::logging_errors::fit::{Fit, score};
+use crate::run::logging_errors::rows::{Equations, Place};
 
 /// Change of the gain that is tolerated beside chance: the temperature of a drive changes it by 5 %.
 const LARGEST_CHANGE: f64 = 0.05;

@@ -134,7 +134,7 @@ impl<const N: usize, const B: usize> Question<N, B> {
 }
 
 /// Results of all checks.
-pub struct Doubts<const N: usize, const B: usize> {
+pub struct LoggingErrors<const N: usize, const B: usize> {
     /// Rows of all recordings.
     pub equations: Equations<N, B>,
     /// Directions with their fits.
@@ -164,7 +164,7 @@ pub struct Sigma {
     /// Part caused by the scatter between recordings; zero where unknown.
     pub recordings: f64,
     /// Part caused by directions that are not significant.
-    pub doubt: f64,
+    pub logging: f64,
     /// Part caused by the steps of the encoders.
     pub encoder: f64,
 }
@@ -179,15 +179,15 @@ impl Sigma {
     /// Reported value.
     #[must_use]
     pub fn total(&self) -> f64 {
-        self.noise.max(self.misfit()).hypot(self.doubt).hypot(self.encoder)
+        self.noise.max(self.misfit()).hypot(self.logging).hypot(self.encoder)
     }
 
     /// Largest part.
     #[must_use]
     pub fn source(&self) -> &'static str {
         let scatter = self.noise.max(self.misfit());
-        if self.doubt.max(self.encoder) > scatter {
-            if self.encoder > self.doubt { "encoder" } else { "doubt" }
+        if self.logging.max(self.encoder) > scatter {
+            if self.encoder > self.logging { "encoder" } else { "doubt" }
         } else if self.recordings > self.noise.max(self.segments) {
             "recordings"
         } else if self.segments > self.noise {
@@ -198,7 +198,7 @@ impl Sigma {
     }
 }
 
-impl<const N: usize, const B: usize> Doubts<N, B> {
+impl<const N: usize, const B: usize> LoggingErrors<N, B> {
     /// Fits every direction; `None` where a joint has too few rows.
     ///
     /// # Errors
@@ -217,7 +217,7 @@ impl<const N: usize, const B: usize> Doubts<N, B> {
             noise: question.sigma[base],
             segments: scatter[base],
             recordings: 0.0,
-            doubt: 0.0,
+            logging: 0.0,
             encoder: encoder.map_or(0.0, |bias| bias.sigma[base]),
         });
         let misfit_over_noise = core::array::from_fn(|joint| {
@@ -231,7 +231,7 @@ impl<const N: usize, const B: usize> Doubts<N, B> {
             found.iter().map(|found| DirectionReport::of(found, &parameters, systematic)).collect();
         for (found, _) in found.iter().zip(&directions).filter(|(_, report)| report.passed) {
             for (sigma, variance) in sigma.iter_mut().zip(found.variance()) {
-                sigma.doubt = sigma.doubt.hypot(variance.sqrt());
+                sigma.logging = sigma.logging.hypot(variance.sqrt());
             }
         }
         let midway = midway::look(&equations);

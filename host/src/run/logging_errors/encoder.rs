@@ -27,8 +27,8 @@ use scarab::real::Real;
 use crate::formats::leg_file::LegFile;
 use crate::formats::recording::{JointSeries, Recording};
 use crate::leg::setup::encoder_steps;
-use crate::run::doubt::fit::{Fit, solve};
-use crate::run::doubt::rows::{Equations, Filters, Motion};
+use crate::run::logging_errors::fit::{Fit, solve};
+use crate::run::logging_errors::rows::{Equations, Filters, Motion};
 use crate::run::resample::Resampled;
 
 /// Share of the changes of a column that must be whole steps.

@@ -30,8 +30,8 @@ use std::borrow::Cow;
 use nalgebra::{Rotation3, Unit, Vector3};
 use scarab::ident::{RowModel, Smoothed};
 
-use crate::run::doubt::fit::{Fit, Score, score};
-use crate::run::doubt::rows::Equations;
+use crate::run::logging_errors::fit::{Fit, Score, score};
+use crate::run::logging_errors::rows::Equations;
 
 /// Standard deviations that chance exceeds once in ten million tests.
 pub const CHANCE: f64 = 5.2;

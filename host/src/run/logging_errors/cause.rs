@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! remaining     misfit of the refit over the torque, root mean square over the joints
-//! plausible     no parameter negative by more than 5 sigma that must be positive; torque of the prior's sign
-//!               and size
+//! plausible     no parameter that must be positive is below zero by more than 5 sigma;
+//!               torque of the prior's sign and size
 //! ```
 //!
 //! Ranking: findings about samples first, then the plausible correction that leaves least of the misfit.
@@ -14,12 +14,12 @@
 use crate::base::number::Number;
 use crate::report::doubt::{CauseReport, DirectionReport, SampleFinding};
 use crate::report::findings::FindingReport;
-use crate::run::doubt::directions::{CHANCE, Directions, Found, label};
-use crate::run::doubt::lag::{self, Lag};
-use crate::run::doubt::midway::Midway;
-use crate::run::doubt::rows::{Equations, Motion};
-use crate::run::doubt::samples::SATURATION;
-use crate::run::doubt::{Doubts, Question, midway_words, sample_cause};
+use crate::run::logging_errors::directions::{CHANCE, Directions, Found, label};
+use crate::run::logging_errors::lag::{self, Lag};
+use crate::run::logging_errors::midway::Midway;
+use crate::run::logging_errors::rows::{Equations, Motion};
+use crate::run::logging_errors::samples::SATURATION;
+use crate::run::logging_errors::{LoggingErrors, Question, midway_words, sample_cause};
 
 /// Sigma by which a parameter may be negative.
 const NEGATIVE_SIGMA: f64 = 5.0;
@@ -62,37 +62,37 @@ struct Tried {
 #[must_use]
 pub fn likely<const N: usize, const B: usize>(
     question: &Question<N, B>,
-    doubts: Option<&Doubts<N, B>>,
+    errors: Option<&LoggingErrors<N, B>>,
     samples: &[SampleFinding],
     findings: &[FindingReport],
 ) -> CauseReport {
     if let Some(finding) = samples.iter().find(|finding| finding.refuses) {
         return sample_cause(finding);
     }
-    let Some(doubts) = doubts else { return excluded(samples).unwrap_or_else(unknown) };
-    if let Some(cause) = encoder_steps(question, doubts, findings) {
+    let Some(errors) = errors else { return excluded(samples).unwrap_or_else(unknown) };
+    if let Some(cause) = encoder_steps(question, errors, findings) {
         return cause;
     }
     // Damage resembles friction at rest and columns without effect: the refused fit's choice of both is not
     // used.
     let plain = question.with_all_columns();
-    let again = plain.as_ref().and_then(|plain| Doubts::of(plain).ok().flatten());
-    let (question, doubts) = match (&plain, &again) {
+    let again = plain.as_ref().and_then(|plain| LoggingErrors::of(plain).ok().flatten());
+    let (question, errors) = match (&plain, &again) {
         (Some(plain), Some(again)) => (plain, again),
-        _ => (question, doubts),
+        _ => (question, errors),
     };
-    let here = quality(question, &doubts.equations);
+    let here = quality(question, &errors.equations);
     let mut tried = refits(question);
     // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
-    let lags = lag::all(&doubts.equations).into_iter().filter(|lag| lag.significance > CHANCE);
-    tried.extend(lags.map(|lag| of_lag(question, doubts, lag, here)));
-    for (found, report) in doubts.found.iter().zip(&doubts.directions) {
+    let lags = lag::all(&errors.equations).into_iter().filter(|lag| lag.significance > CHANCE);
+    tried.extend(lags.map(|lag| of_lag(question, errors, lag, here)));
+    for (found, report) in errors.found.iter().zip(&errors.directions) {
         let certain = found.significance() > CHANCE && (!report.passed || !here.sound);
         if certain {
-            tried.push(of_direction(question, doubts, found, report, here));
+            tried.push(of_direction(question, errors, found, report, here));
         }
     }
-    if let Some(midway) = doubts.midway.as_ref().filter(|midway| midway.refuses()) {
+    if let Some(midway) = errors.midway.as_ref().filter(|midway| midway.refuses()) {
         tried.push(Tried {
             cause: CauseReport {
                 name: "changed_midway",
@@ -108,7 +108,7 @@ pub fn likely<const N: usize, const B: usize>(
             is_shared: false,
         });
     }
-    let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(doubts, &tried.cause)).collect();
+    let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(errors, &tried.cause)).collect();
     let passing = tried.into_iter().zip(refused).filter(|(tried, refused)| {
         tried.quality.sound && (!here.sound || *refused || tried.quality.remaining < HALVED * here.remaining)
     });
@@ -125,7 +125,7 @@ pub fn likely<const N: usize, const B: usize>(
             sigma: Number::UNKNOWN,
             words: finding.words.clone(),
         },
-        (None, None) => weaker(question, doubts, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
+        (None, None) => weaker(question, errors, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
     }
 }
 
@@ -133,10 +133,10 @@ pub fn likely<const N: usize, const B: usize>(
 /// acceptable.
 fn encoder_steps<const N: usize, const B: usize>(
     question: &Question<N, B>,
-    doubts: &Doubts<N, B>,
+    errors: &LoggingErrors<N, B>,
     findings: &[FindingReport],
 ) -> Option<CauseReport> {
-    let bias = doubts.encoder?;
+    let bias = errors.encoder?;
     let mut failed = findings.iter().filter(|finding| !finding.passed);
     let words = if let Some(steps) = failed.clone().find(|finding| finding.test == "encoder_steps")
         && failed.all(|finding| finding.test == "encoder_steps")
@@ -145,11 +145,11 @@ fn encoder_steps<const N: usize, const B: usize>(
     } else {
         let hz = question.calmer_hz().ok()??;
         let calmer = question.at(hz);
-        let doubts = Doubts::of(&calmer).ok()??;
-        let is_right = doubts.directions.iter().all(|direction| direction.passed)
-            && !doubts.midway.as_ref().is_some_and(Midway::refuses)
-            && !doubts.encoder.is_some_and(|bias| bias.refuses())
-            && quality(&calmer, &doubts.equations).sound;
+        let errors = LoggingErrors::of(&calmer).ok()??;
+        let is_right = errors.directions.iter().all(|direction| direction.passed)
+            && !errors.midway.as_ref().is_some_and(Midway::refuses)
+            && !errors.encoder.is_some_and(|bias| bias.refuses())
+            && quality(&calmer, &errors.equations).sound;
         if !is_right {
             return None;
         }
@@ -170,9 +170,9 @@ fn encoder_steps<const N: usize, const B: usize>(
 #[must_use]
 pub fn in_degrees<const N: usize, const B: usize>(
     question: &Question<N, B>,
-    doubts: &Doubts<N, B>,
+    errors: &LoggingErrors<N, B>,
 ) -> Option<CauseReport> {
-    let here = quality(question, &doubts.equations);
+    let here = quality(question, &errors.equations);
     let candidates = corrections::<N>().into_iter().filter(|correction| {
         correction.name == "angle_unit" && spans(question, correction.joint, 2.0 * std::f64::consts::TAU)
     });
@@ -198,15 +198,15 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
 /// Direction that is not significant enough to refuse by itself, named after another refusal.
 fn weaker<const N: usize, const B: usize>(
     question: &Question<N, B>,
-    doubts: &Doubts<N, B>,
+    errors: &LoggingErrors<N, B>,
     here: Quality,
 ) -> Option<CauseReport> {
-    let pairs = doubts.found.iter().zip(&doubts.directions);
+    let pairs = errors.found.iter().zip(&errors.directions);
     let likely = pairs.filter(|(found, report)| {
         found.significance() > WEAKER
             && found.explained() > 0.3 * report.explained_limit.known().unwrap_or(1.0)
     });
-    let tried = likely.map(|(found, report)| of_direction(question, doubts, found, report, here));
+    let tried = likely.map(|(found, report)| of_direction(question, errors, found, report, here));
     nearest(tried.filter(|tried| tried.quality.sound).collect())
 }
 
@@ -226,41 +226,41 @@ fn unknown() -> CauseReport {
     }
 }
 
-fn is_refusing<const N: usize, const B: usize>(doubts: &Doubts<N, B>, cause: &CauseReport) -> bool {
+fn is_refusing<const N: usize, const B: usize>(errors: &LoggingErrors<N, B>, cause: &CauseReport) -> bool {
     // A low-pass, or a delay of all joints, belongs to the delays that refused.
     let is_lag = cause.name == "torque_filter" || (cause.name == "delay" && cause.joint.is_none());
     cause.name == "changed_midway"
-        || doubts.directions.iter().filter(|report| !report.passed).any(|report| {
+        || errors.directions.iter().filter(|report| !report.passed).any(|report| {
             (is_lag && report.name == "delay") || (report.name == cause.name && report.joint == cause.joint)
         })
 }
 
 fn of_lag<const N: usize, const B: usize>(
     question: &Question<N, B>,
-    doubts: &Doubts<N, B>,
+    errors: &LoggingErrors<N, B>,
     lag: Lag<B>,
     here: Quality,
 ) -> Tried {
-    let sigma = doubts.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+    let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
     let sound = is_sound(question, &lag.values, &sigma)
-        && agrees(question, &doubts.equations, &lag.columns, &lag.torque);
+        && agrees(question, &errors.equations, &lag.columns, &lag.torque);
     let remaining = here.remaining * lag.remaining.sqrt();
     Tried { cause: lag.cause, quality: Quality { remaining, sound }, is_shared: false }
 }
 
 fn of_direction<const N: usize, const B: usize>(
     question: &Question<N, B>,
-    doubts: &Doubts<N, B>,
+    errors: &LoggingErrors<N, B>,
     found: &Found<B>,
     report: &DirectionReport,
     here: Quality,
 ) -> Tried {
     let remaining = here.remaining * (1.0 - found.explained()).max(0.0).sqrt();
-    let sigma = doubts.sigma.map(|sigma| sigma.noise.max(sigma.segments));
-    let directions = Directions { equations: &doubts.equations, zero: question.zero(), axis: question.axis };
+    let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+    let directions = Directions { equations: &errors.equations, zero: question.zero(), axis: question.axis };
     let (columns, torque) = directions.system(found.kind, found.value);
     let sound =
-        is_sound(question, &found.values, &sigma) && agrees(question, &doubts.equations, &columns, &torque);
+        is_sound(question, &found.values, &sigma) && agrees(question, &errors.equations, &columns, &torque);
     let mut cause = CauseReport::direction(found.kind, report);
     if !found.alike.is_empty() {
         cause.words = format!(
@@ -420,7 +420,7 @@ fn quality<const N: usize, const B: usize>(
 ) -> Quality {
     let fit = equations.fit(&equations.columns, &equations.torque, false);
     let segments: Vec<usize> = equations.places.iter().map(|place| place.cluster).collect();
-    let scatter = crate::run::doubt::fit::segment_sigma(
+    let scatter = crate::run::logging_errors::fit::segment_sigma(
         &fit,
         &equations.columns,
         &equations.torque,

@@ -12,8 +12,8 @@
 //! all.
 
 use crate::report::doubt::CauseReport;
-use crate::run::doubt::fit::{Fit, score};
-use crate::run::doubt::rows::Equations;
+use crate::run::logging_errors::fit::{Fit, score};
+use crate::run::logging_errors::rows::Equations;
 
 /// Times tried by the scan, s.
 const SCAN_S: [f64; 8] = [0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064, 0.128];

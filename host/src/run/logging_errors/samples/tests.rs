@@ -1,5 +1,5 @@
 use crate::formats::recording::JointSeries;
-use crate::run::doubt::samples::*;
+use crate::run::logging_errors::samples::*;
 
 /// Reproducible noise, uniform in +-1.
 struct Noise(u64);

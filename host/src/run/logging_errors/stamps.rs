@@ -24,7 +24,7 @@ use std::f64::consts::TAU;
 
 use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
-use crate::run::doubt::samples::median;
+use crate::run::logging_errors::samples::median;
 
 /// Finding of wrong time stamps.
 pub const TIME_STAMPS: &str = "time_stamps";

@@ -1,5 +1,5 @@
 use crate::formats::recording::JointSeries;
-use crate::run::doubt::stamps::*;
+use crate::run::logging_errors::stamps::*;
 
 /// Twenty seconds at 500 Hz, sampled at `times + sampled * normal` and stamped `stamped * normal` wrong.
 fn recording(sampled_s: f64, stamped_s: f64) -> Recording {

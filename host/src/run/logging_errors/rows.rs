@@ -17,7 +17,7 @@ use scarab::ident::{
     SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS, Smoothed,
 };
 
-use crate::run::doubt::fit::{Fit, segment_sigma, solve};
+use crate::run::logging_errors::fit::{Fit, segment_sigma, solve};
 
 /// Reserved filter taps: bandwidths from 1 Hz.
 const TAPS: usize = 2048;

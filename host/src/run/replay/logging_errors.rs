@@ -17,9 +17,9 @@ use crate::leg::background::Background;
 use crate::report::RunReport;
 use crate::report::doubt::{BandwidthReport, RecordingsReport};
 use crate::report::findings::FindingReport;
-use crate::run::doubt::encoder::{Encoder, Encoders};
-use crate::run::doubt::rows::{Equations, Filters, Motion};
-use crate::run::doubt::{Doubts, Question, cause, noise as scatter, sample_finding};
+use crate::run::logging_errors::encoder::{Encoder, Encoders};
+use crate::run::logging_errors::rows::{Equations, Filters, Motion};
+use crate::run::logging_errors::{LoggingErrors, Question, cause, noise as scatter, sample_finding};
 use crate::run::replay::cleaning::cleaned;
 use crate::run::replay::recordings::leave_one_out;
 use crate::run::replay::screening::Screening;
@@ -225,14 +225,14 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
     pub(super) fn examine(&self, run: &mut RunReport) -> Result<(), ToolError> {
         let samples = self.screening.findings();
         let (question, file_of) = self.question();
-        let mut doubts =
-            Doubts::of(&question).map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
-        let mut report = doubts.as_ref().map(Doubts::report).unwrap_or_default();
-        if let Some(doubts) = &mut doubts {
-            report.recordings = self.between_recordings(doubts, &file_of);
-            self.widen(run, doubts);
-            run.findings.extend(doubts.findings());
-            run.findings.extend(cause::in_degrees(&question, doubts).map(|found| FindingReport {
+        let mut errors =
+            LoggingErrors::of(&question).map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
+        let mut report = errors.as_ref().map(LoggingErrors::report).unwrap_or_default();
+        if let Some(errors) = &mut errors {
+            report.recordings = self.between_recordings(errors, &file_of);
+            self.widen(run, errors);
+            run.findings.extend(errors.findings());
+            run.findings.extend(cause::in_degrees(&question, errors).map(|found| FindingReport {
                 reason: Reason::Input.name(),
                 test: found.name,
                 joint: found.joint,
@@ -261,7 +261,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         });
         run.verdict = if run.accepted() { "accepted" } else { "refused" };
         if !run.accepted() {
-            let cause = cause::likely(&question, doubts.as_ref(), samples, &run.findings);
+            let cause = cause::likely(&question, errors.as_ref(), samples, &run.findings);
             correct_words(run, cause.name);
             report.likely_cause = Some(cause);
         }
@@ -270,10 +270,10 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
     }
 
     /// Adds the scatter between recordings to sigma.
-    fn between_recordings(&self, doubts: &mut Doubts<N, B>, file_of: &[usize]) -> RecordingsReport {
-        let (count, scatter) = leave_one_out(&doubts.equations, file_of);
+    fn between_recordings(&self, errors: &mut LoggingErrors<N, B>, file_of: &[usize]) -> RecordingsReport {
+        let (count, scatter) = leave_one_out(&errors.equations, file_of);
         let Some(scatter) = scatter else { return RecordingsReport { count, sigma: Vec::new() } };
-        for (sigma, scatter) in doubts.sigma.iter_mut().zip(scatter) {
+        for (sigma, scatter) in errors.sigma.iter_mut().zip(scatter) {
             sigma.recordings = scatter;
         }
         let kept = self.background.kept(&self.solver.record().selection.dropped);
@@ -322,12 +322,12 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
     }
 
     /// Replaces the reported standard deviations by the larger ones.
-    fn widen(&self, run: &mut RunReport, doubts: &Doubts<N, B>) {
+    fn widen(&self, run: &mut RunReport, errors: &LoggingErrors<N, B>) {
         let kept: Vec<usize> = self.background.kept(&self.solver.record().selection.dropped).collect();
         let mut ratios = vec![1.0; kept.len()];
         for ((base, report), ratio) in kept.iter().zip(&mut run.base_parameters).zip(&mut ratios) {
             let Some(before) = report.sigma.known() else { continue };
-            let sigma = doubts.sigma[*base];
+            let sigma = errors.sigma[*base];
             report.sigma = sigma.total().into();
             report.sigma_from = sigma.source();
             report.sigma_noise = sigma.noise.into();
