@@ -112,7 +112,7 @@ fn a_wrong_link_length_is_found_with_sign_and_size() {
 }
 
 #[test]
-fn the_first_joint_s_zero_is_detected_and_the_last_one_s_is_not() {
+fn only_the_first_joint_s_zero_error_is_detected() {
     let found = look(LENGTH_M, [0.087, 0.0], NOISE_NM, 1, |_| 0.0);
     println!("{:?}", found.misalignments);
     let (delta, sigma) = of(&found, Direction::Zero, 0).expect("seen");
