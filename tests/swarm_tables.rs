@@ -189,7 +189,7 @@ fn moving_only_the_best_saves_evaluations_in_the_plane() {
 }
 
 #[test]
-fn velocity_is_not_the_engine() {
+fn search_works_almost_as_well_without_velocity() {
     // Without any velocity the medians stay: 21 and 25 of 22 and 25 iterations.
     let still = AdaptiveSettings {
         inertia_weight: 0.0,
@@ -225,7 +225,7 @@ fn paper_mode_does_what_the_printed_rules_do() {
 }
 
 #[test]
-fn particle_swarm_does_what_its_table_says() {
+fn particle_swarm_meets_its_table() {
     // Known medians: 25, 4, 4, 38; 473 in thirty dimensions, where 16 to 22 % succeed on Ackley's function.
     for (function, dimension, runs, least, most) in [
         (TestFunction::Sphere, 2, 60, 17, 33),
@@ -242,7 +242,7 @@ fn particle_swarm_does_what_its_table_says() {
 }
 
 #[test]
-fn antennae_search_does_what_its_table_says() {
+fn antennae_search_meets_its_table() {
     // Known success: 45, 79, 100 (median 22 iterations), 3 %. 200 runs: standard error 3.5 %, four
     // of them allowed.
     for (function, least, most) in [

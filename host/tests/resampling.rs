@@ -173,7 +173,7 @@ fn too_large_a_bandwidth_gives_a_warning() {
 }
 
 #[test]
-fn points_and_joints_beyond_the_last_are_none() {
+fn points_and_joints_beyond_the_last_have_no_value() {
     let resampled = Resampled::of(&sine(uniform_stamps(500.0)));
     assert_eq!(resampled.position_rad::<1>(resampled.len()), None);
     assert_eq!(resampled.torque_nm::<2>(0), None);

@@ -134,7 +134,7 @@ fn errors_without_effect_on_torque_are_accepted() {
 }
 
 #[test]
-fn honest_runs_are_accepted_far_within_the_limits() {
+fn valid_runs_are_accepted_far_within_the_limits() {
     for seed in 1..=5 {
         let report = simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::of_seed(seed))
             .expect("it runs")

@@ -194,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_known_is_a_dash_and_a_minus_is_a_minus() {
+    fn unknown_values_are_dashes_and_negative_values_have_a_minus() {
         assert_eq!(number(Number::UNKNOWN), "\u{2013}");
         assert_eq!(number((-0.79941).into()), "\u{2212}0.799");
         assert_eq!(number(f64::NAN.into()), "\u{2013}");

@@ -181,7 +181,7 @@ impl Client {
 }
 
 #[test]
-fn a_disconnected_client_pulls_the_plug_and_stops_the_leg() {
+fn a_lost_client_disconnects_the_boards_and_stops_the_leg() {
     for closes in [false, true] {
         let serve = Serve::new();
         let mut client = Client::new(&serve);

@@ -95,7 +95,7 @@ fn coarse_angles_interpolated_to_another_clock_are_neither_held_nor_frozen() {
 }
 
 #[test]
-fn a_gravity_torque_with_a_broad_peak_is_no_limit() {
+fn a_gravity_torque_with_a_broad_peak_is_not_taken_for_a_limit() {
     // Swings up to the horizontal, without noise: a peak of the fourth order.
     let mut swing = recording(0.0, 0.0);
     let series = &mut swing.joints[0];
