@@ -173,8 +173,14 @@ fn blank_lines_are_skipped_but_counted() {
 
 #[test]
 fn time_that_does_not_increase_is_refused() {
-    assert_eq!(refusal_with("0.9,0.1,-0.2,3,-4"), "walk.csv:102: time 0.9 s does not exceed the previous 0.99 s");
-    assert_eq!(refusal_with("0.990,0.1,-0.2,3,-4"), "walk.csv:102: time 0.99 s does not exceed the previous 0.99 s");
+    assert_eq!(
+        refusal_with("0.9,0.1,-0.2,3,-4"),
+        "walk.csv:102: time 0.9 s does not exceed the previous 0.99 s"
+    );
+    assert_eq!(
+        refusal_with("0.990,0.1,-0.2,3,-4"),
+        "walk.csv:102: time 0.99 s does not exceed the previous 0.99 s"
+    );
 }
 
 #[test]

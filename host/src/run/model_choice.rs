@@ -161,7 +161,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             );
         };
         let (gain, surplus) = (f64::from(gain), f64::from(surplus));
-        if asked == Switch::On {
+        if requested == Switch::On {
             let why = if used {
                 "requested by the leg file"
             } else {

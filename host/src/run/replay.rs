@@ -1,8 +1,8 @@
 //! `replay`: the firmware's identification on recordings.
 
 mod cleaning;
-mod logging_errors;
 mod known_mass;
+mod logging_errors;
 mod predictions;
 mod recordings;
 mod screening;
@@ -31,10 +31,10 @@ use crate::run::analysis::{Circumstances, Motion};
 use crate::run::logging_errors::encoder::Encoders;
 use crate::run::resample::Resampled;
 use cleaning::cleaned;
+use known_mass::{load_base, settled};
 use logging_errors::{
     Subject, Whole, chosen_bandwidth, corrected, encoders, is_explained_by_noise, noise_density, sample_noise,
 };
-use known_mass::{load_base, settled};
 use predictions::{Prediction, write_predictions};
 use screening::{Continuity, Screening, refuse_copies};
 

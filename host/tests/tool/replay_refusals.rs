@@ -36,7 +36,10 @@ fn bad_recordings_are_refused_with_file_line_and_reason() {
          are: t_s, q1_rad, tau1_Nm\n"
     );
     assert_eq!(refusal_with("0.2,NaN,1.0"), "error: walk.csv:102: `NaN` in column `q1_rad` is not finite\n");
-    assert_eq!(refusal_with("0.1,0.2,1.0"), "error: walk.csv:102: time 0.1 s does not exceed the previous 0.198 s\n");
+    assert_eq!(
+        refusal_with("0.1,0.2,1.0"),
+        "error: walk.csv:102: time 0.1 s does not exceed the previous 0.198 s\n"
+    );
     assert_eq!(
         refusal_with("0.198,0.2,1.0"),
         "error: walk.csv:102: time 0.198 s does not exceed the previous 0.198 s\n"

@@ -137,7 +137,8 @@ pub(super) fn until_safe(fork: &mut Fork<'_>, patience: &Patience) -> (Option<&'
 fn check_report(fork: &mut Fork<'_>, state: Option<&str>, codes: [FaultCode; 2]) {
     fork.run(REPORT_TICKS);
     let codes = codes.map(FaultCode::number);
-    let has_reported = |node: &u16| fork.host.emergencies().iter().any(|(from, code)| from == node && codes.contains(code));
+    let has_reported =
+        |node: &u16| fork.host.emergencies().iter().any(|(from, code)| from == node && codes.contains(code));
     if state.is_some() && !NODES.iter().all(has_reported) {
         fork.broken("no emergency message reports it");
     }

@@ -104,7 +104,12 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     let erased = fork.host.board().memory().worked().1 > before;
     fork.run(REPORT_TICKS);
     let reports = NODES.map(|node| {
-        fork.host.emergencies().iter().filter(|(from, _)| *from == node).map(|(_, code)| *code).collect::<Vec<_>>()
+        fork.host
+            .emergencies()
+            .iter()
+            .filter(|(from, _)| *from == node)
+            .map(|(_, code)| *code)
+            .collect::<Vec<_>>()
     });
     // Frames sent during the stall may be lost, which is reported; nothing else may be.
     let is_reported = reports.iter().all(|codes| {

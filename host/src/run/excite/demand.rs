@@ -88,7 +88,9 @@ pub fn demand<const N: usize, const B: usize>(
             continue;
         };
         for tick in (0..=ramp.duration_ticks()).step_by(APPROACH_STEP) {
-            for (joint, (torque, uncertainty)) in torques(scorer, &ramp.state_at(tick)).into_iter().enumerate() {
+            for (joint, (torque, uncertainty)) in
+                torques(scorer, &ramp.state_at(tick)).into_iter().enumerate()
+            {
                 demand[joint].approach_nm = demand[joint].approach_nm.max(torque.abs() + uncertainty);
             }
         }

@@ -39,7 +39,12 @@ pub fn measure(bench: &Bench) -> Result<Vec<LimitReport>, ToolError> {
     Ok(reports)
 }
 
-fn one(bench: &Bench, speed: f64, supply: f64, [requested, target]: [f64; 2]) -> Result<LimitReport, ToolError> {
+fn one(
+    bench: &Bench,
+    speed: f64,
+    supply: f64,
+    [requested, target]: [f64; 2],
+) -> Result<LimitReport, ToolError> {
     let mut bench = bench.clone();
     bench.supply.voltage = supply;
     bench.configuration.bus[0] = Volt(8.0);

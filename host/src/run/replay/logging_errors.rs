@@ -225,8 +225,8 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
     pub(super) fn examine(&self, run: &mut RunReport) -> Result<(), ToolError> {
         let samples = self.screening.findings();
         let (question, file_of) = self.question();
-        let mut errors =
-            LoggingErrors::of(&question).map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
+        let mut errors = LoggingErrors::of(&question)
+            .map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
         let mut report = errors.as_ref().map(LoggingErrors::report).unwrap_or_default();
         if let Some(errors) = &mut errors {
             report.recordings = self.between_recordings(errors, &file_of);

@@ -229,7 +229,10 @@ mod tests {
                 for range in [-end..end, 0.0..end, 48.0..48.0 + end, -0.3 * end..end] {
                     let axis = RangedCoordf64::from(range.clone());
                     let drawn = axis.key_points(BoldPoints(labels(&range, requested))).len();
-                    assert!((LEAST_LABELS..=requested + 4).contains(&drawn), "{requested} {range:?}: {drawn}");
+                    assert!(
+                        (LEAST_LABELS..=requested + 4).contains(&drawn),
+                        "{requested} {range:?}: {drawn}"
+                    );
                 }
             }
         }
