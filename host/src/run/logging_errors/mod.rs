@@ -127,7 +127,7 @@ impl<const N: usize, const B: usize> Question<N, B> {
         Ok((hz < self.bandwidth_hz).then_some(hz))
     }
 
-    /// The same input at a lower bandwidth.
+    /// This input at a lower bandwidth.
     fn at(&self, bandwidth_hz: f64) -> Self {
         Self { model: self.model_at(bandwidth_hz), motions: self.motions.clone(), bandwidth_hz, ..*self }
     }
