@@ -293,8 +293,11 @@ fn one() -> i64 {
     1
 }
 
+/// Range of a joint without `range_deg`, anatomical, degrees.
+pub const DEFAULT_RANGE_DEG: [f64; 2] = [-90.0, 90.0];
+
 fn default_range() -> [f64; 2] {
-    [-90.0, 90.0]
+    DEFAULT_RANGE_DEG
 }
 
 fn default_speed_limit() -> f64 {

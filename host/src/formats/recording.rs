@@ -18,6 +18,7 @@
 //! Limits: swapped columns, or a command recorded as a measurement, look like valid numbers here; only the
 //! fit can detect them. Cost: 16 bytes per joint and sample, and 16 per sample.
 
+use std::f64::consts::TAU;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -40,6 +41,9 @@ pub const MINIMUM_DURATION_S: f64 = 1.0;
 pub const MINIMUM_RATE_HZ: f64 = 10.0;
 /// Tolerance on the rate for rounded time stamps.
 const RATE_TOLERANCE: f64 = 1.001;
+/// Deviation from a whole turn within which a jump of an angle is one, rad, and samples for which it stays.
+const TURN_TOLERANCE_RAD: f64 = 0.5;
+const TURN_SAMPLES: usize = 5;
 /// Longest step that is not a gap, s.
 pub const LARGEST_STEP_S: f64 = 0.1;
 /// Longest step in median steps that is not a gap.
@@ -101,7 +105,7 @@ impl Recording {
         )?;
         recording.joints_in_file = joints_in_file;
         recording.check_rate()?;
-        recording.check_gaps().map_err(|(sample, fault)| {
+        recording.check_gaps().and_then(|()| recording.check_turns()).map_err(|(sample, fault)| {
             let line = offsets.get(sample).map(|&offset| line_at(text, offset));
             refuse(file, line, fault)
         })?;
@@ -195,6 +199,23 @@ impl Recording {
             Some(sample) => Err((sample, Fault::Gap { gap: step(sample), limit })),
             None => Ok(()),
         }
+    }
+
+    /// First sample at which an angle jumps by a whole turn and stays there. Isolated samples are outliers.
+    fn check_turns(&self) -> Result<(), (usize, Fault)> {
+        for (joint, series) in self.joints.iter().enumerate() {
+            let angles = &series.position_rad;
+            let is_turn = |change: f64| (change.abs() - TAU).abs() < TURN_TOLERANCE_RAD;
+            let stays = |sample: usize| {
+                angles.get(sample + TURN_SAMPLES).is_none_or(|later| is_turn(later - angles[sample - 1]))
+            };
+            let turn = |sample: &usize| is_turn(angles[*sample] - angles[sample - 1]) && stays(*sample);
+            if let Some(sample) = (1..angles.len()).find(turn) {
+                let jump = angles[sample] - angles[sample - 1];
+                return Err((sample, Fault::Wrapped { joint: joint + 1, jump }));
+            }
+        }
+        Ok(())
     }
 
     fn check_length(&self) -> Result<(), FileError> {

@@ -342,6 +342,6 @@ fn servo_inertia<const N: usize, const B: usize>(
     background: &Background<N, B>,
 ) -> Result<[f64; N], FileError> {
     let links = links::<N>(leg, |joint| joint.prior.as_ref().or(joint.truth.as_ref()))
-        .ok_or_else(|| leg.error("the servo's gains need `prior` or `truth` of every joint"))?;
+        .ok_or_else(|| leg.error("the servo's gains need `prior` or `truth` of every joint; `replay` identifies from a recording without them"))?;
     Ok(largest_inertia(&background.model.chain, &prior_parameters(&links)))
 }

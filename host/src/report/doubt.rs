@@ -34,23 +34,32 @@ pub struct BandwidthReport {
     /// Larger bandwidth that the encoders allow, where the noise explains the misfit.
     #[serde(rename = "bandwidth_proposed_hz")]
     pub proposed_hz: Option<f64>,
+    /// Largest bandwidth at which Stribeck friction is searched for, where the encoders are too coarse here.
+    #[serde(rename = "bandwidth_for_stribeck_hz")]
+    pub stribeck_hz: Option<f64>,
 }
 
 impl BandwidthReport {
     /// Line of the report.
     fn line(&self) -> String {
         let hz = self.bandwidth_hz;
+        let stribeck = self.stribeck_hz.map_or(String::new(), |lower| {
+            format!(
+                "; the encoders are too coarse to search for Stribeck friction, which would bias friction unseen: \
+                 `--bandwidth {lower}` searches for it"
+            )
+        });
         if self.is_chosen {
             format!(
                 "bandwidth: {hz} Hz, chosen from 3.2 to 16 Hz: the largest that the recording's rate allows and at which the \
-                 encoders' steps shift no parameter by more than its sigma, or the smallest if none qualifies"
+                 encoders' steps shift no parameter by more than its sigma, or the smallest if none qualifies{stribeck}"
             )
         } else if let Some(larger) = self.proposed_hz {
             format!(
                 "bandwidth: {hz} Hz; the encoders allow {larger} Hz, at which sticking biases friction less: `--bandwidth {larger}`"
             )
         } else {
-            format!("bandwidth: {hz} Hz")
+            format!("bandwidth: {hz} Hz{stribeck}")
         }
     }
 }
@@ -230,7 +239,8 @@ impl CauseReport {
     /// Printed line.
     #[must_use]
     pub fn line(&self) -> String {
-        format!("likely cause: {}: {}", self.name.replace('_', " "), self.words)
+        let name = format!("{}: ", self.name.replace('_', " "));
+        format!("likely cause: {name}{}", self.words.strip_prefix(&name).unwrap_or(&self.words))
     }
 }
 

@@ -63,6 +63,31 @@ impl FindingReport {
     }
 }
 
+/// Error of a link's length that every recording should show.
+const LARGEST_UNTESTED_LENGTH: f64 = 0.1;
+
+/// Sentences about lengths that the recording hardly tests: the limit of their test is wide.
+#[must_use]
+pub fn untested_lengths(findings: &[FindingReport]) -> Vec<String> {
+    let wide = |finding: &&FindingReport| {
+        finding.test == Test::LinkLength.name()
+            && finding.passed
+            && finding.limit.known().is_none_or(|limit| limit > LARGEST_UNTESTED_LENGTH)
+    };
+    let words = |finding: &FindingReport| {
+        let shown = finding
+            .limit
+            .known()
+            .map_or("no error".into(), |limit| format!("only errors above {:.0} %", 100.0 * limit));
+        format!(
+            "length of the link before joint {}: this recording shows {shown}; measure it, or hold out a motion that \
+             excites every joint",
+            finding.joint.unwrap_or(0)
+        )
+    };
+    findings.iter().filter(wide).map(words).collect()
+}
+
 /// Sentence for a failed test.
 fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
     let joint = evidence.joint.map_or(0, |joint| joint + 1);

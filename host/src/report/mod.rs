@@ -347,6 +347,12 @@ pub struct RunReport {
 }
 
 impl RunReport {
+    /// Whether the run is a replay of recordings.
+    #[must_use]
+    pub fn is_replay(&self) -> bool {
+        self.doubt.is_some()
+    }
+
     /// Whether the result was accepted: exit code 0.
     #[must_use]
     pub fn accepted(&self) -> bool {

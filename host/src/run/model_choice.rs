@@ -24,6 +24,9 @@ use crate::leg::background::Background;
 use crate::leg::model_choice::TermSwitches;
 use crate::report::model_choice::{DirectionsReport, ModelChoiceReport};
 
+/// Reason of a joint whose encoder forbids the search for Stribeck friction.
+const TOO_COARSE: &str = "not searched: the encoder is too coarse at this bandwidth";
+
 /// Decision with its reason.
 struct Decision {
     used: bool,
@@ -126,9 +129,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 false,
                 match requested.offset {
                     Switch::Off => "disabled by the leg file",
-                    Switch::Auto if self.device.stribeck_choice(joint) == Choice::Off => {
-                        "not searched: the encoder is too coarse at this bandwidth"
-                    }
+                    Switch::Auto if self.device.stribeck_choice(joint) == Choice::Off => TOO_COARSE,
                     _ => "not distinguishable from the requested asymmetric Coulomb friction",
                 },
             );
@@ -156,6 +157,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 used,
                 match requested {
                     Switch::Off => "disabled by the leg file",
+                    _ if self.device.stribeck_choice(joint) == Choice::Off => TOO_COARSE,
                     _ => "not searched: plain least squares, or nothing was recorded",
                 },
             );

@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use scarab::ident::{
-    ConstantRatio, Ends, Estimator, HeldOut, KernelError, Plan, Progress, Recorder, SearchState, Solver,
-    Stretches, Thresholds, Unused,
+    Choice, ConstantRatio, Ends, Estimator, HeldOut, KernelError, Plan, Progress, Recorder, SearchState,
+    Solver, Stretches, Thresholds, Unused,
 };
 use scarab::model::{AnatomicalJoint, Payload};
 
 use crate::base::error::ToolError;
-use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
+use crate::formats::leg_file::{DEFAULT_RANGE_DEG, LegFile};
 use crate::formats::recording::Recording;
 use crate::leg::background::Background;
 use crate::leg::setup::{PriorChoice, background};
@@ -46,6 +46,8 @@ const PENDING: usize = 205;
 const GRID_S: f64 = 1.0 / scarab::ident::SAMPLE_RATE_HZ;
 /// Evaluations between two updates of the search.
 const SLICE: u32 = 20;
+/// Lowest bandwidth, tenths of a Hz.
+const LOWEST_TENTHS: u32 = 10;
 /// Excess over the leg's range from which a warning is printed.
 const RANGE_MARGIN_DEG: f64 = 5.0;
 
@@ -187,6 +189,7 @@ fn identified<const N: usize, const B: usize>(
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
     let (training, held_out, wholes, screening) = read_all(options, leg, &ratios)?;
+    warn_of_geometry(leg);
     wholes.iter().for_each(|whole| warn_of_another_leg(&whole.recording, leg));
     screening.warn();
     let encoders: Encoders<N> = encoders(&wholes, leg);
@@ -305,9 +308,24 @@ fn identified<const N: usize, const B: usize>(
     let validation = if validated { vec![motion(unused)] } else { Vec::new() };
     let mut run =
         background.report(&solver, verdict, &[motion(solver.record().clone())], &validation, &circumstances);
-    // A misfit above the noise may be vibration; a larger bandwidth passes more of it.
+    let searches_stribeck = |hz: f64| {
+        let mut model = background.model.clone();
+        encoders.describe(leg, hz, &mut model);
+        (0..N).all(|joint| {
+            model.stribeck_choice[joint] == Choice::Off || model.stribeck_choice(joint).is_possible()
+        })
+    };
+    // A misfit above the noise may be vibration; a larger bandwidth passes more of it. Beyond the bandwidths of
+    // the Stribeck search it would bias friction.
     let proposed_hz = if noise_is_known && !options.chooses_bandwidth {
-        Some(chosen_bandwidth(leg, &background, options)?).filter(|hz| *hz > options.bandwidth_hz)
+        let larger = chosen_bandwidth(leg, &background, options)?;
+        Some(larger).filter(|hz| *hz > options.bandwidth_hz && searches_stribeck(*hz))
+    } else {
+        None
+    };
+    let stribeck_hz = if options.estimator == Estimator::Robust && !searches_stribeck(options.bandwidth_hz) {
+        let tenths = (LOWEST_TENTHS..(10.0 * options.bandwidth_hz) as u32).rev();
+        tenths.map(|tenth| f64::from(tenth) / 10.0).find(|hz| searches_stribeck(*hz))
     } else {
         None
     };
@@ -322,6 +340,7 @@ fn identified<const N: usize, const B: usize>(
         screening: &screening,
         load,
         proposed_hz,
+        stribeck_hz,
     };
     subject.examine(&mut run)?;
     run.scale.load = options.load.as_ref().map(MassReport::from);
@@ -446,7 +465,8 @@ fn warn_of_another_leg(recording: &Recording, leg: &LegFile) {
         let (low, high) =
             angles.fold((f64::MAX, f64::MIN), |(low, high), angle| (low.min(angle), high.max(angle)));
         let [lower, upper] = joint.range_deg;
-        if low < lower - RANGE_MARGIN_DEG || high > upper + RANGE_MARGIN_DEG {
+        let is_stated = joint.range_deg != DEFAULT_RANGE_DEG;
+        if is_stated && (low < lower - RANGE_MARGIN_DEG || high > upper + RANGE_MARGIN_DEG) {
             let warning = format!(
                 "q{}_rad goes from {low:.0} to {high:.0} deg, the range of `{}` is {lower:.0} to {upper:.0} deg: are \
                  column, unit, direction and zero right?",
@@ -455,6 +475,30 @@ fn warn_of_another_leg(recording: &Recording, leg: &LegFile) {
             );
             warn(&recording.file, &warning);
         }
+    }
+}
+
+/// Warns of Denavit-Hartenberg numbers and gravity that suggest another convention.
+fn warn_of_geometry(leg: &LegFile) {
+    let Some(first) = leg.joints.first() else { return };
+    if first.dh.a != 0.0 {
+        eprintln!(
+            "warning: {}: `dh.a` of joint `{}` is {} m and has no effect: it is the distance from the joint before. Is it the \
+             length of this joint's link? Then it belongs to the next joint (docs/model.md)",
+            leg.name, first.name, first.dh.a
+        );
+    }
+    let [x, y, z] = leg.gravity;
+    let (sine, cosine) = first.dh.alpha.sin_cos();
+    let along = z * cosine - y * sine;
+    let across = (x * x + y * y + z * z - along * along).max(0.0).sqrt();
+    let is_parallel = leg.joints.iter().skip(1).all(|joint| joint.dh.alpha == 0.0);
+    if is_parallel && across < 1e-3 * along.abs() {
+        eprintln!(
+            "warning: {}: gravity is along the joints' axes, so no torque holds weight. In a vertical plane gravity lies in x \
+             and y of the base frame, because z is the first joint's axis",
+            leg.name
+        );
     }
 }
 

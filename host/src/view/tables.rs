@@ -8,6 +8,7 @@ use crate::base::output::print;
 use crate::base::precision::{exact, plain, sigma, value};
 use crate::base::table::{Cell, Table, cells};
 use crate::report::disturbances::StribeckReport;
+use crate::report::findings::untested_lengths;
 use crate::report::series::Role;
 use crate::report::{
     AddedMassReport, BaseReport, ComparisonReport, ConsistentSearchReport, FitReport, ParameterReport,
@@ -162,8 +163,8 @@ pub fn sources(sources: &[Source]) -> Table {
 }
 
 /// Meaning of the rows in the table of the files.
-pub const SOURCES: &str = "rows: decimated to 50 a second and used for that joint's torque; still: excluded, because \
-                           friction at rest is undetermined.";
+pub const SOURCES: &str = "rows: decimated to 50 a second and used for that joint's torque; still: excluded, at rest \
+                           or near a reversal, because friction at rest is undetermined.";
 
 /// Prints one run.
 pub fn print_run(run: &RunReport) -> Result<(), ToolError> {
@@ -211,6 +212,9 @@ fn run_text(run: &RunReport) -> String {
     lines.extend(cause.map(|cause| format!("  {}", cause.line())));
     if !run.validated && run.seed.is_none() {
         lines.push("  not validated: no motion was held out (--validate, --split)".into());
+    }
+    if run.is_replay() {
+        lines.extend(untested_lengths(&run.findings).into_iter().map(|words| format!("  {words}")));
     }
     lines.extend(run.compared.iter().flat_map(comparison_lines));
     lines.join("\n") + "\n"

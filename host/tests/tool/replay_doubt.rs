@@ -144,6 +144,28 @@ fn a_larger_bandwidth_is_proposed_where_the_encoders_allow_it() {
     );
 }
 
+/// A search at a bandwidth where one count's pulse looks like a Stribeck curve would find the encoder.
+#[test]
+fn encoders_too_coarse_for_the_stribeck_search_are_reported_with_its_bandwidth() {
+    let (coarse, run) = replay(&quantised(14), "--bandwidth 8", 0);
+    let proposed = number(&coarse["bandwidth_for_stribeck_hz"]);
+    assert!(proposed < 8.0 && coarse["bandwidth_proposed_hz"].is_null(), "{proposed}");
+    assert!(run.printed.contains(&format!("`--bandwidth {proposed}` searches for it")), "{}", run.printed);
+    assert!(run.printed.contains("not searched: the encoder is too coarse"), "{}", run.printed);
+    let (there, _) = replay(&quantised(14), &format!("--bandwidth {proposed}"), 0);
+    assert!(there["bandwidth_for_stribeck_hz"].is_null());
+}
+
+/// Without a held-out excitation the limit of the test of lengths is wide.
+#[test]
+fn lengths_that_a_recording_hardly_tests_are_reported() {
+    let (report, run) = replay(&samples(), "", 0);
+    let tests = report["findings"].as_array().expect("a list");
+    let wide = tests.iter().any(|test| test["test"] == "link_length" && number(&test["limit"]) > 0.1);
+    let words = "length of the link before joint 2: this recording shows only errors above";
+    assert_eq!(run.printed.contains(words), wide, "{}", run.printed);
+}
+
 #[test]
 fn sigma_states_its_parts_by_noise_and_by_misfit() {
     let (report, run) = replay(&samples(), "", 0);

@@ -53,6 +53,49 @@ fn bad_recordings_are_refused_with_file_line_and_reason() {
 }
 
 #[test]
+fn a_wrapped_angle_is_refused_with_its_line_and_an_isolated_sample_is_not() {
+    let samples = Motion::default().samples();
+    let with = |change: &dyn Fn(usize) -> f64| {
+        let rows: Vec<[f64; 3]> = samples
+            .iter()
+            .enumerate()
+            .map(|(index, &[time, angle, torque])| [time, angle + change(index), torque])
+            .collect();
+        crate::pendulum::csv(&rows)
+    };
+    let message = refusal(&with(&|index| if index < 2_000 { 0.0 } else { -std::f64::consts::TAU }));
+    assert!(message.starts_with("error: walk.csv:2002: q1_rad jumps by -6.2"), "{message}");
+    assert!(message.contains("unwrap the angle"), "{message}");
+    let folder = Folder::new();
+    let leg = folder.write("leg.toml", &leg(""));
+    let file = folder.write("walk.csv", &with(&|index| if index == 2_000 { 6.28 } else { 0.0 }));
+    scarab("replay", &[&file, Path::new("--leg"), &leg]).ends_with(0);
+}
+
+#[test]
+fn geometry_of_another_convention_gives_a_warning() {
+    let folder = Folder::new();
+    let recording = folder.write("walk.csv", &Motion::default().csv());
+    for (line, other, words) in [
+        ("a = 0.0", "a = 0.35", "`dh.a` of joint `only` is 0.35 m and has no effect"),
+        ("gravity = [9.81, 0.0, 0.0]", "gravity = [0.0, 0.0, -9.81]", "gravity is along the joints' axes"),
+    ] {
+        let leg = folder.write("leg.toml", &leg("").replace(line, other));
+        let run = scarab("replay", &[&recording, Path::new("--leg"), &leg]);
+        assert!(run.errors.contains(words), "{}", run.errors);
+    }
+}
+
+#[test]
+fn columns_in_degrees_are_refused_with_the_conversion() {
+    let message = refusal("t_s,q1_deg,tau1_Nm\n0,0,0\n");
+    assert!(
+        message.contains("has no column `q1_rad`") && message.contains("multiply degrees by pi/180"),
+        "{message}"
+    );
+}
+
+#[test]
 fn implausible_options_are_refused_with_their_limits() {
     let refused =
         |arguments: &str| scarab(&format!("replay {MUJOCO} --leg mujoco-leg {arguments}"), &[]).refusal();
@@ -174,6 +217,7 @@ fn a_motionless_joint_is_refused_as_unexcited() {
     let still = folder.write("still.csv", &crate::pendulum::csv(&still));
     let run = scarab("replay", &[&still, Path::new("--leg"), &leg, Path::new("--json"), &json]).ends_with(3);
     assert!(run.printed.contains("unexcited: joint 1 hardly moved"), "{}", run.printed);
+    assert!(run.printed.contains("likely cause: motion: joint 1 hardly moved"), "{}", run.printed);
     assert!(reasons(&folder.json("report.json")).contains(&"unexcited"));
 
     // Only one joint moves: the knee's column repeats its first angle.

@@ -26,7 +26,7 @@ impl LegFile {
         let mut joints = Vec::with_capacity(N);
         for joint in &self.joints {
             let truth = joint.truth.as_ref().ok_or_else(|| {
-                self.error(format!("joint `{}` has no `truth`: the leg cannot be simulated", joint.name))
+                self.error(format!("joint `{}` has no `truth`: the leg cannot be simulated; `replay` identifies from a recording", joint.name))
             })?;
             joints.push(joint.description(truth));
         }

@@ -15,7 +15,7 @@ pub enum Fault {
     NotCsv(csv::Error),
     /// The header lacks a column that the leg needs.
     #[error("the header has no column `{column}`; its columns are: {}{}; needed are: {needed}",
-        Excerpt(.present), Separator(.present))]
+        Excerpt(.present), Hint(.present))]
     MissingColumn {
         /// Requested name.
         column: String,
@@ -81,6 +81,16 @@ pub enum Fault {
         /// Longest accepted gap in this recording, s.
         limit: f64,
     },
+    /// An angle was wrapped into one turn.
+    #[error(
+        "q{joint}_rad jumps by {jump:.2} rad, a whole turn, in one sample: unwrap the angle (in Python: numpy.unwrap)"
+    )]
+    Wrapped {
+        /// Joint, from 1.
+        joint: usize,
+        /// Change within one sample, rad.
+        jump: f64,
+    },
     /// Most samples are too far apart.
     #[error(
         "the median step of `t_s` is {} s, which is {} Hz; at least {MINIMUM_RATE_HZ} Hz are needed. `t_s` is in seconds{}",
@@ -123,13 +133,16 @@ impl fmt::Display for Excerpt<'_> {
     }
 }
 
-/// Hint for a header of a single column with another separator in it.
-struct Separator<'a>(&'a str);
+/// Hint for a header of a single column with another separator in it, or with angles in degrees.
+struct Hint<'a>(&'a str);
 
-impl fmt::Display for Separator<'_> {
+impl fmt::Display for Hint<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.0.contains(',') && self.0.contains([';', '\t']) {
             formatter.write_str(" (columns are separated by commas, numbers written with points)")
+        } else if self.0.contains("deg") {
+            formatter
+                .write_str(" (angles are in radians: multiply degrees by pi/180, and rename the columns)")
         } else {
             Ok(())
         }

@@ -31,6 +31,8 @@ const HALVED: f64 = 0.7;
 const WEAKER: f64 = 3.0;
 /// Misfits closer than this ratio count as equal: the simpler correction is named.
 const EQUAL: f64 = 1.1;
+/// Misfits closer than this ratio are those of mirrored legs.
+const MIRRORED: f64 = 1.001;
 
 /// Change of the angles and torques of one instant.
 type Change<const N: usize> = Box<dyn Fn(&mut [f64; N], &mut [f64; N])>;
@@ -68,6 +70,9 @@ pub fn likely<const N: usize, const B: usize>(
 ) -> CauseReport {
     if let Some(finding) = samples.iter().find(|finding| finding.refuses) {
         return sample_cause(finding);
+    }
+    if let Some(cause) = motionless(findings) {
+        return cause;
     }
     let Some(errors) = errors else { return excluded(samples).unwrap_or_else(unknown) };
     if let Some(cause) = encoder_steps(question, errors, findings) {
@@ -129,6 +134,19 @@ pub fn likely<const N: usize, const B: usize>(
     }
 }
 
+/// A joint that hardly moved as the cause.
+fn motionless(findings: &[FindingReport]) -> Option<CauseReport> {
+    let finding =
+        findings.iter().find(|finding| !finding.passed && matches!(finding.test, "speed" | "rows"))?;
+    Some(CauseReport {
+        name: "motion",
+        joint: finding.joint,
+        value: finding.value,
+        sigma: Number::UNKNOWN,
+        words: format!("{}; record a motion that moves every joint", finding.words),
+    })
+}
+
 /// Encoder steps as the cause: where nothing else refuses, or where a lower bandwidth makes the recording
 /// acceptable.
 fn encoder_steps<const N: usize, const B: usize>(
@@ -187,8 +205,16 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
     let least = passing.iter().map(|tried| tried.quality.remaining).fold(f64::INFINITY, f64::min);
     passing.retain(|tried| tried.quality.remaining <= EQUAL * least);
     let name = passing.first()?.cause.name;
-    let of_name = passing.into_iter().filter(|tried| tried.cause.name == name);
-    let mut best = of_name.min_by(|one, other| one.quality.remaining.total_cmp(&other.quality.remaining))?;
+    passing.retain(|tried| tried.cause.name == name);
+    passing.sort_by(|one, other| one.quality.remaining.total_cmp(&other.quality.remaining));
+    let mut all = passing.into_iter();
+    let mut best = all.next()?;
+    // The mirrored leg moves alike: one joint's sign, or that of all others.
+    let alike = all.take_while(|tried| tried.quality.remaining <= MIRRORED * best.quality.remaining);
+    let joints: Vec<String> = alike.filter_map(|tried| Some(tried.cause.joint?.to_string())).collect();
+    if !joints.is_empty() {
+        best.cause.words += &format!("; the same of joint {} explains it as well", joints.join(" or "));
+    }
     if best.is_shared {
         best.cause.joint = None;
     }

@@ -218,6 +218,8 @@ pub(super) struct Subject<'a, const N: usize, const B: usize> {
     pub load: [f32; B],
     /// Larger bandwidth that the encoders allow.
     pub proposed_hz: Option<f64>,
+    /// Largest bandwidth of the Stribeck search, where the encoders are too coarse for it.
+    pub stribeck_hz: Option<f64>,
 }
 
 impl<const N: usize, const B: usize> Subject<'_, N, B> {
@@ -258,6 +260,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             bandwidth_hz: self.options.bandwidth_hz,
             is_chosen: self.options.chooses_bandwidth,
             proposed_hz: self.proposed_hz,
+            stribeck_hz: self.stribeck_hz,
         });
         run.verdict = if run.accepted() { "accepted" } else { "refused" };
         if !run.accepted() {

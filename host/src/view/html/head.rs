@@ -129,8 +129,8 @@ pub fn colophon(run: &RunReport) -> Markup {
     let time = if run.trace.is_some() { String::new() } else { format!(" in {:.2} s", run.wall_s) };
     html! {
         footer {
-            p { "Made by Scarab " (env!("CARGO_PKG_VERSION")) (time) ". Values are SI; sigma \
-                is one standard deviation, of the torque's noise alone." }
+            p { "Made by Scarab " (env!("CARGO_PKG_VERSION")) (time) ". Values are SI; sigma is one standard deviation"
+                @if !run.is_replay() { ", of the torque's noise alone" } "." }
         }
     }
 }

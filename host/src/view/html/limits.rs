@@ -39,7 +39,9 @@ pub fn section(run: &RunReport) -> Markup {
                 }
                 li { strong { "Rest: " } "friction of a joint at rest takes any value up to breakaway; stretches in which a \
                     joint is at rest (grey) are excluded and cannot be predicted." }
-                li { strong { "Sigma: " } "counts noise of the torque, not of the encoder, and no error of the model itself." }
+                @if !run.is_replay() {
+                    li { strong { "Sigma: " } "counts noise of the torque, not of the encoder, and no error of the model itself." }
+                }
             }
         }
     }

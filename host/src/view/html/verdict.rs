@@ -6,7 +6,7 @@ use crate::base::number::Number;
 use crate::base::table::{Table, cells};
 use crate::formats::leg_file::LegFile;
 use crate::report::RunReport;
-use crate::report::findings::FindingReport;
+use crate::report::findings::{FindingReport, untested_lengths};
 use crate::view::html::{count, exact, joint_name, number};
 use crate::view::tables;
 
@@ -20,6 +20,9 @@ pub fn banner(run: &RunReport) -> Markup {
                 p { "The model explains the motion it was identified from" @if validated {
                     ", and predicts the motions that were not used"
                 } ". " (passed(run)) }
+                @if run.is_replay() {
+                    @for words in untested_lengths(&run.findings) { p { strong { "Hardly tested: " } (words) "." } }
+                }
                 @if !validated {
                     p { strong { "Not validated: " } "no motion was held out, so nothing is known of its predictions." }
                 }
