@@ -36,7 +36,7 @@ const SEARCHES: [Algorithm; 4] = [Algorithm::Pso, Algorithm::Bas, Algorithm::Bso
 /// Course of one run.
 struct Way {
     /// Best position after every iteration, beginning with the scattered swarm's.
-    places: Vec<[f64; 2]>,
+    positions: Vec<[f64; 2]>,
     /// f - f* at these positions.
     by_iteration: Vec<f64>,
     /// f - f* of the best after every evaluation.
@@ -69,7 +69,7 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
                 by_evaluation: Band::over_evaluations(&curves(|way| &way.by_evaluation)),
             });
             if let (Algorithm::BsoPaper | Algorithm::Bso, Some(first)) = (search, ways.into_iter().next()) {
-                walks.push(Walk { name: search.id(), positions: first.places });
+                walks.push(Walk { name: search.id(), positions: first.positions });
             }
         }
         figures.push(swarm::figure(
@@ -98,7 +98,7 @@ fn way(algorithm: Algorithm, problem: &TestProblem, seed: ReportSeed) -> Result<
 
 /// Drives a search by single evaluations; the first `first` belong to iteration 0.
 fn walk(mut search: impl Search<f64>, problem: &TestProblem, first: usize) -> Way {
-    let mut way = Way { places: Vec::new(), by_iteration: Vec::new(), by_evaluation: Vec::new() };
+    let mut way = Way { positions: Vec::new(), by_iteration: Vec::new(), by_evaluation: Vec::new() };
     while way.by_iteration.len() <= ITERATIONS || way.by_evaluation.len() < EVALUATIONS {
         let before = search.iterations();
         if search.advance(problem, 1) == 0 {
@@ -110,12 +110,12 @@ fn walk(mut search: impl Search<f64>, problem: &TestProblem, first: usize) -> Wa
         if way.by_evaluation.len() == first || search.iterations() > before {
             way.by_iteration.push(excess);
             if let [x, y] = *best.position {
-                way.places.push([x, y]);
+                way.positions.push([x, y]);
             }
         }
     }
     way.by_iteration.truncate(ITERATIONS + 1);
-    way.places.truncate(ITERATIONS + 1);
+    way.positions.truncate(ITERATIONS + 1);
     way.by_evaluation.truncate(EVALUATIONS);
     way
 }
