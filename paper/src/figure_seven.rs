@@ -238,7 +238,7 @@ fn words(report: &VerificationReport) -> String {
         "worst run",
         "measured, same filter",
         "measured samples",
-        "left out at rest, %",
+        "excluded at rest, %",
         "paper: RMS, N m",
         "%",
     ]);

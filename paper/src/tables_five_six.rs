@@ -253,7 +253,7 @@ fn words(report: &TablesReport) -> String {
         "identified",
         "error, % as printed",
         "by (30)",
-        "torque tells it",
+        "determined by torque",
         "here: truth",
         "one-time",
         "error, %",

@@ -175,7 +175,7 @@ impl CampaignReport {
             .text(["state (reached)"])
             .numbers([
                 "missed",
-                "not to be seen",
+                "undetectable",
                 "smallest seen",
                 "false alarms",
                 "detected of detectable (not detectable)",
@@ -376,7 +376,7 @@ impl CampaignReport {
 pub fn line(outcome: &Outcome) -> String {
     let verdict = match outcome {
         Outcome { detected: true, .. } => "seen",
-        Outcome { undetectable: true, .. } => "not to be seen",
+        Outcome { undetectable: true, .. } => "undetectable",
         _ => "MISSED",
     };
     let which = match outcome.seed {

@@ -18,7 +18,7 @@ type Search = fn(&RunReport) -> Option<&ConsistentSearchReport>;
 
 /// Prints both searches, then the parameters that torque alone does not determine.
 fn print_searches(runs: &[RunReport]) -> Result<(), ToolError> {
-    let mut table = Table::default().label("search for a leg that can exist").numbers([
+    let mut table = Table::default().label("search for a physically consistent leg").numbers([
         "excess <= 0.5",
         "worst excess",
         "within 125 iterations",
@@ -66,7 +66,7 @@ fn print_searches(runs: &[RunReport]) -> Result<(), ToolError> {
 /// Parameters from the prior or in a group: their distance and the prior's distance from the truth.
 fn hidden(runs: &[RunReport]) -> Result<(), ToolError> {
     let Some(first) = runs.first() else { return Ok(()) };
-    let mut table = Table::default().label("what torque cannot tell").text(["status"]).numbers([
+    let mut table = Table::default().label("not determined by torque").text(["status"]).numbers([
         "truth",
         "rms error: prior",
         "base values, completed",

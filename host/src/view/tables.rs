@@ -121,7 +121,7 @@ pub fn fits(
     let known = all().any(|(fit, _)| fit.percent_of_mean_abs_vs_truth.known().is_some());
     let mut table = Table::default()
         .text(["motion", "use", "joint"])
-        .numbers(["rms, N m", "% of mean abs", "% of rms", "set aside, %"])
+        .numbers(["rms, N m", "% of mean abs", "% of rms", "excluded, %"])
         .numbers_if(known, ["% of mean abs, noise-free", "sticking, %"]);
     let percent = |share: Number| number(Number(share.known().map(|share| 100.0 * share)));
     for (fit, role) in all() {

@@ -28,7 +28,7 @@ pub fn trajectory_words(run: &RunReport) -> Markup {
     } else if run.trace.is_some() {
         "Angles as the board logged them, of motions whose log was sent and has no gap. What was commanded is not logged."
     } else {
-        "Angles as recorded, on the firmware's grid of 500 samples a second. A recording does not tell what was commanded."
+        "Angles as recorded, on the firmware's grid of 500 samples a second. A recording contains no commands."
     };
     html! { p { (words) } }
 }
