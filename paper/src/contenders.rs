@@ -135,7 +135,7 @@ pub fn run_own<T: Real>(
 ) -> Result<(), ToolError> {
     const D: usize = MOST_COORDINATES;
     const N: usize = SWARM as usize;
-    let told = |error: SwarmError| ToolError::input(format!("{}: {error:?}", algorithm.id()));
+    let refused = |error: SwarmError| ToolError::input(format!("{}: {error:?}", algorithm.id()));
     let evaluations = budget(recorder.dimension());
     let constriction = PsoSettings {
         inertia_weight: InertiaWeight::constant(T::of(0.7298)),
@@ -145,23 +145,23 @@ pub fn run_own<T: Real>(
     };
     match algorithm {
         Algorithm::PsoConstriction => {
-            let search = Pso::<T, N, D>::new(recorder, constriction, seed).map_err(told)?;
+            let search = Pso::<T, N, D>::new(recorder, constriction, seed).map_err(refused)?;
             follow(search, recorder, SWARM, u32::MAX, evaluations);
         }
         Algorithm::Bas => {
-            let search = Bas::<T, D>::new(recorder, BasSettings::default(), seed).map_err(told)?;
+            let search = Bas::<T, D>::new(recorder, BasSettings::default(), seed).map_err(refused)?;
             follow(search, recorder, 1, ITERATIONS, u32::MAX);
         }
         Algorithm::BsoPaper => {
-            let search = Bso::<T, N, D>::new(recorder, BsoSettings::paper(), seed).map_err(told)?;
+            let search = Bso::<T, N, D>::new(recorder, BsoSettings::paper(), seed).map_err(refused)?;
             follow(search, recorder, SWARM, ITERATIONS, u32::MAX);
         }
         Algorithm::Bso => {
-            let search = Bso::<T, N, D>::new(recorder, BsoSettings::default(), seed).map_err(told)?;
+            let search = Bso::<T, N, D>::new(recorder, BsoSettings::default(), seed).map_err(refused)?;
             follow(search, recorder, SWARM, ITERATIONS, u32::MAX);
         }
         _ => {
-            let search = Pso::<T, N, D>::new(recorder, PsoSettings::default(), seed).map_err(told)?;
+            let search = Pso::<T, N, D>::new(recorder, PsoSettings::default(), seed).map_err(refused)?;
             follow(search, recorder, SWARM, u32::MAX, evaluations);
         }
     }

@@ -87,6 +87,7 @@ fn joint_by_joint(model: &RowModel<f64, JOINTS, ROOM>) -> usize {
         let rows = model.rows(&Smoothed { position, velocity, acceleration, torque: [0.0; JOINTS] });
         factor.insert(&rows.regressor[moving], 0.0);
     }
-    let told = |&base: &usize| factor.triangle()[base][base].abs() > DETERMINED * factor.column_length(base);
-    (0..model.base.rank()).filter(told).count()
+    let is_determined =
+        |&base: &usize| factor.triangle()[base][base].abs() > DETERMINED * factor.column_length(base);
+    (0..model.base.rank()).filter(is_determined).count()
 }

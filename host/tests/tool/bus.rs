@@ -247,8 +247,8 @@ fn a_saturated_bus_stops_a_leg_by_its_timers_only() {
         bus.run(4);
     }
     bus.run(8);
-    let told = bus.sent.iter().find(|sent| sent.frame.id() == 0x81).expect("an emergency");
-    assert_eq!(told.frame.data()[..2], [0x50, 0x82]);
+    let emergency = bus.sent.iter().find(|sent| sent.frame.id() == 0x81).expect("an emergency");
+    assert_eq!(emergency.frame.data()[..2], [0x50, 0x82]);
 }
 
 #[test]
@@ -294,8 +294,8 @@ fn stored_objects_and_the_new_node_id_apply_after_a_reset() {
     }
     bus.run(6000);
     let codes = |bus: &Bus, id: u16| -> Vec<u16> {
-        let told = bus.sent.iter().filter(|sent| sent.frame.id() == id);
-        told.map(|sent| u16::from_le_bytes([sent.frame.data()[0], sent.frame.data()[1]])).collect()
+        let emergencies = bus.sent.iter().filter(|sent| sent.frame.id() == id);
+        emergencies.map(|sent| u16::from_le_bytes([sent.frame.data()[0], sent.frame.data()[1]])).collect()
     };
     assert_eq!(codes(&bus, 0x81), [0xFF0D, 0x8110, 0, 0]);
     assert!(codes(&bus, 0x83).is_empty());

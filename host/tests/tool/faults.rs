@@ -73,8 +73,9 @@ fn runs_of_sweep_and_pairs_can_be_repeated_alone() {
             .map(|seed| {
                 let line = format!("faults --seconds 1 --fault {kind} --replay {seed} --report");
                 let printed = scarab(&line, &[&folder.path("run.html")]).ends_with(0).printed;
-                let told = printed.split_once(&format!("{kind} seed {seed}: ")).expect("it is reported").1;
-                told.split_once("hash ").expect("its hash").1[..16].to_owned()
+                let reported =
+                    printed.split_once(&format!("{kind} seed {seed}: ")).expect("it is reported").1;
+                reported.split_once("hash ").expect("its hash").1[..16].to_owned()
             })
             .collect();
         let folded = alone.bytes().fold(0_u64, |hash, byte| {

@@ -274,12 +274,12 @@ fn a_known_mass_makes_the_model_absolute_with_identified_constants() {
     let arguments = |leg: &str| format!("predict --states {} --leg {leg} --model", states.display());
     let run = scarab(&arguments(DEFAULT_LEG), &[&path]).ends_with(3);
     assert!(run.errors.contains("torque constant of joint `hip`"), "{}", run.errors);
-    let mut told = LegFile::load(DEFAULT_LEG).expect("shipped");
-    for (joint, stored) in told.joints.iter_mut().zip(&model.leg.joints) {
+    let mut identified = LegFile::load(DEFAULT_LEG).expect("shipped");
+    for (joint, stored) in identified.joints.iter_mut().zip(&model.leg.joints) {
         joint.torque_per_ampere = stored.torque_per_ampere;
     }
-    let told = folder.write("leg.toml", &told.to_toml());
-    scarab(&arguments(&told.display().to_string()), &[&path]).ends_with(0);
+    let identified = folder.write("leg.toml", &identified.to_toml());
+    scarab(&arguments(&identified.display().to_string()), &[&path]).ends_with(0);
 }
 
 #[test]

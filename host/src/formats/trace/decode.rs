@@ -140,10 +140,10 @@ impl Skipped {
         }
         let later = self.bytes - self.first_bytes;
         if later > 0 {
-            words.push(format!("{later} bytes later that are no frames of this image"));
+            words.push(format!("{later} further bytes that are not frames of this image"));
         }
         if self.cut_bytes > 0 {
-            words.push(format!("{} bytes at the end, of a frame that was cut", self.cut_bytes));
+            words.push(format!("{} bytes at the end, of an incomplete frame", self.cut_bytes));
         }
         (!words.is_empty()).then(|| format!("passed over: {}", words.join("; ")))
     }

@@ -38,7 +38,7 @@ pub fn hex(line: &Line<'_>, key: &'static str) -> Result<u32, LineError<'static>
 #[must_use]
 pub fn words(kind: &str, error: LineError<'_>) -> String {
     match error {
-        LineError::Kind => "is no record".into(),
+        LineError::Kind => "is not a record".into(),
         LineError::Pair(pair) => format!("`{kind}`: `{pair}` is not key=value"),
         LineError::Missing(key) => format!("`{kind}`: `{key}` is missing"),
         LineError::Value(key) => format!("`{kind}`: the value of `{key}` cannot be read"),
@@ -46,7 +46,7 @@ pub fn words(kind: &str, error: LineError<'_>) -> String {
 }
 
 /// Declares a record: its fields are the keys, each read by the named function.
-macro_rules! told {
+macro_rules! record {
     ($(#[$about:meta])* $name:ident { $( $(#[$what:meta])* $field:ident: $type:ty = $way:ident, )* }) => {
         $(#[$about])*
         #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +64,7 @@ macro_rules! told {
     };
 }
 
-told! {
+record! {
     /// Start of the image.
     Boot {
         /// Version of the records' grammar.
@@ -85,7 +85,7 @@ told! {
         reset: String = text,
     }
 }
-told! {
+record! {
     /// Identity of the board.
     Board {
         /// Unique number of the processor, first word.
@@ -104,7 +104,7 @@ told! {
         clock_hz: u32 = value,
     }
 }
-told! {
+record! {
     /// Progress of a running search.
     Progress {
         /// Servo tick.
@@ -117,7 +117,7 @@ told! {
         excess_chi2: f32 = value,
     }
 }
-told! {
+record! {
     /// State of the leg.
     State {
         /// Servo tick.
@@ -132,7 +132,7 @@ told! {
         motion: u8 = value,
     }
 }
-told! {
+record! {
     /// One sample of the log.
     Sample {
         /// Last of the sample's eight servo ticks.
@@ -149,7 +149,7 @@ told! {
         counts: Vec<i32> = list,
     }
 }
-told! {
+record! {
     /// Statistics of the loops.
     Loops {
         /// Servo tick.
@@ -174,7 +174,7 @@ told! {
         records_lost: u32 = value,
     }
 }
-told! {
+record! {
     /// Supply and temperatures.
     Supply {
         /// Servo tick.
@@ -190,4 +190,4 @@ told! {
     }
 }
 
-pub(super) use told;
+pub(super) use record;

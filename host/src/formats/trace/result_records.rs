@@ -6,9 +6,9 @@
 
 use scarab::trace::{Line, LineError};
 
-use crate::formats::trace::fields::{text, told, value};
+use crate::formats::trace::fields::{record, text, value};
 
-told! {
+record! {
     /// How the result was found.
     Solver {
         /// One-time or sequential.
@@ -33,7 +33,7 @@ told! {
         consistency_chi2: f32 = value,
     }
 }
-told! {
+record! {
     /// One of the fourteen parameters of a joint.
     Parameter {
         /// Joint, from 1.
@@ -48,7 +48,7 @@ told! {
         status: String = text,
     }
 }
-told! {
+record! {
     /// One base parameter.
     Base {
         /// Index of the base parameter, from 0.
@@ -69,7 +69,7 @@ told! {
         least_squares: f32 = value,
     }
 }
-told! {
+record! {
     /// One element of the covariance.
     Covariance {
         /// Row, from 0.
@@ -80,7 +80,7 @@ told! {
         value: f32 = value,
     }
 }
-told! {
+record! {
     /// Stribeck friction of one joint.
     Stribeck {
         /// Joint, from 1.
@@ -97,7 +97,7 @@ told! {
         gain_chi2: f32 = value,
     }
 }
-told! {
+record! {
     /// Index of the motion; 0 is the training motion.
     Motion {
         /// Index of the motion; 0 is the training motion.
@@ -108,7 +108,7 @@ told! {
         longest_common_s: f32 = value,
     }
 }
-told! {
+record! {
     /// Residual of one joint on one motion.
     Fit {
         /// 0 is the motion identified from.
@@ -129,7 +129,7 @@ told! {
         replaced: u32 = value,
     }
 }
-told! {
+record! {
     /// One test of the result.
     Finding {
         /// Reason for rejection if the test failed.
@@ -148,14 +148,14 @@ told! {
         passed: bool = value,
     }
 }
-told! {
+record! {
     /// Reason for rejection.
     Reason {
         /// Word of the closed list of reasons.
         reason: String = text,
     }
 }
-told! {
+record! {
     /// Verdict on the result.
     Verdict {
         /// `accepted` or `refused`.
@@ -164,7 +164,7 @@ told! {
         reasons: usize = value,
     }
 }
-told! {
+record! {
     /// End of the result.
     End {
         /// Records of the result, without this one.
@@ -253,7 +253,7 @@ impl ResultRecords {
                 Some(format!("has {} records, of which {read} were read", end.records))
             }
             (_, None, Some(solver)) => {
-                Some(format!("was told before it was judged (search: {})", solver.state))
+                Some(format!("was sent before it was judged (search: {})", solver.state))
             }
             (_, None, None) | (_, _, None) => Some("has no solver".into()),
             (_, Some(verdict), _) if verdict.reasons != self.reasons.len() => {

@@ -75,19 +75,20 @@ fn values(
     disturbances: &[Disturbance],
     right: bool,
 ) -> Vec<ValueReport> {
-    let told = parameters.iter().enumerate().filter(|(index, _)| hypothesis.determined[*index]);
-    told.map(|(index, &(joint, parameter))| ValueReport {
-        name: parameter_name(joint, parameter),
-        unit: parameter.unit(),
-        value: hypothesis.values[index].into(),
-        sigma: hypothesis.sigma(index).into(),
-        truth: disturbances
-            .first()
-            .filter(|_| right)
-            .and_then(|one| truth(leg, one, joint, parameter))
-            .into(),
-    })
-    .collect()
+    let determined = parameters.iter().enumerate().filter(|(index, _)| hypothesis.determined[*index]);
+    determined
+        .map(|(index, &(joint, parameter))| ValueReport {
+            name: parameter_name(joint, parameter),
+            unit: parameter.unit(),
+            value: hypothesis.values[index].into(),
+            sigma: hypothesis.sigma(index).into(),
+            truth: disturbances
+                .first()
+                .filter(|_| right)
+                .and_then(|one| truth(leg, one, joint, parameter))
+                .into(),
+        })
+        .collect()
 }
 
 fn truth(leg: &LegFile, disturbance: &Disturbance, joint: usize, parameter: Parameter) -> Option<f64> {

@@ -19,7 +19,7 @@ pub fn base(run: &RunReport) -> Markup {
         h3 { "What torque determines" }
         p { "Base parameters: the sums of parameters that show in the torque, by the swarm, with their standard deviation."
             @if misfit { " Sigma is the larger of its part by noise and its part by the model's misfit, with the bias of \
-            the encoders and of what is in doubt." }
+            the encoders and possible logging errors." }
             @if bounded { " No unbiased estimator can have a smaller one than the Cram\u{e9}r-Rao bound." } }
         (tables::base_parameters(run).to_html())
     }

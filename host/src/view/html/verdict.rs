@@ -40,8 +40,8 @@ pub fn banner(run: &RunReport) -> Markup {
 
 /// Faults and warnings of a board; empty for other runs.
 pub fn alarms(run: &RunReport) -> Markup {
-    let told = run.trace.as_ref();
-    let (faults, warnings) = told.map_or((&[][..], &[][..]), |told| (&told.faults, &told.warnings));
+    let trace = run.trace.as_ref();
+    let (faults, warnings) = trace.map_or((&[][..], &[][..]), |trace| (&trace.faults, &trace.warnings));
     html! {
         @if !faults.is_empty() {
             section.verdict.refused {
