@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use hal_sim::drive::complete::SHIFT_QUARTERS;
+use hal_sim::drive::description::SHIFT_QUARTERS;
 use hal_sim::drive::description::ShuntDescription;
 use scarab::board::odrive_v3_6::settings::drives::DEAD_TIME_BAND;
 use scarab::board::odrive_v3_6::settings::{

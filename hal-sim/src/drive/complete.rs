@@ -23,9 +23,6 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisCommand, AxisSample};
 
-/// Quarters of a PWM period between the axes of the board.
-pub const SHIFT_QUARTERS: u32 = 2;
-
 /// Standard deviation of the bus voltage's code.
 const BUS_NOISE_CODES: f64 = 1.0;
 

@@ -7,8 +7,10 @@
 //! clocks per half period. Amplifier settling, rails, noise, diode drop and capacitance are typical values of
 //! such parts, not measurements.
 
-use super::complete::SHIFT_QUARTERS;
 use scarab::hal::{BRIDGE_CLOCK_HZ, SHUNT_TRIGGER_CLOCKS};
+
+/// Quarters of a PWM period between the axes of the board.
+pub const SHIFT_QUARTERS: u32 = 2;
 
 /// A permanent-magnet synchronous motor, star connected.
 #[derive(Clone, Copy, Debug, PartialEq)]

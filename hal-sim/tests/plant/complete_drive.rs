@@ -5,10 +5,10 @@ use crate::common::worn_leg;
 use core::f64::consts::{PI, TAU};
 
 use hal_sim::drive::axis::{Axis, AxisFlow, PERIOD_S};
-use hal_sim::drive::complete::{CompleteDrives, Rotor, SHIFT_QUARTERS};
+use hal_sim::drive::complete::{CompleteDrives, Rotor};
 use hal_sim::drive::description::{
     AxisDescription, BridgeDescription, CompleteDescription, CounterDescription, MotorDescription,
-    ShuntDescription, SupplyDescription, Wiring,
+    SHIFT_QUARTERS, ShuntDescription, SupplyDescription, Wiring,
 };
 use hal_sim::drive::motor::{Direction, Motor, Terminal};
 use hal_sim::drive::stand::{Load, Stand};
