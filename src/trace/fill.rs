@@ -60,6 +60,25 @@ impl<V: Value, const N: usize> Value for [V; N] {
     }
 }
 
+/// Type of a field as a format names it.
+pub(super) trait Hint {
+    /// The name.
+    const HINT: &'static str;
+}
+
+macro_rules! hints {
+    ($($type:ty: $hint:literal),*) => {$(
+        impl Hint for $type {
+            const HINT: &'static str = $hint;
+        }
+    )*};
+}
+hints!(u8: "u8", u16: "u16", u32: "u32", u64: "u64", f32: "f32", bool: "bool", &str: "str");
+
+impl<V, const N: usize> Hint for [V; N] {
+    const HINT: &'static str = "?";
+}
+
 /// Writes `format` with `values` at its placeholders; a placeholder without a value stays empty.
 pub(super) fn fill(format: &str, values: &[&dyn Value], out: &mut dyn Write) -> Result {
     let mut values = values.iter();
@@ -78,4 +97,72 @@ pub(super) fn fill(format: &str, values: &[&dyn Value], out: &mut dyn Write) -> 
         out.write_str(text)?;
     }
     Ok(())
+}
+
+/// True if a format is a kind, the record's number, and these fields with their types. Base 16 is allowed.
+///
+/// For constant evaluation: a text outside its bounds would be an error of the compiler.
+pub(super) const fn is_format_of(format: &str, fields: &[(&str, &str)]) -> bool {
+    let format = format.as_bytes();
+    let mut at = 0;
+    while at < format.len() && matches!(format[at], b'a'..=b'z' | b'0'..=b'9' | b'_') {
+        at += 1;
+    }
+    let begins = at > 0;
+    let (mut at, mut is_right) = after(format, at, " n={=u32}");
+    is_right &= begins;
+    let mut field = 0;
+    while field < fields.len() {
+        let (name, hint) = fields[field];
+        let mut part = 0;
+        let parts = [" ", name, "={=", hint];
+        while part < parts.len() {
+            let found = after(format, at, parts[part]);
+            (at, is_right) = (found.0, is_right && found.1);
+            part += 1;
+        }
+        // Base 16.
+        (at, _) = after(format, at, ":#x");
+        let found = after(format, at, "}");
+        (at, is_right) = (found.0, is_right && found.1);
+        field += 1;
+    }
+    is_right && at == format.len()
+}
+
+/// Place behind `part`, if the text goes on with it; else the same place.
+const fn after(text: &[u8], at: usize, part: &str) -> (usize, bool) {
+    let part = part.as_bytes();
+    let mut place = 0;
+    while place < part.len() {
+        if at + place >= text.len() || text[at + place] != part[place] {
+            return (at, false);
+        }
+        place += 1;
+    }
+    (at + place, true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_format_of;
+
+    #[test]
+    fn a_format_has_the_keys_and_types_of_its_fields_in_their_order() {
+        let is = |format: &str| is_format_of(format, &[("tick", "u32"), ("name", "str")]);
+        assert!(is("kind n={=u32} tick={=u32} name={=str}"));
+        assert!(is("kind n={=u32} tick={=u32:#x} name={=str}"));
+        for other in [
+            "",
+            " n={=u32} tick={=u32} name={=str}",
+            "kind tick={=u32} name={=str}",
+            "kind n={=u32} name={=str} tick={=u32}",
+            "kind n={=u32} tick={=u16} name={=str}",
+            "kind n={=u32} tick={=u32}",
+            "kind n={=u32} tick={=u32} name={=str} more={=u8}",
+            "kind n={=u32} ticks={=u32} name={=str}",
+        ] {
+            assert!(!is(other), "{other}");
+        }
+    }
 }

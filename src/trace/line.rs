@@ -54,7 +54,7 @@ impl<'a> Line<'a> {
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`].
-    pub fn number(&self) -> Result<u32, LineError<'a>> {
+    pub fn number(&self) -> Result<u32, LineError<'static>> {
         self.value("n")
     }
 
@@ -78,7 +78,7 @@ impl<'a> Line<'a> {
     ///
     /// # Errors
     /// [`LineError::Missing`].
-    pub fn text(&self, key: &'a str) -> Result<&'a str, LineError<'a>> {
+    pub fn text<'k>(&self, key: &'k str) -> Result<&'a str, LineError<'k>> {
         let mut pairs = self.pairs().filter_map(Result::ok);
         pairs.find(|(found, _)| *found == key).map(|(_, value)| value).ok_or(LineError::Missing(key))
     }
@@ -87,7 +87,7 @@ impl<'a> Line<'a> {
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`].
-    pub fn value<V: FromStr>(&self, key: &'a str) -> Result<V, LineError<'a>> {
+    pub fn value<'k, V: FromStr>(&self, key: &'k str) -> Result<V, LineError<'k>> {
         self.text(key)?.parse().map_err(|_| LineError::Value(key))
     }
 
@@ -95,7 +95,7 @@ impl<'a> Line<'a> {
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`].
-    pub fn hex(&self, key: &'a str) -> Result<u32, LineError<'a>> {
+    pub fn hex<'k>(&self, key: &'k str) -> Result<u32, LineError<'k>> {
         let digits = self.text(key)?.strip_prefix("0x").ok_or(LineError::Value(key))?;
         u32::from_str_radix(digits, 16).map_err(|_| LineError::Value(key))
     }
@@ -104,10 +104,10 @@ impl<'a> Line<'a> {
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`]; also for a list of another length.
-    pub fn list<V: FromStr + Copy + Default, const N: usize>(
+    pub fn list<'k, V: FromStr + Copy + Default, const N: usize>(
         &self,
-        key: &'a str,
-    ) -> Result<[V; N], LineError<'a>> {
+        key: &'k str,
+    ) -> Result<[V; N], LineError<'k>> {
         let wrong = LineError::Value(key);
         let inside =
             self.text(key)?.strip_prefix('[').and_then(|text| text.strip_suffix(']')).ok_or(wrong)?;

@@ -1,17 +1,25 @@
 //! All records of the trace.
 //!
-//! Each format string is written once and used twice: with `defmt` the device sends index and values; without
-//! it [`Record::write`] fills the string in. The record's number comes first.
+//! The list is written once. The firmware makes [`Record`] of it: with `defmt` the device sends index and
+//! values, without it [`Record::write`] fills the format in. A reader declares its own types from the same
+//! list with `trace_records!`, at no cost to the image.
+//!
+//! `defmt` takes a format as a literal only, so a format stands beside its fields. The compiler refuses one
+//! whose keys or types are not those of the fields. The record's number comes first. Fields behind `+` were
+//! added later: traces of older images lack them.
 
 use core::fmt::{self, Write};
 
 use super::definition::records;
-use super::fill::{Value, fill};
+use super::fill::{Hint, Value, fill, is_format_of};
 
-records! {
+/// Passes the list of all records to a macro.
+#[macro_export]
+macro_rules! trace_records {
+    ($list:ident) => { $list! {
     /// The image has started.
     Boot "boot n={=u32} grammar={=u8} version={=str} leg={=str} joints={=u8} base={=u8} servo_hz={=u32} log_hz={=u32} reset={=str}" {
-        /// Version of the grammar, [`super::GRAMMAR`].
+        /// Version of the grammar, `GRAMMAR`.
         grammar: u8,
         /// Firmware version.
         version: &'static str,
@@ -61,6 +69,7 @@ records! {
         line: u32,
         /// End of a panic's file name, or `-`.
         file: &'static str,
+    } + {
         /// Clock (that of `loops`) when the bridges were off.
         released: u32,
         /// Clock when this record was complete, before the reset.
@@ -405,7 +414,9 @@ records! {
         /// Sums of eight encoder counts, with the drive's sign: the exact angles.
         counts: [i32; N],
     }
+    } };
 }
+trace_records!(records);
 
 #[cfg(test)]
 mod tests;

@@ -89,16 +89,16 @@ fn a_current_tick_after_bridges_off_is_detected() {
 }
 
 const RECORDS: &str = "\
-boot n=0
-state n=1 drive=operation_enabled activity=identify
-boot n=0
-board n=1 clock_hz=125000000
+boot n=0 grammar=1 version=0.1.0 leg=x2 joints=2 base=13 servo_hz=4000 log_hz=500 reset=power
+state n=1 tick=1 drive=operation_enabled activity=identify phase=excite motion=0
+boot n=0 grammar=1 version=0.1.0 leg=x2 joints=2 base=13 servo_hz=4000 log_hz=500 reset=software
+board n=1 uid0=0x0 uid1=0x0 uid2=0x0 version=0 version_minor=0 version_volt=0 clock_hz=125000000
 crash n=2 cause=panic pc=0x0 lr=0x0 status=0x0 address=0xffffffff line=7 file=a.rs released=1100 kept=1300
 refused n=3 why=crash value=0x400
-request n=4 name=identify accepted=false
-state n=5 drive=operation_enabled activity=identify
-boot n=0
-state n=1 drive=operation_enabled activity=identify
+request n=4 tick=1 name=identify accepted=false
+state n=5 tick=2 drive=operation_enabled activity=identify phase=excite motion=0
+boot n=0 grammar=1 version=0.1.0 leg=x2 joints=2 base=13 servo_hz=4000 log_hz=500 reset=pin
+state n=1 tick=3 drive=operation_enabled activity=identify phase=excite motion=0
 ";
 
 #[test]
@@ -114,21 +114,19 @@ fn every_violated_requirement_of_a_crash_is_reported() {
         ("released=1100", "released=1400", "the bridges turned off after the record"),
         ("why=crash", "why=watchdog", "not refused before"),
         ("accepted=false", "accepted=true", "not refused before"),
-        (
-            "boot n=0\nstate n=1 drive=operation",
-            "boot n=0\nstate n=1 drive=switch",
-            "not identifying when it crashed",
-        ),
-        ("state n=5 drive=operation", "state n=5 drive=switch", "not enabled after"),
+        ("tick=1 drive=operation", "tick=1 drive=switch", "not identifying when it crashed"),
+        ("tick=2 drive=operation", "tick=2 drive=switch", "not enabled after"),
     ] {
         let complaints = report(&RECORDS.replacen(from, to, 1), 1_000).complaints;
         assert!(complaints.iter().any(|words| words.contains(complaint)), "{from}: {complaints:?}");
     }
     // 10 us are 1,250 instructions of 8 ns.
     assert!(report(&RECORDS.replace("1100", "2250").replace("1300", "2300"), 1_000).complaints.len() == 1);
-    let again = format!("{RECORDS}crash n=2 cause=panic\n");
+    let crash = RECORDS.lines().find(|line| line.starts_with("crash")).expect("a crash");
+    let again = format!("{RECORDS}{crash}\n");
     assert!(report(&again, 1_000).complaints.iter().any(|words| words.contains("a second time")));
     // One start too many.
-    let more = format!("{RECORDS}boot n=0\n");
+    let boot = RECORDS.lines().next().expect("a start");
+    let more = format!("{RECORDS}{boot}\n");
     assert!(CrashReport::new(CrashKind::Panic, &more, "", 1_000, Path::new("-")).is_err());
 }

@@ -3,9 +3,12 @@
 //! Faults, crashes and refusals have their own weight, because an operator must not overlook them. They are
 //! printed before the tables and again behind the verdict.
 
-use scarab::trace::{GRAMMAR, Line, LineError};
+use scarab::trace::GRAMMAR;
 
-use crate::formats::trace::fields::{Board, Boot, State, hex, list, text, value};
+use crate::formats::trace::records::{
+    AxisFault, Board, Boot, Calibration, Change, Crash, Fault, GateDriver, Limit, NotEnabled, Received,
+    Refused, Request, State, Update,
+};
 
 /// Severity of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,70 +50,59 @@ impl Event {
     }
 }
 
-type Read<T> = Result<T, LineError<'static>>;
-
 /// Event of a record; `None` for kinds that do not belong to the timeline.
-///
-/// # Errors
-/// A key is missing or a value is invalid.
-pub fn of(line: &Line<'_>, servo_hz: f64) -> Read<Option<Event>> {
-    let tick = || -> Read<Option<f64>> { Ok(Some(f64::from(value::<u32>(line, "tick")?) / servo_hz)) };
-    let event = |time_s, weight, words| Ok(Some(Event { time_s, weight, words }));
-    match line.kind() {
-        "boot" => boot(line),
-        "board" => event(None, Weight::Note, board(&Board::read(line)?)),
-        "crash" => event(None, Weight::Fault, crash(line)?),
-        "refused" => {
-            let words = format!(
-                "the drive may not be enabled: {} ({:#x})",
-                spaced(&text(line, "why")?),
-                hex(line, "value")?
-            );
-            event(None, Weight::Fault, words)
+#[must_use]
+pub fn of(record: &Received, servo_hz: f64) -> Option<Event> {
+    let at = |tick: u32| Some(f64::from(tick) / servo_hz);
+    let (time_s, weight, words) = match record {
+        Received::Boot(boot) => {
+            let (weight, words) = start(boot);
+            (None, weight, words)
         }
-        "gate_driver" => {
-            let status: u32 = hex(line, "status")?;
-            event(None, Weight::Fault, format!("gate driver of {}: status {status:#010x}", joint(line)?))
+        Received::Board(found) => (None, Weight::Note, board(found)),
+        Received::Crash(crash) => (None, Weight::Fault, crashed(crash)),
+        Received::Refused(Refused { why, value }) => {
+            (None, Weight::Fault, format!("the drive may not be enabled: {} ({value:#x})", spaced(why)))
         }
-        "state" => {
-            let state = State::read(line)?;
+        Received::GateDriver(GateDriver { joint, status, .. }) => {
+            (None, Weight::Fault, format!("gate driver of {}: status {status:#010x}", place(*joint)))
+        }
+        Received::State(state) => {
             let stopped = ["fault", "fault_reaction_active"].contains(&state.drive.as_str());
             let weight = if stopped { Weight::Warning } else { Weight::Note };
-            event(tick()?, weight, doing(&state))
+            (at(state.tick), weight, doing(state))
         }
-        "request" => {
-            let (name, accepted) = (text(line, "name")?, value::<bool>(line, "accepted")?);
-            let weight = if accepted { Weight::Note } else { Weight::Warning };
-            let answer = if accepted { "accepted" } else { "REFUSED" };
-            event(tick()?, weight, format!("the operator asks: {}, {answer}", spaced(&name)))
+        Received::Request(Request { tick, name, accepted }) => {
+            let weight = if *accepted { Weight::Note } else { Weight::Warning };
+            let answer = if *accepted { "accepted" } else { "REFUSED" };
+            (at(*tick), weight, format!("the operator asks: {}, {answer}", spaced(name)))
         }
-        "not_enabled" => {
-            let words =
-                format!("the drive is NOT enabled: {}, {}", joint(line)?, spaced(&text(line, "why")?));
-            event(tick()?, Weight::Warning, words)
+        Received::NotEnabled(NotEnabled { tick, joint, why }) => {
+            let words = format!("the drive is NOT enabled: {}, {}", place(*joint), spaced(why));
+            (at(*tick), Weight::Warning, words)
         }
-        "fault" => {
-            let (name, code) = (text(line, "name")?, hex(line, "code")?);
-            event(tick()?, Weight::Fault, format!("FAULT {code:#06x} {}: {}", spaced(&name), joint(line)?))
+        Received::Fault(Fault { tick, code, name, joint }) => {
+            (at(*tick), Weight::Fault, format!("FAULT {code:#06x} {}: {}", spaced(name), place(*joint)))
         }
-        "limit" => {
-            let words = format!("LIMIT {}: {}", spaced(&text(line, "name")?), joint(line)?);
-            event(tick()?, Weight::Note, words)
+        Received::Limit(Limit { tick, name, joint, .. }) => {
+            (at(*tick), Weight::Note, format!("LIMIT {}: {}", spaced(name), place(*joint)))
         }
-        "axis_fault" => {
-            let words = format!("FAULT of the axis, {}: {}", spaced(&text(line, "name")?), joint(line)?);
-            event(tick()?, Weight::Fault, words)
+        Received::AxisFault(AxisFault { tick, joint, name }) => {
+            (at(*tick), Weight::Fault, format!("FAULT of the axis, {}: {}", spaced(name), place(*joint)))
         }
-        "calibration" => calibration(line),
-        "change" => change(line),
-        "update" => update(line),
-        _ => Ok(None),
-    }
+        Received::Calibration(calibration) => {
+            let (weight, words) = calibrated(calibration);
+            (None, weight, words)
+        }
+        Received::Change(change) => (None, Weight::Warning, changed(change)),
+        Received::Update(update) => (None, Weight::Note, updated(update)),
+        _ => return None,
+    };
+    Some(Event { time_s, weight, words })
 }
 
-fn boot(line: &Line<'_>) -> Read<Option<Event>> {
-    let boot = Boot::read(line)?;
-    let newer = if boot.grammar > GRAMMAR {
+fn start(boot: &Boot) -> (Weight, String) {
+    let newer = if boot.grammar > usize::from(GRAMMAR) {
         format!("; its records are of version {}, this program knows {GRAMMAR}", boot.grammar)
     } else {
         String::new()
@@ -123,8 +115,7 @@ fn boot(line: &Line<'_>) -> Read<Option<Event>> {
         boot.joints,
         boot.base
     );
-    let weight = if newer.is_empty() { Weight::Note } else { Weight::Warning };
-    Ok(Some(Event { time_s: None, weight, words }))
+    (if newer.is_empty() { Weight::Note } else { Weight::Warning }, words)
 }
 
 /// Description of the board.
@@ -133,7 +124,7 @@ pub fn board(board: &Board) -> String {
     if is_emulated(board) {
         return format!("emulated board, {} MHz", f64::from(board.clock_hz) / 1e6);
     }
-    let version = if board.version == u8::MAX {
+    let version = if board.version == usize::from(u8::MAX) {
         "version not burnt in".into()
     } else {
         format!("v{}.{}-{}V", board.version, board.version_minor, board.version_volt)
@@ -153,33 +144,28 @@ pub fn is_emulated(board: &Board) -> bool {
     (board.uid0, board.uid1, board.uid2) == (0, 0, 0)
 }
 
-fn crash(line: &Line<'_>) -> Read<String> {
-    let (file, source) = (text(line, "file")?, value::<u32>(line, "line")?);
-    let place = if file == "-" { String::new() } else { format!(" in {file} line {source}") };
-    let address = match hex(line, "address")? {
+fn crashed(crash: &Crash) -> String {
+    let place =
+        if crash.file == "-" { String::new() } else { format!(" in {} line {}", crash.file, crash.line) };
+    let address = match crash.address {
         u32::MAX => String::new(),
         address => format!(", address {address:#010x}"),
     };
-    // Older images do not send these keys.
-    let clock = |key| value::<u32>(line, key);
-    let kept = match (clock("released"), clock("kept")) {
-        (Ok(released), Ok(kept)) => {
-            format!("; bridges off {} cycles before the record was complete", kept.wrapping_sub(released))
-        }
-        _ => String::new(),
+    let kept = crash.released.zip(crash.kept).map_or_else(String::new, |(released, kept)| {
+        format!("; bridges off {} cycles before the record was complete", kept.wrapping_sub(released))
+    });
+    // Zero means unknown: a panic has its file and line instead.
+    let known = |words: &str, value: u32| match value {
+        0 => String::new(),
+        known => format!(", {words} {known:#010x}"),
     };
-    // Zero means unknown; a panic has its file and line instead.
-    let known = |words: &str, key| match hex(line, key)? {
-        0 => Read::Ok(String::new()),
-        known => Ok(format!(", {words} {known:#010x}")),
-    };
-    Ok(format!(
+    format!(
         "the image CRASHED before this start: {}{place}{}{}{}{address}{kept}",
-        spaced(&text(line, "cause")?),
-        known("at", "pc")?,
-        known("called from", "lr")?,
-        known("status", "status")?
-    ))
+        spaced(&crash.cause),
+        known("at", crash.pc),
+        known("called from", crash.lr),
+        known("status", crash.status)
+    )
 }
 
 /// Description of the leg's activity.
@@ -190,56 +176,47 @@ pub fn doing(state: &State) -> String {
     format!("drive {}; {}{phase}{motion}", spaced(&state.drive), spaced(&state.activity))
 }
 
-fn calibration(line: &Line<'_>) -> Read<Option<Event>> {
-    let (result, number) = (text(line, "result")?, value::<u32>(line, "number")?);
-    let joint = value::<usize>(line, "joint")?;
-    if result != "done" {
+fn calibrated(found: &Calibration) -> (Weight, String) {
+    let (joint, number) = (found.joint, found.number);
+    if found.result != "done" {
         let number = if number == 0 { String::new() } else { format!(" ({number})") };
-        let words = format!("calibration of joint {joint} REFUSED: {}{number}", spaced(&result));
-        return Ok(Some(Event { time_s: None, weight: Weight::Warning, words }));
+        return (
+            Weight::Warning,
+            format!("calibration of joint {joint} REFUSED: {}{number}", spaced(&found.result)),
+        );
     }
-    let number = |key| value::<f64>(line, key);
     let words = format!(
         "calibration of joint {joint} done: R {:.4} ohm, L {:.1} and {:.1} uH, offset {:.4} turns, shunts at {:.1} and {:.1}",
-        number("resistance_ohm")?,
-        1e6 * number("direct_h")?,
-        1e6 * number("quadrature_h")?,
-        number("offset_turns")?,
-        number("zero_b")?,
-        number("zero_c")?
+        found.resistance_ohm,
+        1e6 * f64::from(found.direct_h),
+        1e6 * f64::from(found.quadrature_h),
+        found.offset_turns,
+        found.zero_b,
+        found.zero_c
     );
-    Ok(Some(Event { time_s: None, weight: Weight::Note, words }))
+    (Weight::Note, words)
 }
 
-fn change(line: &Line<'_>) -> Read<Option<Event>> {
-    let joints: Vec<bool> = list(line, "joints")?;
-    let named = joints.iter().enumerate().filter(|(_, shows)| **shows);
+fn changed(change: &Change) -> String {
+    let named = change.joints.iter().enumerate().filter(|(_, shows)| **shows);
     let named: Vec<String> = named.map(|(joint, _)| (joint + 1).to_string()).collect();
-    let words = format!(
-        "the model no longer fits since {:.1} s, joints {}",
-        value::<f64>(line, "since_s")?,
-        named.join(", ")
-    );
-    Ok(Some(Event { time_s: None, weight: Weight::Warning, words }))
+    format!("the model no longer fits since {:.1} s, joints {}", change.since_s, named.join(", "))
 }
 
-fn update(line: &Line<'_>) -> Read<Option<Event>> {
-    let (cause, verdict) = (text(line, "cause")?, text(line, "verdict")?);
-    let place = match value::<u8>(line, "link")? {
+fn updated(update: &Update) -> String {
+    let place = match update.link {
         0 => String::new(),
         link => format!(" on link {link}"),
     };
-    let offered =
-        if value::<bool>(line, "offered")? { ", a new model is offered" } else { ", the old model stays" };
-    let words = format!("the change was taken for: {}{place}; {verdict}{offered}", spaced(&cause));
-    Ok(Some(Event { time_s: None, weight: Weight::Note, words }))
+    let offered = if update.offered { ", a new model is offered" } else { ", the old model stays" };
+    format!("the change was taken for: {}{place}; {}{offered}", spaced(&update.cause), update.verdict)
 }
 
-fn joint(line: &Line<'_>) -> Read<String> {
-    Ok(match value::<usize>(line, "joint")? {
+fn place(joint: usize) -> String {
+    match joint {
         0 => "the board".into(),
         joint => format!("joint {joint}"),
-    })
+    }
 }
 
 /// Replaces the underscores of a word by spaces.

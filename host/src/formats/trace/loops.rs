@@ -1,6 +1,6 @@
 //! Statistics of loops, stack and supply over a whole trace.
 
-use crate::formats::trace::fields::{Loops, Supply};
+use crate::formats::trace::records::{Loops, Supply};
 use crate::report::trace::LoopReport;
 
 /// Range of the supply, and highest temperatures.

@@ -14,16 +14,16 @@
 //! | [`decode`] | frames of a `defmt` stream to lines |
 //! | [`text`] | finds the record in a line of text, whatever a logger put around it |
 //! | [`read`] | [`Trace`]: lines to records in order, with what was lost |
-//! | [`fields`] | records to values |
+//! | [`records`] | records to values, by the firmware's list |
 //! | [`result_records`] | records of one identification's result |
 //! | [`events`] | the timeline in words |
 //! | [`loops`] | statistics of loops, stack and supply |
 
 pub mod decode;
 pub mod events;
-pub mod fields;
 pub mod loops;
 pub mod read;
+pub mod records;
 pub mod result_records;
 pub mod text;
 

@@ -6,16 +6,18 @@
 //! Cost: the records of a result, the log (60 bytes per sample) and the timeline are stored;
 //! everything else is counted.
 
-use scarab::trace::Line;
+use scarab::trace::{Line, LineError};
 
 use crate::formats::trace::events::{self, Event, Weight};
-use crate::formats::trace::fields::{self, Board, Boot, Loops, Progress, Sample, State, Supply, words};
 use crate::formats::trace::loops::Statistics;
-use crate::formats::trace::result_records::{KINDS, ResultRecords};
+use crate::formats::trace::records::{Board, Boot, Kind, Log, Progress, Received, State, words};
+use crate::formats::trace::result_records::ResultRecords;
 use crate::formats::trace::text;
 
 /// Servo rate, Hz, unless the board reports another.
 const SERVO_HZ: f64 = scarab::servo::SERVO_RATE_HZ as f64;
+/// Most joints of a leg.
+const JOINTS: usize = 3;
 /// Limit of stored messages about unreadable lines; further lines are only counted.
 const MOST_PROBLEMS: usize = 20;
 
@@ -58,7 +60,7 @@ pub struct Trace {
     /// Statistics of loops, stack and supply.
     pub statistics: Statistics,
     /// 500 Hz log in order; each sample with the number of results before it.
-    pub log: Vec<(usize, Sample)>,
+    pub log: Vec<(usize, Log)>,
     /// Gaps in the numbering of the records.
     pub gaps: Vec<Gap>,
     /// Records sent before the first that was received.
@@ -190,59 +192,65 @@ impl Trace {
         self.incomplete.push(why);
     }
 
-    fn record(&mut self, line: &Line<'_>) -> Result<(), scarab::trace::LineError<'static>> {
-        let kind = line.kind();
-        if KINDS.contains(&kind) {
-            return self.result(line);
+    fn record(&mut self, line: &Line<'_>) -> Result<(), LineError<'static>> {
+        let Some(kind) = Kind::of(line.kind()) else {
+            self.unknown += 1;
+            return Ok(());
+        };
+        let received = Received::read(kind, line);
+        if kind.is_of_result() {
+            return self.result(kind, received);
         }
-        if let Some(event) = events::of(line, self.servo_hz())? {
-            if kind == "boot" {
-                self.restart();
-                self.starts += 1;
-            }
-            self.events.push(event);
+        let received = received?;
+        let event = events::of(&received, self.servo_hz());
+        if kind == Kind::Boot {
+            self.restart();
+            self.starts += 1;
         }
-        match kind {
-            "boot" => self.boot = Some(Boot::read(line)?),
-            "board" => self.board = Some(Board::read(line)?),
-            "state" => {
-                let state = State::read(line)?;
+        self.events.extend(event);
+        match received {
+            Received::Boot(boot) => self.boot = Some(boot),
+            Received::Board(board) => self.board = Some(board),
+            Received::State(state) => {
                 // The search runs while the leg settles and until the search is done.
                 if !["settle", "solve"].contains(&state.phase.as_str()) {
                     self.progress = None;
                 }
                 self.state = Some(state);
             }
-            "progress" => self.progress = Some(Progress::read(line)?),
-            "loops" => self.statistics.take(&Loops::read(line)?),
-            "supply" => self.statistics.take_supply(&Supply::read(line)?),
-            "log" => self.sample(Sample::read(line)?)?,
-            _ if !text::is_known(kind) => self.unknown += 1,
+            Received::Progress(progress) => self.progress = Some(progress),
+            Received::Loops(loops) => self.statistics.take(&loops),
+            Received::Supply(supply) => self.statistics.take_supply(&supply),
+            Received::Log(sample) => self.sample(sample)?,
             _ => {}
         }
         Ok(())
     }
 
-    fn sample(&mut self, sample: Sample) -> Result<(), scarab::trace::LineError<'static>> {
+    fn sample(&mut self, sample: Log) -> Result<(), LineError<'static>> {
         let joints = sample.position_rad.len();
-        if !(1..=fields::JOINTS).contains(&joints) {
-            return Err(scarab::trace::LineError::Value("position_rad"));
+        if !(1..=JOINTS).contains(&joints) {
+            return Err(LineError::Value("position_rad"));
         }
         if (sample.torque_nm.len(), sample.counts.len()) != (joints, joints) {
-            return Err(scarab::trace::LineError::Value("counts"));
+            return Err(LineError::Value("counts"));
         }
         self.log.push((self.results.len(), sample));
         Ok(())
     }
 
-    /// Takes a record of a result: `solver` begins one, `end` ends it.
-    fn result(&mut self, line: &Line<'_>) -> Result<(), scarab::trace::LineError<'static>> {
-        if line.kind() == "solver" {
+    /// Takes a record of a result: `solver` begins one, `end` ends it, readable or not.
+    fn result(
+        &mut self,
+        kind: Kind,
+        received: Result<Received, LineError<'static>>,
+    ) -> Result<(), LineError<'static>> {
+        if kind == Kind::Solver {
             self.abandon();
         }
         let records = self.pending.get_or_insert_default();
-        let taken = records.take(line);
-        if line.kind() == "end" {
+        let taken = received.map(|received| records.take(received));
+        if kind == Kind::End {
             let records = self.pending.take().unwrap_or_default();
             match records.lacks() {
                 Some(why) => self.lacks(why),

@@ -6,15 +6,9 @@
 
 use std::borrow::Cow;
 
-use scarab::trace::{Line, LineError, Record};
+use scarab::trace::{Line, LineError};
 
-/// Returns whether the grammar of this version has the kind.
-#[must_use]
-pub fn is_known(kind: &str) -> bool {
-    Record::<1>::FORMATS
-        .iter()
-        .any(|format| format.strip_prefix(kind).is_some_and(|rest| rest.starts_with(' ')))
-}
+use crate::formats::trace::records::Kind;
 
 /// Record within a line; `None` for a line without one.
 #[must_use]
@@ -37,7 +31,7 @@ fn place(line: &str) -> Option<(usize, usize)> {
         let prefix = &before[..before.len() - kind.len()];
         let is_alone = prefix.trim().is_empty();
         let is_apart = is_alone || prefix.ends_with([' ', '\t', ']', ':', '>']);
-        if kind.is_empty() || !is_number(digits) || !is_apart || !(is_alone || is_known(kind)) {
+        if kind.is_empty() || !is_number(digits) || !is_apart || !(is_alone || Kind::of(kind).is_some()) {
             continue;
         }
         return Some((prefix.len(), end(trimmed, prefix.len())));

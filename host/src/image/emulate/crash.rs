@@ -20,6 +20,7 @@ use object::{Object, ObjectSymbol};
 use scarab::trace::Line;
 
 use crate::base::error::{FileError, ToolError};
+use crate::formats::trace::records::{Crash, Kind, Received};
 
 /// Kind of crash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -115,27 +116,29 @@ impl CrashReport {
                 starts.len()
             )));
         };
-        let [crash] = all(after, "crash")[..] else {
+        let [crash] = crashes(after)[..] else {
             return Err(ToolError::input("the start after the crash reports no crash, or more than one"));
         };
-        let lacks = |key: &str| ToolError::input(format!("the record of the crash lacks `{key}`"));
-        let clock = |key: &'static str| crash.value::<u32>(key).map_err(|_| lacks(key));
-        let (released, kept) = (clock("released")?, clock("kept")?);
-        let cause = crash.text("cause").map_err(|_| lacks("cause"))?.to_owned();
+        let (Some(released), Some(kept)) = (crash.released, crash.kept) else {
+            return Err(ToolError::input("the record of the crash lacks `released` or `kept`"));
+        };
         let mut report = Self {
-            cause,
-            place: place(kind, &crash, image)?,
+            cause: crash.cause.clone(),
+            place: place(kind, crash, image)?,
             released_after: released.wrapping_sub(begun),
             kept_after: kept.wrapping_sub(begun),
             complaints: Vec::new(),
         };
-        let clock_hz =
-            all(after, "board").first().and_then(|board| board.value("clock_hz").ok()).unwrap_or(0);
+        let clock_hz = after.iter().find_map(|record| match record {
+            Received::Board(board) => Some(board.clock_hz),
+            _ => None,
+        });
+        let clock_hz = clock_hz.unwrap_or(0);
         let witness = Witness::of(log);
         let expected = [
             (report.cause == kind.name(), "the reported cause is another"),
             (is_identifying(before), "the leg was not identifying when it crashed"),
-            (all(before, "crash").is_empty(), "a crash is reported before it happened"),
+            (crashes(before).is_empty(), "a crash is reported before it happened"),
             (witness.released, "the emulator did not log both bridges turning off"),
             (witness.exceptions == 0, "the emulator logged exceptions between bridges off and reset"),
             (witness.resets == 2, "the emulator did not log exactly two resets"),
@@ -143,7 +146,7 @@ impl CrashReport {
             (released < kept, "the bridges turned off after the record"),
             (is_refused(after), "the drive was not refused before the fault was reset"),
             (is_identifying(after), "the drive was not enabled after the fault was reset"),
-            (all(again, "crash").is_empty(), "the crash is reported a second time"),
+            (crashes(again).is_empty(), "the crash is reported a second time"),
             (is_identifying(again) && !is_refused(again), "the drive is refused without a crash"),
         ];
         let missed = expected.iter().filter(|(held, _)| !held);
@@ -173,46 +176,54 @@ impl CrashReport {
 }
 
 /// Records of each start.
-fn starts(records: &str) -> Vec<Vec<Line<'_>>> {
-    let mut starts: Vec<Vec<Line<'_>>> = Vec::new();
+fn starts(records: &str) -> Vec<Vec<Received>> {
+    let mut starts: Vec<Vec<Received>> = Vec::new();
     for line in records.lines().filter_map(|line| Line::parse(line).ok()) {
-        if line.kind() == "boot" {
+        let record = Kind::of(line.kind()).and_then(|kind| Received::read(kind, &line).ok());
+        if matches!(record, Some(Received::Boot(_))) {
             starts.push(Vec::new());
         }
         if let Some(start) = starts.last_mut() {
-            start.push(line);
+            start.extend(record);
         }
     }
     starts
 }
 
-fn all<'a>(start: &[Line<'a>], kind: &str) -> Vec<Line<'a>> {
-    start.iter().filter(|line| line.kind() == kind).copied().collect()
+fn crashes(start: &[Received]) -> Vec<&Crash> {
+    let crash = |record| match record {
+        &Received::Crash(ref crash) => Some(crash),
+        _ => None,
+    };
+    start.iter().filter_map(crash).collect()
 }
 
 /// Whether the drive was enabled and identifying at the end.
-fn is_identifying(start: &[Line<'_>]) -> bool {
-    all(start, "state").last().is_some_and(|state| {
-        state.text("drive") == Ok("operation_enabled") && state.text("activity") == Ok("identify")
-    })
+fn is_identifying(start: &[Received]) -> bool {
+    let state = start.iter().rev().find_map(|record| match record {
+        Received::State(state) => Some(state),
+        _ => None,
+    });
+    state.is_some_and(|state| state.drive == "operation_enabled" && state.activity == "identify")
 }
 
 /// Whether the inhibit reason was reported before any enabling, and the request refused.
-fn is_refused(start: &[Line<'_>]) -> bool {
-    let is_reported = all(start, "refused").iter().any(|refused| refused.text("why") == Ok("crash"));
-    let mut until = start.iter().take_while(|line| line.text("drive") != Ok("operation_enabled"));
-    is_reported && until.any(|line| line.kind() == "request" && line.text("accepted") == Ok("false"))
+fn is_refused(start: &[Received]) -> bool {
+    let reports = |record: &Received| matches!(record, Received::Refused(refused) if refused.why == "crash");
+    let enabled =
+        |record: &Received| matches!(record, Received::State(state) if state.drive == "operation_enabled");
+    let refuses = |record: &Received| matches!(record, Received::Request(request) if !request.accepted);
+    start.iter().any(reports) && start.iter().take_while(|record| !enabled(record)).any(refuses)
 }
 
 /// Location of the crash.
-fn place(kind: CrashKind, crash: &Line<'_>, image: &Path) -> Result<String, ToolError> {
-    let text = |key: &'static str| crash.text(key).unwrap_or("?").to_owned();
-    let function = |key: &'static str| function(crash.hex(key).unwrap_or(0), image);
+fn place(kind: CrashKind, crash: &Crash, image: &Path) -> Result<String, ToolError> {
+    let Crash { pc, lr, status, address, .. } = crash;
     Ok(match kind {
-        CrashKind::Panic => format!("{} line {}", text("file"), text("line")),
-        CrashKind::HardFault => format!("in {}, address {}", function("pc")?, text("address")),
-        CrashKind::StackOverflow => format!("called from {}, address {}", function("lr")?, text("address")),
-        CrashKind::Interrupt => format!("number {}", crash.hex("status").unwrap_or(0)),
+        CrashKind::Panic => format!("{} line {}", crash.file, crash.line),
+        CrashKind::HardFault => format!("in {}, address {address:#x}", function(*pc, image)?),
+        CrashKind::StackOverflow => format!("called from {}, address {address:#x}", function(*lr, image)?),
+        CrashKind::Interrupt => format!("number {status}"),
     })
 }
 

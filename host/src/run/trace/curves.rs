@@ -11,8 +11,8 @@ use scarab::servo::TICKS_PER_LOG;
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
-use crate::formats::trace::fields::Sample;
 use crate::formats::trace::read::Trace;
+use crate::formats::trace::records::Log;
 use crate::formats::trace::result_records::ResultRecords;
 use crate::leg::motions::VALIDATION_NAMES;
 use crate::report::series::{Anatomy, Reader, Role, Series};
@@ -60,7 +60,7 @@ fn of_size<const N: usize, const B: usize>(
     )
     .map_err(|error| ToolError::input(format!("the filter does not fit the device: {error:?}")))?;
     let of_result = trace.log.iter().filter(|(results, _)| results + 1 == trace.results.len());
-    let samples: Vec<&Sample> =
+    let samples: Vec<&Log> =
         of_result.map(|(_, sample)| sample).filter(|sample| sample.counts.len() == N).collect();
     let parts = samples.chunk_by(|before, after| {
         (before.segment == after.segment, before.motion == after.motion, after.tick > before.tick)
@@ -72,7 +72,7 @@ fn of_size<const N: usize, const B: usize>(
         let (name, role) = match (part[0].segment.as_str(), part[0].motion) {
             ("training", _) => ("excitation", Role::Training),
             ("validation", motion) => {
-                let name = usize::from(motion).checked_sub(1).and_then(|motion| VALIDATION_NAMES.get(motion));
+                let name = motion.checked_sub(1).and_then(|motion| VALIDATION_NAMES.get(motion));
                 (name.copied().unwrap_or("validation"), Role::Validation)
             }
             _ => continue,

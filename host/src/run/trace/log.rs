@@ -7,8 +7,8 @@ use scarab::servo::{LogSample, TICKS_PER_LOG};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
-use crate::formats::trace::fields::Sample;
 use crate::formats::trace::read::Trace;
+use crate::formats::trace::records::Log;
 use crate::run::identify::write_log;
 use crate::with_leg_size;
 
@@ -38,7 +38,7 @@ pub fn write(trace: &Trace, leg: &LegFile, motion: u8, path: &Path) -> Result<Wr
             others => format!("--csv: the trace holds no log of motion {motion}, but of {others}"),
         }));
     };
-    let samples: Vec<&Sample> =
+    let samples: Vec<&Log> =
         of_motion().filter(|(results, _)| results == last).map(|(_, sample)| sample).collect();
     if let Some(sample) = samples.iter().find(|sample| sample.counts.len() != leg.joints.len()) {
         let (recorded, own) = (sample.counts.len(), leg.joints.len());
@@ -65,10 +65,10 @@ pub fn others(trace: &Trace, motion: u8) -> String {
 }
 
 /// Number of the motion that a sample belongs to.
-fn number(sample: &Sample) -> Option<u8> {
+fn number(sample: &Log) -> Option<u8> {
     match sample.segment.as_str() {
         "training" => Some(TRAINING),
-        "validation" => Some(sample.motion),
+        "validation" => u8::try_from(sample.motion).ok(),
         _ => None,
     }
 }
@@ -82,7 +82,7 @@ fn is_another_motion(before: u32, after: u32) -> bool {
 fn write_sized<const N: usize, const B: usize>(
     path: &Path,
     leg: &LegFile,
-    samples: &[&Sample],
+    samples: &[&Log],
 ) -> Result<(), ToolError> {
     let logged: Vec<LoggedSample<N>> = samples
         .iter()

@@ -14,7 +14,8 @@ use crate::base::number::Number;
 use crate::formats::leg_file::LegFile;
 use crate::formats::trace::events::is_emulated;
 use crate::formats::trace::read::Trace;
-use crate::formats::trace::result_records::{Fit, ResultRecords, Solver};
+use crate::formats::trace::records::{Finding, Fit, Solver};
+use crate::formats::trace::result_records::ResultRecords;
 use crate::leg::background::Background;
 use crate::leg::motions::VALIDATION_NAMES;
 use crate::leg::setup::{PriorChoice, background};
@@ -329,7 +330,7 @@ fn fit_report(fit: &Fit, motion: String) -> FitReport {
     }
 }
 
-fn finding(record: &crate::formats::trace::result_records::Finding) -> Result<FindingReport, ToolError> {
+fn finding(record: &Finding) -> Result<FindingReport, ToolError> {
     let tests = Test::ALL.into_iter().find(|test| test.name() == record.test);
     let reasons = Reason::ALL.into_iter().find(|reason| reason.name() == record.reason);
     let (Some(test), Some(reason)) = (tests, reasons) else {
