@@ -20,7 +20,8 @@ pub enum SideArgument {
 /// Leg and its settings.
 #[derive(Args, Clone, Debug)]
 pub struct LegOptions {
-    /// Name of a shipped leg, or a leg file. Default: x2-wearer-75kg; predict and export: the model's leg. Replay and flash-leg require it.
+    /// Name of a shipped leg, or a leg file. Default: x2-wearer-75kg; predict and export: the model's leg.
+    /// Replay and flash-leg require it.
     #[arg(long)]
     leg: Option<LegName>,
     /// Length of the thigh, m (0.402 to 0.505).

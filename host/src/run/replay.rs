@@ -315,8 +315,8 @@ fn identified<const N: usize, const B: usize>(
             model.stribeck_choice[joint] == Choice::Off || model.stribeck_choice(joint).is_possible()
         })
     };
-    // A misfit above the noise may be vibration; a larger bandwidth passes more of it. Beyond the bandwidths of
-    // the Stribeck search it would bias friction.
+    // A misfit above the noise may be vibration; a larger bandwidth passes more of it. Beyond the bandwidths
+    // of the Stribeck search it would bias friction.
     let proposed_hz = if noise_is_known && !options.chooses_bandwidth {
         let larger = chosen_bandwidth(leg, &background, options)?;
         Some(larger).filter(|hz| *hz > options.bandwidth_hz && searches_stribeck(*hz))
