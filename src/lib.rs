@@ -40,5 +40,7 @@ pub mod store;
 pub mod swarm;
 #[cfg(all(feature = "tasks", target_os = "none"))]
 pub mod task;
+#[cfg(test)]
+mod testing;
 pub mod trace;
 pub mod units;

@@ -257,9 +257,29 @@ fn eighth_of_a_turn(x: f32) -> (f32, f32) {
     (sine, cosine)
 }
 
+/// Median of some numbers, the upper one of two; 0 for an empty slice. Sorts the slice.
+pub fn median<T: Real>(values: &mut [T]) -> T {
+    for end in 1..values.len() {
+        for place in (0..end).rev() {
+            if values[place] <= values[place + 1] {
+                break;
+            }
+            values.swap(place, place + 1);
+        }
+    }
+    values.get(values.len() / 2).copied().unwrap_or(T::zero())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn median_is_the_upper_middle_value() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 3.0);
+        assert_eq!(median::<f64>(&mut []), 0.0);
+    }
 
     #[test]
     fn single_precision_sine_and_cosine_stay_within_their_stated_error() {

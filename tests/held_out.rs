@@ -1,15 +1,18 @@
 //! Findings of held-out motions: synthetic torque of one leg, identified with the geometry of another.
 
 use nalgebra::Vector3;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::ident::{
-    Direction, Ends, HeldOut, Misalignment, Plan, Problem, Recorder, Residual, RowModel, Stretches,
+    Direction, Ends, HeldOut, Misalignment, Plan, Problem, Recorder, Residual, RowModel, SAMPLE_RATE_HZ,
+    Stretches,
 };
+use scarab::model::planar::BASE;
 use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
 use scarab::real::sin_cos;
+use testing::TestRandom;
 
-const BASE: usize = 13;
+#[path = "../src/testing.rs"]
+mod testing;
+
 const GRAVITY: Vector3<f64> = Vector3::new(9.81, 0.0, 0.0);
 const LENGTH_M: f64 = 0.42;
 const NOISE_NM: [f64; 2] = [0.4, 0.15];
@@ -56,19 +59,17 @@ struct Found {
 /// `disturbed` adds to the torque of both joints.
 fn look(length_m: f64, zeros: [f64; 2], noise: [f64; 2], seed: u64, disturbed: impl Fn(f64) -> f64) -> Found {
     let model = believed(length_m);
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut normal =
-        || (0..12).map(|_| (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0;
+    let mut random = TestRandom::new(seed);
     let mut sample = |state: &JointState<f64, 2>| -> ([f32; 2], [f32; 2]) {
         let torque = joint_torques(&chain(LENGTH_M), &TRUTH, state, &GRAVITY);
         (
             core::array::from_fn(|joint| (state.q[joint] + zeros[joint]) as f32),
-            core::array::from_fn(|joint| (torque[joint] + noise[joint] * normal()) as f32),
+            core::array::from_fn(|joint| (torque[joint] + noise[joint] * random.normal()) as f32),
         )
     };
     let mut recorder = Recorder::<f32, 2, BASE, 256, 26>::new(8.0).expect("fits");
     for index in 0..10_000 {
-        let (position, torque) = sample(&motion(f64::from(index) / 500.0, 1.0, 0.0));
+        let (position, torque) = sample(&motion(f64::from(index) / SAMPLE_RATE_HZ, 1.0, 0.0));
         recorder.push(&model, &position, &torque);
     }
     let training = recorder.finish();
@@ -79,7 +80,7 @@ fn look(length_m: f64, zeros: [f64; 2], noise: [f64; 2], seed: u64, disturbed: i
         recorder.clear(Ends::Whole);
         held_out.begin(&values, &NOISE_NM.map(|noise| 2.0 * noise as f32), problem.noise(), &[false; BASE]);
         for index in 0..5_000 {
-            let time = f64::from(index) / 500.0;
+            let time = f64::from(index) / SAMPLE_RATE_HZ;
             let (position, torque) = sample(&motion(time, speed, start));
             let torque = torque.map(|torque| torque + disturbed(time) as f32);
             if let Some(progress) = recorder.push(&model, &position, &torque) {
@@ -178,18 +179,17 @@ fn only_an_unmodelled_swing_counts_as_slow_residual() {
 /// its blocks and by its rows.
 fn pushed(duration_s: u32) -> (f64, f64) {
     let model = believed(LENGTH_M);
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
-    let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+    let mut random = TestRandom::new(3);
     let begin_s = 0.4 * f64::from(duration_s);
     let samples: Vec<([f32; 2], [f32; 2])> = (0..500 * duration_s)
         .map(|index| {
-            let time = f64::from(index) / 500.0;
+            let time = f64::from(index) / SAMPLE_RATE_HZ;
             let state = motion(time, 1.0, 0.0);
             let torque = joint_torques(&chain(LENGTH_M), &TRUTH, &state, &GRAVITY);
             let phase = ((time - begin_s) / 0.6).clamp(0.0, 1.0);
             let push = sin_cos(std::f64::consts::PI * phase).0;
             let torque = core::array::from_fn(|joint| {
-                torque[joint] + NOISE_NM[joint] * (20.0 * push + 1.7 * uniform())
+                torque[joint] + NOISE_NM[joint] * (20.0 * push + 1.7 * random.within(1.0))
             });
             (state.q.map(|angle| angle as f32), torque.map(|torque| torque as f32))
         })

@@ -3,14 +3,17 @@
 //! There is no plant: these tests check the filter chain, the information factor and the statistics alone.
 
 use nalgebra::Vector3;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::ident::{
-    Estimate, Evidence, Plan, Problem, Reason, Recorder, RowModel, Thresholds, Verdict, VerdictBuilder,
+    Estimate, Evidence, Plan, Problem, Reason, Recorder, RowModel, SAMPLE_RATE_HZ, Thresholds, Verdict,
+    VerdictBuilder,
 };
+use scarab::model::planar::BASE;
 use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
+use testing::TestRandom;
 
-const BASE: usize = 13;
+#[path = "../src/testing.rs"]
+mod testing;
+
 type LegRecorder = Recorder<f32, 2, BASE, 256, 26>;
 
 fn chain() -> Chain<f64, 2> {
@@ -31,20 +34,6 @@ const TRUTH: LegParameters<f64, 2> = [
     [0.03, -0.016, 0.0, 0.5, 0.0, 0.506, 1.7, 0.10, 0.0, 8.5, 0.12, 3.0, 1.2, 0.4],
     [0.013, 0.011, 0.0, 0.25, 0.0, 0.2546, 0.864, -0.072, 0.0, 4.8, 0.08, 2.0, 0.8, -0.3],
 ];
-
-struct Normal(Xoshiro256PlusPlus);
-
-impl Normal {
-    fn new(seed: u64) -> Self {
-        Self(Xoshiro256PlusPlus::seed_from_u64(seed))
-    }
-    fn uniform(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-    fn next(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
 
 /// Five harmonics of 0.1 Hz on each joint, D-H angles.
 fn motion(time: f64) -> JointState<f64, 2> {
@@ -79,13 +68,13 @@ fn mean_absolute_torque() -> [f64; 2] {
 
 fn record(recorder: &mut LegRecorder, seconds: f64, noise_share: f64, seed: u64) {
     let model = model();
-    let mut normal = Normal::new(seed);
+    let mut random = TestRandom::new(seed);
     let mean = mean_absolute_torque();
-    for index in 0..(seconds * 500.0) as usize {
-        let state = motion(index as f64 / 500.0);
+    for index in 0..(seconds * SAMPLE_RATE_HZ) as usize {
+        let state = motion(index as f64 / SAMPLE_RATE_HZ);
         let exact = torque(&state);
         let noisy =
-            std::array::from_fn(|joint| (exact[joint] + noise_share * mean[joint] * normal.next()) as f32);
+            std::array::from_fn(|joint| (exact[joint] + noise_share * mean[joint] * random.normal()) as f32);
         recorder.push(&model, &state.q.map(|angle| angle as f32), &noisy);
     }
 }
@@ -194,13 +183,13 @@ fn an_implausible_last_angle_is_refused_and_leaves_no_nan() {
 #[test]
 fn a_joint_that_does_not_move_is_refused_as_unexcited() {
     let (mut recorder, model) = (LegRecorder::new(8.0).expect("fits"), model());
-    let mut normal = Normal::new(9);
+    let mut random = TestRandom::new(9);
     for index in 0..10_000 {
-        let mut state = motion(f64::from(index) / 500.0);
+        let mut state = motion(f64::from(index) / SAMPLE_RATE_HZ);
         (state.q[0], state.qd[0], state.qdd[0]) = (0.4, 0.0, 0.0);
-        let noisy = torque(&state).map(|exact| (exact + 0.3 * normal.next()) as f32);
+        let noisy = torque(&state).map(|exact| (exact + 0.3 * random.normal()) as f32);
         // The encoder of the resting joint flickers in the last bit of a 14-bit disc.
-        let flicker = (3.8e-4 * (0.5 + 0.5 * normal.next()).round()) as f32;
+        let flicker = (3.8e-4 * (0.5 + 0.5 * random.normal()).round()) as f32;
         recorder.push(&model, &[state.q[0] as f32 + flicker, state.q[1] as f32], &noisy);
     }
     assert!(judge(&mut recorder).has(Reason::Unexcited));
@@ -210,7 +199,7 @@ fn a_joint_that_does_not_move_is_refused_as_unexcited() {
 fn a_negated_torque_is_refused_as_unphysical() {
     let (mut recorder, model) = (LegRecorder::new(8.0).expect("fits"), model());
     for index in 0..10_000 {
-        let state = motion(f64::from(index) / 500.0);
+        let state = motion(f64::from(index) / SAMPLE_RATE_HZ);
         let against = torque(&state).map(|exact| -exact as f32);
         recorder.push(&model, &state.q.map(|angle| angle as f32), &against);
     }

@@ -7,10 +7,14 @@ use scarab::leg::{
     StoredCalibration, StoredModel, Stribeck,
 };
 use scarab::store::{
-    JointProvenance, Keeper, KeptCalibration, KeptModel, Key, LoadError, Permit, Provenance, RecordError,
-    SaveError, Saved, Store, UnfitRange,
+    CalibrationRecord, JointProvenance, Key, LoadError, ModelRecord, Permit, Provenance, RecordError,
+    SaveError, Saved, Storage, Store, UnfitRange,
 };
 use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
+use testing::TestRandom;
+
+#[path = "../src/testing.rs"]
+mod testing;
 
 /// Short sectors, so that the power can be cut at every byte of every operation.
 const SECTOR: usize = 2048;
@@ -22,8 +26,8 @@ fn permit() -> Permit {
     Permit::of(DriveState::SwitchOnDisabled).expect("the drive is off")
 }
 
-fn calibration(number: u32) -> KeptCalibration {
-    KeptCalibration(StoredCalibration {
+fn calibration(number: u32) -> CalibrationRecord {
+    CalibrationRecord(StoredCalibration {
         resistance: Ohm(0.05 + number as f32 * 1e-4),
         direct_inductance: Henry(2.5e-5),
         quadrature_inductance: Henry(3.1e-5),
@@ -32,9 +36,9 @@ fn calibration(number: u32) -> KeptCalibration {
     })
 }
 
-fn model(number: u32) -> KeptModel<2> {
+fn model(number: u32) -> ModelRecord<2> {
     let value = |joint: usize, index: usize| number as f32 + joint as f32 * 0.5 - index as f32 * 0.125;
-    KeptModel {
+    ModelRecord {
         model: StoredModel {
             fingerprint: Fingerprint(0x0123_4567_89AB_CDEF ^ u64::from(number)),
             parameters: [0, 1].map(|joint| core::array::from_fn(|index| value(joint, index))),
@@ -64,8 +68,8 @@ fn store<const BYTES: usize>(flash: Flash<BYTES, 2>) -> Store<Flash<BYTES, 2>> {
 /// All data stored in a flash, as read by a firmware that has just started.
 #[derive(Clone, Debug, PartialEq)]
 struct Content {
-    calibrations: [Option<KeptCalibration>; 2],
-    model: Option<KeptModel<2>>,
+    calibrations: [Option<CalibrationRecord>; 2],
+    model: Option<ModelRecord<2>>,
     objects: [Option<Vec<u8>>; 2],
 }
 
@@ -183,11 +187,7 @@ fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
 #[test]
 fn a_power_cut_during_a_repair_leaves_the_old_or_the_new() {
     let mut flash = Small::new(11);
-    let mut state = 1_u64;
-    let mut draw = |below: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) % below
-    };
+    let mut random = TestRandom::new(1);
     for number in 0..400 {
         let (before, clean) = content(flash).unwrap();
         let mut whole = store(clean.clone());
@@ -195,13 +195,13 @@ fn a_power_cut_during_a_repair_leaves_the_old_or_the_new() {
         let done = whole.into_flash();
         let (after, _) = content(done.clone()).unwrap();
         let mut dying = clean.clone();
-        dying.fail_after(Some(1 + draw((done.worked() - clean.worked()).max(1))));
+        dying.fail_after(Some(1 + random.below((done.worked() - clean.worked()).max(1))));
         let mut first = store(dying);
         let _ = keep(&mut first, number);
         let mut dead = first.into_flash();
         // Cuts the power twice more, within the work of a repair: a sector erased and records copied.
         for _ in 0..2 {
-            dead.fail_after(Some(1 + draw(3 * SECTOR as u64)));
+            dead.fail_after(Some(1 + random.below(3 * SECTOR as u64)));
             let mut again = store(dead);
             let _ = keep(&mut again, number);
             dead = again.into_flash();
@@ -243,13 +243,10 @@ fn corrupt_flash_gives_stored_data_or_an_error() {
         "one bit flipped, of {}: {whole_count} read whole, {partly} in part, {refused} refused",
         8 * 1200
     );
-    let mut state = 5_u32;
+    let mut random = TestRandom::new(5);
     for _ in 0..300 {
         let mut foreign = Small::new(1);
-        for byte in foreign.bytes_mut() {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            *byte = (state >> 24) as u8;
-        }
+        foreign.bytes_mut().fill_with(|| random.byte());
         if let Ok((found, _)) = content(foreign) {
             assert_eq!(found, Content { calibrations: [None; 2], model: None, objects: [None, None] });
         }
@@ -275,10 +272,10 @@ fn implausible_records_are_neither_stored_nor_read() {
     assert_eq!(refused, Err(SaveError::Record(RecordError::Range)));
     // A record of another kind under this key, and one of a later firmware.
     block_on(store.save_bytes(&permit(), Key::Calibration1, &[1, 0, 3])).unwrap();
-    let found = block_on(store.load::<KeptCalibration>(Key::Calibration1));
+    let found = block_on(store.load::<CalibrationRecord>(Key::Calibration1));
     assert_eq!(found, Err(LoadError::Record(RecordError::Length)));
     block_on(store.save_bytes(&permit(), Key::Calibration1, &[9, 0, 3])).unwrap();
-    let found = block_on(store.load::<KeptCalibration>(Key::Calibration1));
+    let found = block_on(store.load::<CalibrationRecord>(Key::Calibration1));
     assert_eq!(found, Err(LoadError::Record(RecordError::Newer { schema: 9 })));
     assert_eq!(block_on(store.save_bytes(&permit(), Key::Objects1, &[0; 500])), Err(SaveError::TooLong));
 }
@@ -306,7 +303,7 @@ fn a_flash_without_power_gives_a_flash_error() {
     let mut dead = Small::new(1);
     dead.fail_after(Some(0));
     let mut store = store(dead);
-    assert_eq!(block_on(store.load::<KeptModel<2>>(Key::Model)), Err(LoadError::Flash));
+    assert_eq!(block_on(store.load::<ModelRecord<2>>(Key::Model)), Err(LoadError::Flash));
     assert_eq!(keep(&mut store, 0), Err(SaveError::Flash));
     let _: FlashError = FlashError::NoPower;
 }
@@ -329,53 +326,53 @@ fn ten_thousand_models_need_few_erasures() {
     assert!(flash.erasures().iter().all(|&erased| erased <= 15), "{:?}", flash.erasures());
 }
 
-fn keeper(flash: Small) -> Keeper<Small, 2> {
-    Keeper::new(store(flash))
+fn storage(flash: Small) -> Storage<Small, 2> {
+    Storage::new(store(flash))
 }
 
 /// Data that a start finds: calibrations, generation of the model, bytes of the first node.
 fn found(flash: Small) -> ([Option<StoredCalibration>; 2], Option<u32>, Vec<u8>, Small) {
-    let mut keeper = keeper(flash);
-    let calibrations = [0, 1].map(|axis| block_on(keeper.calibration(axis)));
-    let generation = block_on(keeper.model()).expect("readable").map(|kept| kept.provenance.generation);
+    let mut storage = storage(flash);
+    let calibrations = [0, 1].map(|axis| block_on(storage.calibration(axis)));
+    let generation = block_on(storage.model()).expect("readable").map(|kept| kept.provenance.generation);
     let mut bytes = [0; 64];
-    let length = block_on(keeper.objects(0, &mut bytes)).expect("readable");
-    (calibrations, generation, bytes[..length].to_vec(), keeper.into_flash())
+    let length = block_on(storage.objects(0, &mut bytes)).expect("readable");
+    (calibrations, generation, bytes[..length].to_vec(), storage.into_flash())
 }
 
 #[test]
 fn a_save_stores_objects_calibrations_and_the_model() {
     let stored = [1, 2].map(|number| calibration(number).0);
-    let mut first = keeper(Small::new(1));
+    let mut first = storage(Small::new(1));
     // Only one axis passed: its calibration waits for the other's.
     first.calibrated(0, Some(stored[0]));
-    assert_eq!(block_on(first.keep(&permit(), [b"hip", b"knee"], 4)), Some(4));
+    assert_eq!(block_on(first.save(&permit(), [b"hip", b"knee"], 4)), Some(4));
     let (calibrations, generation, objects, flash) = found(first.into_flash());
     assert_eq!((calibrations, generation, &objects[..]), ([None; 2], None, &b"hip"[..]));
 
-    let mut second = keeper(flash);
+    let mut second = storage(flash);
     stored.iter().enumerate().for_each(|(axis, stored)| second.calibrated(axis, Some(*stored)));
     second.accept(model(9));
-    assert_eq!(block_on(second.keep(&permit(), [b"HIP", b"knee"], 4)), Some(5));
+    assert_eq!(block_on(second.save(&permit(), [b"HIP", b"knee"], 4)), Some(5));
     // Nothing changed, so nothing new is stored.
-    assert_eq!(block_on(second.keep(&permit(), [b"HIP", b"knee"], 5)), Some(5));
+    assert_eq!(block_on(second.save(&permit(), [b"HIP", b"knee"], 5)), Some(5));
     let (calibrations, generation, objects, _) = found(second.into_flash());
     assert_eq!((calibrations, generation, &objects[..]), (stored.map(Some), Some(5), &b"HIP"[..]));
 }
 
 #[test]
 fn erased_data_is_not_stored_again_by_the_next_save() {
-    let mut keeper = keeper(Small::new(1));
-    let find = |keeper: &mut Keeper<Small, 2>| {
-        (0..2).for_each(|axis| keeper.calibrated(axis, Some(calibration(axis as u32).0)));
-        keeper.accept(model(3));
+    let mut storage = storage(Small::new(1));
+    let find = |storage: &mut Storage<Small, 2>| {
+        (0..2).for_each(|axis| storage.calibrated(axis, Some(calibration(axis as u32).0)));
+        storage.accept(model(3));
     };
-    find(&mut keeper);
-    assert_eq!(block_on(keeper.keep(&permit(), [b"hip", b"knee"], 0)), Some(1));
-    find(&mut keeper);
-    assert_eq!(block_on(keeper.forget(&permit())), Some(0));
-    assert_eq!(block_on(keeper.keep(&permit(), [b"new", b"new"], 0)), Some(0));
-    let (calibrations, generation, objects, _) = found(keeper.into_flash());
+    find(&mut storage);
+    assert_eq!(block_on(storage.save(&permit(), [b"hip", b"knee"], 0)), Some(1));
+    find(&mut storage);
+    assert_eq!(block_on(storage.forget(&permit())), Some(0));
+    assert_eq!(block_on(storage.save(&permit(), [b"new", b"new"], 0)), Some(0));
+    let (calibrations, generation, objects, _) = found(storage.into_flash());
     assert_eq!((calibrations, generation, &objects[..]), ([None; 2], None, &b"new"[..]));
 }
 
@@ -383,13 +380,13 @@ fn erased_data_is_not_stored_again_by_the_next_save() {
 fn a_failed_write_is_reported_and_stores_nothing() {
     let mut flash = Small::new(1);
     flash.fail_after(Some(0));
-    let mut keeper = keeper(flash);
-    keeper.accept(model(3));
-    assert_eq!(block_on(keeper.forget(&permit())), None);
-    assert_eq!(block_on(keeper.keep(&permit(), [b"hip", b"knee"], 7)), None);
-    let mut flash = keeper.into_flash();
+    let mut storage = storage(flash);
+    storage.accept(model(3));
+    assert_eq!(block_on(storage.forget(&permit())), None);
+    assert_eq!(block_on(storage.save(&permit(), [b"hip", b"knee"], 7)), None);
+    let mut flash = storage.into_flash();
     flash.fail_after(None);
-    let mut keeper = self::keeper(flash);
-    keeper.accept(model(3));
-    assert_eq!(block_on(keeper.keep(&permit(), [b"hip", b"knee"], 7)), Some(8));
+    let mut storage = self::storage(flash);
+    storage.accept(model(3));
+    assert_eq!(block_on(storage.save(&permit(), [b"hip", b"knee"], 7)), Some(8));
 }

@@ -57,7 +57,7 @@ pub struct CurrentSensor {
     offset: f64,
     step: f64,
     outliers: Option<OutlierDescription>,
-    wild: f64,
+    outlier: f64,
 }
 
 impl CurrentSensor {
@@ -69,7 +69,7 @@ impl CurrentSensor {
             offset: description.offset,
             step: description.step,
             outliers: description.outliers,
-            wild: 0.0,
+            outlier: 0.0,
         };
         sensor.set_noise(description.noise);
         sensor
@@ -84,12 +84,12 @@ impl CurrentSensor {
     pub fn begin_logged(&mut self, generator: &mut Xoshiro256PlusPlus) {
         let Some(outliers) = self.outliers else { return };
         let [chance, size]: [f64; 2] = core::array::from_fn(|_| StandardUniform.sample(generator));
-        self.wild = if chance < outliers.share { outliers.current * (2.0 * size - 1.0) } else { 0.0 };
+        self.outlier = if chance < outliers.share { outliers.current * (2.0 * size - 1.0) } else { 0.0 };
     }
 
     /// Reading of a current in A.
     pub fn read(&self, current: f64, generator: &mut Xoshiro256PlusPlus) -> f64 {
-        let mut reading = current + self.offset + self.wild;
+        let mut reading = current + self.offset + self.outlier;
         if self.sigma > 0.0 {
             let normal: f64 = StandardNormal.sample(generator);
             reading += self.sigma * normal;

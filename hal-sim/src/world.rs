@@ -23,11 +23,11 @@ use crate::wearer::Wearer;
 use periods::{Electric, PERIODS_PER_TICK};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, Sample};
+use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, SERVO_RATE_HZ, Sample};
 use scarab::units::Ampere;
 
 /// Servo rate, Hz.
-pub const TICK_RATE_HZ: f64 = 4000.0;
+pub const TICK_RATE_HZ: f64 = SERVO_RATE_HZ as f64;
 /// Duration of a servo tick, s.
 pub const TICK_S: f64 = 1.0 / TICK_RATE_HZ;
 
@@ -202,7 +202,7 @@ impl<const N: usize> World<N> {
     pub fn advance(&mut self) {
         if self.electric.is_some() {
             for _ in 0..PERIODS_PER_TICK {
-                self.period(&[AxisCommand::RELEASED; N], 0.0);
+                self.period(&[AxisCommand::OFF; N], 0.0);
             }
             return self.read_sensors();
         }

@@ -27,7 +27,7 @@ fn foot_height(world: &World<2>) -> f64 {
 fn lowest(world: &mut World<2>, seconds: f64) -> f64 {
     let mut lowest = f64::INFINITY;
     for _ in 0..(seconds / TICK_S) as u32 {
-        world.tick(&DriveCommand::RELEASED);
+        world.tick(&DriveCommand::OFF);
         lowest = lowest.min(foot_height(world));
     }
     lowest

@@ -49,7 +49,7 @@ const SEARCHED: u32 = 512;
 unsafe extern "C" {
     /// Turns both bridges off without lock or wait, and returns the clock as in records. Provided by the
     /// image's board.
-    safe fn scarab_release() -> u32;
+    safe fn scarab_disable_all() -> u32;
     static __stext: u32;
     static __etext: u32;
 }
@@ -85,7 +85,7 @@ const WORDS: usize = size_of::<Crash>() / 4;
 /// Kind of crash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Cause {
+pub enum CrashCause {
     /// Rust panic.
     Panic = 1,
     /// Hard fault of the processor.
@@ -114,7 +114,7 @@ impl Crash {
         check: 0,
     };
 
-    fn of(cause: Cause, released: u32) -> Self {
+    fn of(cause: CrashCause, released: u32) -> Self {
         Self { cause: cause as u32, released, ..Self::NONE }
     }
 
@@ -165,7 +165,7 @@ pub fn take() -> Option<&'static Crash> {
 }
 
 fn end(mut crash: Crash) -> ! {
-    crash.kept = scarab_release();
+    crash.kept = scarab_disable_all();
     crash.check = crash.sum();
     let words: [u32; WORDS] = zerocopy::transmute!(crash);
     let place = (&raw mut RECORD).cast::<u32>();
@@ -180,7 +180,7 @@ fn end(mut crash: Crash) -> ! {
 /// Panic handler: outputs off, record, reset.
 pub fn panic(information: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
-    let mut crash = Crash::of(Cause::Panic, scarab_release());
+    let mut crash = Crash::of(CrashCause::Panic, scarab_disable_all());
     if let Some(location) = information.location() {
         let name = location.file().as_bytes();
         let kept = name.get(name.len().saturating_sub(NAME)..).unwrap_or(&[]);
@@ -193,9 +193,9 @@ pub fn panic(information: &PanicInfo<'_>) -> ! {
 }
 
 /// Ends the run from a board's own handler; the caller chooses the meaning of `status`.
-pub fn give_up(cause: Cause, status: u32) -> ! {
+pub fn give_up(cause: CrashCause, status: u32) -> ! {
     cortex_m::interrupt::disable();
-    end(Crash { status, ..Crash::of(cause, scarab_release()) })
+    end(Crash { status, ..Crash::of(cause, scarab_disable_all()) })
 }
 
 /// Passes the frame's address to [`hard_fault`], resetting the stack pointer where less than half a kilobyte
@@ -217,10 +217,10 @@ unsafe extern "C" fn hard_fault_entry() {
 
 /// Runs at a level that no interrupt reaches, so masking is not needed.
 extern "C" fn hard_fault(frame: u32) -> ! {
-    let released = scarab_release();
+    let released = scarab_disable_all();
     // A frame outside the stack was never stored.
     let stored = stack::word(frame).is_some();
-    let cause = if stored { Cause::HardFault } else { Cause::StackOverflow };
+    let cause = if stored { CrashCause::HardFault } else { CrashCause::StackOverflow };
     let word = |place: u32| stack::word(frame.wrapping_add(4 * place));
     let status = load(FAULT_STATUS);
     end(Crash {
@@ -243,9 +243,9 @@ fn deepest_caller() -> Option<u32> {
 #[unsafe(export_name = "DefaultHandler")]
 extern "C" fn unhandled() -> ! {
     cortex_m::interrupt::disable();
-    let released = scarab_release();
+    let released = scarab_disable_all();
     let number = (load(ACTIVE) & 0x1FF) as i16 - 16;
-    end(Crash { status: number.cast_unsigned().into(), ..Crash::of(Cause::Interrupt, released) })
+    end(Crash { status: number.cast_unsigned().into(), ..Crash::of(CrashCause::Interrupt, released) })
 }
 
 fn load(register: *const u32) -> u32 {

@@ -31,9 +31,7 @@ target_only! {
     pub mod hardware;
     pub mod identity;
     pub mod interrupts;
-    pub mod memory;
     pub mod registers;
     pub mod start;
-    pub mod vectors;
     pub mod watchdog;
 }

@@ -5,7 +5,7 @@
 //! depends on values only, so it exists once. The caller provides frames, clock, leg and flash.
 //!
 //! ```text
-//! frame received           hear(frame, now, sender)             a reset node recalls its stored parameters
+//! frame received           receive(frame, now, sender)          a reset node recalls its stored parameters
 //! mailbox free             poll(joint, now) -> frame            repeat until there is none
 //! leg has ticked           update(LegStatus), order() -> LegOrder   commands, one request, faults of a host
 //! host wrote 1010 or 1011  take_store(into) -> Keeping          then storing(Busy), stored(done, objects)
@@ -26,9 +26,9 @@
 use super::communication::Identity;
 use super::drive::{Axis, AxisConstants, Coupling};
 use super::emergency::ErrorReport;
-use super::identification::{Ask, JointObjects, LegObjects, Results};
+use super::identification::{IdentificationRequest, JointObjects, LegObjects, Results};
 use super::nmt::Reset;
-use super::node::{Heard, Node, Storing};
+use super::node::{FrameEffect, Node, Storing};
 use super::node_id::NodeId;
 use super::stored_parameters::StoredNode;
 use crate::hal::{Controller, Frame};
@@ -37,7 +37,7 @@ use crate::leg::{
     PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
 };
 
-mod keeping;
+mod storage;
 
 /// Gap between two calls, us, beyond which the board cannot have received frames.
 const STOOD_US: u64 = 2_000;
@@ -132,7 +132,7 @@ pub struct LegOrder<const N: usize> {
 
 /// Store operation requested by a host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Keeping {
+pub enum StoreCommand {
     /// Store all objects, and the model if one was accepted since the last store.
     All,
     /// Erase everything; defaults apply after the next start.
@@ -149,7 +149,7 @@ pub struct Device<const N: usize, const LOG: usize> {
     own: [NodeId; N],
     identity: Identity,
     /// Stored parameters that a reset recalls: what the store has confirmed.
-    kept: [StoredNode; N],
+    stored: [StoredNode; N],
     /// Whether a host controls the drive.
     hosted: bool,
     /// A request was held back because the leg would refuse it.
@@ -186,7 +186,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             coupling: Coupling::default(),
             own,
             identity,
-            kept: [StoredNode::NOTHING; N],
+            stored: [StoredNode::NOTHING; N],
             hosted: false,
             refused: false,
             refusal: None,
@@ -201,7 +201,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Handles a frame for every node but its sender. Returns whether a node may have something to send or
     /// do. A reset node recalls its stored parameters at the next call, once for any number of frames.
-    pub fn hear<R: Results>(
+    pub fn receive<R: Results>(
         &mut self,
         frame: &Frame,
         now_us: u64,
@@ -211,11 +211,11 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         self.look_back(now_us);
         let mut concerns = false;
         for joint in (0..N).filter(|joint| Some(*joint) != sender) {
-            let heard = self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
-            match heard.unwrap_or(Heard::Nothing) {
-                Heard::Nothing => continue,
-                Heard::Something => {}
-                Heard::Reset(reset) => {
+            let received = self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
+            match received.unwrap_or(FrameEffect::Nothing) {
+                FrameEffect::Nothing => continue,
+                FrameEffect::Something => {}
+                FrameEffect::Reset(reset) => {
                     if let Some(pending_reset) = self.pending_reset.get_mut(joint) {
                         *pending_reset = Some(reset).max(*pending_reset);
                     }
@@ -241,8 +241,8 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Whether the frame is an emergency or boot-up message of a node, which is sent only once.
     #[must_use]
-    pub fn tells_once(&self, frame: &Frame) -> bool {
-        self.nodes.iter().any(|node| node.tells_once(frame))
+    pub fn reports_once(&self, frame: &Frame) -> bool {
+        self.nodes.iter().any(|node| node.reports_once(frame))
     }
 
     /// Restarts all timeouts if the board could not receive since the last call.
@@ -298,7 +298,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         }
         (self.leg.activity, self.leg.change) = (status.activity, status.change);
         let commanded = self.axes.iter().any(Axis::is_commanded);
-        self.hosted = commanded || self.hosted && drive.permission() != Permission::Released;
+        self.hosted = commanded || self.hosted && drive.permission() != Permission::Off;
         let refused = core::mem::take(&mut self.refused) || status.refused.is_some();
         if !self.hosted {
             self.coupling.look_on(self.axes.each_mut(), drive);
@@ -306,24 +306,30 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         let power = self.coupling.power(self.axes.each_mut(), drive, refused).filter(|_| self.hosted);
         // A step of the drive goes first; other requests wait for the next tick. An identification requested
         // on the way up is discarded: nothing requested before the leg is enabled starts afterwards.
-        let asked = match power {
-            None => self.leg.take_asked(),
-            Some(power) if power.enables() && self.leg.has_asked(Ask::Identify) => self.leg.take_asked(),
+        let requested = match power {
+            None => self.leg.take_request(),
+            Some(power) if power.enables() && self.leg.has_requested(IdentificationRequest::Identify) => {
+                self.leg.take_request()
+            }
             Some(_) => None,
         };
-        self.request = match (power, asked) {
+        self.request = match (power, requested) {
             (Some(power), _) if power.enables() && status.stands_against().is_some() => {
                 self.refused = true;
                 None
             }
             (Some(power), _) => Some(LegRequest::Power(power)),
             // While the operator controls the leg, a host must not start a motion.
-            (None, Some(Ask::Identify | Ask::TakeUpdate)) if !self.hosted => None,
-            (None, Some(Ask::Identify)) => {
+            (None, Some(IdentificationRequest::Identify | IdentificationRequest::TakeUpdate))
+                if !self.hosted =>
+            {
+                None
+            }
+            (None, Some(IdentificationRequest::Identify)) => {
                 Some(LegRequest::Identify { plan: self.leg.plan, seed: self.leg.seed })
             }
-            (None, Some(Ask::Cancel)) => Some(LegRequest::Cancel),
-            (None, Some(Ask::TakeUpdate)) => Some(LegRequest::TakeUpdate),
+            (None, Some(IdentificationRequest::Cancel)) => Some(LegRequest::Cancel),
+            (None, Some(IdentificationRequest::TakeUpdate)) => Some(LegRequest::TakeUpdate),
             (None, None) => None,
         };
         self.explain(status, rises || self.refused);
@@ -344,13 +350,13 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Updates the refusal of a step towards enabled, and its error report.
-    fn explain(&mut self, status: &LegStatus<N>, asked: bool) {
+    fn explain(&mut self, status: &LegStatus<N>, requested: bool) {
         let joint = self.axes.iter().position(Axis::is_out_of_order);
         let order = joint.map(|joint| Refusal { joint: joint as u8, reason: RefusalReason::NoTransition });
         let order = order.filter(|_| self.hosted);
         let lasts = |refusal: &Refusal| Some(*refusal) == order || self.hosted && still(status, *refusal);
         let before = self.refusal.filter(lasts);
-        let own = status.stands_against().filter(|_| asked && self.hosted);
+        let own = status.stands_against().filter(|_| requested && self.hosted);
         let own = own.map(|reason| Refusal { joint: Refusal::LEG, reason });
         self.refusal = status.refused.filter(|_| self.hosted).or(own).or(before).or(order);
         if self.refusal.is_some() && self.refusal == before {

@@ -59,7 +59,7 @@ impl Consumer {
     }
 
     /// Handles a heartbeat or boot-up message of `node`.
-    pub fn heard(&mut self, node: u8, now_us: u64) -> Option<Change> {
+    pub fn received(&mut self, node: u8, now_us: u64) -> Option<Change> {
         if self.time_us() == 0 || node == 0 || node != self.node() {
             return None;
         }
@@ -118,10 +118,10 @@ mod tests {
         let mut consumer = Consumer::default();
         assert_eq!(consumer.set(80 << 16 | 100), Ok(()));
         assert_eq!(consumer.poll(10_000_000), None);
-        assert_eq!((consumer.heard(80, 0), consumer.heard(81, 90_000)), (None, None));
+        assert_eq!((consumer.received(80, 0), consumer.received(81, 90_000)), (None, None));
         assert_eq!((consumer.poll(100_000), consumer.poll(100_001)), (None, Some(Change::Lost)));
         assert_eq!(consumer.poll(200_000), None);
-        assert_eq!(consumer.heard(80, 300_000), Some(Change::Back));
+        assert_eq!(consumer.received(80, 300_000), Some(Change::Back));
         assert_eq!(consumer.set(128 << 16 | 100), Err(Abort::Range));
     }
 

@@ -39,11 +39,11 @@ pub use abort::Abort;
 pub use communication::Identity;
 pub use emergency::ErrorReport;
 pub use nmt::{NmtState, Reset};
-pub use node::{Heard, Node, Storing};
+pub use node::{FrameEffect, Node, Storing};
 pub use node_id::NodeId;
 pub use objects::{Lost, Objects};
 pub use stored_parameters::{
-    LONGEST, StoredNode, kept_bit_rate, kept_entries, kept_node_id, kept_objects, write_kept,
+    LONGEST, StoredNode, stored_bit_rate, stored_entries, stored_node_id, stored_objects, write_stored,
 };
 
 #[cfg(test)]

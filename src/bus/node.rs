@@ -62,7 +62,7 @@ impl Storing {
 
 /// Result of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum FrameEffect {
     /// Not addressed to this node, or a heartbeat in time.
     Nothing,
     /// The node's state may have changed; poll it.
@@ -111,19 +111,19 @@ impl Node {
     }
 
     /// Handles a received frame.
-    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) -> Heard {
+    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) -> FrameEffect {
         let node = self.communication.node;
         match frame.id() {
             nmt::COMMAND => {
                 match nmt::command(frame.data(), node.number()) {
-                    None => return Heard::Nothing,
+                    None => return FrameEffect::Nothing,
                     // A node that has not sent its boot-up message since is still reset.
                     Some(Command::Reset(reset)) if self.pending_reset >= Some(reset) => {
-                        return Heard::Nothing;
+                        return FrameEffect::Nothing;
                     }
                     Some(Command::Reset(reset)) => {
                         self.obey(Command::Reset(reset), objects);
-                        return Heard::Reset(reset);
+                        return FrameEffect::Reset(reset);
                     }
                     Some(command) => self.obey(command, objects),
                 }
@@ -132,27 +132,27 @@ impl Node {
             id if id == node.on(0x600) => {
                 if let (true, Some(request)) = (self.communication.state.serves(), frame.full()) {
                     if matches!(request, [0x20..=0x3F, 0x40, 0x60, 0, ..]) {
-                        self.hear_cycle(Kind::Word, now_us);
+                        self.receive_cycle(Kind::Word, now_us);
                     }
                     let mut dictionary = Dictionary { communication: &mut self.communication, objects };
                     self.server.request(request, now_us, &mut dictionary);
                 }
             }
             id @ 0x701..=0x77F => {
-                let mut heard = Heard::Nothing;
+                let mut received = FrameEffect::Nothing;
                 for place in 0..self.communication.consumers.len() {
                     let consumer = self.communication.consumers.get_mut(place);
-                    let change = consumer.and_then(|consumer| consumer.heard((id & 0x7F) as u8, now_us));
+                    let change = consumer.and_then(|consumer| consumer.received((id & 0x7F) as u8, now_us));
                     if change.is_some() {
-                        heard = Heard::Something;
+                        received = FrameEffect::Something;
                     }
                     self.watch(place as u8, change, objects);
                 }
-                return heard;
+                return received;
             }
             id => return self.receive(id, frame, now_us, objects),
         }
-        Heard::Something
+        FrameEffect::Something
     }
 
     /// Returns the next frame to send. Call it until it returns `None`.
@@ -185,7 +185,7 @@ impl Node {
     }
 
     /// Whether a frame is this node's emergency or boot-up message, which is sent only once.
-    pub(super) fn tells_once(&self, frame: &Frame) -> bool {
+    pub(super) fn reports_once(&self, frame: &Frame) -> bool {
         let Communication { node, emergency, .. } = &self.communication;
         u32::from(frame.id()) == emergency.identifier
             || frame.id() == node.on(nmt::HEARTBEAT) && frame.data() == [0]
@@ -247,8 +247,8 @@ impl Node {
     }
 
     /// Notes a frame that a host may send in every cycle.
-    fn hear_cycle(&mut self, kind: Kind, now_us: u64) {
-        self.communication.silence.heard(kind, now_us);
+    fn receive_cycle(&mut self, kind: Kind, now_us: u64) {
+        self.communication.silence.received(kind, now_us);
         self.communication.emergency.set(Source::Silence, None);
     }
 
@@ -256,7 +256,7 @@ impl Node {
         if self.communication.state != NmtState::Operational {
             return;
         }
-        self.hear_cycle(Kind::Sync, now_us);
+        self.receive_cycle(Kind::Sync, now_us);
         let counter = match (self.communication.sync_overflow, frame.data()) {
             (0, _) => None,
             (overflow, &[counter]) if (1..=overflow).contains(&counter) => Some(counter),
@@ -275,23 +275,23 @@ impl Node {
         }
     }
 
-    fn receive<O: Objects>(&mut self, id: u16, frame: &Frame, now_us: u64, objects: &mut O) -> Heard {
+    fn receive<O: Objects>(&mut self, id: u16, frame: &Frame, now_us: u64, objects: &mut O) -> FrameEffect {
         if self.communication.state != NmtState::Operational {
-            return Heard::Nothing;
+            return FrameEffect::Nothing;
         }
         let mut found = self.communication.receive.iter_mut().enumerate();
         let Some((place, receive)) = found.find(|(_, pdo)| pdo.parameters.identifier() == Some(id)) else {
-            return Heard::Nothing;
+            return FrameEffect::Nothing;
         };
         let received = receive.take(frame, now_us);
-        self.hear_cycle(Kind::Receive(place as u8), now_us);
+        self.receive_cycle(Kind::Receive(place as u8), now_us);
         let too_short = ErrorReport::code(NoticeCode::ShortPdo.number());
         let error = (received == Received::TooShort).then_some(too_short);
         self.communication.emergency.set(Source::Receive(place as u8), error);
         if received == Received::Now {
             self.write_received(place, objects);
         }
-        Heard::Something
+        FrameEffect::Something
     }
 
     /// Writes the objects of a received PDO. An object that rejects its value keeps the old one.

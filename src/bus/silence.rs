@@ -70,7 +70,7 @@ struct Cycle {
 }
 
 impl Cycle {
-    fn heard(&mut self, now_us: u64) {
+    fn received(&mut self, now_us: u64) {
         let since_us = now_us.saturating_sub(self.last_us).min(u64::from(u32::MAX)) as u32;
         self.last_us = now_us;
         let is_regular = since_us <= LONGEST_US
@@ -107,9 +107,9 @@ pub struct Silence {
 
 impl Silence {
     /// Handles a frame of a kind.
-    pub fn heard(&mut self, kind: Kind, now_us: u64) {
+    pub fn received(&mut self, kind: Kind, now_us: u64) {
         let Some(cycle) = self.cycles.get_mut(kind.place()) else { return };
-        cycle.heard(now_us);
+        cycle.received(now_us);
         if cycle.is_armed() {
             // The host still sends, so a kind that is late was given up.
             let is_late = |other: &&mut Cycle| other.is_armed() && now_us > other.last_us + other.time_us();

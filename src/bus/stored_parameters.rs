@@ -35,12 +35,12 @@ impl StoredNode {
     /// Copies `bytes`; those beyond [`LONGEST`] are discarded.
     #[must_use]
     pub fn of(bytes: &[u8]) -> Self {
-        let mut kept = Self::NOTHING;
-        for (to, from) in kept.bytes.iter_mut().zip(bytes) {
+        let mut stored = Self::NOTHING;
+        for (to, from) in stored.bytes.iter_mut().zip(bytes) {
             *to = *from;
-            kept.length += 1;
+            stored.length += 1;
         }
-        kept
+        stored
     }
 
     /// Returns the encoded bytes.
@@ -56,15 +56,15 @@ const BIT_RATE: Object = Object::at(0x2002, 0);
 const OFF: u32 = 1 << 31;
 
 /// Whether the row's objects are stored: writable, no command, and held by the node.
-const fn is_kept(row: &Row) -> bool {
+const fn is_stored(row: &Row) -> bool {
     let commands = matches!(row.index, 0x6040 | 0x6071 | 0x607A | 0x60B1 | 0x60B2 | 0x60C1 | 0x60FE | 0x60FF);
     let others = matches!(row.index, 0x1003 | 0x1010 | 0x1011 | 0x2100..=0x2198);
     matches!(row.access, Access::Both) && !commands && !others
 }
 
 /// All objects that are stored, in the table's order.
-pub fn kept_objects() -> impl Iterator<Item = (Object, &'static Row)> {
-    ROWS.iter().filter(|row| is_kept(row)).flat_map(|row| {
+pub fn stored_objects() -> impl Iterator<Item = (Object, &'static Row)> {
+    ROWS.iter().filter(|row| is_stored(row)).flat_map(|row| {
         (0..u16::from(row.indices)).flat_map(move |index| {
             (0..row.subs).map(move |sub| (Object::at(row.index + index, row.sub + sub), row))
         })
@@ -76,7 +76,7 @@ fn default(row: &Row, node: NodeId) -> u32 {
 }
 
 /// Decodes the entries into object and value. The value is not sign-extended.
-pub fn kept_entries(bytes: &[u8]) -> impl Iterator<Item = (Object, u32)> {
+pub fn stored_entries(bytes: &[u8]) -> impl Iterator<Item = (Object, u32)> {
     let mut rest = bytes;
     core::iter::from_fn(move || {
         let (&[low, high, sub, size], after) = rest.split_first_chunk()?;
@@ -91,18 +91,18 @@ pub fn kept_entries(bytes: &[u8]) -> impl Iterator<Item = (Object, u32)> {
 }
 
 fn number(bytes: &[u8], object: Object) -> Option<u32> {
-    kept_entries(bytes).find(|(other, _)| *other == object).map(|(_, value)| value)
+    stored_entries(bytes).find(|(other, _)| *other == object).map(|(_, value)| value)
 }
 
 /// Returns the stored node-ID (2001), if there is one.
 #[must_use]
-pub fn kept_node_id(bytes: &[u8]) -> Option<NodeId> {
+pub fn stored_node_id(bytes: &[u8]) -> Option<NodeId> {
     number(bytes, NODE_ID).and_then(|number| NodeId::new(number as u8))
 }
 
 /// Returns the stored bit rate (2002) in kbit/s, if there is one.
 #[must_use]
-pub fn kept_bit_rate(bytes: &[u8]) -> Option<u16> {
+pub fn stored_bit_rate(bytes: &[u8]) -> Option<u16> {
     number(bytes, BIT_RATE).map(|rate| rate as u16)
 }
 
@@ -126,10 +126,10 @@ fn append(object: Object, size: u8, value: u32, out: &mut [u8]) -> Result<usize,
 /// # Errors
 /// [`Abort`] of an unknown object, [`Abort::ReadOnly`], [`Abort::Access`] for an object that is never stored,
 /// [`Abort::Store`] if the entry does not fit.
-pub fn write_kept(object: Object, value: u32, out: &mut [u8]) -> Result<usize, Abort> {
+pub fn write_stored(object: Object, value: u32, out: &mut [u8]) -> Result<usize, Abort> {
     let row = find(object)?;
     match row.access {
-        Access::Both if is_kept(row) => append(object, row.kind.size().unwrap_or(4), value, out),
+        Access::Both if is_stored(row) => append(object, row.kind.size().unwrap_or(4), value, out),
         Access::Both => Err(Abort::Access),
         _ => Err(Abort::ReadOnly),
     }
@@ -145,11 +145,11 @@ impl Node {
     ///
     /// # Errors
     /// [`Abort::Store`] if they do not fit into `out`.
-    pub fn keep<O: Objects>(&mut self, objects: &mut O, out: &mut [u8]) -> Result<usize, Abort> {
+    pub fn store<O: Objects>(&mut self, objects: &mut O, out: &mut [u8]) -> Result<usize, Abort> {
         let node = self.id();
         let dictionary = Dictionary { communication: self.communication_mut(), objects };
         let mut length = 0;
-        for (object, row) in kept_objects() {
+        for (object, row) in stored_objects() {
             let Ok(value) = dictionary.value(object) else { continue };
             let size = row.kind.size().unwrap_or(4);
             let mask = u32::MAX >> (32 - 8 * u32::from(size));
@@ -161,13 +161,13 @@ impl Node {
         Ok(length)
     }
 
-    /// Encodes the objects into `kept`; on an error `kept` is empty.
+    /// Encodes the objects into `stored`; on an error `stored` is empty.
     ///
     /// # Errors
-    /// See [`Self::keep`].
-    pub fn keep_into<O: Objects>(&mut self, objects: &mut O, kept: &mut StoredNode) -> Result<(), Abort> {
-        kept.length = 0;
-        kept.length = self.keep(objects, &mut kept.bytes)?;
+    /// See [`Self::store`].
+    pub fn store_into<O: Objects>(&mut self, objects: &mut O, stored: &mut StoredNode) -> Result<(), Abort> {
+        stored.length = 0;
+        stored.length = self.store(objects, &mut stored.bytes)?;
         Ok(())
     }
 
@@ -178,7 +178,7 @@ impl Node {
         let mut write = |object: Object, value: u32| {
             let is_anew = reset == Reset::Node || object.index < PROFILE;
             if let Ok(row) = dictionary.writable(object)
-                && is_kept(row)
+                && is_stored(row)
                 && is_anew
             {
                 let _ = dictionary.write(object, value);
@@ -186,7 +186,7 @@ impl Node {
         };
         let pdos = || (0x1400..0x1404).chain(0x1800..0x1804_u16);
         let touched = |index: u16| {
-            kept_entries(bytes).any(|(object, _)| is_pdo(object.index) && object.index & !0x200 == index)
+            stored_entries(bytes).any(|(object, _)| is_pdo(object.index) && object.index & !0x200 == index)
         };
         let or_default = |object: Object| {
             number(bytes, object).or_else(|| find(object).ok().map(|row| default(row, node))).unwrap_or(0)
@@ -195,7 +195,7 @@ impl Node {
             write(Object::at(index, 1), or_default(Object::at(index, 1)) | OFF);
             write(Object::at(index + 0x200, 0), 0);
         }
-        for (object, value) in kept_entries(bytes) {
+        for (object, value) in stored_entries(bytes) {
             let later = match object.index {
                 0x1400..=0x14FF | 0x1800..=0x18FF => object.sub == 1,
                 0x1600..=0x16FF | 0x1A00..=0x1AFF => object.sub == 0,
@@ -222,7 +222,7 @@ impl Node {
             let mask = u32::MAX >> (32 - 8 * u32::from(size));
             !dictionary.read(object).is_ok_and(|taken| (taken ^ value) & mask == 0)
         };
-        kept_entries(bytes).find(|(object, value)| differs(*object, *value)).map(|(object, _)| object)
+        stored_entries(bytes).find(|(object, value)| differs(*object, *value)).map(|(object, _)| object)
     }
 }
 
@@ -232,16 +232,17 @@ mod tests {
 
     use super::super::tests::Board;
     use super::*;
+    use crate::testing::TestRandom;
 
-    fn kept(board: &mut Board) -> std::vec::Vec<u8> {
+    fn stored(board: &mut Board) -> std::vec::Vec<u8> {
         let mut bytes = [0; LONGEST];
-        let length = board.nodes[0].keep(&mut board.axes[0], &mut bytes).expect("it fits");
+        let length = board.nodes[0].store(&mut board.axes[0], &mut bytes).expect("it fits");
         bytes[..length].to_vec()
     }
 
     #[test]
     fn a_node_with_defaults_stores_nothing() {
-        assert_eq!(kept(&mut Board::started(3)), []);
+        assert_eq!(stored(&mut Board::started(3)), []);
     }
 
     #[test]
@@ -268,8 +269,8 @@ mod tests {
         for (index, sub, value, size) in compact {
             assert_eq!(board.write(index, sub, value, size), Ok(()), "{index:x} {sub}");
         }
-        let bytes = kept(&mut board);
-        assert_eq!((kept_node_id(&bytes), kept_bit_rate(&bytes)), (NodeId::new(9), None));
+        let bytes = stored(&mut board);
+        assert_eq!((stored_node_id(&bytes), stored_bit_rate(&bytes)), (NodeId::new(9), None));
         let mut other = Board::started(1);
         let [node, _] = &mut other.nodes;
         node.recall(&bytes, Reset::Node, &mut other.axes[0]);
@@ -277,19 +278,14 @@ mod tests {
             let expected = if index == 0x607A { Ok(0) } else { board.read(index, sub) };
             assert_eq!(other.read(index, sub), expected, "{index:x} {sub}");
         }
-        assert_eq!(kept(&mut other), bytes);
+        assert_eq!(stored(&mut other), bytes);
     }
 
     #[test]
     fn foreign_bytes_cannot_set_the_controlword() {
-        let mut state = 1_u32;
+        let mut random = TestRandom::new(1);
         for length in 0..200 {
-            let bytes: std::vec::Vec<u8> = (0..length)
-                .map(|_| {
-                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    (state >> 24) as u8
-                })
-                .collect();
+            let bytes: std::vec::Vec<u8> = (0..length).map(|_| random.byte()).collect();
             let mut board = Board::started(1);
             let [node, _] = &mut board.nodes;
             node.recall(&bytes, Reset::Node, &mut board.axes[0]);
@@ -308,9 +304,9 @@ mod tests {
         assert_eq!(board.write(0x1017, 0, 50, 2), Ok(()));
         assert_eq!(board.write(0x6007, 0, 1, 2), Ok(()));
         let mut bytes = [0; LONGEST];
-        let first = write_kept(Object::at(0x1017, 0), 50, &mut bytes).expect("it fits");
-        let second = write_kept(Object::at(0x6007, 0), 1, &mut bytes[first..]).expect("it fits");
-        assert_eq!(&bytes[..first + second], kept(&mut board));
+        let first = write_stored(Object::at(0x1017, 0), 50, &mut bytes).expect("it fits");
+        let second = write_stored(Object::at(0x6007, 0), 1, &mut bytes[first..]).expect("it fits");
+        assert_eq!(&bytes[..first + second], stored(&mut board));
         for (index, sub, why) in [
             (0x5555, 0, Abort::NoObject),
             (0x1018, 9, Abort::NoSubindex),
@@ -318,13 +314,13 @@ mod tests {
             (0x607D, 0, Abort::ReadOnly),
             (0x6040, 0, Abort::Access),
         ] {
-            assert_eq!(write_kept(Object::at(index, sub), 0, &mut bytes), Err(why), "{index:x} {sub}");
+            assert_eq!(write_stored(Object::at(index, sub), 0, &mut bytes), Err(why), "{index:x} {sub}");
         }
-        assert_eq!(write_kept(Object::at(0x1017, 0), 50, &mut bytes[..5]), Err(Abort::Store));
+        assert_eq!(write_stored(Object::at(0x1017, 0), 50, &mut bytes[..5]), Err(Abort::Store));
 
         let refused = |object: Object, value: u32| {
             let (mut bytes, mut board) = ([0; LONGEST], Board::started(1));
-            let length = write_kept(object, value, &mut bytes).expect("it fits");
+            let length = write_stored(object, value, &mut bytes).expect("it fits");
             let [node, _] = &mut board.nodes;
             node.try_recall(&bytes[..length], &mut board.axes[0])
         };
@@ -338,6 +334,6 @@ mod tests {
     fn parameters_that_do_not_fit_are_refused() {
         let mut board = Board::started(1);
         assert_eq!(board.write(0x1017, 0, 50, 2), Ok(()));
-        assert_eq!(board.nodes[0].keep(&mut board.axes[0], &mut [0; 5]), Err(Abort::Store));
+        assert_eq!(board.nodes[0].store(&mut board.axes[0], &mut [0; 5]), Err(Abort::Store));
     }
 }

@@ -17,6 +17,9 @@ pub use can::{Controller, Frame};
 /// PWM periods per second; also the rate of samples and commands of one axis.
 pub const CURRENT_RATE_HZ: u32 = 24_000;
 
+/// Servo ticks per second.
+pub const SERVO_RATE_HZ: u32 = 4000;
+
 /// Clock of the timers that drive the bridges and trigger the shunts' converters, Hz.
 pub const BRIDGE_CLOCK_HZ: u32 = 168_000_000;
 
@@ -51,7 +54,7 @@ pub struct AxisCommand {
 
 impl AxisCommand {
     /// Outputs off.
-    pub const RELEASED: Self = Self { enabled: false, duty: [0.5; 3] };
+    pub const OFF: Self = Self { enabled: false, duty: [0.5; 3] };
 
     /// Low sides on all the time: the motor brakes passively through its own resistance.
     pub const BRAKE: Self = Self { enabled: true, duty: [0.0; 3] };
@@ -86,7 +89,7 @@ pub struct DriveCommand<const N: usize> {
 
 impl<const N: usize> DriveCommand<N> {
     /// Outputs off.
-    pub const RELEASED: Self = Self { enabled: false, currents: [Ampere::ZERO; N] };
+    pub const OFF: Self = Self { enabled: false, currents: [Ampere::ZERO; N] };
 }
 
 /// Joint drives of one leg at the servo's level: one exchange per tick, never blocking.
@@ -114,9 +117,9 @@ pub trait Hardware<const N: usize> {
     /// Runs `step` with all interrupts masked, the emergency stop's included. Only for a few instructions.
     fn masked(&mut self, step: impl FnOnce(&mut Self));
     /// Switches the outputs of all bridges off at once.
-    fn release_all(&mut self);
+    fn disable_all(&mut self);
     /// Switches the outputs of one bridge off at once, and sets its duties to no voltage.
-    fn release(&mut self, axis: usize);
+    fn disable(&mut self, axis: usize);
     /// Sets the duties of one bridge for its next period; its outputs stay as they are.
     fn set_duty(&mut self, axis: usize, duty: &[f32; 3]);
     /// Switches the outputs of one bridge on.

@@ -28,15 +28,12 @@ pub use monitor::detection::{Change, Monitor, MonitorSettings, ROWS_PER_BLOCK};
 pub use monitor::update::hypothesis::{DIRECTIONS, Hypothesis};
 pub use monitor::update::{Cause, PAYLOAD_PARAMETERS, Update};
 pub use record::choice::{Choice, Constant, DriveChoice, Estimator};
-pub use record::dropped::Selection;
 pub use record::factor::Factor;
-pub use record::filters::Filters;
-pub use record::outliers::Outliers;
+pub use record::motion_record::{Outliers, Record, Selection, TorqueSize};
 pub use record::recorder::{
-    LARGEST_STILL_SHARE, MotionWindow, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ,
-    SMOOTHING_BANDWIDTHS, TorqueSize,
+    Filters, LARGEST_STILL_SHARE, MotionWindow, Progress, Recorder, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS,
 };
-pub use record::row_model::no_stribeck;
+pub use record::row_model::{RowModel, no_stribeck};
 pub use record::rows::{DECIMATION, Ends, FilteredRows, RowFilter};
 pub use record::stretch::Stretches;
 pub use record::stribeck::StribeckFit;

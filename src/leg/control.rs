@@ -1,7 +1,6 @@
 //! Control half of a leg: activity, motions, servo, log. Ticked at 4 kHz.
 
 mod host;
-mod surroundings;
 
 pub use host::Host;
 
@@ -10,13 +9,14 @@ use super::configuration::{LegConfiguration, LegError, ProvedMotion};
 use super::identification::Finding;
 use super::model::IdentifiedModel;
 use super::model_blend::ModelBlend;
+use crate::checksum::Checksum;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
 use crate::real::min;
-use crate::safety::{PowerRequest, RETURN_SPEED};
+use crate::safety::{Derating, DriveState, Fault, LimitCodes, Limits, PowerRequest, RETURN_SPEED};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
-use crate::units::{RadianPerSecond, RadianPerSecondSquared};
+use crate::units::{NewtonMetre, RadianPerSecond, RadianPerSecondSquared};
 
 /// Rest after a motion before the next step: half a second.
 const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
@@ -121,7 +121,7 @@ impl<const N: usize> Control<N> {
     }
 
     /// Resets to the state after the start: drive off, nothing measured, no activity. For joints that have
-    /// missed ticks, or whose zeros have changed. The model in use is kept.
+    /// missed ticks, or whose zeros have changed. The model in use stays.
     pub fn restart(&mut self) {
         self.servo.restart();
         self.averager = LogAverager::EMPTY;
@@ -130,6 +130,87 @@ impl<const N: usize> Control<N> {
         (self.motion, self.motion_tick) = (Motion::Hold([0.0; N]), 0);
         self.tracked = None;
         self.models.interrupt();
+    }
+
+    /// Activity.
+    #[must_use]
+    pub fn activity(&self) -> Activity {
+        self.activity
+    }
+
+    /// State of the drive.
+    #[must_use]
+    pub fn state(&self) -> DriveState {
+        self.servo.state()
+    }
+
+    /// Checksum over gains, scales and limits, which are constant.
+    #[must_use]
+    pub fn checksum(&self) -> Checksum {
+        self.servo.checksum()
+    }
+
+    /// Reports a fault detected by the board, for the next tick.
+    pub fn report(&mut self, fault: Fault) {
+        self.servo.report(fault);
+    }
+
+    /// Sets which joints may be enabled outside their range, to return into it.
+    pub fn permit_return(&mut self, joints: [bool; N]) {
+        self.servo.permit_return(joints);
+    }
+
+    /// Sets the derating of the torque caps by temperature and bus voltage, from the next tick on.
+    pub fn derate(&mut self, derating: &Derating) {
+        self.servo.derate(derating);
+    }
+
+    /// Codes of the limits that acted on each joint in the tick that returned `output`.
+    #[must_use]
+    pub fn limit_codes(&self, output: &ControlOutput<N>) -> [LimitCodes; N] {
+        self.servo.limit_codes(&output.servo.decision)
+    }
+
+    /// Torque by a joint's measured current, with the model's sign.
+    #[must_use]
+    pub fn torque(&self, joint: usize, sample: &Sample<N>) -> Option<NewtonMetre> {
+        Some(self.servo.scales().get(joint)?.torque(sample.joints.get(joint)?.current))
+    }
+
+    /// Limits of the joints.
+    #[must_use]
+    pub fn limits(&self) -> &Limits<N> {
+        self.servo.limits()
+    }
+
+    /// Verdict of the last identification.
+    #[must_use]
+    pub fn verdict(&self) -> Option<Verdict> {
+        self.verdict
+    }
+
+    /// Alarm that the model no longer fits. Cleared by a new activity or by taking an update.
+    #[must_use]
+    pub fn change(&self) -> Option<&Change<f32, N>> {
+        self.change.as_ref()
+    }
+
+    /// Cause found for the alarm; [`Cause::Unexplained`] requires a full identification.
+    #[must_use]
+    pub fn cause(&self) -> Option<Cause> {
+        self.cause
+    }
+
+    /// Whether an update is offered.
+    #[must_use]
+    pub fn is_update_offered(&self) -> bool {
+        self.models.is_offered()
+    }
+
+    /// Accepted model.
+    #[must_use]
+    pub fn model(&self) -> Option<&IdentifiedModel<N>> {
+        self.models.model()
     }
 
     /// Runs one tick.
@@ -153,7 +234,7 @@ impl<const N: usize> Control<N> {
     ) -> ControlOutput<N> {
         self.tick = self.tick.wrapping_add(1);
         let refused = request.as_ref().is_some_and(|request| !self.may_begin(request, host.as_ref()));
-        let took_update = !refused && request == Some(ControlRequest::TakeUpdate);
+        let took_update = !refused && matches!(request, Some(ControlRequest::TakeUpdate));
         let power = self.accept(request.filter(|_| !refused));
         let commanded = self.obey(host.as_mut());
         let motion = match &commanded {
@@ -194,7 +275,7 @@ impl<const N: usize> Control<N> {
         }
         // A sample that the servo rejected as a glitch does not enter the log.
         let mut believed = *sample;
-        for (joint, counts) in believed.joints.iter_mut().zip(servo.believed_counts) {
+        for (joint, counts) in believed.joints.iter_mut().zip(servo.accepted_counts) {
             joint.encoder_counts = counts;
         }
         let logged = self.averager.collect(&believed).then(|| {

@@ -251,7 +251,7 @@ where
             return Some(self.judge());
         }
         if self.work == Work::Recording(Segment::Tracking) {
-            return self.keep_up();
+            return self.monitor_model();
         }
         if self.work != Work::Solving {
             return None;
@@ -272,7 +272,7 @@ where
     }
 
     /// Returns the alarm, and later the result of the quick pass.
-    fn keep_up(&mut self) -> Option<Finding<N>> {
+    fn monitor_model(&mut self) -> Option<Finding<N>> {
         if self.change_due {
             self.change_due = false;
             return self.model_monitor.change().map(|change| Finding::Changed(*change));

@@ -54,6 +54,7 @@ pub use crate::ident::{
     StribeckFit, Test, Verdict,
 };
 pub use crate::model::friction::Stribeck;
+pub use crate::model::planar::{BASE, JOINTS};
 pub use crate::model::{Fingerprint, PARAMETERS_PER_JOINT, Parameter};
 pub use crate::motor::{
     AxisFault, Calibration, Direction as CounterDirection, ElectricalAngle, EncoderSetting, Phase,
@@ -111,7 +112,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         if let Some(logged) = &output.logged {
             self.identification.push(logged);
         }
-        let begun = request == Some(ControlRequest::Identify) && !output.refused;
+        let begun = matches!(request, Some(ControlRequest::Identify)) && !output.refused;
         if begun || !matches!(self.control.activity(), Activity::Identify(_)) {
             self.identification.cancel();
         }
@@ -185,10 +186,10 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.control.derate(derating);
     }
 
-    /// Flips a bit of the servo's state, see [`crate::servo::Servo::upset`]. Host only.
+    /// Flips a bit of the servo's state, see [`crate::servo::Servo::flip_bit`]. Host only.
     #[cfg(not(target_os = "none"))]
-    pub fn upset(&mut self, joint: usize, number: u8, bit: u8) {
-        self.control.servo.upset(joint, number, bit);
+    pub fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
+        self.control.servo.flip_bit(joint, number, bit);
     }
 
     /// Both halves, for callers that run them at separate priorities (`operation`).

@@ -37,11 +37,11 @@ pub const fn axis_code(fault: AxisFault) -> FaultCode {
         AxisFault::CurrentSense => FaultCode::CurrentSense,
         AxisFault::Overcurrent => FaultCode::Overcurrent,
         AxisFault::BusVoltage => FaultCode::BusVoltage,
-        AxisFault::Encoder => FaultCode::EncoderPlace,
+        AxisFault::Encoder => FaultCode::EncoderPosition,
         AxisFault::NotANumber => FaultCode::NotFinite,
         AxisFault::EncoderFrozen => FaultCode::EncoderFrozen,
         AxisFault::OpenPhase => FaultCode::OpenPhase,
-        AxisFault::CurrentZero => FaultCode::CurrentZero,
+        AxisFault::CurrentOffset => FaultCode::CurrentOffset,
         AxisFault::StuckConversion => FaultCode::StuckConversion,
         AxisFault::Parameters => FaultCode::Parameters,
     }

@@ -73,7 +73,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
 
     /// Converts a model identified with this configuration to plain data.
     #[must_use]
-    pub fn keep(&self, model: &IdentifiedModel<N>) -> StoredModel<N> {
+    pub fn to_stored(&self, model: &IdentifiedModel<N>) -> StoredModel<N> {
         StoredModel {
             fingerprint: self.fingerprint(),
             parameters: *model.equivalent_parameters(),

@@ -2,10 +2,9 @@
 
 use super::{IdentifiedModel, LegConfiguration};
 
-include!("../../host/legs/x2-wearer-75kg.rs");
+pub(crate) use super::BASE;
 
-/// Number of base parameters of two parallel axes.
-pub(crate) const BASE: usize = 13;
+include!("../../host/legs/x2-wearer-75kg.rs");
 
 pub(crate) fn configuration() -> LegConfiguration<2, BASE> {
     LEG.configuration().expect("a leg that is shipped")

@@ -155,7 +155,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
 mod tests {
     use nalgebra::Matrix4;
 
-    use super::super::testing::Dice;
+    use super::super::testing::TestRandom;
     use super::*;
 
     #[test]
@@ -188,14 +188,15 @@ mod tests {
 
     #[test]
     fn a_frame_is_the_product_of_the_four_elementary_motions() {
-        let mut dice = Dice::new(81);
+        let mut random = TestRandom::new(81);
         for _ in 0..20 {
-            let [alpha, a, q, d] = [dice.within(3.0), dice.within(1.0), dice.within(3.0), dice.within(1.0)];
+            let [alpha, a, q, d] =
+                [random.within(3.0), random.within(1.0), random.within(3.0), random.within(1.0)];
             let shift = |x: f64, z: f64| Matrix4::new_translation(&Vector3::new(x, 0.0, z));
             let turn = |axis: Vector3<f64>| Matrix4::from_scaled_axis(axis);
             let product = turn(Vector3::x() * alpha) * shift(a, 0.0) * turn(Vector3::z() * q) * shift(0.0, d);
             let frame = Chain::new(&[DenavitHartenberg { alpha, a, d }]).unwrap().frames(&[q])[0];
-            let v = Vector3::new(dice.within(1.0), dice.within(1.0), dice.within(1.0));
+            let v = Vector3::new(random.within(1.0), random.within(1.0), random.within(1.0));
             let expected = product.transform_point(&v.into()).coords;
             // A few roundings of numbers up to 2.
             assert!((frame.to_parent(&v) + frame.origin - expected).abs().max() < 1e-15);

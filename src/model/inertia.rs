@@ -118,7 +118,7 @@ pub(super) fn first_moment<T: Real>(parameters: &JointParameters<T>) -> Vector3<
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::Dice;
+    use super::super::testing::TestRandom;
     use super::*;
 
     /// Parameters of point masses by their definition, the integrals as sums.
@@ -140,10 +140,10 @@ mod tests {
     }
 
     fn points(seed: u64) -> [(f64, Vector3<f64>); 12] {
-        let mut dice = Dice::new(seed);
+        let mut random = TestRandom::new(seed);
         [(); 12].map(|()| {
-            let place = Vector3::new(0.3 + dice.within(0.2), dice.within(0.2), dice.within(0.1));
-            (0.5 + dice.within(0.4), place)
+            let place = Vector3::new(0.3 + random.within(0.2), random.within(0.2), random.within(0.1));
+            (0.5 + random.within(0.4), place)
         })
     }
 

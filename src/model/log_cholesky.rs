@@ -126,15 +126,15 @@ pub fn pseudo_inertia<T: Real>(parameters: &InertialParameters<T>) -> Matrix4<T>
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::Dice;
+    use super::super::testing::TestRandom;
     use super::*;
 
     /// Largest coordinate error after a conversion to parameters and back, over random bodies.
     fn round_trip_error<T: Real>(seed: u64) -> f64 {
-        let mut dice = Dice::new(seed);
+        let mut random = TestRandom::new(seed);
         let mut worst = 0.0_f64;
         for _ in 0..200 {
-            let body = LogCholesky(dice.body().0.map(T::of));
+            let body = LogCholesky(random.body().0.map(T::of));
             let back = LogCholesky::from_parameters(&body.to_parameters()).unwrap();
             for (one, other) in body.0.iter().zip(&back.0) {
                 worst = worst.max((*one - *other).to_double().abs());
@@ -153,9 +153,9 @@ mod tests {
 
     #[test]
     fn parameters_of_any_coordinates_are_those_of_the_factor_product() {
-        let mut dice = Dice::new(53);
+        let mut random = TestRandom::new(53);
         for _ in 0..50 {
-            let body = dice.body();
+            let body = random.body();
             let [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = body.0;
             let factor = Matrix4::new(
                 exp(d1),
@@ -183,12 +183,12 @@ mod tests {
 
     #[test]
     fn consistent_means_positive_definite_pseudo_inertia() {
-        let mut dice = Dice::new(54);
+        let mut random = TestRandom::new(54);
         let (mut consistent, mut inconsistent) = (0, 0);
         for _ in 0..500 {
-            let mut parameters = dice.body().to_parameters();
+            let mut parameters = random.body().to_parameters();
             for value in &mut parameters {
-                *value *= 1.0 + dice.within(0.5);
+                *value *= 1.0 + random.within(0.5);
             }
             let smallest = pseudo_inertia(&parameters).symmetric_eigenvalues().min();
             // Eigenvalues this close to zero are rounding; none of the 500 comes near.
@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn impossible_bodies_are_refused() {
-        let good = Dice::new(55).body().to_parameters();
+        let good = TestRandom::new(55).body().to_parameters();
         assert!(is_physically_consistent(&good));
         let changed = |place: usize, value: f64| {
             let mut parameters = good;

@@ -62,16 +62,16 @@ mod tests {
 
     use super::super::newton_euler::{JointState, joint_torques};
     use super::super::parameter::rounded;
-    use super::super::testing::{Dice, rounded_state};
+    use super::super::testing::{TestRandom, rounded_state};
     use super::*;
 
     /// Largest difference between M qdd and the torque that acceleration adds, over the largest such torque.
     fn inconsistency<T: Real>(seed: u64) -> f64 {
-        let mut dice = Dice::new(seed);
+        let mut random = TestRandom::new(seed);
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
         for _ in 0..50 {
-            let (chain, leg) = (dice.chain::<3>().convert::<T>(), rounded(&dice.leg()));
-            let state: JointState<T, 3> = rounded_state(&JointState { qd: [0.0; 3], ..dice.state() });
+            let (chain, leg) = (random.chain::<3>().convert::<T>(), rounded(&random.leg()));
+            let state: JointState<T, 3> = rounded_state(&JointState { qd: [0.0; 3], ..random.state() });
             let resting = JointState::at_rest(state.q);
             let weightless = Vector3::zeros();
             let moving = joint_torques(&chain, &leg, &state, &weightless);
@@ -94,10 +94,10 @@ mod tests {
 
     #[test]
     fn mass_matrix_of_bodies_is_symmetric_and_positive_definite() {
-        let mut dice = Dice::new(63);
+        let mut random = TestRandom::new(63);
         for _ in 0..100 {
-            let (chain, leg) = (dice.chain::<3>(), dice.leg());
-            let matrix = mass_matrix(&chain, &leg, &dice.state().q);
+            let (chain, leg) = (random.chain::<3>(), random.leg());
+            let matrix = mass_matrix(&chain, &leg, &random.state().q);
             assert_eq!(matrix, matrix.transpose());
             let smallest_rotor =
                 leg.iter().map(|joint| joint[Parameter::IA.index()]).fold(f64::MAX, f64::min);

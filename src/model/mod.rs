@@ -28,6 +28,7 @@ pub mod mass_matrix;
 pub mod newton_euler;
 pub mod parameter;
 pub mod payload;
+pub mod planar;
 pub mod regressor;
 #[cfg(test)]
 mod testing;

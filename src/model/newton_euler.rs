@@ -128,7 +128,7 @@ impl<T: Real> Wrench<T> {
 #[cfg(test)]
 mod tests {
     use super::super::inertia::{RigidBody, inertial};
-    use super::super::testing::Dice;
+    use super::super::testing::TestRandom;
     use super::*;
 
     /// Origin and orientation of each link from the angles alone, without the velocities of this module.
@@ -186,9 +186,10 @@ mod tests {
     #[test]
     fn power_of_the_joints_is_the_rate_of_energy() {
         const STEP: f64 = 1e-3;
-        let mut dice = Dice::new(11);
+        let mut random = TestRandom::new(11);
         for _ in 0..20 {
-            let (chain, leg, state, gravity) = (dice.chain::<3>(), dice.leg(), dice.state(), dice.gravity());
+            let (chain, leg, state, gravity) =
+                (random.chain::<3>(), random.leg(), random.state(), random.gravity());
             let torques = rigid_body_torques(&chain, &leg, &state, &gravity);
             let power: f64 = torques.iter().zip(&state.qd).map(|(torque, speed)| torque * speed).sum();
             let size: f64 = torques.iter().zip(&state.qd).map(|(torque, speed)| (torque * speed).abs()).sum();
@@ -201,8 +202,9 @@ mod tests {
 
     #[test]
     fn rotor_and_friction_come_on_top_of_the_rigid_body() {
-        let mut dice = Dice::new(12);
-        let (chain, leg, state, gravity) = (dice.chain::<2>(), dice.leg(), dice.state(), dice.gravity());
+        let mut random = TestRandom::new(12);
+        let (chain, leg, state, gravity) =
+            (random.chain::<2>(), random.leg(), random.state(), random.gravity());
         let rigid = rigid_body_torques(&chain, &leg, &state, &gravity);
         for (joint, torque) in joint_torques(&chain, &leg, &state, &gravity).into_iter().enumerate() {
             let [.., ia, fc, fv, off] = leg[joint];

@@ -70,14 +70,14 @@ impl<T: Real> Payload<T> {
 #[cfg(test)]
 mod tests {
     use super::super::newton_euler::joint_torques;
-    use super::super::testing::{Dice, paper_chain};
+    use super::super::testing::{TestRandom, paper_chain};
     use super::*;
 
     #[test]
     fn a_point_mass_adds_the_torque_of_its_own_motion() {
         // Torque of a point mass by d'Alembert: its weight and its inertia force through the Jacobian, both
         // by differences of its position, without any tensor.
-        let (mut dice, chain) = (Dice::new(91), paper_chain::<f64>());
+        let (mut random, chain) = (TestRandom::new(91), paper_chain::<f64>());
         let gravity = Vector3::new(0.3, -0.2, -9.7);
         for joint in 0..3 {
             let payload = Payload { joint, mass: 2.5, place: Vector3::new(0.2, -0.05, 0.03) };
@@ -87,7 +87,7 @@ mod tests {
                     frame.to_parent(&point) + frame.origin
                 })
             };
-            let state = dice.state::<3>();
+            let state = random.state::<3>();
             let at = |time: f64| -> [f64; 3] {
                 core::array::from_fn(|axis| {
                     state.q[axis] + time * state.qd[axis] + 0.5 * time * time * state.qdd[axis]
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn a_load_taken_off_leaves_the_leg_and_a_joint_that_is_not_there_carries_nothing() {
-        let parameters = Dice::new(92).leg::<2>();
+        let parameters = TestRandom::new(92).leg::<2>();
         let payload = Payload { joint: 1, mass: 3.0, place: Vector3::new(0.3, 0.1, 0.0) };
         let mut loaded = parameters;
         payload.add_to(&mut loaded);

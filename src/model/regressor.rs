@@ -104,17 +104,17 @@ pub fn row_torque<T: Real, const N: usize>(row: &RegressorRow<T, N>, parameters:
 mod tests {
     use super::super::newton_euler::joint_torques;
     use super::super::parameter::rounded;
-    use super::super::testing::{Dice, rounded_state};
+    use super::super::testing::{TestRandom, rounded_state};
     use super::*;
 
     /// Largest difference of regressor times parameters and Newton-Euler over random
     /// legs, over the largest torque.
     fn identity_error<T: Real, const N: usize>(seed: u64) -> f64 {
-        let mut dice = Dice::new(seed);
+        let mut random = TestRandom::new(seed);
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
         for _ in 0..200 {
-            let (chain, leg) = (dice.chain::<N>().convert::<T>(), rounded(&dice.leg::<N>()));
-            let (state, gravity) = (rounded_state(&dice.state()), dice.gravity().map(T::of));
+            let (chain, leg) = (random.chain::<N>().convert::<T>(), rounded(&random.leg::<N>()));
+            let (state, gravity) = (rounded_state(&random.state()), random.gravity().map(T::of));
             let torques = joint_torques(&chain, &leg, &state, &gravity);
             for (row, torque) in regressor(&chain, &state, &gravity).iter().zip(&torques) {
                 worst = worst.max((row_torque(row, &leg) - *torque).to_double().abs());
@@ -138,10 +138,10 @@ mod tests {
 
     #[test]
     fn single_precision_regressor_is_close_to_double() {
-        let mut dice = Dice::new(7);
+        let mut random = TestRandom::new(7);
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
         for _ in 0..200 {
-            let (chain, state, gravity) = (dice.chain::<3>(), dice.state(), dice.gravity());
+            let (chain, state, gravity) = (random.chain::<3>(), random.state(), random.gravity());
             let reference = regressor(&chain, &state, &gravity);
             let single =
                 regressor(&chain.convert::<f32>(), &rounded_state(&state), &gravity.map(|g| g as f32));
@@ -159,8 +159,8 @@ mod tests {
 
     #[test]
     fn a_link_loads_no_joint_beyond_it() {
-        let mut dice = Dice::new(8);
-        let rows = regressor(&dice.chain::<3>(), &dice.state(), &dice.gravity());
+        let mut random = TestRandom::new(8);
+        let rows = regressor(&random.chain::<3>(), &random.state(), &random.gravity());
         assert_eq!(rows[1][0], [0.0; 14]);
         assert_eq!(rows[2][0], [0.0; 14]);
         assert_eq!(rows[2][1], [0.0; 14]);
@@ -169,9 +169,9 @@ mod tests {
 
     #[test]
     fn states_that_are_not_numbers_give_no_number_and_no_panic() {
-        let mut dice = Dice::new(9);
-        let (chain, leg, gravity) = (dice.chain::<2>(), dice.leg(), dice.gravity());
-        let good = dice.state();
+        let mut random = TestRandom::new(9);
+        let (chain, leg, gravity) = (random.chain::<2>(), random.leg(), random.gravity());
+        let good = random.state();
         for bad in [f64::NAN, f64::INFINITY] {
             for state in [
                 JointState { q: [bad, 0.1], ..good },

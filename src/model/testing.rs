@@ -2,36 +2,22 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use nalgebra::Vector3;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro128PlusPlus;
-
 use super::chain::{Chain, DenavitHartenberg};
 use super::inertia::joint;
 use super::log_cholesky::LogCholesky;
 use super::newton_euler::JointState;
 use super::parameter::LegParameters;
 use crate::real::Real;
+pub(crate) use crate::testing::TestRandom;
+use nalgebra::Vector3;
 
 /// Gravity of the planar leg: straight down along x of the base.
 pub fn down_along_x<T: Real>() -> Vector3<T> {
     Vector3::new(T::of(9.81), T::zero(), T::zero())
 }
 
-/// Random generator of chains, legs and motions, in double precision.
-pub struct Dice(Xoshiro128PlusPlus);
-
-impl Dice {
-    pub fn new(seed: u64) -> Self {
-        Self(Xoshiro128PlusPlus::seed_from_u64(seed))
-    }
-
-    /// Uniform in -bound..bound.
-    pub fn within(&mut self, bound: f64) -> f64 {
-        (f64::from(self.0.next_u32()) / f64::from(u32::MAX) * 2.0 - 1.0) * bound
-    }
-
-    pub fn chain<const N: usize>(&mut self) -> Chain<f64, N> {
+impl TestRandom {
+    pub(crate) fn chain<const N: usize>(&mut self) -> Chain<f64, N> {
         Chain::new(&core::array::from_fn(|_| DenavitHartenberg {
             alpha: self.within(PI),
             a: self.within(0.5),
@@ -40,7 +26,7 @@ impl Dice {
         .unwrap()
     }
 
-    pub fn state<const N: usize>(&mut self) -> JointState<f64, N> {
+    pub(crate) fn state<const N: usize>(&mut self) -> JointState<f64, N> {
         JointState {
             q: core::array::from_fn(|_| self.within(PI)),
             qd: core::array::from_fn(|_| self.within(3.0)),
@@ -48,13 +34,13 @@ impl Dice {
         }
     }
 
-    pub fn gravity(&mut self) -> Vector3<f64> {
+    pub(crate) fn gravity(&mut self) -> Vector3<f64> {
         Vector3::new(self.within(9.81), self.within(9.81), self.within(9.81))
     }
 
     /// Coordinates of a body of 0.4 to 20 kg, a few centimetres to decimetres wide,
     /// up to 0.3 m from the origin.
-    pub fn body(&mut self) -> LogCholesky<f64> {
+    pub(crate) fn body(&mut self) -> LogCholesky<f64> {
         let mut body = [0.0; 10];
         body[0] = 0.5 + self.within(1.0);
         for logarithm in &mut body[1..4] {
@@ -70,7 +56,7 @@ impl Dice {
     }
 
     /// Physically consistent links with rotors, friction and offsets.
-    pub fn leg<const N: usize>(&mut self) -> LegParameters<f64, N> {
+    pub(crate) fn leg<const N: usize>(&mut self) -> LegParameters<f64, N> {
         core::array::from_fn(|_| {
             let drive =
                 [0.5 + self.within(0.4), 3.0 + self.within(2.0), 1.0 + self.within(0.8), self.within(1.0)];

@@ -165,20 +165,13 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use rand_core::{Rng, SeedableRng};
-    use rand_xoshiro::Xoshiro128PlusPlus;
-
-    /// Uniform number in -1..=1.
-    pub(in crate::motion) fn symmetric(random: &mut Xoshiro128PlusPlus) -> f32 {
-        random.next_u32() as f32 / u32::MAX as f32 * 2.0 - 1.0
-    }
+    use crate::testing::TestRandom;
 
     /// Random curve with amplitudes that fall with the order, as an excitation's do.
     pub(in crate::motion) fn random_curve(seed: u64) -> Fourier<2, 6> {
-        let mut random = Xoshiro128PlusPlus::seed_from_u64(seed);
-        let mut amplitudes = || {
-            [(); 2].map(|()| core::array::from_fn(|index| 0.3 * symmetric(&mut random) / (index + 1) as f32))
-        };
+        let mut random = TestRandom::new(seed);
+        let mut amplitudes =
+            || [(); 2].map(|()| core::array::from_fn(|index| random.within(0.3) as f32 / (index + 1) as f32));
         let (sine, cosine) = (amplitudes(), amplitudes());
         Fourier::new(Second(10.0), [0.4, -0.7], sine, cosine).expect("finite amplitudes")
     }

@@ -172,14 +172,14 @@ impl CountScale {
 
     /// Moves a position within one turn by less than one turn and wraps the result.
     #[must_use]
-    pub const fn moved(&self, place: i32, step: i32) -> i32 {
-        let place = place + step;
-        if place >= self.counts_per_turn {
-            place - self.counts_per_turn
-        } else if place < 0 {
-            place + self.counts_per_turn
+    pub const fn moved(&self, position: i32, step: i32) -> i32 {
+        let position = position + step;
+        if position >= self.counts_per_turn {
+            position - self.counts_per_turn
+        } else if position < 0 {
+            position + self.counts_per_turn
         } else {
-            place
+            position
         }
     }
 
@@ -192,9 +192,12 @@ impl CountScale {
 
     /// Electrical angle at the middle of a count.
     #[must_use]
-    pub const fn angle(&self, place: i32) -> ElectricalAngle {
+    pub const fn angle(&self, position: i32) -> ElectricalAngle {
         ElectricalAngle(
-            place.cast_unsigned().wrapping_mul(self.units_per_count).wrapping_add(self.units_per_count >> 1),
+            position
+                .cast_unsigned()
+                .wrapping_mul(self.units_per_count)
+                .wrapping_add(self.units_per_count >> 1),
         )
     }
 }
@@ -207,12 +210,12 @@ mod tests {
     fn an_angle_is_the_same_after_whole_turns_of_any_encoder() {
         for (counts, pairs) in [(8192, 7), (4000, 7), (10_000, 21), (2400, 4), (16_384, 14)] {
             let scale = CountScale::new(counts, pairs).expect("usual");
-            let (mut place, steps) = (0, counts.cast_signed() / 3);
+            let (mut position, steps) = (0, counts.cast_signed() / 3);
             for _ in 0..3 {
-                place = scale.moved(place, steps);
+                position = scale.moved(position, steps);
             }
-            place = scale.moved(place, counts.cast_signed() - 3 * steps);
-            assert_eq!(place, 0);
+            position = scale.moved(position, counts.cast_signed() - 3 * steps);
+            assert_eq!(position, 0);
             let half = scale.angle(counts.cast_signed() / 2).since(scale.angle(0)).abs();
             // Tolerance: rounding of half a turn's counts.
             assert!((half - if pairs % 2 == 1 { 0.5 } else { 0.0 }).abs() < 4e-6, "{half}");
@@ -242,11 +245,12 @@ mod tests {
         let scale = CountScale::new(8192, 7).expect("usual");
         for counts_per_tick in [-40.7_f64, -3.3, 0.11, 12.9] {
             let mut tracker = SpeedTracker::at(ElectricalAngle::ZERO);
-            for tick in 0..24_000 {
+            for tick in 0..CURRENT_RATE_HZ {
                 let count = (counts_per_tick * f64::from(tick)).floor() as i32;
                 tracker.track(scale.angle(count.rem_euclid(8192)));
             }
-            let true_speed = counts_per_tick * 7.0 / 8192.0 * core::f64::consts::TAU * 24_000.0;
+            let true_speed =
+                counts_per_tick * 7.0 / 8192.0 * core::f64::consts::TAU * f64::from(CURRENT_RATE_HZ);
             // Filtered steps of one count: below half a count over the loop's 1 ms, 2.7 rad/s.
             assert!((f64::from(tracker.rad_per_s()) - true_speed).abs() < 2.7, "{}", tracker.rad_per_s());
         }

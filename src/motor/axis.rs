@@ -52,23 +52,74 @@ use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, Shu
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample};
 use crate::real::{abs, clamp, is_finite};
-use crate::units::Ampere;
+use crate::units::{Ampere, RadianPerSecond};
 
-mod asked;
 mod index;
-mod told;
-#[cfg(not(target_os = "none"))]
-mod upset;
-mod window;
 
-pub use asked::{AxisFault, AxisRequest, BridgeRequest};
 use index::IndexWatch;
-use window::Window;
 
 /// Weight of a rejected shunt or bus reading. Each accepted reading subtracts one. A sum above
 /// [`MOST_DOUBTS`] is a fault: the third rejection of every other tick, or the sixth of one in four.
 const DOUBT: u8 = 4;
 const MOST_DOUBTS: u8 = 8;
+
+/// Request to an axis for one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisRequest {
+    /// Whether the bridge switches.
+    pub enabled: bool,
+    /// Quadrature current in the joint's sense, clamped to the configuration's limit.
+    pub current: Ampere,
+}
+
+impl AxisRequest {
+    /// Outputs off.
+    pub const OFF: Self = Self { enabled: false, current: Ampere::ZERO };
+}
+
+/// Why an axis turned its outputs off or brakes by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisFault {
+    /// A shunt amplifier at its rail: two ticks in a row, or too many within few ticks.
+    CurrentSense,
+    /// Current vector longer than the bound.
+    Overcurrent,
+    /// Bus voltage out of range, as often as in [`Self::CurrentSense`].
+    BusVoltage,
+    /// Two implausible encoder steps in a row, two index pulses at one wrong position, or none at the right
+    /// one. The rotor position is lost and requires a new calibration.
+    Encoder,
+    /// Target, voltage or duty not finite.
+    NotANumber,
+    /// The counter stands still while the motor turns. The motor brakes until the fault is cleared; the rotor
+    /// position is lost.
+    EncoderFrozen,
+    /// Voltage and current disagree: a phase does not conduct.
+    OpenPhase,
+    /// The current-sensor offsets drifted.
+    CurrentOffset,
+    /// A shunt code does not change while its phase's target current does.
+    StuckConversion,
+    /// Checksum of gains and limits changed.
+    Parameters,
+}
+
+/// Requested state of the bridge for one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BridgeRequest {
+    /// Outputs off.
+    Off,
+    /// Follow a quadrature current in the joint's sense.
+    Follow(Ampere),
+    /// Low sides on: a passive brake.
+    Brake,
+}
+
+impl From<AxisRequest> for BridgeRequest {
+    fn from(request: AxisRequest) -> Self {
+        if request.enabled { Self::Follow(request.current) } else { Self::Off }
+    }
+}
 
 /// One axis; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,7 +133,7 @@ pub struct Axis {
     step: i32,
     index: IndexWatch,
     /// Rotor position within one turn, electrical sense, counts.
-    place: i32,
+    position: i32,
     /// Unwrapped counts, joint's sense.
     counts: i32,
     measured: Rotating<Ampere>,
@@ -100,7 +151,7 @@ pub struct Axis {
     /// Weighted count of rejected shunt and bus readings, see [`DOUBT`].
     doubts: u8,
     /// An encoder step since the last joint sample was implausible.
-    disbelieved: bool,
+    rejected_step: bool,
     fault: Option<AxisFault>,
     /// Rotor position or parameters are lost; [`Self::clear_fault`] has no effect.
     lost: bool,
@@ -117,15 +168,15 @@ impl Axis {
         sample: &AxisSample,
     ) -> Result<Self, AxisError> {
         let constants = Constants::new(configuration, calibration)?;
-        let place = calibration.place_of(&constants.scale, configuration.counter, sample.encoder_count);
+        let position = calibration.position_of(&constants.scale, configuration.counter, sample.encoder_count);
         Ok(Self {
             constants,
             current_loop: CurrentLoop::default(),
-            speed: SpeedTracker::at(constants.scale.angle(place).plus(constants.offset)),
+            speed: SpeedTracker::at(constants.scale.angle(position).plus(constants.offset)),
             counter: sample.encoder_count,
             step: 0,
             index: IndexWatch::at(0),
-            place,
+            position,
             counts: 0,
             measured: Rotating::default(),
             window: Window::EMPTY,
@@ -134,10 +185,10 @@ impl Axis {
             shunt_watch: ShuntWatch::EMPTY,
             checksum: constants.checksum(),
             unchecked: 0,
-            last: AxisCommand::RELEASED,
+            last: AxisCommand::OFF,
             doubtful: false,
             doubts: 0,
-            disbelieved: false,
+            rejected_step: false,
             fault: None,
             lost: false,
         })
@@ -148,6 +199,59 @@ impl Axis {
         self.index.shift(counts.wrapping_sub(self.counts));
         self.counts = counts;
         self.window = Window::EMPTY;
+    }
+
+    /// Resumes after a time without ticks, in which the outputs were off while the counter ran on. The
+    /// present count is accepted with any step.
+    ///
+    /// Set `long` where the counter may have wrapped. The position within a turn then stays valid only where
+    /// the counter's range is a multiple of the turn, as 65,536 of 8,192; otherwise it is lost. Counts may be
+    /// off by multiples of the range; the caller has to correct them.
+    pub fn resume(&mut self, sample: &AxisSample, long: bool) {
+        let constants = &self.constants;
+        let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
+        self.position = constants.scale.within_turn(self.position + constants.counter_sign * step);
+        self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
+        (self.counter, self.step) = (sample.encoder_count, 0);
+        self.index = IndexWatch::at(self.counts);
+        self.speed = SpeedTracker::at(self.angle());
+        self.window = Window::EMPTY;
+        (self.doubtful, self.doubts, self.rejected_step) = (false, 0, false);
+        if long && constants.scale.within_turn(1 << 16) != 0 {
+            self.found(AxisFault::Encoder);
+        }
+    }
+
+    /// Currents of the last tick, in the electrical sense.
+    #[must_use]
+    pub fn measured(&self) -> Rotating<Ampere> {
+        self.measured
+    }
+
+    /// Electrical speed, rad/s.
+    #[must_use]
+    pub fn electrical_speed(&self) -> RadianPerSecond {
+        RadianPerSecond(self.speed.rad_per_s())
+    }
+
+    /// The fault that stopped the axis, if any.
+    #[must_use]
+    pub fn fault(&self) -> Option<AxisFault> {
+        self.fault
+    }
+
+    /// Rotor position or parameters are lost and require a new calibration.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.lost
+    }
+
+    /// Clears a fault, so that a request may enable again. Returns `false` where the axis is lost.
+    pub fn clear_fault(&mut self) -> bool {
+        if !self.lost {
+            self.fault = None;
+        }
+        !self.lost
     }
 
     /// Runs one PWM period and returns the bridge's command for the next one.
@@ -165,10 +269,10 @@ impl Axis {
     #[inline(always)]
     pub fn act(&mut self, sample: &AxisSample, request: BridgeRequest) -> AxisCommand {
         let request = match (request, self.fault) {
-            (BridgeRequest::Released, _) => BridgeRequest::Released,
+            (BridgeRequest::Off, _) => BridgeRequest::Off,
             (request, None) => request,
             (_, Some(AxisFault::EncoderFrozen | AxisFault::Encoder)) => BridgeRequest::Brake,
-            _ => BridgeRequest::Released,
+            _ => BridgeRequest::Off,
         };
         // Field by field: copying the whole struct would also carry the padding, byte by byte.
         let AxisCommand { enabled, duty } = match self.step(sample, request) {
@@ -176,7 +280,7 @@ impl Axis {
             Err(fault) => {
                 self.found(fault);
                 self.current_loop.reset();
-                AxisCommand::RELEASED
+                AxisCommand::OFF
             }
         };
         self.last = AxisCommand { enabled, duty };
@@ -188,8 +292,9 @@ impl Axis {
     fn found(&mut self, fault: AxisFault) {
         self.fault = Some(fault);
         // A frozen counter may first show as another fault.
-        let doubted =
-            self.last.enabled && !self.begins && self.model_watch.doubts(&self.constants.model, self.place);
+        let doubted = self.last.enabled
+            && !self.begins
+            && self.model_watch.doubts(&self.constants.model, self.position);
         self.lost |=
             doubted || matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters);
     }
@@ -205,19 +310,19 @@ impl Axis {
             self.counter = sample.encoder_count;
             self.step = step;
             self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
-            self.place = constants.scale.moved(self.place, constants.counter_sign * step);
+            self.position = constants.scale.moved(self.position, constants.counter_sign * step);
             if let Some(at) = sample.index_count {
                 let since =
                     constants.counter_sign * i32::from(sample.encoder_count.wrapping_sub(at).cast_signed());
-                self.index.came(self.place - since, step);
+                self.index.came(self.position - since, step);
             }
         }
         let angle = self.angle();
         self.speed.track(angle);
         // Both rotations of a tick together share the constants of their polynomials.
         let [rotor, acting] = [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation());
-        let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
-        let switching = request != BridgeRequest::Released;
+        let currents = constants.sense.currents(sample.shunt_codes, constants.current_offsets);
+        let switching = request != BridgeRequest::Off;
         self.measured = match currents {
             Some(currents) => currents.to_rotating(rotor),
             None if switching => self.measured,
@@ -237,23 +342,23 @@ impl Axis {
             None
         };
         if let Some(fault) = doubt {
-            self.disbelieved |= !plausible;
+            self.rejected_step |= !plausible;
             // When switching starts there is no previous command to repeat.
             self.doubts = self.doubts.saturating_add(u8::from(plausible) * DOUBT);
             if self.doubtful || self.doubts > MOST_DOUBTS || switching && !self.last.enabled {
                 return Err(fault);
             }
             self.doubtful = true;
-            return Ok(if switching { self.last } else { AxisCommand::RELEASED });
+            return Ok(if switching { self.last } else { AxisCommand::OFF });
         }
         self.doubtful = false;
         self.doubts = self.doubts.saturating_sub(1);
         if !switching {
             if let Some(currents) = currents {
-                self.shunt_watch.released(currents);
+                self.shunt_watch.disabled(currents);
             }
             self.current_loop.reset();
-            return Ok(AxisCommand::RELEASED);
+            return Ok(AxisCommand::OFF);
         }
         let (d, q) = (self.measured.d.0, self.measured.q.0);
         if d * d + q * q > constants.overcurrent_square {
@@ -272,7 +377,7 @@ impl Axis {
         if !self.last.enabled {
             self.begins = true;
             if !self.shunt_watch.begins_at_zero() {
-                return Err(AxisFault::CurrentZero);
+                return Err(AxisFault::CurrentOffset);
             }
         }
         let bus = constants.sense.bus(sample.bus_code);
@@ -289,7 +394,7 @@ impl Axis {
             return Err(AxisFault::NotANumber);
         }
         let target = Rotating { d: Ampere::ZERO, q: target }.to_stationary(acting);
-        if self.shunt_watch.is_stuck(sample.shunt_codes, target, constants.stuck_asked) {
+        if self.shunt_watch.is_stuck(sample.shunt_codes, target, constants.stuck_change) {
             return Err(AxisFault::StuckConversion);
         }
         let duty = constants.modulator.duties(voltage.to_stationary(acting), 1.0 / bus.0, target);
@@ -303,7 +408,7 @@ impl Axis {
     /// Electrical angle of the current rotor position.
     #[inline(always)]
     fn angle(&self) -> ElectricalAngle {
-        self.constants.scale.angle(self.place).plus(self.constants.offset)
+        self.constants.scale.angle(self.position).plus(self.constants.offset)
     }
 
     /// Whether the index pulses show a lost rotor position.
@@ -322,7 +427,7 @@ impl Axis {
             doubtful: false,
         });
         self.window = Window::EMPTY;
-        JointSample { doubtful: core::mem::take(&mut self.disbelieved), ..sample }
+        JointSample { doubtful: core::mem::take(&mut self.rejected_step), ..sample }
     }
 
     /// Compares voltages with currents and speed ([`ModelWatch`]), index pulses with the counter, and the
@@ -349,7 +454,7 @@ impl Axis {
                 current_loop: &self.current_loop,
                 current: self.measured,
                 speed_rad_per_s: self.speed.rad_per_s(),
-                place: self.place,
+                position: self.position,
                 angle,
             };
             if let Some(fault) = self.model_watch.look(&self.constants.model, &shown) {
@@ -361,6 +466,69 @@ impl Axis {
                 self.found(fault);
             }
         }
+    }
+}
+
+/// Sums since the last joint sample: means of count and current cover the same ticks, so belong to one
+/// instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Window {
+    first: i32,
+    /// Sum of counts minus `first`.
+    counts: i32,
+    current_a: f32,
+    ticks: i32,
+}
+
+impl Window {
+    const EMPTY: Self = Self { first: 0, counts: 0, current_a: 0.0, ticks: 0 };
+    /// Longest window, ticks. If no one reads the sample, averaging restarts.
+    const MOST: i32 = 48;
+
+    fn push(&mut self, counts: i32, current_a: f32) {
+        if self.ticks == 0 || self.ticks == Self::MOST {
+            *self = Self { first: counts, ..Self::EMPTY };
+        }
+        self.counts += counts.wrapping_sub(self.first);
+        self.current_a += current_a;
+        self.ticks += 1;
+    }
+
+    fn mean(&self) -> Option<JointSample> {
+        (self.ticks > 0).then(|| JointSample {
+            encoder_counts: self.first.wrapping_add(self.counts.div_euclid(self.ticks)),
+            current: Ampere(self.current_a / self.ticks as f32),
+            doubtful: false,
+        })
+    }
+}
+
+/// Fault injection, host only: bit flips that the checksum must find (row M2 of docs/safety.md).
+#[cfg(not(target_os = "none"))]
+impl Axis {
+    /// Number of values in which a bit can be flipped.
+    pub const NUMBERS: u8 = 6;
+
+    /// Flips one bit (of 32, from the lowest) of a constant. In order: current limit, square of the
+    /// overcurrent bound, both current-sensor offsets, sign of the current, proportional gain of
+    /// the current loop.
+    pub fn flip_bit(&mut self, number: u8, bit: u8) {
+        let constants = &mut self.constants;
+        let [offset_b, offset_c] = &mut constants.current_offsets;
+        let flipped = match number {
+            0 => &mut constants.current_limit,
+            1 => &mut constants.overcurrent_square,
+            2 => offset_b,
+            3 => offset_c,
+            4 => &mut constants.current_sign,
+            _ => constants.gains.proportional_mut(),
+        };
+        *flipped = f32::from_bits(flipped.to_bits() ^ 1 << (bit % 32));
+    }
+
+    /// Makes the modulator's constants NaN, which no input can do (row N1).
+    pub const fn invalidate_modulation(&mut self) {
+        self.constants.modulator.invalidate();
     }
 }
 

@@ -149,7 +149,7 @@ pub const ZERO_SPREAD_CODES: u16 = 150;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Constants {
     pub sense: SenseScale,
-    pub zeros: [f32; 2],
+    pub current_offsets: [f32; 2],
     pub bus_codes: [u16; 2],
     pub scale: CountScale,
     pub offset: ElectricalAngle,
@@ -166,7 +166,7 @@ pub(super) struct Constants {
     pub modulator: Modulator,
     pub model: ModelLimits,
     /// Target current of a phase beyond which its shunt code must change, A.
-    pub stuck_asked: f32,
+    pub stuck_change: f32,
     pub current_limit: f32,
     pub overcurrent_square: f32,
     /// Electrical speed at which a shorted motor carries the overcurrent bound, rad/s.
@@ -187,8 +187,8 @@ impl Constants {
             self.unindexed,
         ];
         let limits = [
-            self.zeros[0],
-            self.zeros[1],
+            self.current_offsets[0],
+            self.current_offsets[1],
             self.current_sign,
             self.current_limit,
             self.overcurrent_square,
@@ -218,7 +218,7 @@ impl Constants {
         let signs = [configuration.counter.sign(), configuration.flexion.sign()];
         Ok(Self {
             sense: configuration.sense,
-            zeros: calibration.zeros(),
+            current_offsets: calibration.current_offsets(),
             bus_codes: configuration.bus_codes(),
             scale,
             offset: calibration.offset(),
@@ -236,7 +236,7 @@ impl Constants {
             gains,
             modulator: configuration.modulator()?,
             model: ModelLimits::new(configuration, &motor, scale),
-            stuck_asked: ShuntWatch::asked(dead, gains.least_ohm()).0,
+            stuck_change: ShuntWatch::target_change(dead, gains.least_ohm()).0,
             current_limit: configuration.current_limit.0,
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
             brake_speed: brake_speed(&motor, configuration.overcurrent),

@@ -154,8 +154,8 @@ impl ModelLimits {
         Ampere(self.swing_a)
     }
 
-    fn is_still(&self, place: i32, before: i32) -> bool {
-        let distance = self.scale.within_turn(place - before);
+    fn is_still(&self, position: i32, before: i32) -> bool {
+        let distance = self.scale.within_turn(position - before);
         distance <= STANDSTILL || self.scale.counts_per_turn() - distance <= STANDSTILL
     }
 }
@@ -170,7 +170,7 @@ pub struct Shown<'a> {
     /// Electrical speed of the counts, rad/s.
     pub speed_rad_per_s: f32,
     /// Rotor position within one turn, counts.
-    pub place: i32,
+    pub position: i32,
     /// Electrical angle of that position.
     pub angle: ElectricalAngle,
 }
@@ -181,7 +181,7 @@ pub struct ModelWatch {
     /// Periods with too large a residual, less those without.
     suspicion: u8,
     /// Rotor position before the first of them.
-    place: i32,
+    position: i32,
     /// Integral of the residual over the angle, stator's frame, V turns.
     sum: Stationary<f32>,
     /// Travel within the current electrical turn, turns, signed.
@@ -196,7 +196,7 @@ pub struct ModelWatch {
 /// A counter at rest, and the sustained range of currents since then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Still {
-    place: i32,
+    position: i32,
     /// Periods at that position, capped at the settling time.
     periods: u8,
     least_a: f32,
@@ -206,14 +206,14 @@ struct Still {
 }
 
 impl Still {
-    const fn at(place: i32, current_a: f32) -> Self {
-        Self { place, periods: 0, least_a: current_a, most_a: current_a, overdue: 0 }
+    const fn at(position: i32, current_a: f32) -> Self {
+        Self { position, periods: 0, least_a: current_a, most_a: current_a, overdue: 0 }
     }
 
     /// Runs one servo period; returns whether the counter should have moved but did not.
-    fn look(&mut self, limits: &ModelLimits, place: i32, current_a: f32) -> bool {
-        if !limits.is_still(place, self.place) {
-            *self = Self::at(place, current_a);
+    fn look(&mut self, limits: &ModelLimits, position: i32, current_a: f32) -> bool {
+        if !limits.is_still(position, self.position) {
+            *self = Self::at(position, current_a);
         }
         if self.periods < SETTLED {
             self.periods += 1;
@@ -244,7 +244,7 @@ impl ModelWatch {
     /// State before the first servo period.
     pub const EMPTY: Self = Self {
         suspicion: 0,
-        place: 0,
+        position: 0,
         sum: Stationary { alpha: 0.0, beta: 0.0 },
         way: 0.0,
         periods: 0,
@@ -256,8 +256,8 @@ impl ModelWatch {
     /// Whether the counter has stood still since voltages and currents began to disagree. Any fault found
     /// then also makes the rotor position doubtful.
     #[must_use]
-    pub fn doubts(&self, limits: &ModelLimits, place: i32) -> bool {
-        self.suspicion > 0 && limits.is_still(place, self.place)
+    pub fn doubts(&self, limits: &ModelLimits, position: i32) -> bool {
+        self.suspicion > 0 && limits.is_still(position, self.position)
     }
 
     /// Electrical speed whose back-EMF equals the last period's residual, rad/s.
@@ -278,7 +278,7 @@ impl ModelWatch {
             + current * (limits.volt_per_ampere + limits.volt_per_speed_ampere * speed)
             + limits.volt_per_speed * speed;
         if self.suspicion == 0 {
-            self.place = now.place;
+            self.position = now.position;
         }
         // A residual that is not finite exceeds every limit.
         if square <= limit * limit {
@@ -287,14 +287,14 @@ impl ModelWatch {
             self.suspicion += 1;
             if self.suspicion >= PATIENCE {
                 self.suspicion = 0;
-                let frozen = limits.is_still(now.place, self.place) && square <= limits.back_emf_square;
+                let frozen = limits.is_still(now.position, self.position) && square <= limits.back_emf_square;
                 return Some(if frozen { AxisFault::EncoderFrozen } else { AxisFault::OpenPhase });
             }
         }
-        if self.still.look(limits, now.place, now.current.q.0) {
+        if self.still.look(limits, now.position, now.current.q.0) {
             return Some(AxisFault::EncoderFrozen);
         }
-        self.turn(limits, now, residual).then_some(AxisFault::CurrentZero)
+        self.turn(limits, now, residual).then_some(AxisFault::CurrentOffset)
     }
 
     /// Updates the mean over an electrical turn; returns whether a turn ended with too large a mean.
@@ -360,7 +360,7 @@ mod tests {
         current: Rotating<Ampere>,
         angle: ElectricalAngle,
     ) -> Shown<'a> {
-        Shown { current_loop, current, speed_rad_per_s: 0.0, place: 0, angle }
+        Shown { current_loop, current, speed_rad_per_s: 0.0, position: 0, angle }
     }
 
     #[test]
@@ -383,7 +383,7 @@ mod tests {
             let now = shown(&current_loop, current, ElectricalAngle::default());
             // The counter moves: a change of the current at a standing one would be a fault of its own.
             let seen = (0..3 * i32::from(PATIENCE))
-                .find_map(|period| watch.look(&limits, &Shown { place: 10 * period, ..now }));
+                .find_map(|period| watch.look(&limits, &Shown { position: 10 * period, ..now }));
             assert_eq!(seen, None, "{d} {q}");
         }
     }
@@ -440,7 +440,7 @@ mod tests {
             let now = Shown { speed_rad_per_s, ..shown(&current_loop, current, ElectricalAngle::default()) };
             let mut watch = ModelWatch::EMPTY;
             let seen = (0..3 * i32::from(PATIENCE))
-                .find_map(|period| watch.look(&limits, &Shown { place: 10 * period, ..now }));
+                .find_map(|period| watch.look(&limits, &Shown { position: 10 * period, ..now }));
             assert_eq!(seen, expected, "{speed_rad_per_s}");
         }
     }
@@ -460,7 +460,7 @@ mod tests {
                 let held = Rotating { d: Volt(residual.d), q: Volt(residual.q) };
                 let none = Rotating { d: Ampere::ZERO, q: Ampere::ZERO };
                 let current_loop = CurrentLoop::holding(held);
-                watch.look(&limits, &shown(&current_loop, none, angle)) == Some(AxisFault::CurrentZero)
+                watch.look(&limits, &shown(&current_loop, none, angle)) == Some(AxisFault::CurrentOffset)
             })
         });
         assert!(seen[0].is_some() && seen[0] == seen[1], "{seen:?}");

@@ -174,7 +174,7 @@ impl Modulator {
 
     /// Makes every further duty NaN. Host only; row N1 of docs/safety.md.
     #[cfg(not(target_os = "none"))]
-    pub(super) const fn spoil(&mut self) {
+    pub(super) const fn invalidate(&mut self) {
         (self.dead_duty, self.dead_duty_per_unit) = (f32::NAN, f32::NAN);
     }
 
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn duties_give_the_voltage_that_was_asked_for_up_to_the_limit() {
+    fn duties_give_the_requested_voltage_up_to_the_limit() {
         let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, PLAIN).expect("usual");
         let limit = modulator.voltage_limit(Volt(48.0)).0;
         for share in [0.0, 0.1, 0.5, 0.87, 0.999] {
@@ -259,7 +259,7 @@ mod tests {
             .expect("usual");
         let duties = |current| modulator.duties(at(0.0, 0), 1.0 / 48.0, current);
         // Expected: 119 ns of 41.667 us.
-        let full = 119e-9 * 24_000.0;
+        let full = 119e-9 * CURRENT_RATE_HZ as f32;
         let [a, b, c] = duties(Stationary { alpha: Ampere(10.0), beta: Ampere::ZERO });
         assert!((a - 0.5 - full).abs() < 1e-6 && (b - 0.5 + full).abs() < 1e-6 && (c - b).abs() < 1e-7);
         let [a, ..] = duties(Stationary { alpha: Ampere(-0.25), beta: Ampere::ZERO });

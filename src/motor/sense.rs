@@ -27,11 +27,14 @@ pub struct SenseScale {
 }
 
 impl SenseScale {
+    /// Divider of the bus voltage on boards of 48 and 56 V.
+    pub const DIVIDER: f32 = 19.0;
+
     /// ODrive v3.6, 56 V: 0.5 mOhm, 40 V/V, 0.3 V..3.0 V; divider 19. 0.0403 A and 15.3 mV per code.
     pub const ODRIVE_3_6: Self = Self {
         ampere_per_code: [Ampere(3.3 / 4096.0 / 40.0 / 0.0005); 2],
         rails: [372, 3723],
-        volt_per_code: Volt(3.3 * 19.0 / 4096.0),
+        volt_per_code: Volt(3.3 * Self::DIVIDER / 4096.0),
     };
 
     /// Bus voltage of a code.
@@ -44,14 +47,14 @@ impl SenseScale {
     /// at a rail.
     #[must_use]
     #[inline(always)]
-    pub fn currents(&self, codes: [u16; 2], zeros: [f32; 2]) -> Option<Stationary<Ampere>> {
+    pub fn currents(&self, codes: [u16; 2], current_offsets: [f32; 2]) -> Option<Stationary<Ampere>> {
         let [b, c] = codes;
         let width = self.rails[1].wrapping_sub(self.rails[0]);
         if b.wrapping_sub(self.rails[0]) > width || c.wrapping_sub(self.rails[0]) > width {
             return None;
         }
-        let b = self.ampere_per_code[0] * (f32::from(b) - zeros[0]);
-        let c = self.ampere_per_code[1] * (f32::from(c) - zeros[1]);
+        let b = self.ampere_per_code[0] * (f32::from(b) - current_offsets[0]);
+        let c = self.ampere_per_code[1] * (f32::from(c) - current_offsets[1]);
         Some(Stationary::from_two_phases(b, c))
     }
 
@@ -88,12 +91,12 @@ mod tests {
     use super::*;
     use crate::real::sqrt;
 
-    const ZEROS: [f32; 2] = [2050.5, 2040.0];
+    const OFFSETS: [f32; 2] = [2050.5, 2040.0];
 
     #[test]
-    fn two_shunts_tell_three_currents() {
+    fn two_shunts_give_three_currents() {
         let scale = SenseScale::ODRIVE_3_6;
-        let vector = scale.currents([2150, 1990], ZEROS).expect("within the rails");
+        let vector = scale.currents([2150, 1990], OFFSETS).expect("within the rails");
         let (b, c) = (0.040_283 * 99.5, -0.040_283 * 50.0);
         assert!((vector.alpha.0 + b + c).abs() < 1e-3, "{vector:?}");
         assert!((vector.beta.0 - (b - c) / sqrt(3.0)).abs() < 1e-3, "{vector:?}");
@@ -106,10 +109,10 @@ mod tests {
     fn a_saturated_amplifier_gives_no_current() {
         let scale = SenseScale::ODRIVE_3_6;
         for code in [0, 371, 3724, 4095, u16::MAX] {
-            assert_eq!(scale.currents([code, 2048], ZEROS), None);
-            assert_eq!(scale.currents([2048, code], ZEROS), None);
+            assert_eq!(scale.currents([code, 2048], OFFSETS), None);
+            assert_eq!(scale.currents([2048, code], OFFSETS), None);
         }
-        assert!(scale.currents([372, 3723], ZEROS).is_some());
+        assert!(scale.currents([372, 3723], OFFSETS).is_some());
     }
 
     #[test]

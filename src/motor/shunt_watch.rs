@@ -29,7 +29,7 @@ use crate::units::{Ampere, Volt};
 /// Ticks for which a code may stay unchanged while it should move.
 const PATIENCE: u8 = 4;
 /// Least change of a phase's target current that is evaluated, A.
-const ASKED_A: f32 = 1.0;
+const LEAST_CHANGE_A: f32 = 1.0;
 /// Factor on the mean dead-time voltage: its vector of 4/3, and a quarter more.
 const BEYOND_DEAD_TIME: f32 = 1.25 * 4.0 / 3.0;
 /// Share of a new sample in the low-pass.
@@ -42,7 +42,7 @@ const ZERO_A: f32 = 2.0;
 struct Shunt {
     code: u16,
     /// Target current of its phase at the code's last change.
-    asked: f32,
+    target: f32,
     /// Ticks since it should have moved.
     overdue: u8,
 }
@@ -58,13 +58,13 @@ impl ShuntWatch {
     /// State before the first tick.
     pub const EMPTY: Self = Self {
         // Larger than any code.
-        shunts: [Shunt { code: u16::MAX, asked: 0.0, overdue: 0 }; 2],
+        shunts: [Shunt { code: u16::MAX, target: 0.0, overdue: 0 }; 2],
         zero: Stationary { alpha: 0.0, beta: 0.0 },
     };
 
     /// Updates the offset in a tick with the outputs off.
     #[inline(always)]
-    pub fn released(&mut self, currents: Stationary<Ampere>) {
+    pub fn disabled(&mut self, currents: Stationary<Ampere>) {
         self.zero.alpha += ZERO_SHARE * (currents.alpha.0 - self.zero.alpha);
         self.zero.beta += ZERO_SHARE * (currents.beta.0 - self.zero.beta);
     }
@@ -80,28 +80,28 @@ impl ShuntWatch {
     /// Change of a phase's target current beyond which its code must move; see the module. `dead` is the mean
     /// voltage that dead time takes, `ohm` the loop's proportional gain.
     #[must_use]
-    pub fn asked(dead: Volt, ohm: f32) -> Ampere {
-        Ampere(max(ASKED_A, BEYOND_DEAD_TIME * dead.0 / ohm))
+    pub fn target_change(dead: Volt, ohm: f32) -> Ampere {
+        Ampere(max(LEAST_CHANGE_A, BEYOND_DEAD_TIME * dead.0 / ohm))
     }
 
-    /// Whether a code is stuck, in a tick in which the bridge switches; `asked_a` is the
-    /// change of [`Self::asked`].
+    /// Whether a code is stuck, in a tick in which the bridge switches; `least_change_a` is the
+    /// change of [`Self::target_change`].
     #[inline(always)]
-    pub fn is_stuck(&mut self, codes: [u16; 2], target: Stationary<Ampere>, asked_a: f32) -> bool {
+    pub fn is_stuck(&mut self, codes: [u16; 2], target: Stationary<Ampere>, least_change_a: f32) -> bool {
         let phases = target.to_phases();
         let [b, c] = &mut self.shunts;
-        let b = b.is_stuck(codes[0], phases.b.0, asked_a);
-        let c = c.is_stuck(codes[1], phases.c.0, asked_a);
+        let b = b.is_stuck(codes[0], phases.b.0, least_change_a);
+        let c = c.is_stuck(codes[1], phases.c.0, least_change_a);
         b || c
     }
 }
 
 impl Shunt {
     #[inline(always)]
-    fn is_stuck(&mut self, code: u16, asked: f32, asked_a: f32) -> bool {
+    fn is_stuck(&mut self, code: u16, target: f32, least_change_a: f32) -> bool {
         if code != self.code {
-            *self = Self { code, asked, overdue: 0 };
-        } else if abs(asked - self.asked) > asked_a {
+            *self = Self { code, target, overdue: 0 };
+        } else if abs(target - self.target) > least_change_a {
             self.overdue += 1;
         }
         self.overdue >= PATIENCE

@@ -4,8 +4,9 @@
 //! are in `hal-sim/tests/`.
 
 use super::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale};
-use crate::hal::{AxisCommand, AxisSample};
+use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ};
 use crate::real::{sin_cos, sqrt};
+use crate::testing::TestRandom;
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
 pub(crate) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
@@ -27,7 +28,7 @@ pub(crate) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
 };
 
 const SUBSTEPS: usize = 10;
-const STEP_S: f64 = 1.0 / 24_000.0 / SUBSTEPS as f64;
+const STEP_S: f64 = 1.0 / CURRENT_RATE_HZ as f64 / SUBSTEPS as f64;
 
 #[derive(Clone, Debug)]
 pub(crate) struct TestMotor {
@@ -44,7 +45,7 @@ pub(crate) struct TestMotor {
     pub bus: f64,
     /// Dead time as a fraction of a period: the current's sign then sets the voltage.
     pub dead: f64,
-    pub zeros: [f64; 2],
+    pub current_offsets: [f64; 2],
     pub noise_codes: f64,
     /// Encoder position at zero flux angle, mechanical turns; `encoder_sign` is -1 where it counts backwards.
     pub encoder_zero: f64,
@@ -63,7 +64,7 @@ pub(crate) struct TestMotor {
     /// The speed is held by an external machine.
     pub driven: bool,
     pub pending: AxisCommand,
-    pub seed: u64,
+    pub random: TestRandom,
     pub turn: Option<i64>,
 }
 
@@ -80,8 +81,8 @@ impl Default for TestMotor {
             coulomb: 0.01,
             load: 0.0,
             bus: 48.0,
-            dead: 119e-9 * 24_000.0,
-            zeros: [12.3, -20.6],
+            dead: 119e-9 * f64::from(CURRENT_RATE_HZ),
+            current_offsets: [12.3, -20.6],
             noise_codes: 1.5,
             encoder_zero: 0.137,
             encoder_sign: 1.0,
@@ -93,8 +94,8 @@ impl Default for TestMotor {
             angle: 0.3,
             speed: 0.0,
             driven: false,
-            pending: AxisCommand::RELEASED,
-            seed: 1,
+            pending: AxisCommand::OFF,
+            random: TestRandom::new(1),
             turn: None,
         }
     }
@@ -105,19 +106,8 @@ impl TestMotor {
         self.angle * self.pole_pairs
     }
 
-    fn place(&self) -> f64 {
+    fn position(&self) -> f64 {
         self.encoder_sign * self.angle / core::f64::consts::TAU + self.encoder_zero
-    }
-
-    /// Nearly normal noise: the sum of twelve uniform numbers.
-    fn noise(&mut self) -> f64 {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            self.seed =
-                self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            sum += (self.seed >> 40) as f64 / (1_u64 << 24) as f64;
-        }
-        sum
     }
 
     fn phases(&self) -> [f64; 3] {
@@ -142,19 +132,19 @@ impl TestMotor {
         let seen = (self.shunts)([b, c]);
         let mut shunt_codes = [0; 2];
         for (shunt, code) in shunt_codes.iter_mut().enumerate() {
-            let exact = 2048.0 + self.zeros[shunt] + seen[shunt] / (3.3 / 4096.0 / 40.0 / 0.0005);
-            *code = (exact + self.noise_codes * self.noise() + 0.5).clamp(0.0, 4095.0) as u16;
+            let exact = 2048.0 + self.current_offsets[shunt] + seen[shunt] / (3.3 / 4096.0 / 40.0 / 0.0005);
+            *code = (exact + self.noise_codes * self.random.normal() + 0.5).clamp(0.0, 4095.0) as u16;
         }
-        let place = if self.encoder_dead { 0.0 } else { self.place() };
-        let counts = (place * self.counts_per_turn).floor() as i64;
-        let turn = place.floor() as i64;
+        let position = if self.encoder_dead { 0.0 } else { self.position() };
+        let counts = (position * self.counts_per_turn).floor() as i64;
+        let turn = position.floor() as i64;
         let before = self.turn.replace(turn).unwrap_or(turn);
         let mut at = (turn.max(before) as f64 * self.counts_per_turn) as i64;
         if turn < before {
             at += self.index_width;
         }
         let index_count = (before != turn).then_some(at as u16);
-        let bus_code = (self.bus / (3.3 * 19.0 / 4096.0)) as u16;
+        let bus_code = (self.bus / f64::from(SenseScale::ODRIVE_3_6.volt_per_code.0)) as u16;
         AxisSample { shunt_codes, bus_code, encoder_count: counts as u16, index_count }
     }
 

@@ -107,7 +107,7 @@ impl AxisState {
             }
             Order::ClearFault => {
                 // A lost rotor position stays lost until a new calibration, so the fault is reported again. A
-                // braking motor is released and has to be calibrated as well.
+                // braking motor is turned off and has to be calibrated as well.
                 let fault = self.fault();
                 let is_lost = self.axis_mut().is_some_and(|axis| !axis.clear_fault());
                 self.faulted = None;
@@ -139,7 +139,7 @@ impl AxisState {
         target: AxisRequest,
     ) -> (AxisCommand, Option<(Outcome, bool)>) {
         match &mut self.doing {
-            Doing::Nothing => (AxisCommand::RELEASED, None),
+            Doing::Nothing => (AxisCommand::OFF, None),
             Doing::Calibrating(_) if bridges != Bridges::Follow => self.end(Outcome::Interrupted),
             Doing::Calibrating(calibrator) => match calibrator.tick(sample) {
                 CalibrationStep::Running(command) => (command, None),
@@ -150,12 +150,12 @@ impl AxisState {
                 let request = match bridges {
                     Bridges::Follow => target.into(),
                     Bridges::Brake => BridgeRequest::Brake,
-                    Bridges::Release => BridgeRequest::Released,
+                    Bridges::Off => BridgeRequest::Off,
                 };
                 let command = running.act(sample, request);
                 let event = running.fault().filter(|fault| self.faulted != Some(*fault)).map(|fault| {
                     self.faulted = Some(fault);
-                    (Outcome::Fault { fault, lost: running.is_lost() }, request != BridgeRequest::Released)
+                    (Outcome::Fault { fault, lost: running.is_lost() }, request != BridgeRequest::Off)
                 });
                 (command, event)
             }
@@ -164,6 +164,6 @@ impl AxisState {
 
     fn end(&mut self, outcome: Outcome) -> (AxisCommand, Option<(Outcome, bool)>) {
         self.doing = Doing::Nothing;
-        (AxisCommand::RELEASED, Some((outcome, false)))
+        (AxisCommand::OFF, Some((outcome, false)))
     }
 }

@@ -20,7 +20,7 @@ use super::mailboxes::TxScheduler;
 use super::queues::{BusEnds, FRAMES};
 use super::signals::Signals;
 use super::token_bucket::TokenBucket;
-use crate::bus::device::{Device, Keeping};
+use crate::bus::device::{Device, StoreCommand};
 use crate::bus::identification::Results;
 use crate::bus::{StoredNode, Storing};
 use crate::hal::{Controller, Hardware};
@@ -32,9 +32,9 @@ const WATCH_US: u64 = 1000;
 
 /// Objects that a host wants stored: sent to the storage and returned with the result.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Keep<const N: usize> {
+pub struct StoreJob<const N: usize> {
     /// Kind of storage that the host requested.
-    pub what: Keeping,
+    pub what: StoreCommand,
     /// Stored objects of each node.
     pub objects: [StoredNode; N],
     /// Models stored so far.
@@ -43,10 +43,10 @@ pub struct Keep<const N: usize> {
     pub done: bool,
 }
 
-impl<const N: usize> Keep<N> {
+impl<const N: usize> StoreJob<N> {
     /// No request.
     pub const NOTHING: Self =
-        Self { what: Keeping::All, objects: [StoredNode::NOTHING; N], generation: 0, done: true };
+        Self { what: StoreCommand::All, objects: [StoredNode::NOTHING; N], generation: 0, done: true };
 }
 
 /// State between two rounds of the bus.
@@ -87,15 +87,15 @@ impl BusRound {
         &mut self,
         device: &mut Device<N, LOG>,
         ends: &mut BusEnds<'_, N>,
-        storage: &Handover<Keep<N>>,
+        storage: &Handover<StoreJob<N>>,
         signals: &Signals<N>,
         hardware: &mut impl Hardware<N>,
         results: &R,
     ) {
         let now_us = hardware.now_us();
         self.tokens.refill(now_us);
-        let may_hear = self.tokens.may_start();
-        if !may_hear && !ends.status.ready() {
+        let may_receive = self.tokens.may_start();
+        if !may_receive && !ends.status.ready() {
             return;
         }
         let status = hardware.controller();
@@ -107,13 +107,13 @@ impl BusRound {
         if status != Controller::Overrun {
             self.lasting = status;
         }
-        let mut is_behind = !may_hear;
+        let mut is_behind = !may_receive;
         for _ in 0..FRAMES {
             if is_behind {
                 break;
             }
             let Some(frame) = ends.frames.dequeue() else { break };
-            if device.hear(&frame, now_us, None, results) {
+            if device.receive(&frame, now_us, None, results) {
                 is_whole = true;
                 self.tokens.spend(hardware.now_us());
                 is_behind = !self.tokens.may_continue();
@@ -165,7 +165,7 @@ impl BusRound {
         }
     }
 
-    fn store<const N: usize, const LOG: usize>(device: &mut Device<N, LOG>, storage: &Handover<Keep<N>>) {
+    fn store<const N: usize, const LOG: usize>(device: &mut Device<N, LOG>, storage: &Handover<StoreJob<N>>) {
         if let Some(stored) = storage.take_back() {
             device.set_generation(stored.generation);
             device.stored(stored.done, &stored.objects);

@@ -48,7 +48,7 @@ pub struct Situation {
 
 /// Request of the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ask {
+pub enum OperatorRequest {
     /// A step of the drive's power states.
     Power(PowerRequest),
     /// Measure both axes; the motors turn.
@@ -63,7 +63,7 @@ pub enum Ask {
     Reset,
 }
 
-impl Ask {
+impl OperatorRequest {
     /// Word used in records.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -125,7 +125,7 @@ impl Operator {
     }
 
     /// Runs one tick.
-    pub fn tick(&mut self, now: &Situation) -> Option<Ask> {
+    pub fn tick(&mut self, now: &Situation) -> Option<OperatorRequest> {
         let before = (self.enabling.closed, self.start.closed);
         self.enabling.tick(now.enabling);
         self.start.tick(now.start);
@@ -145,9 +145,9 @@ impl Operator {
         (self.ready, self.pressed) = (false, 0);
         let pressed = self.start.closed && !before.1;
         match now.drive {
-            Some(DriveState::OperationEnabled) => return pressed.then_some(Ask::Identify),
+            Some(DriveState::OperationEnabled) => return pressed.then_some(OperatorRequest::Identify),
             _ if pressed && !now.calibrated && !now.calibrating && !now.blocked => {
-                return Some(Ask::Calibrate);
+                return Some(OperatorRequest::Calibrate);
             }
             _ => {}
         }
@@ -162,7 +162,7 @@ impl Operator {
     }
 
     /// Next of the steps shutdown, switch on, enable; each once per closing.
-    fn next_step(&mut self, drive: DriveState) -> Option<Ask> {
+    fn next_step(&mut self, drive: DriveState) -> Option<OperatorRequest> {
         let (place, request) = match drive {
             DriveState::SwitchOnDisabled => (0, PowerRequest::Shutdown),
             DriveState::ReadyToSwitchOn => (1, PowerRequest::SwitchOn),
@@ -171,32 +171,32 @@ impl Operator {
         };
         (self.steps == place).then(|| {
             self.steps += 1;
-            Ask::Power(request)
+            OperatorRequest::Power(request)
         })
     }
 
-    fn without_the_switch(&mut self, now: &Situation, before: (bool, bool)) -> Option<Ask> {
+    fn without_the_switch(&mut self, now: &Situation, before: (bool, bool)) -> Option<OperatorRequest> {
         if let Some(stop) = stop(now) {
             return Some(stop);
         }
         if self.start.closed {
             self.pressed = self.pressed.saturating_add(u32::from(self.ready));
-            return (self.pressed == RESET_TICKS).then_some(Ask::Reset);
+            return (self.pressed == RESET_TICKS).then_some(OperatorRequest::Reset);
         }
         self.ready = true;
         let short = before.1 && self.pressed > 0 && self.pressed < RESET_TICKS;
         self.pressed = 0;
-        (short && now.calibrated && !now.referenced).then_some(Ask::Reference)
+        (short && now.calibrated && !now.referenced).then_some(OperatorRequest::Reference)
     }
 }
 
 /// Stop request of an open switch.
-fn stop(now: &Situation) -> Option<Ask> {
+fn stop(now: &Situation) -> Option<OperatorRequest> {
     match now.drive {
-        _ if now.calibrating => Some(Ask::EndCalibration),
-        Some(DriveState::OperationEnabled) => Some(Ask::Power(PowerRequest::QuickStop)),
+        _ if now.calibrating => Some(OperatorRequest::EndCalibration),
+        Some(DriveState::OperationEnabled) => Some(OperatorRequest::Power(PowerRequest::QuickStop)),
         Some(DriveState::ReadyToSwitchOn | DriveState::SwitchedOn) => {
-            Some(Ask::Power(PowerRequest::DisableVoltage))
+            Some(OperatorRequest::Power(PowerRequest::DisableVoltage))
         }
         _ => None,
     }
@@ -219,12 +219,12 @@ mod tests {
         Situation { calibrated: true, referenced: true, drive: Some(DriveState::SwitchOnDisabled), ..REST };
 
     /// Requests within some ticks of one situation.
-    fn asked(operator: &mut Operator, now: Situation, ticks: u32) -> impl Iterator<Item = Ask> {
+    fn asked(operator: &mut Operator, now: Situation, ticks: u32) -> impl Iterator<Item = OperatorRequest> {
         let mut all = [None; 8];
         let mut count = 0;
         for _ in 0..ticks {
-            if let Some(ask) = operator.tick(&now) {
-                all[count] = Some(ask);
+            if let Some(request) = operator.tick(&now) {
+                all[count] = Some(request);
                 count += 1;
             }
         }
@@ -251,8 +251,8 @@ mod tests {
             assert_eq!(asked(&mut operator, stuck, 10 * RESET_TICKS).count(), 0);
             // After it has been open it counts.
             assert_eq!(asked(&mut operator, READY, 2 * STEADY_TICKS).count(), 0);
-            let ask = asked(&mut operator, Situation { enabling: true, ..READY }, RATE_HZ).next();
-            assert_eq!(ask, Some(Ask::Power(PowerRequest::Shutdown)));
+            let request = asked(&mut operator, Situation { enabling: true, ..READY }, RATE_HZ).next();
+            assert_eq!(request, Some(OperatorRequest::Power(PowerRequest::Shutdown)));
         }
     }
 
@@ -263,8 +263,10 @@ mod tests {
         let mut drive = DriveState::SwitchOnDisabled;
         let mut steps = 0;
         for _ in 0..RATE_HZ {
-            if let Some(Ask::Power(request)) = operator.tick(&Situation { drive: Some(drive), ..held }) {
-                drive = drive.after(crate::leg::DriveEvent::Asked(request), 1);
+            if let Some(OperatorRequest::Power(request)) =
+                operator.tick(&Situation { drive: Some(drive), ..held })
+            {
+                drive = drive.after(crate::leg::DriveEvent::Requested(request), 1);
                 steps += 1;
             }
         }
@@ -276,16 +278,19 @@ mod tests {
         assert_eq!(asked(&mut operator, refused, RATE_HZ).count(), 0);
         let open = Situation { enabling: false, drive: Some(DriveState::SwitchOnDisabled), ..READY };
         assert_eq!(asked(&mut operator, open, STEADY_TICKS).count(), 0);
-        assert_eq!(asked(&mut operator, held, RATE_HZ).next(), Some(Ask::Power(PowerRequest::Shutdown)));
+        assert_eq!(
+            asked(&mut operator, held, RATE_HZ).next(),
+            Some(OperatorRequest::Power(PowerRequest::Shutdown))
+        );
     }
 
     #[test]
     fn opening_the_switch_stops_in_the_same_tick_in_any_state() {
         let cases = [
-            (Some(DriveState::OperationEnabled), false, Ask::Power(PowerRequest::QuickStop)),
-            (Some(DriveState::SwitchedOn), false, Ask::Power(PowerRequest::DisableVoltage)),
-            (Some(DriveState::ReadyToSwitchOn), false, Ask::Power(PowerRequest::DisableVoltage)),
-            (None, true, Ask::EndCalibration),
+            (Some(DriveState::OperationEnabled), false, OperatorRequest::Power(PowerRequest::QuickStop)),
+            (Some(DriveState::SwitchedOn), false, OperatorRequest::Power(PowerRequest::DisableVoltage)),
+            (Some(DriveState::ReadyToSwitchOn), false, OperatorRequest::Power(PowerRequest::DisableVoltage)),
+            (None, true, OperatorRequest::EndCalibration),
         ];
         for (drive, calibrating, expected) in cases {
             let mut operator = holding();
@@ -300,7 +305,7 @@ mod tests {
         let enabled =
             Situation { enabling: true, start: true, drive: Some(DriveState::OperationEnabled), ..READY };
         assert_eq!(asked(&mut operator, enabled, RATE_HZ).count(), 0);
-        let stop = Some(Ask::Power(PowerRequest::QuickStop));
+        let stop = Some(OperatorRequest::Power(PowerRequest::QuickStop));
         assert_eq!(operator.tick(&Situation { enabling: false, ..enabled }), stop);
         assert!(!operator.holds());
     }
@@ -312,7 +317,10 @@ mod tests {
         assert_eq!(asked(&mut operator, Situation { blocked: true, ..held }, RATE_HZ).count(), 0);
         assert_eq!(asked(&mut operator, held, RATE_HZ).count(), 0);
         assert_eq!(asked(&mut operator, READY, STEADY_TICKS).count(), 0);
-        assert_eq!(asked(&mut operator, held, RATE_HZ).next(), Some(Ask::Power(PowerRequest::Shutdown)));
+        assert_eq!(
+            asked(&mut operator, held, RATE_HZ).next(),
+            Some(OperatorRequest::Power(PowerRequest::Shutdown))
+        );
     }
 
     #[test]
@@ -331,16 +339,19 @@ mod tests {
     #[test]
     fn the_button_requests_the_next_step() {
         let with = |now: Situation| asked(&mut holding(), Situation { start: true, ..now }, RATE_HZ).next();
-        assert_eq!(with(Situation { enabling: true, ..REST }), Some(Ask::Calibrate));
+        assert_eq!(with(Situation { enabling: true, ..REST }), Some(OperatorRequest::Calibrate));
         let enabled = Situation { enabling: true, drive: Some(DriveState::OperationEnabled), ..READY };
-        assert_eq!(with(enabled), Some(Ask::Identify));
+        assert_eq!(with(enabled), Some(OperatorRequest::Identify));
 
         let mut operator = trusted();
         let stands = Situation { calibrated: true, ..REST };
         assert_eq!(asked(&mut operator, Situation { start: true, ..stands }, RATE_HZ / 2).count(), 0);
-        assert_eq!(asked(&mut operator, stands, RATE_HZ).next(), Some(Ask::Reference));
+        assert_eq!(asked(&mut operator, stands, RATE_HZ).next(), Some(OperatorRequest::Reference));
         // A long press is a reset, without a reference when it is released.
-        assert!(asked(&mut operator, Situation { start: true, ..stands }, 2 * RESET_TICKS).eq([Ask::Reset]));
+        assert!(
+            asked(&mut operator, Situation { start: true, ..stands }, 2 * RESET_TICKS)
+                .eq([OperatorRequest::Reset])
+        );
         assert_eq!(asked(&mut operator, stands, RATE_HZ).count(), 0);
     }
 
@@ -357,7 +368,7 @@ mod tests {
             }
             // Releasing it requests nothing; after it was open it counts again.
             assert_eq!(asked(&mut operator, now, RATE_HZ).count(), 0, "{now:?}");
-            assert!(asked(&mut operator, welded, 2 * RESET_TICKS).eq([Ask::Reset]), "{now:?}");
+            assert!(asked(&mut operator, welded, 2 * RESET_TICKS).eq([OperatorRequest::Reset]), "{now:?}");
         }
     }
 

@@ -10,10 +10,10 @@
 //! enabling the outputs ([`apply`]). Three ticks after each joint sample an axis checks itself
 //! ([`Axis::check`](crate::motor::Axis::check)).
 //!
-//! While the flash is written ([`Cause::Storing`]) nothing switches, not even the brake resistor, and the
-//! processor may stall. The joints' motion during an erasure is unknown, so their zeros are discarded and the
-//! servo ends. A target is followed only where all axes run. An axis that loses its rotor position ends the
-//! servo's ticks at once.
+//! While the flash is written ([`InhibitReason::Storing`]) nothing switches, not even the brake resistor, and
+//! the processor may stall. The joints' motion during an erasure is unknown, so their zeros are discarded and
+//! the servo ends. A target is followed only where all axes run. An axis that loses its rotor position ends
+//! the servo's ticks at once.
 
 use core::num::NonZeroU32;
 
@@ -23,7 +23,7 @@ use super::signals::Signals;
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Hardware};
 use crate::leg::axis_code;
 use crate::motor::{AxisRequest, BrakeBudget, Chopper};
-use crate::safety::{BoardFault, Bridges, Cause, ServoWatch, TickState, TickWatch};
+use crate::safety::{BoardFault, Bridges, InhibitReason, ServoWatch, TickState, TickWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
 
@@ -151,8 +151,8 @@ impl<const N: usize> CurrentLoops<N> {
             }
         }
         let bridges = Bridges::of(signals.inhibit.causes());
-        if bridges == Bridges::Release {
-            hardware.release_all();
+        if bridges == Bridges::Off {
+            hardware.disable_all();
         }
         if ends.orders.get(axis).is_some_and(|orders| orders.ready()) {
             let order = ends.orders.get_mut(axis).and_then(|orders| orders.dequeue());
@@ -160,7 +160,7 @@ impl<const N: usize> CurrentLoops<N> {
                 report(axis, outcome, ends, signals);
             }
         }
-        let target = if all_run { signals.target(axis) } else { AxisRequest::RELEASED };
+        let target = if all_run { signals.target(axis) } else { AxisRequest::OFF };
         let (mut command, outcome) = this.stage.tick(&sample, bridges, target);
         if let Some((outcome, switching)) = outcome {
             command = react(axis, outcome, switching, command, ends, signals, hardware);
@@ -207,7 +207,7 @@ impl<const N: usize> CurrentLoops<N> {
         self.unconverted = if misses { self.unconverted.saturating_add(1) } else { 0 };
         let unknown = self.unconverted >= UNCONVERTED;
         if unknown {
-            signals.inhibit.raise(Cause::Conversion);
+            signals.inhibit.raise(InhibitReason::Conversion);
         }
         if let Some(chopper) = &self.chopper {
             // During a flash write no tick would turn the resistor off again.
@@ -227,7 +227,7 @@ impl<const N: usize> CurrentLoops<N> {
         let stands = signals.inhibit.is_storing();
         for (other, that) in self.axes.iter().enumerate() {
             if other != axis && !stands && that.last.is_some_and(|last| now.wrapping_sub(last) > late) {
-                signals.inhibit.raise(Cause::CurrentTicks);
+                signals.inhibit.raise(InhibitReason::CurrentTicks);
             }
         }
     }
@@ -243,11 +243,11 @@ fn apply<const N: usize, H: Hardware<N>>(
     hardware: &mut H,
 ) {
     if !command.enabled {
-        return hardware.release(axis);
+        return hardware.disable(axis);
     }
     hardware.set_duty(axis, &command.duty);
     hardware.masked(|hardware| {
-        if Bridges::of(signals.inhibit.causes()) != Bridges::Release {
+        if Bridges::of(signals.inhibit.causes()) != Bridges::Off {
             hardware.enable(axis);
         }
     });
@@ -301,16 +301,16 @@ fn react<const N: usize, H: Hardware<N>>(
 ) -> AxisCommand {
     let mut command = command;
     if let Outcome::Fault { fault, .. } = outcome {
-        signals.inhibit.raise(Cause::of_axis(axis, axis_code(fault), switching));
+        signals.inhibit.raise(InhibitReason::of_axis(axis, axis_code(fault), switching));
         match Bridges::of(signals.inhibit.causes()) {
             Bridges::Follow => {}
             Bridges::Brake => {
                 command = AxisCommand::BRAKE;
                 (0..N).for_each(|other| apply(other, &command, signals, hardware));
             }
-            Bridges::Release => {
-                command = AxisCommand::RELEASED;
-                hardware.release_all();
+            Bridges::Off => {
+                command = AxisCommand::OFF;
+                hardware.disable_all();
             }
         }
     }

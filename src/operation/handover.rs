@@ -48,7 +48,7 @@ impl<T> Handover<T> {
         self.at(GIVEN)
     }
 
-    /// Passes the value back to the side that asked.
+    /// Passes the value back to the requesting side.
     pub fn give_back(&self) {
         self.turn.set(RETURNED);
     }

@@ -113,7 +113,7 @@ impl<const N: usize> HostSide<N> {
 
     /// Takes the newest order, unless a request still waits behind the operator's. Reports the faults of a
     /// lost host.
-    pub fn hear(&mut self, ends: &mut HostEnds<'_, N>, mut report: impl FnMut(Fault)) {
+    pub fn receive(&mut self, ends: &mut HostEnds<'_, N>, mut report: impl FnMut(Fault)) {
         while self.request.is_none()
             && let Some(order) = ends.orders.dequeue()
         {
@@ -219,7 +219,7 @@ impl<const N: usize> HostSide<N> {
 
     /// Low-pass with time constant [`LAG_TICKS`] while the bridges switch.
     fn smooth(&mut self, control: &Control<N>, sample: &Sample<N>, output: &ControlOutput<N>) {
-        let is_off = output.servo.decision.state.permission() == Permission::Released;
+        let is_off = output.servo.decision.state.permission() == Permission::Off;
         for (joint, torque) in self.torque.iter_mut().enumerate() {
             let measured = control.torque(joint, sample).filter(|_| !is_off);
             *torque = measured.map_or(NewtonMetre::ZERO, |now| *torque + (now - *torque) * (1.0 / LAG_TICKS));

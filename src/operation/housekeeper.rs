@@ -15,7 +15,7 @@
 //! afterwards both contacts have to be open once.
 
 use super::axis_state::{Order, Outcome};
-use super::contacts::{Ask, Operator, RATE_HZ, Situation};
+use super::contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
 use super::queues::HousekeepingEnds;
 use super::signals::Signals;
 use crate::hal::{AxisSample, Contacts, Hardware, JointSample};
@@ -23,7 +23,7 @@ use crate::leg::{AxisFault, Calibration, ControlRequest, DriveState, PowerReques
 use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator};
 use crate::real::max;
-use crate::safety::{Cause, CheckClock, of_gate_driver, of_temperature};
+use crate::safety::{CheckClock, InhibitReason, of_gate_driver, of_temperature};
 use crate::trace::{Record, words};
 use crate::units::Hertz;
 
@@ -144,8 +144,8 @@ impl<const N: usize> Housekeeper<N> {
         }
         self.look(level);
         let situation = self.situation(level);
-        if let Some(ask) = self.operator.tick(&situation) {
-            self.accept(ask, level);
+        if let Some(request) = self.operator.tick(&situation) {
+            self.accept(request, level);
         }
         self.advance_reference(level);
     }
@@ -200,22 +200,23 @@ impl<const N: usize> Housekeeper<N> {
         for axis in 0..N {
             let outcome = level.ends.outcomes.get_mut(axis).and_then(|outcomes| outcomes.dequeue());
             if let Some(outcome) = outcome {
-                self.hear(axis, &outcome, level);
+                self.receive(axis, &outcome, level);
             }
         }
         if level.signals.take_forgotten() {
             self.stored = [None; N];
         }
-        self.tell_causes(level);
+        self.record_causes(level);
     }
 
     /// Records every new inhibit reason; those of the gate drivers with each driver's status.
-    fn tell_causes(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+    fn record_causes(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         let causes = level.signals.inhibit.causes();
-        for cause in Cause::ALL.into_iter().filter(|cause| causes & !self.recorded & cause.bit() != 0) {
+        for cause in InhibitReason::ALL.into_iter().filter(|cause| causes & !self.recorded & cause.bit() != 0)
+        {
             let why = cause.name();
             level.record(Record::Refused { why, value: causes });
-            if matches!(cause, Cause::GateFault | Cause::GateConfiguration) {
+            if matches!(cause, InhibitReason::GateFault | InhibitReason::GateConfiguration) {
                 for axis in 0..N {
                     let status = level.hardware.gate_status(axis);
                     level.record(Record::GateDriver { why, joint: axis as u8 + 1, status });
@@ -225,7 +226,7 @@ impl<const N: usize> Housekeeper<N> {
         self.recorded = causes;
     }
 
-    fn hear(&mut self, axis: usize, outcome: &Outcome, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+    fn receive(&mut self, axis: usize, outcome: &Outcome, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         let joint = axis as u8 + 1;
         match outcome {
             Outcome::Calibrated(calibration) => {
@@ -286,7 +287,7 @@ impl<const N: usize> Housekeeper<N> {
             self.settings.axes.get(axis).and_then(|axis| Axis::new(axis, calibration, &sample).ok());
         let (Some(running), Some(calibrated)) = (running, self.calibrated.get_mut(axis)) else {
             self.calibrating = None;
-            return level.signals.inhibit.raise(Cause::Configuration);
+            return level.signals.inhibit.raise(InhibitReason::Configuration);
         };
         *calibrated = true;
         // Counting restarts without a zero.
@@ -314,48 +315,48 @@ impl<const N: usize> Housekeeper<N> {
                 self.calibrating = Some(axis);
                 level.order(axis, Order::Calibrate(calibrator));
             }
-            _ => level.signals.inhibit.raise(Cause::Configuration),
+            _ => level.signals.inhibit.raise(InhibitReason::Configuration),
         }
     }
 
-    fn accept(&mut self, ask: Ask, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
-        let accepted = match ask {
-            Ask::Power(request) => level.request(ControlRequest::Power(request)),
+    fn accept(&mut self, request: OperatorRequest, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        let accepted = match request {
+            OperatorRequest::Power(request) => level.request(ControlRequest::Power(request)),
             // The servo records the result.
-            Ask::Identify => {
+            OperatorRequest::Identify => {
                 level.request(ControlRequest::Identify);
                 return;
             }
-            Ask::Calibrate => {
+            OperatorRequest::Calibrate => {
                 let first = self.calibrated.iter().position(|calibrated| !calibrated);
                 if let Some(first) = first {
                     self.calibrate(first, level);
                 }
                 first.is_some()
             }
-            Ask::EndCalibration => {
+            OperatorRequest::EndCalibration => {
                 // Requested in every round until the calibration has ended.
                 if let Some(axis) = self.calibrating {
                     level.order(axis, Order::Off);
                 }
                 return;
             }
-            Ask::Reference => {
+            OperatorRequest::Reference => {
                 let pose = StatedPose::new(Hertz(RATE_HZ as f32));
                 self.reference = pose.map(|pose| [(pose, false); N]);
                 self.reference.is_some()
             }
-            Ask::Reset => {
-                // Braking motors are released first, because restarting gate drivers measure currents with
+            OperatorRequest::Reset => {
+                // Braking motors are turned off first, because restarting gate drivers measure currents with
                 // another gain.
-                level.signals.inhibit.raise(Cause::GateConfiguration);
-                level.hardware.release_all();
+                level.signals.inhibit.raise(InhibitReason::GateConfiguration);
+                level.hardware.disable_all();
                 level.hardware.switch_gates(false);
                 self.resetting = Some(0);
                 return;
             }
         };
-        level.record(Record::Request { tick: self.round, name: ask.name(), accepted });
+        level.record(Record::Request { tick: self.round, name: request.name(), accepted });
     }
 
     /// Continues a reset and returns whether one is under way: gate drivers off and on, then faults cleared.
@@ -375,13 +376,17 @@ impl<const N: usize> Housekeeper<N> {
         self.operator = Operator::default();
         level.signals.inhibit.reset();
         if !configured {
-            level.signals.inhibit.raise(Cause::GateConfiguration);
+            level.signals.inhibit.raise(InhibitReason::GateConfiguration);
         }
         for axis in 0..N {
             level.order(axis, Order::ClearFault);
         }
         level.request(ControlRequest::Power(PowerRequest::ResetFault));
-        level.record(Record::Request { tick: self.round, name: Ask::Reset.name(), accepted: true });
+        level.record(Record::Request {
+            tick: self.round,
+            name: OperatorRequest::Reset.name(),
+            accepted: true,
+        });
         true
     }
 
@@ -403,7 +408,11 @@ impl<const N: usize> Housekeeper<N> {
         }
         self.reference = Some(poses).filter(|_| standing);
         if !standing {
-            level.record(Record::Request { tick: self.round, name: Ask::Reference.name(), accepted: false });
+            level.record(Record::Request {
+                tick: self.round,
+                name: OperatorRequest::Reference.name(),
+                accepted: false,
+            });
         } else if poses.iter().all(|(_, found)| *found) {
             self.reference = None;
             self.placed = true;
@@ -415,7 +424,7 @@ impl<const N: usize> Housekeeper<N> {
 }
 
 fn found<const N: usize>(joint: u8, calibration: &Calibration) -> Record<N> {
-    let [zero_b, zero_c] = calibration.zeros();
+    let [zero_b, zero_c] = calibration.current_offsets();
     Record::Calibration {
         joint,
         result: "done",

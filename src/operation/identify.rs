@@ -61,7 +61,7 @@ impl IdentificationLevel {
     /// Takes the servo's events and returns whether there were any. `sample` is called for each logged
     /// sample, `record` for each record.
     #[inline(never)]
-    pub fn hear<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>(
+    pub fn receive<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>(
         &mut self,
         identification: &mut Identification<N, B, TAPS, PENDING, W>,
         ends: &mut IdentificationEnds<'_, N>,
@@ -71,11 +71,11 @@ impl IdentificationLevel {
     where
         W: BorrowMut<MotionWindow<f32, N, B>>,
     {
-        let mut heard = false;
+        let mut received = false;
         // At most one queue's worth per call, so that new events do not starve the search.
         for _ in 0..EVENTS {
             let Some(event) = ends.events.dequeue() else { break };
-            heard = true;
+            received = true;
             match event {
                 LegEvent::Sample(logged) => {
                     sample(&logged);
@@ -105,7 +105,7 @@ impl IdentificationLevel {
                 LegEvent::Record(one) => record(&one),
             }
         }
-        heard
+        received
     }
 
     fn take<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>(

@@ -80,7 +80,7 @@ impl TxScheduler {
             let Some(frame) = self.next(now_us, device, results) else { break };
             hardware.send(place as u32, &frame);
             if let Some(given) = self.given.get_mut(place) {
-                *given = device.tells_once(&frame).then_some((self.count, frame));
+                *given = device.reports_once(&frame).then_some((self.count, frame));
                 self.count = self.count.wrapping_add(1);
             }
         }
@@ -117,7 +117,7 @@ impl TxScheduler {
             let joint = self.first;
             self.first = (joint + 1) % N;
             if let Some(frame) = device.poll(joint, now_us, results) {
-                device.hear(&frame, now_us, Some(joint), results);
+                device.receive(&frame, now_us, Some(joint), results);
                 return Some(frame);
             }
         }

@@ -41,8 +41,8 @@ mod token_bucket;
 mod watch;
 
 pub use axis_state::{AxisState, Order, Outcome};
-pub use bus_round::{BusRound, Keep};
-pub use contacts::{Ask, Operator, RATE_HZ, Situation};
+pub use bus_round::{BusRound, StoreJob};
+pub use contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
 pub use current::{CurrentLoops, Tick};
 pub use handover::Handover;
 pub use host_side::{HostRequest, HostSide};

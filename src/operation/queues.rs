@@ -283,10 +283,10 @@ impl<const N: usize> BusQueues<N> {
     #[must_use]
     pub fn split(&mut self) -> (Producer<'_, Frame>, HostEnds<'_, N>, BusEnds<'_, N>) {
         let (frames_in, frames) = self.frames.split();
-        let (give_told, status) = self.status.split();
+        let (give_status, status) = self.status.split();
         let (orders, take_order) = self.orders.split();
         let (give_logged, logged) = self.logged.split();
-        let servo = HostEnds { orders: take_order, status: give_told, logged: give_logged };
+        let servo = HostEnds { orders: take_order, status: give_status, logged: give_logged };
         (frames_in, servo, BusEnds { frames, orders, status, logged })
     }
 }

@@ -115,10 +115,10 @@ impl<const N: usize> ServoLevel<N> {
         }
         self.look_around(control, signals);
         let request = self.next_request(control, ends, signals, hardware);
-        let asked = permitted(request, signals.inhibit.is_clear(), control.state());
+        let permitted = permitted(request, signals.inhibit.is_clear(), control.state());
         let sample = Sample { joints: self.sample };
         let commands = self.host.as_mut().and_then(HostSide::commands);
-        let output = control.tick_with(&sample, asked, gravity, commands);
+        let output = control.tick_with(&sample, permitted, gravity, commands);
         signals.set_targets(output.servo.drive());
         signals.set_permission(output.servo.decision.state.permission());
         if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
@@ -126,7 +126,7 @@ impl<const N: usize> ServoLevel<N> {
         }
         self.report_noted(ends, signals);
         self.report_limits(control, &output, ends, signals);
-        self.report(control, request.as_ref(), asked.as_ref(), &output, ends, signals);
+        self.report(control, request.as_ref(), permitted.as_ref(), &output, ends, signals);
         Some(output)
     }
 
@@ -138,8 +138,8 @@ impl<const N: usize> ServoLevel<N> {
 
     /// Runs instead of a tick while the leg has no zeros: requests are dropped.
     fn rest<H: Hardware<N>>(&mut self, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>, hardware: &mut H) {
-        signals.release();
-        signals.set_permission(Permission::Released);
+        signals.disable();
+        signals.set_permission(Permission::Off);
         let _ = ends.requests.dequeue();
         if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
             host.rest(ends, signals, hardware);
@@ -159,7 +159,7 @@ impl<const N: usize> ServoLevel<N> {
         let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) else {
             return by_hand;
         };
-        host.hear(ends, |fault| control.report(fault));
+        host.receive(ends, |fault| control.report(fault));
         control.permit_return(host.may_return());
         let (request, prepared) = host.request(by_hand).unzip();
         if let Some(prepared) = prepared {
@@ -221,14 +221,14 @@ impl<const N: usize> ServoLevel<N> {
         &mut self,
         control: &Control<N>,
         request: Option<&ControlRequest<N>>,
-        asked: Option<&ControlRequest<N>>,
+        permitted: Option<&ControlRequest<N>>,
         output: &ControlOutput<N>,
         ends: &mut ServoEnds<'_, N>,
         signals: &Signals<N>,
     ) {
         let tick = self.tick;
         let mut record = |record| send(LegEvent::Record(record), ends, signals);
-        let accepted = asked.is_some() && !output.refused;
+        let accepted = permitted.is_some() && !output.refused;
         let name = match request {
             None | Some(ControlRequest::Power(_)) => None,
             Some(ControlRequest::Identify) => Some("identify"),
@@ -238,7 +238,7 @@ impl<const N: usize> ServoLevel<N> {
         if let Some(name) = name {
             record(Record::Request { tick, name, accepted });
         }
-        if accepted && asked == Some(&ControlRequest::Identify) {
+        if accepted && matches!(permitted, Some(ControlRequest::Identify)) {
             send(LegEvent::Begun(self.prepared), ends, signals);
         }
         let mut record = |record| send(LegEvent::Record(record), ends, signals);

@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use crate::hal::DriveCommand;
 use crate::leg::Permission;
 use crate::motor::AxisRequest;
-use crate::safety::{BoardFault, Cause};
+use crate::safety::{BoardFault, InhibitReason};
 use crate::units::Ampere;
 
 /// A word that is read and written atomically.
@@ -88,7 +88,7 @@ impl PartialEq for Word {
     }
 }
 
-/// Inhibit word: one bit per [`Cause`] for which the drive must not be enabled.
+/// Inhibit word: one bit per [`InhibitReason`] for which the drive must not be enabled.
 ///
 /// While any bit is set the current loops turn both bridges off or brake, in every tick, and the servo keeps
 /// its drive off. A bit stays set until the operator's reset; one that still holds is set again in the next
@@ -119,7 +119,7 @@ impl Inhibit {
     }
 
     /// Sets one reason.
-    pub fn raise(&self, cause: Cause) {
+    pub fn raise(&self, cause: InhibitReason) {
         self.raise_bits(cause.bit());
     }
 
@@ -151,18 +151,18 @@ impl Inhibit {
     #[inline(always)]
     #[must_use]
     pub fn is_storing(&self) -> bool {
-        self.causes() & Cause::Storing.bit() != 0
+        self.causes() & InhibitReason::Storing.bit() != 0
     }
 
     /// Clears the reasons that the operator's reset may clear: neither permanent ones nor a flash write in
     /// progress.
     pub fn reset(&self) {
-        self.causes.keep_bits(Cause::for_ever() | Cause::Storing.bit());
+        self.causes.keep_bits(InhibitReason::for_ever() | InhibitReason::Storing.bit());
     }
 
-    /// Clears [`Cause::Storing`].
+    /// Clears [`InhibitReason::Storing`].
     pub fn end_storing(&self) {
-        self.causes.keep_bits(!Cause::Storing.bit());
+        self.causes.keep_bits(!InhibitReason::Storing.bit());
     }
 }
 
@@ -230,7 +230,7 @@ impl<const N: usize> Statistics<N> {
 }
 
 /// Target bits that turn an axis off: a NaN pattern that no computation produces.
-const RELEASED: u32 = u32::MAX;
+const OFF: u32 = u32::MAX;
 
 /// All words that the levels of a board of `N` axes share.
 #[derive(Clone, Debug, PartialEq)]
@@ -239,7 +239,7 @@ pub struct Signals<const N: usize> {
     pub inhibit: Inhibit,
     /// Counters of the levels.
     pub statistics: Statistics<N>,
-    /// Current target of each axis as bits, or [`RELEASED`].
+    /// Current target of each axis as bits, or [`OFF`].
     targets: [Word; N],
     /// Each joint has a calibration and a zero.
     begun: Word,
@@ -261,7 +261,7 @@ impl<const N: usize> Signals<N> {
         Self {
             inhibit: Inhibit::new(),
             statistics: Statistics::new(),
-            targets: [const { Word::new(RELEASED) }; N],
+            targets: [const { Word::new(OFF) }; N],
             begun: Word::new(0),
             reported: [const { Word::new(0) }; N],
             hottest_c: Word::new(0),
@@ -278,7 +278,7 @@ impl<const N: usize> Signals<N> {
     #[must_use]
     pub fn target(&self, axis: usize) -> AxisRequest {
         match self.targets.get(axis).map(Word::get) {
-            None | Some(RELEASED) => AxisRequest::RELEASED,
+            None | Some(OFF) => AxisRequest::OFF,
             Some(bits) => AxisRequest { enabled: true, current: Ampere(f32::from_bits(bits)) },
         }
     }
@@ -286,13 +286,13 @@ impl<const N: usize> Signals<N> {
     /// Sets the current targets of all axes.
     pub fn set_targets(&self, command: &DriveCommand<N>) {
         for (target, current) in self.targets.iter().zip(command.currents) {
-            target.set(if command.enabled { current.0.to_bits() } else { RELEASED });
+            target.set(if command.enabled { current.0.to_bits() } else { OFF });
         }
     }
 
     /// Turns all axes off.
-    pub fn release(&self) {
-        self.set_targets(&DriveCommand::RELEASED);
+    pub fn disable(&self) {
+        self.set_targets(&DriveCommand::OFF);
     }
 
     /// Marks the joints' samples as valid.
@@ -303,7 +303,7 @@ impl<const N: usize> Signals<N> {
     /// Marks the joints' samples as invalid and turns all axes off.
     pub fn end_servo(&self) {
         self.begun.set(0);
-        self.release();
+        self.disable();
     }
 
     /// Returns whether the joints' samples are valid.
@@ -339,11 +339,11 @@ impl<const N: usize> Signals<N> {
         self.hottest_c.set(degrees_c.to_bits());
     }
 
-    /// Permission of the drive since the servo's last tick; released before its first.
+    /// Permission of the drive since the servo's last tick; off before its first.
     #[must_use]
     pub fn permission(&self) -> Permission {
         match self.permission.get() {
-            0 => Permission::Released,
+            0 => Permission::Off,
             1 => Permission::Follow,
             _ => Permission::Damp,
         }
@@ -352,7 +352,7 @@ impl<const N: usize> Signals<N> {
     /// Sets the permission of the drive.
     pub fn set_permission(&self, permission: Permission) {
         self.permission.set(match permission {
-            Permission::Released => 0,
+            Permission::Off => 0,
             Permission::Follow => 1,
             Permission::Damp => 2,
         });

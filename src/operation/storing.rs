@@ -18,12 +18,12 @@
 //!
 //! Each step takes one millisecond and returns at once; longer waits are several steps.
 //!
-//! While motors brake or any other inhibit reason is set nothing is written: a write would release them.
+//! While motors brake or any other inhibit reason is set nothing is written: a write would turn them off.
 
 use super::signals::Inhibit;
 use crate::hal::Hardware;
 use crate::leg::Permission;
-use crate::safety::Cause;
+use crate::safety::InhibitReason;
 
 /// Time for the announcement, ms: two messages of 135 bits at 125 kbit/s and the frames before them.
 const ANNOUNCED_MS: u32 = 20;
@@ -79,16 +79,16 @@ impl Storing {
         hardware: &mut impl Hardware<N>,
         change: impl FnOnce() -> bool,
     ) -> Option<bool> {
-        let is_off = |causes| permission == Permission::Released && inhibit.causes() == causes;
+        let is_off = |causes| permission == Permission::Off && inhibit.causes() == causes;
         self.stage = match self.stage {
             Stage::Idle if self.loose || !is_off(0) => return Some(false),
             Stage::Idle => {
-                inhibit.raise(Cause::Storing);
+                inhibit.raise(InhibitReason::Storing);
                 Stage::Announced(ANNOUNCED_MS - 1)
             }
             Stage::Announced(left @ 1..) => Stage::Announced(left - 1),
             // A drive that was on when the inhibit word was set is off by now, or still damps.
-            Stage::Announced(0) if !is_off(Cause::Storing.bit()) => Stage::Settles(false),
+            Stage::Announced(0) if !is_off(InhibitReason::Storing.bit()) => Stage::Settles(false),
             Stage::Announced(0) => {
                 self.loose = true;
                 Stage::Stretches(PATIENCE_MS)
@@ -121,7 +121,7 @@ impl Storing {
 
     fn forbid_while_loose(&self, inhibit: &Inhibit) {
         if self.loose {
-            inhibit.raise(Cause::Watchdog);
+            inhibit.raise(InhibitReason::Watchdog);
         }
     }
 }

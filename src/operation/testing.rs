@@ -20,7 +20,7 @@ use crate::bus::identification::ResultsCopy;
 use crate::bus::{Identity, NodeId};
 use crate::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
 use crate::leg::{DriveState, JointCommand, JointStatus, Plan};
-use crate::safety::Cause;
+use crate::safety::InhibitReason;
 use crate::units::{Ampere, NewtonMetre};
 
 /// A watchdog whose new period becomes effective after a while. A write during another write is ignored.
@@ -167,7 +167,7 @@ impl<const N: usize> TestHardware<N> {
             most: 0,
         };
         Self {
-            bridges: [AxisCommand::RELEASED; N],
+            bridges: [AxisCommand::OFF; N],
             brake: 0.0,
             servo_pended: 0,
             bus_pended: 0,
@@ -221,8 +221,8 @@ impl<const N: usize> TestHardware<N> {
             && !self.masked
             && core::mem::take(&mut stop.pending)
         {
-            self.bridges = [AxisCommand::RELEASED; N];
-            stop.signals.inhibit.raise(Cause::EmergencyStop);
+            self.bridges = [AxisCommand::OFF; N];
+            stop.signals.inhibit.raise(InhibitReason::EmergencyStop);
             stop.handled = true;
         }
     }
@@ -236,13 +236,13 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
         self.masked = false;
         self.interrupt();
     }
-    fn release_all(&mut self) {
+    fn disable_all(&mut self) {
         self.access();
-        self.bridges = [AxisCommand::RELEASED; N];
+        self.bridges = [AxisCommand::OFF; N];
     }
-    fn release(&mut self, axis: usize) {
+    fn disable(&mut self, axis: usize) {
         self.access();
-        self.bridges[axis] = AxisCommand::RELEASED;
+        self.bridges[axis] = AxisCommand::OFF;
     }
     fn set_duty(&mut self, axis: usize, duty: &[f32; 3]) {
         self.access();
@@ -352,7 +352,7 @@ pub(super) fn commanded() -> [JointCommand; 2] {
     let mut device = device();
     // The boot-up message goes first.
     assert!(device.poll(0, 0, &NOTHING).is_some());
-    device.hear(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &NOTHING);
+    device.receive(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &NOTHING);
     assert!(device.poll(0, 0, &NOTHING).is_some());
     let joint = JointStatus { drive: DriveState::SwitchOnDisabled, ..JointStatus::NONE };
     device.update(&LegStatus { joints: [joint; 2], rests: false, ..LegStatus::NONE });

@@ -4,7 +4,7 @@
 
 use super::signals::{Signals, Word};
 use crate::hal::Hardware;
-use crate::safety::{Cause, CheckIns, GUARD_RATE_HZ, TickGuard};
+use crate::safety::{CheckIns, GUARD_RATE_HZ, InhibitReason, TickGuard};
 
 /// Checks of the ticks per check of the counters: 4 ms.
 const LOOKS: u32 = GUARD_RATE_HZ / 250;
@@ -29,13 +29,13 @@ impl<const N: usize> Watch<N> {
     pub fn look(&mut self, signals: &Signals<N>, hardware: &mut impl Hardware<N>) {
         let counts = counts(signals);
         if self.guard.look(counts.0) {
-            hardware.release_all();
+            hardware.disable_all();
             // Interrupts are masked, because the late tick would otherwise set the two sides of the half
             // bridge in between.
             hardware.masked(|hardware| hardware.set_brake(0.0));
             // During a flash write the ticks stand still.
             if !signals.inhibit.is_storing() {
-                signals.inhibit.raise(Cause::CurrentTicks);
+                signals.inhibit.raise(InhibitReason::CurrentTicks);
             }
         }
         self.looks = (self.looks + 1) % LOOKS;

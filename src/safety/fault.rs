@@ -17,7 +17,7 @@ pub enum Reaction {
     /// Velocity damped under the torque cap for at most 300 ms, then Off. Requires encoder and currents.
     Damp,
     /// Active short circuit by the low sides, a passive brake. Requires a healthy gate driver.
-    Short,
+    ActiveShort,
     /// Enabled with less torque than requested.
     Limit,
     /// Never enabled, with the reason reported.
@@ -31,7 +31,7 @@ impl Reaction {
         match self {
             Self::Off => "Off",
             Self::Damp => "Damp",
-            Self::Short => "Short",
+            Self::ActiveShort => "Short",
             Self::Limit => "Limit",
             Self::Refuse => "Refuse",
         }
@@ -82,13 +82,13 @@ faults! {
     /// The encoder moved farther than the joint can, three times in 10 ms (7305: incremental sensor 1).
     EncoderStep = 0x7305, "E2", "encoder_step", Damp, "its encoder jumped";
     /// Counts were lost, so the rotor angle is unknown until the next calibration.
-    EncoderPlace = 0xFF02, "E4", "encoder_place", Short, "its counts jumped or the index came at another place";
+    EncoderPosition = 0xFF02, "E4", "encoder_place", ActiveShort, "its counts jumped or the index came at another place";
     /// The counter stands still although the motor's voltage shows that it turns.
-    EncoderFrozen = 0xFF09, "E1", "encoder_frozen", Short, "its encoder stopped while the motor turned";
+    EncoderFrozen = 0xFF09, "E1", "encoder_frozen", ActiveShort, "its encoder stopped while the motor turned";
     /// A phase with voltage carries no current.
     OpenPhase = 0xFF0A, "P1", "open_phase", Off, "a phase does not conduct";
     /// The offset of a current sensor drifted.
-    CurrentZero = 0xFF0B, "C1", "current_zero", Off, "the zero of its current drifted";
+    CurrentOffset = 0xFF0B, "C1", "current_zero", Off, "the zero of its current drifted";
     /// A shunt's code stays constant although its phase's current target changes.
     StuckConversion = 0xFF0C, "C3", "stuck_conversion", Off, "a conversion is stuck";
     /// A shunt amplifier at its rail, two ticks in a row or too often in a short time (5210: measuring
@@ -214,10 +214,10 @@ mod tests {
     fn fault_numbers_are_fixed() {
         let numbers = [
             (FaultCode::EncoderStep, 0x7305),
-            (FaultCode::EncoderPlace, 0xFF02),
+            (FaultCode::EncoderPosition, 0xFF02),
             (FaultCode::EncoderFrozen, 0xFF09),
             (FaultCode::OpenPhase, 0xFF0A),
-            (FaultCode::CurrentZero, 0xFF0B),
+            (FaultCode::CurrentOffset, 0xFF0B),
             (FaultCode::StuckConversion, 0xFF0C),
             (FaultCode::CurrentSense, 0x5210),
             (FaultCode::Conversion, 0xFF03),

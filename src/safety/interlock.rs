@@ -53,7 +53,7 @@ const HOPELESS: u8 = 24;
 /// Inhibit reason: keeps the drive off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Cause {
+pub enum InhibitReason {
     /// The emergency stop's contact is open.
     EmergencyStop,
     /// A gate driver reports a fault.
@@ -67,7 +67,7 @@ pub enum Cause {
     /// An axis detected a frozen counter: both axes brake.
     EncoderFrozen,
     /// A switching axis lost its rotor angle, so damping is impossible: both axes brake.
-    EncoderPlace,
+    EncoderPosition,
     /// 24 current ticks were missed without one in time between them.
     CurrentTicks,
     /// The servo did not answer three times in a row.
@@ -88,7 +88,7 @@ pub enum Cause {
     Storing,
 }
 
-impl Cause {
+impl InhibitReason {
     /// All reasons, in the order of their bits.
     pub const ALL: [Self; 16] = [
         Self::EmergencyStop,
@@ -97,7 +97,7 @@ impl Cause {
         Self::Axis1,
         Self::Axis2,
         Self::EncoderFrozen,
-        Self::EncoderPlace,
+        Self::EncoderPosition,
         Self::CurrentTicks,
         Self::ServoTicks,
         Self::Conversion,
@@ -119,7 +119,7 @@ impl Cause {
             Self::GateConfiguration => FaultCode::GateConfiguration,
             Self::Axis1 | Self::Axis2 | Self::Storing => return None,
             Self::EncoderFrozen => FaultCode::EncoderFrozen,
-            Self::EncoderPlace => FaultCode::EncoderPlace,
+            Self::EncoderPosition => FaultCode::EncoderPosition,
             Self::CurrentTicks => FaultCode::CurrentTicks,
             Self::ServoTicks => FaultCode::ServoTicks,
             Self::Conversion => FaultCode::Conversion,
@@ -154,7 +154,7 @@ impl Cause {
     pub const fn of_axis(axis: usize, code: FaultCode, switching: bool) -> Self {
         match (code, axis) {
             (FaultCode::EncoderFrozen, _) if switching => Self::EncoderFrozen,
-            (FaultCode::EncoderPlace, _) if switching => Self::EncoderPlace,
+            (FaultCode::EncoderPosition, _) if switching => Self::EncoderPosition,
             (_, 0) => Self::Axis1,
             _ => Self::Axis2,
         }
@@ -182,7 +182,7 @@ pub enum Bridges {
     /// that turns off when its current exceeds the bound.
     Brake,
     /// Outputs off.
-    Release,
+    Off,
 }
 
 impl Bridges {
@@ -190,11 +190,11 @@ impl Bridges {
     #[inline(always)]
     #[must_use]
     pub const fn of(causes: u32) -> Self {
-        const BRAKE: u32 = Cause::EncoderFrozen.bit() | Cause::EncoderPlace.bit();
+        const BRAKE: u32 = InhibitReason::EncoderFrozen.bit() | InhibitReason::EncoderPosition.bit();
         match (causes, causes & !BRAKE) {
             (0, _) => Self::Follow,
             (_, 0) => Self::Brake,
-            _ => Self::Release,
+            _ => Self::Off,
         }
     }
 }
@@ -236,11 +236,11 @@ impl TickWatch {
     fn look_closer(&mut self, now: TickState) -> (u32, bool) {
         let before = self.missed;
         self.missed = if now.missed > 0 { self.missed.saturating_add(now.missed) } else { 0 };
-        let bit = |holds: bool, cause: Cause| if holds { cause.bit() } else { 0 };
-        let forbids = bit(now.emergency_stop, Cause::EmergencyStop)
-            | bit(now.gate_fault, Cause::GateFault)
-            | bit(!now.complete, Cause::Conversion)
-            | bit(self.missed >= HOPELESS, Cause::CurrentTicks);
+        let bit = |holds: bool, cause: InhibitReason| if holds { cause.bit() } else { 0 };
+        let forbids = bit(now.emergency_stop, InhibitReason::EmergencyStop)
+            | bit(now.gate_fault, InhibitReason::GateFault)
+            | bit(!now.complete, InhibitReason::Conversion)
+            | bit(self.missed >= HOPELESS, InhibitReason::CurrentTicks);
         (forbids, before < PATIENCE && self.missed >= PATIENCE)
     }
 }
@@ -260,7 +260,7 @@ impl ServoWatch {
         let missed = self.ticks == Some(ticks);
         self.unanswered = if missed { self.unanswered.saturating_add(1) } else { 0 };
         self.ticks = Some(ticks);
-        (missed, if self.unanswered >= PATIENCE { Cause::ServoTicks.bit() } else { 0 })
+        (missed, if self.unanswered >= PATIENCE { InhibitReason::ServoTicks.bit() } else { 0 })
     }
 }
 
@@ -273,9 +273,9 @@ mod tests {
     #[test]
     fn every_contact_inhibits_in_its_own_tick() {
         let cases = [
-            (TickState { emergency_stop: true, ..GOOD }, Cause::EmergencyStop),
-            (TickState { gate_fault: true, ..GOOD }, Cause::GateFault),
-            (TickState { complete: false, ..GOOD }, Cause::Conversion),
+            (TickState { emergency_stop: true, ..GOOD }, InhibitReason::EmergencyStop),
+            (TickState { gate_fault: true, ..GOOD }, InhibitReason::GateFault),
+            (TickState { complete: false, ..GOOD }, InhibitReason::Conversion),
         ];
         for (state, cause) in cases {
             let mut watch = TickWatch::default();
@@ -313,14 +313,14 @@ mod tests {
             [1, 17, 1].map(|missed| watch.look(&TickState { missed, ..GOOD })).map(|(_, damp)| damp),
             [false; 3]
         );
-        assert_eq!(gap(24), (Cause::CurrentTicks.bit(), true));
+        assert_eq!(gap(24), (InhibitReason::CurrentTicks.bit(), true));
     }
 
     #[test]
     fn a_servo_that_misses_three_requests_inhibits() {
         let mut watch = ServoWatch::default();
         let seen = [1, 2, 2, 2, 3, 3, 3, 3].map(|ticks| watch.look(ticks));
-        let given_up = Cause::ServoTicks.bit();
+        let given_up = InhibitReason::ServoTicks.bit();
         let expected = [false, false, true, true, false, true, true, true];
         assert_eq!(seen.map(|(missed, _)| missed), expected);
         assert_eq!(seen.map(|(_, bits)| bits), [0, 0, 0, 0, 0, 0, 0, given_up]);
@@ -334,24 +334,20 @@ mod tests {
 
     #[test]
     fn bridges_brake_only_without_another_reason() {
-        let (frozen, place) = (Cause::EncoderFrozen.bit(), Cause::EncoderPlace.bit());
+        let (frozen, place) = (InhibitReason::EncoderFrozen.bit(), InhibitReason::EncoderPosition.bit());
         assert_eq!(Bridges::of(0), Bridges::Follow);
         assert_eq!([frozen, place, frozen | place].map(Bridges::of), [Bridges::Brake; 3]);
-        for cause in Cause::ALL.into_iter().filter(|cause| cause.bit() & (frozen | place) == 0) {
-            assert_eq!(
-                [cause.bit(), cause.bit() | frozen].map(Bridges::of),
-                [Bridges::Release; 2],
-                "{cause:?}"
-            );
+        for cause in InhibitReason::ALL.into_iter().filter(|cause| cause.bit() & (frozen | place) == 0) {
+            assert_eq!([cause.bit(), cause.bit() | frozen].map(Bridges::of), [Bridges::Off; 2], "{cause:?}");
         }
     }
 
     #[test]
     fn every_cause_has_a_unique_bit_and_a_word() {
-        let all = Cause::ALL.iter().fold(0, |bits, cause| bits | cause.bit());
-        assert_eq!(all.count_ones() as usize, Cause::ALL.len());
-        assert!(Cause::ALL.iter().all(|cause| cause.name() != "-"));
-        let for_ever = Cause::ALL.iter().filter(|cause| cause.is_for_ever());
-        assert_eq!(for_ever.fold(0, |bits, cause| bits | cause.bit()), Cause::for_ever());
+        let all = InhibitReason::ALL.iter().fold(0, |bits, cause| bits | cause.bit());
+        assert_eq!(all.count_ones() as usize, InhibitReason::ALL.len());
+        assert!(InhibitReason::ALL.iter().all(|cause| cause.name() != "-"));
+        let for_ever = InhibitReason::ALL.iter().filter(|cause| cause.is_for_ever());
+        assert_eq!(for_ever.fold(0, |bits, cause| bits | cause.bit()), InhibitReason::for_ever());
     }
 }

@@ -15,7 +15,7 @@
 //! | [`SupplyWatch`] | detection of a failing supply |
 //! | [`Monitor`] | all of the above, once per tick |
 //! | [`RefusalReason`] | reasons why enabling is refused |
-//! | [`Cause`], [`TickWatch`], [`ServoWatch`] | inhibit reasons, and the checks of every current tick |
+//! | [`InhibitReason`], [`TickWatch`], [`ServoWatch`] | inhibit reasons; checks of every current tick |
 //! | [`CheckIns`], [`TickGuard`] | check-ins that the watchdog requires; stopped current ticks |
 //! | [`CheckClock`] | periodic checks: gate drivers' registers, temperatures |
 //!
@@ -46,7 +46,7 @@ pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
 pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
 pub use derating::{Derating, DeratingRamps, LimitCode, LimitCodes, Ramp, SupplyWatch};
 pub use fault::{Fault, FaultCode, NO_ERROR, NoticeCode, Reaction};
-pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch, stays_active};
+pub use interlock::{Bridges, InhibitReason, ServoWatch, TickState, TickWatch, stays_active};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, RANGE_TOLERANCE, Request};
 pub use periodic_checks::{BoardFault, CheckClock, of_gate_driver, of_temperature};

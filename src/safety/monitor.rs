@@ -214,19 +214,19 @@ impl<const N: usize> Monitor<N> {
                 match request.power {
                     None => state,
                     Some(power) => {
-                        let asked = state.after(Event::Asked(power), self.damp_ticks);
-                        let enables = asked.is_enabled() && asked != state;
+                        let requested = state.after(Event::Requested(power), self.damp_ticks);
+                        let enables = requested.is_enabled() && requested != state;
                         if enables {
                             refused = self.refusal(observation);
                             self.begin_return(observation);
                         }
-                        if refused.is_some() { state } else { asked }
+                        if refused.is_some() { state } else { requested }
                     }
                 }
             }
         };
         let mut decision = Decision {
-            command: DriveCommand::RELEASED,
+            command: DriveCommand::OFF,
             state: self.state,
             torque: [NewtonMetre::ZERO; N],
             limited: [Limited::default(); N],
@@ -235,7 +235,7 @@ impl<const N: usize> Monitor<N> {
             returns: self.returns(),
         };
         match self.state.permission() {
-            Permission::Released => return decision,
+            Permission::Off => return decision,
             Permission::Damp => {
                 for joint in 0..N {
                     decision.torque[joint] = self.barriers[joint].damp(observation.velocity[joint]);
@@ -258,7 +258,7 @@ impl<const N: usize> Monitor<N> {
             decision.command.currents[joint] = current.limited(self.limits.joints()[joint].current);
         }
         if !decision.command.currents.iter().all(|current| current.is_finite()) {
-            decision.command = DriveCommand::RELEASED;
+            decision.command = DriveCommand::OFF;
         }
         decision
     }
@@ -284,7 +284,7 @@ impl<const N: usize> Monitor<N> {
             }
         }
         let permission = self.state.permission();
-        if permission != Permission::Released {
+        if permission != Permission::Off {
             for joint in 0..N {
                 if observation.velocity[joint].abs().0 > self.fault_speed[joint] {
                     found = found.or(fault(FaultCode::Overspeed, joint));
@@ -354,7 +354,19 @@ impl<const N: usize> Monitor<N> {
     }
 }
 
+/// Access for bit flips, host only (row M2 of docs/safety.md).
+#[cfg(not(target_os = "none"))]
+impl<const N: usize> Monitor<N> {
+    /// A joint's current per torque, overspeed bound, or lower or upper end of its range with tolerance.
+    pub(crate) fn number_mut(&mut self, joint: usize, number: u8) -> Option<&mut f32> {
+        match number {
+            0 => self.ampere_per_nm.get_mut(joint),
+            1 => self.fault_speed.get_mut(joint),
+            2 => self.fault_range.get_mut(joint).map(|[low, _]| &mut low.0),
+            _ => self.fault_range.get_mut(joint).map(|[_, high]| &mut high.0),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests;
-#[cfg(not(target_os = "none"))]
-mod upset;

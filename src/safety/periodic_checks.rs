@@ -5,7 +5,7 @@
 //!
 //! | check | period | worst case | reaction |
 //! | --- | --- | --- | --- |
-//! | wrong gate register, read twice | 8 ms | 8 ms + current tick | [`Cause::GateConfiguration`], Off |
+//! | wrong gate register, read twice | 8 ms | 8 ms + a tick | [`InhibitReason::GateConfiguration`], Off |
 //! | thermistor open or shorted | 50 ms | 50 ms + servo tick | [`FaultCode::Thermistor`], Damp |
 //! | bridge at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::Temperature`], Damp |
 //!
@@ -13,7 +13,7 @@
 //! its range. Cost: about ten instructions.
 
 use super::fault::FaultCode;
-use super::interlock::Cause;
+use super::interlock::InhibitReason;
 
 /// Faults that other levels of the board detect and the servo reacts to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,8 +84,8 @@ impl CheckClock {
 
 /// Inhibit reason of a gate driver, if it lost its configuration.
 #[must_use]
-pub const fn of_gate_driver(holds: bool) -> Option<Cause> {
-    if holds { None } else { Some(Cause::GateConfiguration) }
+pub const fn of_gate_driver(holds: bool) -> Option<InhibitReason> {
+    if holds { None } else { Some(InhibitReason::GateConfiguration) }
 }
 
 /// Fault for a bridge's temperature, if any. Temperature and limit `hottest` in degrees Celsius; `None` for a
@@ -125,6 +125,9 @@ mod tests {
         assert_eq!(of_temperature(Some(100.0), 100.0), Some(BoardFault::Temperature));
         assert_eq!(of_temperature(Some(f32::NAN), 100.0), Some(BoardFault::Temperature));
         assert_eq!(of_temperature(None, 100.0), Some(BoardFault::Thermistor));
-        assert_eq!((of_gate_driver(true), of_gate_driver(false)), (None, Some(Cause::GateConfiguration)));
+        assert_eq!(
+            (of_gate_driver(true), of_gate_driver(false)),
+            (None, Some(InhibitReason::GateConfiguration))
+        );
     }
 }

@@ -30,7 +30,7 @@ impl Refusal {
 pub enum RefusalReason {
     /// The operator does not hold the enabling switch. The bit of 60FD is set while it is held.
     SwitchOpen = 16,
-    /// An inhibit reason is active (`Cause`).
+    /// An inhibit reason is active (`InhibitReason`).
     Blocked = 17,
     /// The joints' zeros are unknown.
     NoReference = 18,

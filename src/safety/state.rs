@@ -90,7 +90,7 @@ pub enum Event {
     /// A tick without a new fault.
     Tick,
     /// A request of the operator.
-    Asked(PowerRequest),
+    Requested(PowerRequest),
     /// A detected fault.
     Failed(Fault),
 }
@@ -99,7 +99,7 @@ pub enum Event {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Permission {
     /// Outputs off.
-    Released,
+    Off,
     /// Follow the request within the limits.
     Follow,
     /// Damp regardless of the request.
@@ -114,7 +114,7 @@ impl DriveState {
         match self {
             Self::OperationEnabled => Permission::Follow,
             Self::QuickStopActive { .. } | Self::FaultReactionActive { .. } => Permission::Damp,
-            _ => Permission::Released,
+            _ => Permission::Off,
         }
     }
 
@@ -139,7 +139,7 @@ impl DriveState {
     pub const fn after(self, event: Event, damp_ticks: u32) -> Self {
         match event {
             Event::Tick => self.after_tick(),
-            Event::Asked(request) => self.after_request(request, damp_ticks),
+            Event::Requested(request) => self.after_request(request, damp_ticks),
             Event::Failed(fault) => self.after_fault(fault, damp_ticks),
         }
     }
@@ -160,18 +160,20 @@ impl DriveState {
     }
 
     const fn after_request(self, request: PowerRequest, damp_ticks: u32) -> Self {
-        use PowerRequest as Ask;
+        use PowerRequest as Request;
         match (self, request) {
-            (Self::SwitchOnDisabled | Self::SwitchedOn | Self::OperationEnabled, Ask::Shutdown) => {
+            (Self::SwitchOnDisabled | Self::SwitchedOn | Self::OperationEnabled, Request::Shutdown) => {
                 Self::ReadyToSwitchOn
             }
-            (Self::ReadyToSwitchOn, Ask::SwitchOn) => Self::SwitchedOn,
-            (Self::SwitchedOn, Ask::EnableOperation) => Self::OperationEnabled,
-            (Self::OperationEnabled, Ask::DisableOperation) => Self::SwitchedOn,
-            (Self::OperationEnabled, Ask::QuickStop) => Self::QuickStopActive { remaining_ticks: damp_ticks },
-            (Self::ReadyToSwitchOn | Self::SwitchedOn, Ask::DisableVoltage | Ask::QuickStop)
-            | (Self::OperationEnabled | Self::QuickStopActive { .. }, Ask::DisableVoltage)
-            | (Self::Fault { .. }, Ask::ResetFault) => Self::SwitchOnDisabled,
+            (Self::ReadyToSwitchOn, Request::SwitchOn) => Self::SwitchedOn,
+            (Self::SwitchedOn, Request::EnableOperation) => Self::OperationEnabled,
+            (Self::OperationEnabled, Request::DisableOperation) => Self::SwitchedOn,
+            (Self::OperationEnabled, Request::QuickStop) => {
+                Self::QuickStopActive { remaining_ticks: damp_ticks }
+            }
+            (Self::ReadyToSwitchOn | Self::SwitchedOn, Request::DisableVoltage | Request::QuickStop)
+            | (Self::OperationEnabled | Self::QuickStopActive { .. }, Request::DisableVoltage)
+            | (Self::Fault { .. }, Request::ResetFault) => Self::SwitchOnDisabled,
             (state, _) => state,
         }
     }
@@ -246,7 +248,11 @@ mod tests {
                     "5" => DriveState::QuickStopActive { remaining_ticks: DAMP_TICKS },
                     index => STATES[index.parse::<usize>().expect("a digit")],
                 };
-                assert_eq!(state.after(Event::Asked(request), DAMP_TICKS), expected, "{state:?} {request:?}");
+                assert_eq!(
+                    state.after(Event::Requested(request), DAMP_TICKS),
+                    expected,
+                    "{state:?} {request:?}"
+                );
             }
         }
     }
@@ -261,9 +267,9 @@ mod tests {
                     let end = [first, second, third]
                         .into_iter()
                         .fold(DriveState::SwitchOnDisabled, |state, request| {
-                            state.after(Event::Asked(request), DAMP_TICKS)
+                            state.after(Event::Requested(request), DAMP_TICKS)
                         });
-                    if end.permission() != Permission::Released {
+                    if end.permission() != Permission::Off {
                         ways += 1;
                         assert_eq!(
                             (first, second, third),
@@ -285,12 +291,12 @@ mod tests {
                 DriveState::QuickStopActive { .. } | DriveState::FaultReactionActive { .. } => {
                     Permission::Damp
                 }
-                _ => Permission::Released,
+                _ => Permission::Off,
             };
             assert_eq!(failed.permission(), expected, "{state:?}");
             assert_eq!(failed.fault(), Some(OVERSPEED));
             let off = state.after(Event::Failed(NOT_FINITE), DAMP_TICKS);
-            assert_eq!(off.permission(), Permission::Released, "{state:?}");
+            assert_eq!(off.permission(), Permission::Off, "{state:?}");
         }
         let mut state = DriveState::OperationEnabled.after(Event::Failed(OVERSPEED), DAMP_TICKS);
         let mut damped = 0;

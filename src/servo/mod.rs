@@ -33,8 +33,7 @@ pub use observer::{Observer, ObserverGains};
 pub use scale::JointScale;
 pub use tick::{Effort, Servo, ServoCommand, ServoOutput};
 
-/// Ticks per second.
-pub const SERVO_RATE_HZ: u32 = 4000;
+pub use crate::hal::SERVO_RATE_HZ;
 
 /// Time between two ticks, s.
 pub const TICK_S: f32 = 1.0 / SERVO_RATE_HZ as f32;

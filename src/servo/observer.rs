@@ -114,9 +114,8 @@ impl Observer {
 mod tests {
     use super::*;
     use crate::real::{sin_cos, sqrt};
+    use crate::testing::TestRandom;
     use core::f64::consts::TAU;
-    use rand_core::{Rng, SeedableRng};
-    use rand_xoshiro::Xoshiro128PlusPlus;
 
     const RATE_HZ: f64 = 4000.0;
     const POLE_RAD_PER_S: f64 = TAU * 100.0;
@@ -228,12 +227,12 @@ mod tests {
     #[test]
     fn noise_of_velocity_is_as_stated() {
         let gains = ObserverGains::new(OBSERVER_BANDWIDTH);
-        let mut random = Xoshiro128PlusPlus::seed_from_u64(7);
+        let mut random = TestRandom::new(7);
         let mut observer = Observer::default();
         let (mut sum, mut square, ticks) = (0.0, 0.0, 200_000);
         for tick in 0..ticks {
             // Uniform whole numbers in -500..=500: standard deviation sqrt((1001^2 - 1) / 12).
-            observer.update(&gains, (random.next_u32() % 1001) as i32 - 500, 0.0);
+            observer.update(&gains, (random.bits() % 1001) as i32 - 500, 0.0);
             if tick >= 1000 {
                 let velocity = f64::from(observer.velocity_counts_per_s());
                 sum += velocity;

@@ -69,7 +69,7 @@ pub struct ServoOutput<const N: usize> {
     /// Estimated velocities.
     pub velocity: [RadianPerSecond; N],
     /// Encoder counts; those of the observer where the reading was impossible.
-    pub believed_counts: [i32; N],
+    pub accepted_counts: [i32; N],
     /// Commanded minus estimated angles.
     pub tracking_error: [Radian; N],
     /// Torques of feedforward and feedback before the monitor.
@@ -233,14 +233,14 @@ impl<const N: usize> Servo<N> {
         let motion = &command.motion;
         let rejected = self.observe(sample, motion);
         // One loop, not a closure for each: a size-optimised build would call every closure for every joint.
-        let mut believed_counts = [0; N];
+        let mut accepted_counts = [0; N];
         let mut position = [Radian::ZERO; N];
         let mut velocity = [RadianPerSecond::ZERO; N];
         let mut tracking_error = [Radian::ZERO; N];
         for joint in 0..N {
             let (observer, scale) = (&self.observers[joint], &self.joints[joint].scale);
             let reading = sample.joints[joint].encoder_counts;
-            believed_counts[joint] = if rejected[joint] { observer.nearest_counts() } else { reading };
+            accepted_counts[joint] = if rejected[joint] { observer.nearest_counts() } else { reading };
             position[joint] = scale.position(observer.position_counts());
             velocity[joint] =
                 RadianPerSecond(scale.signed_radian_per_count() * observer.velocity_counts_per_s());
@@ -281,7 +281,7 @@ impl<const N: usize> Servo<N> {
                 self.controllers[joint].preset(&self.joints[joint].controller, decision.torque[joint]);
             }
         }
-        ServoOutput { position, velocity, believed_counts, tracking_error, wanted_torque, decision }
+        ServoOutput { position, velocity, accepted_counts, tracking_error, wanted_torque, decision }
     }
 
     /// Moves the observers by one tick; returns which readings were rejected.
@@ -321,7 +321,27 @@ impl<const N: usize> Servo<N> {
     }
 }
 
+/// Fault injection, host only: bit flips that the checksum must find (row M2 of docs/safety.md).
+#[cfg(not(target_os = "none"))]
+impl<const N: usize> Servo<N> {
+    /// Numbers of a joint that can be flipped.
+    pub const NUMBERS: u8 = 6;
+
+    /// Flips one bit (of 32, from the lowest) of one of a joint's constants: counts per radian, largest
+    /// acceleration, current per torque, overspeed bound, either end of the range.
+    pub fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
+        let Some(this) = self.joints.get_mut(joint) else { return };
+        let flipped = match number {
+            0 => &mut this.count_per_radian,
+            1 => &mut this.largest_acceleration_rad_per_s2,
+            number => match self.monitor.number_mut(joint, number - 2) {
+                Some(flipped) => flipped,
+                None => return,
+            },
+        };
+        *flipped = f32::from_bits(flipped.to_bits() ^ 1 << (bit % 32));
+    }
+}
+
 #[cfg(test)]
 mod tests;
-#[cfg(not(target_os = "none"))]
-mod upset;

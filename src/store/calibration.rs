@@ -6,14 +6,14 @@
 use zerocopy::little_endian::{F32, I32, U32};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
-use super::record::{Kept, RecordError};
+use super::record::{RecordError, Storable};
 use crate::leg::{CounterDirection, ElectricalAngle, EncoderSetting, StoredCalibration};
 use crate::real::is_finite;
 use crate::units::{Henry, Ohm};
 
 /// Calibration of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KeptCalibration(pub StoredCalibration);
+pub struct CalibrationRecord(pub StoredCalibration);
 
 /// Layout in the flash, 24 bytes.
 #[derive(Clone, Copy, Debug, Default, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
@@ -31,7 +31,7 @@ pub struct CalibrationLayout {
     _reserved: [u8; 2],
 }
 
-impl Kept for KeptCalibration {
+impl Storable for CalibrationRecord {
     type Layout = CalibrationLayout;
     const LENGTHS: &'static [usize] = &[{
         assert!(size_of::<CalibrationLayout>() == 24);

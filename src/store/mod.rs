@@ -33,14 +33,14 @@
 //! cut. There is no clock, so records carry a generation instead of a date.
 
 mod calibration;
-mod keeper;
 mod model;
 mod record;
+mod storage;
 
-pub use calibration::KeptCalibration;
-pub use keeper::Keeper;
-pub use model::{JointProvenance, KeptModel, Provenance};
-pub use record::{Kept, RecordError};
+pub use calibration::CalibrationRecord;
+pub use model::{JointProvenance, ModelRecord, Provenance};
+pub use record::{RecordError, Storable};
+pub use storage::Storage;
 
 use core::ops::Range;
 
@@ -90,7 +90,7 @@ impl Permit {
     /// Returns a permit for a drive with this permission; `None` where a bridge may switch.
     #[must_use]
     pub fn under(permission: Permission) -> Option<Self> {
-        (permission == Permission::Released).then_some(Self(()))
+        (permission == Permission::Off).then_some(Self(()))
     }
 }
 
@@ -155,7 +155,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// See [`LoadError`]. An invalid record stays where it is.
-    pub async fn load<R: Kept>(&mut self, key: Key) -> Result<Option<R>, LoadError> {
+    pub async fn load<R: Storable>(&mut self, key: Key) -> Result<Option<R>, LoadError> {
         match self.fetch(key).await? {
             Some(bytes) => record::decode(bytes).map(Some).map_err(LoadError::Record),
             None => Ok(None),
@@ -166,10 +166,15 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// See [`SaveError`].
-    pub async fn save<R: Kept>(&mut self, permit: &Permit, key: Key, kept: &R) -> Result<Saved, SaveError> {
+    pub async fn save<R: Storable>(
+        &mut self,
+        permit: &Permit,
+        key: Key,
+        value: &R,
+    ) -> Result<Saved, SaveError> {
         let mut bytes = [0; LONGEST + HEAD];
-        let length = record::encode(kept, &mut bytes).map_err(SaveError::Record)?;
-        self.keep(permit, key, bytes.get(..length).unwrap_or_default()).await
+        let length = record::encode(value, &mut bytes).map_err(SaveError::Record)?;
+        self.write(permit, key, bytes.get(..length).unwrap_or_default()).await
     }
 
     /// Reads raw bytes, at most the length of `into`; returns their number.
@@ -190,7 +195,7 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// See [`SaveError`].
     pub async fn save_bytes(&mut self, permit: &Permit, key: Key, bytes: &[u8]) -> Result<Saved, SaveError> {
-        self.keep(permit, key, bytes).await
+        self.write(permit, key, bytes).await
     }
 
     /// Erases the whole store, when a host restores the defaults.
@@ -213,7 +218,7 @@ impl<F: NorFlash> Store<F> {
         })
     }
 
-    async fn keep(&mut self, _permit: &Permit, key: Key, bytes: &[u8]) -> Result<Saved, SaveError> {
+    async fn write(&mut self, _permit: &Permit, key: Key, bytes: &[u8]) -> Result<Saved, SaveError> {
         if bytes.len() > LONGEST + HEAD {
             return Err(SaveError::TooLong);
         }

@@ -9,7 +9,7 @@ use core::borrow::BorrowMut;
 use zerocopy::little_endian::{F32, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
-use super::record::{Kept, LONGEST, RecordError};
+use super::record::{LONGEST, RecordError, Storable};
 use crate::leg::{
     Constant, Fingerprint, Identification, IdentifiedModel, LegConfiguration, MotionWindow,
     PARAMETERS_PER_JOINT, StoredModel, Stribeck,
@@ -48,7 +48,7 @@ pub struct Provenance<const N: usize> {
 
 /// A model with its provenance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KeptModel<const N: usize> {
+pub struct ModelRecord<const N: usize> {
     /// The model as plain data.
     pub model: StoredModel<N>,
     /// Provenance, for reports.
@@ -72,7 +72,7 @@ const fn version_of(text: &[u8]) -> [u8; 3] {
     version
 }
 
-impl<const N: usize> KeptModel<N> {
+impl<const N: usize> ModelRecord<N> {
     /// Builds the stored form of a newly accepted model from its identification, with
     /// the given generation and seed.
     pub fn of<const B: usize, const TAPS: usize, const PENDING: usize, W>(
@@ -101,7 +101,7 @@ impl<const N: usize> KeptModel<N> {
             }
         }
         Self {
-            model: configuration.keep(model),
+            model: configuration.to_stored(model),
             provenance: Provenance {
                 firmware: VERSION,
                 generation,
@@ -168,7 +168,7 @@ impl<const N: usize> Default for ModelLayout<N> {
     }
 }
 
-impl<const N: usize> Kept for KeptModel<N> {
+impl<const N: usize> Storable for ModelRecord<N> {
     type Layout = ModelLayout<N>;
     const LENGTHS: &'static [usize] = &[{
         let length = 28 + 81 * N;

@@ -2,8 +2,8 @@
 //!
 //! This rule gives migration without code per version. A record of an older schema is the beginning of a
 //! newer one; missing fields take the layout's default. A record of a newer schema is refused, because its
-//! meaning is unknown. The flash log's CRCs protect its bits. [`Kept::from_layout`] checks its meaning and
-//! refuses values out of range.
+//! meaning is unknown. The flash log's CRCs protect its bits. [`Storable::from_layout`] checks its meaning
+//! and refuses values out of range.
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
@@ -28,7 +28,7 @@ pub enum RecordError {
 }
 
 /// A value that can be stored.
-pub trait Kept: Sized {
+pub trait Storable: Sized {
     /// Layout in the flash: plain bytes, little-endian, without gaps. Its default fills
     /// fields that older schemas lack.
     type Layout: FromBytes + IntoBytes + Immutable + KnownLayout + Unaligned + Default;
@@ -46,8 +46,8 @@ pub trait Kept: Sized {
 }
 
 /// Writes a record of the newest schema and returns its length.
-pub(super) fn encode<R: Kept>(kept: &R, out: &mut [u8]) -> Result<usize, RecordError> {
-    let layout = kept.to_layout();
+pub(super) fn encode<R: Storable>(value: &R, out: &mut [u8]) -> Result<usize, RecordError> {
+    let layout = value.to_layout();
     // A record that would be refused on reading is not stored.
     R::from_layout(&layout)?;
     let bytes = layout.as_bytes();
@@ -58,7 +58,7 @@ pub(super) fn encode<R: Kept>(kept: &R, out: &mut [u8]) -> Result<usize, RecordE
 }
 
 /// Reads a record of any known schema.
-pub(super) fn decode<R: Kept>(bytes: &[u8]) -> Result<R, RecordError> {
+pub(super) fn decode<R: Storable>(bytes: &[u8]) -> Result<R, RecordError> {
     let Some((&[low, high], rest)) = bytes.split_first_chunk::<HEAD>() else {
         return Err(RecordError::Length);
     };
@@ -78,6 +78,7 @@ mod tests {
     use zerocopy::little_endian::{F32, U16};
 
     use super::*;
+    use crate::testing::TestRandom;
 
     #[derive(FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
     #[repr(C)]
@@ -102,7 +103,7 @@ mod tests {
         word: [u8; 3],
     }
 
-    impl Kept for Value {
+    impl Storable for Value {
         type Layout = Layout;
         const LENGTHS: &'static [usize] = &[2, 6, 9];
 
@@ -159,14 +160,11 @@ mod tests {
 
     #[test]
     fn no_byte_string_makes_the_reader_panic() {
-        let mut state = 1_u32;
+        let mut random = TestRandom::new(1);
         for length in 0..40 {
             for _ in 0..200 {
                 let mut bytes = [0; 40];
-                for byte in &mut bytes {
-                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    *byte = (state >> 24) as u8;
-                }
+                bytes.fill_with(|| random.byte());
                 bytes[1] = 0;
                 bytes[0] %= 5;
                 let _ = decode::<Value>(&bytes[..length]);

@@ -38,29 +38,9 @@ pub(super) fn clip_to_box<T: Real>(value: T) -> T {
     clamp(value, T::zero(), T::one())
 }
 
-/// Median of some numbers, the upper one of two; 0 for an empty slice. Sorts the slice.
-pub(super) fn median<T: Real>(values: &mut [T]) -> T {
-    for end in 1..values.len() {
-        for place in (0..end).rev() {
-            if values[place] <= values[place + 1] {
-                break;
-            }
-            values.swap(place, place + 1);
-        }
-    }
-    values.get(values.len() / 2).copied().unwrap_or(T::zero())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn median_is_the_upper_middle_value() {
-        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 3.0);
-        assert_eq!(median::<f64>(&mut []), 0.0);
-    }
 
     #[test]
     fn only_the_live_part_of_a_row_is_touched() {

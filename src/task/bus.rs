@@ -25,9 +25,9 @@ use super::leg::{BASE, JOINTS};
 use crate::bus::device::Device;
 use crate::bus::identification::ResultsCopy;
 use crate::hal::{Frame, Hardware};
-use crate::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, Keep};
+use crate::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, StoreJob};
 use crate::place::{each, fill};
-use crate::store::KeptModel;
+use crate::store::ModelRecord;
 
 /// Length of the log's queue to a host, samples: 384 ms.
 pub const LOG: usize = 192;
@@ -42,24 +42,24 @@ pub struct Memory {
     queues: BusQueues<JOINTS>,
     found: Queue<&'static mut BoardResults, 2>,
     spare: Queue<&'static mut BoardResults, 2>,
-    accepted: Queue<KeptModel<JOINTS>, 2>,
+    accepted: Queue<ModelRecord<JOINTS>, 2>,
     results: [BoardResults; 2],
-    storage: Handover<Keep<JOINTS>>,
+    storage: Handover<StoreJob<JOINTS>>,
 }
 
 /// The identification's end of the queues.
 pub struct ThreadEnd {
     found: Producer<'static, &'static mut BoardResults>,
     spare: Consumer<'static, &'static mut BoardResults>,
-    accepted: Producer<'static, KeptModel<JOINTS>>,
+    accepted: Producer<'static, ModelRecord<JOINTS>>,
 }
 
 /// The storage's end of the queues.
-pub struct KeeperEnd {
+pub struct StorageEnd {
     /// Data to store.
-    pub storage: &'static Handover<Keep<JOINTS>>,
+    pub storage: &'static Handover<StoreJob<JOINTS>>,
     /// Accepted models.
-    pub accepted: Consumer<'static, KeptModel<JOINTS>>,
+    pub accepted: Consumer<'static, ModelRecord<JOINTS>>,
 }
 
 /// State of level 5.
@@ -70,7 +70,7 @@ pub struct BusLoop {
     found: &'static mut BoardResults,
     round: BusRound,
     ends: BusEnds<'static, JOINTS>,
-    storage: &'static Handover<Keep<JOINTS>>,
+    storage: &'static Handover<StoreJob<JOINTS>>,
 }
 
 /// State of level 5, once the start has set it.
@@ -88,7 +88,7 @@ impl Memory {
                 found: Queue::new(),
                 spare: Queue::new(),
                 accepted: Queue::new(),
-                storage: Handover::new(Keep::NOTHING),
+                storage: Handover::new(StoreJob::NOTHING),
             },
             { results: |results| each(results, BoardResults::nothing) }
         )
@@ -98,16 +98,16 @@ impl Memory {
     pub fn split(
         &'static mut self,
         device: &'static mut BoardDevice,
-    ) -> (Producer<'static, Frame>, HostEnds<'static, JOINTS>, ThreadEnd, KeeperEnd, BusLoop) {
+    ) -> (Producer<'static, Frame>, HostEnds<'static, JOINTS>, ThreadEnd, StorageEnd, BusLoop) {
         let (frames_in, servo, ends) = self.queues.split();
         let ((found_in, fresh), (mut spare, spare_out)) = (self.found.split(), self.spare.split());
         let (accepted_in, accepted) = self.accepted.split();
         let [found, other] = &mut self.results;
         let _ = spare.enqueue(other);
-        let storage: &'static Handover<Keep<JOINTS>> = &self.storage;
+        let storage: &'static Handover<StoreJob<JOINTS>> = &self.storage;
         let bus = BusLoop { device, fresh, spare, found, round: BusRound::new(), ends, storage };
         let thread = ThreadEnd { found: found_in, spare: spare_out, accepted: accepted_in };
-        (frames_in, servo, thread, KeeperEnd { storage, accepted }, bus)
+        (frames_in, servo, thread, StorageEnd { storage, accepted }, bus)
     }
 }
 
@@ -120,7 +120,7 @@ impl ThreadEnd {
     }
 
     /// Passes on a model that may be stored, replacing one that was not.
-    pub fn accept(&mut self, model: KeptModel<JOINTS>) {
+    pub fn accept(&mut self, model: ModelRecord<JOINTS>) {
         let _ = self.accepted.enqueue(model);
     }
 }

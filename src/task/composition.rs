@@ -4,9 +4,9 @@ use embassy_executor::Executor;
 use heapless::spsc::{Consumer, Producer};
 use static_cell::{ConstStaticCell, StaticCell};
 
+use super::identify::{BoardFunctions, Introduction, crashed};
 use super::leg::JOINTS;
-use super::surroundings::{Introduction, Surroundings, crashed};
-use super::{SIGNALS, bus, current, housekeeping, identify, keep, leg, servo};
+use super::{SIGNALS, bus, current, housekeeping, identify, leg, memory, servo, storage, vectors};
 use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::board::odrive_v3_6::identity::{Identity, Reset};
 use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
@@ -14,15 +14,16 @@ use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
 use crate::board::odrive_v3_6::settings::drives::CALIBRATION;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
-use crate::board::odrive_v3_6::{brake, can, converter, memory, vectors, watchdog};
+use crate::board::odrive_v3_6::{brake, can, converter, watchdog};
 use crate::board::stack;
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::{LONGEST, NodeId, Storing};
 use crate::leg::{Control, Following, StoredCalibration};
+use crate::motor::SenseScale;
 use crate::operation::{
     Calibrated, Ends, HostEnds, Housekeeper, HousekeepingEnds, HousekeepingSettings, Queues, ServoLevel,
 };
-use crate::safety::Cause;
+use crate::safety::InhibitReason;
 use crate::trace::Record;
 use cortex_m::peripheral::DWT;
 
@@ -31,11 +32,15 @@ type Housekeeping = (Housekeeper<JOINTS>, HousekeepingEnds<'static, JOINTS>, Odr
 
 /// Builds the leg, hands everything to its level and starts the levels; does not return.
 pub fn run(board: Board) -> ! {
-    let (thread, keeping, keeper) = hand_out(board);
+    let (thread, keeping, storage) = hand_out(board);
     vectors::enable();
     if !watchdog::tighten_at_once() {
-        // The keeper asks again until the watchdog has its time; without a keeper nothing does.
-        SIGNALS.inhibit.raise(if keeper.is_some() { Cause::Watchdog } else { Cause::Configuration });
+        // The storage task requests it again until the watchdog has its time; without that task nothing does.
+        SIGNALS.inhibit.raise(if storage.is_some() {
+            InhibitReason::Watchdog
+        } else {
+            InhibitReason::Configuration
+        });
     }
     let housekeeping = vectors::HOUSEKEEPING.start(vectors::HOUSEKEEPING_VECTOR);
     let (housekeeper, ends, board) = keeping;
@@ -48,7 +53,7 @@ pub fn run(board: Board) -> ! {
         if let Some(Ok(task)) = thread.map(identify::run) {
             spawner.spawn(task);
         }
-        if let Some(Ok(task)) = keeper.map(keep::run) {
+        if let Some(Ok(task)) = storage.map(storage::run) {
             spawner.spawn(task);
         }
     })
@@ -56,10 +61,13 @@ pub fn run(board: Board) -> ! {
 
 /// Builds and hands out everything. Separate from [`run`], whose frame stays on the stack for ever.
 #[inline(never)]
-fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'static mut keep::Keeper>) {
+fn hand_out(
+    board: Board,
+) -> (Option<identify::Thread>, Housekeeping, Option<&'static mut storage::StorageTask>) {
     judge(&board);
-    let divider = analog::divider(board.identity.version).unwrap_or(LARGEST_DIVIDER);
-    let surroundings = Surroundings {
+    // With the largest divider no voltage reads too low; a board of unknown version enables nothing.
+    let divider = analog::divider(board.identity.version).unwrap_or(SenseScale::DIVIDER);
+    let functions = BoardFunctions {
         clock: DWT::cycle_count,
         clock_hz: board.clock_hz,
         stack_used: stack::used,
@@ -68,7 +76,7 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'s
         temperatures_c: || converter::thermistors().map(|code| temperature_c(code).unwrap_or(f32::NAN)),
         chopper_duty: brake::duty,
         // The probe reads at its own pace; nothing to do.
-        told: || (),
+        reported: || (),
     };
     identify::introduce(&introduction(&board), board.clock_hz);
     let built = memory::identification();
@@ -85,7 +93,7 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'s
 
     let mut control = built.as_ref().and_then(|(configuration, _)| Control::new(configuration).ok());
     let notes = &mut housekeeping_ends.notes;
-    let Joined { host, following, results, keeper, stored } = match (&built, &mut control) {
+    let Joined { host, following, results, storage, stored } = match (&built, &mut control) {
         (Some((configuration, _)), Some(control)) => {
             join(configuration, control, &board.identity, calibrated, notes)
         }
@@ -97,10 +105,10 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'s
             let volt_per_code = analog::sense(divider).volt_per_code;
             let level = ServoLevel::new(&control, drives::derating(divider), volt_per_code, following);
             static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
-            let clock = surroundings.clock;
+            let clock = functions.clock;
             place(&servo::SERVO, SERVO.init(servo::ServoLoop { control, level, ends: servo_ends, clock }));
         }
-        None => SIGNALS.inhibit.raise(Cause::Configuration),
+        None => SIGNALS.inhibit.raise(InhibitReason::Configuration),
     }
     let axes = drives::axes(&leg::LEG, divider);
     let settings = HousekeepingSettings { axes, calibration: [CALIBRATION; JOINTS], hottest_c: HOTTEST_C };
@@ -108,10 +116,10 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'s
     let thread = built.map(|(configuration, built)| identify::Thread {
         identification: built,
         ends: identification,
-        surroundings,
+        board: functions,
         bus: results.map(|results| (results, configuration)),
     });
-    (thread, (housekeeper, housekeeping_ends, Odrive::new(board.gate_drivers)), keeper)
+    (thread, (housekeeper, housekeeping_ends, Odrive::new(board.gate_drivers)), storage)
 }
 
 /// Default node numbers of hip and knee.
@@ -126,7 +134,7 @@ struct Joined {
     host: Option<HostEnds<'static, JOINTS>>,
     following: Option<Following<JOINTS>>,
     results: Option<bus::ThreadEnd>,
-    keeper: Option<&'static mut keep::Keeper>,
+    storage: Option<&'static mut storage::StorageTask>,
     stored: [Option<StoredCalibration>; JOINTS],
 }
 
@@ -153,24 +161,24 @@ fn join(
         }
     });
     let [low, middle, high] = identity.unique;
-    let told = crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6");
+    let identity = crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6");
     let (plan, seed) = (configuration.plan, configuration.swarm_seed);
-    let device = memory::device(|| bus::BoardDevice::new(NODES, told, constants, plan, seed));
-    let mut keeper = memory::keeper();
+    let device = memory::device(|| bus::BoardDevice::new(NODES, identity, constants, plan, seed));
+    let mut storage = memory::storage();
     let mut calibrations = [None; JOINTS];
     // Reading may repair the effects of a power loss, which erases flash. Nothing may switch yet, and the
     // watchdog still has the 4 s of the start.
-    if let Some(keeper) = &mut keeper {
-        calibrations = keeper.calibrations();
+    if let Some(storage) = &mut storage {
+        calibrations = storage.calibrations();
         for joint in 0..JOINTS {
             let mut bytes = [0; LONGEST];
-            match keeper.objects(joint, &mut bytes) {
+            match storage.objects(joint, &mut bytes) {
                 Some(length) => device.recall(joint, bytes.get(..length).unwrap_or_default()),
                 // Reports to hosts that stored parameters are lost.
                 None => device.storing(Storing::Failed),
             }
         }
-        match keeper.model(configuration) {
+        match storage.model(configuration) {
             Some(Some((model, generation))) if control.adopt(model) => device.set_generation(generation),
             Some(None) => {}
             _ => device.storing(Storing::Failed),
@@ -185,15 +193,12 @@ fn join(
     static BUS: StaticCell<bus::BusLoop> = StaticCell::new();
     place(&bus::BUS, BUS.init(bus));
     place(&bus::FRAMES_IN, frames);
-    if let Some(keeper) = &mut keeper {
-        keeper.serve(end, calibrated);
+    if let Some(storage) = &mut storage {
+        storage.serve(end, calibrated);
     }
     let following = Some(Following::new(configuration));
-    Joined { host: Some(servo), following, results: Some(thread), keeper, stored: calibrations }
+    Joined { host: Some(servo), following, results: Some(thread), storage, stored: calibrations }
 }
-
-/// Divider for a board of unknown version: no voltage reads too low with it, and nothing is enabled.
-const LARGEST_DIVIDER: f32 = 19.0;
 
 fn introduction(board: &Board) -> Introduction {
     let identity = &board.identity;
@@ -204,11 +209,11 @@ fn introduction(board: &Board) -> Introduction {
 /// Raises the inhibit reasons that the start found.
 fn judge(board: &Board) {
     let found = [
-        (board.crash.is_some(), Cause::Crash),
-        (board.identity.reset == Reset::Watchdog, Cause::Watchdog),
-        (board.gates_configured.contains(&false), Cause::GateConfiguration),
-        (!board.timers_in_phase, Cause::Timers),
-        (analog::divider(board.identity.version).is_none(), Cause::BoardVersion),
+        (board.crash.is_some(), InhibitReason::Crash),
+        (board.identity.reset == Reset::Watchdog, InhibitReason::Watchdog),
+        (board.gates_configured.contains(&false), InhibitReason::GateConfiguration),
+        (!board.timers_in_phase, InhibitReason::Timers),
+        (analog::divider(board.identity.version).is_none(), InhibitReason::BoardVersion),
     ];
     for (_, cause) in found.into_iter().filter(|(found, _)| *found) {
         SIGNALS.inhibit.raise(cause);

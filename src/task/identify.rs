@@ -9,12 +9,13 @@ use embassy_time::{Duration, Instant, Timer};
 use super::SIGNALS;
 use super::bus::ThreadEnd;
 use super::leg::{BASE, JOINTS, LEG, Leg, LegIdentification};
-use super::surroundings::{Introduction, Surroundings};
+use crate::board::crash::Crash;
 use crate::leg::{Activity, IdentifyPhase, LoggedSample};
 use crate::operation::{IdentificationEnds, IdentificationLevel, Slice};
 use crate::servo::{LOG_RATE_HZ, SERVO_RATE_HZ};
-use crate::store::KeptModel;
+use crate::store::ModelRecord;
 use crate::trace::{GRAMMAR, Record, Report, words};
+use crate::units::Volt;
 
 /// Evaluations of the search per slice: some 0.25 ms.
 const EVALUATIONS: u32 = 4;
@@ -29,8 +30,49 @@ const SENDS_LOG: bool = option_env!("SCARAB_TRACE_LOG").is_some();
 
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
-fn tell(record: &Record<JOINTS>) {
+fn send(record: &Record<JOINTS>) {
     record.emit(NUMBER.fetch_add(1, Ordering::Relaxed));
+}
+
+/// Functions and constants of one board, as values: so the same task runs on the board and in the emulator.
+#[derive(Clone, Copy)]
+pub struct BoardFunctions {
+    /// Clock in processor cycles (instructions in the emulator); wraps.
+    pub clock: fn() -> u32,
+    /// Frequency of that clock, Hz.
+    pub clock_hz: u32,
+    /// Deepest use of the stack so far, bytes.
+    pub stack_used: fn() -> u32,
+    /// Size of the stack, bytes.
+    pub stack_bytes: fn() -> u32,
+    /// Bus voltage per code; `None` where it is not measured.
+    pub volt_per_code: Option<Volt>,
+    /// Temperatures of both bridges and the chopper, degrees Celsius; NaN where not measured.
+    pub temperatures_c: fn() -> [f32; JOINTS + 1],
+    /// Duty of the brake resistor.
+    pub chopper_duty: fn() -> f32,
+    /// Called when a result has been reported completely.
+    pub reported: fn(),
+}
+
+/// Data of the records sent at the start.
+#[derive(Clone, Copy)]
+pub struct Introduction {
+    /// Unique number of the board, lowest word first.
+    pub unique: [u32; 3],
+    /// Factory version: major, minor, voltage; 255 where nothing was written.
+    pub version: [u8; 3],
+    /// Reason of the last reset, as in records.
+    pub reset: &'static str,
+    /// Crash that ended the previous run.
+    pub crash: Option<Record<JOINTS>>,
+}
+
+/// Converts a crash to its record.
+#[must_use]
+pub fn crashed(crash: &'static Crash) -> Record<JOINTS> {
+    let Crash { pc, lr, status, address, line, released, kept, .. } = *crash;
+    Record::Crash { cause: crash.cause(), pc, lr, status, address, line, file: crash.file(), released, kept }
 }
 
 /// State of the thread.
@@ -40,7 +82,7 @@ pub struct Thread {
     /// The thread's ends of the queues.
     pub ends: IdentificationEnds<'static, JOINTS>,
     /// Access to the board.
-    pub surroundings: Surroundings,
+    pub board: BoardFunctions,
     /// Results for the bus, if there is one, and the leg's configuration.
     pub bus: Option<(ThreadEnd, &'static Leg)>,
 }
@@ -58,7 +100,7 @@ struct State {
 pub fn introduce(introduction: &Introduction, clock_hz: u32) {
     let Introduction { unique, version, reset, crash } = introduction;
     let ([uid0, uid1, uid2], [version, version_minor, version_volt]) = (*unique, *version);
-    tell(&Record::Boot {
+    send(&Record::Boot {
         grammar: GRAMMAR,
         version: env!("CARGO_PKG_VERSION"),
         leg: LEG.name,
@@ -68,9 +110,9 @@ pub fn introduce(introduction: &Introduction, clock_hz: u32) {
         log_hz: LOG_RATE_HZ,
         reset,
     });
-    tell(&Record::Board { uid0, uid1, uid2, version, version_minor, version_volt, clock_hz });
+    send(&Record::Board { uid0, uid1, uid2, version, version_minor, version_volt, clock_hz });
     if let Some(crash) = crash {
-        tell(crash);
+        send(crash);
     }
 }
 
@@ -86,11 +128,11 @@ pub async fn run(mut thread: Thread) -> ! {
         next_loops: now,
     };
     loop {
-        let heard = state.level.hear(thread.identification, &mut thread.ends, tell, log);
+        let received = state.level.receive(thread.identification, &mut thread.ends, send, log);
         let working = thread.work(&mut state);
         thread.publish(&mut state);
         thread.fill(&mut state);
-        if heard || working {
+        if received || working {
             embassy_futures_yield().await;
         } else {
             Timer::after_millis(1).await;
@@ -103,7 +145,7 @@ fn log(logged: &LoggedSample<JOINTS>) {
     if SENDS_LOG {
         let (segment, motion) = words::segment(logged.segment);
         let sample = &logged.sample;
-        tell(&Record::Log {
+        send(&Record::Log {
             tick: sample.tick,
             segment,
             motion,
@@ -131,13 +173,13 @@ impl Thread {
     /// Runs one slice; returns whether there was work.
     #[inline(never)]
     fn work(&mut self, state: &mut State) -> bool {
-        match state.level.work(self.identification, EVALUATIONS, &mut self.ends, &SIGNALS, tell) {
+        match state.level.work(self.identification, EVALUATIONS, &mut self.ends, &SIGNALS, send) {
             Slice::Idle => false,
             Slice::Busy => true,
             Slice::Judged(model) => {
                 state.report = Some(Report::default());
                 if let (Some((bus, leg)), Some(model)) = (&mut self.bus, &model) {
-                    bus.accept(KeptModel::of(leg, self.identification, model, 0, state.level.seed()));
+                    bus.accept(ModelRecord::of(leg, self.identification, model, 0, state.level.seed()));
                 }
                 true
             }
@@ -171,15 +213,15 @@ impl Thread {
         }
         state.next_paced = now + PACE;
         if let Some(note) = self.ends.notes.dequeue() {
-            return tell(&note);
+            return send(&note);
         }
         if let Some(report) = &mut state.report {
             match report.advance(self.identification) {
-                Some(record) => return tell(&record),
+                Some(record) => return send(&record),
                 None => {
                     state.report = None;
-                    self.tell_loops(state);
-                    (self.surroundings.told)();
+                    self.send_loops(state);
+                    (self.board.reported)();
                 }
             }
         }
@@ -187,19 +229,19 @@ impl Thread {
             && matches!(state.level.activity(), Activity::Identify(IdentifyPhase::Solve))
         {
             state.next_progress = now + PROGRESS;
-            return self.tell_progress(state);
+            return self.send_progress(state);
         }
         if now >= state.next_loops {
             state.next_loops = now + LOOPS;
-            self.tell_loops(state);
-            self.tell_supply(state);
+            self.send_loops(state);
+            self.send_supply(state);
         }
     }
 
-    fn tell_progress(&self, state: &State) {
+    fn send_progress(&self, state: &State) {
         let Some(solver) = self.identification.solver() else { return };
         let search = solver.search();
-        tell(&Record::Progress {
+        send(&Record::Progress {
             tick: state.level.tick(),
             iterations: search.iterations(),
             evaluations: search.evaluations(),
@@ -207,13 +249,13 @@ impl Thread {
         });
     }
 
-    fn tell_supply(&self, state: &State) {
-        let board = &self.surroundings;
+    fn send_supply(&self, state: &State) {
+        let board = &self.board;
         let Some(volt_per_code) = board.volt_per_code else { return };
         let [now, low, high] = &SIGNALS.statistics.bus;
         let volt = |code: u32| volt_per_code.0 * code.min(4095) as f32;
         let [first, second, chopper] = (board.temperatures_c)();
-        tell(&Record::Supply {
+        send(&Record::Supply {
             tick: state.level.tick(),
             bus_v: volt(now.get()),
             bus_low_v: volt(low.swap(u32::MAX)),
@@ -224,10 +266,10 @@ impl Thread {
         });
     }
 
-    fn tell_loops(&self, state: &State) {
+    fn send_loops(&self, state: &State) {
         let statistics = &SIGNALS.statistics;
-        let board = &self.surroundings;
-        tell(&Record::Loops {
+        let board = &self.board;
+        send(&Record::Loops {
             tick: state.level.tick(),
             current_worst: statistics.current_worst.swap(0),
             servo_worst: statistics.servo_worst.swap(0),

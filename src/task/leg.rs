@@ -4,12 +4,10 @@
 
 use crate::leg::{Identification, LegConfiguration, MotionWindow};
 
+pub use crate::leg::{BASE, JOINTS};
+
 include!(env!("SCARAB_LEG_SOURCE"));
 
-/// Joints of a leg, and axes of the board.
-pub const JOINTS: usize = 2;
-/// Capacity for base parameters: two parallel axes.
-pub const BASE: usize = 13;
 /// Taps of the filters.
 pub const TAPS: usize = 256;
 /// Filter outputs in progress for these taps.

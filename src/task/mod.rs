@@ -17,10 +17,6 @@
 
 use self::leg::JOINTS;
 use crate::operation::Signals;
-use crate::safety::Cause;
-
-pub use crate::operation::EventQueue;
-pub use crate::safety::stays_active;
 
 pub mod bus;
 #[cfg(feature = "board-odrive-v3-6")]
@@ -31,18 +27,17 @@ pub mod current;
 pub mod housekeeping;
 pub mod identify;
 #[cfg(feature = "board-odrive-v3-6")]
-pub mod keep;
 pub mod leg;
+#[cfg(feature = "board-odrive-v3-6")]
+mod memory;
 pub mod servo;
-pub mod surroundings;
+#[cfg(feature = "board-odrive-v3-6")]
+pub mod storage;
+#[cfg(feature = "board-odrive-v3-6")]
+mod vectors;
 
 #[cfg(feature = "board-odrive-v3-6")]
 pub use composition::run;
 
 /// Words that all levels share.
 pub static SIGNALS: Signals<JOINTS> = Signals::new();
-
-/// Emergency stop's contact opened: inhibits enabling from now on.
-pub fn stop() {
-    SIGNALS.inhibit.raise(Cause::EmergencyStop);
-}

@@ -31,7 +31,7 @@ enum Part {
     Reasons,
     Verdict,
     End,
-    Told,
+    Sent,
 }
 
 /// A report in progress; see the module.
@@ -63,7 +63,7 @@ impl Report {
     ) -> Option<Record<N>> {
         let estimate = identification.estimate()?;
         let source = Source { identification, estimate: &estimate };
-        while self.part != Part::Told {
+        while self.part != Part::Sent {
             if let Some(record) = source.record(self) {
                 self.index += 1;
                 if let Some(record) = record {
@@ -82,7 +82,7 @@ impl Report {
                     Part::Findings => Part::Reasons,
                     Part::Reasons => Part::Verdict,
                     Part::Verdict => Part::End,
-                    Part::End | Part::Told => Part::Told,
+                    Part::End | Part::Sent => Part::Sent,
                 };
             }
         }
@@ -123,7 +123,7 @@ where
                 Some(Record::Verdict { verdict: judged(verdict.is_accepted()), reasons })
             }),
             Part::End => (index == 0).then_some(Some(Record::End { records: report.records })),
-            Part::Told => None,
+            Part::Sent => None,
         }
     }
 

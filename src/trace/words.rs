@@ -89,7 +89,7 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
         AxisFault::NotANumber => "not_a_number",
         AxisFault::EncoderFrozen => "encoder_frozen",
         AxisFault::OpenPhase => "open_phase",
-        AxisFault::CurrentZero => "current_zero",
+        AxisFault::CurrentOffset => "current_zero",
         AxisFault::StuckConversion => "stuck_conversion",
         AxisFault::Parameters => "parameters",
     }
@@ -133,7 +133,7 @@ pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
         Why::Overcurrent => ("overcurrent", 0),
         Why::CurrentSense => ("current_sense", 0),
         Why::BusVoltage => ("bus_voltage", 0),
-        Why::ShuntZero(phase) => ("shunt_zero", number(phase)),
+        Why::ShuntOffset(phase) => ("shunt_zero", number(phase)),
         Why::Turning => ("turning", 0),
         Why::PhaseOpen(phase) => ("phase_open", number(phase)),
         Why::ShuntInverted(phase) => ("shunt_inverted", number(phase)),

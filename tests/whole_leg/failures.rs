@@ -82,7 +82,7 @@ fn a_nan_current_turns_off_at_once_and_keeps_the_old_model() {
             assert!(is_enabled(&pair) && model.is_some());
             pair.sample.joints[joint].current = Ampere(absurd);
             let output = tick(&mut pair, None);
-            assert_eq!(*output.servo.drive(), DriveCommand::RELEASED);
+            assert_eq!(*output.servo.drive(), DriveCommand::OFF);
             assert_eq!(output.servo.decision.fault.map(|fault| fault.code), Some(FaultCode::NotFinite));
             assert_eq!(activity(&pair), Activity::Idle);
             nothing_comes_of_it(&mut pair, SECOND);

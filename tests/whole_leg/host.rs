@@ -8,7 +8,7 @@ use super::*;
 
 const HOLD: JointCommand = JointCommand {
     target: Target::Hold,
-    asked: 0,
+    request_count: 0,
     feedforward: false,
     halt: false,
     velocity: RadianPerSecond(0.5),
@@ -74,7 +74,8 @@ impl Hosted {
     fn point(&mut self, joint: usize, position: f32, immediately: bool) {
         let command = &mut self.commands[joint];
         let point = SetPoint { position: Radian(position), relative: false, immediately };
-        (command.target, command.asked) = (Target::ProfilePosition(point), command.asked.wrapping_add(1));
+        (command.target, command.request_count) =
+            (Target::ProfilePosition(point), command.request_count.wrapping_add(1));
     }
 
     fn cyclic(&mut self, joint: usize, position: f32) {
@@ -299,14 +300,14 @@ fn homing_sets_the_position_to_the_offset_without_motion() {
     hosted.commands[1].target = Target::Homing { offset: Radian(place + 0.05) };
     hosted.run(SECOND);
     assert!(!hosted.status[1].homed);
-    hosted.commands[1].asked += 1;
+    hosted.commands[1].request_count += 1;
     hosted.run(SECOND);
     assert!(hosted.status[1].homed && !hosted.status[1].deviates);
     assert!((hosted.position(1) - place - 0.05).abs() < 0.002, "{}", hosted.position(1));
     assert!((hosted.truth(1) - truth).abs() < 0.003, "{} {truth}", hosted.truth(1));
     // An offset out of range is an error and has no effect.
     hosted.commands[1].target = Target::Homing { offset: Radian(9.0) };
-    hosted.commands[1].asked += 1;
+    hosted.commands[1].request_count += 1;
     hosted.run(SECOND / 10);
     assert!(hosted.status[1].deviates && is_enabled(&hosted.pair));
     assert!((hosted.position(1) - place - 0.05).abs() < 0.002);
@@ -513,7 +514,7 @@ fn homing_without_a_method_is_an_error_and_keeps_the_zero() {
     let before = hosted.position(0);
     let command = &mut hosted.commands[0];
     command.target = Target::Homing { offset: Radian(f32::INFINITY) };
-    command.asked = command.asked.wrapping_add(1);
+    command.request_count = command.request_count.wrapping_add(1);
     hosted.run(100);
     assert!(hosted.status[0].deviates && !hosted.status[0].homed);
     assert!((hosted.position(0) - before).abs() < 1e-3 && is_enabled(&hosted.pair));

@@ -18,22 +18,20 @@ mod trace;
 
 use std::sync::OnceLock;
 
+use scarab::hal::SERVO_RATE_HZ;
 use scarab::ident::Verdict;
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase, Step};
+use scarab::model::planar::{BASE, JOINTS};
 use scarab::safety::DriveState;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_host::rig::options::SimulationOptions;
 use scarab_host::rig::pair;
 
-/// Joints and base parameters of the default leg.
-const JOINTS: usize = 2;
-const BASE: usize = 13;
-
 type Pair = pair::Pair<JOINTS, BASE>;
 type Context = pair::Context<JOINTS, BASE>;
 
 /// Ticks of one second.
-const SECOND: u64 = 4000;
+const SECOND: u64 = SERVO_RATE_HZ as u64;
 /// Limit for an identification, which takes 53 s.
 const LONGEST_IDENTIFICATION: u64 = 100 * SECOND;
 

@@ -2,7 +2,7 @@
 
 use std::mem::size_of;
 
-use scarab::ident::record::window::{ROOM, Window};
+use scarab::ident::record::window::{NUMBERS, Window};
 use scarab::ident::{Estimate, HeldOut, Record, Recorder, RowFilter, Solver, SwarmSearch};
 use scarab::leg::{Control, Identification, Leg, ModelMonitor};
 use scarab_host::rig::pair::{PENDING, TAPS};
@@ -14,7 +14,7 @@ use super::*;
 const STATIC_BYTES: usize = 48 * 1024;
 
 /// Window of blocks, which only the processor accesses.
-const WINDOW_BYTES: usize = size_of::<Window<f32, JOINTS, BASE, ROOM>>();
+const WINDOW_BYTES: usize = size_of::<Window<f32, JOINTS, BASE, NUMBERS>>();
 const _: () = assert!(WINDOW_BYTES <= 34 * 1024);
 
 #[test]

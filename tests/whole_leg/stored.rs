@@ -8,7 +8,7 @@ use super::*;
 /// Stored model of the identified leg.
 fn kept() -> StoredModel<JOINTS> {
     let pair = identified();
-    context().configuration.keep(pair.leg.control().model().expect("accepted"))
+    context().configuration.to_stored(pair.leg.control().model().expect("accepted"))
 }
 
 #[test]

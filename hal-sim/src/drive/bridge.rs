@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn a_disabled_bridge_is_off_in_all_outputs() {
         let mut bridge = Bridge::new(&BridgeDescription::default(), PERIOD);
-        bridge.begin(&AxisCommand::RELEASED);
+        bridge.begin(&AxisCommand::OFF);
         assert_eq!(bridge.next_edge(PERIOD), PERIOD);
         assert!((0..3).all(|output| bridge.output(output, BUS) == Terminal::Off(-0.8, 48.8)));
         assert_eq!(bridge.low_side_time(1, 0.0), None);

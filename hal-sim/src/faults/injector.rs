@@ -115,10 +115,10 @@ impl Injector {
         sample.encoder_count = wrapped(counter);
         sample.index_count = sample.index_count.map(|at| at.wrapping_add(moved));
         for (slot, injection) in self.slots.iter().flatten().map(|(injection, _)| injection).enumerate() {
-            let spoilt = injection.channel == Channel::Index
+            let injected = injection.channel == Channel::Index
                 && injection.joint == joint
                 && injection.timing.holds(tick);
-            sample.index_count = match (spoilt, injection.form) {
+            sample.index_count = match (injected, injection.form) {
                 (false, _) => sample.index_count,
                 (true, Form::Off) => None,
                 (true, Form::Offset(offset)) => sample.index_count.map(|at| wrapped(f64::from(at) + offset)),
@@ -163,7 +163,7 @@ mod tests {
     const SAMPLE: AxisSample =
         AxisSample { shunt_codes: [2048, 2048], bus_code: 3136, encoder_count: 10, index_count: Some(8) };
 
-    fn spoilt(channel: Channel, form: Form) -> [AxisSample; 2] {
+    fn injected(channel: Channel, form: Form) -> [AxisSample; 2] {
         let mut injector = Injector::new(1);
         assert!(injector.add(Injection { channel, joint: 1, form, timing: Timing::from(5) }));
         let mut samples = [SAMPLE; 2];
@@ -177,12 +177,12 @@ mod tests {
 
     #[test]
     fn only_the_named_channel_and_joint_are_faulted() {
-        let lost = spoilt(Channel::Counter, Form::Offset(-12.0));
+        let lost = injected(Channel::Counter, Form::Offset(-12.0));
         let moved = AxisSample { encoder_count: 65_534, index_count: Some(65_532), ..SAMPLE };
         assert_eq!(lost, [SAMPLE, moved]);
-        let railed = spoilt(Channel::ShuntC, Form::Rail(4095.0));
+        let railed = injected(Channel::ShuntC, Form::Rail(4095.0));
         assert_eq!(railed, [SAMPLE, AxisSample { shunt_codes: [2048, 4095], ..SAMPLE }]);
-        let unseen = spoilt(Channel::Index, Form::Off);
+        let unseen = injected(Channel::Index, Form::Off);
         assert_eq!(unseen, [SAMPLE, AxisSample { index_count: None, ..SAMPLE }]);
     }
 

@@ -26,7 +26,7 @@ fn errors(seed: u64) -> [f64; 4] {
     // The rotor turns slowly over many counts (2,400 counts and 21 pole pairs are 3 degrees each)
     // with a quadrature current. Its component along the true flux is the offset's error.
     stand.set_load(Load::Turned(2.0));
-    let mut sample = stand.period(&AxisCommand::RELEASED, 0.0);
+    let mut sample = stand.period(&AxisCommand::OFF, 0.0);
     let mut axis = Axis::new(&trial.configuration, &found, &sample).expect("sensible");
     let request = AxisRequest { enabled: true, current: Ampere(10.0) };
     let mut sums = [0.0; 2];
@@ -147,7 +147,7 @@ fn apply_wiring_fault(trial: &mut Trial, seed: u64) -> Refusal {
         // A current-sensor offset of 180 codes.
         _ => {
             trial.axis.shunts.offset_codes[1] = 180.0;
-            Refusal::ShuntZero(Phase::C)
+            Refusal::ShuntOffset(Phase::C)
         }
     }
 }

@@ -25,9 +25,9 @@ pub struct Trial {
     pub settings: CalibrationSettings,
 }
 
-struct Dice(Xoshiro256PlusPlus);
+struct TestRandom(Xoshiro256PlusPlus);
 
-impl Dice {
+impl TestRandom {
     fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -43,18 +43,18 @@ const CURRENT: f64 = 20.0;
 impl Trial {
     /// Trial wired according to its configuration.
     pub fn sound(seed: u64) -> Self {
-        let mut dice = Dice(Xoshiro256PlusPlus::seed_from_u64(seed));
-        let pole_pairs = dice.one_of([4, 5, 7, 10, 14, 21]);
-        let counts = dice.one_of([2400.0, 4000.0, 8192.0, 10_000.0, 16_384.0]);
+        let mut random = TestRandom(Xoshiro256PlusPlus::seed_from_u64(seed));
+        let pole_pairs = random.one_of([4, 5, 7, 10, 14, 21]);
+        let counts = random.one_of([2400.0, 4000.0, 8192.0, 10_000.0, 16_384.0]);
         // Ranges: 30 mOhm to 0.3 Ohm, small and large ones equally often; L/R of 0.3 ms to 1.5 ms; 20 to
         // 100 mN m/A.
-        let resistance = dice.one_of([0.03, 0.05, 0.08, 0.13, 0.2]) * dice.between(1.0, 1.5);
-        let inductance_d = resistance * dice.between(0.3e-3, 1.5e-3);
-        let torque_per_ampere = dice.between(0.02, 0.1);
+        let resistance = random.one_of([0.03, 0.05, 0.08, 0.13, 0.2]) * random.between(1.0, 1.5);
+        let inductance_d = resistance * random.between(0.3e-3, 1.5e-3);
+        let torque_per_ampere = random.between(0.02, 0.1);
         let holding = torque_per_ampere * CURRENT;
         let flux = torque_per_ampere / (1.5 * f64::from(pole_pairs));
         // If saliency outweighed the magnets, the rotor would not rest along them.
-        let inductance_q = (inductance_d * dice.between(1.0, 1.4)).min(inductance_d + 0.8 * flux / CURRENT);
+        let inductance_q = (inductance_d * random.between(1.0, 1.4)).min(inductance_d + 0.8 * flux / CURRENT);
         // Current along the flux of a salient rotor holds it with less torque: 3/2 p i sin(x)
         // (flux - (Lq - Ld) i cos(x)).
         let held = holding * (1.0 - (inductance_q - inductance_d) * CURRENT / flux).max(0.2);
@@ -64,34 +64,34 @@ impl Trial {
             inductance_q,
             flux,
             pole_pairs,
-            electrical_zero: dice.between(0.0, TAU),
-            cogging: dice.between(0.0, 0.03) * held,
+            electrical_zero: random.between(0.0, TAU),
+            cogging: random.between(0.0, 0.03) * held,
             cogging_periods: 6 * pole_pairs,
             thermal_resistance: 1.0,
             thermal_time: 600.0,
         };
         let shunts = ShuntDescription {
-            offset_codes: [dice.between(-80.0, 80.0), dice.between(-80.0, 80.0)],
-            gain_error: [dice.between(-0.003, 0.003), dice.between(-0.003, 0.003)],
-            noise_codes: dice.between(0.5, 2.0),
+            offset_codes: [random.between(-80.0, 80.0), random.between(-80.0, 80.0)],
+            gain_error: [random.between(-0.003, 0.003), random.between(-0.003, 0.003)],
+            noise_codes: random.between(0.5, 2.0),
             ..ShuntDescription::default()
         };
-        let reversed = dice.one_of([true, false]);
+        let reversed = random.one_of([true, false]);
         let wiring = Wiring {
-            phases: dice.one_of([[0, 1, 2], [1, 2, 0], [2, 0, 1]]),
+            phases: random.one_of([[0, 1, 2], [1, 2, 0], [2, 0, 1]]),
             encoder: if reversed { EncoderWiring::Reversed } else { EncoderWiring::Forward },
             ..Wiring::default()
         };
         let counter = CounterDescription {
             counts,
-            start: dice.one_of([0, 1, 40_000, 65_535]),
-            index: dice.between(0.0, TAU),
+            start: random.one_of([0, 1, 40_000, 65_535]),
+            index: random.between(0.0, TAU),
         };
         let bridge = BridgeDescription::default();
         let load = Load::Free {
-            inertia: dice.between(0.5e-4, 10e-4),
-            coulomb: dice.between(0.0, 0.15) * held,
-            viscous: dice.between(1e-4, 5e-4),
+            inertia: random.between(0.5e-4, 10e-4),
+            coulomb: random.between(0.0, 0.15) * held,
+            viscous: random.between(1e-4, 5e-4),
             torque: 0.0,
         };
         let configuration = AxisConfiguration {
@@ -113,7 +113,7 @@ impl Trial {
         };
         // Rest positions from cogging.
         let tooth = TAU / f64::from(motor.cogging_periods);
-        let angle = (dice.between(0.0, 6.0) / tooth).round() * tooth;
+        let angle = (random.between(0.0, 6.0) / tooth).round() * tooth;
         Self {
             axis: AxisDescription { motor, bridge, shunts, counter, wiring, ratio: 50.0 },
             load,
@@ -150,7 +150,7 @@ impl Trial {
 
     fn run_with(&self, seed: u64, mut calibrator: Calibrator) -> (Stand, Result<Calibration, Refusal>, f64) {
         let mut stand = Stand::new(&self.axis, &SupplyDescription::default(), self.load, self.angle, seed);
-        let mut sample = stand.period(&AxisCommand::RELEASED, 0.0);
+        let mut sample = stand.period(&AxisCommand::OFF, 0.0);
         let mut furthest = 0.0_f64;
         loop {
             let command = match calibrator.tick(&sample) {

@@ -247,7 +247,7 @@ fn codes_are_the_currents_at_the_middle_of_the_lower_zero_vector() {
     let (mut axis, _) = turning(&description, 150.0, 4.5, 1.9, 2001);
     let expected = axis.currents();
     let mut noise = Xoshiro256PlusPlus::seed_from_u64(1);
-    let sample: AxisSample = axis.begin(&AxisCommand::RELEASED, 0, &mut noise);
+    let sample: AxisSample = axis.begin(&AxisCommand::OFF, 0, &mut noise);
     let step = description.shunts.ampere_per_code();
     for (channel, code) in sample.shunt_codes.iter().enumerate() {
         let read = (f64::from(*code) - 2048.0) * step;
@@ -440,12 +440,12 @@ fn a_free_rotor_accelerates_by_the_torque_and_sticks_at_rest() {
     let load = |torque: f64| Load::Free { inertia: 2e-4, coulomb: 0.02, viscous: 0.0, torque };
     let mut stand = Stand::new(&axis(), &SupplyDescription::default(), load(0.015), 0.3, 1);
     for _ in 0..1000 {
-        stand.period(&AxisCommand::RELEASED, 0.0);
+        stand.period(&AxisCommand::OFF, 0.0);
     }
     assert_eq!(stand.rotor(), Rotor { angle: 0.3, speed: 0.0 }, "a load below the friction moves the rotor");
     stand.set_load(load(0.05));
     for _ in 0..2400 {
-        stand.period(&AxisCommand::RELEASED, 0.0);
+        stand.period(&AxisCommand::OFF, 0.0);
     }
     let expected = -(0.05 - 0.02) / 2e-4 * 0.1;
     assert!((stand.rotor().speed / expected - 1.0).abs() < 1e-9, "{:?}", stand.rotor());
@@ -476,7 +476,7 @@ fn a_world_with_complete_drives_and_its_copies_repeat_bit_for_bit() {
     assert!(copy == one);
     assert!(shaken(&mut copy, 4000..6000) == shaken(&mut one, 4000..6000));
     assert!(copy == one);
-    copy.period(&[AxisCommand::RELEASED; 2], 0.0);
+    copy.period(&[AxisCommand::OFF; 2], 0.0);
     assert!(copy != one);
     let moved = one.truth();
     assert!((moved.time_s - 0.25).abs() < 1e-12 && moved.motor_torque[0].abs() > 1.0, "{moved:?}");

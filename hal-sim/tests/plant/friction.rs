@@ -179,10 +179,10 @@ fn a_leg_with_bridges_off_swings_out_and_hangs() {
         world.tick(&pushing);
     }
     assert!(world.truth().motor_torque[0] > 39.0);
-    world.tick(&DriveCommand::RELEASED);
+    world.tick(&DriveCommand::OFF);
     assert_eq!(world.truth().motor_torque, [0.0; 2]);
     for _ in 0..80_000 {
-        world.tick(&DriveCommand::RELEASED);
+        world.tick(&DriveCommand::OFF);
     }
     let truth = world.truth();
     assert_eq!(truth.sticking, [true; 2]);

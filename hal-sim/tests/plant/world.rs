@@ -84,7 +84,7 @@ fn current_noise_has_its_stated_size_in_the_mean_of_eight_samples() {
     for _ in 0..rows {
         let mut mean = 0.0;
         for _ in 0..8 {
-            let reading = f64::from(world.tick(&DriveCommand::RELEASED).joints[0].current.0) - 0.2;
+            let reading = f64::from(world.tick(&DriveCommand::OFF).joints[0].current.0) - 0.2;
             mean += reading / 8.0;
             single_squares += reading * reading / f64::from(8 * rows);
         }

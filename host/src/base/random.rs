@@ -30,6 +30,11 @@ impl Random {
         low + self.unit() * (high - low)
     }
 
+    /// Sum of twelve uniform numbers: mean 0, variance 1, at most 6.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+
     /// Log-uniform between two positive numbers.
     pub fn logarithmic(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.unit())

@@ -47,7 +47,7 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
     use FaultCode as Code;
     match code {
         // A motor too fast for a short circuit is turned off; both are, if neither was switching.
-        Code::EncoderPlace | Code::EncoderFrozen => &["Short", "Off"],
+        Code::EncoderPosition | Code::EncoderFrozen => &["Short", "Off"],
         Code::EncoderStep
         | Code::SupplyLost
         | Code::Temperature
@@ -63,7 +63,7 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
         // With too many missing ticks, damping is impossible.
         Code::CurrentTicks => &["Damp", "Off"],
         Code::OpenPhase
-        | Code::CurrentZero
+        | Code::CurrentOffset
         | Code::StuckConversion
         | Code::CurrentSense
         | Code::Conversion

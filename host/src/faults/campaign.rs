@@ -28,8 +28,8 @@ use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::{Context, Pair};
 
-/// Number of base parameters of the legs in a campaign.
-pub(super) const BASE: usize = 13;
+pub(super) use scarab::model::planar::BASE;
+
 /// Runs of a row per base.
 const RUNS_PER_BASE: u64 = 256;
 /// Row of the torque caps, and the factor by which they are widened when disabled.

@@ -22,6 +22,8 @@ use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
 
+pub use scarab::model::planar::JOINTS;
+
 /// Required reaction of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Expected {
@@ -104,7 +106,7 @@ pub enum Event {
     Touch(f64),
     /// Frequency of the watchdog's oscillator, Hz.
     Oscillator(f64),
-    /// A bit flip in a constant of an axis or of the servo's joint (`Axis::upset`, `Servo::upset`).
+    /// A bit flip in a constant of an axis or of the servo's joint (`Axis::flip_bit`, `Servo::flip_bit`).
     Upset {
         /// True for the axis, false for the servo.
         of_axis: bool,
@@ -192,9 +194,6 @@ pub struct Bounds {
     /// Shunt offset, A, whose voltage exceeds that of dead time and of changes within a turn.
     pub smallest_offset_a: f64,
 }
-
-/// Joints of the legs in a campaign.
-pub const JOINTS: usize = 2;
 
 /// All rows, in the catalogue's order.
 pub fn rows() -> impl Iterator<Item = &'static Row> {

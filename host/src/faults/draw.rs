@@ -5,11 +5,12 @@ use hal_sim::faults::{Channel, Form, Injection, Timing};
 use crate::base::random::Random;
 use crate::faults::catalogue::{Event, Expected, Onset, Scenario};
 use crate::rig::faulty_board::{PERIOD_MS, PERIODS_PER_S};
+use scarab::motor::SenseScale;
 
 /// Scale of the board's shunts and converter, A.
 pub const AMPERE_PER_CODE: f64 = 0.040_283;
 /// Scale of the bus voltage's divider, V.
-pub const VOLT_PER_CODE: f64 = 3.3 * 19.0 / 4096.0;
+pub const VOLT_PER_CODE: f64 = 3.3 * SenseScale::DIVIDER as f64 / 4096.0;
 
 /// Creates an injection.
 #[must_use]

@@ -15,11 +15,7 @@ use crate::base::error::FileError;
 use crate::formats::leg_file::geometry::chain;
 use crate::formats::leg_file::{JointFile, LegFile, Side};
 use crate::leg::setup::{PriorChoice, background, base_rank, configuration};
-
-/// Joints and base parameters of the legs that an image supports.
-const JOINTS: usize = 2;
-/// See [`JOINTS`].
-const BASE: usize = 13;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Constant of an image, and the configuration it stands for.
 pub type Described = (LegDescription<JOINTS>, LegConfiguration<JOINTS, BASE>);

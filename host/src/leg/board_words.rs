@@ -38,7 +38,7 @@ pub fn refusal(reason: Refusal) -> String {
         Refusal::BusVoltage => {
             "the bus voltage left 20 V..58 V (`supply.voltage_v`, `supply.resistance_ohm`)".into()
         }
-        Refusal::ShuntZero(phase) => {
+        Refusal::ShuntOffset(phase) => {
             format!("the shunt of phase {} has too large an offset, or too much noise", name(phase))
         }
         Refusal::Turning => "the rotor turns although the bridge is off".into(),
@@ -92,7 +92,7 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
         AxisFault::NotANumber => "a current or voltage was not finite",
         AxisFault::EncoderFrozen => "the counter is constant although the motor turns",
         AxisFault::OpenPhase => "a phase has voltage but no current",
-        AxisFault::CurrentZero => "a shunt's offset drifted",
+        AxisFault::CurrentOffset => "a shunt's offset drifted",
         AxisFault::Parameters => "its gains or limits changed in memory",
         AxisFault::StuckConversion => "a shunt's code does not change with its current",
     }

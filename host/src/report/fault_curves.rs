@@ -1,7 +1,6 @@
 //! Curves of a run with a fault, for its figure.
 
-/// Number of joints.
-const JOINTS: usize = 2;
+use scarab::model::planar::JOINTS;
 
 /// Curves of one run, one value per PWM period.
 #[derive(Clone, Debug, Default, PartialEq)]

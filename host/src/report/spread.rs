@@ -1,7 +1,6 @@
 //! Distribution of every base parameter about its truth over many runs of one leg.
 
-use scarab::real::sqrt;
-
+use crate::base::stats::rms;
 use crate::report::RunReport;
 
 /// One base parameter over all runs that determine it.
@@ -50,9 +49,9 @@ impl Spread {
             sigmas.push(sigma);
             bounds.extend(base.cramer_rao.known().filter(|bound| *bound > 0.0));
         }
-        let over_bound = (!bounds.is_empty()).then(|| rms(&absolute) / rms(&bounds));
+        let over_bound = (!bounds.is_empty()).then(|| rms(absolute) / rms(bounds.iter().copied()));
         let truth = *truths.first()?;
-        Some(Self { name: name.to_owned(), unit, truth, errors, sigma: rms(&sigmas), over_bound })
+        Some(Self { name: name.to_owned(), unit, truth, errors, sigma: rms(sigmas), over_bound })
     }
 
     /// Mean error in sigma.
@@ -65,7 +64,7 @@ impl Spread {
     #[must_use]
     pub fn deviation(&self) -> f64 {
         let mean = self.mean();
-        rms(&self.errors.iter().map(|error| error - mean).collect::<Vec<_>>())
+        rms(self.errors.iter().map(|error| error - mean))
     }
 
     /// Share of the errors within a number of sigma.
@@ -76,13 +75,10 @@ impl Spread {
     }
 }
 
-fn rms(values: &[f64]) -> f64 {
-    sqrt(values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scarab::real::sqrt;
 
     #[test]
     fn errors_are_counted_about_truth_and_spread_about_their_mean() {

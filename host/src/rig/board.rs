@@ -20,10 +20,11 @@ use hal_sim::world::World;
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use scarab::board::odrive_v3_6::settings::analog::HOTTEST_C;
 use scarab::board::odrive_v3_6::settings::drives;
-use scarab::hal::{AxisCommand, LegDrives};
+use scarab::hal::{AxisCommand, CURRENT_RATE_HZ, LegDrives};
 use scarab::leg::MotorDescription;
 use scarab::motor::{
     Axis, AxisConfiguration, Calibration, CalibrationSettings, CalibrationStep, Calibrator, Chopper,
+    SenseScale,
 };
 use scarab::operation::HousekeepingSettings;
 use scarab::units::{Ampere, RadianPerSecond, Volt, Weber};
@@ -32,12 +33,10 @@ use crate::base::error::ToolError;
 use crate::formats::leg_file::{JointFile, LegFile, MotorFile};
 use crate::leg::board_words as words;
 
-/// Divider of the bus voltage on the 56 V board.
-const DIVIDER: f32 = 19.0;
 /// Bus voltages at which the bridges may switch.
-pub const BUS: [Volt; 2] = drives::bus(DIVIDER);
+pub const BUS: [Volt; 2] = drives::bus(SenseScale::DIVIDER);
 /// Bus voltages at which the brake resistor conducts.
-pub const BRAKE: [Volt; 2] = drives::chopper(DIVIDER);
+pub const BRAKE: [Volt; 2] = drives::chopper(SenseScale::DIVIDER);
 
 /// Largest current for the calibration of a motor on its stand.
 const CALIBRATION_CURRENT_A: f64 = drives::CALIBRATION.current.0 as f64;
@@ -46,14 +45,14 @@ const CALIBRATION_CURRENT_A: f64 = drives::CALIBRATION.current.0 as f64;
 const CALIBRATION_VOLTAGE_V: [f64; 2] = [3.0, 9.5];
 const CALIBRATION_TURNS_PER_S: f32 = drives::CALIBRATION.turns_per_s;
 /// Half-wave with which the firmware measures inductances, s, and its share of the calibration current.
-const HALF_WAVE_S: f64 = 2.0 / 24_000.0;
+const HALF_WAVE_S: f64 = 2.0 / CURRENT_RATE_HZ as f64;
 const WAVE_SHARE: f64 = 0.3;
 /// Load on the stand: the rotor alone, kg m^2; bearings, N m; slight drag, N m s/rad.
 const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
 /// Rest before a calibration: half a second.
 const REST_PERIODS: u32 = 12_000;
 /// Limit of a calibration, periods; it takes some seconds.
-const LONGEST_CALIBRATION: u32 = 24_000 * 60;
+const LONGEST_CALIBRATION: u32 = 60 * CURRENT_RATE_HZ;
 
 /// Configuration of a joint's axis, derived from the leg file by the board's settings.
 pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfiguration {
@@ -64,7 +63,7 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
         ratio: joint.encoder.ratio as f32,
     };
     let speed = RadianPerSecond(joint.speed_limit_deg_s.to_radians() as f32);
-    drives::axis(&motor, Ampere(joint.current_limit() as f32), speed, DIVIDER)
+    drives::axis(&motor, Ampere(joint.current_limit() as f32), speed, SenseScale::DIVIDER)
 }
 
 /// Calibration settings of a motor on its stand. The current is limited by the axis and by the resistance at
@@ -90,7 +89,7 @@ pub fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, se
     let mut stand = Stand::new(axis, supply, ROTOR, angle, seed);
     // Cogging moves the rotor to a rest position.
     for _ in 0..REST_PERIODS {
-        stand.period(&AxisCommand::RELEASED, 0.0);
+        stand.period(&AxisCommand::OFF, 0.0);
     }
     stand
 }
@@ -109,7 +108,7 @@ pub fn commission(
     let mut stand = rested(axis, supply, angle, seed);
     let mut calibrator =
         Calibrator::new(configuration, settings).map_err(|error| refused(words::axis_error(error)))?;
-    let mut command = AxisCommand::RELEASED;
+    let mut command = AxisCommand::OFF;
     for _ in 0..LONGEST_CALIBRATION {
         match calibrator.tick(&stand.period(&command, 0.0)) {
             CalibrationStep::Running(next) => command = next,
@@ -130,7 +129,7 @@ fn ready<const N: usize>(
     seed: u64,
 ) -> Result<([Axis; N], Chopper), ToolError> {
     let pose = world.sample();
-    let samples = world.period(&[AxisCommand::RELEASED; N], 0.0);
+    let samples = world.period(&[AxisCommand::OFF; N], 0.0);
     let mut axes = Vec::with_capacity(N);
     for (index, joint) in believed.joints.iter().enumerate().take(N) {
         let motor = joint
@@ -157,7 +156,7 @@ fn ready<const N: usize>(
         axes.try_into().map_err(|_| ToolError::input("every joint needs a motor (`[joint.motor]`)"))?;
     // The first period took the reference; outputs stay off for the rest of its servo tick.
     for _ in 1..PERIODS_PER_TICK {
-        world.period(&[AxisCommand::RELEASED; N], 0.0);
+        world.period(&[AxisCommand::OFF; N], 0.0);
     }
     Ok((axes, chopper))
 }

@@ -16,7 +16,7 @@
 use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Contacts, Sample};
 use scarab::leg::{ControlOutput, Following, axis_code};
 use scarab::operation::{AxisState, Outcome, Slice};
-use scarab::safety::{Cause, FaultCode};
+use scarab::safety::{FaultCode, InhibitReason};
 
 mod view;
 mod watchdog;
@@ -145,7 +145,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// Hides the inhibit reasons whose detectors are disabled.
     fn hide(&mut self) {
-        let hidden = Cause::ALL.into_iter().filter(|cause| self.is_blind(cause.code()));
+        let hidden = InhibitReason::ALL.into_iter().filter(|cause| self.is_blind(cause.code()));
         let bits = hidden.fold(0, |bits, cause| bits | cause.bit());
         self.board.signals.inhibit.hide(bits);
     }
@@ -199,7 +199,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         let registers = &self.board.registers;
         let brake = self.injector.brake(now, registers.brake);
         // Without their supply the gate drivers open every switch, independent of the timers.
-        let commands = if registers.gates_on { registers.commands } else { [AxisCommand::RELEASED; N] };
+        let commands = if registers.gates_on { registers.commands } else { [AxisCommand::OFF; N] };
         let mut samples = self.world.period(&commands, brake);
         let emergency_stop = self.injector.happens(Channel::EmergencyStop, 0, now);
         let gate_fault = self.injector.happens(Channel::GateFault, 0, now);
@@ -260,21 +260,21 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         }
     }
 
-    /// Flips a bit in an axis' constants (`Axis::upset`) or in those of the servo's joint.
+    /// Flips a bit in an axis' constants (`Axis::flip_bit`) or in those of the servo's joint.
     pub fn upset(&mut self, of_axis: bool, joint: usize, number: u8, bit: u8) {
         if of_axis {
             if let Some(axis) = self.board.loops.axis_state_mut(joint).and_then(AxisState::axis_mut) {
-                axis.upset(number, bit);
+                axis.flip_bit(number, bit);
             }
         } else {
-            self.leg.upset(joint, number, bit);
+            self.leg.flip_bit(joint, number, bit);
         }
     }
 
     /// Sets the values of an axis' modulation to NaN.
     pub fn spoil_modulation(&mut self, joint: usize) {
         if let Some(axis) = self.board.loops.axis_state_mut(joint).and_then(AxisState::axis_mut) {
-            axis.spoil_modulation();
+            axis.invalidate_modulation();
         }
     }
 }

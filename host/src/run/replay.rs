@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use scarab::ident::{
-    Choice, ConstantRatio, Ends, Estimator, HeldOut, KernelError, Plan, Progress, Recorder, SearchState,
-    Solver, Stretches, Thresholds, Unused,
+    Choice, ConstantRatio, Ends, Estimator, HeldOut, KernelError, Plan, Progress, Recorder, SAMPLE_RATE_HZ,
+    SearchState, Solver, Stretches, Thresholds, Unused,
 };
 use scarab::model::{AnatomicalJoint, Payload};
 
@@ -43,7 +43,7 @@ const TAPS: usize = 2048;
 /// Open outputs of that filter.
 const PENDING: usize = 205;
 /// Sample time of the firmware, s.
-const GRID_S: f64 = 1.0 / scarab::ident::SAMPLE_RATE_HZ;
+const GRID_S: f64 = 1.0 / SAMPLE_RATE_HZ;
 /// Evaluations between two updates of the search.
 const SLICE: u32 = 20;
 /// Lowest bandwidth, tenths of a Hz.
@@ -152,7 +152,7 @@ impl<const N: usize> Samples<N> {
     }
 
     fn duration_s(&self) -> f64 {
-        self.position.len() as f64 / 500.0
+        self.position.len() as f64 / SAMPLE_RATE_HZ
     }
 }
 
@@ -517,7 +517,7 @@ fn feed<const N: usize, const B: usize>(
         let mut is_running = true;
         let mut take = |index: usize, progress: Option<Progress<f32, N, B>>| {
             let Some(progress) = progress else { return };
-            let time_s = samples.start_s + (index - reach) as f64 / 500.0;
+            let time_s = samples.start_s + (index - reach) as f64 / SAMPLE_RATE_HZ;
             seen(number + 1, time_s, &progress);
             rows += u32::from(progress.rows.is_some());
         };

@@ -33,9 +33,10 @@
 use std::fmt;
 
 use crate::formats::recording::{JointSeries, Recording};
+use scarab::ident::SAMPLE_RATE_HZ;
 
 /// Rate of the grid, Hz: that of the firmware's filter chain.
-pub const GRID_RATE_HZ: f64 = 500.0;
+pub const GRID_RATE_HZ: f64 = SAMPLE_RATE_HZ;
 /// Share of the grid's period below which the median step leads to averaging, above it to interpolation.
 pub const DENSE_STEP: f64 = 0.9;
 /// Share of a recording's own rate up to which its resampled motion can be trusted.

@@ -107,7 +107,7 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         let all: Option<Vec<_>> = self
             .ratios
             .iter()
-            .map(|ratio| ratio.filter(|found| found.is_told() && found.is_consistent()))
+            .map(|ratio| ratio.filter(|found| found.is_determined() && found.is_consistent()))
             .collect();
         all?.try_into().ok()
     }
@@ -270,7 +270,7 @@ impl ScaleReport {
                 identified: (used / found).into(),
                 sigma: (used * sigma / (found * found)).into(),
                 consistent: ratio.map(|ratio| ratio.is_consistent()),
-                determined: ratio.is_some_and(|ratio| ratio.is_told()),
+                determined: ratio.is_some_and(|ratio| ratio.is_determined()),
             }
         };
         Self {

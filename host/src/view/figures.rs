@@ -109,15 +109,15 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
         }
     }
     // A board may have sent no log, and never sends its cost above the optimum of its box.
-    let is_told = run.trace.is_some();
-    if !is_told || !series.motions.is_empty() {
+    let is_determined = run.trace.is_some();
+    if !is_determined || !series.motions.is_empty() {
         let (file, title) =
             ("residuals.svg".into(), "Distribution and autocorrelation of the residuals".into());
         add(Group::Residuals, file, title, residuals::height(joints.len()), &|area| {
             residuals::whole(area, joints, series)
         })?;
     }
-    if !is_told {
+    if !is_determined {
         let title = "Cost of the beetle swarm above the optimum".into();
         add(Group::Search, "search.svg".into(), title, 330, &|area| search::whole(area, series))?;
     }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::command::{Folder, MUJOCO, scarab};
 use scarab::model::Payload;
+use scarab_host::base::stats::rms;
 use scarab_host::formats::leg_file::LegFile;
 use scarab_host::report::RunReport;
 use scarab_host::report::series::{Role, Series};
@@ -16,11 +17,6 @@ fn identified() -> (RunReport, Series) {
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
     let options = SimulationOptions { with_series: true, ..SimulationOptions::of_seed(1) };
     identify_one::<2, 13>(&leg, &options, None).expect("it runs")
-}
-
-fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0_u32), |(sum, count), value| (sum + value * value, count + 1));
-    scarab::real::sqrt(sum / f64::from(count))
 }
 
 #[test]
@@ -79,17 +75,17 @@ fn curves_of_one_motion_share_their_time_base() {
             // would be visible.
             let deviation =
                 curves.measured_deg.iter().zip(&curves.commanded_deg).map(|(one, other)| one - other);
-            assert!(root_mean_square(deviation) < 0.2, "{} {joint}", motion.name);
+            assert!(rms(deviation) < 0.2, "{} {joint}", motion.name);
             // The table's error against the noise-free torque is below 1.3 %; a shift of a row by
             // 20 ms gives tens of percent.
             let moving = |still: &bool| !still;
             let error = curves.noise_free_nm.iter().zip(&curves.predicted_nm).zip(&curves.still);
             let error = error.filter(|(_, still)| moving(still)).map(|((one, other), _)| one - other);
-            let size = root_mean_square(curves.noise_free_nm.iter().copied());
-            assert!(root_mean_square(error) < 0.02 * size, "{} {joint}", motion.name);
+            let size = rms(curves.noise_free_nm.iter().copied());
+            assert!(rms(error) < 0.02 * size, "{} {joint}", motion.name);
             // The drawn residual equals the one in the table; training uses whole windows there,
             // cut ones here.
-            let residual = root_mean_square(curves.residual_nm().flatten());
+            let residual = rms(curves.residual_nm().flatten());
             let fits = if motion.role == Role::Training { &report.training } else { &report.validation };
             let name = if motion.role == Role::Training { "fourier" } else { motion.name.as_str() };
             let fit =
@@ -121,7 +117,7 @@ fn torques_corrected_by_a_known_mass_are_drawn_corrected() {
         let fits = if motion.role == Role::Training { &report.training } else { &report.validation };
         let name = if motion.role == Role::Training { "fourier" } else { motion.name.as_str() };
         for (joint, curves) in motion.joints.iter().enumerate() {
-            let residual = root_mean_square(curves.residual_nm().flatten());
+            let residual = rms(curves.residual_nm().flatten());
             let fit =
                 fits.iter().find(|fit| fit.motion == name && fit.joint == joint + 1).expect("in the table");
             // Tolerance as above without a mass; a ratio on the wrong side gives 44 % of the

@@ -1,6 +1,7 @@
 //! Pendulum with an analytic recording: torque in closed form, any stamps, a little noise.
 
 use scarab::real::sin_cos;
+use scarab_host::base::random::Random;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
@@ -52,16 +53,11 @@ impl Default for Motion {
 impl Motion {
     /// Rows `t,q,tau` of ten seconds.
     pub fn samples(&self) -> Vec<[f64; 3]> {
-        let mut random = self.seed;
-        // Uniform in +-1 (constants of Knuth's MMIX generator; its high bits).
-        let mut uniform = || {
-            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (random >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        };
+        let mut random = Random::new("pendulum", self.seed);
         let [inertia, hx, hy, coulomb, viscous, offset] = TRUTH.map(|(_, value)| value);
         (0..(10.0 * self.rate_hz) as u32)
             .map(|sample| {
-                let time = f64::from(sample) / self.rate_hz + self.jitter_s * uniform();
+                let time = f64::from(sample) / self.rate_hz + self.jitter_s * random.uniform(-1.0, 1.0);
                 let (mut q, mut qd, mut qdd) = (self.centre, 0.0, 0.0);
                 for (amplitude, frequency, phase) in [(1.2, 0.9, 0.0), (0.15, 1.7, 1.0)] {
                     let speed = TAU * frequency;
@@ -76,7 +72,7 @@ impl Motion {
                     + coulomb * qd.signum()
                     + viscous * qd
                     + offset
-                    + self.noise_nm * uniform();
+                    + self.noise_nm * random.uniform(-1.0, 1.0);
                 [time, self.direction * (q - self.zero_offset), self.direction * torque]
             })
             .collect()

@@ -7,6 +7,7 @@
 
 use crate::command::{Folder, Table, fit, reasons, scarab};
 use scarab::real::{sin_cos, sqrt};
+use scarab_host::base::stats::rms;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -64,7 +65,7 @@ fn judged(table: &Table, joint: usize) -> f64 {
     let parts = errors.chunk_by(|one, next| one.0 == next.0);
     let filtered: Vec<f64> =
         parts.flat_map(|part| butterworth(&part.iter().map(|row| row.1).collect::<Vec<_>>())).collect();
-    sqrt(filtered.iter().map(|error| error * error).sum::<f64>() / filtered.len() as f64)
+    rms(filtered)
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Outliers, pushes and Stribeck friction: robust identification compared with plain least squares.
 
+use scarab_host::base::random::Random;
+use scarab_host::base::stats::rms;
 use scarab_host::formats::leg_file::LegFile;
 
 use crate::command::{Folder, MUJOCO, Table, base, reasons, scarab};
@@ -20,7 +22,7 @@ fn pooled_error(runs: &Value) -> f64 {
             (of("value") - of("truth")) / of("cramer_rao")
         })
         .collect();
-    sqrt(errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64)
+    rms(errors)
 }
 
 #[test]
@@ -72,25 +74,11 @@ fn the_default_leg_shows_no_stribeck_friction_and_few_excluded_samples() {
     }
 }
 
-/// Reproducible random numbers from 0 to 1.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn sign(&mut self) -> f64 {
-        if self.roll() < 0.5 { -1.0 } else { 1.0 }
-    }
-}
-
 /// Recording with 3 % of its torques off by one to two times their maximum, and 3 % of its angles by 0.05
 /// to 0.3 rad. Pushes of 0.3 of the largest torque last 0.3 s, at the given rate per minute on each joint.
 fn corrupted(recording: &Path, pushes_per_minute: f64) -> String {
     let mut table = Table::read(recording.to_str().expect("a path"));
-    let mut dice = Dice(1);
+    let mut random = Random::new("robust", 1);
     let time = table.column("t_s");
     let pushes = ((time[time.len() - 1] - time[0]) * pushes_per_minute / 60.0).round() as usize;
     for (column, name) in table.header.clone().iter().enumerate() {
@@ -101,16 +89,20 @@ fn corrupted(recording: &Path, pushes_per_minute: f64) -> String {
         }
         let greatest = table.column(name).iter().fold(0.0, |greatest: f64, value| greatest.max(value.abs()));
         for row in &mut table.rows {
-            if dice.roll() < 0.03 {
-                let size = if angle { 0.05 + 0.25 * dice.roll() } else { greatest * (1.0 + dice.roll()) };
-                row[column] += dice.sign() * size;
+            if random.uniform(0.0, 1.0) < 0.03 {
+                let size = if angle {
+                    0.05 + 0.25 * random.uniform(0.0, 1.0)
+                } else {
+                    greatest * (1.0 + random.uniform(0.0, 1.0))
+                };
+                row[column] += random.sign() * size;
             }
         }
         for push in 0..if torque { pushes } else { 0 } {
             // Never both joints at once: that would count as contact.
             let phase = if name == "tau1_Nm" { 0.1 } else { 0.6 };
-            let share = (push as f64 + phase + 0.2 * dice.roll()) / pushes as f64;
-            let (begin, size) = (time[0] + share * (time[time.len() - 1] - time[0]), dice.sign());
+            let share = (push as f64 + phase + 0.2 * random.uniform(0.0, 1.0)) / pushes as f64;
+            let (begin, size) = (time[0] + share * (time[time.len() - 1] - time[0]), random.sign());
             for (row, now) in table.rows.iter_mut().zip(&time) {
                 row[column] += if (begin..begin + 0.3).contains(now) { 0.3 * greatest * size } else { 0.0 };
             }

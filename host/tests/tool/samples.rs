@@ -2,6 +2,7 @@
 //! of a push.
 
 use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
+use scarab_host::base::random::Random;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -109,10 +110,9 @@ fn wrong_time_stamps_are_refused_where_inertias_are_wrong() {
     let file = changed(&folder, |table| {
         let column = index(table, "t_s");
         // Late by up to 1.9 ms, irregularly: rows are stamped when the recorder has time.
-        let mut random = 5_u64;
+        let mut random = Random::new("stamps", 5);
         for row in &mut table.rows {
-            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            row[column] += 1.9e-3 * (random >> 11) as f64 / (1_u64 << 53) as f64;
+            row[column] += random.uniform(0.0, 1.9e-3);
         }
     });
     let (run, report) = replay(&folder, &file, "--bandwidth 25");

@@ -8,6 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::command::Folder;
+use scarab_host::base::random::Random;
 
 const MS: Duration = Duration::from_millis(1);
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -299,17 +300,12 @@ fn a_flood_is_answered_by_bells_within_bounded_memory() {
     let mut stream = client.stream.try_clone().expect("a socket");
     let begin = Instant::now();
     let flood = thread::spawn(move || {
-        let mut random = 1_u32;
+        let mut random = Random::new("flood", 1);
         for _ in 0..FRAMES / 100 {
             let mut lines = String::new();
             for _ in 0..100 {
-                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 // Below 0x780, and without network management: all of these are answered.
-                lines.push_str(&format!(
-                    "t{:03X}2{:04X}\r",
-                    1 + (random >> 20) % 0x77F,
-                    random >> 8 & 0xFFFF
-                ));
+                lines.push_str(&format!("t{:03X}2{:04X}\r", 1 + random.below(0x77F), random.below(0x1_0000)));
             }
             stream.write_all(lines.as_bytes()).expect("a connection");
         }

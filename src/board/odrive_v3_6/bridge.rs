@@ -7,20 +7,20 @@ use super::registers::{load, store};
 use super::settings::timers::{BASES, BDTR, CCR1, MOE, TOP, bridge, compare};
 
 /// BDTR as the start wrote it: main output off.
-const RELEASED: u32 = bridge(0)[0].value;
+const OFF: u32 = bridge(0)[0].value;
 
 /// All three duties one half.
 const NO_VOLTAGE: u32 = TOP as u32 / 2;
 
 /// Turns both bridges off at once.
 #[inline]
-pub fn release_all() {
-    store(BASES[0] + BDTR, RELEASED);
-    store(BASES[1] + BDTR, RELEASED);
+pub fn disable_all() {
+    store(BASES[0] + BDTR, OFF);
+    store(BASES[1] + BDTR, OFF);
 }
 
 /// Whether both bridges are off.
-pub fn are_released() -> bool {
+pub fn are_disabled() -> bool {
     BASES.iter().all(|base| load(base + BDTR) & MOE == 0)
 }
 
@@ -30,9 +30,9 @@ pub fn are_released() -> bool {
 /// would have the duties of the last period before. This function therefore sets the duties to one half,
 /// which is no voltage.
 #[inline]
-pub fn release(axis: usize) {
+pub fn disable(axis: usize) {
     let Some(&base) = BASES.get(axis) else { return };
-    store(base + BDTR, RELEASED);
+    store(base + BDTR, OFF);
     for channel in [CCR1, CCR1 + 4, CCR1 + 8] {
         store(base + channel, NO_VOLTAGE);
     }
@@ -53,6 +53,6 @@ pub fn set_duty(axis: usize, duty: &[f32; 3]) {
 #[inline]
 pub fn enable(axis: usize) {
     if let Some(&base) = BASES.get(axis) {
-        store(base + BDTR, RELEASED | MOE);
+        store(base + BDTR, OFF | MOE);
     }
 }

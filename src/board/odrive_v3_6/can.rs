@@ -23,7 +23,7 @@ use super::registers::{apply, load, store};
 use super::settings::can::{
     BEGIN, CLOCK, EDGES, ERRORS, MAILBOX, MSR, PINS, RECEIVED, RF0R, SET_UP, TAKE_PART, TSR, set_up,
 };
-use crate::bus::{Controller, Frame};
+use crate::hal::{Controller, Frame};
 
 /// Longest wait for initialisation mode: the controller completes a reception first, at most a frame of the
 /// slowest bus, 1.1 ms.
@@ -125,7 +125,7 @@ pub fn lose() {
 }
 
 /// Clears the cause of the level-5 interrupt.
-pub(super) fn acknowledge() {
+pub fn acknowledge() {
     store(TSR, ANSWERED);
 }
 

@@ -12,7 +12,7 @@ use super::bridge;
 use super::registers::{load, store};
 use super::settings::external::{PENDING, STOP_LINE};
 use super::settings::pins::{BSRR, IDR, port};
-use crate::task::stays_active;
+use crate::safety::stays_active;
 
 fn is_high(letter: u8, number: u32) -> bool {
     load(port(letter) + IDR) >> number & 1 == 1
@@ -26,11 +26,11 @@ pub fn emergency_stop() -> bool {
 
 /// Interrupt of the contact's falling edge: turns both bridges off if the contact stays open, and returns
 /// whether it did.
-pub(super) fn stop_came() -> bool {
+pub fn stop_came() -> bool {
     store(PENDING, 1 << STOP_LINE);
     let open = emergency_stop();
     if open {
-        bridge::release_all();
+        bridge::disable_all();
     }
     open
 }

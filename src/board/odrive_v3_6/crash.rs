@@ -7,12 +7,12 @@ use cortex_m_rt::exception;
 use super::bridge;
 use super::registers::apply;
 use super::settings::CLOCK_FAILURE_SEEN;
-use crate::board::crash::{Cause, give_up};
+use crate::board::crash::{CrashCause, give_up};
 
 /// First step of every crash.
 #[unsafe(no_mangle)]
-extern "C" fn scarab_release() -> u32 {
-    bridge::release_all();
+extern "C" fn scarab_disable_all() -> u32 {
+    bridge::disable_all();
     DWT::cycle_count()
 }
 
@@ -20,7 +20,7 @@ extern "C" fn scarab_release() -> u32 {
 /// outputs are off.
 #[exception]
 unsafe fn NonMaskableInt() {
-    bridge::release_all();
+    bridge::disable_all();
     apply(&[CLOCK_FAILURE_SEEN]);
-    give_up(Cause::Clock, 0)
+    give_up(CrashCause::Clock, 0)
 }

@@ -44,7 +44,7 @@ pub fn index(axis: usize) -> Option<u16> {
 
 /// Interrupt of an index pulse: captures the count, late by the interrupt latency and at worst by a current
 /// tick. That is up to 10 us, or 3 counts at 36 turns per second of 8192. A glitch at rest is dropped.
-pub(super) fn index_came(axis: usize) {
+pub fn index_came(axis: usize) {
     if let (Some(slot), Some(sampled), Some(line)) =
         (INDEX.get(axis), SAMPLED.get(axis), INDEX_LINES.get(axis))
     {

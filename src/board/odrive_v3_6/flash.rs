@@ -59,7 +59,7 @@ pub struct Flash(());
 
 impl Flash {
     /// For the owner of the store; two instances would undo each other's writes.
-    pub(super) const fn new() -> Self {
+    pub const fn new() -> Self {
         Self(())
     }
 
@@ -70,7 +70,7 @@ impl Flash {
         patience: u32,
         change: impl FnOnce(),
     ) -> Result<(), FlashError> {
-        if !bridge::are_released() || brake::is_on() {
+        if !bridge::are_disabled() || brake::is_on() {
             return Err(FlashError::Armed);
         }
         store(SR, WRONG);

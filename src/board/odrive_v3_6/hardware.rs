@@ -38,13 +38,13 @@ impl Hardware<2> for Odrive {
     }
 
     #[inline(always)]
-    fn release_all(&mut self) {
-        bridge::release_all();
+    fn disable_all(&mut self) {
+        bridge::disable_all();
     }
 
     #[inline(always)]
-    fn release(&mut self, axis: usize) {
-        bridge::release(axis);
+    fn disable(&mut self, axis: usize) {
+        bridge::disable(axis);
     }
 
     #[inline(always)]

@@ -8,7 +8,7 @@ use crate::bus::drive::Mode;
 use crate::bus::identification::ResultsCopy;
 use crate::units::{Ampere, NewtonMetre};
 
-mod kept;
+mod storage;
 
 /// No identification result.
 const NOTHING: ResultsCopy<2, 1> = ResultsCopy::nothing();
@@ -83,12 +83,12 @@ impl Bench {
                 self.refused = self.refuses;
             }
             if let Some(LegRequest::Power(power)) = order.request.filter(|_| self.refused.is_none()) {
-                self.drive = self.drive.after(crate::leg::DriveEvent::Asked(power), 4);
+                self.drive = self.drive.after(crate::leg::DriveEvent::Requested(power), 4);
             }
             self.orders.push(order);
             for joint in 0..2 {
                 while let Some(frame) = self.device.poll(joint, self.now_us, &NOTHING) {
-                    self.device.hear(&frame, self.now_us, Some(joint), &NOTHING);
+                    self.device.receive(&frame, self.now_us, Some(joint), &NOTHING);
                     frames.push(frame);
                 }
             }
@@ -97,7 +97,7 @@ impl Bench {
     }
 
     fn send(&mut self, id: u16, data: &[u8]) -> Vec<Frame> {
-        self.device.hear(&Frame::new(id, data), self.now_us, None, &NOTHING);
+        self.device.receive(&Frame::new(id, data), self.now_us, None, &NOTHING);
         self.run(8)
     }
 
@@ -116,7 +116,7 @@ impl Bench {
     }
 
     /// Performs the pending store request and reports its outcome.
-    fn store(&mut self, done: bool) -> Option<(Keeping, [StoredNode; 2])> {
+    fn store(&mut self, done: bool) -> Option<(StoreCommand, [StoredNode; 2])> {
         let mut objects = [StoredNode::of(&[0x55; 9]); 2];
         let what = self.device.take_store(&mut objects)?;
         self.device.stored(done, &objects);
@@ -222,7 +222,7 @@ fn a_target_received_after_the_tick_is_in_the_next_order() {
     bench.send(0, &[1, 0]);
     bench.write(1, 0x6060, 0, 8, 1);
     bench.enable();
-    bench.device.hear(&Frame::new(0x301, &500_000_i32.to_le_bytes()), bench.now_us, None, &NOTHING);
+    bench.device.receive(&Frame::new(0x301, &500_000_i32.to_le_bytes()), bench.now_us, None, &NOTHING);
     let commands = bench.device.order().commands.expect("a host has the drive");
     let crate::leg::Target::CyclicPosition { position, .. } = commands[0].target else {
         panic!("{:?}", commands[0].target)
@@ -239,13 +239,13 @@ fn a_reset_node_restarts_once_even_on_a_full_bus() {
     bench.write(1, 0x6065, 0, 1, 4);
     // Communication reset, then node reset; no mailbox is free for the boot-up message.
     for command in [130, 129, 129] {
-        bench.device.hear(&Frame::new(0, &[command, 0]), bench.now_us, None, &NOTHING);
+        bench.device.receive(&Frame::new(0, &[command, 0]), bench.now_us, None, &NOTHING);
     }
     assert_eq!(bench.device.pending_reset, [Some(Reset::Node); 2]);
     bench.device.watch(bench.now_us, &NOTHING);
     assert_eq!(bench.device.pending_reset, [None; 2]);
     for id in [0x080, 0x201, 0x601, 0x700] {
-        bench.device.hear(&Frame::new(id, &[0; 8]), bench.now_us, None, &NOTHING);
+        bench.device.receive(&Frame::new(id, &[0; 8]), bench.now_us, None, &NOTHING);
     }
     assert_eq!(bench.device.pending_reset, [None; 2], "no second restart");
     let boots = bench.run(4).iter().filter(|frame| frame.id() & 0x780 == 0x700).count();
@@ -261,7 +261,7 @@ fn storing_while_the_other_node_resets_stores_its_old_parameters() {
     assert!(before.is_some());
     let save = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
     for frame in [Frame::new(0, &[129, 1]), Frame::new(0x602, &save)] {
-        bench.device.hear(&frame, bench.now_us, None, &NOTHING);
+        bench.device.receive(&frame, bench.now_us, None, &NOTHING);
     }
     assert_eq!(bench.store(true), before);
 }
@@ -274,7 +274,7 @@ fn nothing_is_sent_while_bus_off_and_only_new_frames_afterwards() {
     bench.device.on_controller(Controller::Off, &NOTHING);
     let request = Frame::new(0x080, &[]);
     for _ in 0..50 {
-        bench.device.hear(&request, bench.now_us, None, &NOTHING);
+        bench.device.receive(&request, bench.now_us, None, &NOTHING);
         assert_eq!(bench.run(4), []);
     }
     bench.drive = DriveState::ReadyToSwitchOn;
@@ -304,7 +304,7 @@ fn a_request_waits_for_a_step_of_the_drive() {
         ];
         bench.orders.clear();
         for frame in frames {
-            bench.device.hear(&frame, bench.now_us, None, &NOTHING);
+            bench.device.receive(&frame, bench.now_us, None, &NOTHING);
             bench.device.poll(0, bench.now_us, &NOTHING);
         }
         bench.run(8);
@@ -330,7 +330,7 @@ fn an_identification_requested_on_the_way_up_is_discarded() {
     for (id, data) in
         [(0x602, [0x2B, 0x40, 0x60, 0, 15, 0, 0, 0]), (0x601, [0x2F, 0x00, 0x21, 1, 1, 0, 0, 0])]
     {
-        bench.device.hear(&Frame::new(id, &data), bench.now_us, None, &NOTHING);
+        bench.device.receive(&Frame::new(id, &data), bench.now_us, None, &NOTHING);
     }
     bench.run(8);
     assert_eq!(bench.drive, DriveState::OperationEnabled);
@@ -517,10 +517,10 @@ fn a_step_during_a_quick_stop_is_reported_as_refused() {
         let mut bench = Bench::new();
         bench.send(0, &[1, 0]);
         bench.enable();
-        bench.device.hear(&Frame::new(0x201, &[2, 0]), bench.now_us, None, &NOTHING);
+        bench.device.receive(&Frame::new(0x201, &[2, 0]), bench.now_us, None, &NOTHING);
         bench.run(2);
         assert!(matches!(bench.drive, DriveState::QuickStopActive { .. }));
-        bench.device.hear(&Frame::new(0x201, &[word, 0]), bench.now_us, None, &NOTHING);
+        bench.device.receive(&Frame::new(0x201, &[word, 0]), bench.now_us, None, &NOTHING);
         let mut sent = bench.run(1);
         assert!(matches!(bench.drive, DriveState::QuickStopActive { .. }));
         sent.retain(|frame| matches!(frame.id(), 0x81 | 0x82));

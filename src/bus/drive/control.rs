@@ -1,4 +1,4 @@
-//! Drive profile of one joint: the controlword (6040) and its effects.
+//! Drive profile of one joint: the controlword (6040) and its effects, and the statusword (6041).
 //!
 //! Why a state per joint besides the leg's: a host enables its nodes one after the other and waits for each.
 //! A leg is enabled as a whole or not at all (`safety`). So each joint follows its own CiA 402 state machine,
@@ -16,10 +16,18 @@
 //! A controlword that asks for a step which does not exist from the present state has no effect, such as 7
 //! or F at switch on disabled, or any step during a quick stop or with bit 7 set. A new word of that kind is
 //! reported (FF0E). A repeated one is not: hosts repeat theirs while the other joint stops the leg.
-//! Source: CiA 402, controlword.
+//!
+//! ```text
+//! statusword
+//! bits 0-3, 5, 6  state          4 voltage, 9 remote       10 target reached   11 internal limit active
+//! bit 12   profile position: set-point acknowledge; homing: attained; cyclic: the command is followed
+//! bit 13   positions: following error; homing: error
+//! bit 15   this joint is enabled, but the leg's bridges are off because another joint is not enabled
+//! ```
+//!
+//! Source: CiA 402, controlword and statusword; bit 15 is manufacturer-specific.
 
 use super::coupling::level;
-use super::status::state_bits;
 use super::{JointCommand, JointStatus, Mode, SetPoint, Target};
 use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::Lost;
@@ -158,14 +166,14 @@ pub struct Axis {
     /// Bit 4 of the present controlword was accepted: set-point acknowledge or start of homing.
     taken: bool,
     /// Counts accepted set-points and starts of homing.
-    asked: u8,
+    request_count: u8,
     /// Fault that the leg must react to.
     fault: Option<FaultCode>,
     /// A host has sent a controlword other than 0.
     pub(super) commanded: bool,
     /// A step towards enabled was requested and not processed yet.
     rises: bool,
-    /// The present controlword asked for a step that does not exist.
+    /// The present controlword requested a step that does not exist.
     is_out_of_order: bool,
     /// Reason why such a step is refused, while it lasts.
     pub(in crate::bus) refused: Option<ErrorReport>,
@@ -204,7 +212,7 @@ impl Axis {
             resets: false,
             set_point: SetPoint { position: Radian::ZERO, relative: false, immediately: false },
             taken: false,
-            asked: 0,
+            request_count: 0,
             fault: None,
             commanded: false,
             rises: false,
@@ -240,7 +248,7 @@ impl Axis {
         core::mem::take(&mut self.rises)
     }
 
-    /// Whether the present controlword asked in vain for a step that does not exist in CiA 402. A fault says
+    /// Whether the present controlword requested a step that does not exist in CiA 402. A fault says
     /// itself why there is no step.
     pub(in crate::bus) const fn is_out_of_order(&self) -> bool {
         self.is_out_of_order
@@ -286,7 +294,7 @@ impl Axis {
         };
         if word & RESET == 0 {
             self.rises |= wanted > level(self.own);
-            self.ask(word);
+            self.request(word);
         }
         self.is_out_of_order = (is_new || self.is_out_of_order) && wanted > level(self.own);
         self.taken &= word & NEW != 0;
@@ -304,13 +312,13 @@ impl Axis {
             Some(Mode::Homing) => {}
             _ => return,
         }
-        self.asked = self.asked.wrapping_add(1);
+        self.request_count = self.request_count.wrapping_add(1);
         self.taken = true;
     }
 
-    fn ask(&mut self, word: u16) {
+    fn request(&mut self, word: u16) {
         use PowerRequest::{DisableOperation, DisableVoltage, EnableOperation, Shutdown, SwitchOn};
-        let mut go = |request| self.own = self.own.after(DriveEvent::Asked(request), 1);
+        let mut go = |request| self.own = self.own.after(DriveEvent::Requested(request), 1);
         match word & 0xF {
             low if low & 0b0010 == 0 => go(DisableVoltage),
             low if low & 0b0100 == 0 => self.stop(),
@@ -330,7 +338,7 @@ impl Axis {
     fn stop(&mut self) {
         use PowerRequest::{DisableVoltage, QuickStop};
         let request = if self.settings.quick_stop_option == 0 { DisableVoltage } else { QuickStop };
-        self.own = self.own.after(DriveEvent::Asked(request), 1);
+        self.own = self.own.after(DriveEvent::Requested(request), 1);
     }
 
     /// Reacts to a lost host by option code 6007.
@@ -341,11 +349,11 @@ impl Axis {
                 Some(code) => self.fault = Some(code),
                 None => self.stop(),
             },
-            2 => self.own = self.own.after(DriveEvent::Asked(PowerRequest::DisableVoltage), 1),
+            2 => self.own = self.own.after(DriveEvent::Requested(PowerRequest::DisableVoltage), 1),
             3 => self.stop(),
             _ => {}
         }
-        // Bits held down are released, so that the next controlword has rising edges.
+        // Bits held down are cleared, so that the next controlword has rising edges.
         (self.controlword, self.is_out_of_order) = (0, false);
         self.taken = false;
     }
@@ -419,7 +427,7 @@ impl Axis {
         let acceleration = |micro: u32| RadianPerSecondSquared(micro as f32 * 1e-6);
         JointCommand {
             target,
-            asked: self.asked,
+            request_count: self.request_count,
             feedforward: settings.feedforward,
             halt: self.controlword & HALT != 0,
             velocity: RadianPerSecond(settings.profile_velocity as f32 * 1e-6),
@@ -443,5 +451,19 @@ impl Axis {
             unit *= 0.1;
         }
         Second(f32::from(self.settings.period) * unit)
+    }
+}
+
+/// Statusword bits of a state.
+const fn state_bits(state: DriveState) -> u16 {
+    match state {
+        DriveState::NotReadyToSwitchOn => 0x00,
+        DriveState::SwitchOnDisabled => 0x40,
+        DriveState::ReadyToSwitchOn => 0x21,
+        DriveState::SwitchedOn => 0x23,
+        DriveState::OperationEnabled => 0x27,
+        DriveState::QuickStopActive { .. } => 0x07,
+        DriveState::FaultReactionActive { .. } => 0x0F,
+        DriveState::Fault { .. } => 0x08,
     }
 }

@@ -17,7 +17,6 @@
 mod control;
 mod coupling;
 mod objects;
-mod status;
 
 pub use crate::leg::{JointCommand, JointStatus, Mode, SetPoint, Target};
 pub(super) use control::USUAL_KBIT;

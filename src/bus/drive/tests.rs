@@ -147,10 +147,10 @@ fn a_lost_host_stops_the_drive_by_its_option() {
     ];
     for (option, state, nmt) in cases {
         let mut board = Board::enabled();
-        board.hear(0, &[1, 0]);
+        board.receive(0, &[1, 0]);
         assert_eq!(board.write(0x6007, 0, option, 2), Ok(()));
         assert_eq!(board.write(0x1016, 1, 80 << 16 | 20, 4), Ok(()));
-        board.hear(0x750, &[5]);
+        board.receive(0x750, &[5]);
         board.frames();
         let frames = board.run(80);
         assert!(frames.iter().all(|frame| frame.id() != 0x81), "{frames:?}");
@@ -160,7 +160,7 @@ fn a_lost_host_stops_the_drive_by_its_option() {
         assert_eq!((board.states()[0], board.nodes[0].state()), (state, nmt), "{option}");
         // The host is back: the end of the error is reported, and nothing restarts.
         board.run(10);
-        board.hear(0x750, &[5]);
+        board.receive(0x750, &[5]);
         let frames = board.run(2);
         let back = frames.iter().find(|frame| frame.id() == 0x81).expect("the end of it");
         assert_eq!(back.data(), [0; 8]);
@@ -203,22 +203,22 @@ fn a_mode_is_displayed_before_the_leg_is_enabled() {
 fn a_lost_bus_or_an_nmt_command_stops_the_drive_for_good() {
     use super::super::Controller;
     let lose: [fn(&mut Board); 6] = [
-        |board| board.hear(0, &[2, 1]),
-        |board| board.hear(0, &[128, 1]),
-        |board| board.hear(0, &[129, 2]),
-        |board| board.hear(0, &[130, 0]),
+        |board| board.receive(0, &[2, 1]),
+        |board| board.receive(0, &[128, 1]),
+        |board| board.receive(0, &[129, 2]),
+        |board| board.receive(0, &[130, 0]),
         |board| board.nodes[1].on_controller(Controller::Passive, &mut board.axes[1]),
         |board| board.nodes[1].on_controller(Controller::Off, &mut board.axes[1]),
     ];
     for (number, lose) in lose.into_iter().enumerate() {
         let mut board = Board::enabled();
-        board.hear(0, &[1, 0]);
+        board.receive(0, &[1, 0]);
         board.tick();
         lose(&mut board);
         board.tick();
         assert!(matches!(board.drive, DriveState::QuickStopActive { .. }), "{number}: {:?}", board.drive);
         board.nodes[1].on_controller(Controller::Active, &mut board.axes[1]);
-        board.hear(0, &[1, 0]);
+        board.receive(0, &[1, 0]);
         board.run(10);
         assert_eq!(board.control([15; 2]), [0x40; 2], "{number}");
     }
@@ -241,11 +241,11 @@ fn each_rising_edge_takes_one_set_point() {
         assert!(axis.statusword() & 1 << 12 != 0);
         axis.write(CONTROLWORD, 0x3F).expect("a word");
         let point = number(axis);
-        assert_eq!((axis.command().asked, point.immediately, point.relative), (count, true, false));
+        assert_eq!((axis.command().request_count, point.immediately, point.relative), (count, true, false));
         assert!((point.position.0 - position as f32 * 1e-6).abs() < 1e-7);
         // A new target without a rising edge moves nothing.
         axis.write(Object::at(0x607A, 0), 900_000).expect("a target");
-        assert_eq!((number(axis), axis.command().asked), (point, count));
+        assert_eq!((number(axis), axis.command().request_count), (point, count));
         axis.write(CONTROLWORD, 0x2F).expect("a word");
         assert!(axis.statusword() & 1 << 12 == 0);
     }
@@ -267,7 +267,7 @@ fn a_set_point_before_power_is_discarded() {
     board.control([0x0F, 15]);
     board.control([0x1F, 15]);
     assert_ne!(board.axes[0].command().target, Target::ProfilePosition(SetPoint::default()));
-    assert_eq!(board.axes[0].command().asked, 1);
+    assert_eq!(board.axes[0].command().request_count, 1);
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::leg::{LoggedSample, Segment};
 
 /// One stored sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Kept<const N: usize> {
+struct Entry<const N: usize> {
     tick: u32,
     segment: u32,
     position_rad: [f32; N],
@@ -27,7 +27,7 @@ struct Kept<const N: usize> {
 /// Samples that wait for a host, at most `L`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Log<const N: usize, const L: usize> {
-    samples: [Kept<N>; L],
+    samples: [Entry<N>; L],
     first: usize,
     length: usize,
     held: usize,
@@ -47,7 +47,7 @@ const fn number(segment: Option<Segment>) -> u32 {
 impl<const N: usize, const L: usize> Log<N, L> {
     /// Empty queue.
     pub const EMPTY: Self = Self {
-        samples: [Kept { tick: 0, segment: 0, position_rad: [0.0; N], torque_nm: [0.0; N] }; L],
+        samples: [Entry { tick: 0, segment: 0, position_rad: [0.0; N], torque_nm: [0.0; N] }; L],
         first: 0,
         length: 0,
         held: 0,
@@ -62,7 +62,7 @@ impl<const N: usize, const L: usize> Log<N, L> {
         let place = (self.first + self.length) % L.max(1);
         match self.samples.get_mut(place) {
             Some(slot) if self.length < L => {
-                *slot = Kept {
+                *slot = Entry {
                     tick: logged.sample.tick,
                     segment: number(logged.segment),
                     position_rad: logged.sample.position_rad,
@@ -111,14 +111,14 @@ impl<const N: usize, const L: usize> Log<N, L> {
                 break;
             }
             let place = place % Self::BYTES;
-            let kept = self.samples.get((self.first + sample) % L.max(1));
-            *byte = kept.and_then(|kept| kept.byte(place)).unwrap_or(0);
+            let entry = self.samples.get((self.first + sample) % L.max(1));
+            *byte = entry.and_then(|entry| entry.byte(place)).unwrap_or(0);
         }
         (self.held * Self::BYTES) as u32
     }
 }
 
-impl<const N: usize> Kept<N> {
+impl<const N: usize> Entry<N> {
     fn byte(&self, place: usize) -> Option<u8> {
         let word = match place / 4 {
             0 => self.tick,

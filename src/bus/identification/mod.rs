@@ -28,7 +28,7 @@ use crate::leg::{Activity, IdentifyPhase, Parameter, Permission, Plan, Reason, S
 
 /// Request of a host to the leg, besides power and targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ask {
+pub enum IdentificationRequest {
     /// Start an identification: excite, solve, validate.
     Identify,
     /// Cancel the identification.
@@ -54,7 +54,7 @@ pub struct LegObjects<const N: usize, const L: usize> {
     pub generation: u32,
     /// Last command written.
     command: u8,
-    asked: Option<Ask>,
+    requested: Option<IdentificationRequest>,
     /// Pending store request; `true` restores the defaults.
     store: Option<bool>,
 }
@@ -71,20 +71,20 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
             seed,
             generation,
             command: 0,
-            asked: None,
+            requested: None,
             store: None,
         }
     }
 
     /// Whether this request is pending.
     #[must_use]
-    pub fn has_asked(&self, ask: Ask) -> bool {
-        self.asked == Some(ask)
+    pub fn has_requested(&self, request: IdentificationRequest) -> bool {
+        self.requested == Some(request)
     }
 
     /// Takes the pending request.
-    pub fn take_asked(&mut self) -> Option<Ask> {
-        self.asked.take()
+    pub fn take_request(&mut self) -> Option<IdentificationRequest> {
+        self.requested.take()
     }
 
     /// Takes the pending store request; `true` restores the defaults.
@@ -122,10 +122,10 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
         let is_identifying = matches!(self.activity, Activity::Identify(_));
         match (sub, value) {
             (1, 0..=3) => {
-                self.asked = match value {
-                    1 => Some(Ask::Identify),
-                    2 => Some(Ask::Cancel),
-                    3 => Some(Ask::TakeUpdate),
+                self.requested = match value {
+                    1 => Some(IdentificationRequest::Identify),
+                    2 => Some(IdentificationRequest::Cancel),
+                    3 => Some(IdentificationRequest::TakeUpdate),
                     _ => None,
                 };
                 self.command = value as u8;
@@ -263,7 +263,7 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
 
     fn store(&mut self, defaults: bool) -> Result<(), Abort> {
         // Not with an active inhibit reason either: the motors may be braking.
-        if self.axis.drive().permission() != Permission::Released || self.axis.is_blocked() {
+        if self.axis.drive().permission() != Permission::Off || self.axis.is_blocked() {
             return Err(Abort::State);
         }
         self.leg.store = Some(defaults);

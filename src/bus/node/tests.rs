@@ -6,7 +6,7 @@ use super::*;
 
 fn started() -> Board {
     let mut board = Board::started(1);
-    board.hear(0, &[1, 0]);
+    board.receive(0, &[1, 0]);
     board.tick();
     board
 }
@@ -21,7 +21,7 @@ fn a_node_boots_once_and_again_after_each_reset() {
     for reset in [129, 130] {
         assert_eq!(board.write(0x6065, 0, 5, 4), Ok(()));
         assert_eq!(board.write(0x1005, 0, 0x1FF, 4), Ok(()));
-        board.hear(0, &[reset, 3]);
+        board.receive(0, &[reset, 3]);
         assert_eq!(board.frames(), [boot[0]]);
         // A communication reset leaves the drive's objects unchanged.
         let window = if reset == 130 { 5 } else { 87_266 };
@@ -70,11 +70,11 @@ fn a_stopped_node_sends_its_heartbeat_and_nothing_else() {
     let mut board = started();
     assert_eq!(board.write(0x1017, 0, 1, 2), Ok(()));
     board.frames();
-    board.hear(0, &[2, 1]);
+    board.receive(0, &[2, 1]);
     assert_eq!(board.nodes[0].state(), NmtState::Stopped);
-    board.hear(0x601, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]);
-    board.hear(0x080, &[]);
-    board.hear(0x201, &[6, 0]);
+    board.receive(0x601, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]);
+    board.receive(0x080, &[]);
+    board.receive(0x201, &[6, 0]);
     let frames = board.run(8);
     let own: std::vec::Vec<_> = frames.iter().filter(|frame| frame.id() & 0x7F == 1).collect();
     assert_eq!(own, [&Frame::new(0x701, &[4]); 2]);
@@ -84,7 +84,7 @@ fn a_stopped_node_sends_its_heartbeat_and_nothing_else() {
 fn the_heartbeat_carries_the_state_at_its_period() {
     let mut board = Board::started(1);
     assert_eq!(board.write(0x1017, 0, 5, 2), Ok(()));
-    board.hear(0, &[1, 1]);
+    board.receive(0, &[1, 1]);
     let frames = board.run(400);
     let count = frames.iter().filter(|frame| **frame == Frame::new(0x701, &[5])).count();
     assert_eq!(count, 20);
@@ -94,17 +94,17 @@ fn the_heartbeat_carries_the_state_at_its_period() {
 fn synchronous_pdos_are_written_at_the_sync() {
     let mut board = started();
     assert_eq!(board.write(0x1401, 2, 1, 1), Ok(()));
-    board.hear(0x301, &[1, 2, 3, 0]);
+    board.receive(0x301, &[1, 2, 3, 0]);
     assert_eq!(board.read(0x607A, 0), Ok(0));
-    board.hear(0x080, &[]);
+    board.receive(0x080, &[]);
     board.frames();
     assert_eq!(board.read(0x607A, 0), Ok(0x30201));
     assert_eq!(board.write(0x1401, 2, 255, 1), Ok(()));
-    board.hear(0x301, &[4, 0, 0, 0]);
+    board.receive(0x301, &[4, 0, 0, 0]);
     assert_eq!(board.read(0x607A, 0), Ok(4));
     // PDOs are ignored in Pre-operational.
-    board.hear(0, &[128, 0]);
-    board.hear(0x301, &[5, 0, 0, 0]);
+    board.receive(0, &[128, 0]);
+    board.receive(0x301, &[5, 0, 0, 0]);
     assert_eq!(board.read(0x607A, 0), Ok(4));
 }
 
@@ -125,7 +125,7 @@ fn a_pdo_can_be_remapped_while_operational() {
         assert_eq!(board.nodes[0].state(), NmtState::Operational);
     }
     let lengths = |board: &mut Board| -> std::vec::Vec<usize> {
-        board.hear(0x080, &[]);
+        board.receive(0x080, &[]);
         let frames = board.frames();
         frames.iter().filter(|frame| frame.id() == 0x281).map(|frame| frame.data().len()).collect()
     };
@@ -138,14 +138,14 @@ fn a_pdo_can_be_remapped_while_operational() {
 #[test]
 fn a_short_pdo_is_reported_and_ignored_and_a_late_one_stops_the_drive() {
     let mut board = started();
-    board.hear(0x301, &[1, 2, 3]);
+    board.receive(0x301, &[1, 2, 3]);
     let sent = board.tick();
     assert_eq!(sent[0], Frame::new(0x81, &[0x10, 0x82, 0b1_0001, 0, 0, 0, 0, 0]));
     assert_eq!(board.read(0x607A, 0), Ok(0));
-    board.hear(0x301, &[1, 0, 0, 0]);
+    board.receive(0x301, &[1, 0, 0, 0]);
     assert_eq!(board.tick()[0], Frame::new(0x81, &[0; 8]));
     assert_eq!(board.write(0x1401, 5, 10, 2), Ok(()));
-    board.hear(0x301, &[1, 0, 0, 0]);
+    board.receive(0x301, &[1, 0, 0, 0]);
     assert_eq!(board.run(40), []);
     let sent = board.run(2);
     assert_eq!(sent[0], Frame::new(0x81, &[0x50, 0x82, 0b1_0001, 0, 0, 0, 0, 0]));
@@ -157,7 +157,7 @@ fn a_counted_sync_without_valid_counter_is_ignored() {
     let mut board = started();
     assert_eq!(board.write(0x1019, 0, 4, 1), Ok(()));
     let sent = |board: &mut Board, data: &[u8]| {
-        board.hear(0x080, data);
+        board.receive(0x080, data);
         board.frames().iter().filter(|frame| frame.id() == 0x281).count()
     };
     assert_eq!([sent(&mut board, &[]), sent(&mut board, &[5]), sent(&mut board, &[0])], [0; 3]);
@@ -193,7 +193,7 @@ fn reconfiguring_a_heartbeat_ends_its_error_and_the_next_is_reported() {
     assert_eq!(board.write(0x1029, 1, 1, 1), Ok(()));
     for _ in 0..3 {
         assert_eq!(board.write(0x1016, 1, 80 << 16 | 10, 4), Ok(()));
-        board.hear(0x750, &[5]);
+        board.receive(0x750, &[5]);
         board.frames();
         board.now_us += 20_000;
         assert_eq!(codes(&board.frames()), [0x8130]);
@@ -210,12 +210,12 @@ fn another_pdo_does_not_end_the_error_of_a_late_one() {
         assert_eq!(board.write(object, 5, value, 2), Ok(()));
     }
     assert_eq!(board.write(0x1029, 1, 1, 1), Ok(()));
-    board.hear(0x201, &[0, 0]);
+    board.receive(0x201, &[0, 0]);
     board.frames();
     board.now_us += 101_000;
     assert_eq!(codes(&board.frames()), [0x8250]);
-    board.hear(0x301, &[0; 4]);
+    board.receive(0x301, &[0; 4]);
     assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), (std::vec::Vec::new(), Ok(0x11)));
-    board.hear(0x201, &[0, 0]);
+    board.receive(0x201, &[0, 0]);
     assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), ([0].into(), Ok(0)));
 }

@@ -48,15 +48,19 @@ fn a_segment_with_the_wrong_toggle_ends_the_transfer() {
     assert_eq!(code(board.ask([0x60, 0, 0, 0, 0, 0, 0, 0])), Some(0x0504_0001));
 }
 
-/// Uploads by blocks; `hears(n)` says whether the client receives the nth segment.
-fn block_upload(board: &mut Board, block: u8, mut hears: impl FnMut(usize) -> bool) -> (Vec<u8>, u16, usize) {
+/// Uploads by blocks; `receives(n)` says whether the client receives the nth segment.
+fn block_upload(
+    board: &mut Board,
+    block: u8,
+    mut receives: impl FnMut(usize) -> bool,
+) -> (Vec<u8>, u16, usize) {
     let begin = board.ask(request(0xA4, 0x100A, [block, 0, 0, 0])).expect("an answer");
     assert_eq!(begin, request(0xC6, 0x100A, (LONG as u32).to_le_bytes()));
     let id = board.nodes[0].id();
     let (mut bytes, mut segments): (Vec<u8>, usize) = (Vec::new(), 0);
     let mut send = [0xA3, 0, 0, 0, 0, 0, 0, 0];
     loop {
-        board.hear(id.on(0x600), &send);
+        board.receive(id.on(0x600), &send);
         let frames: Vec<[u8; 8]> = board
             .frames()
             .iter()
@@ -67,7 +71,7 @@ fn block_upload(board: &mut Board, block: u8, mut hears: impl FnMut(usize) -> bo
             && end[0] & 0xE3 == 0xC1
         {
             bytes.truncate(bytes.len() - usize::from(end[0] >> 2 & 7));
-            board.hear(id.on(0x600), &[0xA1, 0, 0, 0, 0, 0, 0, 0]);
+            board.receive(id.on(0x600), &[0xA1, 0, 0, 0, 0, 0, 0, 0]);
             assert_eq!(board.frames(), []);
             return (bytes, u16::from_le_bytes([end[1], end[2]]), segments);
         }
@@ -75,7 +79,7 @@ fn block_upload(board: &mut Board, block: u8, mut hears: impl FnMut(usize) -> bo
         let mut taken = 0;
         for frame in frames {
             segments += 1;
-            if hears(segments) && frame[0] & 0x7F == taken + 1 {
+            if receives(segments) && frame[0] & 0x7F == taken + 1 {
                 taken += 1;
                 bytes.extend(&frame[1..]);
             }
@@ -126,7 +130,7 @@ fn invalid_block_sizes_and_segment_numbers_are_refused() {
         assert_eq!(code(board.ask(request(0xA4, 0x100A, [block, 0, 0, 0]))), Some(0x0504_0002));
     }
     board.ask(request(0xA4, 0x100A, [3, 0, 0, 0]));
-    board.hear(0x601, &[0xA3, 0, 0, 0, 0, 0, 0, 0]);
+    board.receive(0x601, &[0xA3, 0, 0, 0, 0, 0, 0, 0]);
     assert_eq!(board.frames().len(), 3);
     assert_eq!(code(board.ask([0xA2, 4, 3, 0, 0, 0, 0, 0])), Some(0x0504_0003));
 }

@@ -5,6 +5,7 @@ use std::vec::Vec;
 use super::super::tests::Board;
 use super::*;
 use crate::leg::DriveState;
+use crate::testing::TestRandom;
 
 const MS: u64 = 1000;
 
@@ -14,7 +15,7 @@ fn begins(frames: &[(Kind, u64)], until_us: u64) -> Option<u64> {
     let mut frames = frames.iter().peekable();
     (0..until_us).step_by(500).find(|&now_us| {
         while let Some((kind, at_us)) = frames.next_if(|(_, at_us)| *at_us <= now_us) {
-            silence.heard(*kind, *at_us);
+            silence.received(*kind, *at_us);
         }
         silence.begins(now_us)
     })
@@ -63,11 +64,8 @@ fn irregular_or_slow_frames_never_arm() {
 
 #[test]
 fn jitter_pauses_and_a_new_rate_are_not_silence() {
-    let mut random = 1_u64;
-    let mut below = |bound: u64| {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (random >> 33) % bound
-    };
+    let mut random = TestRandom::new(1);
+    let mut below = |bound: u64| random.below(bound);
     // One minute at 2 ms with intervals of 0 to 4 ms; one of 100 intervals is a pause of up to 95 ms.
     let mut now = 0;
     let host: Vec<_> = (0..30_000)
@@ -119,17 +117,17 @@ impl Board {
     /// Sends `count` host cycles of 2 ms: SYNC, or a frame to the first node with the controlword.
     fn cycles(&mut self, id: u16, data: &[u8], count: u32) {
         for _ in 0..count {
-            self.hear(id, data);
+            self.receive(id, data);
             self.run(8);
         }
     }
 
     fn moving() -> Self {
         let mut board = Self::started(1);
-        board.hear(0, &[1, 0]);
+        board.receive(0, &[1, 0]);
         for word in [6, 7, 15] {
             for id in [0x201, 0x202] {
-                board.hear(id, &[word, 0]);
+                board.receive(id, &[word, 0]);
             }
             board.run(4);
         }
@@ -155,8 +153,8 @@ fn a_silent_host_is_reported_and_stops_the_leg_by_its_option() {
         assert_eq!(reports.iter().map(|frame| frame.id()).collect::<Vec<_>>(), [0x81, 0x82]);
         assert_eq!(board.read(0x603F, 0), Ok(0xFF0F));
         // The host sends again.
-        board.hear(0, &[1, 0]);
-        board.hear(0x80, &[]);
+        board.receive(0, &[1, 0]);
+        board.receive(0x80, &[]);
         let frames = board.run(4);
         assert!(frames.iter().any(|frame| frame.id() == 0x81 && frame.data() == [0; 8]), "{frames:?}");
         assert_eq!(board.drive == DriveState::OperationEnabled, enabled);
@@ -193,12 +191,12 @@ fn a_host_that_stops_on_purpose_is_not_reported() {
     // The drive is off.
     let mut board = Board::moving();
     board.cycles(0x80, &[], 50);
-    [0x201, 0x202].into_iter().for_each(|id| board.hear(id, &[0, 0]));
+    [0x201, 0x202].into_iter().for_each(|id| board.receive(id, &[0, 0]));
     assert_eq!(quiet(&mut board), crate::bus::NmtState::Operational);
     // An NMT command stops the drive without an error.
     let mut board = Board::moving();
     board.cycles(0x80, &[], 50);
-    board.hear(0, &[2, 0]);
+    board.receive(0, &[2, 0]);
     quiet(&mut board);
     // The detection is switched off (2013).
     let mut board = Board::moving();

@@ -1,9 +1,7 @@
 //! Random frames: all identifiers and lengths, interrupted transfers, two clients at once.
 
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::*;
+use crate::testing::TestRandom;
 
 /// Whether the state bits of the statusword are a CiA 402 state.
 fn is_state(word: u16) -> bool {
@@ -11,11 +9,11 @@ fn is_state(word: u16) -> bool {
 }
 
 /// A random frame, mostly a valid one.
-fn frame(random: &mut impl Rng) -> (u16, Vec<u8>) {
-    let [kind, a, b, c] = random.next_u32().to_le_bytes();
+fn frame(random: &mut TestRandom) -> (u16, Vec<u8>) {
+    let [kind, a, b, c] = random.bits().to_le_bytes();
     // Separate random bytes, so that the choices are independent.
-    let [cut, short, command, _] = random.next_u32().to_le_bytes();
-    let mut data = [random.next_u32().to_le_bytes(), random.next_u32().to_le_bytes()].concat();
+    let [cut, short, command, _] = random.bits().to_le_bytes();
+    let mut data = [random.bits().to_le_bytes(), random.bits().to_le_bytes()].concat();
     let id = match kind % 8 {
         // Requests with an existing command and object.
         0..=3 => {
@@ -49,17 +47,17 @@ fn frame(random: &mut impl Rng) -> (u16, Vec<u8>) {
 }
 
 fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut random = TestRandom::new(seed);
     let mut board = Board::started(1);
     let (mut most, mut seen) = (0, [0; 4]);
     for number in 0..frames {
         let (id, data) = frame(&mut random);
-        board.hear(id, &data);
-        if random.next_u32() % 64 == 0 {
+        board.receive(id, &data);
+        if random.bits() % 64 == 0 {
             board.now_us += 2_000_000;
         }
         // A correct sequence that enables the leg, now and then.
-        if random.next_u32() % 512 == 0 {
+        if random.bits() % 512 == 0 {
             for (id, data) in [
                 (0, [130, 0]),
                 (0, [1, 0]),
@@ -68,11 +66,11 @@ fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
                 (0x201, [15, 0]),
                 (0x202, [15, 0]),
             ] {
-                board.hear(id, &data);
+                board.receive(id, &data);
                 board.tick();
             }
         }
-        if random.next_u32() % 4096 == 0 {
+        if random.bits() % 4096 == 0 {
             let fault = crate::leg::Fault { code: crate::leg::FaultCode::Overspeed, joint: 1 };
             board.drive = board.drive.after(DriveEvent::Failed(fault), 4);
         }

@@ -26,7 +26,7 @@ fn map(board: &mut Board, place: usize, communication: u16, cob: u32, kind: u32,
 /// Compact mapping of nodes 1 and 2 (docs/bus.md).
 fn compact() -> Board {
     let mut board = Board::started(1);
-    board.hear(0, &[1, 0]);
+    board.receive(0, &[1, 0]);
     board.frames();
     for place in 0..2 {
         let node = 1 + place as u32;
@@ -46,8 +46,8 @@ fn compact() -> Board {
 #[test]
 fn the_compact_mapping_moves_two_joints_with_one_frame_and_answers_with_two() {
     let mut board = compact();
-    board.hear(0x301, &[1, 2, 3, 0, 4, 5, 6, 0]);
-    board.hear(0x080, &[]);
+    board.receive(0x301, &[1, 2, 3, 0, 4, 5, 6, 0]);
+    board.receive(0x080, &[]);
     let sent: Vec<(u16, usize)> =
         board.frames().iter().map(|frame| (frame.id(), frame.data().len())).collect();
     assert_eq!(sent, [(0x181, 8), (0x182, 8)]);

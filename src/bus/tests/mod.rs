@@ -74,7 +74,7 @@ impl Board {
     }
 
     /// Puts a frame on the bus.
-    pub fn hear(&mut self, id: u16, data: &[u8]) {
+    pub fn receive(&mut self, id: u16, data: &[u8]) {
         for (node, axis) in self.nodes.iter_mut().zip(&mut self.axes) {
             node.on_frame(&Frame::new(id, data), self.now_us, axis);
         }
@@ -95,7 +95,7 @@ impl Board {
                 PowerRequest::Shutdown | PowerRequest::SwitchOn | PowerRequest::EnableOperation
             );
             if !(self.refuses && enables) {
-                self.drive = self.drive.after(DriveEvent::Asked(request), 4);
+                self.drive = self.drive.after(DriveEvent::Requested(request), 4);
             }
         }
         self.frames()
@@ -119,7 +119,7 @@ impl Board {
     /// Sends an SDO request to the first node and returns its answer.
     pub fn ask(&mut self, request: [u8; 8]) -> Option<[u8; 8]> {
         let id = self.nodes[0].id();
-        self.hear(id.on(0x600), &request);
+        self.receive(id.on(0x600), &request);
         let [node, _] = &mut self.nodes;
         // Other frames are discarded.
         while let Some(frame) = node.poll(self.now_us, &mut self.axes[0]) {

@@ -48,7 +48,7 @@ fn replay() -> Replay {
         } else {
             assert!(!ours.iter().any(|frame| frame.id() == id + 0x580 - 0x600), "unused answer: {id:x}");
             for board in &mut boards {
-                board.hear(id, &data);
+                board.receive(id, &data);
                 ours.extend(board.frames());
             }
         }
@@ -90,7 +90,7 @@ fn the_recorded_session_configures_pdos_while_operational() {
             assert_eq!(board.read(index, sub), Ok(value), "{index:x}");
         }
         // The recording contains no SYNC; the next one triggers four PDOs per node.
-        board.hear(0x80, &[]);
+        board.receive(0x80, &[]);
         let frames: Vec<(u16, usize)> =
             board.frames().iter().map(|frame| (frame.id(), frame.data().len())).collect();
         let node = node as u16;
@@ -110,7 +110,7 @@ fn the_recorded_session_enables_one_joint_and_the_leg_waits_for_both() {
         assert_eq!(board.drive, DriveState::SwitchOnDisabled);
         let knee = board.nodes[1].id();
         for word in [0x06, 0x3F] {
-            board.hear(knee.on(0x200), &[word, 0]);
+            board.receive(knee.on(0x200), &[word, 0]);
             board.run(4);
         }
         assert_eq!(board.drive, DriveState::OperationEnabled);

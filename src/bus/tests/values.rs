@@ -82,8 +82,8 @@ fn objects_of_another_maker_are_accepted() {
         assert_eq!(board.write(index, sub, value, size), Ok(()), "{index:x} {sub}");
     }
     board.run(1);
-    board.hear(0, &[1, 0]);
-    board.hear(0x201, &[6, 0, 0xAA, 0, 0, 0]);
+    board.receive(0, &[1, 0]);
+    board.receive(0x201, &[6, 0, 0xAA, 0, 0, 0]);
     assert_eq!(
         (board.read(0x6040, 0), board.read(0x2194, 0), board.read(0x60FE, 1)),
         (Ok(6), Ok(0xAA), Ok(0xAA))

@@ -31,7 +31,8 @@
 //! rows and a queue of row centres.
 
 use crate::ident::record::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE};
-use crate::ident::record::recorder::{LARGEST_STILL_SHARE, RowModel};
+use crate::ident::record::recorder::LARGEST_STILL_SHARE;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::record::rows::{DECIMATION, FilteredRows};
 use crate::ident::signal::smoothing::Smoothed;
 use crate::model::{Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, rigid_body_torques};
@@ -92,7 +93,7 @@ struct HeldRow<T, const N: usize, const B: usize> {
 pub struct Alignment<T, const N: usize, const B: usize, const PENDING: usize> {
     /// Packed: base columns, directions, residual.
     factor: [T; LARGEST_SIZE],
-    wild: [T; N],
+    outlier_bound: [T; N],
     weight: [T; N],
     /// Columns that are not estimated.
     dropped: [bool; B],
@@ -101,7 +102,7 @@ pub struct Alignment<T, const N: usize, const B: usize, const PENDING: usize> {
     rows: usize,
     left: usize,
     /// Index of each joint's last row with an unexpectedly large residual.
-    last_wild: [Option<usize>; N],
+    last_outlier: [Option<usize>; N],
     /// Directions at the centres of unfinished rows.
     queue: [[[T; N]; DIRECTIONS]; PENDING],
     next: usize,
@@ -123,13 +124,13 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         };
         Self {
             factor: [zero; LARGEST_SIZE],
-            wild: [T::LARGEST; N],
+            outlier_bound: [T::LARGEST; N],
             weight: [zero; N],
             dropped: [false; B],
             held: [row; HELD],
             rows: 0,
             left: 0,
-            last_wild: [None; N],
+            last_outlier: [None; N],
             queue: [[[zero; N]; DIRECTIONS]; PENDING],
             next: 0,
             waiting: 0,
@@ -143,12 +144,13 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         self.factor.fill(T::zero());
     }
 
-    /// Starts another motion. A residual above `wild` (N m) marks a row as disturbed; `noise` is
+    /// Starts another motion. A residual above `outlier_bound` (N m) marks a row as disturbed; `noise` is
     /// the standard deviation of an independent row of each joint, N m. Columns that were
     /// `dropped` are not free to follow.
-    pub fn begin(&mut self, wild: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
+    pub fn begin(&mut self, outlier_bound: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
         self.break_off();
-        (self.wild, self.weight, self.dropped) = (*wild, noise.map(|noise| T::one() / noise), *dropped);
+        (self.outlier_bound, self.weight, self.dropped) =
+            (*outlier_bound, noise.map(|noise| T::one() / noise), *dropped);
     }
 
     /// Ends a continuous stretch of samples: all rows that are held back enter the factor.
@@ -156,7 +158,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         while self.left < self.rows {
             self.release();
         }
-        (self.rows, self.left, self.last_wild) = (0, 0, [None; N]);
+        (self.rows, self.left, self.last_outlier) = (0, 0, [None; N]);
         (self.next, self.waiting, self.instants) = (0, 0, 0);
     }
 
@@ -199,8 +201,8 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         for joint in 0..N {
             let row = rows.regressor[joint].iter().zip(values);
             residual[joint] -= row.fold(T::zero(), |sum, (&y, &p)| sum + y * p);
-            if used[joint] && real::abs(residual[joint]) > self.wild[joint] {
-                self.last_wild[joint] = Some(self.rows);
+            if used[joint] && real::abs(residual[joint]) > self.outlier_bound[joint] {
+                self.last_outlier[joint] = Some(self.rows);
             }
         }
         if let Some(slot) = self.held.get_mut(self.rows % HELD) {
@@ -218,7 +220,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         self.left += 1;
         let Some(held) = self.held.get(row % HELD).copied() else { return };
         for joint in (0..N).filter(|&joint| held.used[joint]) {
-            if self.last_wild[joint].is_some_and(|wild| wild + HELD >= row) {
+            if self.last_outlier[joint].is_some_and(|outlier| outlier + HELD >= row) {
                 continue;
             }
             let mut entering = [T::zero(); LARGEST_COLUMNS + 1];

@@ -5,14 +5,15 @@
 
 use super::alignment::Alignment;
 use super::residual::Residual;
-use crate::ident::record::recorder::{Progress, RowModel};
+use crate::ident::record::recorder::Progress;
+use crate::ident::record::row_model::RowModel;
 use crate::real::Real;
 
 /// A known model tested on motions that the identification did not use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldOut<T, const N: usize, const B: usize, const PENDING: usize> {
     values: [T; B],
-    wild: [T; N],
+    outlier_bound: [T; N],
     reach: usize,
     residual: Residual<T, N>,
     alignment: Alignment<T, N, B, PENDING>,
@@ -24,7 +25,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> HeldOut<T, N
     pub fn new(reach: usize) -> Self {
         Self {
             values: [T::zero(); B],
-            wild: [T::LARGEST; N],
+            outlier_bound: [T::LARGEST; N],
             reach,
             residual: Residual::new(),
             alignment: Alignment::new(),
@@ -37,13 +38,13 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> HeldOut<T, N
         self.alignment.clear();
     }
 
-    /// Starts the next motion, tested against base `values`. A residual above `wild` (N m) is unexpected;
-    /// `noise` is the standard deviation of an independent row of each joint, N m. Columns that were
-    /// `dropped` are not estimated.
-    pub fn begin(&mut self, values: &[T; B], wild: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
-        (self.values, self.wild) = (*values, *wild);
+    /// Starts the next motion, tested against base `values`. A residual above `outlier_bound` (N m) is
+    /// unexpected; `noise` is the standard deviation of an independent row of each joint, N m. Columns that
+    /// were `dropped` are not estimated.
+    pub fn begin(&mut self, values: &[T; B], outlier_bound: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
+        (self.values, self.outlier_bound) = (*values, *outlier_bound);
         self.residual = Residual::new();
-        self.alignment.begin(wild, noise, dropped);
+        self.alignment.begin(outlier_bound, noise, dropped);
     }
 
     /// Ends a continuous stretch of samples.
@@ -57,7 +58,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> HeldOut<T, N
         let rows = progress.rows.as_ref();
         self.alignment.take(model, &self.values, self.reach, &progress.instant, rows);
         if let Some(rows) = rows {
-            self.residual.take(rows, &self.values, &self.wild);
+            self.residual.take(rows, &self.values, &self.outlier_bound);
         }
     }
 

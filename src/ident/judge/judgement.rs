@@ -2,7 +2,7 @@
 
 use super::alignment::Misalignments;
 use super::verdict::{Evidence, Reason, Test, Thresholds, Unused, Verdict, VerdictBuilder};
-use crate::ident::record::recorder::RowModel;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::estimate::Problem;
 use crate::ident::solve::solver::Solver;
 use crate::real::Real;
@@ -15,7 +15,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         model: &RowModel<T, N, B>,
         thresholds: &Thresholds<T>,
         unused: impl Iterator<Item = Unused<'a, T, N, B>>,
-        asked: &Misalignments<T>,
+        misalignments: &Misalignments<T>,
         hand_on: &mut dyn FnMut(&Evidence<T>),
     ) -> Verdict {
         let builder = &mut VerdictBuilder::new(hand_on);
@@ -43,7 +43,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         let mut predicted = false;
         for (motion, unused) in unused.enumerate() {
             predicted = true;
-            thresholds.judge_set_aside(&unused.record.outliers, Some(motion), builder);
+            thresholds.judge_excluded(&unused.record.outliers, Some(motion), builder);
             thresholds.judge_validation(record, motion, unused.record, &estimate, builder);
             thresholds.judge_colour(motion, &unused, builder);
             thresholds.judge_contact(motion, &unused, builder);
@@ -53,7 +53,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         }
         if !builder.verdict().has(Reason::Validation) {
             // Pushes and a wrong mass ask for changes that are not geometry errors.
-            for found in asked.iter().flatten() {
+            for found in misalignments.iter().flatten() {
                 thresholds.judge_alignment(found, noise_is_known, builder);
             }
         }

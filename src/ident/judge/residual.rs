@@ -27,7 +27,7 @@ pub const BLOCK_ROWS: u32 = 25;
 /// Fewest used rows of a valid block.
 const LEAST_FILLED: u32 = 12;
 /// Outlier rows are a minority up to one in this many.
-const LARGEST_WILD_PART: u64 = 3;
+const LARGEST_OUTLIER_PART: u64 = 3;
 
 /// Products of neighbouring blocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +59,7 @@ pub struct JointResidual<T> {
     /// Rows used.
     pub rows: u32,
     /// Rows with an error above the limit.
-    pub wild: u32,
+    pub outliers: u32,
     all: Neighbours<T>,
     /// Statistics over blocks without an error above the limit.
     undisturbed: Neighbours<T>,
@@ -73,7 +73,7 @@ impl<T: Real> JointResidual<T> {
     fn new() -> Self {
         Self {
             rows: 0,
-            wild: 0,
+            outliers: 0,
             all: Neighbours::new(),
             undisturbed: Neighbours::new(),
             block: T::zero(),
@@ -86,7 +86,7 @@ impl<T: Real> JointResidual<T> {
     /// Statistics to judge by. Disturbed blocks are excluded where they are `forgiven` and outlier rows are a
     /// minority. An error that is everywhere is not a disturbance.
     fn judged(&self, forgiven: bool) -> &Neighbours<T> {
-        let minority = u64::from(self.wild) * LARGEST_WILD_PART <= u64::from(self.rows);
+        let minority = u64::from(self.outliers) * LARGEST_OUTLIER_PART <= u64::from(self.rows);
         if forgiven && minority { &self.undisturbed } else { &self.all }
     }
 
@@ -131,11 +131,11 @@ impl<T: Real> JointResidual<T> {
         self.close();
     }
 
-    fn take(&mut self, residual: T, wild: T) {
-        let is_wild = real::abs(residual) > wild;
+    fn take(&mut self, residual: T, outlier_bound: T) {
+        let is_outlier = real::abs(residual) > outlier_bound;
         self.rows = self.rows.saturating_add(1);
-        self.wild = self.wild.saturating_add(u32::from(is_wild));
-        self.is_disturbed |= is_wild;
+        self.outliers = self.outliers.saturating_add(u32::from(is_outlier));
+        self.is_disturbed |= is_outlier;
         self.block += residual;
         self.filled += 1;
         self.age += 1;
@@ -178,8 +178,13 @@ impl<T: Real, const N: usize> Residual<T, N> {
         self.common = 0;
     }
 
-    /// Takes one row of each joint; an error above `wild` (N m) is part of a stretch.
-    pub fn take<const B: usize>(&mut self, rows: &FilteredRows<T, N, B>, values: &[T; B], wild: &[T; N]) {
+    /// Takes one row of each joint; an error above `outlier_bound` (N m) is part of a stretch.
+    pub fn take<const B: usize>(
+        &mut self,
+        rows: &FilteredRows<T, N, B>,
+        values: &[T; B],
+        outlier_bound: &[T; N],
+    ) {
         if !rows.is_finite() {
             self.break_off();
             return;
@@ -193,8 +198,8 @@ impl<T: Real, const N: usize> Residual<T, N> {
             }
             let row = rows.regressor[joint].iter().zip(values);
             let residual = row.fold(rows.torque[joint], |rest, (&element, &value)| rest - element * value);
-            self.joints[joint].take(residual, wild[joint]);
-            if real::abs(residual) > wild[joint] { missed += 1 } else { expected += 1 }
+            self.joints[joint].take(residual, outlier_bound[joint]);
+            if real::abs(residual) > outlier_bound[joint] { missed += 1 } else { expected += 1 }
         }
         self.common = if missed > 0 && expected == 0 { self.common.saturating_add(1) } else { 0 };
         self.longest_common_s =

@@ -14,7 +14,7 @@
 //! [`crate::ident::solve::estimate`].
 //! Cost of a row: `B^2 + 2 B` multiplications. Memory: `B^2 + B + N + 1` numbers and `B` flags.
 
-use crate::ident::record::recorder::Record;
+use crate::ident::record::motion_record::Record;
 use crate::ident::record::rows::FilteredRows;
 use crate::ident::solve::estimate::{Estimate, noise};
 use crate::real::{self, Real};

@@ -10,9 +10,9 @@
 
 use super::choice::{Choice, Estimator};
 use super::factor::Factor;
-use super::outliers::Outliers;
+use super::motion_record::Outliers;
+use super::motion_record::TorqueSize;
 use super::packed::{self, LARGEST_SIZE};
-use super::recorder::TorqueSize;
 use super::reweighting::{Weights, weigh, weighted};
 use super::row_model::RowModel;
 use super::stribeck::{
@@ -43,8 +43,8 @@ pub(super) struct Assembly<T, const N: usize, const B: usize> {
 
 /// Adds up a window. `information` is `m sum h^2`; `model` is `None` when nothing was recorded.
 #[inline(never)]
-pub(super) fn assemble<T: Real, const N: usize, const B: usize, const ROOM: usize>(
-    window: &Window<T, N, B, ROOM>,
+pub(super) fn assemble<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
+    window: &Window<T, N, B, NUMBERS>,
     model: Option<&Choices<N>>,
     estimator: Estimator,
     information: T,
@@ -140,8 +140,8 @@ impl<const N: usize> Choices<N> {
 }
 
 /// Weighted rows and absolute torques of one joint.
-fn sums<T: Real, const N: usize, const B: usize, const ROOM: usize>(
-    window: &Window<T, N, B, ROOM>,
+fn sums<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
+    window: &Window<T, N, B, NUMBERS>,
     joint: usize,
     weights: &Weights<T>,
 ) -> (T, T) {
@@ -157,8 +157,8 @@ fn sums<T: Real, const N: usize, const B: usize, const ROOM: usize>(
 
 /// Error of all rows of one joint with the weighted solution, over the torque of
 /// all rows; zero without torque.
-fn whole_error_share<T: Real, const N: usize, const B: usize, const ROOM: usize>(
-    window: &Window<T, N, B, ROOM>,
+fn whole_error_share<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
+    window: &Window<T, N, B, NUMBERS>,
     joint: usize,
     weighted: &[T; LARGEST_SIZE],
 ) -> T {
@@ -173,8 +173,8 @@ fn whole_error_share<T: Real, const N: usize, const B: usize, const ROOM: usize>
 }
 
 /// Shares and longest stretches of disturbed rows. A block without usable rows inherits the state before it.
-fn disturbed<T: Real, const N: usize, const B: usize, const ROOM: usize>(
-    window: &Window<T, N, B, ROOM>,
+fn disturbed<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
+    window: &Window<T, N, B, NUMBERS>,
     weights: &[Weights<T>; N],
     outliers: &mut Outliers<T, N>,
 ) {

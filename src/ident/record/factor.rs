@@ -84,9 +84,9 @@ impl<T: Real, const B: usize> Factor<T, B> {
                 continue; // squares that underflow carry no information
             }
             let (cosine, sine) = (diagonal / length, entering / length);
-            let kept = &mut self.r[column];
-            kept[column] = length;
-            for (old, new) in kept.iter_mut().zip(row.iter_mut()).skip(column + 1) {
+            let stored = &mut self.r[column];
+            stored[column] = length;
+            for (old, new) in stored.iter_mut().zip(row.iter_mut()).skip(column + 1) {
                 (*old, *new) = (cosine * *old + sine * *new, cosine * *new - sine * *old);
             }
             let z = self.z[column];

@@ -5,27 +5,20 @@
 //! | `choice` | what to estimate: always, never, or as the data decide | |
 //! | `row_model` | geometry, gravity, columns and friction curves: an instant becomes a row | |
 //! | `rows` | second filter step: rows and torque through one low-pass, then 50 Hz | |
-//! | `filters` | the recorder's two filters, built before it | |
 //! | `recorder` | from logged samples to a record, in constant memory | |
 //! | `window` | the motion as blocks of rows | |
 //! | `packed` | factors of a few columns, without zeros | |
 //! | `factor` | square-root information factor | Golub and Van Loan, 5.1.8 |
-//! | `sum` | sum of many terms without loss of digits | |
 //! | `reweighting` | weights of the blocks | Huber and Ronchetti 2009 |
 //! | `stribeck` | Stribeck friction from one record | Armstrong-Helouvry 1994; Golub and Pereyra 1973 |
 //! | `assembly` | window to record: weights, Stribeck friction, one factor per joint | |
-//! | `motion_record` | the record of one motion | |
-//! | `outliers` | replaced samples and disturbed stretches of a record | |
-//! | `dropped` | columns of a record that are held at zero | |
+//! | `motion_record` | the record of one motion, its excluded data and the columns held at zero | |
 //! | `stretch` | durations of disturbances, by a second pass over the rows | |
 
 mod assembly;
 pub mod choice;
-pub mod dropped;
 pub mod factor;
-pub mod filters;
-mod motion_record;
-pub mod outliers;
+pub mod motion_record;
 pub mod packed;
 pub mod recorder;
 pub mod reweighting;
@@ -33,5 +26,4 @@ pub mod row_model;
 pub mod rows;
 pub mod stretch;
 pub mod stribeck;
-mod sum;
 pub mod window;

@@ -1,10 +1,10 @@
 //! Record of one motion: information, sizes, excluded data. Made by a [`super::recorder::Recorder`].
 
-use super::dropped::Selection;
 use super::factor::Factor;
-use super::outliers::Outliers;
+use super::row_model::RowModel;
 use super::rows::DECIMATION;
 use super::stribeck::StribeckFit;
+use crate::model::Parameter;
 use crate::real::{self, Real};
 
 /// Size of one joint's torque and speed in a motion.
@@ -81,5 +81,102 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
         }
         let mean = (factor.excess(base) + factor.residual()) / T::of(f64::from(rows));
         Some(real::sqrt(mean))
+    }
+}
+
+/// Replaced samples and down-weighted rows of one motion.
+///
+/// A result rests on how many samples were replaced ([`crate::ident::signal::hampel`]) and how much of the
+/// motion got less weight ([`super::reweighting`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outliers<T, const N: usize> {
+    /// 500 Hz samples taken in.
+    pub samples: u32,
+    /// Isolated outliers of each joint's angle and torque, replaced before the filter.
+    pub replaced: [u32; N],
+    /// Share of each joint's rows that got less than half of their weight, 0..1.
+    pub disturbed_share: [T; N],
+    /// Longest stretch of disturbed rows of each joint, s.
+    pub longest_s: [T; N],
+    /// Longest stretch in which all joints' rows were disturbed at once, s.
+    pub longest_common_s: T,
+    /// Error over torque, root mean squares over all rows, with the parameters that the weighted rows give.
+    pub whole_error_share: [T; N],
+}
+
+impl<T: Real, const N: usize> Outliers<T, N> {
+    /// Empty statistics.
+    #[must_use]
+    pub fn none() -> Self {
+        Self {
+            samples: 0,
+            replaced: [0; N],
+            disturbed_share: [T::zero(); N],
+            longest_s: [T::zero(); N],
+            longest_common_s: T::zero(),
+            whole_error_share: [T::zero(); N],
+        }
+    }
+
+    /// Converts to another precision.
+    #[must_use]
+    pub fn convert<U: Real>(&self) -> Outliers<U, N> {
+        let convert = |value: T| U::of(value.to_double());
+        Outliers {
+            samples: self.samples,
+            replaced: self.replaced,
+            disturbed_share: self.disturbed_share.map(convert),
+            longest_s: self.longest_s.map(convert),
+            longest_common_s: convert(self.longest_common_s),
+            whole_error_share: self.whole_error_share.map(convert),
+        }
+    }
+}
+
+/// Decisions about the columns of one record: those held at zero, and the chi-square that each candidate
+/// explains. [`crate::ident::solve::selection`] decides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Selection<T, const N: usize, const B: usize> {
+    /// True when the elimination has ended.
+    pub is_made: bool,
+    /// Base parameters that are held at zero.
+    pub dropped: [bool; B],
+    /// (C1) of every candidate, at the time of dropping for a dropped one; zero for all others.
+    pub gain: [T; B],
+    /// Gain and surplus (N m) of the best Stribeck curve of each joint that was searched, accepted or not.
+    pub stribeck: [Option<(T, T)>; N],
+}
+
+impl<T: Real, const N: usize, const B: usize> Selection<T, N, B> {
+    /// Selection of all columns, before any decision.
+    #[must_use]
+    pub fn all() -> Self {
+        Self { is_made: false, dropped: [false; B], gain: [T::zero(); B], stribeck: [None; N] }
+    }
+
+    /// Number of base parameters held at zero.
+    #[must_use]
+    pub fn dropped_count(&self) -> usize {
+        self.dropped.iter().filter(|dropped| **dropped).count()
+    }
+
+    /// True if this parameter is held at zero.
+    #[must_use]
+    pub fn drops(&self, model: &RowModel<T, N, B>, joint: usize, parameter: Parameter) -> bool {
+        model.drive(joint, parameter).and_then(|base| self.dropped.get(base)).copied().unwrap_or(false)
+    }
+
+    /// Converts to another precision.
+    #[must_use]
+    pub fn convert<U: Real>(&self) -> Selection<U, N, B> {
+        let convert = |value: T| U::of(value.to_double());
+        Selection {
+            is_made: self.is_made,
+            dropped: self.dropped,
+            gain: self.gain.map(convert),
+            stribeck: self
+                .stribeck
+                .map(|tried| tried.map(|(gain, surplus)| (convert(gain), convert(surplus)))),
+        }
     }
 }

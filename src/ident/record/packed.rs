@@ -31,11 +31,11 @@ pub const LARGEST_SIZE: usize = size(LARGEST_COLUMNS);
 pub fn rotate<T: Real>(factor: &mut [T], columns: usize, row: &mut Row<T>) {
     let mut rest = factor;
     for column in 0..columns.min(LARGEST_COLUMNS) {
-        let Some((kept, below)) = rest.split_at_mut_checked(columns - column + 1) else { return };
+        let Some((stored, below)) = rest.split_at_mut_checked(columns - column + 1) else { return };
         rest = below;
         let Some(entering) = row.get_mut(column..=columns) else { return };
-        let (Some((diagonal, kept)), Some((first, entering))) =
-            (kept.split_first_mut(), entering.split_first_mut())
+        let (Some((diagonal, stored)), Some((first, entering))) =
+            (stored.split_first_mut(), entering.split_first_mut())
         else {
             return;
         };
@@ -48,7 +48,7 @@ pub fn rotate<T: Real>(factor: &mut [T], columns: usize, row: &mut Row<T>) {
             continue; // squares that underflow carry no information
         }
         let (cosine, sine) = (*diagonal / length, first / length);
-        for (old, new) in kept.iter_mut().zip(entering) {
+        for (old, new) in stored.iter_mut().zip(entering) {
             (*old, *new) = (cosine * *old + sine * *new, cosine * *new - sine * *old);
         }
         *diagonal = length;
@@ -76,9 +76,9 @@ pub fn residual<T: Real>(factor: &[T], columns: usize) -> T {
 
 /// Takes all rows of another factor with the same columns, each multiplied by `weight`.
 pub fn merge<T: Real>(factor: &mut [T], other: &[T], columns: usize, weight: T) {
-    for (column, kept) in rows(other, columns) {
+    for (column, stored) in rows(other, columns) {
         let mut row = [T::zero(); LARGEST_COLUMNS + 1];
-        for (slot, &element) in row.iter_mut().skip(column).zip(kept) {
+        for (slot, &element) in row.iter_mut().skip(column).zip(stored) {
             *slot = element * weight;
         }
         rotate(factor, columns, &mut row);

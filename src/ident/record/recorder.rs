@@ -14,13 +14,9 @@ use core::mem::MaybeUninit;
 
 use super::assembly::{Choices, assemble};
 use super::choice::Estimator;
-use super::dropped::Selection;
-use super::filters::Filters;
-pub use super::motion_record::{Record, TorqueSize};
-use super::outliers::Outliers;
-pub use super::row_model::RowModel;
+use super::motion_record::{Outliers, Record, Selection, TorqueSize};
+use super::row_model::RowModel;
 use super::rows::{DECIMATION, Ends, FilteredRows, RowFilter};
-use super::sum::Sum;
 use super::window::{self, Window};
 use crate::ident::signal::hampel::{self, Hampel, Quantity};
 use crate::ident::signal::kernel::{Kernel, KernelError, LowPass};
@@ -51,7 +47,39 @@ pub const STILL_PULSES: f64 = 1.6;
 pub const LARGEST_STILL_SHARE: f64 = 0.05;
 
 /// Window of the blocks of one motion, with the device's size.
-pub type MotionWindow<T, const N: usize, const B: usize> = Window<T, N, B, { window::ROOM }>;
+pub type MotionWindow<T, const N: usize, const B: usize> = Window<T, N, B, { window::NUMBERS }>;
+
+/// Both filters of a recorder, built before it: construction may fail while nothing large is allocated yet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Filters<T, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
+    smoothing: Kernel<T, TAPS>,
+    low_pass: LowPass<T, TAPS>,
+}
+
+impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
+    Filters<T, N, B, TAPS, PENDING>
+{
+    /// Builds both filters for a low-pass that is 3 dB down at `bandwidth_hz`.
+    ///
+    /// # Errors
+    /// [`KernelError`] when the bandwidth is invalid or its kernel does not fit `TAPS` and `PENDING`.
+    #[inline(never)]
+    pub fn new(bandwidth_hz: T) -> Result<Self, KernelError> {
+        let rate = T::of(SAMPLE_RATE_HZ);
+        let low_pass = LowPass::new(bandwidth_hz, rate)?;
+        if RowFilter::<T, N, B, PENDING>::outputs_needed(low_pass.taps()) > PENDING {
+            return Err(KernelError::TooLong { needed: low_pass.taps() });
+        }
+        let smoothing = Kernel::new(T::of(SMOOTHING_BANDWIDTHS) * bandwidth_hz, rate)?;
+        Ok(Self { smoothing, low_pass })
+    }
+
+    /// Row low-pass, the second filter.
+    #[must_use]
+    pub fn low_pass(&self) -> &LowPass<T, TAPS> {
+        &self.low_pass
+    }
+}
 
 /// Accumulates one motion after the other. The recorder owns its window, or `W`
 /// refers to one elsewhere in memory.
@@ -203,8 +231,8 @@ where
             let [angle, effort] = &mut self.hampel[joint];
             let (angle, effort) = (angle.finish()?, effort.finish()?);
             (position[joint], torque[joint]) = (angle.value, effort.value);
-            let wild = u32::from(angle.wild) + u32::from(effort.wild);
-            self.replaced[joint] = self.replaced[joint].saturating_add(wild);
+            let outlier = u32::from(angle.outlier) + u32::from(effort.outlier);
+            self.replaced[joint] = self.replaced[joint].saturating_add(outlier);
         }
         Some(self.advance(model, &position, &torque))
     }
@@ -252,8 +280,8 @@ where
                 continue;
             };
             (angles[joint], torques[joint]) = (angle.value, effort.value);
-            let wild = u32::from(angle.wild) + u32::from(effort.wild);
-            self.replaced[joint] = self.replaced[joint].saturating_add(wild);
+            let outlier = u32::from(angle.outlier) + u32::from(effort.outlier);
+            self.replaced[joint] = self.replaced[joint].saturating_add(outlier);
         }
         complete.then_some((angles, torques))
     }
@@ -337,5 +365,30 @@ where
             selection: Selection { stribeck: assembly.tried, ..Selection::all() },
             noise: self.noise.map(|noise| noise.sigma()),
         }
+    }
+}
+
+/// A sum that keeps its digits over millions of terms (Neumaier 1974).
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sum<T> {
+    total: T,
+    lost: T,
+}
+
+impl<T: Real> Sum<T> {
+    fn zero() -> Self {
+        Self { total: T::zero(), lost: T::zero() }
+    }
+    fn add(&mut self, term: T) {
+        let total = self.total + term;
+        self.lost += if real::abs(self.total) >= real::abs(term) {
+            (self.total - total) + term
+        } else {
+            (term - total) + self.total
+        };
+        self.total = total;
+    }
+    fn value(&self) -> T {
+        self.total + self.lost
     }
 }

@@ -50,8 +50,8 @@ const INDEPENDENT_SHARE: f64 = 1e-4;
 pub type Weights<T> = [T; LARGEST_BLOCKS];
 
 /// Factor of all rows of one joint, each block's squares times its weight.
-pub fn weighted<T: Real, const N: usize, const B: usize, const ROOM: usize>(
-    window: &Window<T, N, B, ROOM>,
+pub fn weighted<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
+    window: &Window<T, N, B, NUMBERS>,
     joint: usize,
     weights: &Weights<T>,
 ) -> [T; LARGEST_SIZE] {
@@ -69,8 +69,8 @@ pub fn weighted<T: Real, const N: usize, const B: usize, const ROOM: usize>(
 
 /// Weights of one joint's blocks; `information` is `m sum h^2`.
 #[must_use]
-pub fn weigh<T: Real, const N: usize, const B: usize, const ROOM: usize>(
-    window: &Window<T, N, B, ROOM>,
+pub fn weigh<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
+    window: &Window<T, N, B, NUMBERS>,
     joint: usize,
     information: T,
 ) -> Weights<T> {
@@ -95,7 +95,7 @@ pub fn weigh<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     for round in 0..ROUNDS {
         let parameters = packed::solve(&all, columns, T::of(INDEPENDENT_SHARE));
         let blocks = Residuals::of(window, joint, &parameters);
-        let scale = real::max(median(&mut blocks.means()), harmless);
+        let scale = real::max(real::median(blocks.means().pushed()), harmless);
         let before = weights;
         if round < NORM_ROUNDS {
             for (weight, block) in weights.iter_mut().zip(&blocks.blocks) {
@@ -126,8 +126,8 @@ struct Residuals<T> {
 }
 
 impl<T: Real> Residuals<T> {
-    fn of<const N: usize, const B: usize, const ROOM: usize>(
-        window: &Window<T, N, B, ROOM>,
+    fn of<const N: usize, const B: usize, const NUMBERS: usize>(
+        window: &Window<T, N, B, NUMBERS>,
         joint: usize,
         parameters: &[T],
     ) -> Self {
@@ -169,19 +169,10 @@ impl<T: Real> List<T> {
             self.count += 1;
         }
     }
-}
 
-/// Median of the values, the upper one of two.
-fn median<T: Real>(list: &mut List<T>) -> T {
-    let Some(values) = list.values.get_mut(..list.count) else { return T::zero() };
-    for end in 1..values.len() {
-        let mut place = end;
-        while place > 0 && values[place] < values[place - 1] {
-            values.swap(place, place - 1);
-            place -= 1;
-        }
+    fn pushed(&mut self) -> &mut [T] {
+        self.values.get_mut(..self.count).unwrap_or_default()
     }
-    values.get(values.len() / 2).copied().unwrap_or(T::zero())
 }
 
 /// Score of a block: standard normal if its residuals are noise of variance `scale`.
@@ -195,11 +186,11 @@ fn normal_score<T: Real>(block: &Block<T>, scale: T, information: T) -> T {
 fn redescend<T: Real>(weights: &mut Weights<T>, blocks: &Residuals<T>, scale: T, information: T) {
     let mut scores = List::new();
     blocks.with_rows().for_each(|block| scores.push(normal_score(block, scale, information)));
-    let centre = median(&mut scores);
+    let centre = real::median(scores.pushed());
     for score in &mut scores.values {
         *score = real::abs(*score - centre);
     }
-    let spread = real::max(median(&mut scores) / T::of(0.6745), T::one());
+    let spread = real::max(real::median(scores.pushed()) / T::of(0.6745), T::one());
     let score = |block: Option<&Block<T>>| {
         let block = block.filter(|block| block.rows > T::zero());
         block.map_or(T::zero(), |block| (normal_score(block, scale, information) - centre) / spread)
@@ -212,8 +203,8 @@ fn redescend<T: Real>(weights: &mut Weights<T>, blocks: &Residuals<T>, scale: T,
         let (full, nothing) = if beside { LIMITS_BESIDE } else { LIMITS };
         let fallen = (score(blocks.blocks.get(place)) - T::of(full)) / (T::of(nothing) - T::of(full));
         let fallen = real::clamp(fallen, T::zero(), T::one());
-        let kept = T::one() - fallen * fallen;
-        *weight = kept * kept;
+        let remaining = T::one() - fallen * fallen;
+        *weight = remaining * remaining;
     }
 }
 

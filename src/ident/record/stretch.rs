@@ -17,7 +17,8 @@
 //! sign. Cost: B multiplications for each joint and row. Known limits: needs the rows a second time, so it
 //! serves recordings. The drive's own record has blocks of 0.64 s at most in its first 44 s.
 
-use super::recorder::{LARGEST_STILL_SHARE, Record};
+use super::motion_record::Record;
+use super::recorder::LARGEST_STILL_SHARE;
 use super::row_model::RowModel;
 use super::rows::FilteredRows;
 use crate::model::Parameter;

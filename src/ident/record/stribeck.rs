@@ -130,9 +130,9 @@ fn reordered<T: Real, const B: usize, const K: usize>(
 ) -> [T; LARGEST_SIZE] {
     let mut result = [T::zero(); LARGEST_SIZE];
     let (base, all) = (joint.columns.base().len(), joint.columns.all());
-    for (column, kept) in packed::rows(joint.factor, all) {
+    for (column, stored) in packed::rows(joint.factor, all) {
         let mut row: Row<T> = [T::zero(); LARGEST_COLUMNS + 1];
-        let at = |place: usize| place.checked_sub(column).and_then(|place| kept.get(place)).copied();
+        let at = |place: usize| place.checked_sub(column).and_then(|place| stored.get(place)).copied();
         for (slot, combination) in row.iter_mut().zip(front) {
             for (index, &weight) in combination.bank.iter().enumerate() {
                 *slot += weight * at(base + index).unwrap_or(T::zero());
@@ -144,7 +144,7 @@ fn reordered<T: Real, const B: usize, const K: usize>(
         for (place, slot) in row.iter_mut().skip(K).take(base).enumerate() {
             *slot = at(place).unwrap_or(T::zero());
         }
-        if let (Some(slot), Some(&right)) = (row.get_mut(K + base), kept.last()) {
+        if let (Some(slot), Some(&right)) = (row.get_mut(K + base), stored.last()) {
             *slot = right;
         }
         packed::rotate(&mut result, K + base, &mut row);
@@ -164,8 +164,8 @@ fn without_front<T: Real, const B: usize>(
 ) -> Factor<T, B> {
     let mut factor = Factor::new();
     let count = front + columns.base().len();
-    for (column, kept) in packed::rows(packed, count).skip(front) {
-        let Some((&right, elements)) = kept.split_last() else { continue };
+    for (column, stored) in packed::rows(packed, count).skip(front) {
+        let Some((&right, elements)) = stored.split_last() else { continue };
         let mut row = [T::zero(); B];
         for (&element, &base) in elements.iter().zip(columns.base().iter().skip(column - front)) {
             row[base] = element;
@@ -211,23 +211,23 @@ impl<T: Real> Reduced<T> {
             packed::rotate(&mut all, columns, &mut row);
         }
         let (base, own) = (joint.columns.base(), joint.columns.all());
-        for (column, kept) in packed::rows(joint.factor, own) {
+        for (column, stored) in packed::rows(joint.factor, own) {
             let mut row: Row<T> = [T::zero(); LARGEST_COLUMNS + 1];
-            for (place, &element) in (column..own).zip(kept) {
+            for (place, &element) in (column..own).zip(stored) {
                 let target = base.get(place).copied().unwrap_or(rank + place - base.len());
                 if let Some(slot) = row.get_mut(target) {
                     *slot = element / joint.noise;
                 }
             }
-            row[columns] = kept.last().copied().unwrap_or(T::zero()) / joint.noise;
+            row[columns] = stored.last().copied().unwrap_or(T::zero()) / joint.noise;
             packed::rotate(&mut all, columns, &mut row);
         }
         let mut reduced = Self { rows: [[T::zero(); BANK]; BANK], right: [T::zero(); BANK] };
-        for (index, (_, kept)) in packed::rows(&all, columns).skip(columns - BANK).enumerate() {
-            for (slot, &element) in reduced.rows[index].iter_mut().skip(index).zip(kept) {
+        for (index, (_, stored)) in packed::rows(&all, columns).skip(columns - BANK).enumerate() {
+            for (slot, &element) in reduced.rows[index].iter_mut().skip(index).zip(stored) {
                 *slot = element;
             }
-            reduced.right[index] = kept.last().copied().unwrap_or(T::zero());
+            reduced.right[index] = stored.last().copied().unwrap_or(T::zero());
         }
         reduced
     }

@@ -12,7 +12,7 @@
 //! numbers of a block   sum over joints of  n_i (n_i + 3) / 2 + 1  and two more: sum of |torque|, rows
 //! ```
 //!
-//! Memory: `ROOM` numbers and about 1 kB. For the default leg (9 + 3 and 7 + 3 columns) a block takes 161
+//! Memory: `NUMBERS` numbers and about 1 kB. For the default leg (9 + 3 and 7 + 3 columns) a block takes 161
 //! numbers, so 8192 numbers hold 50 blocks: 22 s of motion in pieces of 0.32 and 0.64 s.
 //! Cost: a row is rotated into a factor of its joint's columns. Every eighth output two blocks are merged,
 //! one joint per call of [`Window::tidy`], so that no sample bears the whole cost. The sums over blocks stay
@@ -21,7 +21,7 @@
 //! than 32 columns is rejected.
 
 use super::packed::{self, LARGEST_COLUMNS, Row};
-use super::recorder::RowModel;
+use super::row_model::RowModel;
 use super::rows::FilteredRows;
 use super::stribeck::BANK;
 use crate::model::Parameter;
@@ -30,7 +30,7 @@ use crate::real::{self, Real};
 /// Outputs of the row filter, 50 a second, in a block.
 pub const BLOCK_ROWS: u32 = 8;
 /// Length of the device's window in numbers: 32 KB in single precision.
-pub const ROOM: usize = 8192;
+pub const NUMBERS: usize = 8192;
 /// Most blocks of a window.
 pub const LARGEST_BLOCKS: usize = 64;
 /// Numbers of a joint in a block besides its factor: sum of the absolute torque, and rows.
@@ -76,7 +76,7 @@ pub struct Part<'a, T> {
 
 /// The blocks of one motion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Window<T, const N: usize, const B: usize, const ROOM: usize> {
+pub struct Window<T, const N: usize, const B: usize, const NUMBERS: usize> {
     columns: [Columns<B>; N],
     stride: usize,
     capacity: usize,
@@ -88,10 +88,10 @@ pub struct Window<T, const N: usize, const B: usize, const ROOM: usize> {
     closed: usize,
     /// Index of the pair that is being merged, and the next joint.
     joining: Option<(u8, u8)>,
-    room: [T; ROOM],
+    numbers: [T; NUMBERS],
 }
 
-impl<const N: usize, const B: usize, const ROOM: usize> Window<f32, N, B, ROOM> {
+impl<const N: usize, const B: usize, const NUMBERS: usize> Window<f32, N, B, NUMBERS> {
     /// Empty window without columns: for a static of its own in the device's memory, where it is never moved.
     pub const EMPTY: Self = Self {
         columns: [Columns { base: [0; B], count: 0, friction: [None; 2], bank: 0, start: 0 }; N],
@@ -102,11 +102,11 @@ impl<const N: usize, const B: usize, const ROOM: usize> Window<f32, N, B, ROOM> 
         outputs: [0; LARGEST_BLOCKS],
         closed: 0,
         joining: None,
-        room: [0.0; ROOM],
+        numbers: [0.0; NUMBERS],
     };
 }
 
-impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B, ROOM> {
+impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N, B, NUMBERS> {
     /// Empty window without columns.
     #[must_use]
     pub fn new() -> Self {
@@ -119,7 +119,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
             outputs: [0; LARGEST_BLOCKS],
             closed: 0,
             joining: None,
-            room: [T::zero(); ROOM],
+            numbers: [T::zero(); NUMBERS],
         }
     }
 
@@ -178,7 +178,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         }
         self.stride = start;
         let fits = self.columns.iter().all(|columns| columns.all() <= LARGEST_COLUMNS);
-        self.capacity = if fits { (ROOM / start.max(1)).min(LARGEST_BLOCKS) } else { 0 };
+        self.capacity = if fits { (NUMBERS / start.max(1)).min(LARGEST_BLOCKS) } else { 0 };
         self.order = core::array::from_fn(|slot| slot as u8);
         (self.closed, self.joining) = (0, None);
         if self.capacity > 0 {
@@ -188,7 +188,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
 
     /// Makes a slot an open block.
     fn empty(&mut self, slot: usize) {
-        if let Some(numbers) = self.room.get_mut(slot * self.stride..(slot + 1) * self.stride) {
+        if let Some(numbers) = self.numbers.get_mut(slot * self.stride..(slot + 1) * self.stride) {
             numbers.fill(T::zero());
         }
         (self.level[slot], self.outputs[slot]) = (0, 0);
@@ -265,14 +265,14 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
     pub fn tidy(&mut self) -> bool {
         let Some((place, joint)) = self.joining else { return false };
         let (place, joint) = (usize::from(place), usize::from(joint));
-        let (kept, freed) = (self.slot(place), self.slot(place + 1));
-        self.merge(kept, freed, joint);
+        let (merged, freed) = (self.slot(place), self.slot(place + 1));
+        self.merge(merged, freed, joint);
         if joint + 1 < N {
             self.joining = Some((place as u8, joint as u8 + 1));
             return true;
         }
-        self.level[kept] = self.level[kept].max(self.level[freed]).saturating_add(1);
-        self.outputs[kept] = self.outputs[kept].saturating_add(self.outputs[freed]);
+        self.level[merged] = self.level[merged].max(self.level[freed]).saturating_add(1);
+        self.outputs[merged] = self.outputs[merged].saturating_add(self.outputs[freed]);
         // The freed slot goes behind the closed ones.
         if let Some(younger) = self.order.get_mut(place + 1..self.closed) {
             younger.rotate_left(1);
@@ -283,15 +283,15 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         true
     }
 
-    fn merge(&mut self, kept: usize, freed: usize, joint: usize) {
+    fn merge(&mut self, merged: usize, freed: usize, joint: usize) {
         let columns = self.columns[joint];
         let size = packed::size(columns.all()) + BESIDE;
-        let (first, second) = (kept.min(freed) * self.stride, kept.max(freed) * self.stride);
-        let Some((low, high)) = self.room.split_at_mut_checked(second) else { return };
+        let (first, second) = (merged.min(freed) * self.stride, merged.max(freed) * self.stride);
+        let Some((low, high)) = self.numbers.split_at_mut_checked(second) else { return };
         let low = low.get_mut(first + columns.start..first + columns.start + size);
         let high = high.get_mut(columns.start..columns.start + size);
         let (Some(low), Some(high)) = (low, high) else { return };
-        let (into, from) = if kept < freed { (low, high) } else { (high, low) };
+        let (into, from) = if merged < freed { (low, high) } else { (high, low) };
         packed::merge(into, from, columns.all(), T::one());
         if let ([.., absolute, rows], [.., other_absolute, other_rows]) = (into, &mut *from) {
             *absolute += *other_absolute;
@@ -303,7 +303,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
     fn part_mut(&mut self, slot: usize, joint: usize) -> Option<&mut [T]> {
         let columns = self.columns.get(joint)?;
         let start = slot * self.stride + columns.start;
-        self.room.get_mut(start..start + packed::size(columns.all()) + BESIDE)
+        self.numbers.get_mut(start..start + packed::size(columns.all()) + BESIDE)
     }
 
     /// Number of blocks with rows, including the open one.
@@ -324,7 +324,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
     pub fn part(&self, block: usize, joint: usize) -> Option<Part<'_, T>> {
         let columns = self.columns.get(joint)?;
         let start = self.slot(block) * self.stride + columns.start;
-        let all = self.room.get(start..start + packed::size(columns.all()) + BESIDE)?;
+        let all = self.numbers.get(start..start + packed::size(columns.all()) + BESIDE)?;
         match all {
             [factor @ .., absolute_torque, rows] => {
                 Some(Part { factor, absolute_torque: *absolute_torque, rows: *rows })
@@ -334,7 +334,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
     }
 }
 
-impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Default for Window<T, N, B, ROOM> {
+impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Default for Window<T, N, B, NUMBERS> {
     fn default() -> Self {
         Self::new()
     }

@@ -59,7 +59,7 @@ pub struct Cleaned<T> {
     /// The sample or its replacement.
     pub value: T,
     /// True if it was replaced.
-    pub wild: bool,
+    pub outlier: bool,
 }
 
 /// The filter of one measured value.
@@ -128,7 +128,7 @@ impl<T: Real> Hampel<T> {
         let first = WINDOW - self.filled;
         let end = WINDOW - self.missing;
         let whole = first == 0 && end == WINDOW;
-        let Some(predicted) = self.predict(first, end) else { return Cleaned { value, wild: false } };
+        let Some(predicted) = self.predict(first, end) else { return Cleaned { value, outlier: false } };
         let deviation = real::abs(value - predicted);
         let (floor, factor) = match self.quantity {
             Quantity::Angle => (T::of(ANGLE_FLOOR_RAD), T::of(FACTOR)),
@@ -138,13 +138,13 @@ impl<T: Real> Hampel<T> {
         let settled = self.seen >= SETTLED;
         let (low, high) = self.range(first, end);
         let slack = if whole { limit } else { limit + (high - low) };
-        let wild = settled && deviation > limit && (value < low - slack || value > high + slack);
+        let outlier = settled && deviation > limit && (value < low - slack || value > high + slack);
         if whole {
             self.learn(deviation, predicted);
         }
-        let value = if wild { predicted } else { value };
+        let value = if outlier { predicted } else { value };
         self.window[REACH] = value;
-        Cleaned { value, wild }
+        Cleaned { value, outlier }
     }
 
     fn learn(&mut self, deviation: T, predicted: T) {

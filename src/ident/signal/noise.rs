@@ -151,16 +151,13 @@ impl<T: Real> Default for NoiseLevel<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_core::{Rng, SeedableRng};
-    use rand_xoshiro::Xoshiro256PlusPlus;
+    use crate::testing::TestRandom;
 
     fn level(signal: impl Fn(u32, f64) -> f64, samples: u32, seed: u64) -> f64 {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut normal =
-            || (0..12).map(|_| (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0;
+        let mut random = TestRandom::new(seed);
         let mut noise = NoiseLevel::<f32>::new();
         for index in 0..samples {
-            noise.push(signal(index, normal()) as f32);
+            noise.push(signal(index, random.normal()) as f32);
         }
         f64::from(noise.sigma())
     }

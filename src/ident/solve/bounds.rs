@@ -16,7 +16,8 @@
 //! the joints, an inertia with little effect on one joint could change another joint's torque by 1e5 N m.
 
 use super::constrained::ParameterBox;
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::row_model::RowModel;
 use crate::model::{self, LegParameters, PARAMETERS_PER_JOINT, Parameter, RigidBody};
 use crate::real::{self, Real};
 

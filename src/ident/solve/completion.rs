@@ -12,7 +12,8 @@
 
 use super::estimate::Estimate;
 use crate::ident::record::factor::Factor;
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::row_model::RowModel;
 use crate::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing};
 use crate::real::{self, Real};
 

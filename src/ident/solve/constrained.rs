@@ -138,26 +138,21 @@ fn gradient<T: Real, const B: usize>(factor: &Factor<T, B>, values: &[T; B]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_core::{Rng, SeedableRng};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
-    fn uniform(random: &mut Xoshiro256PlusPlus) -> f64 {
-        random.next_u64() as f64 / u64::MAX as f64 * 2.0 - 1.0
-    }
+    use crate::testing::TestRandom;
 
     #[test]
     fn no_feasible_point_is_better_than_the_constrained_optimum() {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+        let mut random = TestRandom::new(11);
         let mut active = 0;
         for _ in 0..200 {
             let mut factor = Factor::<f64, 6>::new();
             for _ in 0..30 {
-                let row = core::array::from_fn(|_| uniform(&mut random));
-                factor.insert(&row, 3.0 * uniform(&mut random) + row[2]);
+                let row = core::array::from_fn(|_| random.within(1.0));
+                factor.insert(&row, 3.0 * random.within(1.0) + row[2]);
             }
             let bounds = ParameterBox {
-                low: core::array::from_fn(|_| -0.5 + 0.4 * uniform(&mut random)),
-                high: core::array::from_fn(|_| 0.5 + 0.4 * uniform(&mut random)),
+                low: core::array::from_fn(|_| -0.5 + 0.4 * random.within(1.0)),
+                high: core::array::from_fn(|_| 0.5 + 0.4 * random.within(1.0)),
             };
             let best = least_squares_in_box(&factor, 6, &bounds);
             let slope = gradient(&factor, &best);

@@ -20,7 +20,8 @@
 //! distal joint that moves alone cannot separate its rotor's inertia from its link's.
 
 use crate::ident::record::factor::Factor;
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::row_model::RowModel;
 use crate::real::{self, Real};
 
 /// Order in which the joints' rows give the parameters.
@@ -59,7 +60,7 @@ pub fn noise<T: Real, const N: usize, const B: usize>(record: &Record<T, N, B>) 
 pub struct Stage<T, const B: usize> {
     columns: [usize; B],
     count: usize,
-    asked: usize,
+    requested: usize,
     factor: Factor<T, B>,
 }
 
@@ -72,20 +73,20 @@ impl<T: Real, const B: usize> Stage<T, B> {
             count += 1;
         }
         let all = source.restricted(columns.get(..count).unwrap_or(&[]), held, weight);
-        let mut kept = 0;
+        let mut free = 0;
         for index in 0..count {
             let share = T::of(DETERMINED_SHARE) * all.column_length(index);
             if real::abs(all.triangle()[index][index]) > share {
-                columns[kept] = columns[index];
-                kept += 1;
+                columns[free] = columns[index];
+                free += 1;
             }
         }
-        let factor = if kept == count {
+        let factor = if free == count {
             all
         } else {
-            source.restricted(columns.get(..kept).unwrap_or(&[]), held, weight)
+            source.restricted(columns.get(..free).unwrap_or(&[]), held, weight)
         };
-        Self { columns, count: kept, asked: count, factor }
+        Self { columns, count: free, requested: count, factor }
     }
 
     /// Base parameters that this stage determines.
@@ -96,8 +97,8 @@ impl<T: Real, const B: usize> Stage<T, B> {
 
     /// Number of base parameters that were open in this stage.
     #[must_use]
-    pub fn asked(&self) -> usize {
-        self.asked
+    pub fn requested(&self) -> usize {
+        self.requested
     }
 
     /// Cost in chi-square units, column `i` being base parameter `columns()[i]`.

@@ -34,7 +34,7 @@
 
 use super::estimate::Estimate;
 use crate::ident::record::factor::Factor;
-use crate::ident::record::recorder::Record;
+use crate::ident::record::motion_record::Record;
 use crate::real::{self, Real};
 
 /// Estimate of one joint's torque constant from two runs.
@@ -68,7 +68,7 @@ impl<T: Real> ConstantRatio<T> {
 
     /// True if the mass is heavy enough to determine this joint's constant.
     #[must_use]
-    pub fn is_told(&self) -> bool {
+    pub fn is_determined(&self) -> bool {
         self.ratio > T::zero() && self.sigma <= T::of(LARGEST_SIGMA_SHARE) * self.ratio
     }
 }
@@ -152,8 +152,8 @@ impl<T: Real, const B: usize> Eliminated<T, B> {
             let turn = |old: &mut T, new: &mut T| {
                 (*old, *new) = (cosine * *old + sine * *new, cosine * *new - sine * *old);
             };
-            let kept = &mut self.triangle[column];
-            kept.iter_mut().zip(row.iter_mut()).skip(column).for_each(|(old, new)| turn(old, new));
+            let stored = &mut self.triangle[column];
+            stored.iter_mut().zip(row.iter_mut()).skip(column).for_each(|(old, new)| turn(old, new));
             turn(&mut self.torque[column], &mut torque);
             turn(&mut self.load[column], &mut load);
         }

@@ -13,10 +13,10 @@
 //! leaves the factor: its entries are removed and the rows rotated to a triangle again
 //! ([`crate::ident::record::factor::Factor::restricted`]), so no row is needed twice.
 //!
-//! **The limit** is three standard deviations. A zero column is kept in 0.27 % of all cases. A nonzero one is
-//! dropped in half of the cases where its value is three of its standard deviations, and hardly ever from six
-//! on. The verdict uses the same limit for a negative rotor inertia: one that is negative beyond noise is
-//! kept and refused, not silently dropped.
+//! **The limit** is three standard deviations. A zero column is retained in 0.27 % of all cases. A nonzero
+//! one is dropped in half of the cases where its value is three of its standard deviations, and hardly ever
+//! from six on. The verdict uses the same limit for a negative rotor inertia: one that is negative beyond
+//! noise is retained and refused, not silently dropped.
 //!
 //! | symbol | meaning | unit |
 //! | --- | --- | --- |
@@ -31,11 +31,12 @@
 
 use super::estimate::Problem;
 use crate::ident::record::choice::Choice;
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::row_model::RowModel;
 use crate::model::{Parameter, Standing};
 use crate::real::Real;
 
-/// Least chi-square that a kept column must explain: three standard deviations.
+/// Least chi-square that a retained column must explain: three standard deviations.
 pub const SMALLEST_GAIN: f64 = 9.0;
 
 /// Base parameters that may be dropped: those of one parameter alone. A parameter measured only in a sum has

@@ -1,29 +1,26 @@
 //! Records of random states for tests: a leg with or without the parameters that may be dropped.
 
 use nalgebra::Vector3;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::estimate::Plan;
 use super::search::SearchState;
 use super::solver::Solver;
 use crate::ident::record::choice::{Choice, DriveChoice};
-use crate::ident::record::recorder::{Record, Recorder, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::recorder::Recorder;
+use crate::ident::record::row_model::RowModel;
 use crate::model::{
     BaseParameters, Chain, ColumnMask, DenavitHartenberg, JointState, LegParameters, Parameter, regressor,
 };
 use crate::real::Real;
+use crate::testing::TestRandom;
 
-/// Columns of the model.
-pub const B: usize = 13;
+pub use crate::model::planar::BASE as B;
+
 const SIGMA: f64 = 0.3;
 const STATES: u32 = 400;
 
 pub type Model<T> = RowModel<T, 2, B>;
-
-fn within(dice: &mut Xoshiro256PlusPlus, bound: f64) -> f64 {
-    (dice.next_u64() as f64 / u64::MAX as f64 * 2.0 - 1.0) * bound
-}
 
 /// Model without the columns of `off`, with those of `choice` to be decided.
 pub fn model<T: Real>(choice: Choice, off: &[(usize, Parameter)]) -> Model<T> {
@@ -55,12 +52,12 @@ pub fn record_on<T: Real>(
     seed: u64,
     angle: fn(f64) -> f64,
 ) -> Record<T, 2, B> {
-    let mut dice = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut random = TestRandom::new(seed);
     let exact = self::model::<f64>(Choice::On, &[]);
     let mut record = Recorder::<T, 2, B, 256, 26>::new(T::of(8.0)).unwrap().finish();
     let mut squares = [0.0; 2];
     for _ in 0..STATES {
-        let mut many = |bound: f64| core::array::from_fn(|_| within(&mut dice, bound));
+        let mut many = |bound: f64| core::array::from_fn(|_| random.within(bound));
         let mut state = JointState { q: many(1.0), qd: many(2.0), qdd: many(6.0) };
         state.q[0] = angle(state.q[0]);
         let rows = regressor(&exact.chain, &state, &exact.gravity);
@@ -68,7 +65,7 @@ pub fn record_on<T: Real>(
             let mut row = [T::zero(); B];
             model.base.select(&full.map(|block| block.map(T::of)), &mut row);
             // Twelve uniform numbers: variance 12 a^2 / 3.
-            let noise: f64 = (0..12).map(|_| within(&mut dice, SIGMA / 2.0)).sum();
+            let noise: f64 = (0..12).map(|_| random.within(SIGMA / 2.0)).sum();
             let torque = crate::model::row_torque(full, leg) + noise;
             record.factors[joint].insert(&row, T::of(torque));
             squares[joint] += torque * torque;

@@ -121,7 +121,7 @@ pub struct JointCommand {
     pub target: Target,
     /// Counter of set-points and homing starts, wrapping. A changed value is a new request, unless it was
     /// made before the leg was enabled.
-    pub asked: u8,
+    pub request_count: u8,
     /// Uses an accepted model as feedforward, if all joints request it.
     pub feedforward: bool,
     /// Slows down along the profile and holds (bit 8).

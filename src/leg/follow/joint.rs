@@ -82,7 +82,7 @@ pub struct Follower {
     course: Course,
     /// Torque of the torque modes, N m.
     torque: f32,
-    /// [`JointCommand::asked`] of the previous tick.
+    /// [`JointCommand::is_requested`] of the previous tick.
     seen: u8,
     /// Profile position: the active set-point.
     goal: Option<f32>,
@@ -144,7 +144,7 @@ impl Follower {
 
     /// Starts following from `course`. Requests made before are discarded.
     pub fn start(&mut self, command: &JointCommand, course: Course) {
-        *self = Self { seen: command.asked, course, homed: self.homed, ..Self::NEW };
+        *self = Self { seen: command.request_count, course, homed: self.homed, ..Self::NEW };
     }
 
     /// Runs one tick.
@@ -153,7 +153,7 @@ impl Follower {
         if begins {
             self.begin(command, measured);
         }
-        let asked = core::mem::replace(&mut self.seen, command.asked) != command.asked;
+        let is_requested = core::mem::replace(&mut self.seen, command.request_count) != command.request_count;
         let resumes = core::mem::replace(&mut self.halted, command.halt) && !command.halt;
         let returns = measured.returns;
         let ends = core::mem::replace(&mut self.returned, returns) && !returns;
@@ -206,7 +206,7 @@ impl Follower {
                 demand
             }
             Target::ProfilePosition(point) => {
-                self.take(point, asked);
+                self.take(point, is_requested);
                 self.go(command, &rates, range, bounds, measured);
                 demand
             }
@@ -220,7 +220,7 @@ impl Follower {
             }
             Target::Homing { offset } => {
                 self.stop(&rates, bounds, measured);
-                let shift = if asked { self.home(offset, measured, bounds) } else { None };
+                let shift = if is_requested { self.home(offset, measured, bounds) } else { None };
                 Demand { shift, ..demand }
             }
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
@@ -311,8 +311,8 @@ impl Follower {
         held
     }
 
-    fn take(&mut self, point: SetPoint, asked: bool) {
-        if asked {
+    fn take(&mut self, point: SetPoint, is_requested: bool) {
+        if is_requested {
             self.next = Some(point);
         }
         if let Some(point) = self.next

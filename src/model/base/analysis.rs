@@ -72,11 +72,11 @@ pub enum Standing {
     Off,
 }
 
-/// Gap between kept and dropped columns, as shares of a column's length.
+/// Gap between retained and dropped columns, as shares of a column's length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation<T> {
-    /// Smallest share of a kept column that earlier ones do not explain; above the tolerance.
-    pub smallest_kept: T,
+    /// Smallest share of a retained column that earlier ones do not explain; above the tolerance.
+    pub smallest_retained: T,
     /// Largest such share of a dropped column; below the tolerance. If the gap is wide, it is pure rounding.
     pub largest_dropped: T,
 }
@@ -141,7 +141,7 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
             nothing: [[T::zero(); PARAMETERS_PER_JOINT]; N],
             mask: *mask,
             separation: Separation {
-                smallest_kept: echelon.smallest_kept,
+                smallest_retained: echelon.smallest_retained,
                 largest_dropped: echelon.largest_dropped,
             },
         };
@@ -166,7 +166,7 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         self.rank
     }
 
-    /// Gap between kept and dropped columns: the margin of the rank.
+    /// Gap between retained and dropped columns: the margin of the rank.
     #[must_use]
     pub fn separation(&self) -> Separation<T> {
         self.separation

@@ -7,8 +7,8 @@
 //! ```text
 //! collect: | R |  rotated to | R' |        column by column in the order of preference
 //!          | y |             | 0  |
-//! reduce:  each column's part below the kept rows is rotated into one; kept if its share of the column
-//!          exceeds the tolerance; then back-substitution makes the kept columns unit vectors
+//! reduce:  each column's part below the retained rows is rotated into one; retained if its share of the
+//!          column exceeds the tolerance; then back-substitution makes the retained columns unit vectors
 //! ```
 //!
 //! Source: G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed. 2013, sections 5.1.8 and 5.2.
@@ -47,10 +47,10 @@ pub(super) struct Factor<T, const N: usize> {
 
 /// Result of the reduction.
 pub(super) struct Echelon<T> {
-    /// Number of kept columns; the first `rank` rows of the factor belong to them.
+    /// Number of retained columns; the first `rank` rows of the factor belong to them.
     pub rank: usize,
-    /// Smallest share of a kept column that earlier ones do not explain.
-    pub smallest_kept: T,
+    /// Smallest share of a retained column that earlier ones do not explain.
+    pub smallest_retained: T,
     /// Largest such share of a dropped column.
     pub largest_dropped: T,
 }
@@ -85,19 +85,19 @@ impl<T: Real, const N: usize> Factor<T, N> {
         }
     }
 
-    /// Brings the factor to echelon form; calls `kept` with each column that is
+    /// Brings the factor to echelon form; calls `retained` with each column that is
     /// independent of those before it.
     ///
-    /// A column is dependent if its part beyond the kept ones is at most `tolerance` of its entry in
+    /// A column is dependent if its part beyond the retained ones is at most `tolerance` of its entry in
     /// `lengths`, all of which are positive.
     pub fn reduce(
         &mut self,
         tolerance: T,
         lengths: &LegParameters<T, N>,
-        mut kept: impl FnMut(usize, usize, Parameter),
+        mut retained: impl FnMut(usize, usize, Parameter),
     ) -> Echelon<T> {
         let rows = self.rows.as_flattened_mut();
-        let mut echelon = Echelon { rank: 0, smallest_kept: T::LARGEST, largest_dropped: T::zero() };
+        let mut echelon = Echelon { rank: 0, smallest_retained: T::LARGEST, largest_dropped: T::zero() };
         for (joint, parameter) in in_order_of_preference::<N>() {
             let Some((pivot_row, below)) =
                 rows.get_mut(echelon.rank..).and_then(<[RegressorRow<T, N>]>::split_first_mut)
@@ -109,8 +109,8 @@ impl<T: Real, const N: usize> Factor<T, N> {
             }
             let share = abs(entry(pivot_row, joint, parameter)) / entry(lengths, joint, parameter);
             if share > tolerance {
-                echelon.smallest_kept = min(echelon.smallest_kept, share);
-                kept(echelon.rank, joint, parameter);
+                echelon.smallest_retained = min(echelon.smallest_retained, share);
+                retained(echelon.rank, joint, parameter);
                 echelon.rank += 1;
             } else {
                 echelon.largest_dropped = max(echelon.largest_dropped, share);
@@ -119,7 +119,7 @@ impl<T: Real, const N: usize> Factor<T, N> {
         echelon
     }
 
-    /// Back-substitution for one kept column: divides its row by the pivot and
+    /// Back-substitution for one retained column: divides its row by the pivot and
     /// clears the column in earlier rows.
     pub fn substitute(&mut self, place: usize, joint: usize, parameter: Parameter) {
         let Some((pivot_row, before)) =
@@ -147,12 +147,12 @@ fn rotate<T: Real, const N: usize>(
     joint: usize,
     parameter: Parameter,
 ) {
-    let (kept, lost) = (entry(into, joint, parameter), entry(from, joint, parameter));
+    let (retained, lost) = (entry(into, joint, parameter), entry(from, joint, parameter));
     if lost == T::zero() {
         return;
     }
-    let length = sqrt(kept * kept + lost * lost);
-    let (cosine, sine) = (kept / length, lost / length);
+    let length = sqrt(retained * retained + lost * lost);
+    let (cosine, sine) = (retained / length, lost / length);
     for (one, other) in into.iter_mut().flatten().zip(from.iter_mut().flatten()) {
         (*one, *other) = (cosine * *one + sine * *other, cosine * *other - sine * *one);
     }

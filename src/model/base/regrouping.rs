@@ -73,7 +73,7 @@ pub fn regroup<T: Real, const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::super::super::newton_euler::joint_torques;
-    use super::super::super::testing::Dice;
+    use super::super::super::testing::TestRandom;
     use super::*;
 
     /// Largest change of torque by a change of parameters, over random legs and motions, N m.
@@ -81,12 +81,12 @@ mod tests {
         seed: u64,
         change: impl Fn(&Chain<f64, N>, &LegParameters<f64, N>) -> LegParameters<f64, N>,
     ) -> f64 {
-        let mut dice = Dice::new(seed);
+        let mut random = TestRandom::new(seed);
         let mut worst = 0.0_f64;
         for _ in 0..100 {
-            let (chain, leg) = (dice.chain::<N>(), dice.leg::<N>());
+            let (chain, leg) = (random.chain::<N>(), random.leg::<N>());
             let changed = change(&chain, &leg);
-            let (state, gravity) = (dice.state(), dice.gravity());
+            let (state, gravity) = (random.state(), random.gravity());
             let before = joint_torques(&chain, &leg, &state, &gravity);
             let after = joint_torques(&chain, &changed, &state, &gravity);
             for joint in 0..N {
@@ -110,8 +110,8 @@ mod tests {
 
     #[test]
     fn regrouping_leaves_as_many_inertial_parameters_as_the_rank() {
-        let mut dice = Dice::new(75);
-        let grouped = regroup(&dice.chain::<3>(), &dice.leg());
+        let mut random = TestRandom::new(75);
+        let grouped = regroup(&random.chain::<3>(), &random.leg());
         let inertial = |joint: &[f64; 14]| joint[..11].iter().filter(|value| **value != 0.0).count();
         // ZZ HX HY of the first link, seven of every other, rotors of all but the first.
         assert_eq!(grouped.map(|joint| inertial(&joint)), [3, 8, 8]);

@@ -30,7 +30,7 @@ const REST_SAMPLES: u8 = 16;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pulse {
     /// Position within a turn, or less than a turn beyond it.
-    place: i32,
+    position: i32,
     /// Counts by which the capture may be late.
     late: i32,
 }
@@ -59,8 +59,8 @@ impl IndexWatch {
 
     /// Records a pulse at a rotor position, in a period in which the counter moved by `step`.
     #[inline(always)]
-    pub(super) fn came(&mut self, place: i32, step: i32) {
-        self.pulse = Some(Pulse { place, late: step.abs() / LATENCY });
+    pub(super) fn came(&mut self, position: i32, step: i32) {
+        self.pulse = Some(Pulse { position, late: step.abs() / LATENCY });
     }
 
     /// Shifts the stored counts after the joint's zero was set.
@@ -85,8 +85,8 @@ impl IndexWatch {
         }
         let is_overdue = since(self.right_at) > longest;
         let Some(pulse) = self.pulse.take() else { return is_overdue };
-        let lies_at = |place: i32, late: i32| {
-            let distance = scale.within_turn(pulse.place - place);
+        let lies_at = |position: i32, late: i32| {
+            let distance = scale.within_turn(pulse.position - position);
             distance.min(scale.counts_per_turn() - distance) <= INDEX_WIDTH + late
         };
         if lies_at(0, pulse.late) {
@@ -97,7 +97,7 @@ impl IndexWatch {
             return is_overdue;
         }
         match self.suspect {
-            Some((first, _)) if lies_at(first.place, pulse.late + first.late) => self.left || is_overdue,
+            Some((first, _)) if lies_at(first.position, pulse.late + first.late) => self.left || is_overdue,
             _ => {
                 (self.suspect, self.left) = (Some((pulse, counts)), false);
                 is_overdue
@@ -138,8 +138,8 @@ mod tests {
         }
 
         /// One pulse at a position, in a period of so many counts.
-        fn pulse(&mut self, place: i32, step: i32) -> bool {
-            self.watch.came(place, step);
+        fn pulse(&mut self, position: i32, step: i32) -> bool {
+            self.watch.came(position, step);
             self.look()
         }
 
@@ -155,18 +155,19 @@ mod tests {
     #[test]
     fn a_pulse_is_right_up_to_four_counts_and_the_travel_of_10_us() {
         // The travel is a quarter of the step; beyond it the pulse is a suspect.
-        for (place, step, right) in [(4, 3, true), (5, 3, false), (5, 4, true), (6, -8, true), (7, 8, false)]
+        for (position, step, right) in
+            [(4, 3, true), (5, 3, false), (5, 4, true), (6, -8, true), (7, 8, false)]
         {
-            for place in [place, -place, place + TURN, TURN - place] {
+            for position in [position, -position, position + TURN, TURN - position] {
                 let mut rotor = Turning::new();
-                assert!(!rotor.turn(100) && !rotor.pulse(place, step));
-                assert_eq!(rotor.is_suspicious(), !right, "{place} {step}");
+                assert!(!rotor.turn(100) && !rotor.pulse(position, step));
+                assert_eq!(rotor.is_suspicious(), !right, "{position} {step}");
             }
         }
     }
 
     #[test]
-    fn one_wrong_pulse_is_noise_and_a_second_one_at_its_place_a_loss() {
+    fn one_wrong_pulse_is_noise_and_a_second_one_there_a_loss() {
         for (second, lost) in [(300, true), (304, true), (296, true), (305, false), (295, false)] {
             for turn in [TURN, -TURN] {
                 let mut rotor = Turning::new();

@@ -1,4 +1,5 @@
 use super::*;
+use crate::hal::CURRENT_RATE_HZ;
 use crate::motor::calibration::tests::calibrate;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{AxisConfiguration, DeadTime, Direction};
@@ -28,7 +29,7 @@ impl Bench {
         let axis = Axis::new(configuration, &calibration, &sample).expect("usual");
         let mut bench = Self { motor, axis, sample };
         // Track the speed before anything switches.
-        bench.run(AxisRequest::RELEASED, 480);
+        bench.run(AxisRequest::OFF, 480);
         bench
     }
 
@@ -39,9 +40,9 @@ impl Bench {
     }
 
     /// Runs ticks and takes the joint's sample after every sixth, as a board does.
-    fn run_sampled(&mut self, request: AxisRequest, ticks: usize, spoil: impl Fn(&mut AxisSample)) {
+    fn run_sampled(&mut self, request: AxisRequest, ticks: usize, inject: impl Fn(&mut AxisSample)) {
         for tick in 0..ticks {
-            spoil(&mut self.sample);
+            inject(&mut self.sample);
             self.tick(request);
             if tick % 6 == 2 {
                 self.axis.check();
@@ -53,7 +54,7 @@ impl Bench {
     }
 
     fn run(&mut self, request: AxisRequest, ticks: usize) -> AxisCommand {
-        (0..ticks).fold(AxisCommand::RELEASED, |_, _| self.tick(request))
+        (0..ticks).fold(AxisCommand::OFF, |_, _| self.tick(request))
     }
 
     /// Mean and spread (peak to peak) of both true currents over at least one electrical turn.
@@ -98,17 +99,17 @@ fn the_voltage_is_turned_to_where_the_rotor_will_be_in_the_middle_of_its_period(
             AxisConfiguration { feedforward: false, dead_time: DeadTime::Uncompensated, ..CONFIGURATION };
         let mut bench = Bench::at(0.0, &configuration);
         let mut sample = bench.sample;
-        sample.shunt_codes = bench.axis.constants.zeros.map(|zero| (zero + 0.5) as u16);
+        sample.shunt_codes = bench.axis.constants.current_offsets.map(|zero| (zero + 0.5) as u16);
         sample.index_count = None;
         for _ in 0..1200 {
-            bench.axis.tick(&sample, AxisRequest::RELEASED);
+            bench.axis.tick(&sample, AxisRequest::OFF);
             sample.encoder_count = sample.encoder_count.wrapping_add(counts_per_tick as u16);
         }
         let [a, b, c] = bench.axis.tick(&sample, ask(10.0)).duty;
         let alpha = f64::from(2.0 * a - b - c) / 3.0;
         let beta = f64::from(b - c) * 0.577_350_269;
         let scale = &bench.axis.constants.scale;
-        let angle = scale.angle(bench.axis.place).plus(bench.axis.constants.offset);
+        let angle = scale.angle(bench.axis.position).plus(bench.axis.constants.offset);
         let duty_turns = crate::real::atan2(beta, alpha) / core::f64::consts::TAU;
         let ahead = duty_turns - 0.25 - f64::from(angle.turns());
         let expected = 1.5 * f64::from(counts_per_tick) * 7.0 / 8192.0;
@@ -158,10 +159,10 @@ fn counts_stay_exact_through_many_wraps_of_the_counter() {
     let _ = bench.axis.joint_sample();
     bench.axis.set_counts(0);
     let begin = bench.motor.angle;
-    bench.run(AxisRequest::RELEASED, 24_000);
+    bench.run(AxisRequest::OFF, CURRENT_RATE_HZ as usize);
     // The newest sample has not been ticked yet.
-    bench.tick(AxisRequest::RELEASED);
-    bench.tick(AxisRequest::RELEASED);
+    bench.tick(AxisRequest::OFF);
+    bench.tick(AxisRequest::OFF);
     let turned = -(bench.motor.angle - begin) / core::f64::consts::TAU * 8192.0;
     let _ = bench.axis.joint_sample();
     let counts = f64::from(bench.axis.joint_sample().encoder_counts);
@@ -170,24 +171,24 @@ fn counts_stay_exact_through_many_wraps_of_the_counter() {
 }
 
 #[test]
-fn every_border_releases_and_stays_released_until_it_is_cleared() {
-    type Spoil = fn(&mut AxisSample);
-    let spoils: [(Spoil, AxisFault, usize); 4] = [
+fn every_bound_turns_off_until_the_fault_is_cleared() {
+    type Inject = fn(&mut AxisSample);
+    let injections: [(Inject, AxisFault, usize); 4] = [
         (|sample| sample.shunt_codes[1] = 4000, AxisFault::CurrentSense, 2),
         (|sample| sample.bus_code = 3950, AxisFault::BusVoltage, 2),
         (|sample| sample.bus_code = 0, AxisFault::BusVoltage, 2),
         (|sample| sample.shunt_codes = [3700, 2048], AxisFault::Overcurrent, 1),
     ];
-    for (spoil, fault, patience) in spoils {
+    for (inject, fault, patience) in injections {
         let mut bench = Bench::at(50.0, &CONFIGURATION);
         bench.run(ask(5.0), 100);
         for tick in 1..=patience {
             assert_eq!(bench.axis.fault(), None);
-            spoil(&mut bench.sample);
+            inject(&mut bench.sample);
             assert_eq!(bench.tick(ask(5.0)).enabled, tick < patience, "{fault:?}");
         }
         assert_eq!(bench.axis.fault(), Some(fault));
-        assert_eq!(bench.run(ask(5.0), 10), AxisCommand::RELEASED);
+        assert_eq!(bench.run(ask(5.0), 10), AxisCommand::OFF);
         assert!(bench.axis.clear_fault());
         assert!(bench.run(ask(5.0), 10).enabled);
     }
@@ -195,26 +196,26 @@ fn every_border_releases_and_stays_released_until_it_is_cleared() {
 
 #[test]
 fn who_is_about_to_switch_is_patient_with_no_bad_sample() {
-    type Spoil = fn(&mut AxisSample);
-    let cases: [(Spoil, AxisFault); 3] = [
+    type Inject = fn(&mut AxisSample);
+    let cases: [(Inject, AxisFault); 3] = [
         (|sample| sample.shunt_codes[0] = 0, AxisFault::CurrentSense),
         (|sample| sample.bus_code = 4095, AxisFault::BusVoltage),
         (|sample| sample.encoder_count ^= 0x4000, AxisFault::Encoder),
     ];
-    for (spoil, fault) in cases {
+    for (inject, fault) in cases {
         let mut bench = Bench::at(0.0, &CONFIGURATION);
-        spoil(&mut bench.sample);
-        assert_eq!((bench.tick(ask(5.0)), bench.axis.fault()), (AxisCommand::RELEASED, Some(fault)));
+        inject(&mut bench.sample);
+        assert_eq!((bench.tick(ask(5.0)), bench.axis.fault()), (AxisCommand::OFF, Some(fault)));
         // While switching, the same sample is tolerated.
         let mut bench = Bench::at(0.0, &CONFIGURATION);
         bench.run(ask(5.0), 10);
-        spoil(&mut bench.sample);
+        inject(&mut bench.sample);
         assert!(bench.tick(ask(5.0)).enabled && bench.axis.fault().is_none(), "{fault:?}");
     }
 }
 
 #[test]
-fn one_bad_sample_alone_is_survived_and_a_lost_place_is_not_cleared() {
+fn one_bad_sample_is_survived_and_a_lost_position_is_not_cleared() {
     let mut bench = Bench::at(50.0, &CONFIGURATION);
     bench.run(ask(5.0), 100);
     for _ in 0..10 {
@@ -230,7 +231,7 @@ fn one_bad_sample_alone_is_survived_and_a_lost_place_is_not_cleared() {
     assert_eq!(bench.axis.fault(), Some(AxisFault::Encoder));
     // Without the rotor's angle only braking is left.
     assert_eq!(bench.run(ask(5.0), 10), AxisCommand::BRAKE);
-    assert_eq!(bench.run(AxisRequest::RELEASED, 1), AxisCommand::RELEASED);
+    assert_eq!(bench.run(AxisRequest::OFF, 1), AxisCommand::OFF);
     assert!(!bench.axis.clear_fault());
 }
 
@@ -239,7 +240,7 @@ fn nothing_that_is_not_finite_reaches_the_bridge() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut bench = Bench::at(0.0, &CONFIGURATION);
         bench.run(ask(5.0), 100);
-        assert_eq!(bench.tick(ask(bad)), AxisCommand::RELEASED);
+        assert_eq!(bench.tick(ask(bad)), AxisCommand::OFF);
         assert_eq!(bench.axis.fault(), Some(AxisFault::NotANumber));
         assert!(bench.axis.clear_fault());
         bench.run(ask(5.0), 600);
@@ -303,7 +304,7 @@ fn every_one_of_the_65536_offsets_of_the_counter_gives_the_same_bits() {
 }
 
 #[test]
-fn a_reading_that_was_not_believed_is_told_once() {
+fn a_rejected_reading_is_reported_once() {
     let mut bench = Bench::at(60.0, &CONFIGURATION);
     bench.run(ask(5.0), 240);
     assert!(!bench.axis.joint_sample().doubtful);
@@ -320,18 +321,28 @@ fn the_way_back_from_a_wrong_reading_is_no_second_one() {
     for speed in [-60.0, 0.0, 60.0] {
         let bench = Bench::at(speed, &CONFIGURATION);
         let mut sound = bench.clone();
-        sound.run(AxisRequest::RELEASED, 12);
+        sound.run(AxisRequest::OFF, 12);
         sound.axis.joint_sample();
-        sound.run(AxisRequest::RELEASED, 6);
+        sound.run(AxisRequest::OFF, 6);
         let expected = sound.axis.joint_sample().encoder_counts;
         for size in (1..=80).flat_map(|size| [size, -size]) {
             let mut bench = bench.clone();
             bench.sample.encoder_count = bench.sample.encoder_count.wrapping_add_signed(size);
-            bench.run(AxisRequest::RELEASED, 12);
+            bench.run(AxisRequest::OFF, 12);
             assert_eq!(bench.axis.fault(), None, "{size} counts at {speed} rad/s");
             bench.axis.joint_sample();
-            bench.run(AxisRequest::RELEASED, 6);
+            bench.run(AxisRequest::OFF, 6);
             assert_eq!(bench.axis.joint_sample().encoder_counts, expected, "{size} counts at {speed} rad/s");
         }
     }
+}
+
+#[test]
+fn a_mean_of_counts_is_right_although_their_sum_wraps() {
+    let mut window = Window::EMPTY;
+    for ticks in 0..4 {
+        window.push(1_600_000_000 + ticks, 2.0);
+    }
+    let mean = window.mean().expect("four ticks");
+    assert_eq!((mean.encoder_counts, mean.current), (1_600_000_001, Ampere(2.0)));
 }

@@ -56,14 +56,15 @@ impl FieldWay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hal::CURRENT_RATE_HZ;
 
     #[test]
     fn the_field_begins_and_ends_at_rest_and_never_jumps() {
         let way = FieldWay::over(7.0, 8.0);
-        let (mut place, mut speed) = (0.0, 0.0);
+        let (mut position, mut speed) = (0.0, 0.0);
         for tick in 1..=36_000 {
-            let travelled = way.travelled(tick as f32 / 24_000.0);
-            let step = travelled - place;
+            let travelled = way.travelled(tick as f32 / CURRENT_RATE_HZ as f32);
+            let step = travelled - position;
             // 8 turns per second are 3.3e-4 of a turn per tick, reached in a quarter of a second: 5.6e-8 more
             // in each. Nine turns are rounded to half a millionth.
             assert!(
@@ -71,8 +72,8 @@ mod tests {
                 "{tick}: {step} after {speed}"
             );
             assert_eq!(way.steady(travelled).is_some(), travelled > 1.0 && travelled <= 8.0);
-            (place, speed) = (travelled, step);
+            (position, speed) = (travelled, step);
         }
-        assert!(way.ended(place) && place == 9.0);
+        assert!(way.ended(position) && position == 9.0);
     }
 }

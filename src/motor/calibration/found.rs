@@ -31,13 +31,13 @@ impl EncoderSetting {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
     pub(super) encoder: EncoderSetting,
-    pub(super) zeros: [f32; 2],
+    pub(super) current_offsets: [f32; 2],
     pub(super) resistance: Ohm,
     pub(super) inductances: Inductances,
     pub(super) offset: ElectricalAngle,
     /// Counter at the end of the calibration, and the rotor position at that reading.
     pub(super) counter: u16,
-    pub(super) place: i32,
+    pub(super) position: i32,
     pub(super) indexed: bool,
 }
 
@@ -71,8 +71,8 @@ impl Calibration {
 
     /// Current-sensor offsets: shunt codes without current.
     #[must_use]
-    pub fn zeros(&self) -> [f32; 2] {
-        self.zeros
+    pub fn current_offsets(&self) -> [f32; 2] {
+        self.current_offsets
     }
 
     /// Resistance of one phase.
@@ -103,7 +103,7 @@ impl Calibration {
     /// of its range.
     #[must_use]
     pub fn angle_at(&self, scale: &CountScale, direction: Direction, counter: u16) -> ElectricalAngle {
-        scale.angle(self.place_of(scale, direction, counter)).plus(self.offset)
+        scale.angle(self.position_of(scale, direction, counter)).plus(self.offset)
     }
 
     /// Returns the part to store; `None` without an index, because the counter resets with the power.
@@ -126,8 +126,13 @@ impl Calibration {
         Self { counter: self.counter.wrapping_add(offset), ..*self }
     }
 
-    pub(in crate::motor) fn place_of(&self, scale: &CountScale, direction: Direction, counter: u16) -> i32 {
+    pub(in crate::motor) fn position_of(
+        &self,
+        scale: &CountScale,
+        direction: Direction,
+        counter: u16,
+    ) -> i32 {
         let moved = i32::from(counter.wrapping_sub(self.counter).cast_signed());
-        scale.within_turn(self.place + direction.sign() * moved)
+        scale.within_turn(self.position + direction.sign() * moved)
     }
 }

@@ -149,7 +149,7 @@ mod tests {
 
     /// Inductance found for the swing of a known resistance and inductance at an amplitude.
     fn found(resistance: f64, inductance: f64, amplitude: f64) -> Result<Henry, Refusal> {
-        let seconds = 2.0 / 24_000.0;
+        let seconds = 2.0 / f64::from(CURRENT_RATE_HZ);
         let tangent = |y: f64| 1.0 - 2.0 / (crate::real::exp(2.0 * y) + 1.0);
         let swing = 2.0 * amplitude / resistance * tangent(resistance * seconds / (2.0 * inductance));
         let stage = InductanceStage {
@@ -166,7 +166,7 @@ mod tests {
             [(0.05, 25e-6, 1.0), (0.2, 60e-6, 3.0), (1.0, 150e-6, 12.0), (0.01, 10e-6, 0.2)]
         {
             let found = f64::from(found(resistance, inductance, amplitude).expect("usual").0);
-            let x: f64 = resistance * 2.0 / 24_000.0 / (2.0 * inductance);
+            let x: f64 = resistance * 2.0 / f64::from(CURRENT_RATE_HZ) / (2.0 * inductance);
             // Tolerance: truncation of the series, and single precision.
             let error = x * x * x * x / 5.0 + 1e-5;
             assert!((found / inductance - 1.0).abs() < error, "{found} for {inductance}, x {x}");

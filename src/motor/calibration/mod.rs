@@ -47,6 +47,7 @@
 //! (gravity) shifts the offset by asin(torque / holding torque), friction does not. Calibrate with the
 //! leg hanging or unloaded.
 
+mod current_offsets;
 mod field;
 mod found;
 mod hold;
@@ -55,7 +56,6 @@ mod refusal;
 mod resistance;
 mod scan;
 mod track;
-mod zeros;
 
 use super::configuration::{AxisConfiguration, AxisError, Direction};
 use super::{
@@ -63,6 +63,7 @@ use super::{
 };
 use crate::hal::{AxisCommand, AxisSample};
 use crate::units::{Ampere, Hertz, Ohm, Volt, Weber};
+use current_offsets::CurrentOffsets;
 pub use found::{Calibration, EncoderSetting, StoredCalibration};
 use hold::Hold;
 use inductance::{InductanceStage, Inductances};
@@ -70,7 +71,6 @@ pub use refusal::{Phase, Refusal};
 use resistance::ResistanceStage;
 use scan::{Scan, ScanResult};
 pub(super) use track::INDEX_WIDTH;
-use zeros::Zeros;
 
 /// Limits of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,7 +133,7 @@ enum Outcome<R> {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
-    Zeros(Zeros),
+    CurrentOffsets(CurrentOffsets),
     Resistance(ResistanceStage),
     Inductance(InductanceStage),
     Scan(Scan),
@@ -145,7 +145,7 @@ enum Stage {
 pub struct Calibrator {
     bench: Bench,
     stored: Option<StoredCalibration>,
-    zeros: [f32; 2],
+    current_offsets: [f32; 2],
     resistance: Ohm,
     inductances: Inductances,
     stage: Stage,
@@ -181,10 +181,10 @@ impl Calibrator {
         Ok(Self {
             bench,
             stored: None,
-            zeros: [0.0; 2],
+            current_offsets: [0.0; 2],
             resistance: Ohm::ZERO,
             inductances: Inductances::default(),
-            stage: Stage::Zeros(Zeros::default()),
+            stage: Stage::CurrentOffsets(CurrentOffsets::default()),
         })
     }
 
@@ -224,10 +224,13 @@ impl Calibrator {
         if !(low..=high).contains(&sample.bus_code) {
             return Err(Err(Refusal::BusVoltage));
         }
-        let zeros = self.zeros;
-        let reading = |zeros| {
-            let current =
-                self.bench.sense.currents(sample.shunt_codes, zeros).ok_or(Refusal::CurrentSense)?;
+        let current_offsets = self.current_offsets;
+        let reading = |current_offsets| {
+            let current = self
+                .bench
+                .sense
+                .currents(sample.shunt_codes, current_offsets)
+                .ok_or(Refusal::CurrentSense)?;
             let (alpha, beta) = (current.alpha.0, current.beta.0);
             if alpha * alpha + beta * beta > self.bench.overcurrent_square {
                 return Err(Refusal::Overcurrent);
@@ -237,15 +240,15 @@ impl Calibrator {
         };
         match &mut self.stage {
             Stage::Finished(end) => Err(*end),
-            Stage::Zeros(stage) => {
+            Stage::CurrentOffsets(stage) => {
                 if let Some(found) = stage.tick(sample).map_err(Err)? {
-                    self.zeros = found;
+                    self.current_offsets = found;
                     self.stage = Stage::Resistance(ResistanceStage::default());
                 }
-                Ok(AxisCommand::RELEASED)
+                Ok(AxisCommand::OFF)
             }
             Stage::Resistance(stage) => {
-                let reading = reading(zeros).map_err(Err)?;
+                let reading = reading(current_offsets).map_err(Err)?;
                 match stage.tick(&reading).map_err(Err)? {
                     Outcome::Running(voltage) => Ok(reading.command(voltage)),
                     Outcome::Passed((resistance, hold)) => {
@@ -258,7 +261,7 @@ impl Calibrator {
                 }
             }
             Stage::Inductance(stage) => {
-                let reading = reading(zeros).map_err(Err)?;
+                let reading = reading(current_offsets).map_err(Err)?;
                 match stage.tick(&reading, self.resistance).map_err(Err)? {
                     Outcome::Running(voltage) => Ok(reading.command(voltage)),
                     Outcome::Passed((inductances, hold)) => {
@@ -276,7 +279,7 @@ impl Calibrator {
                 }
             }
             Stage::Scan(stage) => {
-                let reading = reading(zeros).map_err(Err)?;
+                let reading = reading(current_offsets).map_err(Err)?;
                 match stage.tick(&reading).map_err(Err)? {
                     Outcome::Running(voltage) => Ok(reading.command(voltage)),
                     Outcome::Passed(found) => Err(Ok(self.passed(found, sample))),
@@ -314,12 +317,12 @@ impl Calibrator {
     fn passed(&self, found: ScanResult, sample: &AxisSample) -> Calibration {
         Calibration {
             encoder: self.bench.encoder,
-            zeros: self.zeros,
+            current_offsets: self.current_offsets,
             resistance: self.resistance,
             inductances: self.inductances,
             offset: found.offset,
             counter: sample.encoder_count,
-            place: found.place,
+            position: found.position,
             indexed: self.bench.index,
         }
     }

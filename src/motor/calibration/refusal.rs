@@ -21,7 +21,7 @@ pub enum Refusal {
     /// Bus voltage out of range.
     BusVoltage,
     /// The current-sensor offset of this phase is too far from the middle, or too noisy.
-    ShuntZero(Phase),
+    ShuntOffset(Phase),
     /// The rotor turns although the outputs are off.
     Turning,
     /// No current in this phase.

@@ -63,7 +63,7 @@ pub(super) struct ScanResult {
     /// Electrical angle at rotor position zero.
     pub offset: ElectricalAngle,
     /// Rotor position of the last sample.
-    pub place: i32,
+    pub position: i32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,8 +204,8 @@ impl Scan {
         }
         let drift = self.followed.deviation.drift_per_turn();
         if drift.abs() * pairs > GREATEST_DRIFT {
-            let told = reading.bench.scale.counts_per_turn() as f32;
-            return Err(Refusal::CountsPerTurn((told * (1.0 - drift) + 0.5) as u32));
+            let stated = reading.bench.scale.counts_per_turn() as f32;
+            return Err(Refusal::CountsPerTurn((stated * (1.0 - drift) + 0.5) as u32));
         }
         self.followed.must_keep_to_the_field()?;
         if (electrical - pairs).abs() > GREATEST_TRAVEL_ERROR {
@@ -253,6 +253,6 @@ impl Scan {
 
     fn result(&self, reading: &Reading<'_>) -> ScanResult {
         let from_index = self.track.way.wrapping_sub(self.track.index.unwrap_or(0));
-        ScanResult { offset: self.offset, place: reading.bench.scale.within_turn(from_index) }
+        ScanResult { offset: self.offset, position: reading.bench.scale.within_turn(from_index) }
     }
 }

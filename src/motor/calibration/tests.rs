@@ -1,23 +1,25 @@
 extern crate std;
 
 use super::*;
+use crate::hal::CURRENT_RATE_HZ;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{Axis, AxisRequest};
+use crate::testing::TestRandom;
 
 pub(crate) const SETTINGS: CalibrationSettings =
     CalibrationSettings { current: Ampere(20.0), voltage: Volt(4.0), turns_per_s: 8.0 };
 
-/// Runs a calibration to its end and checks that quadrature torque never runs the rotor away. `spoil` can
+/// Runs a calibration to its end and checks that quadrature torque never runs the rotor away. `inject` can
 /// change every sample, by its number.
 fn run_with(
     motor: &mut TestMotor,
     mut calibrator: Calibrator,
-    mut spoil: impl FnMut(&mut AxisSample, u32),
+    mut inject: impl FnMut(&mut AxisSample, u32),
 ) -> Result<Calibration, Refusal> {
     let mut sample = motor.sample();
     // At most ten seconds.
     for tick in 0..240_000 {
-        spoil(&mut sample, tick);
+        inject(&mut sample, tick);
         let command = match calibrator.tick(&sample) {
             CalibrationStep::Running(command) => command,
             CalibrationStep::Done(calibration) => return Ok(calibration),
@@ -60,7 +62,7 @@ fn a_scan_takes_22_field_turns_two_rests_and_a_fall() {
     assert!(matches!(calibrator.stage, Stage::Finished(Ok(_))));
     // 7 pole pairs at 8 turns of the field per second; 0.2 s of rest before each way, 50 ms of fall.
     let seconds = 22.0 / 8.0 + 2.0 * 0.2 + 0.05;
-    assert!((f64::from(ticks) / 24_000.0 - seconds).abs() < 2e-3, "{ticks}");
+    assert!((f64::from(ticks) / f64::from(CURRENT_RATE_HZ) - seconds).abs() < 2e-3, "{ticks}");
 }
 
 #[test]
@@ -68,7 +70,7 @@ fn a_counter_that_began_elsewhere_moves_the_position_of_every_count() {
     let found = calibrate(&mut TestMotor::default(), &CONFIGURATION).expect("sound");
     let scale = CONFIGURATION.scale().expect("usual");
     let at =
-        |calibration: &Calibration, counter| calibration.place_of(&scale, CONFIGURATION.counter, counter);
+        |calibration: &Calibration, counter| calibration.position_of(&scale, CONFIGURATION.counter, counter);
     for offset in [1, 5000, 65_535] {
         let moved = found.with_counter_moved(offset);
         for counter in [0_u16, 12_345, 65_000] {
@@ -89,7 +91,7 @@ fn a_sound_motor_is_measured_and_its_offset_found() {
         assert!((f64::from(found.quadrature_inductance().0) / 27e-6 - 1.0).abs() < 0.02, "{found:?}");
         let error = offset_error_deg(&mut motor, &configuration, &found);
         assert!(error.abs() < 1.0, "{error} degrees");
-        assert!((f64::from(found.zeros()[0]) - 2060.3).abs() < 0.6, "{found:?}");
+        assert!((f64::from(found.current_offsets()[0]) - 2060.3).abs() < 0.6, "{found:?}");
     }
 }
 
@@ -118,7 +120,7 @@ const WRONG: [(Change, Refusal); 18] = [
     (|motor| motor.encoder_sign = -1.0, Refusal::Direction),
     (|motor| motor.encoder_dead = true, Refusal::NoCounts),
     (|motor| motor.pole_pairs = 11.0, Refusal::PolePairs(11)),
-    (|motor| motor.zeros[1] = 400.0, Refusal::ShuntZero(Phase::C)),
+    (|motor| motor.current_offsets[1] = 400.0, Refusal::ShuntOffset(Phase::C)),
     (|motor| motor.bus = 12.0, Refusal::BusVoltage),
     // The holding torque is 0.61 N m: friction of 0.4 is a lag of 41 degrees, although the rotor follows.
     (|motor| motor.coulomb = 0.54, Refusal::Slipped),
@@ -140,7 +142,7 @@ const WRONG: [(Change, Refusal); 18] = [
 ];
 
 #[test]
-fn the_index_tells_counts_per_turn_from_pole_pairs() {
+fn the_index_separates_counts_per_turn_from_pole_pairs() {
     let configuration = AxisConfiguration { counts_per_turn: 4096, ..CONFIGURATION };
     let refusals: std::vec::Vec<Refusal> = (0..7)
         .map(|turn| {
@@ -151,9 +153,9 @@ fn the_index_tells_counts_per_turn_from_pole_pairs() {
             calibrate(&mut motor, &configuration).expect_err("half of the counts")
         })
         .collect();
-    let told = refusals.iter().filter(|&&reason| reason == Refusal::CountsPerTurn(2048)).count();
+    let found = refusals.iter().filter(|&&reason| reason == Refusal::CountsPerTurn(2048)).count();
     let mistaken = refusals.iter().filter(|&&reason| reason == Refusal::PolePairs(14)).count();
-    assert_eq!((told, mistaken), (2, 5), "{refusals:?}");
+    assert_eq!((found, mistaken), (2, 5), "{refusals:?}");
 }
 
 #[test]
@@ -194,13 +196,14 @@ fn constants_that_are_not_the_stored_ones_are_another_motors_and_what_is_used_is
         (0.15, 0.25, |stored| &mut stored.direct_inductance.0),
         (0.15, 0.25, |stored| &mut stored.quadrature_inductance.0),
     ];
-    for (agrees, differs, place) in changes {
+    for (agrees, differs, position) in changes {
         for (share, end) in [(agrees, true), (-agrees, true), (differs, false), (-differs, false)] {
             let mut changed = stored;
             // The measured value exceeds the stored one by this share.
-            *place(&mut changed) /= 1.0 + share;
+            *position(&mut changed) /= 1.0 + share;
             let calibrator = Calibrator::from_stored(&CONFIGURATION, SETTINGS, changed).expect("usual");
-            let found = run(&mut TestMotor { seed: 9, ..TestMotor::default() }, calibrator);
+            let found =
+                run(&mut TestMotor { random: TestRandom::new(9), ..TestMotor::default() }, calibrator);
             assert_eq!(found.err(), (!end).then_some(Refusal::OtherMotor), "{share}");
             let Ok(found) = found else { continue };
             let near = |found: f32, first: f32| (found / first - 1.0).abs() < 0.04;
@@ -248,21 +251,21 @@ fn a_calibration_is_of_no_use_to_another_configuration() {
 
 #[test]
 fn a_border_that_is_crossed_on_the_way_ends_the_calibration() {
-    type Spoil = fn(&mut AxisSample);
-    let spoils: [(Spoil, Refusal); 4] = [
+    type Inject = fn(&mut AxisSample);
+    let injections: [(Inject, Refusal); 4] = [
         // 62 A in phase B.
         (|sample| sample.shunt_codes = [3600, 2048], Refusal::Overcurrent),
         (|sample| sample.shunt_codes[1] = 4000, Refusal::CurrentSense),
         (|sample| sample.bus_code = 3950, Refusal::BusVoltage),
         (|sample| sample.bus_code = 0, Refusal::BusVoltage),
     ];
-    for (spoil, reason) in spoils {
+    for (inject, reason) in injections {
         // During the resistance stage and during the scan.
         for moment in [12_000, 80_000] {
             let calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
             let end = run_with(&mut TestMotor::default(), calibrator, |sample, tick| {
                 if tick == moment {
-                    spoil(sample);
+                    inject(sample);
                 }
             });
             assert_eq!(end, Err(reason), "tick {moment}");

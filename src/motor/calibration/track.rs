@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drift_is_told_from_what_swings() {
+    fn a_drift_is_separated_from_what_swings() {
         for (turns, drift) in [(4.0, 0.024), (64.0, -0.002), (7.0, 0.0)] {
             let mut deviation = Deviation::default();
             for tick in 0..100_000 {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::hal::CURRENT_RATE_HZ;
 use crate::units::Weber;
 
 const MOTOR: MotorConstants = MotorConstants {
@@ -8,7 +9,7 @@ const MOTOR: MotorConstants = MotorConstants {
     flux: Weber(2.9e-3),
 };
 
-const PERIOD_S: f64 = 1.0 / 24_000.0;
+const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
 
 /// A motor in the rotor's frame with the loop's delay: the voltage of one sample acts from the next on.
 struct Plant {

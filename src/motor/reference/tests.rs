@@ -1,7 +1,8 @@
 use super::*;
+use crate::hal::SERVO_RATE_HZ;
 
 const SETTINGS: EndStopSettings = EndStopSettings {
-    rate: Hertz(4000.0),
+    rate: Hertz(SERVO_RATE_HZ as f32),
     counts_per_s: -20_000.0,
     current: Ampere(6.0),
     lead: 2000.0,
@@ -27,7 +28,7 @@ impl Joint {
     }
 
     fn step(&mut self, current: f64) -> JointSample {
-        let step = 1.0 / 4000.0;
+        let step = 1.0 / f64::from(SERVO_RATE_HZ);
         self.speed += step * 2e5 * (current - 2e-5 * self.speed);
         let friction = step * 2e5 * self.friction;
         self.speed -= self.speed.clamp(-friction, friction);
@@ -93,13 +94,13 @@ fn a_way_without_a_stop_a_joint_that_sticks_and_an_obstacle_are_refused() {
 #[test]
 fn a_stated_pose_wants_a_joint_that_stands() {
     let sample = |count| JointSample { encoder_counts: count, ..JointSample::default() };
-    let mut pose = StatedPose::new(Hertz(4000.0)).expect("usual");
+    let mut pose = StatedPose::new(Hertz(SERVO_RATE_HZ as f32)).expect("usual");
     let mut ticks = 1;
     while pose.tick(&sample(-5)) == ReferenceStep::Running(Ampere::ZERO) {
         ticks += 1;
     }
     assert_eq!((ticks, pose.tick(&sample(-5))), (2000, ReferenceStep::Found(-5)));
-    let mut pose = StatedPose::new(Hertz(4000.0)).expect("usual");
+    let mut pose = StatedPose::new(Hertz(SERVO_RATE_HZ as f32)).expect("usual");
     let _ = pose.tick(&sample(-5));
     assert_eq!(pose.tick(&sample(10)), ReferenceStep::Refused(ReferenceRefusal::Moved));
     assert!(StatedPose::new(Hertz(f32::NAN)).is_none());

@@ -19,7 +19,7 @@ struct Bench {
     /// The leg's ends.
     host: HostEnds<'static, 2>,
     bus: BusEnds<'static, 2>,
-    storage: Handover<Keep<2>>,
+    storage: Handover<StoreJob<2>>,
     drive: DriveState,
     /// The operator holds the enabling switch.
     held: bool,
@@ -38,7 +38,7 @@ impl Bench {
             signals: Signals::new(),
             host,
             bus,
-            storage: Handover::new(Keep::NOTHING),
+            storage: Handover::new(StoreJob::NOTHING),
             drive: DriveState::SwitchOnDisabled,
             held: true,
             takes: true,
@@ -63,7 +63,7 @@ impl Bench {
             {
                 self.requests.push(request);
                 if let LegRequest::Power(power) = request {
-                    self.drive = self.drive.after(DriveEvent::Asked(power), 4);
+                    self.drive = self.drive.after(DriveEvent::Requested(power), 4);
                 }
             }
             self.drive = self.drive.after(DriveEvent::Tick, 4);
@@ -106,13 +106,13 @@ impl Bench {
     }
 
     /// Codes of both nodes' emergency messages since the last call, the first node's first.
-    fn told(&mut self) -> Vec<(u16, u16)> {
+    fn emergencies(&mut self) -> Vec<(u16, u16)> {
         let sent = core::mem::take(&mut self.hardware.can.sent).into_iter().map(|(frame, _, _)| frame);
         let emergencies = sent.filter(|frame| matches!(frame.id(), 0x81..=0xFF));
         let code = |frame: Frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]);
-        let mut told: Vec<(u16, u16)> = emergencies.map(|frame| (frame.id(), code(frame))).collect();
-        told.sort_by_key(|(id, _)| *id);
-        told
+        let mut emergencies: Vec<(u16, u16)> = emergencies.map(|frame| (frame.id(), code(frame))).collect();
+        emergencies.sort_by_key(|(id, _)| *id);
+        emergencies
     }
 }
 
@@ -167,12 +167,12 @@ fn a_leg_without_reports_is_ordered_only_by_frames() {
 fn an_overrun_is_reported_and_stops_a_hosted_leg() {
     let mut bench = Bench::new();
     bench.enable();
-    bench.told();
+    bench.emergencies();
     bench.requests.clear();
     bench.hardware.can.overrun = true;
     bench.run(8);
     assert_eq!(bench.requests, [LegRequest::Power(PowerRequest::QuickStop)]);
-    assert_eq!(bench.told(), [(0x81, 0x8110), (0x81, 0), (0x82, 0x8110), (0x82, 0)]);
+    assert_eq!(bench.emergencies(), [(0x81, 0x8110), (0x81, 0), (0x82, 0x8110), (0x82, 0)]);
 }
 
 #[test]
@@ -193,7 +193,7 @@ fn an_overrun_of_a_passive_controller_fills_no_mailboxes() {
 fn bus_off_is_reported_once_and_nothing_is_sent() {
     let mut bench = Bench::new();
     bench.enable();
-    bench.told();
+    bench.emergencies();
     bench.requests.clear();
     bench.hardware.can.controller = Controller::Off;
     bench.run(50);
@@ -201,7 +201,7 @@ fn bus_off_is_reported_once_and_nothing_is_sent() {
     bench.hardware.can.controller = Controller::Active;
     bench.run(8);
     assert_eq!(bench.requests, [LegRequest::Power(PowerRequest::QuickStop)]);
-    assert_eq!(bench.told(), [(0x81, 0x8140), (0x81, 0), (0x82, 0x8140), (0x82, 0)]);
+    assert_eq!(bench.emergencies(), [(0x81, 0x8140), (0x81, 0), (0x82, 0x8140), (0x82, 0)]);
 }
 
 #[test]
@@ -238,10 +238,10 @@ fn one_store_runs_at_a_time_and_its_result_is_reported() {
         bench.storage.give_back();
     };
     let mut bench = Bench::new();
-    bench.told();
+    bench.emergencies();
     window(&mut bench, 11);
     let first = given(&bench);
-    assert_eq!(first.what, Keeping::All);
+    assert_eq!(first.what, StoreCommand::All);
     // A second request waits until the first ends.
     window(&mut bench, 22);
     assert_eq!(given(&bench).objects, first.objects);
@@ -251,7 +251,8 @@ fn one_store_runs_at_a_time_and_its_result_is_reported() {
     assert_eq!((bench.device.generation(), given(&bench).generation), (5, 5));
     end(&bench, false);
     bench.run(8);
-    let codes: Vec<u16> = bench.told().iter().filter(|(id, _)| *id == 0x81).map(|(_, code)| *code).collect();
+    let codes: Vec<u16> =
+        bench.emergencies().iter().filter(|(id, _)| *id == 0x81).map(|(_, code)| *code).collect();
     assert_eq!((codes.first(), codes.last()), (Some(&0xFF0D), Some(&0x5530)), "{codes:x?}");
     assert!(bench.storage.given().is_none() && bench.storage.idle().is_some());
     // The flash refused the second: a reset restores the first.

@@ -6,6 +6,7 @@ use std::vec::Vec;
 use super::super::testing::TestHardware;
 use super::super::{Ends, EventQueue, Queues};
 use super::*;
+use crate::hal::CURRENT_RATE_HZ;
 use crate::leg::AxisFault;
 use crate::motor::calibration::tests::calibrate;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
@@ -91,7 +92,7 @@ impl Bench {
     fn tick(&mut self, torn: bool) {
         self.now = self.now.wrapping_add(PERIOD.get());
         for axis in 0..2 {
-            let mut sample = self.motors[axis].period(AxisCommand::RELEASED);
+            let mut sample = self.motors[axis].period(AxisCommand::OFF);
             if self.late_index {
                 sample.index_count = Some(sample.encoder_count);
             }
@@ -112,7 +113,7 @@ impl Bench {
     }
 
     fn store(&mut self) {
-        self.signals.inhibit.raise(Cause::Storing);
+        self.signals.inhibit.raise(InhibitReason::Storing);
         self.run(480);
     }
 
@@ -124,7 +125,7 @@ impl Bench {
 
     /// Turns both rotors through a whole turn past their index. Returns whether no axis finds it at a wrong
     /// position.
-    fn is_at_its_place(&mut self) -> bool {
+    fn is_at_its_position(&mut self) -> bool {
         for motor in &mut self.motors {
             motor.speed = 60.0;
         }
@@ -143,7 +144,7 @@ fn tick_at(now: u32, sample: AxisSample) -> Tick {
 fn an_axis_checks_itself_in_every_servo_period() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.run(TICKS_PER_SERVO);
-    bench.loops.axis_state_mut(1).and_then(AxisState::axis_mut).expect("running").upset(0, 3);
+    bench.loops.axis_state_mut(1).and_then(AxisState::axis_mut).expect("running").flip_bit(0, 3);
     // The checksum of the constants is compared in every 256th check.
     bench.run(256 * TICKS_PER_SERVO);
     let is_seen = |(axis, outcome): &(usize, Outcome)| {
@@ -160,7 +161,7 @@ fn the_brake_resistor_has_no_duty_while_the_flash_is_written() {
     }
     bench.run(3);
     assert!(bench.hardware.brake > 0.7, "{}", bench.hardware.brake);
-    bench.signals.inhibit.raise(Cause::Storing);
+    bench.signals.inhibit.raise(InhibitReason::Storing);
     bench.tick(false);
     assert_eq!(bench.hardware.brake, 0.0);
     bench.signals.inhibit.end_storing();
@@ -189,7 +190,7 @@ fn an_erasure_discards_only_the_zeros() {
         assert_eq!(bench.outcomes, expected, "{turns}");
         assert_eq!(bench.causes(), 0);
         // The rotor angle is still known: the index is at its position.
-        assert!(bench.is_at_its_place(), "{turns}");
+        assert!(bench.is_at_its_position(), "{turns}");
         assert_eq!(bench.outcomes.len(), 4);
     }
 }
@@ -200,12 +201,12 @@ fn writing_words_discards_nothing() {
     bench.store();
     for _ in 0..100 {
         // Motion of a falling joint: 60 rad/s of its motor.
-        bench.stand(WRITTEN, 60.0 / core::f64::consts::TAU * f64::from(WRITTEN) / 24_000.0);
+        bench.stand(WRITTEN, 60.0 / core::f64::consts::TAU * f64::from(WRITTEN) / f64::from(CURRENT_RATE_HZ));
         bench.tick(false);
     }
     bench.stored();
     assert_eq!((bench.signals.has_begun(), bench.outcomes.len(), bench.causes()), (true, 0, 0));
-    assert!(bench.is_at_its_place());
+    assert!(bench.is_at_its_position());
 }
 
 #[test]
@@ -228,10 +229,10 @@ fn the_same_gap_without_a_flash_write_is_a_fault() {
     bench.stand(ERASED, 0.4);
     bench.run(3);
     assert_eq!(bench.damped, [true; 2]);
-    assert_eq!(bench.causes() & Cause::CurrentTicks.bit(), Cause::CurrentTicks.bit());
+    assert_eq!(bench.causes() & InhibitReason::CurrentTicks.bit(), InhibitReason::CurrentTicks.bit());
     let mut bench = Bench::new(&CONFIGURATION);
     bench.tick(true);
-    assert_eq!(bench.causes(), Cause::Conversion.bit());
+    assert_eq!(bench.causes(), InhibitReason::Conversion.bit());
 }
 
 #[test]
@@ -243,7 +244,7 @@ fn late_ticks_are_reported_for_their_own_joint() {
             bench.now = bench.now.wrapping_add(PERIOD.get());
             for axis in 0..2 {
                 if axis != late || period > 4 {
-                    let sample = bench.motors[axis].period(AxisCommand::RELEASED);
+                    let sample = bench.motors[axis].period(AxisCommand::OFF);
                     bench.tick_axis(axis, &tick_at(bench.now, sample));
                 }
             }
@@ -258,7 +259,7 @@ fn the_emergency_stop_works_during_a_flash_write() {
     bench.store();
     let tick = Tick { emergency_stop: true, ..tick_at(bench.now, bench.motors[0].sample()) };
     bench.tick_axis(0, &tick);
-    assert_eq!(bench.causes(), Cause::Storing.bit() | Cause::EmergencyStop.bit());
+    assert_eq!(bench.causes(), InhibitReason::Storing.bit() | InhibitReason::EmergencyStop.bit());
 }
 
 #[test]
@@ -275,7 +276,7 @@ fn a_missing_bus_voltage_inhibits_at_the_second_period() {
         causes.push(bench.causes());
     }
     // The first missing reading is tolerated.
-    assert_eq!(causes, [0, 0, 0, Cause::Conversion.bit()]);
+    assert_eq!(causes, [0, 0, 0, InhibitReason::Conversion.bit()]);
     assert_eq!(bench.hardware.brake, 0.0);
 }
 

@@ -11,6 +11,7 @@ use crate::hal::{Contacts, JointSample};
 use crate::leg::testing::{LEG, configuration, model};
 use crate::leg::{Cause, Change, FaultCode, Finding, Verdict};
 use crate::safety::{Refusal, RefusalReason};
+use crate::testing::TestRandom;
 
 struct Bench {
     side: HostSide<2>,
@@ -64,9 +65,9 @@ impl Bench {
         self.orders.len() + usize::from(!self.bus.orders.ready())
     }
 
-    fn hear(&mut self, report: impl FnMut(Fault)) {
+    fn receive(&mut self, report: impl FnMut(Fault)) {
         self.give();
-        self.side.hear(&mut self.host, report);
+        self.side.receive(&mut self.host, report);
     }
 
     fn held(&self, request: Option<ControlRequest<2>>, state: DriveState) -> Option<ControlRequest<2>> {
@@ -121,7 +122,7 @@ fn a_request_waits_behind_the_operators_and_none_is_lost() {
         Bench::new(&[order(Some(ENABLE)), order(Some(identify)), order(Some(LegRequest::TakeUpdate))]);
     let stop = ControlRequest::Power(PowerRequest::QuickStop);
     for _ in 0..3 {
-        bench.hear(unreported);
+        bench.receive(unreported);
         // The operator's request comes first and begins without a host's plan.
         assert_eq!(bench.side.request(Some(stop)), Some((stop, None)));
         assert_eq!(bench.waiting(), 2);
@@ -132,7 +133,7 @@ fn a_request_waits_behind_the_operators_and_none_is_lost() {
         (ControlRequest::TakeUpdate, None),
     ];
     for expected in expected {
-        bench.hear(unreported);
+        bench.receive(unreported);
         assert_eq!(bench.side.request(None), Some(expected));
         assert_eq!(bench.side.request(None), None, "once");
     }
@@ -144,14 +145,14 @@ fn the_newest_commands_count_and_a_cancel_passes_once() {
     let mut bench = Bench::new(&[order(Some(LegRequest::Cancel)), fault]);
     assert!(bench.commands().is_none());
     let mut reported = Vec::new();
-    (0..2).for_each(|_| bench.hear(|fault| reported.push(fault)));
+    (0..2).for_each(|_| bench.receive(|fault| reported.push(fault)));
     assert_eq!(reported, [Fault { code: FaultCode::Heartbeat, joint: 1 }]);
     let commands = commanded();
     assert_eq!(bench.commands(), Some((commands, true)));
     assert_eq!(bench.commands(), Some((commands, false)));
     // A host that no longer has the drive commands nothing.
     bench.orders.push_back(LegOrder { commands: None, ..order(None) });
-    bench.hear(unreported);
+    bench.receive(unreported);
     assert_eq!(bench.commands(), None);
 }
 
@@ -219,13 +220,13 @@ fn a_report_contains_the_switch_and_the_inhibit_reasons() {
         let mut bench = Bench::new(&[]);
         bench.hold(switch);
         if blocked {
-            bench.signals.inhibit.raise(crate::safety::Cause::GateFault);
+            bench.signals.inhibit.raise(crate::safety::InhibitReason::GateFault);
         }
         (0..2).for_each(|_| bench.report(&control, &output));
         let status = bench.status[0];
         assert_eq!((status.held, status.blocked, status.rests), (switch == [true; 2], blocked, false));
         (0..2).for_each(|_| bench.rest());
-        let causes = if blocked { crate::safety::Cause::GateFault.bit() } else { 0 };
+        let causes = if blocked { crate::safety::InhibitReason::GateFault.bit() } else { 0 };
         let held = status.held;
         assert_eq!(bench.status[1], LegStatus { held, blocked, causes, ..LegStatus::NONE });
     }
@@ -234,25 +235,25 @@ fn a_report_contains_the_switch_and_the_inhibit_reasons() {
 #[test]
 fn requests_to_a_leg_without_zeros_are_dropped() {
     let mut bench = Bench::new(&[order(Some(ENABLE))]);
-    bench.hear(unreported);
+    bench.receive(unreported);
     bench.orders.extend([order(Some(ENABLE)), order(Some(LegRequest::Cancel))]);
-    bench.signals.inhibit.raise(crate::safety::Cause::EmergencyStop);
+    bench.signals.inhibit.raise(crate::safety::InhibitReason::EmergencyStop);
     bench.hold([false; 2]);
     for _ in 0..2 {
         bench.give();
         bench.rest();
     }
     assert_eq!((bench.waiting(), bench.status.len()), (0, 1));
-    let causes = crate::safety::Cause::EmergencyStop.bit();
+    let causes = crate::safety::InhibitReason::EmergencyStop.bit();
     assert_eq!(bench.status[0], LegStatus { causes, ..LegStatus::NONE });
-    bench.hear(unreported);
+    bench.receive(unreported);
     assert_eq!((bench.side.request(None), bench.commands()), (None, None));
 }
 
 #[test]
 fn a_host_without_the_drive_cancels_by_a_quick_stop() {
     let mut bench = Bench::new(&[LegOrder { commands: None, ..order(Some(LegRequest::Cancel)) }]);
-    bench.hear(unreported);
+    bench.receive(unreported);
     assert_eq!(bench.commands(), None);
     assert_eq!(bench.side.request(None), Some((ControlRequest::Power(PowerRequest::QuickStop), None)));
     assert_eq!(bench.side.request(None), None, "once");
@@ -266,12 +267,11 @@ fn a_bridge_reports_torque_smoothed_and_only_while_switching() {
     bench.signals.statistics.see_bus(2400);
     let mut status = |state: DriveState, ticks: u32| {
         output.servo.decision.state = state;
-        let mut random = 1_u32;
+        let mut random = TestRandom::new(1);
         let mut most = 0.0_f32;
         for tick in 0..ticks {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             // Noise of 3 A around 10 A.
-            let current = 10.0 + 3.0 * ((random >> 8) as f32 / (1 << 23) as f32 - 1.0);
+            let current = 10.0 + random.within(3.0) as f32;
             let joint = JointSample { current: crate::units::Ampere(current), ..SAMPLE.joints[0] };
             let Bench { side, host, hardware, signals, .. } = &mut bench;
             side.report(&control, &Sample { joints: [joint; 2] }, &output, host, signals, hardware);

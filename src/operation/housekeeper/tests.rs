@@ -12,6 +12,7 @@ use crate::motor::calibration::tests::{SETTINGS, calibrate};
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::operation::AxisState;
 use crate::safety::Bridges;
+use crate::testing::TestRandom;
 
 mod reports;
 
@@ -158,9 +159,9 @@ fn carried_out(motor: &mut TestMotor, order: Order) -> Outcome {
     stage.obey(order);
     let mut sample = motor.sample();
     for _ in 0..240_000 {
-        let (command, event) = stage.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::RELEASED);
+        let (command, event) = stage.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF);
         if let Some((outcome, _)) = event {
-            motor.period(AxisCommand::RELEASED);
+            motor.period(AxisCommand::OFF);
             return outcome;
         }
         sample = motor.period(command);
@@ -174,7 +175,8 @@ fn an_encoder_moved_without_power_is_refused_and_then_measured() {
     let stored = calibrate(&mut motor, &CONFIGURATION).expect("sound").stored().expect("an index");
     // The rotor was moved; in the second case the encoder is 20 electrical degrees off on its shaft.
     for (shaft_deg, fits) in [(0.0, true), (20.0, false)] {
-        let mut motor = TestMotor { angle: motor.angle + 11.0, seed: 9, ..TestMotor::default() };
+        let mut motor =
+            TestMotor { angle: motor.angle + 11.0, random: TestRandom::new(9), ..TestMotor::default() };
         motor.encoder_zero += shaft_deg / 360.0 / 7.0;
         let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
         let (_, order) = bench.press().remove(0);
@@ -223,7 +225,7 @@ fn a_reset_releases_braking_motors_until_gates_are_configured() {
     for gates_configure in [true, false] {
         let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
         bench.hardware.gates_configure = gates_configure;
-        bench.signals.inhibit.raise(Cause::EncoderFrozen);
+        bench.signals.inhibit.raise(InhibitReason::EncoderFrozen);
         bench.hardware.bridges = [AxisCommand::BRAKE; 2];
         for _ in 0..19 {
             bench.hold(false, true);
@@ -236,11 +238,11 @@ fn a_reset_releases_braking_motors_until_gates_are_configured() {
         // The drivers' supply is off, and a current tick would turn the outputs off as well.
         assert!(!bench.hardware.is_enabled());
         while bench.orders.is_empty() {
-            assert_eq!(Bridges::of(bench.signals.inhibit.causes()), Bridges::Release);
+            assert_eq!(Bridges::of(bench.signals.inhibit.causes()), Bridges::Off);
             bench.round();
         }
         assert_eq!(bench.hardware.gates_switched, [false, true]);
-        let left = if gates_configure { 0 } else { Cause::GateConfiguration.bit() };
+        let left = if gates_configure { 0 } else { InhibitReason::GateConfiguration.bit() };
         assert_eq!(bench.signals.inhibit.causes(), left);
     }
 }

@@ -34,14 +34,15 @@ impl Bench {
     }
 
     /// Sends events, lets the level take them, and returns whether there were any.
-    fn hear(&mut self, events: impl IntoIterator<Item = LegEvent<2>>) -> bool {
+    fn receive(&mut self, events: impl IntoIterator<Item = LegEvent<2>>) -> bool {
         for event in events {
             assert!(self.ends.servo.events.enqueue(event).is_ok(), "full");
         }
         let Self { level, identification, ends, records, samples, .. } = self;
         let record = |record: &Record<2>| records.push(*record);
-        level
-            .hear(identification, &mut ends.identification, record, |logged| samples.push(logged.sample.tick))
+        level.receive(identification, &mut ends.identification, record, |logged| {
+            samples.push(logged.sample.tick)
+        })
     }
 
     fn work(&mut self) -> Slice<2> {
@@ -78,23 +79,23 @@ fn training(ticks: &[u32]) -> impl Iterator<Item = LegEvent<2>> {
 fn a_missing_sample_ends_the_identification_with_refused_input() {
     for waits in [IdentifyPhase::Settle, IdentifyPhase::Solve, IdentifyPhase::Judge] {
         let mut bench = Bench::new();
-        bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
         bench.level.published();
         // The sample at 24 was lost.
         bench.signals.statistics.samples_lost.add();
-        bench.hear(training(&[8, 16, 32, 40]));
+        bench.receive(training(&[8, 16, 32, 40]));
         // While the leg moves no verdict is expected.
         assert_eq!((bench.work(), bench.finding(), bench.lost()), (Slice::Idle, None, 0));
-        bench.hear([logged(48, None), phase(waits)]);
+        bench.receive([logged(48, None), phase(waits)]);
         assert_eq!(bench.work(), Slice::Idle);
         let verdict = Verdict::refused(Reason::Input);
         assert_eq!(bench.finding(), Some(Finding::Judged { verdict, model: None }), "{waits:?}");
         assert_eq!(bench.records, [Record::Refused { why: "samples_lost", value: 1 }]);
         assert_eq!(bench.level.unpublished(), None, "control has not taken it yet");
-        bench.hear([LegEvent::TookResult]);
+        bench.receive([LegEvent::TookResult]);
         assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Judged(None), Some(Some(verdict))));
         // Cancelled: the recorded motion has no further result.
-        bench.hear([logged(56, None)]);
+        bench.receive([logged(56, None)]);
         assert_eq!((bench.work(), bench.finding(), bench.lost()), (Slice::Idle, None, 1));
         assert!(bench.identification.solver().is_none());
     }
@@ -103,12 +104,12 @@ fn a_missing_sample_ends_the_identification_with_refused_input() {
 #[test]
 fn samples_of_several_motions_one_after_the_other_have_no_gap() {
     let mut bench = Bench::new();
-    bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+    bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
     // The tick wraps.
-    bench.hear(training(&[u32::MAX - 11, u32::MAX - 3, 4, 12]));
+    bench.receive(training(&[u32::MAX - 11, u32::MAX - 3, 4, 12]));
     let (first, second) = (Some(Segment::Validation(0)), Some(Segment::Validation(1)));
-    bench.hear([logged(20, None), logged(800, first), logged(808, first), logged(1600, second)]);
-    bench.hear([phase(IdentifyPhase::Settle)]);
+    bench.receive([logged(20, None), logged(800, first), logged(808, first), logged(1600, second)]);
+    bench.receive([phase(IdentifyPhase::Settle)]);
     bench.work();
     assert!(!bench.level.gap && bench.lost() == 0);
     assert_eq!(bench.samples, [u32::MAX - 11, u32::MAX - 3, 4, 12, 20, 800, 808, 1600]);
@@ -118,10 +119,10 @@ fn samples_of_several_motions_one_after_the_other_have_no_gap() {
 #[test]
 fn a_new_identification_starts_without_the_previous_gap() {
     let mut bench = Bench::new();
-    bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
-    bench.hear(training(&[8, 24]));
+    bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+    bench.receive(training(&[8, 24]));
     assert!(bench.level.gap);
-    bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Settle)]);
+    bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Settle)]);
     bench.work();
     assert_eq!((bench.level.gap, bench.finding(), bench.lost()), (false, None, 0));
 }
@@ -131,13 +132,13 @@ fn a_hosts_identification_begins_with_its_plan_and_seed() {
     let mut bench = Bench::new();
     let seed = bench.identification.swarm_seed();
     assert_eq!(bench.level.seed(), seed);
-    bench.hear([LegEvent::Begun(None)]);
+    bench.receive([LegEvent::Begun(None)]);
     assert_eq!((bench.level.seed(), bench.identification.swarm_seed()), (seed, seed));
     for plan in [Plan::OneTime, Plan::Sequential] {
         let mut expected = bench.identification.clone();
         expected.prepare(plan, seed + 7);
         bench.level.published();
-        bench.hear([LegEvent::Begun(Some((plan, seed + 7)))]);
+        bench.receive([LegEvent::Begun(Some((plan, seed + 7)))]);
         assert!(*bench.identification == *expected, "{plan:?}");
         assert_eq!((bench.level.seed(), bench.identification.swarm_seed()), (seed + 7, seed + 7));
         // The new identification has no results yet.
@@ -149,10 +150,10 @@ fn a_hosts_identification_begins_with_its_plan_and_seed() {
 fn a_leg_that_stops_identifying_cancels_the_search() {
     let is_searching = |activity: LegEvent<2>| {
         let mut bench = Bench::new();
-        bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
         let ticks: Vec<u32> = (1..=80).map(|sample| 8 * sample).collect();
-        bench.hear(training(&ticks));
-        bench.hear([logged(648, None), activity]);
+        bench.receive(training(&ticks));
+        bench.receive([logged(648, None), activity]);
         bench.work() != Slice::Idle || bench.finding().is_some()
     };
     assert!(is_searching(phase(IdentifyPhase::Solve)));
@@ -163,9 +164,9 @@ fn a_leg_that_stops_identifying_cancels_the_search() {
 #[test]
 fn records_pass_in_order_and_the_activity_is_known() {
     let mut bench = Bench::new();
-    assert!(!bench.hear([]));
+    assert!(!bench.receive([]));
     let records = [1, 2].map(|tick| Record::Request { tick, name: "identify", accepted: true });
-    assert!(bench.hear(records.map(LegEvent::Record).into_iter().chain([phase(IdentifyPhase::Approach)])));
+    assert!(bench.receive(records.map(LegEvent::Record).into_iter().chain([phase(IdentifyPhase::Approach)])));
     assert_eq!(bench.records, records);
     assert_eq!(bench.level.activity(), Activity::Identify(IdentifyPhase::Approach));
 }
@@ -176,10 +177,10 @@ fn a_result_counts_only_after_control_has_taken_it() {
     let judged = || {
         let mut bench = Bench::new();
         assert_eq!(Results::verdict(&*bench.identification), None);
-        bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
         bench.level.published();
-        bench.hear(training(&ticks));
-        bench.hear([logged(648, None), phase(IdentifyPhase::Solve)]);
+        bench.receive(training(&ticks));
+        bench.receive([logged(648, None), phase(IdentifyPhase::Solve)]);
         let find = |bench: &mut Bench| {
             let slices = (0..100_000).find_map(|_| {
                 assert!(!matches!(bench.work(), Slice::Judged(_)));
@@ -193,7 +194,7 @@ fn a_result_counts_only_after_control_has_taken_it() {
                 let at = 1000 * (1 + u32::from(motion));
                 let samples =
                     (0..80).map(|sample| logged(at + 8 * sample, Some(Segment::Validation(motion))));
-                bench.hear(samples.chain([logged(at + 640, None), phase(IdentifyPhase::Judge)]));
+                bench.receive(samples.chain([logged(at + 640, None), phase(IdentifyPhase::Judge)]));
             }
             finding = find(&mut bench);
         }
@@ -205,12 +206,12 @@ fn a_result_counts_only_after_control_has_taken_it() {
     let (mut bench, verdict) = judged();
     assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Idle, None));
     // The result is taken and the leg does something else before the thread runs again.
-    bench.hear([LegEvent::TookResult, LegEvent::Activity(Activity::Idle)]);
+    bench.receive([LegEvent::TookResult, LegEvent::Activity(Activity::Idle)]);
     assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Judged(None), Some(Some(verdict))));
-    bench.hear([]);
+    bench.receive([]);
     assert_eq!(bench.work(), Slice::Idle, "once");
     // The operator stopped while the verdict was computed: control never takes it.
     let (mut bench, _) = judged();
-    bench.hear([LegEvent::Activity(Activity::Idle)]);
+    bench.receive([LegEvent::Activity(Activity::Idle)]);
     assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Idle, None));
 }

@@ -29,18 +29,18 @@ impl Bench {
             [1, 2].into_iter().flat_map(|node| [(node, asynchronous), (node, every_2_ms)])
         {
             let size = if sub == 2 { 0x2F } else { 0x2B };
-            bench.hear(&Frame::new(0x600 + node, &[size, 0x00, 0x18, sub, value, 0, 0, 0]));
+            bench.receive(&Frame::new(0x600 + node, &[size, 0x00, 0x18, sub, value, 0, 0, 0]));
             bench.run(2);
         }
-        bench.hear(&Frame::new(0, &[1, 0]));
+        bench.receive(&Frame::new(0, &[1, 0]));
         bench.run(40);
         assert!(bench.leaving(0x181).count() > 5 && bench.leaving(0x182).count() > 5);
         bench.hardware.can.sent.clear();
         bench
     }
 
-    fn hear(&mut self, frame: &Frame) {
-        self.device.hear(frame, self.hardware.now_us, None, &NOTHING);
+    fn receive(&mut self, frame: &Frame) {
+        self.device.receive(frame, self.hardware.now_us, None, &NOTHING);
     }
 
     fn set(&mut self, controller: Controller, unplugged: bool) {
@@ -64,7 +64,7 @@ impl Bench {
     }
 
     /// Codes of a node's emergency messages that left.
-    fn told(&self, node: u16) -> Vec<u16> {
+    fn emergencies(&self, node: u16) -> Vec<u16> {
         self.leaving(0x80 + node)
             .map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]))
             .collect()
@@ -93,7 +93,7 @@ fn after_a_pulled_plug_frames_are_new_and_emergencies_complete() {
             assert!(age_us <= patience_us, "{rounds}: {frame:?} after {age_us} us");
             assert!(*left_us > back_us);
         }
-        assert_eq!([1, 2].map(|node| bench.told(node)), [[0x8120, 0]; 2].map(Vec::from), "{rounds}");
+        assert_eq!([1, 2].map(|node| bench.emergencies(node)), [[0x8120, 0]; 2].map(Vec::from), "{rounds}");
         // Both nodes send again as before.
         assert!(bench.leaving(0x181).count() > 3 && bench.leaving(0x182).count() > 3, "{rounds}");
     }
@@ -105,7 +105,7 @@ fn a_passive_controller_that_still_sends_loses_nothing() {
     bench.set(Controller::Passive, false);
     bench.run(400);
     assert_eq!(
-        (bench.hardware.can.aborted, bench.told(1), bench.told(2)),
+        (bench.hardware.can.aborted, bench.emergencies(1), bench.emergencies(2)),
         (0, [0x8120].into(), [0x8120].into())
     );
     // 200 ms, one frame every 2 ms from each node.
@@ -138,7 +138,7 @@ fn nothing_waits_in_a_controller_that_is_off() {
     let back_us = bench.hardware.now_us;
     bench.run(20);
     assert!(bench.hardware.can.sent.iter().all(|(_, given_us, _)| *given_us > back_us));
-    assert_eq!(bench.told(1), [0x8140, 0]);
+    assert_eq!(bench.emergencies(1), [0x8140, 0]);
 }
 
 #[test]
@@ -175,16 +175,16 @@ fn a_waiting_emergency_is_sent_in_any_controller_state() {
         bench.set(Controller::Active, false);
         bench.run(20);
         let code = if controller == Controller::Off { 0x8140 } else { 0x8120 };
-        let mut told = [1, 2].map(|node| bench.told(node));
-        told.iter_mut().for_each(|codes| codes.truncate(2));
-        assert_eq!(told, [[0xFF0D, code]; 2].map(Vec::from), "{controller:?}");
+        let mut emergencies = [1, 2].map(|node| bench.emergencies(node));
+        emergencies.iter_mut().for_each(|codes| codes.truncate(2));
+        assert_eq!(emergencies, [[0xFF0D, code]; 2].map(Vec::from), "{controller:?}");
     }
 }
 
 #[test]
 fn an_emergency_with_another_identifier_is_sent_again_too() {
     let mut bench = Bench::new();
-    bench.hear(&Frame::new(0x601, &[0x23, 0x14, 0x10, 0, 0x10, 0x03, 0, 0]));
+    bench.receive(&Frame::new(0x601, &[0x23, 0x14, 0x10, 0, 0x10, 0x03, 0, 0]));
     bench.run(4);
     bench.hardware.can.unplugged = true;
     bench.set(Controller::Passive, true);
@@ -214,9 +214,9 @@ fn repeated_emergencies_are_in_order_from_any_mailbox() {
     bench.hardware.can.unplugged = false;
     bench.run(20);
     for node in [1, 2] {
-        let told = bench.told(node);
-        let told: Vec<u16> = told.into_iter().filter(|code| *code != 0x8120).collect();
-        assert_eq!(told, [0xFF0D, 0], "{node}");
+        let emergencies = bench.emergencies(node);
+        let emergencies: Vec<u16> = emergencies.into_iter().filter(|code| *code != 0x8120).collect();
+        assert_eq!(emergencies, [0xFF0D, 0], "{node}");
     }
 }
 

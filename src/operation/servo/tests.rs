@@ -33,7 +33,7 @@ struct Bench {
     bus: BusEnds<'static, 2>,
     counts: [i32; 2],
     /// The identification takes its events.
-    is_heard: bool,
+    is_received: bool,
     events: Vec<LegEvent<2>>,
     states: Vec<DriveState>,
     /// Newest report to the bus.
@@ -61,7 +61,7 @@ impl Bench {
             ends,
             bus,
             counts: [COUNTS; 2],
-            is_heard: true,
+            is_received: true,
             events: Vec::new(),
             states: Vec::new(),
             status: None,
@@ -115,7 +115,7 @@ impl Bench {
         }
         let Self { level, control, ends, signals, hardware, .. } = self;
         let output = level.tick(control, LEG.gravity, &mut ends.servo, signals, hardware);
-        while self.is_heard
+        while self.is_received
             && let Some(event) = self.ends.identification.events.dequeue()
         {
             self.events.push(event);
@@ -170,7 +170,7 @@ fn the_leg_does_not_tick_before_every_joint_has_a_zero() {
         assert!(bench.tick().is_none());
     }
     assert_eq!((bench.signals.target(0).enabled, bench.signals.target(1).enabled), (false, false));
-    assert_eq!((bench.signals.permission(), bench.level.ticks()), (Permission::Released, 0));
+    assert_eq!((bench.signals.permission(), bench.level.ticks()), (Permission::Off, 0));
     // The bus is informed that the leg rests; the request is dropped.
     let joints = bench.status.expect("a report").joints;
     assert!(joints.iter().all(|joint| joint.bus.0 > 40.0));
@@ -189,7 +189,7 @@ fn a_restarted_leg_is_off_and_has_no_targets() {
     assert!(bench.signals.target(0).enabled && bench.signals.target(1).enabled);
     bench.signals.end_servo();
     bench.tick();
-    assert_eq!((bench.signals.permission(), bench.signals.target(0).enabled), (Permission::Released, false));
+    assert_eq!((bench.signals.permission(), bench.signals.target(0).enabled), (Permission::Off, false));
     bench.signals.begin_servo();
     bench.tick();
     assert_eq!(bench.control.state(), DriveState::SwitchOnDisabled);
@@ -206,7 +206,11 @@ fn a_restarted_leg_discards_the_zeros_of_homing() {
     bench.run(10);
     let before = position(&bench);
     let target = crate::leg::Target::Homing { offset: crate::units::Radian(0.3) };
-    let homing = hold.map(|command| JointCommand { target, asked: command.asked.wrapping_add(1), ..command });
+    let homing = hold.map(|command| JointCommand {
+        target,
+        request_count: command.request_count.wrapping_add(1),
+        ..command
+    });
     bench.order(Some(homing), None);
     bench.run(10);
     // The zero is shifted by whole counts, 15 microradians each.
@@ -269,7 +273,7 @@ fn an_open_enabling_switch_stops_an_enabled_leg() {
 #[test]
 fn only_requests_that_turn_off_pass_while_inhibited() {
     let mut bench = Bench::enabled();
-    bench.signals.inhibit.raise(crate::safety::Cause::EmergencyStop);
+    bench.signals.inhibit.raise(crate::safety::InhibitReason::EmergencyStop);
     bench.tick();
     assert_eq!(
         (bench.control.state(), bench.signals.target(0).enabled),

@@ -22,7 +22,7 @@ impl Bench {
         Self {
             hardware: TestHardware::new(),
             inhibit: Inhibit::new(),
-            permission: Permission::Released,
+            permission: Permission::Off,
             now_ms: 0,
             later: None,
             storing: Vec::new(),
@@ -96,7 +96,7 @@ fn a_watchdog_with_the_starts_period_keeps_the_drive_off() {
     bench.hardware.watchdog.stretched = true;
     for _ in 0..3 {
         bench.look_after(&mut storing);
-        assert_eq!(bench.causes(), Cause::Watchdog.bit());
+        assert_eq!(bench.causes(), InhibitReason::Watchdog.bit());
         // The operator's reset.
         bench.inhibit = Inhibit::new();
         assert_eq!(change(&mut storing, &mut bench), (false, 0));
@@ -128,12 +128,12 @@ fn a_failed_write_is_reported() {
 
 #[test]
 fn nothing_is_written_while_the_drive_is_on_or_inhibited() {
-    let brakes = Cause::EncoderFrozen.bit();
+    let brakes = InhibitReason::EncoderFrozen.bit();
     for (permission, causes) in [
         (Permission::Follow, 0),
         (Permission::Damp, 0),
-        (Permission::Released, brakes),
-        (Permission::Released, Cause::EmergencyStop.bit()),
+        (Permission::Off, brakes),
+        (Permission::Off, InhibitReason::EmergencyStop.bit()),
     ] {
         let mut bench = Bench { permission, ..Bench::off() };
         bench.inhibit.raise_bits(causes);
@@ -145,7 +145,7 @@ fn nothing_is_written_while_the_drive_is_on_or_inhibited() {
 
 #[test]
 fn a_drive_enabled_during_the_announcement_prevents_the_write() {
-    for later in [(1, Permission::Damp, 0), (20, Permission::Follow, 0), (7, Permission::Released, 1)] {
+    for later in [(1, Permission::Damp, 0), (20, Permission::Follow, 0), (7, Permission::Off, 1)] {
         let mut bench = Bench { later: Some(later), ..Bench::off() };
         assert_eq!(change(&mut settled(), &mut bench), (false, 0), "{later:?}");
         assert_eq!(bench.storing, [(0, true), (21, false)]);
@@ -159,10 +159,10 @@ fn a_watchdog_that_keeps_its_period_prevents_the_write() {
     bench.hardware.watchdog.takes_ms = None;
     assert_eq!(change(&mut storing, &mut bench), (false, 0));
     // The watchdog's period is unknown: the drive stays off until it is known.
-    assert_eq!(bench.causes(), Cause::Watchdog.bit());
+    assert_eq!(bench.causes(), InhibitReason::Watchdog.bit());
     bench.inhibit = Inhibit::new();
     bench.look_after(&mut storing);
-    assert_eq!(bench.causes(), Cause::Watchdog.bit());
+    assert_eq!(bench.causes(), InhibitReason::Watchdog.bit());
     bench.inhibit = Inhibit::new();
     assert_eq!(change(&mut storing, &mut bench), (false, 0));
     bench.hardware.watchdog = TestWatchdog { takes_ms: Some(3), ..TestWatchdog::default() };
@@ -184,7 +184,7 @@ fn the_drive_stays_off_until_the_watchdog_is_tight_again() {
     stuck.hardware.watchdog.stretched = true;
     let mut storing = Storing::new();
     stuck.look_after(&mut storing);
-    assert_eq!(stuck.causes(), Cause::Watchdog.bit());
+    assert_eq!(stuck.causes(), InhibitReason::Watchdog.bit());
     stuck.hardware.watchdog.pass(u64::MAX);
     stuck.look_after(&mut storing);
     assert_eq!(storing, settled());

@@ -48,7 +48,7 @@ fn bridges_without_current_ticks_are_turned_off() {
         (0..2).for_each(|axis| hardware.enable(axis));
         look(&mut watch, &signals, &mut hardware, 1, hung);
         let stops = matches!(hung, Some(0 | 1));
-        let causes = if stops { Cause::CurrentTicks.bit() } else { 0 };
+        let causes = if stops { InhibitReason::CurrentTicks.bit() } else { 0 };
         assert_eq!((hardware.is_enabled(), signals.inhibit.causes()), (!stops, causes), "{hung:?}");
     }
 }
@@ -58,14 +58,14 @@ fn stalled_ticks_during_a_flash_write_are_no_fault() {
     let (signals, mut hardware) = (Signals::new(), TestHardware::new());
     let mut watch = Watch::new(&signals);
     look(&mut watch, &signals, &mut hardware, 2, None);
-    signals.inhibit.raise(Cause::Storing);
+    signals.inhibit.raise(InhibitReason::Storing);
     hardware.enable(0);
     watch.look(&signals, &mut hardware);
     // The bridges are turned off nevertheless.
-    assert_eq!((hardware.is_enabled(), signals.inhibit.causes()), (false, Cause::Storing.bit()));
+    assert_eq!((hardware.is_enabled(), signals.inhibit.causes()), (false, InhibitReason::Storing.bit()));
     signals.inhibit.end_storing();
     watch.look(&signals, &mut hardware);
-    assert_eq!(signals.inhibit.causes(), Cause::CurrentTicks.bit());
+    assert_eq!(signals.inhibit.causes(), InhibitReason::CurrentTicks.bit());
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Properties of the monitor.
 
 use super::*;
+use crate::hal::SERVO_RATE_HZ;
 use crate::safety::limits::tests::{HIP, KNEE};
+use crate::testing::TestRandom;
 
-const RATE_HZ: u32 = 4000;
 const MIDDLE: [Radian; 2] = [Radian(0.45), Radian(-0.9)];
 const STANDING: Observation<2> = Observation {
     position: MIDDLE,
@@ -21,7 +22,7 @@ fn ask(power: PowerRequest) -> Request<2> {
 }
 
 fn enabled() -> Monitor<2> {
-    let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), RATE_HZ);
+    let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
     for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
         let _ = monitor.decide(&STANDING, &ask(power));
     }
@@ -44,11 +45,11 @@ fn no_value_that_is_not_finite_reaches_the_bridge() {
                 let mut monitor = enabled();
                 let decision = monitor.decide(&observation, &wanted);
                 let fault = Fault { code: FaultCode::NotFinite, joint: joint as u8 };
-                assert_eq!(decision.command, DriveCommand::RELEASED, "field {field}");
+                assert_eq!(decision.command, DriveCommand::OFF, "field {field}");
                 assert_eq!((decision.fault, decision.state), (Some(fault), DriveState::Fault { fault }));
                 // The drive stays off when the value is finite again.
                 let decision = monitor.decide(&STANDING, &request(5.0));
-                assert_eq!(decision.command, DriveCommand::RELEASED);
+                assert_eq!(decision.command, DriveCommand::OFF);
             }
         }
     }
@@ -57,18 +58,15 @@ fn no_value_that_is_not_finite_reaches_the_bridge() {
 #[test]
 fn torque_and_current_never_exceed_their_caps() {
     let mut monitor = enabled();
-    let mut random = 1_u32;
+    let mut random = TestRandom::new(1);
     for _ in 0..20_000 {
-        let mut uniform = |bound: f32| {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (random >> 8) as f32 / (1 << 23) as f32 * bound - bound
-        };
+        let mut within = |bound: f64| random.within(bound) as f32;
         let observation = Observation {
-            position: [Radian(0.45 + uniform(0.4)), Radian(-0.9 + uniform(0.7))],
-            velocity: [RadianPerSecond(uniform(3.0)), RadianPerSecond(uniform(3.0))],
+            position: [Radian(0.45 + within(0.4)), Radian(-0.9 + within(0.7))],
+            velocity: [RadianPerSecond(within(3.0)), RadianPerSecond(within(3.0))],
             ..STANDING
         };
-        let wanted = [NewtonMetre(uniform(1e4)), NewtonMetre(uniform(300.0))];
+        let wanted = [NewtonMetre(within(1e4)), NewtonMetre(within(300.0))];
         let decision = monitor.decide(&observation, &Request { torque: wanted, power: None });
         assert!(decision.command.enabled);
         for joint in 0..2 {
@@ -101,7 +99,7 @@ fn overspeed_damps_in_the_same_tick_for_300_ms_then_turns_off() {
     while monitor.decide(&STANDING, &request(30.0)).command.enabled {
         damped += 1;
     }
-    assert_eq!(damped, RATE_HZ * 3 / 10);
+    assert_eq!(damped, SERVO_RATE_HZ * 3 / 10);
     assert_eq!(monitor.state(), DriveState::Fault { fault });
 }
 
@@ -167,7 +165,7 @@ fn a_refused_enabling_names_joint_and_reason() {
         (Observation { rejected: [false, true], ..STANDING }, RefusalReason::Encoder),
     ];
     for (observation, reason) in cases {
-        let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), RATE_HZ);
+        let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
         monitor.permit_return([true, false]);
         let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
         let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
@@ -179,7 +177,7 @@ fn a_refused_enabling_names_joint_and_reason() {
 
 /// Places the hip beyond its upper end and the knee beyond its lower end, rad, and requests enabling there.
 fn outside(hip: f32, knee: f32) -> (Monitor<2>, Observation<2>) {
-    let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), RATE_HZ);
+    let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
     let position = [HIP.high + Radian(hip), KNEE.low - Radian(knee)];
     let observation = Observation { position, ..STANDING };
     for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
@@ -278,7 +276,7 @@ fn a_quick_stop_damps_and_does_not_end_enabled() {
     let decision =
         monitor.decide(&turning, &Request { power: Some(PowerRequest::QuickStop), ..request(50.0) });
     assert!(decision.command.enabled && decision.torque[0].0 < 0.0);
-    for _ in 0..RATE_HZ {
+    for _ in 0..SERVO_RATE_HZ {
         let _ = monitor.decide(&STANDING, &request(50.0));
     }
     assert_eq!(monitor.state(), DriveState::SwitchOnDisabled);

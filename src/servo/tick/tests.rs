@@ -59,7 +59,7 @@ fn bandwidth(with_velocity: bool) -> f64 {
 }
 
 #[test]
-fn the_checksum_stays_in_motion_and_tells_other_gains_and_limits() {
+fn the_checksum_stays_in_motion_and_differs_for_other_gains_and_limits() {
     let joints = JOINTS;
     let servo = Servo::new(joints).expect("sensible");
     let sum = servo.checksum();
@@ -231,9 +231,9 @@ fn nothing_that_is_not_finite_passes_the_tick_and_nothing_of_it_stays() {
                 assert_eq!(output.velocity[1], RadianPerSecond::ZERO);
                 let model = Exact;
                 let command = ServoCommand { motion, feedforward: Some(&model), power: None };
-                assert_eq!(*bench.servo.tick(&sample, &command, NOWHERE).drive(), DriveCommand::RELEASED);
+                assert_eq!(*bench.servo.tick(&sample, &command, NOWHERE).drive(), DriveCommand::OFF);
             } else {
-                assert_eq!(*output.drive(), DriveCommand::RELEASED, "{bad} in {field}");
+                assert_eq!(*output.drive(), DriveCommand::OFF, "{bad} in {field}");
             }
             let here = bench.pose();
             for power in [
@@ -273,7 +273,7 @@ fn a_command_that_runs_out_of_range_stops_at_the_limit() {
 }
 
 #[test]
-fn a_joint_that_is_driven_too_fast_is_damped_and_then_released() {
+fn a_joint_that_is_driven_too_fast_is_damped_and_then_off() {
     let mut bench = Bench::enabled(JOINTS, Plant::KNEE);
     bench.plants[1].velocity = 6.5;
     let fault = Fault { code: FaultCode::Overspeed, joint: 1 };
@@ -290,7 +290,7 @@ fn a_joint_that_is_driven_too_fast_is_damped_and_then_released() {
 }
 
 #[test]
-fn a_single_wild_reading_does_not_move_the_torque() {
+fn a_single_outlier_does_not_move_the_torque() {
     let mut bench = Bench::enabled(JOINTS, Plant::KNEE);
     let hold = MotionState::at_rest(bench.pose());
     for _ in 0..400 {
@@ -351,18 +351,18 @@ fn absurd_joints_are_refused_by_name() {
 }
 
 #[test]
-fn every_number_that_can_be_upset_is_another_one() {
+fn every_number_whose_bits_flip_is_another_one() {
     let sound = Bench::enabled(JOINTS, Plant::KNEE).servo;
-    let upset = |number| {
+    let flip_bit = |number| {
         let mut servo = sound;
-        servo.upset(0, number, 3);
+        servo.flip_bit(0, number, 3);
         servo
     };
-    let all: [_; Servo::<2>::NUMBERS as usize] = core::array::from_fn(|number| upset(number as u8));
+    let all: [_; Servo::<2>::NUMBERS as usize] = core::array::from_fn(|number| flip_bit(number as u8));
     for (number, one) in all.iter().enumerate() {
         assert!(*one != sound && all.iter().filter(|other| *other == one).count() == 1, "{number}");
         let mut twice = *one;
-        twice.upset(0, number as u8, 3);
+        twice.flip_bit(0, number as u8, 3);
         assert!(twice == sound, "{number}");
     }
 }

@@ -110,7 +110,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
 
     /// Preferred direction of a beetle: downhill for the first. Some follow the difference of two personal
     /// bests (such differences point into narrow valleys); the others have none.
-    fn wish(&self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) -> Option<[T; D]> {
+    fn proposal(&self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) -> Option<[T; D]> {
         match beetle {
             _ if self.leap.under_way => Some(self.axis(beetle, beetles.dimension())),
             0 if self.has(Part::GradientDirection) => {
@@ -218,9 +218,9 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         if self.leap.under_way {
             reach.long = Some(leap_whisker(random));
         }
-        let wish = self.wish(beetle, beetles, random);
+        let proposal = self.proposal(beetle, beetles, random);
         let position = &beetles.position[beetle.min(N - 1)];
-        self.frame.aim(beetle, wish, position, &self.metric, reach, random);
+        self.frame.aim(beetle, proposal, position, &self.metric, reach, random);
     }
 
     fn tip(&self, beetle: usize, side: Side, beetles: &Particles<T, N, D>) -> [T; D] {

@@ -115,21 +115,21 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         self.dimension.min(N)
     }
 
-    /// Points direction `index` along `wish` (metric coordinates), as far as that is orthogonal to the
+    /// Points direction `index` along `proposal` (metric coordinates), as far as that is orthogonal to the
     /// earlier ones. Otherwise it points along a random vector, in the last resort along a coordinate axis.
     ///
     /// The whisker has its usual length where that stays within the limit.
     pub fn aim(
         &mut self,
         index: usize,
-        wish: Option<[T; D]>,
+        proposal: Option<[T; D]>,
         beetle: &[T; D],
         metric: &Metric<T, D>,
         reach: Reach<T>,
         random: &mut Random,
     ) {
         let index = index.min(N - 1);
-        let direction = self.new_direction(index, wish, random);
+        let direction = self.new_direction(index, proposal, random);
         let displacement = metric.to_box(&direction);
         let box_length = sqrt(dot(live(&displacement, self.dimension), live(&displacement, self.dimension)));
         let covector = metric.gradient_to_box(&direction);
@@ -145,10 +145,10 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         };
     }
 
-    fn new_direction(&self, index: usize, wish: Option<[T; D]>, random: &mut Random) -> [T; D] {
-        let mut wish = wish;
+    fn new_direction(&self, index: usize, proposal: Option<[T; D]>, random: &mut Random) -> [T; D] {
+        let mut proposal = proposal;
         for _ in 0..DRAWS {
-            let candidate = wish.take().unwrap_or_else(|| self.draw(random));
+            let candidate = proposal.take().unwrap_or_else(|| self.draw(random));
             if let Some(direction) = self.complement(index, candidate) {
                 return direction;
             }
@@ -236,14 +236,14 @@ mod tests {
     const D: usize = 9;
     const REACH: Reach<f64> = Reach { whisker: 0.1, limit: 0.5, parabola: true, long: None };
 
-    fn frame_of(dimension: usize, wish: Option<[f64; D]>) -> (Frame<f64, N, D>, Metric<f64, D>) {
+    fn frame_of(dimension: usize, proposal: Option<[f64; D]>) -> (Frame<f64, N, D>, Metric<f64, D>) {
         let mut random = Random::new(4);
         let mut metric = Metric::identity(dimension);
         let mut frame = Frame::new(dimension);
         frame.aim(0, None, &[0.5; D], &metric, REACH, &mut random);
         metric.stretch(&frame.direction[0], &frame.displacement[0], &frame.covector[0], 4.0);
         for index in 0..frame.count() {
-            frame.aim(index, wish, &[0.5; D], &metric, REACH, &mut random);
+            frame.aim(index, proposal, &[0.5; D], &metric, REACH, &mut random);
         }
         (frame, metric)
     }
@@ -251,18 +251,18 @@ mod tests {
     #[test]
     fn directions_are_orthonormal_whatever_is_wished() {
         for dimension in [1, 2, 5, D] {
-            for wish in [None, Some([1.0; D]), Some([0.0; D]), Some([f64::NAN; D]), Some([1e200; D])] {
-                let wish = wish.map(|mut wish| {
-                    wish[dimension..].fill(0.0);
-                    wish
+            for proposal in [None, Some([1.0; D]), Some([0.0; D]), Some([f64::NAN; D]), Some([1e200; D])] {
+                let proposal = proposal.map(|mut proposal| {
+                    proposal[dimension..].fill(0.0);
+                    proposal
                 });
-                let (frame, metric) = frame_of(dimension, wish);
+                let (frame, metric) = frame_of(dimension, proposal);
                 for one in 0..frame.count() {
                     for other in 0..=one {
                         let product = dot(&frame.direction[one], &frame.direction[other]);
                         let expected = if one == other { 1.0 } else { 0.0 };
                         // One pass of Gram-Schmidt with a remainder of at least 1e-2: 1e2 roundings.
-                        assert!(abs(product - expected) < 1e-12, "{dimension} {wish:?}: {product}");
+                        assert!(abs(product - expected) < 1e-12, "{dimension} {proposal:?}: {product}");
                     }
                     assert_eq!(frame.displacement[one], metric.to_box(&frame.direction[one]));
                     assert!(frame.whisker[one].length * frame.whisker[one].box_length <= 0.5 + 1e-15);

@@ -13,9 +13,9 @@
 //! more iterations); rates of 0.85 and 1, curvature limited to 1/9..9 (3 % faster on one function, longer
 //! tails on another).
 
-use crate::real::{Real, abs, clamp, sqrt};
+use crate::real::{Real, abs, clamp, median, sqrt};
 
-use super::super::rows::{add_scaled, live, live_mut, median};
+use super::super::rows::{add_scaled, live, live_mut};
 use super::adaptive::AdaptiveRules;
 use super::settings::Part;
 

@@ -42,11 +42,11 @@ impl Account {
             "a second",
             "%"
         );
-        let (mut kept, mut sum) = (true, 0.0);
+        let (mut is_within, mut sum) = (true, 0.0);
         for line in self.0.iter().flatten() {
             let share = percent(line.tally.mean(), line.per_second);
             sum += share;
-            kept &= line.tally.most() <= line.goal;
+            is_within &= line.tally.most() <= line.goal;
             let (mean, most) = (line.tally.mean(), line.tally.most());
             hprintln!(
                 "{:<40} {:>7} {:>7} {:>7} {:>9} {:>6.1}",
@@ -59,7 +59,7 @@ impl Account {
             );
         }
         hprintln!("{:<40} {:>40.1}", "in all; the search has the rest", sum);
-        kept
+        is_within
     }
 }
 

@@ -37,9 +37,9 @@ pub fn report() -> bool {
     let Some(calibration) = calibrated(&mut motor, &CONFIGURATION, &mut tally) else { return false };
     tally.print("calibration, a tick");
     let Some(all) = ticks(&mut motor, &CONFIGURATION, &calibration) else { return false };
-    let kept = all.print_against("axis tick, all of them", MOST_INSTRUCTIONS);
+    let is_within = all.print_against("axis tick, all of them", MOST_INSTRUCTIONS);
     axis_parts::report(&all);
-    kept
+    is_within
 }
 
 /// Calibrates a motor and counts the ticks' instructions; `None` if the calibration is refused.
@@ -74,7 +74,7 @@ fn ticks(motor: &mut Motor, configuration: &AxisConfiguration, calibration: &Cal
         let mut sample = motor.sample(None);
         let mut axis = Axis::new(configuration, calibration, &sample).ok()?;
         for _ in 0..240 {
-            sample = motor.period(tick(&mut axis, &sample, AxisRequest::RELEASED));
+            sample = motor.period(tick(&mut axis, &sample, AxisRequest::OFF));
         }
         let mut tally = Tally::default();
         for step in 0..TICKS {

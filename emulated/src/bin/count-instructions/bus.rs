@@ -19,7 +19,7 @@ struct Bench {
     node: Node,
     axis: Axis,
     now_us: u64,
-    heard: Tally,
+    received: Tally,
     polled: Tally,
 }
 
@@ -37,21 +37,21 @@ impl Bench {
             node: Node::new(NodeId::new(1)?, identity),
             axis: Axis::new(constants),
             now_us: 0,
-            heard: Tally::default(),
+            received: Tally::default(),
             polled: Tally::default(),
         };
         bench.poll();
-        bench.hear(0, &[1, 1]);
+        bench.receive(0, &[1, 1]);
         bench.poll();
-        (bench.heard, bench.polled) = (Tally::default(), Tally::default());
+        (bench.received, bench.polled) = (Tally::default(), Tally::default());
         Some(bench)
     }
 
-    fn hear(&mut self, id: u16, data: &[u8]) {
+    fn receive(&mut self, id: u16, data: &[u8]) {
         let frame = Frame::new(id, data);
         let (instructions, _) =
             count(|| black_box(&mut self.node).on_frame(&frame, self.now_us, &mut self.axis));
-        self.heard.push(instructions);
+        self.received.push(instructions);
     }
 
     /// Sends all waiting frames; the last poll returns none.
@@ -79,36 +79,36 @@ pub fn report() -> Option<()> {
 
     let mut bench = Bench::new()?;
     for _ in 0..100 {
-        bench.hear(0x301, &[1, 2, 3, 4]);
+        bench.receive(0x301, &[1, 2, 3, 4]);
     }
-    bench.heard.print("a received PDO with one target");
+    bench.received.print("a received PDO with one target");
 
     let mut bench = Bench::new()?;
     for _ in 0..100 {
         bench.now_us += 1000;
-        bench.hear(0x80, &[]);
+        bench.receive(0x80, &[]);
         bench.poll();
     }
-    bench.heard.print("a SYNC");
+    bench.received.print("a SYNC");
     bench.polled.print("a poll after it: three PDOs, four objects");
 
     let mut bench = Bench::new()?;
     for sub in [1, 2, 3, 5] {
-        bench.hear(0x601, &[0x40, 0x00, 0x18, sub, 0, 0, 0, 0]);
+        bench.receive(0x601, &[0x40, 0x00, 0x18, sub, 0, 0, 0, 0]);
         bench.poll();
     }
-    bench.heard.print("an SDO that reads");
+    bench.received.print("an SDO that reads");
 
     let mut bench = Bench::new()?;
-    bench.hear(0x601, &[0xA4, 0x09, 0x10, 0, 127, 0, 0, 0]);
+    bench.receive(0x601, &[0xA4, 0x09, 0x10, 0, 127, 0, 0, 0]);
     bench.poll();
-    bench.hear(0x601, &[0xA3, 0, 0, 0, 0, 0, 0, 0]);
+    bench.receive(0x601, &[0xA3, 0, 0, 0, 0, 0, 0, 0]);
     bench.polled = Tally::default();
     bench.poll();
     bench.polled.print("a poll that sends a segment of a block");
-    bench.heard = Tally::default();
-    bench.hear(0x601, &[0xA2, 126, 127, 0, 0, 0, 0, 0]);
-    bench.heard.print("a block of which the last segment was lost");
+    bench.received = Tally::default();
+    bench.receive(0x601, &[0xA2, 126, 127, 0, 0, 0, 0, 0]);
+    bench.received.print("a block of which the last segment was lost");
 
     let mut bench = Bench::new()?;
     let mut random = 1_u64;
@@ -126,10 +126,10 @@ pub fn report() -> Option<()> {
             _ => u16::from_le_bytes([b, c]) & 0x7FF,
         };
         bench.now_us += 1000;
-        bench.hear(id, data.get(..usize::from(c % 9))?);
+        bench.receive(id, data.get(..usize::from(c % 9))?);
         bench.poll();
     }
-    bench.heard.print("random frames: one that comes");
+    bench.received.print("random frames: one that comes");
     bench.polled.print("random frames: one poll");
     Some(())
 }

@@ -14,9 +14,9 @@ use heapless::spsc::Producer;
 use scarab::bus::device::{Device, LegStatus};
 use scarab::bus::drive::{AxisConstants, Mode};
 use scarab::bus::identification::ResultsCopy;
-use scarab::bus::{Frame, Identity, LONGEST, NmtState, NodeId, kept_objects, write_kept};
+use scarab::bus::{Frame, Identity, LONGEST, NmtState, NodeId, stored_objects, write_stored};
 use scarab::leg::{DriveState, JointStatus, Plan};
-use scarab::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, Keep, Signals};
+use scarab::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, Signals, StoreJob};
 use scarab::units::{Ampere, NewtonMetre};
 
 use crate::account::percent;
@@ -28,7 +28,7 @@ const COUNT: usize = 2000;
 /// Time after the boot-up messages.
 const START_US: u64 = 10_000;
 /// Interval of the servo's reports: every second tick.
-const TOLD_US: u64 = 500;
+const STATUS_US: u64 = 500;
 /// With this share a fifth of the processor remains for housekeeping and the search.
 const MOST_PERCENT: f32 = 43.0;
 /// A device with its queues. The servo at their other end takes its orders, and reports on request.
@@ -39,7 +39,7 @@ struct Bench<'a> {
     frames: Producer<'a, Frame>,
     ends: BusEnds<'a, 2>,
     servo: HostEnds<'a, 2>,
-    storage: Handover<Keep<2>>,
+    storage: Handover<StoreJob<2>>,
     signals: Signals<2>,
     machine: Machine,
     lost: u32,
@@ -67,7 +67,7 @@ impl<'a> Bench<'a> {
             frames,
             ends,
             servo,
-            storage: Handover::new(Keep::NOTHING),
+            storage: Handover::new(StoreJob::NOTHING),
             signals: Signals::new(),
             machine: Machine::default(),
             lost: 0,
@@ -75,14 +75,14 @@ impl<'a> Bench<'a> {
             tally: Tally::default(),
             may_lose: false,
         };
-        bench.hear(None);
-        bench.hear(Some(Frame::new(0, &[1, 0])));
+        bench.receive(None);
+        bench.receive(Some(Frame::new(0, &[1, 0])));
         let operational = bench.device.nodes().iter().all(|node| node.state() == NmtState::Operational);
         operational.then_some(bench)
     }
 
     /// Runs one round; returns whether a frame was sent.
-    fn hear(&mut self, frame: Option<Frame>) -> bool {
+    fn receive(&mut self, frame: Option<Frame>) -> bool {
         self.machine.sent = 0;
         if let Some(frame) = frame {
             self.lost += u32::from(self.frames.enqueue(frame).is_err());
@@ -98,20 +98,20 @@ impl<'a> Bench<'a> {
     /// Runs these frames back to back on a full wire; frames that are sent raise further rounds.
     fn run(&mut self, name: &str, frames: &[Frame]) -> bool {
         (self.tally, self.machine.bits, self.lost) = (Tally::default(), 0, 0);
-        let (begun_us, mut bits_heard, mut half_ms) = (self.now_us, 0, 0);
+        let (begun_us, mut bits_received, mut half_ms) = (self.now_us, 0, 0);
         let joint = JointStatus { drive: DriveState::OperationEnabled, ..JointStatus::NONE };
         let mut number = 0;
         for frame in frames.iter().cycle().take(COUNT) {
-            bits_heard += bits(frame);
-            self.now_us = begun_us + u64::from(bits_heard + self.machine.bits);
-            let mut sends = self.hear(Some(*frame));
+            bits_received += bits(frame);
+            self.now_us = begun_us + u64::from(bits_received + self.machine.bits);
+            let mut sends = self.receive(Some(*frame));
             while sends {
-                self.now_us = begun_us + u64::from(bits_heard + self.machine.bits);
-                sends = self.hear(None);
+                self.now_us = begun_us + u64::from(bits_received + self.machine.bits);
+                sends = self.receive(None);
             }
             number += 1;
-            if self.now_us / TOLD_US > half_ms {
-                half_ms = self.now_us / TOLD_US;
+            if self.now_us / STATUS_US > half_ms {
+                half_ms = self.now_us / STATUS_US;
                 let status = LegStatus {
                     joints: [joint; 2],
                     held: true,
@@ -120,22 +120,22 @@ impl<'a> Bench<'a> {
                     ..LegStatus::NONE
                 };
                 let _ = self.servo.status.enqueue(status);
-                self.hear(None);
+                self.receive(None);
             }
         }
         let seconds = (self.now_us - begun_us) as f32 * 1e-6;
         let per_second = |count: u32| (count as f32 / seconds) as u32;
         let share = percent(self.tally.mean(), per_second(self.tally.number()));
-        let kept = share <= MOST_PERCENT && (self.lost == 0 || self.may_lose);
+        let is_within = share <= MOST_PERCENT && (self.lost == 0 || self.may_lose);
         hprintln!(
             "{:<40} {:>8} {:>8} {:>6.1}  {}",
             name,
             per_second(number),
             self.tally.most(),
             share,
-            if kept { "kept" } else { "MISSED" }
+            if is_within { "kept" } else { "MISSED" }
         );
-        kept
+        is_within
     }
 }
 
@@ -158,41 +158,41 @@ pub fn report() -> Option<bool> {
         ("network management, reset", Frame::new(0, &[129, 0])),
         ("SDO, answered", Frame::new(0x601, &read)),
     ];
-    let mut kept = true;
+    let mut is_within = true;
     for (name, frame) in all {
-        kept &= Bench::new(&mut BusQueues::new())?.run(name, &[frame]);
+        is_within &= Bench::new(&mut BusQueues::new())?.run(name, &[frame]);
     }
     let mixed = [all[2].1, all[4].1, Frame::new(0x302, &[1, 2, 3, 4]), all[8].1];
-    kept &= Bench::new(&mut BusQueues::new())?.run("SYNC, targets, SDO", &mixed);
+    is_within &= Bench::new(&mut BusQueues::new())?.run("SYNC, targets, SDO", &mixed);
     let mut queues = BusQueues::new();
     let mut bench = Bench::new(&mut queues)?;
     full(&mut bench);
     // Reception stops for over a millisecond; frames without space are reported as lost (8110).
     bench.may_lose = true;
-    kept &= bench.run("reset, records of 400 bytes", &[all[7].1]);
+    is_within &= bench.run("reset, records of 400 bytes", &[all[7].1]);
 
     heading("a round that keeps both nodes' objects");
     let mut queues = BusQueues::new();
     let mut bench = Bench::new(&mut queues)?;
     bench.tally = Tally::default();
-    bench.hear(Some(Frame::new(0x601, &[0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'])));
+    bench.receive(Some(Frame::new(0x601, &[0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'])));
     bench.tally.print("save");
-    Some(kept & bench.storage.given().is_some())
+    Some(is_within & bench.storage.given().is_some())
 }
 
 /// Fills both nodes' stored objects up to a record's capacity, with any values.
 fn full(bench: &mut Bench<'_>) {
     let mut record = [0; LONGEST];
     let mut length = 0;
-    for (object, row) in kept_objects() {
+    for (object, row) in stored_objects() {
         let Some(room) = record.get_mut(length..) else { break };
         // Node numbers stay unchanged.
-        let Ok(size) = write_kept(object, row.default, room) else { break };
+        let Ok(size) = write_stored(object, row.default, room) else { break };
         length += if object.index == 0x2001 { 0 } else { size };
     }
     for joint in 0..2 {
         bench.device.recall(joint, record.get(..length).unwrap_or_default());
     }
     bench.now_us += 10_000;
-    bench.hear(None);
+    bench.receive(None);
 }

@@ -99,10 +99,10 @@ impl Tally {
 
     /// Prints one line of the table with the design's bound; returns whether it is met.
     pub fn print_against(&self, name: &str, goal: u32) -> bool {
-        let kept = self.most <= goal;
-        let word = if kept { "kept" } else { "MISSED" };
+        let is_within = self.most <= goal;
+        let word = if is_within { "kept" } else { "MISSED" };
         hprintln!("{:<48} {:>8} {:>8}   goal {}: {}", name, self.mean(), self.most, goal, word);
-        kept
+        is_within
     }
 }
 

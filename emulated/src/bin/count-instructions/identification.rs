@@ -120,8 +120,8 @@ fn searched(
     hprintln!("{:<48} {:>8}", "once: the last one, and the start of the completion", last);
     completion.print("one step of the completion to a leg");
     let seconds = total as f32 / INSTRUCTIONS_PER_S;
-    let kept = solver.search().state() == SearchState::Done && seconds <= MOST_SEARCH_S;
-    let word = if kept { "kept" } else { "MISSED" };
+    let is_within = solver.search().state() == SearchState::Done && seconds <= MOST_SEARCH_S;
+    let word = if is_within { "kept" } else { "MISSED" };
     let (evaluations, iterations) = (solver.search().evaluations(), solver.search().iterations());
     hprintln!(
         "in all, million instructions: {}; {} iterations, {} evaluations",
@@ -135,5 +135,5 @@ fn searched(
         MOST_SEARCH_S,
         word
     );
-    kept
+    is_within
 }

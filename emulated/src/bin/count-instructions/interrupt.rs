@@ -175,7 +175,7 @@ impl Bench {
     /// Sets the motors' speed and starts the axes with bridges off. Returns the most expensive interrupt with
     /// an order.
     fn begin(&mut self, calibrations: &[Calibration; AXES], speed_rad_per_s: f32) -> Option<u32> {
-        SIGNALS.set_targets(&DriveCommand::RELEASED);
+        SIGNALS.set_targets(&DriveCommand::OFF);
         self.tally = Tally::default();
         for axis in 0..AXES {
             let (motor, sample) = (self.motors.get_mut(axis)?, self.samples.get_mut(axis)?);

@@ -15,9 +15,8 @@ use scarab::units::{
     RadianPerSecondSquared,
 };
 
-pub const JOINTS: usize = 2;
-/// Base parameters of a leg with parallel axes.
-pub const BASE: usize = 13;
+pub use scarab::model::planar::{BASE, JOINTS};
+
 /// Bandwidth stated in the leg file.
 pub const BANDWIDTH_HZ: f32 = 16.0;
 pub const GRAVITY: [f32; 3] = [9.81, 0.0, 0.0];

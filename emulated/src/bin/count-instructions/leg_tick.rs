@@ -126,7 +126,7 @@ fn follow_a_host(
     let (mut control, mut following) = (Control::new(configuration).ok()?, Following::new(configuration));
     let mut command = JointCommand {
         target: Target::Hold,
-        asked: 0,
+        request_count: 0,
         feedforward,
         halt: false,
         velocity: RadianPerSecond(0.5),

@@ -13,7 +13,7 @@ use crate::counter;
 /// Time per instruction while the levels above the bus take a third of the processor.
 const US_PER_INSTRUCTION: f32 = 1e6 / PROCESSOR_HZ * CYCLES_PER_INSTRUCTION / (1.0 - 0.33);
 /// Register value with the main output off, and duties of no voltage.
-const RELEASED: u32 = bridge(0)[0].value;
+const OFF: u32 = bridge(0)[0].value;
 const NO_VOLTAGE: u32 = TOP as u32 / 2;
 
 /// Registers of one converter.
@@ -63,7 +63,7 @@ pub static REGISTERS: Registers = Registers {
 
 /// Command in a bridge's registers.
 pub fn command(axis: usize) -> AxisCommand {
-    let Some(timer) = REGISTERS.timers.get(axis) else { return AxisCommand::RELEASED };
+    let Some(timer) = REGISTERS.timers.get(axis) else { return AxisCommand::OFF };
     let duty = timer.duties.each_ref().map(|duty| 1.0 - duty.get() as f32 / f32::from(TOP));
     AxisCommand { enabled: timer.output.get() & MOE != 0, duty }
 }
@@ -93,14 +93,14 @@ impl Hardware<2> for Machine {
     }
 
     #[inline(always)]
-    fn release_all(&mut self) {
-        REGISTERS.timers.iter().for_each(|timer| timer.output.set(RELEASED));
+    fn disable_all(&mut self) {
+        REGISTERS.timers.iter().for_each(|timer| timer.output.set(OFF));
     }
 
     #[inline(always)]
-    fn release(&mut self, axis: usize) {
+    fn disable(&mut self, axis: usize) {
         let Some(timer) = REGISTERS.timers.get(axis) else { return };
-        timer.output.set(RELEASED);
+        timer.output.set(OFF);
         timer.duties.iter().for_each(|duty| duty.set(NO_VOLTAGE));
     }
 
@@ -116,7 +116,7 @@ impl Hardware<2> for Machine {
     #[inline(always)]
     fn enable(&mut self, axis: usize) {
         if let Some(timer) = REGISTERS.timers.get(axis) {
-            timer.output.set(RELEASED | MOE);
+            timer.output.set(OFF | MOE);
         }
     }
 

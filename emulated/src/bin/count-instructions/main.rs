@@ -32,7 +32,7 @@ use cortex_m_semihosting::{debug, hprintln};
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let kept = counter::start() && {
+    let is_within = counter::start() && {
         let mut account = account::Account::default();
         let axis = copies::report() & axis_tick::report() & interrupt::report(&mut account);
         let search = leg::model().and_then(|model| {
@@ -41,14 +41,14 @@ fn main() -> ! {
         });
         let swarm = swarm::report().and_then(|()| own_objective::report()).and_then(|()| bus::report());
         let bus = bus_round::report();
-        let kept = account.report();
-        axis && search == Some(true) && swarm.is_some() && bus == Some(true) && kept
+        let is_within = account.report();
+        axis && search == Some(true) && swarm.is_some() && bus == Some(true) && is_within
     };
-    end(kept)
+    end(is_within)
 }
 
-fn end(kept: bool) -> ! {
-    debug::exit(if kept { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+fn end(is_within: bool) -> ! {
+    debug::exit(if is_within { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
     loop {
         core::hint::spin_loop();
     }

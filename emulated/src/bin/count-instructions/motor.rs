@@ -3,7 +3,7 @@
 //! The model is accurate enough for a calibration to pass and for realistic currents, speeds and noise. The
 //! current loop is verified on the simulated hardware, not here.
 
-use scarab::hal::{AxisCommand, AxisSample};
+use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ};
 use scarab::motor::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale};
 use scarab::real::sin_cos;
 use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
@@ -36,7 +36,7 @@ const INDUCTANCE_H: f32 = 25e-6;
 const INERTIA: f32 = 2e-4;
 const FRICTION_NM: f32 = 0.01;
 const STEPS: usize = 4;
-const STEP_S: f32 = 1.0 / 24_000.0 / STEPS as f32;
+const STEP_S: f32 = 1.0 / CURRENT_RATE_HZ as f32 / STEPS as f32;
 const AMPERE_PER_CODE: f32 = 3.3 / 4096.0 / 40.0 / 0.0005;
 
 #[derive(Clone, Copy)]
@@ -60,7 +60,7 @@ impl Motor {
             speed_rad_per_s: 0.0,
             driven: false,
             bus: 48.0,
-            pending: AxisCommand::RELEASED,
+            pending: AxisCommand::OFF,
             seed: 1,
         }
     }
@@ -80,7 +80,7 @@ impl Motor {
         let turned = 0.866_025_4 * beta;
         let shunt_codes = [turned - 0.5 * alpha, -turned - 0.5 * alpha]
             .map(|current| (2050.0 + current / AMPERE_PER_CODE + self.noise()) as u16);
-        let bus_code = (self.bus / (3.3 * 19.0 / 4096.0)) as u16;
+        let bus_code = (self.bus / (3.3 * SenseScale::DIVIDER / 4096.0)) as u16;
         let encoder_count = (self.turns * COUNTS) as u32 as u16;
         AxisSample { shunt_codes, bus_code, encoder_count, index_count }
     }

@@ -3,7 +3,7 @@
 //! Their commands are discarded: the cost of the loops is real, and their effect on a motor is tested
 //! elsewhere. Their calibration is real as well, on a small motor in single precision.
 
-use scarab::hal::AxisSample;
+use scarab::hal::{AxisSample, CURRENT_RATE_HZ};
 use scarab::motor::{Axis, AxisRequest, CalibrationSettings, CalibrationStep, Calibrator};
 use scarab::task::leg::JOINTS;
 use scarab::units::{Ampere, Volt};
@@ -13,7 +13,7 @@ use super::motor::{CONFIGURATION, Motor};
 const SETTINGS: CalibrationSettings =
     CalibrationSettings { current: Ampere(10.0), voltage: Volt(2.0), turns_per_s: 10.0 };
 /// Limit in PWM periods; a calibration takes some seconds.
-const LONGEST: u32 = 24_000 * 20;
+const LONGEST: u32 = 20 * CURRENT_RATE_HZ;
 
 /// Both axes with their simulated sensors.
 pub struct Axes {

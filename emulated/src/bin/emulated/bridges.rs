@@ -9,16 +9,16 @@ use scarab::board::odrive_v3_6::settings::timers::{BASES, BDTR, bridge};
 use super::clock;
 
 /// Register value with the main output off.
-const RELEASED: u32 = bridge(0)[0].value;
+const OFF: u32 = bridge(0)[0].value;
 
 /// First step of every crash.
 #[unsafe(no_mangle)]
-extern "C" fn scarab_release() -> u32 {
+extern "C" fn scarab_disable_all() -> u32 {
     for base in BASES {
         let register = (base + BDTR) as *mut u32;
         // SAFETY: a register of a timer that the emulated machine maps without modelling it: the write only
         // appears in the log.
-        unsafe { register.write_volatile(RELEASED) }
+        unsafe { register.write_volatile(OFF) }
     }
     clock::instructions()
 }

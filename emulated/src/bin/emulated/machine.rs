@@ -12,8 +12,8 @@ impl Hardware<JOINTS> for Machine {
     fn masked(&mut self, step: impl FnOnce(&mut Self)) {
         step(self);
     }
-    fn release_all(&mut self) {}
-    fn release(&mut self, _: usize) {}
+    fn disable_all(&mut self) {}
+    fn disable(&mut self, _: usize) {}
     fn set_duty(&mut self, _: usize, _: &[f32; 3]) {}
     fn enable(&mut self, _: usize) {}
     fn set_brake(&mut self, _: f32) {}

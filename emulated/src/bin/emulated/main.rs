@@ -38,9 +38,10 @@ use rehearsal::Start;
 use scarab::board::odrive_v3_6::settings::{analog, drives};
 use scarab::board::{crash, stack};
 use scarab::leg::{Control, Filters};
+use scarab::motor::SenseScale;
 use scarab::operation::{Ends, EventQueue, Queues, ServoLevel};
-use scarab::safety::Cause;
-use scarab::task::surroundings::{Introduction, Surroundings, crashed};
+use scarab::safety::InhibitReason;
+use scarab::task::identify::{BoardFunctions, Introduction, crashed};
 use scarab::task::{SIGNALS, identify, leg, servo};
 use scarab::trace::Record;
 use static_cell::{ConstStaticCell, StaticCell};
@@ -51,11 +52,11 @@ fn main() -> ! {
     let found = crash::take();
     let start = rehearsal::start(found.is_some());
     if found.is_some() {
-        SIGNALS.inhibit.raise(Cause::Crash);
+        SIGNALS.inhibit.raise(InhibitReason::Crash);
     }
     let crash = found.map(crashed);
     let introduction = Introduction { unique: [0; 3], version: [0; 3], reset: start.name(), crash };
-    identify::introduce(&introduction, SURROUNDINGS.clock_hz);
+    identify::introduce(&introduction, FUNCTIONS.clock_hz);
     let thread = hand_out(start);
     vectors::enable();
     SIGNALS.begin_servo();
@@ -83,12 +84,10 @@ fn spin<S>(task: SpawnToken<S>) -> ! {
 /// Identifier of the thread's executor in `embassy_executor`: woken by an event.
 const THREAD: usize = usize::MAX;
 
-/// Divider of the bus voltage, as on a board of 56 V.
-const DIVIDER: f32 = 19.0;
 /// Bus voltage.
 const BUS_V: f32 = 48.0;
 
-const SURROUNDINGS: Surroundings = Surroundings {
+const FUNCTIONS: BoardFunctions = BoardFunctions {
     clock: clock::instructions,
     clock_hz: clock::INSTRUCTIONS_PER_S,
     stack_used: stack::used,
@@ -96,7 +95,7 @@ const SURROUNDINGS: Surroundings = Surroundings {
     volt_per_code: None,
     temperatures_c: || [f32::NAN; leg::JOINTS + 1],
     chopper_duty: || 0.0,
-    told: || end(true),
+    reported: || end(true),
 };
 
 /// Builds both halves of the leg in place. A separate function like [`hand_out`], so that its stack is freed.
@@ -124,10 +123,10 @@ fn hand_out(start: Start) -> identify::Thread {
     static QUEUES: ConstStaticCell<Queues<{ leg::JOINTS }>> = ConstStaticCell::new(Queues::new());
     let Ends { current, servo: ends, mut housekeeping, identification: identification_ends, .. } =
         QUEUES.take().split(EVENTS.take());
-    let volt_per_code = analog::sense(DIVIDER).volt_per_code;
-    let level = ServoLevel::new(&control, drives::derating(DIVIDER), volt_per_code, None);
+    let volt_per_code = analog::sense(SenseScale::DIVIDER).volt_per_code;
+    let level = ServoLevel::new(&control, drives::derating(SenseScale::DIVIDER), volt_per_code, None);
     static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
-    let servo = SERVO.init(servo::ServoLoop { control, level, ends, clock: SURROUNDINGS.clock });
+    let servo = SERVO.init(servo::ServoLoop { control, level, ends, clock: FUNCTIONS.clock });
     // The ideal drives need no supply; the leg reads a bus voltage that neither derates nor faults.
     SIGNALS.statistics.see_bus((BUS_V / volt_per_code.0) as u16);
     if let Some(mut home) = servo::SERVO.try_lock() {
@@ -135,10 +134,11 @@ fn hand_out(start: Start) -> identify::Thread {
     }
     let causes = SIGNALS.inhibit.causes();
     if causes != 0 {
-        let _ = housekeeping.notes.enqueue(Record::Refused { why: Cause::Crash.name(), value: causes });
+        let _ =
+            housekeeping.notes.enqueue(Record::Refused { why: InhibitReason::Crash.name(), value: causes });
     }
     plant::prepare(current.samples, housekeeping.requests, housekeeping.drive, start);
-    identify::Thread { identification, ends: identification_ends, surroundings: SURROUNDINGS, bus: None }
+    identify::Thread { identification, ends: identification_ends, board: FUNCTIONS, bus: None }
 }
 
 /// Ends the emulator.

@@ -29,7 +29,7 @@ const LONGEST_TICKS: u32 = 300 * SERVO_RATE_HZ;
 /// Ticks after a fault, for its records.
 const LAST_TICKS: u32 = SERVO_RATE_HZ / 2;
 /// Operator's requests, one per servo tick; the first tick has none.
-const ASKED: [ControlRequest<JOINTS>; 4] = [
+const REQUESTS: [ControlRequest<JOINTS>; 4] = [
     ControlRequest::Power(PowerRequest::Shutdown),
     ControlRequest::Power(PowerRequest::SwitchOn),
     ControlRequest::Power(PowerRequest::EnableOperation),
@@ -157,7 +157,7 @@ impl Plant {
             let _ = self.requests.enqueue(ControlRequest::Power(PowerRequest::ResetFault));
             self.began = self.servo_ticks;
         } else if let Some(index) = (self.servo_ticks - self.began).checked_sub(1)
-            && let Some(request) = ASKED.get(index as usize)
+            && let Some(request) = REQUESTS.get(index as usize)
         {
             let _ = self.requests.enqueue(*request);
         }

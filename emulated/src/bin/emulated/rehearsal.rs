@@ -47,7 +47,7 @@ const FRAME: usize = 1024;
 
 /// State preserved over a reset. The emulated memory is all zero at power-on.
 #[derive(Clone, Copy)]
-struct Kept {
+struct Persisted {
     /// Instruction count at which the crash was begun.
     begun: u32,
     /// Consecutive starts that found a crash.
@@ -57,7 +57,7 @@ struct Kept {
 }
 
 #[unsafe(link_section = ".uninit.rehearsal")]
-static mut KEPT: MaybeUninit<Kept> = MaybeUninit::uninit();
+static mut PERSISTED: MaybeUninit<Persisted> = MaybeUninit::uninit();
 
 /// Servo tick from which on the crash is due, at thread level or in the servo's interrupt; without
 /// one the largest.
@@ -92,9 +92,9 @@ impl Start {
     pub fn act(self, servo_ticks: u32) {
         match self {
             // This crash was not requested. Its records have been sent, and the run cannot continue.
-            Self::Crashed if servo_ticks == RESET / 2 && kept().begun == 0 => end(false),
+            Self::Crashed if servo_ticks == RESET / 2 && persisted().begun == 0 => end(false),
             Self::Crashed if servo_ticks == RESTART => {
-                keep(Kept { begun: 0, crashes: 0, restarted: true });
+                persist(Persisted { begun: 0, crashes: 0, restarted: true });
                 SCB::sys_reset();
             }
             Self::Again if servo_ticks == LAST => end(true),
@@ -103,22 +103,22 @@ impl Start {
     }
 }
 
-fn kept() -> Kept {
+fn persisted() -> Persisted {
     // SAFETY: the static exists and is aligned, zero at power-on and always written as a whole afterwards. So
     // its flag is 0 or 1. Every access is volatile, and none interrupts another: starts come before
     // interrupts, and a crash ends the run.
-    unsafe { ptr::read_volatile((&raw const KEPT).cast::<Kept>()) }
+    unsafe { ptr::read_volatile((&raw const PERSISTED).cast::<Persisted>()) }
 }
 
-fn keep(now: Kept) {
-    // SAFETY: as for `kept`.
-    unsafe { ptr::write_volatile((&raw mut KEPT).cast::<Kept>(), now) }
+fn persist(now: Persisted) {
+    // SAFETY: as for `persisted`.
+    unsafe { ptr::write_volatile((&raw mut PERSISTED).cast::<Persisted>(), now) }
 }
 
 /// Determines the kind of start; a first start arms the requested crash.
 pub fn start(crashed: bool) -> Start {
-    let before = kept();
-    keep(Kept { crashes: before.crashes + u32::from(crashed), restarted: false, ..before });
+    let before = persisted();
+    persist(Persisted { crashes: before.crashes + u32::from(crashed), restarted: false, ..before });
     if crashed {
         heprintln!("emulated: crash {} was begun at instruction {}", before.crashes + 1, before.begun);
         if before.crashes > 0 {
@@ -130,18 +130,18 @@ pub fn start(crashed: bool) -> Start {
     if before.restarted {
         return Start::Again;
     }
-    ask();
+    read_request();
     Start::First
 }
 
 /// Parses `crash=KIND@TICK` on the command line.
-fn ask() {
+fn read_request() {
     let mut line = [0_u8; COMMAND_LINE];
     // SAFETY: the debugger's call writes at most the given number of bytes.
     let failed = unsafe { syscall!(GET_CMDLINE, line.as_mut_ptr(), line.len()) };
     let words = line.split(|byte| matches!(byte, b' ' | 0)).filter_map(|word| str::from_utf8(word).ok());
-    let asked = words.filter_map(|word| word.strip_prefix("crash=")?.split_once('@')).next();
-    let Some((kind, tick)) = asked.filter(|_| failed == 0) else { return };
+    let requested = words.filter_map(|word| word.strip_prefix("crash=")?.split_once('@')).next();
+    let Some((kind, tick)) = requested.filter(|_| failed == 0) else { return };
     let Ok(tick) = tick.parse() else { return };
     let kind = match kind {
         "hard_fault" => return DUE_IN_SERVO.store(tick, Ordering::Relaxed),
@@ -155,7 +155,7 @@ fn ask() {
 }
 
 fn begin() {
-    keep(Kept { begun: clock::instructions(), ..kept() });
+    persist(Persisted { begun: clock::instructions(), ..persisted() });
 }
 
 /// Crashes at thread level when due, between two steps of the identification.

@@ -3,7 +3,7 @@
 use hal_sim::faults::{Channel, Form, Injection, Injector, Timing};
 use scarab::hal::Contacts;
 use scarab::leg::DriveState;
-use scarab::safety::{Cause, FaultCode};
+use scarab::safety::{FaultCode, InhibitReason};
 
 use crate::faults::aftermath;
 use crate::faults::campaign::BASE;
@@ -79,7 +79,7 @@ fn a_lost_rotor_position_requires_calibration_and_reference() {
         assert!(hold(&mut rig, HELD, 0.4));
         lose_counts(&mut rig, joint);
         hold(&mut rig, HELD, 0.01);
-        assert_eq!((rig.alarm(), rig.is_braking()), (Some(FaultCode::EncoderPlace), true));
+        assert_eq!((rig.alarm(), rig.is_braking()), (Some(FaultCode::EncoderPosition), true));
         assert!(!reset(&mut rig), "no calibration");
         assert_eq!((rig.causes(), rig.state()), (0, DriveState::NotReadyToSwitchOn));
         // The leg comes to rest, then the axis is calibrated.
@@ -101,7 +101,7 @@ fn a_lost_rotor_position_ends_the_servo_in_its_tick() {
     lose_counts(&mut rig, 1);
     for _ in 0..4 {
         rig.advance();
-        let found = rig.alarm() == Some(FaultCode::EncoderPlace);
+        let found = rig.alarm() == Some(FaultCode::EncoderPosition);
         assert_eq!(rig.state() == DriveState::NotReadyToSwitchOn, found);
     }
     assert!(rig.alarm().is_some() && rig.is_braking());
@@ -157,7 +157,7 @@ fn missing_ticks_during_a_flash_write_are_no_fault() {
     // Writing words takes less than 2 ms. An erasure takes longer and discards the joints' zeros.
     for (storing, periods, enabled) in [(false, 40, false), (true, 40, true), (true, 100, false)] {
         let mut rig = ready();
-        rig.board.signals.inhibit.raise_bits(if storing { Cause::Storing.bit() } else { 0 });
+        rig.board.signals.inhibit.raise_bits(if storing { InhibitReason::Storing.bit() } else { 0 });
         for joint in 0..2 {
             // On the board the watchdog's timeout is longer meanwhile; here it is not.
             let timing = Timing::lasting(rig.period, periods);

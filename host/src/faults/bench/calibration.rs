@@ -10,7 +10,7 @@ use core::f64::consts::TAU;
 use hal_sim::drive::description::{AxisDescription, EncoderWiring, SupplyDescription};
 use hal_sim::faults::{Channel, Form, Injection, Injector, Timing};
 use rayon::prelude::*;
-use scarab::hal::AxisCommand;
+use scarab::hal::{AxisCommand, CURRENT_RATE_HZ};
 use scarab::motor::{Calibration, CalibrationStep, Calibrator};
 
 use crate::base::error::ToolError;
@@ -38,7 +38,7 @@ pub(super) const BENCH: Bench = Bench {
 };
 
 /// Longest calibration, periods; usually some seconds.
-const LONGEST: u64 = 60 * 24_000;
+const LONGEST: u64 = 60 * CURRENT_RATE_HZ as u64;
 
 /// Number of ways to connect an axis wrongly.
 const WAYS: u64 = 11;
@@ -116,7 +116,7 @@ fn loose(
         }
         let mut calibrator =
             Calibrator::new(&configuration, settings).map_err(|error| ToolError::input(axis_error(error)))?;
-        let mut command = AxisCommand::RELEASED;
+        let mut command = AxisCommand::OFF;
         for tick in 0..LONGEST {
             if let Some((at, Loose::Wire(output))) = loose
                 && at == tick
@@ -157,7 +157,7 @@ fn loose(
 /// of offset, a fifth of the resistance.
 fn is_like(found: &Calibration, sound: &Calibration) -> bool {
     let turns = (found.offset().turns() - sound.offset().turns()).rem_euclid(1.0);
-    let mut zeros = found.zeros().into_iter().zip(sound.zeros());
+    let mut zeros = found.current_offsets().into_iter().zip(sound.current_offsets());
     let resistance = found.resistance().0 / sound.resistance().0;
     turns.min(1.0 - turns) < 5.0 / 360.0
         && zeros.all(|(found, sound)| f64::from(found - sound).abs() * AMPERE_PER_CODE < 1.0)

@@ -22,8 +22,7 @@ use crate::faults::run::Outcome;
 use crate::formats::leg_file::LegFile;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, start_position};
-
-const BASE: usize = 13;
+use scarab::model::planar::BASE;
 
 pub(super) const BENCH: Bench = Bench {
     head: Head {

@@ -5,7 +5,7 @@
 //! switch on), independent of host and operator. All stored data is present. Blind: half of the runs start as
 //! a board that still has everything in memory, the others with an empty memory.
 
-use scarab::hal::{AxisCommand, Contacts};
+use scarab::hal::{AxisCommand, Contacts, SERVO_RATE_HZ};
 
 use crate::base::error::ToolError;
 use crate::faults::bench::Bench;
@@ -17,7 +17,7 @@ use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 
 /// Servo ticks until the bus voltage must be zero, of operated contacts, and of an opened switch.
-const PATIENCE: u64 = 2 * 4000;
+const PATIENCE: u64 = 2 * SERVO_RATE_HZ as u64;
 const HANDS: u64 = 1000;
 const OPEN: u64 = 200;
 /// Bus voltage with the supply present, V.
@@ -84,7 +84,7 @@ fn one(mut fork: Fork<'_>, remembers: Option<Board>) -> Result<Outcome, ToolErro
     }
     // Without power there are no commands: the bridges' switches are open.
     for _ in 0..away {
-        fork.host.rig().world.period(&[AxisCommand::RELEASED; JOINTS], 0.0);
+        fork.host.rig().world.period(&[AxisCommand::OFF; JOINTS], 0.0);
     }
     set_source(&mut fork, BUS_V);
     match remembers {

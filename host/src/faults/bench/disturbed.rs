@@ -23,8 +23,8 @@ use crate::rig::options::SimulationOptions;
 use crate::rig::pair::Context;
 use crate::rig::perturb::{self, Perturbation};
 use crate::run::simulate::drive;
+use scarab::model::planar::BASE;
 
-const BASE: usize = 13;
 /// Twice the limit for an undisturbed identification.
 const HARMFUL_PERCENT: f64 = 3.0;
 /// Speed below which a row is not counted.

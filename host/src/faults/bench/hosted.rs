@@ -97,7 +97,7 @@ impl Fork<'_> {
         match self.host.rig().state().permission() {
             Permission::Follow => None,
             Permission::Damp => Some("Damp"),
-            Permission::Released => Some("Off"),
+            Permission::Off => Some("Off"),
         }
     }
 

@@ -13,7 +13,7 @@
 //! truncated and interleaved transfers, network management, controlwords that enable.
 
 use scarab::bus::Frame;
-use scarab::hal::Contacts;
+use scarab::hal::{Contacts, SERVO_RATE_HZ};
 use scarab::safety::FaultCode;
 
 use crate::base::error::ToolError;
@@ -31,7 +31,7 @@ use crate::rig::bus::host::Host;
 const FLOOD: u64 = 400;
 const FRAMES: u64 = 3;
 /// Servo ticks until waiting frames have been sent and the nodes are back.
-const DRAINED: u64 = 4000;
+const DRAINED: u64 = SERVO_RATE_HZ as u64;
 /// Device type of a servo drive with CiA 402's profile.
 const SERVO_DRIVE: u32 = 0x0002_0192;
 /// Bus load above which the bus counts as full.

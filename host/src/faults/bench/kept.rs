@@ -21,9 +21,9 @@ use embassy_futures::block_on;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
-use scarab::bus::{LONGEST, kept_entries};
+use scarab::bus::{LONGEST, stored_entries};
 use scarab::leg::{ControlRequest, DriveState, IdentifiedModel, NoticeCode};
-use scarab::store::{KeptModel, Key};
+use scarab::store::{Key, ModelRecord};
 
 use crate::base::error::ToolError;
 use crate::base::random::Random;
@@ -40,9 +40,10 @@ use crate::rig::bus::board::Board;
 use crate::rig::bus::host::Host;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
+use scarab::hal::SERVO_RATE_HZ;
 
 /// Longest identification, servo ticks.
-const LONGEST_TICKS: u64 = 300 * 4000;
+const LONGEST_TICKS: u64 = 300 * SERVO_RATE_HZ as u64;
 /// Drive state in which writing is permitted.
 const OFF: DriveState = DriveState::SwitchOnDisabled;
 /// Number of fill levels of the flash.
@@ -88,7 +89,7 @@ pub(super) const ARMED: Bench = Bench {
 };
 
 /// Identifies a leg and returns its model as stored.
-fn identified(leg: &LegFile, seed: u64) -> Result<KeptModel<JOINTS>, ToolError> {
+fn identified(leg: &LegFile, seed: u64) -> Result<ModelRecord<JOINTS>, ToolError> {
     let refused = || leg.error("its identification is refused");
     let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(seed))?;
     let mut pair = Pair::new(leg, &context, seed)?;
@@ -100,7 +101,7 @@ fn identified(leg: &LegFile, seed: u64) -> Result<KeptModel<JOINTS>, ToolError> 
         pair.tick(request.take(), context.gravity);
         if let Some(model) = pair.leg.control().model() {
             let identification = pair.leg.identification();
-            return Ok(KeptModel::of(&context.configuration, identification, model, seed as u32, seed));
+            return Ok(ModelRecord::of(&context.configuration, identification, model, seed as u32, seed));
         }
     }
     Err(refused().into())
@@ -110,7 +111,7 @@ fn identified(leg: &LegFile, seed: u64) -> Result<KeptModel<JOINTS>, ToolError> 
 #[derive(Clone, Debug, PartialEq)]
 struct All {
     objects: [Option<Vec<u8>>; 2],
-    model: Option<KeptModel<JOINTS>>,
+    model: Option<ModelRecord<JOINTS>>,
 }
 
 impl All {
@@ -119,7 +120,7 @@ impl All {
     }
 
     /// Random bytes; the store does not interpret them.
-    fn random(random: &mut Xoshiro256PlusPlus, model: &KeptModel<JOINTS>) -> Self {
+    fn random(random: &mut Xoshiro256PlusPlus, model: &ModelRecord<JOINTS>) -> Self {
         let objects = [0, 1].map(|_| {
             let mut bytes = vec![0; 1 + random.next_u32() as usize % LONGEST];
             random.fill_bytes(&mut bytes);
@@ -166,7 +167,7 @@ struct Filled {
 }
 
 /// Flashes from empty to one whose next save erases a sector, in equal steps, and those that erase.
-fn filled(model: &KeptModel<JOINTS>) -> Vec<Filled> {
+fn filled(model: &ModelRecord<JOINTS>) -> Vec<Filled> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut memory = Memory::new(None);
     let mut old = All::random(&mut random, model);
@@ -239,14 +240,14 @@ struct Rotting {
     board: Board<JOINTS, BASE>,
     /// All stored objects of each node.
     objects: [Vec<Vec<u8>>; 2],
-    models: [(KeptModel<JOINTS>, IdentifiedModel<JOINTS>); 2],
-    kept: KeptModel<JOINTS>,
-    other: KeptModel<JOINTS>,
+    models: [(ModelRecord<JOINTS>, IdentifiedModel<JOINTS>); 2],
+    kept: ModelRecord<JOINTS>,
+    other: ModelRecord<JOINTS>,
 }
 
 impl Rotting {
     /// Model that the leg derives from one of its stored models.
-    fn own(&self, kept: &KeptModel<JOINTS>) -> Option<IdentifiedModel<JOINTS>> {
+    fn own(&self, kept: &ModelRecord<JOINTS>) -> Option<IdentifiedModel<JOINTS>> {
         self.models.into_iter().find(|(record, _)| record.model == kept.model).map(|(_, model)| model)
     }
 
@@ -340,12 +341,12 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
 
 /// Following window among a node's objects, or its start value.
 fn window(bytes: &[u8]) -> u32 {
-    kept_entries(bytes).find(|(object, _)| object.index == WINDOW).map_or(UNTOUCHED, |(_, value)| value)
+    stored_entries(bytes).find(|(object, _)| object.index == WINDOW).map_or(UNTOUCHED, |(_, value)| value)
 }
 
 /// Returns whether every record can be read, whatever its content.
 fn readable(memory: &mut Memory) -> bool {
-    let model = memory.with(|store| block_on(store.load::<KeptModel<JOINTS>>(Key::Model)));
+    let model = memory.with(|store| block_on(store.load::<ModelRecord<JOINTS>>(Key::Model)));
     (0..2).all(|joint| memory.objects(joint).is_ok()) && model.is_some_and(|model| model.is_ok())
 }
 

@@ -12,7 +12,7 @@ use core::f64::consts::TAU;
 
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use rayon::prelude::*;
-use scarab::hal::{AxisCommand, AxisSample, JointSample};
+use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, JointSample};
 use scarab::motor::{Axis, AxisConfiguration, AxisRequest, Calibration, CalibrationStep, Calibrator};
 use scarab::units::Ampere;
 
@@ -45,7 +45,7 @@ const PERIODS: usize = 600;
 /// Amplitude (A) and frequency (Hz) of the requested current.
 const ASKED_A: f64 = 4.0;
 const ASKED_HZ: f64 = 40.0;
-const LONGEST: u64 = 24_000 * 60;
+const LONGEST: u64 = 60 * CURRENT_RATE_HZ as u64;
 
 /// Inputs and outputs of one axis.
 struct Driven {
@@ -58,7 +58,7 @@ struct Driven {
 }
 
 fn asked(period: usize) -> AxisRequest {
-    let turns = ASKED_HZ * period as f64 / 24_000.0;
+    let turns = ASKED_HZ * period as f64 / f64::from(CURRENT_RATE_HZ);
     AxisRequest { enabled: true, current: Ampere((ASKED_A * (TAU * turns).sin()) as f32) }
 }
 
@@ -68,7 +68,7 @@ fn run(
     mut sample: impl FnMut(usize, &AxisCommand) -> AxisSample,
 ) -> (Vec<AxisCommand>, Vec<JointSample>) {
     let (mut commands, mut joint) = (Vec::with_capacity(PERIODS), Vec::new());
-    let mut command = AxisCommand::RELEASED;
+    let mut command = AxisCommand::OFF;
     for period in 0..PERIODS {
         command = axis.tick(&sample(period, &command), asked(period));
         commands.push(command);
@@ -92,7 +92,7 @@ impl Driven {
         let settings = calibration_settings(&configuration, motor);
         let mut stand = rested(&drives.axes[index], &drives.supply, TAU * 0.3, 1);
         let mut calibrator = Calibrator::new(&configuration, settings).map_err(|_| unfit())?;
-        let mut command = AxisCommand::RELEASED;
+        let mut command = AxisCommand::OFF;
         let mut calibration = None;
         for _ in 0..LONGEST {
             match calibrator.tick(&stand.period(&command, 0.0)) {
@@ -105,7 +105,7 @@ impl Driven {
             }
         }
         let calibration = calibration.ok_or_else(unfit)?;
-        let first = stand.period(&AxisCommand::RELEASED, 0.0);
+        let first = stand.period(&AxisCommand::OFF, 0.0);
         let mut axis = Axis::new(&configuration, &calibration, &first).map_err(|_| unfit())?;
         let mut samples = Vec::with_capacity(PERIODS);
         let (commands, joint) = run(&mut axis, |_, command| {

@@ -27,11 +27,12 @@ use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
 use crate::rig::bus::host::{Host, Speaks};
+use scarab::hal::SERVO_RATE_HZ;
 
 const NODES: [u16; 2] = [1, 2];
 const WIDENED: Radian = Radian(2.0);
 /// Servo ticks per second.
-const SECOND: u64 = 4000;
+const SECOND: u64 = SERVO_RATE_HZ as u64;
 /// Largest share of the torque cap.
 const SHARE: f64 = 0.25;
 /// Largest speed outside the range, rad/s: the commanded 0.1 rad/s plus the transient while the drive takes

@@ -17,10 +17,11 @@ use crate::faults::run::Outcome;
 use crate::formats::leg_file::LegFile;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
+use scarab::hal::SERVO_RATE_HZ;
+use scarab::model::planar::BASE;
 
-const BASE: usize = 13;
 /// Longest identification, servo ticks.
-const LONGEST: u64 = 300 * 4000;
+const LONGEST: u64 = 300 * SERVO_RATE_HZ as u64;
 /// Servo ticks for which a leg is observed after its search: half a second.
 const AFTERWARDS: u64 = 2000;
 

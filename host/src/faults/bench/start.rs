@@ -36,7 +36,7 @@ pub(super) const ZEROS: Bench = Bench {
         state: "Refuse / Off",
         deadline_ms: 10.0,
         unit: "A",
-        codes: &[FaultCode::CurrentZero],
+        codes: &[FaultCode::CurrentOffset],
         lacking: None,
     },
     run: arm,

@@ -151,7 +151,7 @@ fn calibrated(
     let mut stand = rested(&drives.axes[index], &drives.supply, TAU * 0.3, seed);
     let mut calibrator = Calibrator::new(&configuration, settings).map_err(|_| unfit())?;
     let mut watch = TickWatch::default();
-    let mut command = AxisCommand::RELEASED;
+    let mut command = AxisCommand::OFF;
     for tick in 0..LONGEST {
         let sample = stand.period(&command, 0.0);
         let emergency_stop = pressed.is_some_and(|pressed| tick >= pressed) && !blind;

@@ -26,7 +26,7 @@ pub static ROWS: [Row; 3] = [
         fault: "conversion stuck or missing",
         detector: "constant code while the requested current changes; end-of-conversion flags of shunts and supply",
         state: "Off",
-        codes: &[FaultCode::Conversion, FaultCode::StuckConversion, FaultCode::CurrentZero],
+        codes: &[FaultCode::Conversion, FaultCode::StuckConversion, FaultCode::CurrentOffset],
         // Limit for a stuck conversion; a missing one is detected in its own tick.
         deadline_ms: 4.0 * PERIOD_MS,
         unit: "",

@@ -27,7 +27,7 @@ pub static ROWS: [Row; 2] = [
         fault: "lost counts, missing index; a single wrong index pulse is no fault",
         detector: "two index pulses at one wrong position, two turns without a right one; largest step",
         state: "Damp",
-        codes: &[FaultCode::EncoderPlace],
+        codes: &[FaultCode::EncoderPosition],
         deadline_ms: f64::INFINITY,
         unit: "counts",
         lacking: Some("braked (Short) instead of damped, since the rotor's angle is lost with the counts"),

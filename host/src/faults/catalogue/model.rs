@@ -31,7 +31,7 @@ pub static ROWS: [Row; 3] = [
         fault: "current offset drifts",
         detector: "mean of the residual over an electrical turn",
         state: "Refuse / Off",
-        codes: &[FaultCode::CurrentZero, FaultCode::OpenPhase, FaultCode::Overcurrent],
+        codes: &[FaultCode::CurrentOffset, FaultCode::OpenPhase, FaultCode::Overcurrent],
         deadline_ms: 50.0,
         unit: "A",
         lacking: Some("small offsets while the joint moves; below 2 A of the vector at enabling"),
@@ -44,7 +44,7 @@ pub static ROWS: [Row; 3] = [
         state: "Off",
         codes: &[
             FaultCode::OpenPhase,
-            FaultCode::CurrentZero,
+            FaultCode::CurrentOffset,
             FaultCode::EncoderFrozen,
             FaultCode::Overcurrent,
         ],

@@ -6,7 +6,7 @@ use scarab::leg::{
     Constant, CounterDirection, ElectricalAngle, EncoderSetting, Fingerprint, StoredCalibration, StoredModel,
     Stribeck,
 };
-use scarab::store::{JointProvenance, KeptCalibration, KeptModel, Provenance};
+use scarab::store::{CalibrationRecord, JointProvenance, ModelRecord, Provenance};
 use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
 
 use crate::formats::kept_file::{
@@ -42,7 +42,7 @@ fn not_below_zero(name: &str, value: f64) -> Result<f32, String> {
 }
 
 impl AxisCalibration {
-    pub(super) fn of_kept(joint: Joint, kept: &KeptCalibration) -> Self {
+    pub(super) fn of_kept(joint: Joint, kept: &CalibrationRecord) -> Self {
         let StoredCalibration { resistance, direct_inductance, quadrature_inductance, offset, encoder } =
             kept.0;
         Self {
@@ -62,7 +62,7 @@ impl AxisCalibration {
         }
     }
 
-    pub(super) fn to_kept(&self) -> Result<KeptCalibration, String> {
+    pub(super) fn to_kept(&self) -> Result<CalibrationRecord, String> {
         let units = (self.offset_rad * UNITS_PER_RAD).round();
         if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&units) {
             return Err(format!("`offset_rad` is {}; it must be from -pi to pi", self.offset_rad));
@@ -71,7 +71,7 @@ impl AxisCalibration {
         if pole_pairs == 0 || counts_per_turn == 0 {
             return Err("`encoder`: pole pairs and counts per turn must be above 0".into());
         }
-        Ok(KeptCalibration(StoredCalibration {
+        Ok(CalibrationRecord(StoredCalibration {
             resistance: Ohm(above_zero("resistance_ohm", self.resistance_ohm)?),
             direct_inductance: Henry(above_zero("direct_inductance_h", self.direct_inductance_h)?),
             quadrature_inductance: Henry(above_zero(
@@ -156,8 +156,8 @@ fn fingerprint(text: &str) -> Option<Fingerprint> {
 }
 
 impl ModelPart {
-    pub(super) fn of_kept<const N: usize>(kept: &KeptModel<N>) -> Self {
-        let KeptModel { model, provenance } = kept;
+    pub(super) fn of_kept<const N: usize>(kept: &ModelRecord<N>) -> Self {
+        let ModelRecord { model, provenance } = kept;
         let [major, minor, patch] = provenance.firmware;
         let known = |value: f32| (!value.is_nan()).then_some(f64::from(value));
         let joint = |(place, joint): (usize, Joint)| {
@@ -187,7 +187,7 @@ impl ModelPart {
         }
     }
 
-    pub(super) fn to_kept<const N: usize>(&self) -> Result<KeptModel<N>, String> {
+    pub(super) fn to_kept<const N: usize>(&self) -> Result<ModelRecord<N>, String> {
         let mut joints = Vec::new();
         for (part, expected) in self.joint.iter().zip(Joint::ALL) {
             let name = part.joint.name();
@@ -205,7 +205,7 @@ impl ModelPart {
             return Err(format!("`bridge_temperature_c` is {celsius}; it must be from {low} to {high}"));
         }
         let fault = |key: &str, value: &str, why: &str| format!("`{key}` is `{value}`; it must be {why}");
-        Ok(KeptModel {
+        Ok(ModelRecord {
             model: StoredModel {
                 fingerprint: fingerprint(&self.fingerprint)
                     .ok_or_else(|| fault("fingerprint", &self.fingerprint, "16 hexadecimal digits"))?,

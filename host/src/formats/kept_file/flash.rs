@@ -3,7 +3,7 @@
 use embassy_futures::block_on;
 use scarab::leg::DriveState;
 use scarab::store::{
-    Kept, KeptCalibration, KeptModel, Key, LoadError, Permit, RecordError, SaveError, Saved, Store,
+    CalibrationRecord, Key, LoadError, ModelRecord, Permit, RecordError, SaveError, Saved, Storable, Store,
 };
 
 use crate::formats::kept_file::memory::{Cells, Memory};
@@ -50,12 +50,12 @@ impl FlashContents {
     }
 }
 
-fn load<R: Kept>(memory: &mut Memory, key: Key) -> Result<Option<R>, LoadError> {
+fn load<R: Storable>(memory: &mut Memory, key: Key) -> Result<Option<R>, LoadError> {
     memory.with(|store| block_on(store.load::<R>(key))).unwrap_or(Err(LoadError::Flash))
 }
 
 fn model<const N: usize>(memory: &mut Memory) -> Result<Option<ModelPart>, LoadError> {
-    Ok(load::<KeptModel<N>>(memory, Key::Model)?.map(|kept| ModelPart::of_kept(&kept)))
+    Ok(load::<ModelRecord<N>>(memory, Key::Model)?.map(|kept| ModelPart::of_kept(&kept)))
 }
 
 /// Model with as many joints as the length of its record.
@@ -80,7 +80,7 @@ fn node(memory: &mut Memory, joint: Joint, key: Key) -> Result<Option<NodeObject
 }
 
 fn calibration(memory: &mut Memory, joint: Joint, key: Key) -> Result<Option<AxisCalibration>, String> {
-    let kept = load::<KeptCalibration>(memory, key).map_err(load_words)?;
+    let kept = load::<CalibrationRecord>(memory, key).map_err(load_words)?;
     kept.map(|kept| {
         let part = AxisCalibration::of_kept(joint, &kept);
         part.to_kept().map(|_| part)
@@ -155,7 +155,8 @@ impl KeptFile {
         let permit = Permit::of(DriveState::SwitchOnDisabled).ok_or("a drive that is off")?;
         for (joint, key) in CALIBRATIONS {
             let given = |joint| self.calibration.iter().any(|axis| axis.joint == joint);
-            let other_is_older = !given(joint) && matches!(load::<KeptCalibration>(memory, key), Ok(Some(_)));
+            let other_is_older =
+                !given(joint) && matches!(load::<CalibrationRecord>(memory, key), Ok(Some(_)));
             if !self.calibration.is_empty() && other_is_older {
                 let name = joint.name();
                 return Err(format!(
@@ -189,7 +190,7 @@ impl KeptFile {
 fn keep_model<const N: usize>(
     memory: &mut Memory,
     permit: &Permit,
-    kept: &KeptModel<N>,
+    kept: &ModelRecord<N>,
 ) -> Result<(), String> {
     let save = |store: &mut Store<Cells>| block_on(store.save(permit, Key::Model, kept));
     saved(memory.with(save), "model")

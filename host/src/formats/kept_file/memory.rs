@@ -7,7 +7,7 @@ use embassy_futures::block_on;
 use hal_sim::flash::Flash;
 use scarab::bus::LONGEST;
 use scarab::leg::{DriveState, IdentifiedModel, LegConfiguration};
-use scarab::store::{KeptModel, Key, Permit, Store};
+use scarab::store::{Key, ModelRecord, Permit, Store};
 
 /// Size and number of the sectors used on the STM32F405.
 pub const SECTOR: usize = 128 * 1024;
@@ -61,12 +61,12 @@ impl Memory {
     }
 
     /// Returns the stored model without a check of its leg; `None` if there is none or it cannot be read.
-    pub fn any_model<const N: usize>(&mut self) -> Option<KeptModel<N>> {
-        self.with(|store| block_on(store.load::<KeptModel<N>>(Key::Model)))?.ok().flatten()
+    pub fn any_model<const N: usize>(&mut self) -> Option<ModelRecord<N>> {
+        self.with(|store| block_on(store.load::<ModelRecord<N>>(Key::Model)))?.ok().flatten()
     }
 
     /// Stores any model.
-    pub fn keep_any<const N: usize>(&mut self, state: DriveState, kept: &KeptModel<N>) -> bool {
+    pub fn keep_any<const N: usize>(&mut self, state: DriveState, kept: &ModelRecord<N>) -> bool {
         let Some(permit) = Permit::of(state) else { return false };
         self.with(|store| block_on(store.save(&permit, Key::Model, kept))).is_some_and(|saved| saved.is_ok())
     }
@@ -105,7 +105,7 @@ impl Memory {
         &mut self,
         configuration: &LegConfiguration<N, B>,
     ) -> Result<Option<(IdentifiedModel<N>, u32)>, String> {
-        let kept = self.with(|store| block_on(store.load::<KeptModel<N>>(Key::Model)));
+        let kept = self.with(|store| block_on(store.load::<ModelRecord<N>>(Key::Model)));
         let kept = kept.transpose().map_err(|why| format!("the stored model: {why:?}"))?.flatten();
         let Some(kept) = kept else { return Ok(None) };
         let model = configuration.restore(&kept.model).map_err(|why| format!("the stored model: {why:?}"))?;

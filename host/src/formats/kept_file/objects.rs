@@ -6,7 +6,7 @@
 use scarab::bus::dictionary::{Object, Type, find};
 use scarab::bus::drive::{Axis, AxisConstants, Mode};
 use scarab::bus::table::{NAMES, ROWS};
-use scarab::bus::{Abort, Identity, LONGEST, Node, NodeId, kept_entries, kept_objects, write_kept};
+use scarab::bus::{Abort, Identity, LONGEST, Node, NodeId, stored_entries, stored_objects, write_stored};
 use scarab::units::{Ampere, NewtonMetre};
 
 use crate::formats::kept_file::{Joint, ObjectValue};
@@ -52,7 +52,7 @@ pub(super) fn to_bytes(objects: &[ObjectValue], joint: Joint) -> Result<Vec<u8>,
         let object = Object::at(given.index, given.subindex);
         let fault = |why: &str| format!("{}: {why}", words(object));
         let row = find(object).map_err(|_| fault("there is no such object"))?;
-        match write_kept(object, given.value as u32, &mut [0; 8]) {
+        match write_stored(object, given.value as u32, &mut [0; 8]) {
             Ok(_) => {}
             Err(Abort::ReadOnly) => return Err(fault("is read-only")),
             Err(_) => return Err(fault("is a command or belongs to the leg: never stored")),
@@ -78,9 +78,9 @@ pub(super) fn to_bytes(objects: &[ObjectValue], joint: Joint) -> Result<Vec<u8>,
     }
     let mut bytes = [0; LONGEST];
     let mut length = 0;
-    for (object, _) in kept_objects() {
+    for (object, _) in stored_objects() {
         if let Some((_, value)) = known.iter().find(|(other, _)| *other == object) {
-            length += write_kept(object, *value as u32, &mut bytes[length..])
+            length += write_stored(object, *value as u32, &mut bytes[length..])
                 .map_err(|_| format!("more than the {LONGEST} bytes that a board stores for a node"))?;
         }
     }
@@ -107,7 +107,7 @@ fn try_on_a_node(bytes: &[u8], joint: Joint) -> Result<(), String> {
 
 /// Objects in the bytes of a node; entries missing in the table are named in the error.
 pub(super) fn of_bytes(bytes: &[u8], joint: Joint) -> Result<Vec<ObjectValue>, String> {
-    let objects: Vec<ObjectValue> = kept_entries(bytes)
+    let objects: Vec<ObjectValue> = stored_entries(bytes)
         .map(|(object, bits)| ObjectValue {
             index: object.index,
             subindex: object.sub,

@@ -4,11 +4,7 @@ use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, start_position};
-
-/// Joints and base parameters of the legs that an image supports.
-const JOINTS: usize = 2;
-/// See [`JOINTS`].
-const BASE: usize = 13;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Constants of `hal_sim::world::World` as Rust source.
 pub fn source(leg: &LegFile, seed: u64) -> Result<String, ToolError> {

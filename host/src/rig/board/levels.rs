@@ -28,7 +28,7 @@ use scarab::leg::{AxisFault, Control, ControlOutput, ControlRequest, Following};
 use scarab::motor::{Chopper, SenseScale};
 use scarab::operation::{
     AxisState, BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings,
-    IdentificationLevel, Keep, Queues, RATE_HZ, ServoLevel, Signals, Slice, Tick, Watch,
+    IdentificationLevel, Queues, RATE_HZ, ServoLevel, Signals, Slice, StoreJob, Tick, Watch,
 };
 use scarab::safety::GUARD_RATE_HZ;
 
@@ -36,7 +36,7 @@ use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::rig::board::locked::Locked;
 use crate::rig::board::registers::Registers;
-use crate::rig::board::{DIVIDER, housekeeping_settings, ready};
+use crate::rig::board::{housekeeping_settings, ready};
 use crate::rig::pair::DeviceLeg;
 
 /// PWM periods between two rounds of the housekeeping, and between two checks of the watch.
@@ -53,7 +53,7 @@ pub struct BusLevel<const N: usize> {
     queues: Locked<BusQueues<N>>,
     round: BusRound,
     /// Request of a host to store data.
-    pub storage: Handover<Keep<N>>,
+    pub storage: Handover<StoreJob<N>>,
 }
 
 /// Contacts of the board and conversions in one period.
@@ -134,7 +134,12 @@ impl<const N: usize> Levels<N> {
             loops: loops([AxisState::OFF; N], chopper),
             bus: following.is_some().then(Box::default),
             events: Locked::new(EventQueue::new()),
-            servo: ServoLevel::new(leg.control(), drives::derating(DIVIDER), volt_per_code, following),
+            servo: ServoLevel::new(
+                leg.control(),
+                drives::derating(SenseScale::DIVIDER),
+                volt_per_code,
+                following,
+            ),
             housekeeper: Housekeeper::new(settings),
             identification: IdentificationLevel::new(leg.identification().swarm_seed()),
             settings,
@@ -156,7 +161,7 @@ impl<const N: usize> Levels<N> {
     /// Connects the board to a bus, before its first tick.
     pub fn join_bus<const B: usize>(&mut self, leg: &DeviceLeg<N, B>, following: Following<N>) {
         let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
-        let derating = drives::derating(DIVIDER);
+        let derating = drives::derating(SenseScale::DIVIDER);
         self.servo = ServoLevel::new(leg.control(), derating, volt_per_code, Some(following));
         (self.bus, self.following) = (Some(Box::default()), Some(following));
     }
@@ -204,7 +209,7 @@ impl<const N: usize> Levels<N> {
     pub fn identify<const B: usize>(&mut self, leg: &mut DeviceLeg<N, B>, evaluations: u32) -> Slice<N> {
         let mut ends = self.queues.get().split(self.events.get()).identification;
         let (_, identification) = leg.halves();
-        self.identification.hear(identification, &mut ends, |_| {}, |_| {});
+        self.identification.receive(identification, &mut ends, |_| {}, |_| {});
         while ends.notes.dequeue().is_some() {}
         // Results are read directly, so nothing is published.
         self.identification.published();
@@ -286,7 +291,7 @@ impl<const N: usize> Default for BusLevel<N> {
         Self {
             queues: Locked::new(BusQueues::new()),
             round: BusRound::new(),
-            storage: Handover::new(Keep::NOTHING),
+            storage: Handover::new(StoreJob::NOTHING),
         }
     }
 }

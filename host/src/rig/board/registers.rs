@@ -83,7 +83,7 @@ impl<const N: usize> Registers<N> {
     pub fn new() -> Self {
         Self {
             contacts: Contacts::default(),
-            commands: [AxisCommand::RELEASED; N],
+            commands: [AxisCommand::OFF; N],
             brake: 0.0,
             encoders: [0; N],
             gates: [true; N],
@@ -122,12 +122,12 @@ impl<const N: usize> Hardware<N> for Registers<N> {
         step(self);
     }
 
-    fn release_all(&mut self) {
-        self.commands = [AxisCommand::RELEASED; N];
+    fn disable_all(&mut self) {
+        self.commands = [AxisCommand::OFF; N];
     }
 
-    fn release(&mut self, axis: usize) {
-        self.commands[axis] = AxisCommand::RELEASED;
+    fn disable(&mut self, axis: usize) {
+        self.commands[axis] = AxisCommand::OFF;
     }
 
     fn set_duty(&mut self, axis: usize, duty: &[f32; 3]) {

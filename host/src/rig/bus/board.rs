@@ -22,7 +22,7 @@ use scarab::leg::ControlRequest;
 use scarab::operation::Slice;
 use scarab::safety::PowerRequest;
 use scarab::servo::SERVO_RATE_HZ;
-use scarab::store::KeptModel;
+use scarab::store::ModelRecord;
 
 use crate::base::error::ToolError;
 use crate::formats::kept_file::memory::Memory;
@@ -221,7 +221,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
             self.rig.advance();
             if let Slice::Judged(Some(model)) = core::mem::replace(&mut self.rig.slice, Slice::Idle) {
                 let (identification, seed) = (self.rig.leg.identification(), self.rig.board.seed());
-                let model = KeptModel::of(&self.context.configuration, identification, &model, 0, seed);
+                let model = ModelRecord::of(&self.context.configuration, identification, &model, 0, seed);
                 self.flashing.accept(model);
             }
             if self.rig.board.registers.bus_due {
@@ -257,7 +257,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
     /// Whether a frame is an emergency message of this board.
     #[must_use]
     pub fn is_emergency(&self, frame: &Frame) -> bool {
-        frame.full().is_some() && self.device.tells_once(frame)
+        frame.full().is_some() && self.device.reports_once(frame)
     }
 
     /// Returns the nodes.

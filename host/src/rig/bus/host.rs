@@ -19,10 +19,8 @@ use crate::rig::bus::board::{Board, TICK_NS};
 use crate::rig::bus::network::Network;
 use crate::rig::bus::wire::Sent;
 use crate::rig::faulty_board::Rig;
+use scarab::model::planar::{BASE, JOINTS};
 
-/// Number of base parameters.
-const BASE: usize = 13;
-const JOINTS: usize = 2;
 const NODES: [u16; JOINTS] = [1, 2];
 /// Node-ID of the host.
 const NUMBER: u16 = 0x70;
@@ -329,6 +327,7 @@ mod tests {
     use crate::formats::leg_file::DEFAULT_LEG;
     use crate::rig::options::{DriveModel, SimulationOptions};
     use crate::rig::pair::Context;
+    use scarab::hal::SERVO_RATE_HZ;
 
     fn host(leg: &LegFile) -> Host {
         let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
@@ -386,7 +385,7 @@ mod tests {
     }
 
     /// Ticks per second.
-    const SECOND: u64 = 4000;
+    const SECOND: u64 = SERVO_RATE_HZ as u64;
 
     /// Steps of a usual host towards enabled. Returns whether the leg is enabled.
     fn enable(host: &mut Host) -> bool {

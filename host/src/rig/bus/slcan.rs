@@ -126,6 +126,7 @@ pub fn encode(frame: &Frame, out: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::random::Random;
 
     fn exchange(line: &mut Line, text: &str) -> (Vec<Frame>, String) {
         let mut out = Vec::new();
@@ -172,12 +173,11 @@ mod tests {
     #[test]
     fn random_bytes_cause_no_panic() {
         let mut line = Line::default();
-        let mut state = 1_u32;
+        let mut random = Random::new("slcan", 1);
         let mut out = Vec::new();
         let letters = b"tTrROCSVvNFZMm0123456789ABCDEFabcdef\r\r\r\n\x00\xFF";
         for _ in 0..200_000 {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let _ = line.receive(letters[(state >> 16) as usize % letters.len()], &mut out);
+            let _ = line.receive(letters[random.below(letters.len() as u64) as usize], &mut out);
             out.clear();
         }
     }

@@ -7,11 +7,11 @@
 //! queue of three, further ones are lost.
 //! ```
 
-use scarab::bus::device::Keeping;
+use scarab::bus::device::StoreCommand;
 use scarab::bus::{Frame, StoredNode};
 use scarab::leg::DriveState;
 use scarab::operation::{Inhibit, Storing};
-use scarab::store::KeptModel;
+use scarab::store::ModelRecord;
 
 use crate::formats::kept_file::memory::{Memory, SECTOR};
 use crate::rig::board::levels::Levels;
@@ -30,19 +30,19 @@ const QUEUE: usize = 3;
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<const N: usize> {
     /// Store all, or restore the defaults.
-    pub what: Keeping,
+    pub what: StoreCommand,
     /// Objects of each node.
     pub objects: [StoredNode; N],
     /// An accepted model that is not stored yet.
-    pub model: Option<KeptModel<N>>,
+    pub model: Option<ModelRecord<N>>,
 }
 
 impl<const N: usize> Asked<N> {
     /// Stores all objects and a model, or erases everything; returns whether this succeeded.
     fn change(&self, memory: &mut Memory, state: DriveState) -> bool {
         match self.what {
-            Keeping::Defaults => memory.forget(state),
-            Keeping::All => {
+            StoreCommand::Defaults => memory.forget(state),
+            StoreCommand::All => {
                 let mut nodes = self.objects.iter().enumerate();
                 nodes.all(|(joint, kept)| memory.keep_objects(state, joint, kept.bytes()))
                     && self.model.is_none_or(|model| memory.keep_any(state, &model))
@@ -54,8 +54,8 @@ impl<const N: usize> Asked<N> {
     #[must_use]
     pub fn generation(&self) -> Option<u32> {
         match self.what {
-            Keeping::Defaults => Some(0),
-            Keeping::All => self.model.map(|model| model.provenance.generation),
+            StoreCommand::Defaults => Some(0),
+            StoreCommand::All => self.model.map(|model| model.provenance.generation),
         }
     }
 }
@@ -66,7 +66,7 @@ pub struct Flashing<const N: usize> {
     storing: Storing,
     asked: Option<Asked<N>>,
     /// An accepted model that is not stored yet.
-    accepted: Option<KeptModel<N>>,
+    accepted: Option<ModelRecord<N>>,
     /// Whether the flash was changed.
     has_kept: bool,
     /// Time of the next step.
@@ -109,7 +109,7 @@ impl<const N: usize> Flashing<N> {
     }
 
     /// Sets the model to be stored with the next request.
-    pub(super) fn accept(&mut self, model: KeptModel<N>) {
+    pub(super) fn accept(&mut self, model: ModelRecord<N>) {
         self.accepted = Some(model);
     }
 
@@ -176,7 +176,7 @@ impl<const N: usize> Flashing<N> {
         if let Some(generation) = asked.generation().filter(|_| done) {
             keep.generation = generation;
             self.accepted = None;
-            if asked.what == Keeping::Defaults {
+            if asked.what == StoreCommand::Defaults {
                 signals.forget_stored();
             }
         }

@@ -2,7 +2,7 @@
 
 use scarab::hal::AxisCommand;
 use scarab::leg::{ControlRequest, DriveState};
-use scarab::safety::{Cause, FaultCode};
+use scarab::safety::{FaultCode, InhibitReason};
 
 use crate::rig::faulty_board::{Edges, Rig};
 
@@ -61,9 +61,9 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// Fault reported by the firmware: an axis' fault, another inhibit reason, or the leg's fault.
     #[must_use]
     pub fn alarm(&self) -> Option<FaultCode> {
-        let cause = || Cause::ALL.into_iter().find(|cause| self.causes() & cause.bit() != 0);
+        let cause = || InhibitReason::ALL.into_iter().find(|cause| self.causes() & cause.bit() != 0);
         self.axis_fault
-            .or_else(|| cause().and_then(Cause::code))
+            .or_else(|| cause().and_then(InhibitReason::code))
             .or_else(|| self.state().fault().map(|fault| fault.code))
     }
 

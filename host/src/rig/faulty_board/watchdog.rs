@@ -7,12 +7,12 @@
 //! ```
 //!
 //! A reset turns both bridges off in hardware. The new start has neither calibration nor reference and is
-//! refused for [`Cause::Watchdog`]. Its servo does not begin before calibration and reference, so the leg's
-//! part of the firmware does not run here.
+//! refused for [`InhibitReason::Watchdog`]. Its servo does not begin before calibration and reference, so the
+//! leg's part of the firmware does not run here.
 
 use hal_sim::faults::Injector;
 use scarab::hal::AxisCommand;
-use scarab::safety::{Cause, FaultCode};
+use scarab::safety::{FaultCode, InhibitReason};
 
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 
@@ -60,7 +60,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// open, and the watchdog counts.
     pub fn stand_still(&mut self, periods: u64) {
         for _ in 0..periods {
-            self.world.period(&[AxisCommand::RELEASED; N], 0.0);
+            self.world.period(&[AxisCommand::OFF; N], 0.0);
         }
         self.period += periods;
         if self.period - self.watchdog.fed >= self.watchdog.patience {
@@ -86,7 +86,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// Resets the board; the injected hang ends.
     fn restart(&mut self) {
         self.restarted = true;
-        self.boot(Cause::Watchdog.bit());
+        self.boot(InhibitReason::Watchdog.bit());
     }
 
     /// Restores the power. The operator's contacts and the plant continue.

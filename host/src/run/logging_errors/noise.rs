@@ -56,8 +56,7 @@ pub fn density(mut scatter: Vec<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_core::{Rng, SeedableRng};
-    use rand_xoshiro::Xoshiro256PlusPlus;
+    use crate::base::random::Random;
 
     #[test]
     fn the_density_is_the_same_at_any_rate_and_with_uneven_stamps() {
@@ -65,15 +64,13 @@ mod tests {
         // median scatters by 4 %.
         for (rate_hz, jitter) in [(64.0_f64, 0.0), (100.0, 0.3), (500.0, 0.4), (1000.0, 0.0), (20_000.0, 0.4)]
         {
-            let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
-            let mut uniform = move || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+            let mut random = Random::new("", 3);
             let sigma = (1e-3_f64 * rate_hz).sqrt();
             let (mut times, mut torques) = (Vec::new(), Vec::new());
             for sample in 0..(20.0 * rate_hz) as u32 {
-                let time = (f64::from(sample) + jitter * uniform()) / rate_hz;
-                let normal: f64 = (0..12).map(|_| uniform()).sum();
+                let time = (f64::from(sample) + jitter * random.uniform(-0.5, 0.5)) / rate_hz;
                 times.push(time);
-                torques.push(20.0 * (std::f64::consts::TAU * time).sin() + sigma * normal);
+                torques.push(20.0 * (std::f64::consts::TAU * time).sin() + sigma * random.normal());
             }
             let found = density(scatter(&times, &torques, 8.0)).expect("enough");
             assert!((found / 1e-3 - 1.0).abs() < 0.2, "{rate_hz} Hz: {found}");

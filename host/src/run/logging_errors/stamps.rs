@@ -22,6 +22,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::base::stats::rms;
 use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
 use crate::run::logging_errors::samples::median;
@@ -64,7 +65,7 @@ pub fn examine(recording: &Recording, bandwidth_hz: f64) -> Option<SampleFinding
         return None;
     }
     let errors = clock_errors(time, median_step);
-    let size = root_mean_square(&errors);
+    let size = rms(errors.iter().copied());
     let share = recording
         .joints
         .iter()
@@ -172,19 +173,15 @@ fn inertia_error(time: &[f64], angle: &[f64], errors: &[f64], median_step: f64, 
         values.chunks_exact(length).map(|chunk| chunk.iter().sum::<f64>() / length as f64).collect()
     };
     let duration = length as f64 * median_step;
-    let density = root_mean_square(&means(&apparent)).powi(2) * duration;
+    let density = rms(means(&apparent)).powi(2) * duration;
     let noise = 0.4 * TAU.powi(4) * bandwidth_hz.powi(5) * density;
     let smooth = means(angle);
     let accelerations: Vec<f64> = smooth
         .windows(3)
         .map(|three| (three[2] - 2.0 * three[1] + three[0]) / (duration * duration))
         .collect();
-    let signal = root_mean_square(&accelerations).powi(2);
+    let signal = rms(accelerations.iter().copied()).powi(2);
     if signal > 0.0 { noise / signal } else { 0.0 }
-}
-
-fn root_mean_square(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

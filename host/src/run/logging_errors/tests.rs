@@ -1,16 +1,15 @@
 //! A two-link arm with analytic motion, damaged in one way at a time.
 
 use nalgebra::Vector3;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::ident::{LinkPrior, RowModel, Smoothed, prior_parameters};
 use scarab::model::{
     AnatomicalJoint, BaseParameters, Chain, DenavitHartenberg, PARAMETERS_PER_JOINT, RigidBody,
 };
 
+use crate::base::random::Random;
 use crate::run::logging_errors::*;
+use scarab::model::planar::BASE;
 
-const BASE: usize = 13;
 const NOISE_NM: f64 = 0.3;
 
 fn model() -> RowModel<f64, 2, BASE> {
@@ -60,9 +59,7 @@ fn instant(time_s: f64) -> Smoothed<f64, 2> {
 fn motion(late_s: [f64; 2], seed: u64) -> Motion<2> {
     let model = model();
     let values = model.base.project(&prior_parameters(&truth()));
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut normal =
-        || (0..12).map(|_| (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0;
+    let mut random = Random::new("", seed);
     let torque = |joint: usize, time_s: f64| -> f64 {
         model.rows(&instant(time_s)).regressor[joint].iter().zip(&values).map(|(y, p)| y * p).sum()
     };
@@ -70,7 +67,9 @@ fn motion(late_s: [f64; 2], seed: u64) -> Motion<2> {
     for sample in 0..10_000 {
         let time_s = f64::from(sample) / 500.0;
         motion.position.push(instant(time_s).position);
-        motion.torque.push([0, 1].map(|joint| torque(joint, time_s - late_s[joint]) + NOISE_NM * normal()));
+        motion
+            .torque
+            .push([0, 1].map(|joint| torque(joint, time_s - late_s[joint]) + NOISE_NM * random.normal()));
     }
     motion
 }

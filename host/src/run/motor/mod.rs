@@ -79,14 +79,14 @@ impl Bench {
     /// New stand with a rotor turning at `speed` from `angle` on (rad/s, rad).
     pub fn rig(&self, speed: f64, angle: f64) -> Result<Rig, ToolError> {
         let mut stand = Stand::new(&self.axis, &self.supply, Load::Turned(speed), angle, self.seed);
-        let sample = stand.period(&AxisCommand::RELEASED, 0.0);
+        let sample = stand.period(&AxisCommand::OFF, 0.0);
         let axis = Axis::new(&self.configuration, &self.calibration, &sample).map_err(|error| {
             ToolError::input(format!("axis `{}`: {}", self.joint, words::axis_error(error)))
         })?;
-        let mut rig = Rig { stand, axis, command: AxisCommand::RELEASED, chopper: None, brake: 0.0, sample };
+        let mut rig = Rig { stand, axis, command: AxisCommand::OFF, chopper: None, brake: 0.0, sample };
         // The rotor already turns: its speed is estimated before the bridge switches.
         for _ in 0..(TRACKED_S / PERIOD_S) as u32 {
-            rig.tick(AxisRequest::RELEASED);
+            rig.tick(AxisRequest::OFF);
         }
         Ok(rig)
     }

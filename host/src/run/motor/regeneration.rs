@@ -75,7 +75,7 @@ fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
             AxisFault::NotANumber => "not_a_number",
             AxisFault::EncoderFrozen => "encoder_frozen",
             AxisFault::OpenPhase => "open_phase",
-            AxisFault::CurrentZero => "current_zero",
+            AxisFault::CurrentOffset => "current_zero",
             AxisFault::Parameters => "parameters",
             AxisFault::StuckConversion => "stuck_conversion",
         }),

@@ -39,7 +39,7 @@ fn clean_series(values: &mut [f64], quantity: Quantity) -> u32 {
     }
     let mut replaced = 0;
     for (value, cleaned) in values.iter_mut().zip(&cleaned) {
-        if cleaned.wild && (*value - cleaned.value).abs() > harmless {
+        if cleaned.outlier && (*value - cleaned.value).abs() > harmless {
             *value = cleaned.value;
             replaced += 1;
         }

@@ -9,6 +9,7 @@ use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
 use crate::run::logging_errors::samples::{self, QUANTISED};
 use crate::run::logging_errors::stamps;
+use scarab::ident::SAMPLE_RATE_HZ;
 
 /// Reach of the smoothing to each side, in periods of the rows' bandwidth.
 const REACH_PERIODS: f64 = 0.983;
@@ -45,7 +46,7 @@ impl Screening {
         let margin_s = 2.0 * recording.median_step_s();
         let spans =
             self.spans.iter().filter(|(file, _)| *file == recording.file).flat_map(|(_, spans)| spans);
-        let point = |time_s: f64| ((time_s - start_s) * 500.0).max(0.0);
+        let point = |time_s: f64| ((time_s - start_s) * SAMPLE_RATE_HZ).max(0.0);
         spans
             .map(|span| {
                 point(span.start - margin_s).floor() as usize..point(span.end + margin_s).ceil() as usize

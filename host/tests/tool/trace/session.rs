@@ -2,16 +2,14 @@
 
 use std::sync::OnceLock;
 
+use scarab::hal::SERVO_RATE_HZ;
 use scarab::leg::{Activity, ControlRequest, LoggedSample};
+use scarab::model::planar::{BASE, JOINTS};
 use scarab::trace::{GRAMMAR, Record, Report, words};
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_host::formats::trace::Trace;
 use scarab_host::rig::options::SimulationOptions;
 use scarab_host::rig::pair;
-
-/// Joints and base parameters of the default leg.
-const JOINTS: usize = 2;
-const BASE: usize = 13;
 
 type Context = pair::Context<JOINTS, BASE>;
 type Pair = pair::Pair<JOINTS, BASE>;
@@ -19,7 +17,7 @@ type Pair = pair::Pair<JOINTS, BASE>;
 /// Ticks between two records of the search.
 const PROGRESS_TICKS: u64 = 100;
 /// Limit of an identification, ticks; one takes 53 s.
-const LONGEST: u64 = 100 * 4000;
+const LONGEST: u64 = 100 * SERVO_RATE_HZ as u64;
 
 pub fn default_leg() -> LegFile {
     LegFile::load(DEFAULT_LEG).expect("shipped")

@@ -24,7 +24,7 @@ pub const THERMISTOR_CODES: [u16; 2] = [100, 3700];
 #[must_use]
 pub const fn divider(version: [u8; 3]) -> Option<f32> {
     match version {
-        [3, 5 | 6, 56 | 48] => Some(19.0),
+        [3, 5 | 6, 56 | 48] => Some(SenseScale::DIVIDER),
         [3, 5 | 6, 24] => Some(11.0),
         _ => None,
     }

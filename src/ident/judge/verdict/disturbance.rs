@@ -4,7 +4,7 @@
 //! exclusions are not trusted, and a leg that stood on the floor was not an open chain.
 
 use super::{Evidence, Reason, Test, Thresholds, VerdictBuilder};
-use crate::ident::record::outliers::Outliers;
+use crate::ident::record::motion_record::Outliers;
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
@@ -45,12 +45,12 @@ impl<T: Real> Thresholds<T> {
             limit: self.longest_disturbance_s,
             passed: outliers.longest_common_s <= self.longest_disturbance_s || mostly,
         });
-        self.judge_set_aside(outliers, None, builder);
+        self.judge_excluded(outliers, None, builder);
     }
 
     /// Judges the shares of replaced samples and disturbed rows, on the motion
     /// identified from or a held-out one.
-    pub fn judge_set_aside<const N: usize>(
+    pub fn judge_excluded<const N: usize>(
         &self,
         outliers: &Outliers<T, N>,
         motion: Option<usize>,

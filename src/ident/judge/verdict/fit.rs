@@ -12,7 +12,8 @@
 
 use super::{Evidence, Reason, Test, Thresholds, VerdictBuilder};
 use crate::ident::judge::residual::Residual;
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::estimate::Estimate;
 use crate::model::Parameter;
 use crate::real::{self, Real};
@@ -141,10 +142,10 @@ impl<T: Real> Thresholds<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ident::record::dropped::Selection;
     use crate::ident::record::factor::Factor;
-    use crate::ident::record::outliers::Outliers;
-    use crate::ident::record::recorder::TorqueSize;
+    use crate::ident::record::motion_record::Outliers;
+    use crate::ident::record::motion_record::Selection;
+    use crate::ident::record::motion_record::TorqueSize;
 
     #[test]
     fn a_prediction_is_uncertain_by_its_share_of_the_torque() {

@@ -39,12 +39,12 @@ impl<T: Real> Thresholds<T> {
         builder: &mut VerdictBuilder<'_, T>,
     ) {
         let residual = unused.residual;
-        let (wild, rows) = residual
+        let (outliers, rows) = residual
             .joints
             .iter()
-            .fold((0_u32, 0_u32), |(wild, rows), joint| (wild + joint.wild, rows + joint.rows));
+            .fold((0_u32, 0_u32), |(outliers, rows), joint| (outliers + joint.outliers, rows + joint.rows));
         // A wrong model has errors everywhere: that is not contact.
-        let elsewhere = T::of(f64::from(rows)) * T::of(0.5) < T::of(f64::from(wild));
+        let elsewhere = T::of(f64::from(rows)) * T::of(0.5) < T::of(f64::from(outliers));
         let value = residual.longest_common_s;
         let limit = self.longest_disturbance_s;
         builder.note(Evidence {

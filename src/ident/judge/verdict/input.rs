@@ -1,7 +1,8 @@
 //! Tests of the motion itself: usable data, and enough excitation.
 
 use super::{Reason, Test, Thresholds, VerdictBuilder};
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::estimate::Stage;
 use crate::real::Real;
 
@@ -46,9 +47,9 @@ impl<T: Real> Thresholds<T> {
         determined: usize,
         builder: &mut VerdictBuilder<'_, T>,
     ) {
-        let rank = T::of(stage.asked() as f64);
-        let told = T::of(stage.columns().len().min(determined) as f64);
-        builder.at_least(Reason::Unexcited, Test::Determined, None, told, rank);
+        let rank = T::of(stage.requested() as f64);
+        let determined = T::of(stage.columns().len().min(determined) as f64);
+        builder.at_least(Reason::Unexcited, Test::Determined, None, determined, rank);
         let condition = stage.condition().unwrap_or(T::LARGEST);
         builder.at_most(Reason::Unexcited, Test::Condition, None, None, condition, self.largest_condition);
     }

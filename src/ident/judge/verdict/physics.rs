@@ -4,7 +4,8 @@ use nalgebra::{SMatrix, Vector3};
 
 use super::{Reason, Test, Thresholds, VerdictBuilder};
 use crate::ident::record::choice::Constant;
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::completion::is_weak;
 use crate::ident::solve::estimate::Estimate;
 use crate::ident::solve::solver::Consistency;
@@ -177,15 +178,15 @@ fn energy_weights<T: Real, const N: usize, const B: usize>(
 mod tests {
     use super::super::Evidence;
     use super::*;
-    use crate::ident::record::dropped::Selection;
     use crate::ident::record::factor::Factor;
-    use crate::ident::record::outliers::Outliers;
-    use crate::ident::record::recorder::TorqueSize;
+    use crate::ident::record::motion_record::Outliers;
+    use crate::ident::record::motion_record::Selection;
+    use crate::ident::record::motion_record::TorqueSize;
     use crate::model::{BaseParameters, Chain, DenavitHartenberg};
 
     /// Number of sigma by which joint 0's friction is negative, with these values and a sigma of 0.1 each.
     fn negative(level: f32, half: f32, meaning: Constant) -> f32 {
-        const BASE: usize = 13;
+        use crate::model::planar::BASE;
         let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
         let geometry =
             core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
@@ -233,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_negative_direction_has_the_energy_that_is_told_and_a_positive_matrix_has_none() {
+    fn a_negative_direction_has_the_reported_energy_and_a_positive_matrix_none() {
         // L D L' with ones on the diagonal of L: the first pivot that is not positive is D's.
         let lower = SMatrix::<f64, 3, 3>::new(1.0, 0.0, 0.0, 0.5, 1.0, 0.0, -2.0, 3.0, 1.0);
         for (pivots, expected) in [

@@ -3,9 +3,9 @@
 use super::*;
 
 extern crate std;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use std::vec::Vec;
+
+use crate::testing::TestRandom;
 
 const BANDWIDTH: f64 = 16.0;
 
@@ -15,7 +15,7 @@ fn low_pass() -> LowPass<f64, 256> {
 
 /// White noise of 500 Hz through the low-pass, one row in ten samples, variance 1.
 struct Rows {
-    random: Xoshiro256PlusPlus,
+    random: TestRandom,
     window: Vec<f64>,
     weights: Vec<f64>,
 }
@@ -25,26 +25,17 @@ impl Rows {
         let low_pass = low_pass();
         let size = real::sqrt(low_pass.energy());
         let weights: Vec<_> = low_pass.weights().iter().map(|weight| weight / size).collect();
-        let mut rows = Self {
-            random: Xoshiro256PlusPlus::seed_from_u64(seed),
-            window: std::vec![0.0; weights.len()],
-            weights,
-        };
+        let mut rows = Self { random: TestRandom::new(seed), window: std::vec![0.0; weights.len()], weights };
         for _ in 0..20 {
             rows.next();
         }
         rows
     }
 
-    fn normal(&mut self) -> f64 {
-        let mut uniform = || (self.random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
-
     fn next(&mut self) -> f64 {
         self.window.drain(..DECIMATION);
         for _ in 0..DECIMATION {
-            let value = self.normal();
+            let value = self.random.normal();
             self.window.push(value);
         }
         self.window.iter().zip(&self.weights).map(|(sample, weight)| sample * weight).sum()
@@ -79,7 +70,7 @@ fn mean(lengths: impl Iterator<Item = f64>) -> f64 {
 }
 
 #[test]
-fn false_alarms_are_as_rare_as_asked_for_and_not_much_rarer() {
+fn false_alarms_are_as_rare_as_requested_and_not_much_rarer() {
     // One a minute, so that they can be counted; no clipping, which would make them rarer still.
     let asked = 60.0;
     for margin in [1.0, 1.2] {

@@ -23,7 +23,7 @@
 
 use crate::ident::judge::verdict::Thresholds;
 use crate::ident::record::factor::Factor;
-use crate::ident::record::recorder::RowModel;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::estimate::Estimate;
 use crate::model::{PARAMETERS_PER_JOINT, Parameter};
 use crate::real::{self, Real};
@@ -32,7 +32,7 @@ use crate::real::{self, Real};
 pub const DIRECTIONS: usize = 10;
 
 /// Smallest independent share of a column's length for its parameter to be determined.
-const TOLD_SHARE: f64 = 1e-3;
+const DETERMINED_SHARE: f64 = 1e-3;
 
 /// Result of one hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -180,14 +180,14 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
     /// Least squares over the whitened columns.
     #[inline(never)]
     fn fit(&self, columns: &[[T; B]; DIRECTIONS]) -> (Hypothesis<T>, [[T; DIRECTIONS]; DIRECTIONS]) {
-        let mut kept = [0; DIRECTIONS];
+        let mut chosen = [0; DIRECTIONS];
         let mut count = 0;
         let mut factor = Factor::<T, DIRECTIONS>::new();
         for candidate in 0..DIRECTIONS {
-            kept[count] = candidate;
-            let tried = self.triangularised(columns, kept.get(..=count).unwrap_or(&[]));
+            chosen[count] = candidate;
+            let tried = self.triangularised(columns, chosen.get(..=count).unwrap_or(&[]));
             let own = real::abs(tried.triangle()[count][count]);
-            if own > T::of(TOLD_SHARE) * tried.column_length(count) {
+            if own > T::of(DETERMINED_SHARE) * tried.column_length(count) {
                 (factor, count) = (tried, count + 1);
             }
         }
@@ -198,10 +198,10 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
             freedom: T::of(self.rank.saturating_sub(count).max(1) as f64),
             ..Hypothesis::nothing()
         };
-        for (place, &index) in kept.iter().enumerate().take(count) {
+        for (place, &index) in chosen.iter().enumerate().take(count) {
             hypothesis.values[index] = solved[place];
             hypothesis.determined[index] = true;
-            for (other, &column) in kept.iter().enumerate().take(count) {
+            for (other, &column) in chosen.iter().enumerate().take(count) {
                 covariance[index][column] = dot(&inverse[place], &inverse[other]);
             }
             hypothesis.sigmas[index] = real::sqrt(covariance[index][index]);
@@ -209,11 +209,11 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
         (hypothesis, covariance)
     }
 
-    fn triangularised(&self, columns: &[[T; B]; DIRECTIONS], kept: &[usize]) -> Factor<T, DIRECTIONS> {
+    fn triangularised(&self, columns: &[[T; B]; DIRECTIONS], chosen: &[usize]) -> Factor<T, DIRECTIONS> {
         let mut factor = Factor::new();
         for (index, &right) in self.whitened.iter().enumerate() {
             let mut row = [T::zero(); DIRECTIONS];
-            for (element, &column) in row.iter_mut().zip(kept) {
+            for (element, &column) in row.iter_mut().zip(chosen) {
                 *element = columns.get(column).map_or(T::zero(), |column| column[index]);
             }
             factor.insert(&row, right);

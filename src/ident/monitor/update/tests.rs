@@ -1,19 +1,18 @@
 //! The quick update on rows made from a known change: noise of known size, gait-like postures, no filter.
 
 use super::*;
-use crate::ident::record::dropped::Selection;
-use crate::ident::record::outliers::Outliers;
-use crate::ident::record::recorder::TorqueSize;
+use crate::ident::record::motion_record::Outliers;
+use crate::ident::record::motion_record::Selection;
+use crate::ident::record::motion_record::TorqueSize;
 use crate::ident::solve::estimate::{Plan, Problem};
+use crate::model::planar::BASE;
 use crate::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, Payload, regressor};
+use crate::testing::TestRandom;
 use nalgebra::Vector3;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 
 extern crate std;
 use std::vec::Vec;
 
-const BASE: usize = 13;
 const SIGMA: f64 = 0.5;
 const TRUTH: LegParameters<f64, 2> = [
     [0.03, -0.016, 0.0, 0.5, 0.0, 0.506, 1.7, 0.10, 0.0, 8.5, 0.12, 3.0, 1.2, 0.4],
@@ -28,18 +27,6 @@ fn model<T: Real>() -> RowModel<T, 2, BASE> {
     RowModel::new(chain, gravity, base)
 }
 
-/// Uniform in +-`half`, and a normal variable.
-struct Dice(Xoshiro256PlusPlus);
-
-impl Dice {
-    fn within(&mut self, half: f64) -> f64 {
-        ((self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0) * half
-    }
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.within(0.5)).sum::<f64>()
-    }
-}
-
 /// Independent rows of random states: `speed` and `acceleration` bound them, `bias`
 /// is a torque beyond the model.
 fn record<T: Real>(
@@ -48,21 +35,21 @@ fn record<T: Real>(
     [speed, acceleration, bias]: [f64; 3],
     seed: u64,
 ) -> Record<T, 2, BASE> {
-    let (model, mut dice) = (model::<f64>(), Dice(Xoshiro256PlusPlus::seed_from_u64(seed)));
+    let (model, mut random) = (model::<f64>(), TestRandom::new(seed));
     let values = model.base.project(truth);
     let mut factors = [Factor::<T, BASE>::new(), Factor::new()];
     for _ in 0..states {
         let state = JointState {
-            q: [0.45 + dice.within(0.4), -0.8 + dice.within(0.7)],
-            qd: [dice.within(speed), dice.within(speed)],
-            qdd: [dice.within(acceleration), dice.within(acceleration)],
+            q: [0.45 + random.within(0.4), -0.8 + random.within(0.7)],
+            qd: [random.within(speed), random.within(speed)],
+            qdd: [random.within(acceleration), random.within(acceleration)],
         };
         let full = regressor(&model.chain, &state, &model.gravity);
         for (joint, row) in full.iter().enumerate() {
             let mut selected = [0.0; BASE];
             model.base.select(row, &mut selected);
             let exact: f64 = selected.iter().zip(&values).map(|(element, value)| element * value).sum();
-            let torque = exact + bias * state.q[0] * state.q[0] + SIGMA * dice.normal();
+            let torque = exact + bias * state.q[0] * state.q[0] + SIGMA * random.normal();
             factors[joint].insert(&selected.map(T::of), T::of(torque));
         }
     }
@@ -106,7 +93,7 @@ fn with_friction(factor: f64) -> LegParameters<f64, 2> {
 }
 
 #[test]
-fn what_changed_is_told_from_what_did_not() {
+fn what_changed_is_distinguished_from_what_did_not() {
     for seed in 0..10 {
         let cause = |leg: &LegParameters<f64, 2>| updated::<f32>(leg, WALKING, seed).cause;
         assert_eq!(cause(&loaded(1, 3.0, [0.2, 0.05, 0.0])), Cause::Payload { link: 1 });

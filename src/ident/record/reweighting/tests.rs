@@ -5,8 +5,7 @@ extern crate std;
 use super::*;
 use crate::ident::record::rows::FilteredRows;
 use crate::ident::record::stribeck::BANK;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
+use crate::testing::TestRandom;
 
 const COLUMNS: usize = 6;
 const TRUTH: [f64; COLUMNS] = [10.0, 3.0, 1.0, -0.5, 2.0, 3.0];
@@ -21,15 +20,13 @@ fn columns(time: f64) -> [f64; COLUMNS] {
 
 /// Independent rows with noise of one N m, plus `disturbance` at each row's time.
 fn motion(rows: u32, seed: u64, disturbance: impl Fn(f64) -> f64) -> Blocks {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut normal =
-        || (0..12).map(|_| (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0;
+    let mut random = TestRandom::new(seed);
     let mut window = Blocks::of_columns(COLUMNS, [None; 2], 0);
     for index in 0..rows {
         let time = ROW_S * f64::from(index);
         let row = columns(time);
         let torque = row.iter().zip(TRUTH).map(|(element, value)| element * value).sum::<f64>();
-        let torque = torque + disturbance(time) + normal();
+        let torque = torque + disturbance(time) + random.normal();
         let rows = FilteredRows {
             regressor: [row.map(|element| element as f32)],
             stribeck: [[0.0; BANK]],
@@ -105,7 +102,7 @@ fn noise_alone_loses_next_to_nothing() {
 }
 
 #[test]
-fn what_the_columns_explain_is_never_set_aside() {
+fn what_the_columns_explain_is_never_excluded() {
     // Another leg, moved equally: all of the torque differs, none of it is disturbed.
     let other = |time: f64| {
         columns(time).iter().zip([-6.0, 4.0, 8.0, 9.0, -3.0, 2.0]).map(|(y, p)| y * p).sum::<f64>()

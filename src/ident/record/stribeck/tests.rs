@@ -6,8 +6,7 @@ use super::*;
 use crate::ident::record::reweighting::weighted;
 use crate::ident::record::rows::FilteredRows;
 use crate::ident::record::window::{LARGEST_BLOCKS, Window};
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
+use crate::testing::TestRandom;
 
 #[test]
 fn the_bank_makes_the_curve_of_any_speed_in_its_range() {
@@ -54,9 +53,7 @@ const VISCOUS: f64 = 3.3;
 /// Fit to 20 s of rows of a joint that swings at up to 1.2 rad/s: gravity, Coulomb, viscous, offset. The
 /// least gain and surplus are those of `auto`.
 fn found(surplus: f64, speed: f64, seed: u64) -> Option<(StribeckFit<f32, COLUMNS>, [f32; COLUMNS])> {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut normal =
-        || (0..12).map(|_| (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0;
+    let mut random = TestRandom::new(seed);
     let mut window = Window::<f32, 1, COLUMNS, 8192>::of_columns(COLUMNS, [Some(1), Some(2)], BANK);
     for index in 0..1000 {
         let (sine, cosine) = real::sin_cos(1.3 * 0.02 * f64::from(index));
@@ -67,7 +64,8 @@ fn found(surplus: f64, speed: f64, seed: u64) -> Option<(StribeckFit<f32, COLUMN
         let ratio = velocity / speed;
         let sign = real::sign(velocity);
         let curve = surplus * sign * real::exp(-ratio * ratio);
-        let torque = 20.0 * sine + COULOMB_NM * sign + VISCOUS * velocity + 1.0 + curve + NOISE_NM * normal();
+        let torque =
+            20.0 * sine + COULOMB_NM * sign + VISCOUS * velocity + 1.0 + curve + NOISE_NM * random.normal();
         let rows = FilteredRows {
             regressor: [[sine, sign, velocity, 1.0].map(|element| element as f32)],
             stribeck: [bank_columns(velocity).map(|element| element as f32)],

@@ -3,8 +3,7 @@
 use super::*;
 use crate::ident::record::factor::Factor;
 use crate::ident::record::reweighting::weighted;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
+use crate::testing::TestRandom;
 
 const COLUMNS: usize = 6;
 type Blocks = Window<f32, 1, COLUMNS, 1500>;
@@ -33,14 +32,12 @@ fn rounded(rows: &FilteredRows<f64, 1, COLUMNS>) -> FilteredRows<f32, 1, COLUMNS
 
 #[test]
 fn ten_hours_of_rows_in_single_precision_keep_the_parameters() {
-    let mut generator = Xoshiro256PlusPlus::seed_from_u64(5);
-    let mut normal =
-        || (0..12).map(|_| (generator.next_u64() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0;
+    let mut random = TestRandom::new(5);
     let mut window = blocks();
     let (mut naive, mut double) = (Factor::<f32, COLUMNS>::new(), Factor::<f64, COLUMNS>::new());
     for index in 0..1_800_000 {
         let mut exact = row(index);
-        exact.torque[0] += normal();
+        exact.torque[0] += random.normal();
         let single = rounded(&exact);
         double.insert(&exact.regressor[0], exact.torque[0]);
         naive.insert(&single.regressor[0], single.torque[0]);
@@ -107,17 +104,17 @@ fn blocks_say_the_same_before_while_and_after_two_of_them_are_joined() {
             still: [0.0; 2],
         };
         assert!(window.insert(&rows, &[true; 2]));
-        let told = |window: &Window<f64, 2, COLUMNS, 1500>, joint| {
+        let content = |window: &Window<f64, 2, COLUMNS, 1500>, joint| {
             let parts = (0..window.blocks()).filter_map(|block| window.part(block, joint));
             parts.fold((0.0, 0.0), |(rows, cost), part| {
                 (rows + part.rows, cost + packed::cost(part.factor, COLUMNS, &parameters))
             })
         };
-        let before = [told(&window, 0), told(&window, 1)];
+        let before = [content(&window, 0), content(&window, 1)];
         while window.tidy() {
             joined += 1;
             for joint in 0..2 {
-                let now = told(&window, joint);
+                let now = content(&window, joint);
                 assert_eq!(now.0, f64::from(index + 1));
                 // Two thousand rows in double precision.
                 assert!((now.1 / before[joint].1 - 1.0).abs() < 1e-11, "{now:?} {before:?}");

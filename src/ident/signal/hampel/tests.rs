@@ -6,24 +6,12 @@ use std::vec::Vec;
 
 use super::*;
 use crate::real::sin_cos;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
+use crate::testing::TestRandom;
 
-struct Dice(Xoshiro256PlusPlus);
-
-impl Dice {
-    fn uniform(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-    /// Box and Muller: the tails matter here.
-    fn normal(&mut self) -> f64 {
-        let radius = real::sqrt(-2.0 * real::ln(1.0 - self.uniform()));
-        radius * sin_cos(core::f64::consts::TAU * self.uniform()).1
-    }
-}
-
-fn dice(seed: u64) -> Dice {
-    Dice(Xoshiro256PlusPlus::seed_from_u64(seed))
+/// Normal variable by Box and Muller: the tails matter here.
+fn gaussian(random: &mut TestRandom) -> f64 {
+    let radius = real::sqrt(-2.0 * real::ln(1.0 - random.uniform()));
+    radius * sin_cos(core::f64::consts::TAU * random.uniform()).1
 }
 
 fn run(quantity: Quantity, samples: &[f64]) -> Vec<Cleaned<f32>> {
@@ -43,10 +31,10 @@ fn torque(index: usize) -> f64 {
 
 #[test]
 fn gaussian_noise_with_coulomb_steps_is_touched_less_than_once_in_ten_thousand() {
-    let mut dice = dice(1);
-    let samples: Vec<f64> = (0..400_000).map(|index| torque(index) + dice.normal()).collect();
-    let wild = run(Quantity::Torque, &samples).iter().filter(|cleaned| cleaned.wild).count();
-    assert!(wild < 40, "{wild} of 400,000");
+    let mut random = TestRandom::new(1);
+    let samples: Vec<f64> = (0..400_000).map(|index| torque(index) + gaussian(&mut random)).collect();
+    let outlier = run(Quantity::Torque, &samples).iter().filter(|cleaned| cleaned.outlier).count();
+    assert!(outlier < 40, "{outlier} of 400,000");
 }
 
 #[test]
@@ -60,20 +48,20 @@ fn every_sample_comes_back_once_and_in_order() {
 }
 
 #[test]
-fn three_percent_of_wild_torques_are_found_and_leave_errors_of_the_size_of_the_noise() {
-    let mut dice = dice(2);
-    let clean: Vec<f64> = (0..100_000).map(|index| torque(index) + dice.normal()).collect();
-    let hit: Vec<bool> = clean.iter().map(|_| dice.uniform() < 0.03).collect();
+fn three_percent_of_outliers_are_found_and_leave_errors_of_the_noise() {
+    let mut random = TestRandom::new(2);
+    let clean: Vec<f64> = (0..100_000).map(|index| torque(index) + gaussian(&mut random)).collect();
+    let hit: Vec<bool> = clean.iter().map(|_| random.uniform() < 0.03).collect();
     let samples: Vec<f64> = clean
         .iter()
         .zip(&hit)
-        .map(|(value, hit)| if *hit { value + 30.0 * (2.0 * dice.uniform() - 1.0) } else { *value })
+        .map(|(value, hit)| if *hit { value + 30.0 * (2.0 * random.uniform() - 1.0) } else { *value })
         .collect();
     let cleaned = run(Quantity::Torque, &samples);
     let (mut missed, mut false_alarms, mut squared) = (0, 0, 0.0);
     for (((cleaned, clean), sample), hit) in cleaned.iter().zip(&clean).zip(&samples).zip(&hit) {
-        missed += u32::from(*hit && !cleaned.wild && (sample - clean).abs() > 8.0);
-        false_alarms += u32::from(!*hit && cleaned.wild);
+        missed += u32::from(*hit && !cleaned.outlier && (sample - clean).abs() > 8.0);
+        false_alarms += u32::from(!*hit && cleaned.outlier);
         let error = f64::from(cleaned.value) - clean;
         squared += error * error / 100_000.0;
     }
@@ -85,23 +73,23 @@ fn three_percent_of_wild_torques_are_found_and_leave_errors_of_the_size_of_the_n
 }
 
 #[test]
-fn three_wild_values_in_a_row_are_found_and_a_step_is_not() {
-    let mut dice = dice(3);
-    let mut samples: Vec<f64> = (0..4000).map(|index| torque(index) + 0.3 * dice.normal()).collect();
+fn three_outliers_in_a_row_are_found_and_a_step_is_not() {
+    let mut random = TestRandom::new(3);
+    let mut samples: Vec<f64> = (0..4000).map(|index| torque(index) + 0.3 * gaussian(&mut random)).collect();
     for place in [1000, 1001, 1002, 2500, 2501] {
         samples[place] += 25.0;
     }
     samples.iter_mut().skip(3200).for_each(|value| *value += 25.0);
-    let wild: Vec<usize> = run(Quantity::Torque, &samples)
+    let outlier: Vec<usize> = run(Quantity::Torque, &samples)
         .iter()
         .enumerate()
-        .filter_map(|(place, cleaned)| cleaned.wild.then_some(place))
+        .filter_map(|(place, cleaned)| cleaned.outlier.then_some(place))
         .collect();
-    assert_eq!(wild, [1000, 1001, 1002, 2500, 2501]);
+    assert_eq!(outlier, [1000, 1001, 1002, 2500, 2501]);
 }
 
 #[test]
-fn a_smooth_angle_passes_bit_for_bit_and_a_wild_one_is_put_back_where_it_was() {
+fn a_smooth_angle_passes_bit_for_bit_and_an_outlier_is_replaced() {
     // 0.4 rad at 1.5 Hz on a 14-bit encoder, mean of eight readings: curvature and quantisation, no noise.
     let count = core::f64::consts::TAU / 16384.0;
     let angle = |index: usize| {
@@ -115,7 +103,7 @@ fn a_smooth_angle_passes_bit_for_bit_and_a_wild_one_is_put_back_where_it_was() {
         samples[place] += 0.02;
     }
     for (place, cleaned) in run(Quantity::Angle, &samples).iter().enumerate() {
-        assert_eq!(cleaned.wild, (200..4900).contains(&place) && (place - 200) % 37 == 0, "{place}");
+        assert_eq!(cleaned.outlier, (200..4900).contains(&place) && (place - 200) % 37 == 0, "{place}");
         // An extrapolated parabola is at most seven errors of an eighth of a count off.
         assert!((f64::from(cleaned.value) - angle(place)).abs() < count, "{place}");
     }

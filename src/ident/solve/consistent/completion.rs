@@ -16,8 +16,9 @@
 use super::cost::LegCost;
 use super::interior;
 use super::limits::Limits;
-use crate::ident::record::dropped::Selection;
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::motion_record::Selection;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::bounds::LinkPrior;
 use crate::ident::solve::completion::complete_within;
 use crate::ident::solve::estimate::Stage;

@@ -14,7 +14,7 @@
 //! evaluation 400. Memory: `14 N (14 N + 3)` scalars.
 
 use super::limits::Limits;
-use crate::ident::record::recorder::RowModel;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::estimate::Stage;
 use crate::model::{INERTIAL_PARAMETERS, LegParameters, PARAMETERS_PER_JOINT, Parameter, row_torque};
 use crate::real::{self, Real};
@@ -120,10 +120,10 @@ impl<T: Real, const N: usize> LegCost<T, N> {
     #[inline(never)]
     pub(super) fn insert(&mut self, row: &mut LegParameters<T, N>, mut right: T) {
         let row = row.as_flattened_mut();
-        let kept_rows = self.triangle.as_flattened_mut().iter_mut().zip(self.right.as_flattened_mut());
-        for (column, (kept, kept_right)) in kept_rows.enumerate() {
-            let kept = kept.as_flattened_mut();
-            let (Some(&entering), Some(&diagonal)) = (row.get(column), kept.get(column)) else { break };
+        let stored_rows = self.triangle.as_flattened_mut().iter_mut().zip(self.right.as_flattened_mut());
+        for (column, (stored, stored_right)) in stored_rows.enumerate() {
+            let stored = stored.as_flattened_mut();
+            let (Some(&entering), Some(&diagonal)) = (row.get(column), stored.get(column)) else { break };
             if entering == T::zero() {
                 continue;
             }
@@ -132,10 +132,11 @@ impl<T: Real, const N: usize> LegCost<T, N> {
                 continue; // squares that underflow carry no information
             }
             let (cosine, sine) = (diagonal / length, entering / length);
-            for (old, new) in kept.iter_mut().zip(row.iter_mut()).skip(column) {
+            for (old, new) in stored.iter_mut().zip(row.iter_mut()).skip(column) {
                 (*old, *new) = (cosine * *old + sine * *new, cosine * *new - sine * *old);
             }
-            (*kept_right, right) = (cosine * *kept_right + sine * right, cosine * right - sine * *kept_right);
+            (*stored_right, right) =
+                (cosine * *stored_right + sine * right, cosine * right - sine * *stored_right);
         }
     }
 

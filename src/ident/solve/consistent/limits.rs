@@ -18,8 +18,9 @@
 //! centres of mass at the joints. Its standard deviations equal its own size ([`Limits::deviations`]), so a
 //! zero in it carries no information.
 
-use crate::ident::record::dropped::Selection;
-use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::motion_record::Selection;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::bounds::{LinkPrior, measured_box, segment_length};
 use crate::ident::solve::completion::prior_deviations;
 use crate::model::{

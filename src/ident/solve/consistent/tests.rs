@@ -1,33 +1,22 @@
 //! Claims about completion and full search, on factors made from random states and on adversarial ones.
 
 use nalgebra::{Matrix3, Vector3};
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::pseudo_inertia::Factored;
 use super::*;
-use crate::ident::record::recorder::{Record, Recorder, RowModel};
+use crate::ident::record::motion_record::Record;
+use crate::ident::record::recorder::Recorder;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::bounds::{LinkPrior, prior_parameters};
 use crate::ident::solve::estimate::{Estimate, Plan, Problem};
+use crate::model::planar::BASE as B;
 use crate::model::{
     BaseParameters, Chain, ColumnMask, DenavitHartenberg, JointState, LegParameters, Parameter, RigidBody,
     regressor,
 };
 use crate::real::Real;
 use crate::swarm::{BsoSettings, Objective};
-
-const B: usize = 13;
-
-struct Dice(Xoshiro256PlusPlus);
-
-impl Dice {
-    fn new(seed: u64) -> Self {
-        Self(Xoshiro256PlusPlus::seed_from_u64(seed))
-    }
-    fn within(&mut self, bound: f64) -> f64 {
-        (self.0.next_u64() as f64 / u64::MAX as f64 * 2.0 - 1.0) * bound
-    }
-}
+use crate::testing::TestRandom;
 
 fn link(mass: f64, centre: [f64; 3], inertia: [f64; 3], drive: [f64; 4]) -> LinkPrior<f64> {
     LinkPrior {
@@ -51,16 +40,16 @@ fn truth() -> [LinkPrior<f64>; 2] {
 }
 
 /// Wrong by up to `share` in every number, still physically consistent.
-fn wrong(dice: &mut Dice, share: f64) -> [LinkPrior<f64>; 2] {
+fn wrong(random: &mut TestRandom, share: f64) -> [LinkPrior<f64>; 2] {
     truth().map(|link| LinkPrior {
         body: RigidBody {
-            mass: link.body.mass * (1.0 + dice.within(share)),
-            centre_of_mass: link.body.centre_of_mass * (1.0 + dice.within(share)),
-            inertia: link.body.inertia * (1.0 + dice.within(share)),
+            mass: link.body.mass * (1.0 + random.within(share)),
+            centre_of_mass: link.body.centre_of_mass * (1.0 + random.within(share)),
+            inertia: link.body.inertia * (1.0 + random.within(share)),
         },
-        rotor_inertia: link.rotor_inertia * (1.0 + dice.within(share)),
-        coulomb_friction: link.coulomb_friction * (1.0 + dice.within(share)),
-        viscous_friction: link.viscous_friction * (1.0 + dice.within(share)),
+        rotor_inertia: link.rotor_inertia * (1.0 + random.within(share)),
+        coulomb_friction: link.coulomb_friction * (1.0 + random.within(share)),
+        viscous_friction: link.viscous_friction * (1.0 + random.within(share)),
         offset: 0.0,
     })
 }
@@ -77,7 +66,7 @@ const ALL: ColumnMask<2> = [[true; 14]; 2];
 
 /// Torque of these base values on random states, with noise of 0.3 N m.
 fn record<const N: usize>(
-    dice: &mut Dice,
+    random: &mut TestRandom,
     model: &RowModel<f64, N, B>,
     values: &[f64; B],
 ) -> Record<f64, N, B> {
@@ -85,15 +74,15 @@ fn record<const N: usize>(
     let mut squares = [0.0; N];
     for _ in 0..400 {
         let state = JointState {
-            q: core::array::from_fn(|_| dice.within(1.0)),
-            qd: core::array::from_fn(|_| dice.within(2.0)),
-            qdd: core::array::from_fn(|_| dice.within(6.0)),
+            q: core::array::from_fn(|_| random.within(1.0)),
+            qd: core::array::from_fn(|_| random.within(2.0)),
+            qdd: core::array::from_fn(|_| random.within(6.0)),
         };
         for (joint, full) in regressor(&model.chain, &state, &model.gravity).iter().enumerate() {
             let mut row = [0.0; B];
             model.base.select(full, &mut row);
             let exact: f64 = row.iter().zip(values).map(|(element, value)| element * value).sum();
-            let torque = exact + (0..12).map(|_| dice.within(0.15)).sum::<f64>();
+            let torque = exact + (0..12).map(|_| random.within(0.15)).sum::<f64>();
             record.factors[joint].insert(&row, torque);
             squares[joint] += torque * torque;
         }
@@ -140,27 +129,27 @@ fn excess<T: Real, const N: usize>(
 }
 
 /// Base values of no possible leg: some inertia or friction of the true leg is negative.
-fn impossible(dice: &mut Dice, model: &RowModel<f64, 2, B>) -> [f64; B] {
+fn impossible(random: &mut TestRandom, model: &RowModel<f64, 2, B>) -> [f64; B] {
     let mut parameters = prior_parameters(&truth());
     for _ in 0..2 {
-        let joint = usize::from(dice.within(1.0) > 0.0);
+        let joint = usize::from(random.within(1.0) > 0.0);
         let which = [Parameter::ZZ, Parameter::IA, Parameter::FC, Parameter::FV, Parameter::HX];
-        let parameter = which[((dice.within(0.5) + 0.5) * 4.99) as usize];
-        parameters[joint][parameter.index()] *= -1.0 + dice.within(0.8);
+        let parameter = which[((random.within(0.5) + 0.5) * 4.99) as usize];
+        parameters[joint][parameter.index()] *= -1.0 + random.within(0.8);
     }
     model.base.project(&parameters)
 }
 
 #[test]
 fn no_impossible_leg_is_ever_visited_whatever_the_data_and_the_precision() {
-    let mut dice = Dice::new(1);
+    let mut random = TestRandom::new(1);
     let (mut forced, mut free) = (0, 0);
     for index in 0..40 {
         let model = model::<f64, 2>(&ALL);
         let honest = model.base.project(&prior_parameters(&truth()));
-        let values = if index % 2 == 0 { impossible(&mut dice, &model) } else { honest };
-        let record = record(&mut dice, &model, &values);
-        let prior = (index % 3 != 0).then(|| wrong(&mut dice, 0.4));
+        let values = if index % 2 == 0 { impossible(&mut random, &model) } else { honest };
+        let record = record(&mut random, &model, &values);
+        let prior = (index % 3 != 0).then(|| wrong(&mut random, 0.4));
         let (reference, _) = complete::<f64, 2>(&ALL, &record, prior.as_ref(), Effort::reference());
         let effort = Effort::device(prior.is_some());
         let (single, estimate) = complete::<f32, 2>(&ALL, &record, prior.as_ref(), effort);
@@ -189,12 +178,12 @@ fn no_impossible_leg_is_ever_visited_whatever_the_data_and_the_precision() {
 
 #[test]
 fn the_prior_has_no_say_in_what_is_measured() {
-    let mut dice = Dice::new(2);
+    let mut random = TestRandom::new(2);
     let mut moved = 0;
     for _ in 0..20 {
         let model = model::<f64, 2>(&ALL);
-        let record = record(&mut dice, &model, &model.base.project(&prior_parameters(&truth())));
-        let prior = wrong(&mut dice, 0.4);
+        let record = record(&mut random, &model, &model.base.project(&prior_parameters(&truth())));
+        let prior = wrong(&mut random, 0.4);
         let (completion, estimate) = complete::<f32, 2>(&ALL, &record, Some(&prior), Effort::device(true));
         moved += u32::from(completion.steps() > 0);
         let found = model.base.project(&completion.parameters().map(|joint| joint.map(f64::from)));
@@ -210,9 +199,9 @@ fn the_prior_has_no_say_in_what_is_measured() {
 
 #[test]
 fn a_closed_form_that_is_a_leg_is_taken_as_it_is() {
-    let mut dice = Dice::new(3);
+    let mut random = TestRandom::new(3);
     let model = model::<f64, 2>(&ALL);
-    let record = record(&mut dice, &model, &model.base.project(&prior_parameters(&truth())));
+    let record = record(&mut random, &model, &model.base.project(&prior_parameters(&truth())));
     let (completion, estimate) = complete::<f64, 2>(&ALL, &record, Some(&truth()), Effort::reference());
     assert_eq!(completion.steps(), 0);
     let closed =
@@ -229,12 +218,12 @@ fn a_closed_form_that_is_a_leg_is_taken_as_it_is() {
 
 #[test]
 fn no_allowed_leg_is_better_than_the_completion() {
-    let mut dice = Dice::new(4);
+    let mut random = TestRandom::new(4);
     for _ in 0..10 {
         let model = model::<f64, 2>(&ALL);
-        let values = impossible(&mut dice, &model);
-        let record = record(&mut dice, &model, &values);
-        let prior = wrong(&mut dice, 0.4);
+        let values = impossible(&mut random, &model);
+        let record = record(&mut random, &model, &values);
+        let prior = wrong(&mut random, 0.4);
         let (completion, _) = complete::<f64, 2>(&ALL, &record, Some(&prior), Effort::reference());
         let (cost, best) = (completion.cost(), completion.parameters());
         let (objective, least) =
@@ -242,7 +231,7 @@ fn no_allowed_leg_is_better_than_the_completion() {
         for _ in 0..200 {
             let position: [f64; 28] = core::array::from_fn(|coordinate| {
                 let (low, high) = objective.bounds(coordinate);
-                low + (high - low) * (0.5 + dice.within(0.5))
+                low + (high - low) * (0.5 + random.within(0.5))
             });
             let other = objective.parameters(&position);
             if !completion.limits().allow(&other) {
@@ -265,11 +254,11 @@ fn no_allowed_leg_is_better_than_the_completion() {
 
 #[test]
 fn without_a_prior_a_leg_that_can_exist_costs_nothing() {
-    let mut dice = Dice::new(7);
+    let mut random = TestRandom::new(7);
     let model = model::<f64, 2>(&ALL);
     let parameters = prior_parameters(&truth());
     for _ in 0..10 {
-        let mut record = record(&mut dice, &model, &model.base.project(&parameters));
+        let mut record = record(&mut random, &model, &model.base.project(&parameters));
         // Every row has a hundredfold weight, as in a long record: a pull toward the neutral leg would show.
         record.row_information = 100.0;
         let (reference, _) = complete::<f64, 2>(&ALL, &record, None, Effort::reference());
@@ -286,14 +275,14 @@ fn without_a_prior_a_leg_that_can_exist_costs_nothing() {
 
 #[test]
 fn legs_of_one_joint_without_prior_and_without_some_columns_are_completed() {
-    let mut dice = Dice::new(5);
+    let mut random = TestRandom::new(5);
     let mut mask = [[true; 14]; 1];
     mask[0][Parameter::IA.index()] = false;
     let model = model::<f64, 1>(&mask);
     let single = [truth()[0]];
     let mut parameters = prior_parameters(&single);
     parameters[0][Parameter::IA.index()] = 0.0;
-    let record = record(&mut dice, &model, &model.base.project(&parameters));
+    let record = record(&mut random, &model, &model.base.project(&parameters));
     for prior in [None, Some(&single)] {
         let (completion, _) = complete::<f32, 1>(&mask, &record, prior, Effort::device(prior.is_some()));
         let found = completion.parameters();
@@ -305,10 +294,10 @@ fn legs_of_one_joint_without_prior_and_without_some_columns_are_completed() {
 
 #[test]
 fn every_point_of_the_full_box_is_a_leg_and_slices_do_not_change_the_search() {
-    let mut dice = Dice::new(6);
+    let mut random = TestRandom::new(6);
     let (model64, model32) = (model::<f64, 2>(&ALL), model::<f32, 2>(&ALL));
-    let record = record(&mut dice, &model64, &model64.base.project(&prior_parameters(&truth())));
-    for prior in [None, Some(wrong(&mut dice, 0.4))] {
+    let record = record(&mut random, &model64, &model64.base.project(&prior_parameters(&truth())));
+    for prior in [None, Some(wrong(&mut random, 0.4))] {
         let (completion, _) =
             complete::<f32, 2>(&ALL, &record, prior.as_ref(), Effort::device(prior.is_some()));
         let single = record.convert::<f32>();
@@ -322,7 +311,7 @@ fn every_point_of_the_full_box_is_a_leg_and_slices_do_not_change_the_search() {
                 let (low, high) = objective.bounds(coordinate);
                 // Includes the corners.
                 let share =
-                    if index % 2 == 0 { 0.5 + dice.within(0.5) } else { dice.within(1.0).round().abs() };
+                    if index % 2 == 0 { 0.5 + random.within(0.5) } else { random.within(1.0).round().abs() };
                 low + (high - low) * share as f32
             });
             let leg = objective.parameters(&position);

@@ -1,18 +1,17 @@
 use super::*;
-use crate::ident::record::dropped::Selection;
-use crate::ident::record::outliers::Outliers;
-use crate::ident::record::recorder::{RowModel, TorqueSize};
+use crate::ident::record::motion_record::Outliers;
+use crate::ident::record::motion_record::Selection;
+use crate::ident::record::motion_record::TorqueSize;
+use crate::ident::record::row_model::RowModel;
 use crate::ident::signal::smoothing::Smoothed;
 use crate::ident::solve::estimate::{Plan, Problem};
+use crate::model::planar::BASE;
 use crate::model::{BaseParameters, Chain, DenavitHartenberg, LegParameters, Payload};
+use crate::testing::TestRandom;
 use nalgebra::Vector3;
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 
 extern crate std;
 use std::vec::Vec;
-
-const BASE: usize = 13;
 
 fn model<T: Real>() -> RowModel<T, 2, BASE> {
     let link = |a: f64| DenavitHartenberg { alpha: T::zero(), a: T::of(a), d: T::zero() };
@@ -34,17 +33,6 @@ fn base_of<T: Real>(payload: &Payload<f64>) -> [T; BASE] {
     model::<f64>().base.project(&payload.parameters::<2>()).map(T::of)
 }
 
-struct Dice(Xoshiro256PlusPlus);
-
-impl Dice {
-    fn within(&mut self, bound: f64) -> f64 {
-        ((self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0) * bound
-    }
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.within(0.5)).sum()
-    }
-}
-
 /// 500 independent rows; torque in true N m times `ratios`, with white noise of `noise` times that.
 fn record<T: Real>(
     carried: Option<&Payload<f64>>,
@@ -56,14 +44,14 @@ fn record<T: Real>(
     let mut leg = LEG;
     carried.into_iter().for_each(|payload| payload.add_to(&mut leg));
     let values = exact.base.project(&leg);
-    let mut dice = Dice(Xoshiro256PlusPlus::seed_from_u64(seed));
+    let mut random = TestRandom::new(seed);
     let mut factors: [Factor<T, BASE>; 2] = core::array::from_fn(|_| Factor::new());
     let mut squares = [0.0; 2];
     for _ in 0..500 {
         let instant = Smoothed {
-            position: [0.5 + dice.within(0.4), -0.9 + dice.within(0.7)],
-            velocity: [dice.within(1.5), dice.within(2.0)],
-            acceleration: [dice.within(4.0), dice.within(6.0)],
+            position: [0.5 + random.within(0.4), -0.9 + random.within(0.7)],
+            velocity: [random.within(1.5), random.within(2.0)],
+            acceleration: [random.within(4.0), random.within(6.0)],
             torque: [0.0; 2],
         };
         let rows = exact.rows(&instant);
@@ -75,7 +63,7 @@ fn record<T: Real>(
         });
         for joint in 0..2 {
             let real: f64 = rows.regressor[joint].iter().zip(&values).map(|(left, right)| left * right).sum();
-            let logged = ratios[joint] * (real + noise * dice.normal());
+            let logged = ratios[joint] * (real + noise * random.normal());
             factors[joint].insert(&device.regressor[joint], T::of(logged));
             squares[joint] += logged * logged / 500.0;
         }
@@ -104,7 +92,7 @@ fn record_of<T: Real>(factors: [Factor<T, BASE>; 2], torque: [TorqueSize<T>; 2])
 const RATIOS: [f64; 2] = [1.0 / 1.2, 1.1];
 
 #[test]
-fn a_mass_on_the_last_link_tells_every_constant_in_either_precision() {
+fn a_mass_on_the_last_link_determines_every_constant_in_either_precision() {
     let load = base_of(&ON_THE_KNEE);
     let (without, with) = (record::<f64>(None, RATIOS, 0.0, 1), record(Some(&ON_THE_KNEE), RATIOS, 0.0, 2));
     let (device, device_with) =
@@ -121,7 +109,7 @@ fn a_mass_on_the_last_link_tells_every_constant_in_either_precision() {
 }
 
 #[test]
-fn a_mass_on_the_first_link_tells_the_first_constant_only() {
+fn a_mass_on_the_first_link_determines_the_first_constant_only() {
     let load = base_of(&ON_THE_HIP);
     let (without, with) = (record::<f64>(None, RATIOS, 0.0, 1), record(Some(&ON_THE_HIP), RATIOS, 0.0, 2));
     let hip = torque_constant_ratio(&without, &with, 0, &load).expect("felt");
@@ -200,10 +188,10 @@ fn a_widened_covariance_holds_the_spread_that_an_uncertain_constant_adds() {
     let mut wide = narrow.clone();
     widen(&mut wide, &solve([1.0 + sigma, 1.0]));
     widen(&mut wide, &solve([1.0, 1.0 + sigma]));
-    let mut dice = Dice(Xoshiro256PlusPlus::seed_from_u64(4));
+    let mut random = TestRandom::new(4);
     let mut squares = [0.0; BASE];
     for _ in 0..400 {
-        let drawn = solve([1.0 + sigma * dice.normal(), 1.0 + sigma * dice.normal()]);
+        let drawn = solve([1.0 + sigma * random.normal(), 1.0 + sigma * random.normal()]);
         for (sum, (value, middle)) in squares.iter_mut().zip(drawn.values.iter().zip(&narrow.values)) {
             *sum += (value - middle) * (value - middle) / 400.0;
         }

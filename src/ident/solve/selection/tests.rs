@@ -80,7 +80,7 @@ fn slices_do_not_change_the_choice() {
 }
 
 #[test]
-fn a_column_that_the_motion_does_not_tell_from_others_is_dropped() {
+fn a_column_that_the_motion_does_not_separate_from_others_is_dropped() {
     // At two angles of the hip the moments' columns make up any constant.
     let (auto, on) = (model::<f64>(Choice::Auto, &[]), model::<f64>(Choice::On, &[]));
     let two = |model: &Model<f64>| {
@@ -90,7 +90,7 @@ fn a_column_that_the_motion_does_not_tell_from_others_is_dropped() {
     let chosen = select(&auto, two(&auto));
     let stage = Problem::new(&chosen, &auto).whole();
     assert_eq!(
-        (dropped(&auto, &chosen), stage.columns().len(), stage.asked()),
+        (dropped(&auto, &chosen), stage.columns().len(), stage.requested()),
         ([false, true, false], 12, 12)
     );
 }

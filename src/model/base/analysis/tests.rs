@@ -3,7 +3,7 @@
 use super::*;
 use crate::model::chain::DenavitHartenberg;
 use crate::model::parameter::rounded;
-use crate::model::testing::{Dice, down_along_x, paper_chain, planar_leg, rounded_state};
+use crate::model::testing::{TestRandom, down_along_x, paper_chain, planar_leg, rounded_state};
 use Parameter::{FC, FV, HX, HY, HZ, IA, M, OFF, XX, XY, XZ, YY, YZ, ZZ};
 
 /// Mask of all parameters but these.
@@ -25,10 +25,10 @@ fn down_along_z<T: Real>() -> Vector3<T> {
 fn rank<T: Real, const N: usize>(chain: &Chain<T, N>, gravity: Vector3<T>, off: &[Parameter]) -> usize {
     let base = BaseParameters::<T, N, 42>::analyse(chain, &gravity, &all_but(off)).unwrap();
     let separation = base.separation();
-    // Measured on these legs: kept 0.43 of a column or more; dropped up to 4e-10 (f64) and 1e-5 (f32). The
-    // tolerances are 1.5e-8 and 3.5e-4.
+    // Measured on these legs: retained 0.43 of a column or more; dropped up to 4e-10 (f64) and 1e-5 (f32).
+    // The tolerances are 1.5e-8 and 3.5e-4.
     let tolerance = sqrt(T::EPSILON);
-    assert!(separation.smallest_kept > T::of(0.3), "{separation:?}");
+    assert!(separation.smallest_retained > T::of(0.3), "{separation:?}");
     assert!(separation.largest_dropped < tolerance * T::of(0.05), "{separation:?}");
     base.rank()
 }
@@ -157,14 +157,14 @@ fn the_paper_chain_has_the_set_of_table_six_with_minus_yy_in_xx() {
 
 /// Ranks of random chains; dropped columns must be far below the tolerance.
 fn ranks_without_special_angles<T: Real, const N: usize>() {
-    let mut dice = Dice::new(21);
+    let mut random = TestRandom::new(21);
     for _ in 0..100 {
-        let (chain, gravity) = (dice.chain::<N>().convert::<T>(), dice.gravity().map(T::of));
+        let (chain, gravity) = (random.chain::<N>().convert::<T>(), random.gravity().map(T::of));
         let base = BaseParameters::<T, N, 42>::analyse(&chain, &gravity, &all_but(&[FC, FV, OFF])).unwrap();
         let separation = base.separation();
         // Three parameters of the first link, seven of every other, rotors of all but the first.
         assert_eq!(base.rank(), 3 + 8 * (N - 1), "{separation:?}");
-        // Measured over 600 chains in f32: kept 6e-4 or more, on a nearly special chain; dropped 5e-7 or
+        // Measured over 600 chains in f32: retained 6e-4 or more, on a nearly special chain; dropped 5e-7 or
         // less. The tolerance is 3.5e-4.
         let tolerance = sqrt(T::EPSILON);
         assert!(separation.largest_dropped < tolerance * T::of(0.05), "{separation:?}");
@@ -191,15 +191,15 @@ fn gravity_off_the_first_axis_by_a_thousandth_shows_the_first_centre_of_mass() {
 }
 
 fn torque_from_base_values<T: Real>(bound: f64) {
-    let mut dice = Dice::new(22);
-    let (chain, gravity) = (dice.chain::<3>().convert::<T>(), dice.gravity().map(T::of));
+    let mut random = TestRandom::new(22);
+    let (chain, gravity) = (random.chain::<3>().convert::<T>(), random.gravity().map(T::of));
     let base = BaseParameters::<T, 3, 32>::analyse(&chain, &gravity, &all_but(&[])).unwrap();
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
     for _ in 0..50 {
-        let leg = rounded(&dice.leg());
+        let leg = rounded(&random.leg());
         let values = base.project(&leg);
         let bare = base.complete(&values, &[[T::zero(); 14]; 3]);
-        for row in regressor(&chain, &rounded_state(&dice.state()), &gravity) {
+        for row in regressor(&chain, &rounded_state(&random.state()), &gravity) {
             let mut columns = [T::zero(); 32];
             base.select(&row, &mut columns);
             let sum =
@@ -223,10 +223,10 @@ fn base_values_times_independent_columns_give_the_torque() {
 
 #[test]
 fn completion_keeps_the_base_values_and_whatever_is_not_independent() {
-    let mut dice = Dice::new(23);
+    let mut random = TestRandom::new(23);
     let leg = planar_leg::<f64>(0.39);
     let base = BaseParameters::<f64, 2, 13>::analyse(&leg, &down_along_x(), &all_but(&[])).unwrap();
-    let (truth, prior) = (dice.leg::<2>(), dice.leg::<2>());
+    let (truth, prior) = (random.leg::<2>(), random.leg::<2>());
     let completed = base.complete(&base.project(&truth), &prior);
     for (one, other) in base.project(&completed).iter().zip(&base.project(&truth)) {
         // Three roundings of numbers up to ten.

@@ -4,9 +4,9 @@ use super::*;
 use crate::real::sin_cos;
 
 #[test]
-fn an_index_away_from_its_place_is_a_lost_place() {
+fn an_index_away_from_its_position_is_a_lost_position() {
     for (missed, lost) in [(3, false), (-3, false), (6, true), (-6, true), (300, true)] {
-        for request in [ask(5.0), AxisRequest::RELEASED] {
+        for request in [ask(5.0), AxisRequest::OFF] {
             for speed in [50.0, -50.0] {
                 let mut bench = Bench::at(speed, &CONFIGURATION);
                 bench.run(request, 100);
@@ -23,10 +23,10 @@ fn an_index_away_from_its_place_is_a_lost_place() {
 }
 
 #[test]
-fn two_turns_without_an_index_are_a_lost_place_where_there_was_one() {
+fn two_turns_without_an_index_are_a_lost_position_where_there_was_one() {
     // A turn takes 3,016 ticks.
     for (speed, ticks, lost) in [(50.0, 5000, false), (50.0, 9000, true), (-50.0, 9000, true)] {
-        for request in [ask(5.0), AxisRequest::RELEASED] {
+        for request in [ask(5.0), AxisRequest::OFF] {
             let mut bench = Bench::at(speed, &CONFIGURATION);
             bench.run_sampled(request, ticks, |sample| sample.index_count = None);
             assert_eq!(bench.axis.fault(), lost.then_some(AxisFault::Encoder), "{speed} {ticks}");
@@ -47,7 +47,7 @@ const TURN: usize = 3016;
 
 #[test]
 fn one_wrong_index_pulse_changes_no_command_and_takes_nothing() {
-    for request in [ask(5.0), AxisRequest::RELEASED] {
+    for request in [ask(5.0), AxisRequest::OFF] {
         for speed in [0.0, 50.0, -50.0] {
             // Single pulses, and bursts as long as a servo tick with a pulse in each tick.
             for burst in [1, 6] {

@@ -12,11 +12,11 @@ impl Bench {
         &mut self,
         request: AxisRequest,
         periods: usize,
-        mut spoil: impl FnMut(&mut AxisSample),
+        mut inject: impl FnMut(&mut AxisSample),
     ) -> Option<(usize, AxisFault)> {
         for period in 1..=periods {
             for tick in 0..6 {
-                spoil(&mut self.sample);
+                inject(&mut self.sample);
                 self.tick(request);
                 if tick == 2 {
                     self.axis.check();
@@ -112,23 +112,23 @@ fn a_sound_axis_brakes_for_as_long_as_the_other_one_needs_it() {
 }
 
 #[test]
-fn a_motor_too_fast_to_brake_below_the_current_bound_is_released() {
+fn a_motor_too_fast_to_brake_below_the_current_bound_is_off() {
     // Braking at 150 to 180 rad/s already carries 55 A.
     for speed in [200.0, -260.0] {
         let mut bench = Bench::settled(speed, 0.0);
-        assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED, "{speed} rad/s");
+        assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::OFF, "{speed} rad/s");
         assert_eq!(bench.axis.fault(), Some(AxisFault::Overcurrent));
         assert!(bench.axis.clear_fault(), "nothing was lost");
 
         let mut bench = Bench::settled(speed, 0.0);
         assert!(matches!(bench.frozen(ask(0.0), FIFTY_MS), Some((_, AxisFault::EncoderFrozen))));
-        assert_eq!(bench.tick(ask(0.0)), AxisCommand::RELEASED, "{speed} rad/s");
+        assert_eq!(bench.tick(ask(0.0)), AxisCommand::OFF, "{speed} rad/s");
         assert!(!bench.axis.clear_fault(), "the place is lost, whatever was found since");
     }
 }
 
 #[test]
-fn a_motor_that_brakes_is_released_when_it_is_told_or_when_its_current_passes_the_bound() {
+fn a_braking_motor_turns_off_on_request_or_beyond_the_current_bound() {
     let mut bench = Bench::settled(60.0, 10.0);
     assert!(bench.frozen(ask(10.0), TWENTY_MS).is_some());
     for _ in 0..100 {
@@ -138,11 +138,11 @@ fn a_motor_that_brakes_is_released_when_it_is_told_or_when_its_current_passes_th
     // 60 rad/s make 1.2 V at 0.05 ohm: the motor brakes, whatever the sensors measure.
     let torque = bench.motor.current[1];
     assert!(torque < -15.0, "{torque} A");
-    assert_eq!(bench.tick(AxisRequest::RELEASED), AxisCommand::RELEASED);
+    assert_eq!(bench.tick(AxisRequest::OFF), AxisCommand::OFF);
     bench.sample.shunt_codes = [3700, 2048];
-    assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED);
+    assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::OFF);
     assert_eq!(bench.axis.fault(), Some(AxisFault::Overcurrent));
-    assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED);
+    assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::OFF);
     assert!(!bench.axis.clear_fault(), "the place that was lost before stays lost");
 }
 
@@ -155,11 +155,11 @@ fn an_open_phase_is_seen_within_50_ms() {
         let found = bench.until_fault(ask(current), FIFTY_MS, |_| {});
         let Some((_, fault)) = found else { panic!("{speed} rad/s, {current} A") };
         // At rest the fault may show as a frozen counter; then the motor brakes with two phases.
-        use AxisFault::{CurrentZero, EncoderFrozen, OpenPhase, Overcurrent};
-        assert!(matches!(fault, OpenPhase | CurrentZero | Overcurrent | EncoderFrozen));
+        use AxisFault::{CurrentOffset, EncoderFrozen, OpenPhase, Overcurrent};
+        assert!(matches!(fault, OpenPhase | CurrentOffset | Overcurrent | EncoderFrozen));
         let brakes = fault == EncoderFrozen;
         assert!(speed == 0.0 || !brakes, "{speed} rad/s, {current} A: {fault:?}");
-        assert_eq!(bench.tick(ask(current)), if brakes { AxisCommand::BRAKE } else { AxisCommand::RELEASED });
+        assert_eq!(bench.tick(ask(current)), if brakes { AxisCommand::BRAKE } else { AxisCommand::OFF });
     }
 }
 
@@ -168,29 +168,29 @@ fn a_zero_that_drifts_by_six_amperes_is_seen_within_50_ms_of_motion() {
     for (speed, current) in [(60.0, 0.0), (60.0, 20.0), (-100.0, 30.0), (220.0, -10.0)] {
         for (shunt, codes) in [(0, 150.0), (1, -150.0)] {
             let mut bench = Bench::settled(speed, current);
-            bench.motor.zeros[shunt] += codes;
+            bench.motor.current_offsets[shunt] += codes;
             let found = bench.until_fault(ask(current), FIFTY_MS, |_| {});
             assert!(
-                matches!(found, Some((_, AxisFault::CurrentZero))),
+                matches!(found, Some((_, AxisFault::CurrentOffset))),
                 "{speed} rad/s, {current} A: {found:?}"
             );
             // A drift of 1 A is tolerated.
             let mut bench = Bench::settled(speed, current);
-            bench.motor.zeros[shunt] += codes / 6.0;
+            bench.motor.current_offsets[shunt] += codes / 6.0;
             assert_eq!(bench.until_fault(ask(current), 400, |_| {}), None, "{speed} rad/s, {current} A");
         }
     }
 }
 
 #[test]
-fn zeros_that_drifted_while_released_are_refused_at_enabling() {
+fn offsets_that_drifted_while_off_are_refused_at_enabling() {
     for (codes, refused) in [(25.0, false), (-60.0, true), (100.0, true)] {
         let mut bench = Bench::at(50.0, &CONFIGURATION);
-        bench.motor.zeros[1] += codes;
+        bench.motor.current_offsets[1] += codes;
         // 240 ticks are 10 ms.
-        bench.run(AxisRequest::RELEASED, 240);
+        bench.run(AxisRequest::OFF, 240);
         assert_eq!(bench.tick(ask(0.0)).enabled, !refused, "{codes} codes");
-        assert_eq!(bench.axis.fault(), refused.then_some(AxisFault::CurrentZero), "{codes} codes");
+        assert_eq!(bench.axis.fault(), refused.then_some(AxisFault::CurrentOffset), "{codes} codes");
     }
 }
 
@@ -201,9 +201,9 @@ fn a_warm_motor_that_is_reversed_again_and_again_raises_nothing() {
         bench.motor.resistance *= resistance;
         bench.motor.flux *= flux;
         bench.motor.inductance = bench.motor.inductance.map(|henry| henry * inductance);
-        for step in 0..24_000 {
+        for step in 0..CURRENT_RATE_HZ {
             // Speeds up to the joint's greatest, at 3 Hz; currents at 7 Hz, with a step in each cycle.
-            let time = f64::from(step) / 24_000.0;
+            let time = f64::from(step) / f64::from(CURRENT_RATE_HZ);
             bench.motor.speed = 220.0 * crate::real::sin_cos(time * 18.8).0;
             let current = 38.0 * crate::real::sin_cos(time * 44.0).0 as f32;
             bench.tick(ask(if step % 3000 < 1500 { current } else { -0.5 * current }));
@@ -219,7 +219,7 @@ fn a_warm_motor_that_is_reversed_again_and_again_raises_nothing() {
 }
 
 #[test]
-fn a_code_that_stays_while_its_phase_is_asked_for_more_is_seen_in_the_fourth_tick() {
+fn a_code_that_stays_while_its_target_changes_is_detected_in_the_fourth_tick() {
     for shunt in [0, 1] {
         let mut bench = Bench::settled(100.0, 20.0);
         let stuck = bench.sample.shunt_codes[shunt];
@@ -253,7 +253,7 @@ fn a_changed_bit_of_gains_or_limits_is_seen_within_100_ms() {
             match word {
                 0 => flip(&mut constants.current_limit, bit),
                 1 => flip(&mut constants.overcurrent_square, bit),
-                2 => flip(&mut constants.zeros[1], bit),
+                2 => flip(&mut constants.current_offsets[1], bit),
                 _ => constants.greatest_step ^= 1 << bit,
             }
             let found = bench.until_fault(ask(5.0), 400, |_| {});
@@ -264,10 +264,10 @@ fn a_changed_bit_of_gains_or_limits_is_seen_within_100_ms() {
 }
 
 #[test]
-fn codes_without_noise_that_stay_are_no_fault_while_nothing_is_asked_to_change() {
+fn codes_without_noise_that_stay_are_no_fault_while_no_target_changes() {
     let mut bench = Bench::at(0.0, &CONFIGURATION);
     bench.motor.noise_codes = 0.0;
-    bench.motor.zeros = [12.0, -21.0];
+    bench.motor.current_offsets = [12.0, -21.0];
     assert_eq!(bench.until_fault(ask(0.0), 200, |_| {}), None);
     // Half of the limit, 20 A, moves any rotor except this simulated one.
     for current in [0.9, 5.0, -5.0, 7.0, 0.0] {
@@ -277,26 +277,29 @@ fn codes_without_noise_that_stay_are_no_fault_while_nothing_is_asked_to_change()
 
 #[test]
 fn a_code_that_is_wrong_every_other_tick_is_not_survived_for_long() {
-    type Spoil = fn(&mut AxisSample);
-    let spoils: [(Spoil, AxisFault); 2] = [
+    type Inject = fn(&mut AxisSample);
+    let injections: [(Inject, AxisFault); 2] = [
         (|sample| sample.shunt_codes[1] = 4000, AxisFault::CurrentSense),
         (|sample| sample.bus_code = 3950, AxisFault::BusVoltage),
     ];
     // One wrong reading in every `of`, and the number of wrong readings until the fault.
-    for (of, told) in [(2, Some(3)), (3, Some(4)), (4, Some(6)), (5, None)] {
-        for (spoil, fault) in spoils {
+    for (of, detected_after) in [(2, Some(3)), (3, Some(4)), (4, Some(6)), (5, None)] {
+        for (inject, fault) in injections {
             let mut bench = Bench::at(50.0, &CONFIGURATION);
             bench.run(ask(5.0), 100);
             let mut wrong = 0;
             for tick in 0..400 {
                 if tick % of == 0 && bench.axis.fault().is_none() {
-                    spoil(&mut bench.sample);
+                    inject(&mut bench.sample);
                     wrong += 1;
                 }
                 bench.tick(ask(5.0));
             }
-            assert_eq!(bench.axis.fault(), told.map(|_| fault), "one of {of}");
-            assert!(told.is_none_or(|told| told == wrong), "one of {of}: {wrong}");
+            assert_eq!(bench.axis.fault(), detected_after.map(|_| fault), "one of {of}");
+            assert!(
+                detected_after.is_none_or(|detected_after| detected_after == wrong),
+                "one of {of}: {wrong}"
+            );
         }
     }
 }
@@ -305,19 +308,19 @@ fn a_code_that_is_wrong_every_other_tick_is_not_survived_for_long() {
 fn duties_that_are_no_numbers_release() {
     let mut bench = Bench::at(50.0, &CONFIGURATION);
     bench.run(ask(5.0), 100);
-    bench.axis.spoil_modulation();
-    assert_eq!(bench.tick(ask(5.0)), AxisCommand::RELEASED);
+    bench.axis.invalidate_modulation();
+    assert_eq!(bench.tick(ask(5.0)), AxisCommand::OFF);
     assert_eq!(bench.axis.fault(), Some(AxisFault::NotANumber));
 }
 
 #[test]
-fn an_upset_flips_the_bit_that_is_named() {
+fn a_flip_changes_the_bit_that_is_named() {
     let sound = Bench::settled(0.0, 0.0).axis;
-    let upset = |bit| {
+    let flip_bit = |bit| {
         let mut axis = sound;
-        axis.upset(0, bit);
+        axis.flip_bit(0, bit);
         axis
     };
-    assert!(upset(3) != sound && upset(3) != upset(4));
-    assert!(upset(3) == upset(35), "32 bits");
+    assert!(flip_bit(3) != sound && flip_bit(3) != flip_bit(4));
+    assert!(flip_bit(3) == flip_bit(35), "32 bits");
 }

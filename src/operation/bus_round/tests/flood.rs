@@ -30,13 +30,13 @@ fn a_frame_for_no_own_node_costs_nothing_else() {
     bench.send(0x601, &[0x23, 0x16, 0x10, 1, 2, 0, 0x70, 0]);
     bench.arrive(&[Frame::new(0x770, &[5])]);
     bench.run(1);
-    bench.told();
+    bench.emergencies();
     for _ in 0..8 {
         bench.hardware.now_us += 500;
         frames_alone(&mut bench, &[Frame::new(0x7F0, &[])]);
         bench.hardware.empty_mailboxes();
     }
-    assert_eq!(bench.told(), [(0x81, 0x8130)]);
+    assert_eq!(bench.emergencies(), [(0x81, 0x8130)]);
 }
 
 #[test]
@@ -45,17 +45,17 @@ fn expensive_frames_get_half_of_the_time_and_the_leg_its_reports() {
     bench.enable();
     bench.hardware.reception().frame_us = 700;
     let begin_us = bench.hardware.now_us();
-    let (mut heard, mut rounds) = (0, 0);
+    let (mut received, mut rounds) = (0, 0);
     while bench.hardware.now_us() < begin_us + 100_000 {
         bench.arrive(&[Frame::new(0x80, &[])]);
         let before = bench.unheard();
         bench.run(1);
-        heard += before - bench.unheard();
+        received += before - bench.unheard();
         rounds += 1;
         // Without a balance the leg's reports and orders still pass, at every tick.
         assert!(bench.host.orders.ready() && bench.host.status.ready());
     }
-    let share = heard as f64 * 700.0 / 100_000.0;
+    let share = received as f64 * 700.0 / 100_000.0;
     assert!((0.4..0.6).contains(&share), "{share}, {rounds} rounds");
     // All frames of the burst are processed one after the other.
     bench.hardware.reception().frame_us = 0;
@@ -76,7 +76,7 @@ fn waiting_frames_prevent_a_timeout_and_a_lost_host_causes_one() {
     bench.send(0x601, &[0x2B, 0x00, 0x14, 5, 3, 0, 0, 0]);
     bench.arrive(&[Frame::new(0x201, &[0, 0])]);
     bench.run(4);
-    bench.told();
+    bench.emergencies();
     // An expensive frame, and behind it one that was sent in time.
     bench.hardware.reception().frame_us = 2_500;
     bench.arrive(&[Frame::new(0x80, &[])]);
@@ -86,18 +86,18 @@ fn waiting_frames_prevent_a_timeout_and_a_lost_host_causes_one() {
         bench.arrive(&[Frame::new(0x201, &[0, 0])]);
         bench.run(1);
     }
-    assert_eq!(bench.told(), []);
+    assert_eq!(bench.emergencies(), []);
     bench.run(10);
-    assert_eq!(bench.told(), [(0x81, 0x8250)]);
+    assert_eq!(bench.emergencies(), [(0x81, 0x8250)]);
     // The timeout acts, however expensive the other frames are.
     bench.send(0, &[1, 0]);
     bench.arrive(&[Frame::new(0x201, &[0, 0])]);
     bench.run(2);
-    bench.told();
+    bench.emergencies();
     bench.hardware.reception().frame_us = 900;
     for _ in 0..80 {
         bench.arrive(&[Frame::new(0x80, &[])]);
         bench.run(1);
     }
-    assert!(bench.told().contains(&(0x81, 0x8250)));
+    assert!(bench.emergencies().contains(&(0x81, 0x8250)));
 }

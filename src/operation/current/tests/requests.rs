@@ -39,7 +39,7 @@ fn a_servo_that_never_answers_is_counted_and_inhibits() {
     assert_eq!((signals.statistics.servo_missed.get(), signals.inhibit.causes()), (2, 0));
     let signals = Signals::new();
     request(&signals, 4, false);
-    let given_up = Cause::ServoTicks.bit();
+    let given_up = InhibitReason::ServoTicks.bit();
     assert_eq!((signals.statistics.servo_missed.get(), signals.inhibit.causes()), (3, given_up));
 }
 
@@ -54,7 +54,7 @@ fn the_state_of_each_axis_can_be_replaced() {
     // A target is followed only where all axes run, so no tick enables a bridge.
     bench.signals.set_targets(&DriveCommand { enabled: true, currents: [Ampere(1.0); 2] });
     bench.run(12);
-    bench.signals.release();
+    bench.signals.disable();
     *bench.loops.axis_state_mut(0).expect("two axes") = AxisState::OFF;
     assert_eq!(is_running(&bench), [false; 2]);
 }
@@ -68,7 +68,7 @@ fn each_running_axis_sends_one_sample_in_six_periods() {
         let now = bench.now.wrapping_add(period * PERIOD.get());
         let Ends { mut current, mut servo, .. } = bench.queues.split(&mut bench.events);
         for axis in 0..2 {
-            let sample = bench.motors[axis].period(AxisCommand::RELEASED);
+            let sample = bench.motors[axis].period(AxisCommand::OFF);
             bench.loops.tick(axis, &tick_at(now, sample), &mut current, &bench.signals, &mut bench.hardware);
             while servo.samples[axis].dequeue().is_some() {
                 samples[axis] += 1;

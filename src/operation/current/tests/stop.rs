@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use super::super::super::testing::Stop;
 use super::*;
-use crate::hal::DriveCommand;
+use crate::hal::{CURRENT_RATE_HZ, DriveCommand};
 use crate::motor::Calibrator;
 use crate::motor::calibration::tests::SETTINGS;
 use crate::operation::Order;
@@ -50,7 +50,7 @@ impl Scene {
     /// Both axes brake because one counter froze.
     fn braking() -> Self {
         let mut scene = Self::following();
-        scene.signals.inhibit.raise(Cause::EncoderFrozen);
+        scene.signals.inhibit.raise(InhibitReason::EncoderFrozen);
         scene.run(60);
         assert_eq!(scene.hardware.bridges, [AxisCommand::BRAKE; 2]);
         scene
@@ -66,7 +66,7 @@ impl Scene {
         let calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
         let stage = scene.loops.axis_state_mut(axis).expect("two axes");
         assert_eq!(stage.obey(Order::Calibrate(calibrator)), None);
-        for _ in 0..24_000 {
+        for _ in 0..CURRENT_RATE_HZ {
             scene.run(1);
             if scene.hardware.bridges[axis].enabled {
                 return scene;
@@ -166,7 +166,7 @@ fn a_stop_while_an_axis_loses_its_position_leaves_no_bridge_on() {
         // That tick makes both axes brake.
         let mut undisturbed = scene.with_stop(u32::MAX);
         (0..=axis).for_each(|axis| undisturbed.tick(axis));
-        assert_eq!(undisturbed.signals.inhibit.causes(), Cause::EncoderPlace.bit());
+        assert_eq!(undisturbed.signals.inhibit.causes(), InhibitReason::EncoderPosition.bit());
         assert_eq!(undisturbed.hardware.bridges, [AxisCommand::BRAKE; 2]);
         scene.stop_everywhere("losing its position", axis);
     }

@@ -58,7 +58,7 @@ fn the_hottest_bridge_derates_and_an_open_thermistor_leaves_no_torque() {
 
 #[test]
 fn each_gate_driver_is_recorded_with_its_own_status() {
-    let statuses = |bench: &Bench, cause: Cause| -> Vec<(u8, u32)> {
+    let statuses = |bench: &Bench, cause: InhibitReason| -> Vec<(u8, u32)> {
         let status = |record: &Record<2>| match record {
             Record::GateDriver { why, joint, status } if *why == cause.name() => Some((*joint, *status)),
             _ => None,
@@ -67,17 +67,17 @@ fn each_gate_driver_is_recorded_with_its_own_status() {
     };
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
     bench.hardware.gate_status = [0x0481_0300, 0x0402_0301];
-    bench.signals.inhibit.raise(Cause::GateFault);
+    bench.signals.inhibit.raise(InhibitReason::GateFault);
     bench.hold(false, false);
     let expected = [(1, 0x0481_0300), (2, 0x0402_0301)];
-    assert_eq!(statuses(&bench, Cause::GateFault), expected, "once");
-    assert_eq!(statuses(&bench, Cause::GateConfiguration), []);
+    assert_eq!(statuses(&bench, InhibitReason::GateFault), expected, "once");
+    assert_eq!(statuses(&bench, InhibitReason::GateConfiguration), []);
     // The second driver loses its registers and no longer answers.
     bench.hardware.gates_hold[1] = false;
     bench.hardware.gate_status[1] = u32::MAX;
     bench.hold(false, false);
-    assert_eq!(statuses(&bench, Cause::GateConfiguration), [(1, 0x0481_0300), (2, u32::MAX)]);
-    assert_ne!(bench.signals.inhibit.causes() & Cause::GateConfiguration.bit(), 0);
+    assert_eq!(statuses(&bench, InhibitReason::GateConfiguration), [(1, 0x0481_0300), (2, u32::MAX)]);
+    assert_ne!(bench.signals.inhibit.causes() & InhibitReason::GateConfiguration.bit(), 0);
 }
 
 #[test]
@@ -112,10 +112,10 @@ fn a_reference_is_refused_while_a_joint_moves() {
 
 #[test]
 fn a_reset_restarts_the_gate_drivers_and_clears_old_reasons() {
-    for (configures, causes) in [(true, 0), (false, Cause::GateConfiguration.bit())] {
+    for (configures, causes) in [(true, 0), (false, InhibitReason::GateConfiguration.bit())] {
         let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
         bench.hardware.gates_configure = configures;
-        bench.signals.inhibit.raise(Cause::GateFault);
+        bench.signals.inhibit.raise(InhibitReason::GateFault);
         for _ in 0..25 {
             bench.hold(false, true);
         }

@@ -40,7 +40,7 @@ fn changed_gains_or_limits_are_a_fault_within_64_ms() {
     assert_eq!(fault(&bench), None);
     bench.tick();
     assert_eq!(fault(&bench), Some(Fault { code: FaultCode::Parameters, joint: 0 }));
-    assert_eq!(bench.signals.permission(), Permission::Released);
+    assert_eq!(bench.signals.permission(), Permission::Off);
 }
 
 #[test]

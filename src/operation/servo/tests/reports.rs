@@ -76,7 +76,7 @@ fn a_refusal_by_the_bus_is_recorded_once_with_and_without_zeros_of_the_joints() 
 #[test]
 fn samples_leave_space_for_other_events() {
     let mut bench = Bench::enabled();
-    bench.is_heard = false;
+    bench.is_received = false;
     bench.run(2000);
     let statistics = &bench.signals.statistics;
     let room = bench.ends.servo.events.capacity() - RESERVED;

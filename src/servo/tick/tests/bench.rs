@@ -74,7 +74,7 @@ pub(super) struct Bench {
 impl Bench {
     pub(super) fn enabled(joints: [JointConfiguration; 2], plant: Plant) -> Self {
         let servo = Servo::new(joints).expect("a sensible configuration");
-        let mut bench = Self { servo, plants: [plant; 2], command: DriveCommand::RELEASED };
+        let mut bench = Self { servo, plants: [plant; 2], command: DriveCommand::OFF };
         for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
             let here = bench.pose();
             bench.tick(MotionState::at_rest(here), None::<&NoModel>, Some(power));

@@ -1,21 +1,12 @@
+use crate::base::random::Random;
 use crate::formats::recording::JointSeries;
 use crate::run::logging_errors::samples::*;
-
-/// Reproducible noise, uniform in +-1.
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-}
 
 const STEPS: usize = 10_000;
 
 /// Twenty seconds at 500 Hz: an angle in steps of `count` and a torque of 10 N m with noise of `noise_nm`.
 fn recording(count: f64, noise_nm: f64) -> Recording {
-    let mut noise = Noise(7);
+    let mut noise = Random::new("samples", 7);
     let time_s: Vec<f64> = (0..STEPS).map(|sample| sample as f64 * 0.002).collect();
     let position_rad = time_s
         .iter()
@@ -24,7 +15,9 @@ fn recording(count: f64, noise_nm: f64) -> Recording {
         .collect();
     let torque_nm = time_s
         .iter()
-        .map(|time| 7.0 * (3.1 * time).sin() + 3.0 * (11.0 * time).sin() + noise_nm * noise.next())
+        .map(|time| {
+            7.0 * (3.1 * time).sin() + 3.0 * (11.0 * time).sin() + noise_nm * noise.uniform(-1.0, 1.0)
+        })
         .collect();
     Recording {
         file: "a.csv".into(),

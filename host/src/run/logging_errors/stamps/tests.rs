@@ -1,20 +1,15 @@
+use crate::base::random::Random;
 use crate::formats::recording::JointSeries;
 use crate::run::logging_errors::stamps::*;
 
 /// Twenty seconds at 500 Hz, sampled at `times + sampled * normal` and stamped `stamped * normal` wrong.
 fn recording(sampled_s: f64, stamped_s: f64) -> Recording {
-    let mut random = 3_u64;
-    let mut uniform = || {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (random >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    // Twelve uniform numbers: normal to a few per cent.
-    let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+    let mut random = Random::new("stamps", 3);
     let mut rows: Vec<(f64, f64)> = (0..10_000)
         .map(|sample| {
-            let time = f64::from(sample) * 0.002 + sampled_s * normal();
+            let time = f64::from(sample) * 0.002 + sampled_s * random.normal();
             let angle = 0.8 * (3.1 * time).sin() + 0.2 * (8.3 * time).cos();
-            (time + stamped_s * normal(), (angle / 3.8e-4).round() * 3.8e-4)
+            (time + stamped_s * random.normal(), (angle / 3.8e-4).round() * 3.8e-4)
         })
         .collect();
     let mut stamps: Vec<f64> = rows.iter().map(|row| row.0).collect();

@@ -16,7 +16,7 @@ const GREATEST_SPREAD: u16 = 80;
 const GREATEST_TRAVEL: u16 = 3;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Zeros {
+pub(super) struct CurrentOffsets {
     ticks: u32,
     sums: [u32; 2],
     least: [u16; 2],
@@ -24,7 +24,7 @@ pub(super) struct Zeros {
     counter: u16,
 }
 
-impl Zeros {
+impl CurrentOffsets {
     pub(super) fn tick(&mut self, sample: &AxisSample) -> Result<Option<[f32; 2]>, Refusal> {
         self.ticks += 1;
         if self.ticks <= SETTLE_TICKS {
@@ -47,7 +47,7 @@ impl Zeros {
         for (shunt, phase) in [Phase::B, Phase::C].into_iter().enumerate() {
             let off = (self.sums[shunt] / MEAN_TICKS).abs_diff(MIDDLE);
             if off > u32::from(ZERO_SPREAD_CODES) || self.most[shunt] - self.least[shunt] > GREATEST_SPREAD {
-                return Err(Refusal::ShuntZero(phase));
+                return Err(Refusal::ShuntOffset(phase));
             }
         }
         Ok(Some(self.sums.map(|sum| sum as f32 / MEAN_TICKS as f32)))
@@ -60,26 +60,26 @@ mod tests {
 
     #[test]
     fn offsets_are_the_mean_of_exactly_4096_samples() {
-        let mut zeros = Zeros::default();
+        let mut current_offsets = CurrentOffsets::default();
         for tick in 1..SETTLE_TICKS + MEAN_TICKS {
             // Samples before the last of those to settle are in no mean and in no spread.
             let code = if tick < SETTLE_TICKS { 3000 } else { 2050 };
             let sample = AxisSample { shunt_codes: [code, 2040], ..AxisSample::default() };
-            assert_eq!(zeros.tick(&sample), Ok(None), "{tick}");
+            assert_eq!(current_offsets.tick(&sample), Ok(None), "{tick}");
         }
         let sample = AxisSample { shunt_codes: [2050, 2040], ..AxisSample::default() };
-        assert_eq!(zeros.tick(&sample), Ok(Some([2050.0, 2040.0])));
+        assert_eq!(current_offsets.tick(&sample), Ok(Some([2050.0, 2040.0])));
     }
 
     #[test]
     fn a_rotor_that_moves_by_more_than_three_counts_is_refused() {
         for (travel, refused) in [(3_u16, false), (4, true), (5, true), (0_u16.wrapping_sub(4), true)] {
-            let mut zeros = Zeros::default();
+            let mut current_offsets = CurrentOffsets::default();
             let at =
                 |encoder_count| AxisSample { shunt_codes: [2048; 2], encoder_count, ..AxisSample::default() };
-            (0..SETTLE_TICKS).for_each(|_| assert_eq!(zeros.tick(&at(7)), Ok(None)));
+            (0..SETTLE_TICKS).for_each(|_| assert_eq!(current_offsets.tick(&at(7)), Ok(None)));
             let expected = if refused { Err(Refusal::Turning) } else { Ok(None) };
-            assert_eq!(zeros.tick(&at(travel.wrapping_add(7))), expected, "{travel}");
+            assert_eq!(current_offsets.tick(&at(travel.wrapping_add(7))), expected, "{travel}");
         }
     }
 }

@@ -1,14 +1,15 @@
 //! Interrupt vectors of this board, each one call.
-#![expect(unsafe_code, reason = "to unmask a vector, and to tell an executor of its own interrupt")]
+#![expect(unsafe_code, reason = "unmasking vectors, and entering an executor from its own interrupt")]
 
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{
     ADC, CAN1_RX0, CAN1_TX, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS,
 };
 
-use super::hardware::Odrive;
-use super::{can, contacts, encoder};
-use crate::task;
+use super::{SIGNALS, bus, current, servo};
+use crate::board::odrive_v3_6::hardware::Odrive;
+use crate::board::odrive_v3_6::{can, contacts, encoder};
+use crate::safety::InhibitReason;
 
 /// Enables the interrupts of emergency stop, converters, index pulses, bus and servo; their data must
 /// be in place.
@@ -24,18 +25,18 @@ pub fn enable() {
 
 #[interrupt]
 fn ADC() {
-    task::current::interrupt();
+    current::interrupt();
 }
 
 #[interrupt]
 fn OTG_HS() {
-    task::servo::interrupt(&mut Odrive);
+    servo::interrupt(&mut Odrive);
 }
 
 #[interrupt]
 fn EXTI4() {
     if contacts::stop_came() {
-        task::stop();
+        SIGNALS.inhibit.raise(InhibitReason::EmergencyStop);
     }
 }
 
@@ -55,7 +56,7 @@ fn EXTI15_10() {
 fn CAN1_RX0() {
     for _ in 0..3 {
         let Some(frame) = can::receive() else { break };
-        if !task::bus::received(frame) {
+        if !bus::received(frame) {
             can::lose();
         }
     }
@@ -65,7 +66,7 @@ fn CAN1_RX0() {
 #[interrupt]
 fn CAN1_TX() {
     can::acknowledge();
-    task::bus::interrupt(&mut Odrive);
+    bus::interrupt(&mut Odrive);
 }
 
 /// Executor of the housekeeping.

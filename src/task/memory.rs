@@ -1,17 +1,18 @@
-//! Placement of large objects.
+//! Static memory of the large objects.
 //!
 //! The identification lies in core-coupled memory; its window of blocks, half of the total, in
 //! the other memory.
-#![expect(unsafe_code, reason = "a section of the linker's")]
+#![expect(unsafe_code, reason = "sections of the linker script")]
 
 use static_cell::{ConstStaticCell, StaticCell};
 
+use super::bus;
+use super::leg::{JOINTS, LEG, Leg, LegIdentification, LegWindow};
+use super::storage::StorageTask;
+use crate::board::odrive_v3_6::flash::Flash;
+use crate::board::odrive_v3_6::settings::flash::BYTES;
 use crate::leg::Filters;
-use super::flash::Flash;
-use super::settings::flash::BYTES;
-use crate::task::{EventQueue, bus};
-use crate::task::keep::Keeper;
-use crate::task::leg::{JOINTS, LEG, Leg, LegIdentification, LegWindow};
+use crate::operation::EventQueue;
 
 #[unsafe(link_section = ".ccm.identification")]
 static IDENTIFICATION: StaticCell<LegIdentification> = StaticCell::new();
@@ -30,7 +31,7 @@ pub fn identification() -> Option<(&'static Leg, &'static mut LegIdentification)
     Some((configuration, built))
 }
 
-#[unsafe(link_section = ".ccm.told")]
+#[unsafe(link_section = ".ccm.events")]
 static EVENTS: StaticCell<EventQueue<JOINTS>> = StaticCell::new();
 
 /// Queue from the servo to the identification, once.
@@ -56,9 +57,9 @@ pub fn bus() -> &'static mut bus::Memory {
     bus::Memory::place(BUS.uninit())
 }
 
-/// Keeper of the stored parameters, once; `None` where the flash has no valid size.
+/// Task state of the storage, once; `None` where the flash has no valid size.
 #[inline(never)]
-pub fn keeper() -> Option<&'static mut Keeper> {
-    static KEEPER: StaticCell<Keeper> = StaticCell::new();
-    Some(KEEPER.init(Keeper::new(Flash::new(), BYTES)?))
+pub fn storage() -> Option<&'static mut StorageTask> {
+    static STORAGE: StaticCell<StorageTask> = StaticCell::new();
+    Some(STORAGE.init(StorageTask::new(Flash::new(), BYTES)?))
 }

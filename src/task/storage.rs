@@ -1,6 +1,6 @@
 //! Thread: persistent storage on the board.
 //!
-//! Connects flash, watchdog, inhibits and queues to `operation::Storing` and `store::Keeper`.
+//! Connects flash, watchdog, inhibits and queues to `operation::Storing` and `store::Storage`.
 //!
 //! During a flash write all software stalls, and with it every clock (`board::odrive_v3_6::flash`). The
 //! current loops do not count the gap while `storing` is raised (`operation::CurrentLoops`). An emergency
@@ -13,14 +13,14 @@ use embassy_time::Timer;
 use heapless::spsc::Consumer;
 
 use super::SIGNALS;
-use super::bus::KeeperEnd;
+use super::bus::StorageEnd;
 use super::leg::{JOINTS, Leg};
 use crate::board::odrive_v3_6::flash::Flash;
 use crate::board::odrive_v3_6::hardware::Odrive;
-use crate::bus::device::Keeping;
+use crate::bus::device::StoreCommand;
 use crate::bus::{LONGEST, StoredNode};
 use crate::leg::{IdentifiedModel, StoredCalibration};
-use crate::operation::{Calibrated, Keep, Storing};
+use crate::operation::{Calibrated, StoreJob, Storing};
 use crate::store::{self, Permit, Store};
 
 /// Polling interval of the task, ms.
@@ -30,10 +30,10 @@ const ROUND_MS: u64 = 10;
 const STEP_MS: u64 = 1;
 
 /// The store and the ends of its queues.
-pub struct Keeper {
-    keeper: store::Keeper<Flash, JOINTS>,
+pub struct StorageTask {
+    storage: store::Storage<Flash, JOINTS>,
     storing: Storing,
-    ends: Option<(KeeperEnd, Consumer<'static, Calibrated>)>,
+    ends: Option<(StorageEnd, Consumer<'static, Calibrated>)>,
 }
 
 /// Polls a future that must complete at once: the flash driver never waits.
@@ -44,34 +44,34 @@ fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
     }
 }
 
-impl Keeper {
-    /// Creates a keeper on this flash; `None` where its size is invalid, which no board of this kind has.
+impl StorageTask {
+    /// Creates the storage on this flash; `None` where its size is invalid, which no board of this kind has.
     #[must_use]
     pub fn new(flash: Flash, bytes: u32) -> Option<Self> {
         let store = Store::new(flash, 0..bytes).ok()?;
-        Some(Self { keeper: store::Keeper::new(store), storing: Storing::new(), ends: None })
+        Some(Self { storage: store::Storage::new(store), storing: Storing::new(), ends: None })
     }
 
     /// Sets the sources of requests and of calibrations.
-    pub fn serve(&mut self, end: KeeperEnd, calibrated: Consumer<'static, Calibrated>) {
+    pub fn serve(&mut self, end: StorageEnd, calibrated: Consumer<'static, Calibrated>) {
         self.ends = Some((end, calibrated));
     }
 
     /// Reads the stored objects of a node; returns their length, or `None` where they cannot be read.
     pub fn objects(&mut self, joint: usize, into: &mut [u8; LONGEST]) -> Option<usize> {
-        at_once(self.keeper.objects(joint, into))?
+        at_once(self.storage.objects(joint, into))?
     }
 
     /// Stored calibrations.
     pub fn calibrations(&mut self) -> [Option<StoredCalibration>; JOINTS] {
-        core::array::from_fn(|axis| at_once(self.keeper.calibration(axis))?)
+        core::array::from_fn(|axis| at_once(self.storage.calibration(axis))?)
     }
 
     /// Stored model and its generation, if there is one; `None` where it cannot be read or belongs
     /// to another leg.
     pub fn model(&mut self, leg: &Leg) -> Option<Option<(IdentifiedModel<JOINTS>, u32)>> {
-        match at_once(self.keeper.model())?? {
-            Some(kept) => Some(Some((leg.restore(&kept.model).ok()?, kept.provenance.generation))),
+        match at_once(self.storage.model())?? {
+            Some(record) => Some(Some((leg.restore(&record.model).ok()?, record.provenance.generation))),
             None => Some(None),
         }
     }
@@ -79,17 +79,17 @@ impl Keeper {
 
 /// Stores or resets; returns `None` on failure.
 #[inline(never)]
-fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep<JOINTS>) -> Option<()> {
+fn change(storage: &mut store::Storage<Flash, JOINTS>, job: &mut StoreJob<JOINTS>) -> Option<()> {
     let permit = Permit::under(SIGNALS.permission())?;
-    keep.generation = match keep.what {
-        Keeping::Defaults => {
-            let generation = at_once(keeper.forget(&permit))??;
+    job.generation = match job.what {
+        StoreCommand::Defaults => {
+            let generation = at_once(storage.forget(&permit))??;
             SIGNALS.forget_stored();
             generation
         }
-        Keeping::All => {
-            let objects = keep.objects.each_ref().map(StoredNode::bytes);
-            at_once(keeper.keep(&permit, objects, keep.generation))??
+        StoreCommand::All => {
+            let objects = job.objects.each_ref().map(StoredNode::bytes);
+            at_once(storage.save(&permit, objects, job.generation))??
         }
     };
     Some(())
@@ -97,27 +97,27 @@ fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep<JOINTS>) ->
 
 /// Task of the storage.
 #[embassy_executor::task]
-pub async fn run(keeper: &'static mut Keeper) -> ! {
-    let Keeper { keeper, storing, ends } = keeper;
+pub async fn run(storage: &'static mut StorageTask) -> ! {
+    let StorageTask { storage, storing, ends } = storage;
     loop {
         Timer::after_millis(ROUND_MS).await;
         storing.look_after(&SIGNALS.inhibit, &mut Odrive);
         let Some((end, calibrated)) = ends else { continue };
         if let Some(model) = end.accepted.dequeue() {
-            keeper.accept(model);
+            storage.accept(model);
         }
         while let Some((axis, calibration)) = calibrated.dequeue() {
-            keeper.calibrated(axis, calibration);
+            storage.calibrated(axis, calibration);
         }
-        let Some(mut keep) = end.storage.given() else { continue };
-        keep.done = loop {
-            let change = || change(keeper, &mut keep).is_some();
+        let Some(mut job) = end.storage.given() else { continue };
+        job.done = loop {
+            let change = || change(storage, &mut job).is_some();
             match storing.step(&SIGNALS.inhibit, SIGNALS.permission(), &mut Odrive, change) {
                 Some(done) => break done,
                 None => Timer::after_millis(STEP_MS).await,
             }
         };
-        drop(keep);
+        drop(job);
         end.storage.give_back();
     }
 }

@@ -12,22 +12,22 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 
-use super::{KeptCalibration, KeptModel, Key, Permit, Store};
+use super::{CalibrationRecord, Key, ModelRecord, Permit, Store};
 use crate::leg::StoredCalibration;
 
 const OBJECTS: [Key; 2] = [Key::Objects1, Key::Objects2];
 const CALIBRATIONS: [Key; 2] = [Key::Calibration1, Key::Calibration2];
 
 /// Stored parameters and pending results of a leg with `N` joints, two at most; see the module.
-pub struct Keeper<F: NorFlash, const N: usize> {
+pub struct Storage<F: NorFlash, const N: usize> {
     store: Store<F>,
     /// Model accepted since the last "save".
-    accepted: Option<KeptModel<N>>,
+    accepted: Option<ModelRecord<N>>,
     /// Calibration that each axis passed, if it can be stored.
     calibrations: [Option<StoredCalibration>; N],
 }
 
-impl<F: NorFlash, const N: usize> Keeper<F, N> {
+impl<F: NorFlash, const N: usize> Storage<F, N> {
     /// Manager without pending results.
     #[must_use]
     pub const fn new(store: Store<F>) -> Self {
@@ -35,7 +35,7 @@ impl<F: NorFlash, const N: usize> Keeper<F, N> {
     }
 
     /// Sets the pending model; replaces an older pending one.
-    pub fn accept(&mut self, model: KeptModel<N>) {
+    pub fn accept(&mut self, model: ModelRecord<N>) {
         self.accepted = Some(model);
     }
 
@@ -55,24 +55,24 @@ impl<F: NorFlash, const N: usize> Keeper<F, N> {
     /// Reads the stored calibration of an axis; `None` if there is none or it cannot be read.
     pub async fn calibration(&mut self, axis: usize) -> Option<StoredCalibration> {
         let key = *CALIBRATIONS.get(axis)?;
-        self.store.load::<KeptCalibration>(key).await.ok()?.map(|kept| kept.0)
+        self.store.load::<CalibrationRecord>(key).await.ok()?.map(|record| record.0)
     }
 
     /// Reads the stored model. The outer `None` means that reading failed, the inner that no model is stored.
-    pub async fn model(&mut self) -> Option<Option<KeptModel<N>>> {
+    pub async fn model(&mut self) -> Option<Option<ModelRecord<N>>> {
         self.store.load(Key::Model).await.ok()
     }
 
     /// Stores these objects of each node and all pending results. Returns the number of models stored so far;
     /// `generation` is that number before. `None` if anything failed.
-    pub async fn keep(&mut self, permit: &Permit, objects: [&[u8]; N], generation: u32) -> Option<u32> {
+    pub async fn save(&mut self, permit: &Permit, objects: [&[u8]; N], generation: u32) -> Option<u32> {
         for (key, bytes) in OBJECTS.into_iter().zip(objects) {
             self.store.save_bytes(permit, key, bytes).await.ok()?;
         }
         // All or none: with only one, the neighbouring axis would be checked against an older calibration.
         if self.calibrations.iter().all(Option::is_some) {
             for (key, calibration) in CALIBRATIONS.into_iter().zip(self.calibrations.iter().flatten()) {
-                self.store.save(permit, key, &KeptCalibration(*calibration)).await.ok()?;
+                self.store.save(permit, key, &CalibrationRecord(*calibration)).await.ok()?;
             }
         }
         let Some(mut model) = self.accepted else { return Some(generation) };

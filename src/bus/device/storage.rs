@@ -1,17 +1,17 @@
 //! Stored parameters of a board: what a host wants stored, the outcome, and what a reset recalls.
 
-use super::{Device, Keeping};
+use super::{Device, StoreCommand};
 use crate::bus::drive::{Axis, USUAL_KBIT};
 use crate::bus::nmt::{NmtState, Reset};
 use crate::bus::node::{Node, Storing};
 use crate::bus::node_id::NodeId;
-use crate::bus::stored_parameters::{StoredNode, kept_bit_rate, kept_node_id};
+use crate::bus::stored_parameters::{StoredNode, stored_bit_rate, stored_node_id};
 
 impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// Sets the stored parameters of a node and restarts all nodes with theirs.
     pub fn recall(&mut self, joint: usize, bytes: &[u8]) {
-        if let Some(kept) = self.kept.get_mut(joint) {
-            *kept = StoredNode::of(bytes);
+        if let Some(stored) = self.stored.get_mut(joint) {
+            *stored = StoredNode::of(bytes);
         }
         // The new node-ID of one node may free the default of another.
         self.pending_reset = [Some(Reset::Node); N];
@@ -19,10 +19,10 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Node-IDs according to these parameters; `None` if two nodes would share one.
-    fn numbers(&self, kept: &[StoredNode; N]) -> Option<[NodeId; N]> {
+    fn numbers(&self, stored: &[StoredNode; N]) -> Option<[NodeId; N]> {
         let mut numbers = self.own;
-        for (number, kept) in numbers.iter_mut().zip(kept) {
-            *number = kept_node_id(kept.bytes()).unwrap_or(*number);
+        for (number, stored) in numbers.iter_mut().zip(stored) {
+            *number = stored_node_id(stored.bytes()).unwrap_or(*number);
         }
         let is_other = |place: usize, number| numbers.iter().skip(place + 1).all(|other| other != number);
         numbers.iter().enumerate().all(|(place, number)| is_other(place, number)).then_some(numbers)
@@ -33,11 +33,11 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         if self.pending_reset.iter().all(Option::is_none) {
             return;
         }
-        let numbers = self.numbers(&self.kept).unwrap_or(self.own);
+        let numbers = self.numbers(&self.stored).unwrap_or(self.own);
         for (joint, number) in numbers.into_iter().enumerate() {
             let Some(reset) = self.pending_reset.get_mut(joint).and_then(Option::take) else { continue };
-            let (Some(node), Some(axis), Some(kept)) =
-                (self.nodes.get_mut(joint), self.axes.get_mut(joint), self.kept.get(joint))
+            let (Some(node), Some(axis), Some(stored)) =
+                (self.nodes.get_mut(joint), self.axes.get_mut(joint), self.stored.get(joint))
             else {
                 continue;
             };
@@ -45,7 +45,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             if node.id() != number || node.state() != NmtState::Initialising {
                 *node = Node::new(number, self.identity);
             }
-            node.recall(kept.bytes(), reset, axis);
+            node.recall(stored.bytes(), reset, axis);
             node.goes_on(self.controller, self.storing);
             if reset == Reset::Node {
                 // The bit rate applies to all nodes; without a stored one the default returns.
@@ -64,14 +64,14 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// Takes the pending store request and encodes each node's objects into `into`. The objects apply only
     /// after [`Self::stored`]. If they do not fit, or two nodes would share a node-ID, nothing is stored;
     /// hosts receive FF0D, then 5530.
-    pub fn take_store(&mut self, into: &mut [StoredNode; N]) -> Option<Keeping> {
+    pub fn take_store(&mut self, into: &mut [StoredNode; N]) -> Option<StoreCommand> {
         self.recall_reset();
         let defaults = self.leg.take_store()?;
         let mut fits = true;
-        for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(into.iter_mut()) {
-            *kept = StoredNode::NOTHING;
+        for ((node, axis), stored) in self.nodes.iter_mut().zip(&mut self.axes).zip(into.iter_mut()) {
+            *stored = StoredNode::NOTHING;
             if !defaults {
-                fits &= node.keep_into(axis, kept).is_ok();
+                fits &= node.store_into(axis, stored).is_ok();
             }
         }
         if !fits || self.numbers(into).is_none() {
@@ -80,14 +80,14 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             self.storing(Storing::Failed);
             return None;
         }
-        Some(if defaults { Keeping::Defaults } else { Keeping::All })
+        Some(if defaults { StoreCommand::Defaults } else { StoreCommand::All })
     }
 
     /// Reports the outcome of storing `objects`. A reset recalls them only after success; after a failure it
     /// recalls the previous ones.
     pub fn stored(&mut self, done: bool, objects: &[StoredNode; N]) {
         if done {
-            self.kept = *objects;
+            self.stored = *objects;
         }
         // No frame was received during the flash write, and a board's clock did not advance.
         self.nodes.iter_mut().for_each(|node| node.stood_still(self.looked_us));
@@ -103,6 +103,6 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// Returns the stored bit rate, kbit/s.
     #[must_use]
     pub fn bit_rate(&self) -> Option<u16> {
-        self.kept.iter().find_map(|kept| kept_bit_rate(kept.bytes()))
+        self.stored.iter().find_map(|stored| stored_bit_rate(stored.bytes()))
     }
 }

@@ -8,16 +8,16 @@ fn stored_parameters_are_recalled_by_a_reset_and_a_start() {
     bench.write(1, 0x6065, 0, 12_345, 4);
     bench.write(2, 0x2002, 0, 500, 2);
     bench.save(1);
-    let (what, kept) = bench.store(true).expect("a store request");
-    assert_eq!((what, bench.store(true)), (Keeping::All, None));
+    let (what, stored) = bench.store(true).expect("a store request");
+    assert_eq!((what, bench.store(true)), (StoreCommand::All, None));
     assert_eq!(bench.device.bit_rate(), Some(500));
     bench.write(1, 0x6065, 0, 1, 4);
     bench.send(0, &[129, 0]);
     assert_eq!(bench.read(1, 0x6065), 12_345);
     // Another start, with the stored bytes.
     let mut other = Bench::new();
-    for (joint, kept) in kept.iter().enumerate() {
-        other.device.recall(joint, kept.bytes());
+    for (joint, stored) in stored.iter().enumerate() {
+        other.device.recall(joint, stored.bytes());
     }
     other.run(4);
     assert_eq!(
@@ -25,7 +25,7 @@ fn stored_parameters_are_recalled_by_a_reset_and_a_start() {
         (12_345, 500, Some(500))
     );
     other.load(2);
-    assert_eq!(other.store(true), Some((Keeping::Defaults, [StoredNode::NOTHING; 2])));
+    assert_eq!(other.store(true), Some((StoreCommand::Defaults, [StoredNode::NOTHING; 2])));
     other.send(0, &[129, 0]);
     assert_eq!((other.read(1, 0x6065), other.device.bit_rate()), (87_266, None));
 }
@@ -43,12 +43,12 @@ fn a_failed_store_leaves_the_recalled_parameters_unchanged() {
         bench.save(1);
     };
     set(&mut bench, 11_111, 500);
-    assert_eq!(bench.store(false).map(|(what, _)| what), Some(Keeping::All));
+    assert_eq!(bench.store(false).map(|(what, _)| what), Some(StoreCommand::All));
     assert_eq!(window(&mut bench), (87_266, None));
     set(&mut bench, 22_222, 250);
     // Until the store has finished, the old parameters apply.
     let mut objects = [StoredNode::NOTHING; 2];
-    assert_eq!(bench.device.take_store(&mut objects), Some(Keeping::All));
+    assert_eq!(bench.device.take_store(&mut objects), Some(StoreCommand::All));
     assert_eq!(window(&mut bench), (87_266, None));
     bench.device.stored(true, &objects);
     assert_eq!(window(&mut bench), (22_222, Some(250)));
@@ -56,7 +56,7 @@ fn a_failed_store_leaves_the_recalled_parameters_unchanged() {
     assert!(bench.store(false).is_some());
     assert_eq!(window(&mut bench), (22_222, Some(250)));
     bench.load(2);
-    assert_eq!(bench.store(false).map(|(what, _)| what), Some(Keeping::Defaults));
+    assert_eq!(bench.store(false).map(|(what, _)| what), Some(StoreCommand::Defaults));
     assert_eq!(window(&mut bench), (22_222, Some(250)));
     bench.load(2);
     assert!(bench.store(true).is_some());
@@ -124,7 +124,7 @@ fn two_nodes_never_share_a_node_id() {
     // Conflicting bytes from another source: both nodes use their defaults.
     let mut other = Bench::new();
     let mut bytes = [0; 5];
-    crate::bus::write_kept(crate::bus::dictionary::Object::at(0x2001, 0), 1, &mut bytes).expect("it fits");
+    crate::bus::write_stored(crate::bus::dictionary::Object::at(0x2001, 0), 1, &mut bytes).expect("it fits");
     other.device.recall(1, &bytes);
     assert_eq!(other.device.nodes().each_ref().map(|node| node.id().number()), [1, 2]);
     // The first node's change frees its node-ID for the second, in either order of recall.
@@ -162,14 +162,14 @@ fn both_nodes_share_the_bit_rate() {
     // Default bit rate again, written at the other node.
     bench.write(1, 0x2002, 0, 1000, 2);
     bench.save(1);
-    let (_, kept) = bench.store(true).expect("a store request");
+    let (_, stored) = bench.store(true).expect("a store request");
     assert_eq!((bench.device.bit_rate(), bench.read(2, 0x2002)), (None, 1000));
-    assert_eq!(kept, [StoredNode::NOTHING; 2]);
+    assert_eq!(stored, [StoredNode::NOTHING; 2]);
     // A bit rate stored for one node only, as by an older version or a tool, applies to both and survives a
     // reset of either.
     let mut bytes = [0; 8];
     let rate = crate::bus::dictionary::Object::at(0x2002, 0);
-    let length = crate::bus::write_kept(rate, 500, &mut bytes).expect("it fits");
+    let length = crate::bus::write_stored(rate, 500, &mut bytes).expect("it fits");
     for joint in 0..2 {
         let mut other = Bench::new();
         other.device.recall(joint, &bytes[..length]);
