@@ -217,7 +217,10 @@ fn the_error_of_a_missing_file_lists_the_shipped_legs() {
 fn a_leg_without_truth_or_with_another_number_of_joints_cannot_be_simulated() {
     let arm = LegFile::load("dp-a0").expect("shipped");
     let fault = arm.description::<2>().expect_err("no truth").to_string();
-    assert_eq!(fault, "dp-a0: joint `shoulder` has no `truth`: the leg cannot be simulated");
+    assert_eq!(
+        fault,
+        "dp-a0: joint `shoulder` has no `truth`: the leg cannot be simulated; `replay` identifies from a recording"
+    );
     let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     let fault = leg.description::<3>().expect_err("two joints").to_string();
     assert_eq!(fault, "x2-wearer-75kg: has 2 joints, not 3");

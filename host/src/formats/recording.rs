@@ -41,7 +41,7 @@ pub const MINIMUM_DURATION_S: f64 = 1.0;
 pub const MINIMUM_RATE_HZ: f64 = 10.0;
 /// Tolerance on the rate for rounded time stamps.
 const RATE_TOLERANCE: f64 = 1.001;
-/// Deviation from a whole turn within which a jump of an angle is one, rad, and samples for which it stays.
+/// Deviation from a whole turn within which a jump of an angle is one, rad, and samples on either side.
 const TURN_TOLERANCE_RAD: f64 = 0.5;
 const TURN_SAMPLES: usize = 5;
 /// Longest step that is not a gap, s.
@@ -205,11 +205,13 @@ impl Recording {
     fn check_turns(&self) -> Result<(), (usize, Fault)> {
         for (joint, series) in self.joints.iter().enumerate() {
             let angles = &series.position_rad;
-            let is_turn = |change: f64| (change.abs() - TAU).abs() < TURN_TOLERANCE_RAD;
-            let stays = |sample: usize| {
-                angles.get(sample + TURN_SAMPLES).is_none_or(|later| is_turn(later - angles[sample - 1]))
+            let is_turn =
+                |later: f64, earlier: f64| ((later - earlier).abs() - TAU).abs() < TURN_TOLERANCE_RAD;
+            let turn = |&sample: &usize| {
+                let (before, after) = angles.split_at(sample);
+                let mut pairs = after.iter().zip(before.iter().rev()).take(TURN_SAMPLES);
+                pairs.all(|(later, earlier)| is_turn(*later, *earlier))
             };
-            let turn = |sample: &usize| is_turn(angles[*sample] - angles[sample - 1]) && stays(*sample);
             if let Some(sample) = (1..angles.len()).find(turn) {
                 let jump = angles[sample] - angles[sample - 1];
                 return Err((sample, Fault::Wrapped { joint: joint + 1, jump }));

@@ -154,7 +154,7 @@ fn bad_input_names_the_option() {
         ("--seconds 0", "--seconds: 0"),
         ("--hours -1", "unexpected argument"),
         ("--hours=-1", "--hours: -1 is not from 0 to 1000"),
-        ("--fault C2 --every-tick", "--every-tick: is about the emergency stop"),
+        ("--fault C2 --every-tick", "--every-tick: tests the emergency stop (row X1)"),
         ("--leg mujoco-leg", "has no [joint.motor]"),
         ("--blind --fault K4", "--blind: of --fault K4 not every one"),
         ("--blind --fault K4 --fault C2", "--blind: of --fault K4 --fault C2 not every one"),

@@ -1,7 +1,7 @@
 //! Exciting motion of the leg "x2-wearer-75kg" (geometry 7deaf1c6bfce81bb), joints hip, knee.
 //! Written by `scarab excite`.
 //!
-//! Model's (D-H) joint angles. A leg takes it only after `LegConfiguration::prove`.
+//! Model's (D-H) joint angles. A leg accepts it only after `LegConfiguration::prove`.
 
 use scarab::motion::ExcitationTable;
 
