@@ -45,8 +45,8 @@ impl BandwidthReport {
         let hz = self.bandwidth_hz;
         let stribeck = self.stribeck_hz.map_or(String::new(), |lower| {
             format!(
-                "; the encoders are too coarse to search for Stribeck friction, which would bias friction unseen: \
-                 `--bandwidth {lower}` searches for it"
+                "; an encoder (by the leg file's `encoder` or the recording) is too coarse to search for Stribeck friction, \
+                 which would bias friction unseen: `--bandwidth {lower}` searches for it"
             )
         });
         if self.is_chosen {

@@ -315,17 +315,20 @@ fn identified<const N: usize, const B: usize>(
             model.stribeck_choice[joint] == Choice::Off || model.stribeck_choice(joint).is_possible()
         })
     };
+    let largest = |hz: f64| {
+        let tenths = (LOWEST_TENTHS..=(10.0 * hz) as u32).rev().map(|tenth| f64::from(tenth) / 10.0);
+        std::iter::once(hz).chain(tenths).find(|hz| searches_stribeck(*hz))
+    };
     // A misfit above the noise may be vibration; a larger bandwidth passes more of it. Beyond the bandwidths
     // of the Stribeck search it would bias friction.
     let proposed_hz = if noise_is_known && !options.chooses_bandwidth {
         let larger = chosen_bandwidth(leg, &background, options)?;
-        Some(larger).filter(|hz| *hz > options.bandwidth_hz && searches_stribeck(*hz))
+        largest(larger).filter(|hz| *hz > options.bandwidth_hz)
     } else {
         None
     };
     let stribeck_hz = if options.estimator == Estimator::Robust && !searches_stribeck(options.bandwidth_hz) {
-        let tenths = (LOWEST_TENTHS..(10.0 * options.bandwidth_hz) as u32).rev();
-        tenths.map(|tenth| f64::from(tenth) / 10.0).find(|hz| searches_stribeck(*hz))
+        largest(options.bandwidth_hz)
     } else {
         None
     };

@@ -138,10 +138,8 @@ fn a_larger_bandwidth_is_proposed_where_the_encoders_allow_it() {
     let (there, _) = replay(&samples(), &format!("--bandwidth {proposed}"), 0);
     assert!(there["bandwidth_proposed_hz"].is_null());
     let (chosen, _) = replay(&samples(), "--bandwidth auto", 0);
-    assert_eq!(
-        (number(&chosen["bandwidth_hz"]), chosen["bandwidth_proposed_hz"].is_null()),
-        (proposed, true)
-    );
+    // The proposal stays where Stribeck friction is searched for.
+    assert!(number(&chosen["bandwidth_hz"]) >= proposed && chosen["bandwidth_proposed_hz"].is_null());
 }
 
 /// A search at a bandwidth where one count's pulse looks like a Stribeck curve would find the encoder.

@@ -136,8 +136,8 @@ pub fn likely<const N: usize, const B: usize>(
 
 /// A joint that hardly moved as the cause.
 fn motionless(findings: &[FindingReport]) -> Option<CauseReport> {
-    let finding =
-        findings.iter().find(|finding| !finding.passed && matches!(finding.test, "speed" | "rows"))?;
+    let failed = |test: &str| findings.iter().find(|finding| !finding.passed && finding.test == test);
+    let finding = failed("speed").or_else(|| failed("rows"))?;
     Some(CauseReport {
         name: "motion",
         joint: finding.joint,
