@@ -65,7 +65,7 @@ fn twenty_complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
                 ..SimulationOptions::of_seed(seed)
             })
             .collect();
-        identify_many::<2, 13>(&leg(), &options).expect("they run").runs
+        identify_many::<2, 13>(&leg(), &options).expect("they run")
     };
     let ideal = runs(DriveModel::Ideal, &[]);
     let compared = |full: &[RunReport]| -> Vec<(String, f64)> {

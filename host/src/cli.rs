@@ -12,6 +12,7 @@ mod identify;
 mod image;
 mod kept;
 mod leg_options;
+pub mod merge;
 mod model;
 mod monitor;
 mod motor;
@@ -31,13 +32,14 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use crate::base::error::{EXIT_REFUSED, ToolError};
 use crate::base::names::BY_CARGO;
 use crate::base::output;
+use crate::formats::shard::Argument;
 
 /// Identifies legs, simulated or recorded. Exit codes: 0 accepted, 3 refused, 2 bad input.
 #[derive(Parser, Debug)]
 #[command(name = "scarab", version, max_term_width = HELP_WIDTH, after_help = "\
 Options without a command belong to `identify`. `scarab COMMAND --help` has an example of each.
 Your data: replay, predict, compare, export, regressor. Simulation: identify, excite, monitor, motor, serve.
-Board: fw, flash-leg, trace, eds, kept. The project's own checks: faults, emulate.")]
+Board: fw, flash-leg, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -87,6 +89,9 @@ enum Command {
     /// time, and reaction.
     #[command(after_help = "Example: cargo sim faults --fault X1 --seeds 2")]
     Faults(faults::FaultsArguments),
+    /// Join the shards of `identify --seeds` or `faults` to the report of the whole campaign.
+    #[command(after_help = "Example: cargo sim merge shard-1.json shard-2.json --json runs.json")]
+    Merge(merge::MergeArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     #[command(after_help = "Example: cargo sim regressor --leg my-leg.toml --states states.csv")]
     Regressor(regressor::RegressorArguments),
@@ -124,8 +129,8 @@ pub fn main() -> ExitCode {
     match words.get(1).and_then(|word| word.to_str()) {
         None if is_by_cargo => {
             words.extend(MAIN_JOB.map(Into::into));
-            return perform(words, |cli: &Cli| {
-                let code = run(&cli.command)?;
+            return perform(words, |cli: &Cli, stated| {
+                let code = run(&cli.command, stated)?;
                 output::print(NEXT)?;
                 Ok(code)
             });
@@ -136,18 +141,20 @@ pub fn main() -> ExitCode {
         }
         Some(_) => {}
     }
-    perform(words, |cli: &Cli| run(&cli.command))
+    perform(words, |cli: &Cli, stated| run(&cli.command, stated))
 }
 
-/// Parses these words, checks their files, and runs the command. Prints an error; returns the exit code.
+/// Parses these words, checks their files, and runs the command. Prints an error; returns the exit code. The
+/// command receives the stated arguments of a campaign ([`arguments::stated`]).
 pub fn perform<C: CommandFactory + FromArgMatches>(
     words: Vec<OsString>,
-    run: impl FnOnce(&C) -> Result<u8, ToolError>,
+    run: impl FnOnce(&C, Vec<Argument>) -> Result<u8, ToolError>,
 ) -> ExitCode {
     let description = C::command();
     let matches = description.clone().get_matches_from(words);
     let command = C::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    match arguments::check(&description, &matches).and_then(|()| run(&command)) {
+    let checked = arguments::check(&description, &matches);
+    match checked.and_then(|()| run(&command, arguments::stated(&description, &matches))) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
             let kind = if error.exit_code() == EXIT_REFUSED { "refused" } else { "error" };
@@ -158,10 +165,11 @@ pub fn perform<C: CommandFactory + FromArgMatches>(
 }
 
 /// Runs one command and returns its exit code.
-fn run(command: &Command) -> Result<u8, ToolError> {
+fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
     match command {
         Command::Excite(arguments) => excite::run(arguments),
-        Command::Faults(arguments) => faults::run(arguments),
+        Command::Faults(arguments) => faults::run(arguments, stated),
+        Command::Merge(arguments) => merge::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
         Command::Trace(arguments) => trace::run(arguments),
         Command::Predict(arguments) => predict::run(arguments),
@@ -176,7 +184,7 @@ fn run(command: &Command) -> Result<u8, ToolError> {
         Command::Emulate(arguments) => emulate::emulate(arguments),
         Command::Fw(arguments) => image::firmware(arguments),
         Command::FlashLeg(arguments) => image::flash_leg(arguments),
-        Command::Identify(arguments) => identify::run(arguments),
+        Command::Identify(arguments) => identify::run(arguments, stated),
     }
 }
 

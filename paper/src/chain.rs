@@ -13,8 +13,6 @@
 
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
 use scarab::ident::record::recorder::STILL_SPEED;
 use scarab::ident::{
     Ends, Estimator, Factor, FilteredRows, LARGEST_STILL_SHARE, Plan, Record, Recorder, RowModel, Smoothed,
@@ -25,6 +23,7 @@ use scarab::motion::{MotionError, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::Second;
 use scarab_host::base::error::ToolError;
+use scarab_host::base::words::exact;
 use scarab_host::formats::leg_file::{LegFile, Switch};
 use scarab_host::leg::motions::EXCITATION_CYCLES;
 use scarab_host::leg::setup;
@@ -33,6 +32,7 @@ use scarab_host::report::series::Series;
 use scarab_host::rig::options::SimulationOptions;
 use scarab_host::rig::pair::{Context, PENDING, TAPS};
 use scarab_host::run::simulate::{Driven, drive};
+use serde::{Deserialize, Serialize};
 
 use super::verification;
 
@@ -111,19 +111,25 @@ pub struct Verification {
 type Samples = Vec<Smoothed<f32, JOINTS>>;
 
 /// Prediction error of one joint's torque.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// Mean absolute noise-free torque, N m; all percentages refer to it.
+    #[serde(with = "exact")]
     pub mean_absolute_nm: f64,
     /// Equation (33) against the noise-free torque, N m.
+    #[serde(with = "exact")]
     pub rms_nm: f64,
     /// Equation (33) against the noise-free torque, percent.
+    #[serde(with = "exact")]
     pub percent_of_truth: f64,
     /// Error against the measured torque behind the same filter, percent.
+    #[serde(with = "exact")]
     pub percent_filtered: f64,
     /// Error against every measured sample as logged, percent.
+    #[serde(with = "exact")]
     pub percent_of_samples: f64,
     /// Share of the rows excluded because the joint was at rest.
+    #[serde(with = "exact")]
     pub still_share: f64,
 }
 
@@ -260,27 +266,6 @@ fn smoothed(
         filtered.extend(progress.rows.map(|rows| rows.torque));
     }
     Ok((instants, filtered))
-}
-
-/// Runs many cases in parallel; results are in the order of `options`.
-pub fn run_all<O: Sync, R: Send>(
-    what: &str,
-    options: &[O],
-    run: impl Fn(&O) -> Result<R, ToolError> + Sync,
-) -> Result<Vec<R>, ToolError> {
-    let progress = ProgressBar::new(options.len() as u64).with_message(what.to_owned());
-    let style = "{msg:28} {bar:32} {pos}/{len} runs, {elapsed} elapsed, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(style) {
-        progress.set_style(style);
-    }
-    let runs = options.par_iter().map(|options| {
-        let run = run(options);
-        progress.inc(1);
-        run
-    });
-    let runs = runs.collect();
-    progress.finish_and_clear();
-    runs
 }
 
 /// Median: the mean of the two middle values if their number is even.

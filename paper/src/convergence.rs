@@ -37,6 +37,7 @@ use scarab::motion::Periodic;
 use scarab::units::Second;
 use scarab_host::base::error::ToolError;
 use scarab_host::base::number::Number;
+use scarab_host::base::shard::Shard;
 use scarab_host::base::table::Table;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile, Switch};
 use scarab_host::leg::motions::{EXCITATION_CYCLES, most_informative};
@@ -44,14 +45,15 @@ use scarab_host::rig::options::SimulationOptions;
 use scarab_host::rig::pair::{Context, Pair};
 use serde::Serialize;
 
-use super::chain::{LEG, median, run_all};
+use super::chain::{LEG, median};
+use super::runs::{RowRuns, run_rows};
 use super::seeds::ReportSeed;
 use super::swarm_bench::{Bench, SHARE, Trial};
-use super::{PaperOptions, Part, Section};
+use super::{Part, Section};
 use crate::digits::percent;
 
 /// Runs per row by default.
-const RUNS: u64 = 100;
+pub const RUNS: u64 = 100;
 /// Exciting motions, each the best of some random ones.
 const MOTIONS: u64 = 5;
 const CANDIDATES: u64 = 40;
@@ -122,24 +124,44 @@ pub struct ConvergenceReport {
     pub rows: Vec<ConvergenceRow>,
 }
 
-/// Runs the experiment and formats its section.
-pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
-    let report = report(options.seeds.unwrap_or(RUNS))?;
+/// Formats the section of these runs.
+pub fn section(runs: &[Vec<[Option<Trial>; 4]>]) -> Result<Section, ToolError> {
+    let report = report(runs);
     Section::of(Part::Convergence, "convergence", &report, words(&report), Vec::new())
 }
 
-/// Runs the experiment.
-pub fn report(runs: u64) -> Result<ConvergenceReport, ToolError> {
+/// Sets of unknowns with name and goal for 95 % of the runs; the last only for legs with a link
+/// along gravity.
+type Unknowns = [(&'static str, u32); 4];
+
+/// Each leg's searches share their records.
+const LEGS: [(&str, Unknowns); 4] = [
+    ("chain", PLAIN),
+    ("leg", PLAIN),
+    ("leg", [("whole-raw", 75), ("whole-base", 75), ("28", 125), ("28-seen", 125)]),
+    (
+        "chain",
+        [("whole-raw", 75), ("whole-base", 75), ("whole-log-cholesky", 75), ("whole-log-cholesky-seen", 75)],
+    ),
+];
+const PLAIN: Unknowns = [("raw", 75), ("base", 75), ("log-cholesky", 75), ("log-cholesky-seen", 75)];
+
+/// Runs all searches, leg by leg.
+pub fn runs(runs: u64, shard: Shard) -> Result<RowRuns<[Option<Trial>; 4]>, ToolError> {
     let (chain, leg) = (LegFile::load(LEG)?, LegFile::load(DEFAULT_LEG)?);
-    let plain = [("raw", 75), ("base", 75), ("log-cholesky", 75), ("log-cholesky-seen", 75)];
-    let mut rows = leg_rows::<3, 28>(&links_and_friction(&chain), "chain", plain, runs)?;
-    rows.extend(leg_rows::<2, 13>(&links_and_friction(&leg), "leg", plain, runs)?);
-    let whole = [("whole-raw", 75), ("whole-base", 75), ("28", 125), ("28-seen", 125)];
-    rows.extend(leg_rows::<2, 13>(&leg, "leg", whole, runs)?);
-    let log = [("whole-log-cholesky", 75), ("whole-log-cholesky-seen", 75)];
-    let whole = [("whole-raw", 75), ("whole-base", 75), log[0], log[1]];
-    rows.extend(leg_rows::<3, 28>(&chain, "chain", whole, runs)?);
-    Ok(ConvergenceReport { motions: MOTIONS, tolerance: SHARE, precision: "f32", rows })
+    Ok(vec![
+        leg_runs::<3, 28>(&links_and_friction(&chain), LEGS[0].0, runs, shard)?,
+        leg_runs::<2, 13>(&links_and_friction(&leg), LEGS[1].0, runs, shard)?,
+        leg_runs::<2, 13>(&leg, LEGS[2].0, runs, shard)?,
+        leg_runs::<3, 28>(&chain, LEGS[3].0, runs, shard)?,
+    ])
+}
+
+/// Reports these runs.
+#[must_use]
+pub fn report(runs: &[Vec<[Option<Trial>; 4]>]) -> ConvergenceReport {
+    let rows = LEGS.iter().zip(runs).flat_map(|((name, unknowns), trials)| leg_rows(name, unknowns, trials));
+    ConvergenceReport { motions: MOTIONS, tolerance: SHARE, precision: "f32", rows: rows.collect() }
 }
 
 /// The leg without rotors and offsets, in the plant and in the estimate, as in the paper.
@@ -154,38 +176,42 @@ fn links_and_friction(leg: &LegFile) -> LegFile {
     leg
 }
 
-/// Sets of unknowns with name and goal for 95 % of the runs; the last only for legs with a link
-/// along gravity.
-fn leg_rows<const N: usize, const B: usize>(
+/// Runs the searches of one leg.
+fn leg_runs<const N: usize, const B: usize>(
     leg: &LegFile,
     name: &str,
-    unknowns: [(&str, u32); 4],
     runs: u64,
-) -> Result<Vec<ConvergenceRow>, ToolError> {
+    shard: Shard,
+) -> Result<Vec<[Option<Trial>; 4]>, ToolError> {
     let motions = motions::<N, B>(leg)?;
-    let seeds: Vec<_> = ReportSeed::searches(runs).collect();
-    let trials = run_all(&format!("convergence, {name}"), &seeds, |&seed| {
+    let rows = run_rows(&format!("convergence, {name}"), &[()], runs, shard, |(), seed| {
+        let seed = seed.search();
         let motion = motions[(seed % MOTIONS) as usize];
         let (context, record) = recorded::<N, B>(leg, seed, motion)?;
         let bench = Bench::new(&context, record, seed)?;
         let (whole, seen) = bench.whole_legs();
         Ok([Some(bench.raw()), Some(bench.base()), Some(whole), seen])
     })?;
+    Ok(rows.into_iter().flatten().collect())
+}
+
+/// Rows of one leg.
+fn leg_rows(name: &str, unknowns: &Unknowns, trials: &[[Option<Trial>; 4]]) -> Vec<ConvergenceRow> {
     let row = |index: usize| {
-        let all = || trials.iter().filter_map(|trials: &[Option<Trial>; 4]| trials[index]);
+        let all = || trials.iter().filter_map(|trials| trials[index]);
         let (unknowns, goal_iterations_p95) = unknowns[index];
         all().next()?;
         Some(ConvergenceRow {
             problem: format!("{name}-{unknowns}"),
             dimension: all().map(|trial| trial.dimension).max().unwrap_or(0),
-            runs,
+            runs: trials.len() as u64,
             rows: Spent::of(all().map(|trial| trial.reached[0])),
             over_samples: Spent::of(all().map(|trial| trial.reached[1])),
             lowest_chi2: all().map(|trial| trial.lowest).fold(f64::INFINITY, f64::min).into(),
             goal_iterations_p95,
         })
     };
-    Ok((0..4).filter_map(row).collect())
+    (0..4).filter_map(row).collect()
 }
 
 /// Value that 95 % do not exceed.

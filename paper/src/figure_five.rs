@@ -45,7 +45,7 @@ struct Way {
 
 /// Draws the four figures.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
-    let runs = options.seeds.unwrap_or(RUNS);
+    let runs = options.runs(RUNS);
     let mut figures = Vec::new();
     let mut markdown = format!(
         "Paths and traces of the first of {runs} runs; curves are medians with the middle half of the runs.\n"

@@ -12,24 +12,24 @@ use scarab::ident::Plan;
 use scarab_host::base::error::ToolError;
 use scarab_host::base::names::plan_name;
 use scarab_host::base::number::Number;
+use scarab_host::base::shard::Shard;
 use scarab_host::base::table::Table;
 use scarab_host::leg::motions::EXCITATION_CYCLES;
 use serde::Serialize;
 
-use super::chain::{
-    self, ChainOptions, ChainRun, Fit, JOINTS, LEG, NOISE_PERCENT, PLANS, median, predicted, run_all,
-};
+use super::chain::{self, ChainOptions, ChainRun, Fit, JOINTS, LEG, NOISE_PERCENT, PLANS, median, predicted};
 use super::printed::FIGURE_SEVEN;
+use super::runs::{RowRuns, run_rows};
 use super::seeds::ReportSeed;
 use super::verification::{self, ROTATION_DEG};
-use super::{PaperOptions, Part, Section};
+use super::{Part, Section};
 use crate::digits::{number, percent};
 use crate::figures::chain::{Curve, JointTorque, Level, drawn};
 
 /// Runs per method and noise level by default.
-const RUNS: u64 = 10;
+pub const RUNS: u64 = 10;
 /// Levels of noise, percent.
-const LEVELS: [f64; 7] = [0.0, 1.0, 3.0, 5.0, NOISE_PERCENT, 10.0, 15.0];
+pub const LEVELS: [f64; 7] = [0.0, 1.0, 3.0, 5.0, NOISE_PERCENT, 10.0, 15.0];
 /// Goal for the prediction against the noise-free torque at [`NOISE_PERCENT`], percent.
 pub const GOAL_PERCENT: f64 = 2.0;
 
@@ -104,9 +104,9 @@ pub struct VerificationReport {
     pub lines: Vec<FitLine>,
 }
 
-/// Runs the experiment, draws it and formats its section.
-pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
-    let report = report(options.seeds.unwrap_or(RUNS), &LEVELS)?;
+/// Draws and formats the section of these runs.
+pub fn section(runs: &[Vec<[Fit; JOINTS]>]) -> Result<Section, ToolError> {
+    let report = report(runs, &LEVELS)?;
     let leg = chain::leg()?;
     let shown = |plan| {
         chain::run(
@@ -123,9 +123,8 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     Section::of(Part::FigureSeven, "verification", &report, words(&report), vec![figure])
 }
 
-/// Runs the experiment.
-pub fn report(runs: u64, levels: &[f64]) -> Result<VerificationReport, ToolError> {
-    let leg = chain::leg()?;
+/// Cases at these levels of noise.
+fn cases(levels: &[f64]) -> Vec<Case> {
     let mut cases: Vec<Case> = Vec::new();
     for &noise_percent in levels {
         cases.extend(PLANS.map(|plan| Case { noise_percent, ..Case::of(plan) }));
@@ -134,24 +133,34 @@ pub fn report(runs: u64, levels: &[f64]) -> Result<VerificationReport, ToolError
         cases.push(Case { method: UNWEIGHTED, ..Case::of(Plan::OneTime) });
         cases.push(Case { method: LONG, cycles: LONG_CYCLES, ..Case::of(Plan::Sequential) });
     }
-    let seeds = ReportSeed::searches(runs);
-    let all: Vec<_> = cases.iter().flat_map(|case| seeds.clone().map(move |seed| (*case, seed))).collect();
-    let fits = run_all("Figure 7", &all, |(case, seed)| {
+    cases
+}
+
+/// Runs every method at these levels of noise.
+pub fn runs(runs: u64, levels: &[f64], shard: Shard) -> Result<RowRuns<[Fit; JOINTS]>, ToolError> {
+    let leg = chain::leg()?;
+    run_rows("Figure 7", &cases(levels), runs, shard, |case, seed| {
         let options = ChainOptions {
             noise_percent: case.noise_percent,
             cycles: case.cycles,
-            ..ChainOptions::new(*seed, case.plan)
+            ..ChainOptions::new(seed.search(), case.plan)
         };
         let run = chain::run(&leg, &leg, &options)?;
         let values = if case.method == UNWEIGHTED { &run.unweighted } else { &run.values };
         Ok(run.verification.fit(&run.model, values))
-    })?;
-    let of_cases = cases.iter().zip(fits.chunks(seeds.count()));
+    })
+}
+
+/// Reports these runs.
+pub fn report(runs: &[Vec<[Fit; JOINTS]>], levels: &[f64]) -> Result<VerificationReport, ToolError> {
+    let leg = chain::leg()?;
+    let cases = cases(levels);
+    let of_cases = cases.iter().zip(runs);
     let lines =
         of_cases.flat_map(|(case, fits)| (0..JOINTS).map(move |joint| line(case, joint, fits))).collect();
     Ok(VerificationReport {
         leg: LEG,
-        runs,
+        runs: runs.first().map_or(0, Vec::len) as u64,
         links_alone_nm: verification::links_alone(&leg)?,
         paper: FIGURE_SEVEN.map(|(rms_nm, percent)| PaperFit { rms_nm, percent }),
         lines,

@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | [`table_three`] | the test functions as printed and as intended, and their least values |
 //! | [`table_four`] | the searches on test functions: [`searches`], [`contenders`], [`goals`] |
+//! | [`runs`] | runs of all rows, whole or a shard of them |
 //! | [`figure_five`] | paths of the searches in the plane |
 //! | [`problems`], [`seeds`], [`recorder`], [`statistics`] | test problems, seeds, evaluation counts, rows |
 //! | [`tables_five_six`] | parameters of the three-joint chain, by both methods |
@@ -34,6 +35,7 @@ pub mod problems;
 pub mod ranks;
 pub mod raw_cost;
 pub mod recorder;
+pub mod runs;
 pub mod searches;
 pub mod seeds;
 pub mod seen_links;
@@ -45,9 +47,13 @@ pub mod tables_five_six;
 pub mod verification;
 
 use scarab_host::base::error::ToolError;
+use scarab_host::base::shard::Shard;
+use scarab_host::formats::shard::ShardResults;
 use scarab_host::report::SCHEMA;
 use scarab_host::view::figures::Figure;
 use serde_json::{Map, Value};
+
+use crate::runs::{PaperRuns, joined};
 
 /// A table, figure or experiment of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +85,12 @@ impl Part {
         Self::LoadChange,
     ];
 
+    /// Whether the part has runs that shards divide.
+    #[must_use]
+    pub const fn is_divided(self) -> bool {
+        !matches!(self, Self::TableThree | Self::FigureFive)
+    }
+
     /// Name of the part's section in a document ([`scarab_host::view::document`]).
     #[must_use]
     pub const fn section_name(self) -> &'static str {
@@ -101,6 +113,16 @@ pub struct PaperOptions {
     pub seeds: Option<u64>,
     /// Searches of Table IV; empty for all.
     pub algorithms: Vec<contenders::Algorithm>,
+    /// Part of the runs of each row.
+    pub shard: Shard,
+}
+
+impl PaperOptions {
+    /// Runs of each row of a part with this default.
+    #[must_use]
+    pub fn runs(&self, default: u64) -> u64 {
+        self.seeds.unwrap_or(default)
+    }
 }
 
 /// Results of one part.
@@ -136,20 +158,70 @@ impl Section {
     }
 }
 
-/// Runs these parts, one after the other.
-pub fn run(parts: &[Part], options: &PaperOptions) -> Result<Vec<Section>, ToolError> {
-    parts.iter().map(|part| section(*part, options)).collect()
+/// Runs of these parts, whole or a shard of them.
+pub fn runs(parts: &[Part], options: &PaperOptions) -> Result<PaperRuns, ToolError> {
+    let (mut all, shard) = (PaperRuns::default(), options.shard);
+    for part in parts {
+        match part {
+            Part::TableThree | Part::FigureFive => {}
+            Part::TableFour => all.table_four = Some(table_four::runs(options)?),
+            Part::TablesFiveSix => {
+                let runs = options.runs(tables_five_six::RUNS);
+                all.tables_five_six = Some(tables_five_six::runs(runs, shard)?);
+            }
+            Part::FigureSeven => {
+                let runs = options.runs(figure_seven::RUNS);
+                all.figure_seven = Some(figure_seven::runs(runs, &figure_seven::LEVELS, shard)?);
+            }
+            Part::LoadChange => {
+                all.load_change = Some(load_change::runs(options.runs(load_change::RUNS), shard)?);
+            }
+            Part::Convergence => {
+                all.convergence = Some(convergence::runs(options.runs(convergence::RUNS), shard)?);
+            }
+        }
+    }
+    Ok(all)
 }
 
-fn section(part: Part, options: &PaperOptions) -> Result<Section, ToolError> {
+/// Sections of these parts, from the runs of all shards.
+pub fn sections(
+    parts: &[Part],
+    options: &PaperOptions,
+    mut shards: Vec<ShardResults<PaperRuns>>,
+) -> Result<Vec<Section>, ToolError> {
+    parts.iter().map(|part| section(*part, options, &mut shards)).collect()
+}
+
+fn section(
+    part: Part,
+    options: &PaperOptions,
+    shards: &mut [ShardResults<PaperRuns>],
+) -> Result<Section, ToolError> {
+    let name = part.section_name();
     match part {
         Part::TableThree => table_three::section(),
-        Part::TableFour => table_four::section(options),
         Part::FigureFive => figure_five::section(options),
-        Part::TablesFiveSix => tables_five_six::section(options),
-        Part::FigureSeven => figure_seven::section(options),
-        Part::LoadChange => load_change::section(options),
-        Part::Convergence => convergence::section(options),
+        Part::TableFour => {
+            let runs = joined(shards, name, options.runs(table_four::RUNS), |runs| &mut runs.table_four)?;
+            table_four::section(options, &runs)
+        }
+        Part::TablesFiveSix => {
+            let runs = options.runs(tables_five_six::RUNS);
+            tables_five_six::section(&joined(shards, name, runs, |runs| &mut runs.tables_five_six)?)
+        }
+        Part::FigureSeven => {
+            let runs = options.runs(figure_seven::RUNS);
+            figure_seven::section(&joined(shards, name, runs, |runs| &mut runs.figure_seven)?)
+        }
+        Part::LoadChange => {
+            let runs = options.runs(load_change::RUNS);
+            load_change::section(&joined(shards, name, runs, |runs| &mut runs.load_change)?)
+        }
+        Part::Convergence => {
+            let runs = options.runs(convergence::RUNS);
+            convergence::section(&joined(shards, name, runs, |runs| &mut runs.convergence)?)
+        }
     }
 }
 

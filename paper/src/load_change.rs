@@ -17,20 +17,21 @@ use scarab::ident::Plan;
 use scarab::model::{INERTIAL_PARAMETERS, Payload, RigidBody};
 use scarab_host::base::error::ToolError;
 use scarab_host::base::number::Number;
+use scarab_host::base::shard::Shard;
 use scarab_host::base::table::Table;
 use scarab_host::formats::leg_file::{LegFile, LinkParameters};
 use scarab_host::leg::setup;
-use scarab_host::report::BaseReport;
-use serde::Serialize;
+use scarab_host::report::{BaseReport, RunReport};
+use serde::{Deserialize, Serialize};
 
-use super::chain::{self, ChainOptions, ChainRun, JOINTS, NOISE_PERCENT, ROOM, median, run_all};
+use super::chain::{self, ChainOptions, Fit, JOINTS, NOISE_PERCENT, ROOM, median};
 use super::printed::TABLE_FIVE;
-use super::seeds::ReportSeed;
-use super::{PaperOptions, Part, Section};
+use super::runs::{RowRuns, run_rows};
+use super::{Part, Section};
 use crate::digits::{number, percent};
 
 /// Pairs of runs by default.
-const RUNS: u64 = 20;
+pub const RUNS: u64 = 20;
 /// Offset of the second identification's noise seed.
 const SECOND_STREAM: u64 = 1_000_000;
 /// Changes above this limit count as detected, standard deviations.
@@ -95,44 +96,59 @@ pub struct LoadReport {
     pub torque: Vec<LoadedTorque>,
 }
 
-/// Runs the experiment and formats its section.
-pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
-    let report = report(options.seeds.unwrap_or(RUNS))?;
+/// Formats the section of these runs.
+pub fn section(runs: &[Vec<LoadRun>]) -> Result<Section, ToolError> {
+    let report = report(runs)?;
     Section::of(Part::LoadChange, "load_change", &report, words(&report), Vec::new())
 }
 
 /// Chain before and after the load change.
-struct Pair {
-    before: ChainRun,
-    after: ChainRun,
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoadRun {
+    before: RunReport,
+    after: RunReport,
+    /// Torque errors of the loaded chain with each set of parameters, in the order of [`SETS`].
+    fits: [[Fit; JOINTS]; SETS.len()],
 }
 
-/// Runs the experiment.
-pub fn report(runs: u64) -> Result<LoadReport, ToolError> {
+/// Names of the parameter sets.
+const SETS: [&str; 3] = ["before the change", "before the change, the known load added", "identified again"];
+
+/// Identifies the chain before and after the change, for each seed.
+pub fn runs(runs: u64, shard: Shard) -> Result<RowRuns<LoadRun>, ToolError> {
     let leg = chain::leg()?;
     let load = load();
     let heavier = loaded(&leg, &load)?;
-    let seeds: Vec<_> = ReportSeed::searches(runs).collect();
-    let pairs = run_all("load change", &seeds, |&seed| {
+    let model = setup::row_model::<JOINTS, ROOM>(&leg)?;
+    let added = model.base.project(&load.parameters::<JOINTS>()).map(|value| value as f32);
+    run_rows("load change", &[()], runs, shard, |(), seed| {
         let options = |seed| ChainOptions::new(seed, Plan::OneTime);
-        Ok(Pair {
-            before: chain::run(&leg, &leg, &options(seed))?,
-            after: chain::run(&heavier, &leg, &options(seed + SECOND_STREAM))?,
-        })
-    })?;
-    let names = pairs.first().map(|pair| pair.before.report.base_parameters.clone()).unwrap_or_default();
+        let before = chain::run(&leg, &leg, &options(seed.search()))?;
+        let after = chain::run(&heavier, &leg, &options(seed.search() + SECOND_STREAM))?;
+        let with_load = core::array::from_fn(|base| before.values[base] + added[base]);
+        let sets = [before.values, with_load, after.values];
+        let fits = sets.map(|values| after.verification.fit(&after.model, &values));
+        Ok(LoadRun { before: before.report, after: after.report, fits })
+    })
+}
+
+/// Reports these runs.
+pub fn report(runs: &[Vec<LoadRun>]) -> Result<LoadReport, ToolError> {
+    let (leg, load) = (chain::leg()?, load());
+    let pairs = runs.first().map_or(&[][..], Vec::as_slice);
+    let names = pairs.first().map(|pair| pair.before.base_parameters.clone()).unwrap_or_default();
     let thigh = leg.joints[JOINTS - 1].dh.a;
-    let masses = differences(&pairs, "HX2R");
+    let masses = differences(pairs, "HX2R");
     let mass = |of: fn(&Difference) -> f64| median(masses.iter().map(of)).map(|value| value / thigh).into();
     Ok(LoadReport {
         load_kg: load.mass,
         load_place_m: load.place.into(),
-        runs,
+        runs: pairs.len() as u64,
         noise_percent: NOISE_PERCENT,
-        changed_of_table_v: changed(&pairs),
-        lines: names.iter().map(|base| change_line(base, &pairs)).collect(),
+        changed_of_table_v: changed(pairs),
+        lines: names.iter().map(|base| change_line(base, pairs)).collect(),
         mass_found_kg: [mass(|change| change.found), mass(|change| change.sigma)],
-        torque: torque(&leg, &load, &pairs)?,
+        torque: torque(pairs),
     })
 }
 
@@ -167,9 +183,9 @@ struct Difference {
     truth: f64,
 }
 
-fn differences(pairs: &[Pair], name: &str) -> Vec<Difference> {
-    let named = |run: &ChainRun| run.report.base_parameters.iter().find(|base| base.name == name).cloned();
-    let of = |pair: &Pair| -> Option<Difference> {
+fn differences(pairs: &[LoadRun], name: &str) -> Vec<Difference> {
+    let named = |run: &RunReport| run.base_parameters.iter().find(|base| base.name == name).cloned();
+    let of = |pair: &LoadRun| -> Option<Difference> {
         let (before, after) = (named(&pair.before)?, named(&pair.after)?);
         Some(Difference {
             found: after.value.known()? - before.value.known()?,
@@ -180,7 +196,7 @@ fn differences(pairs: &[Pair], name: &str) -> Vec<Difference> {
     pairs.iter().filter_map(of).collect()
 }
 
-fn change_line(base: &BaseReport, pairs: &[Pair]) -> ChangeLine {
+fn change_line(base: &BaseReport, pairs: &[LoadRun]) -> ChangeLine {
     let changes = differences(pairs, &base.name);
     let of = |value: fn(&Difference) -> f64| -> Number { median(changes.iter().map(value)).into() };
     let count = changes.len().max(1) as f64;
@@ -203,10 +219,10 @@ fn change_line(base: &BaseReport, pairs: &[Pair]) -> ChangeLine {
     }
 }
 
-fn changed(pairs: &[Pair]) -> Vec<&'static str> {
+fn changed(pairs: &[LoadRun]) -> Vec<&'static str> {
     let Some(pair) = pairs.first() else { return Vec::new() };
-    let truth = |run: &ChainRun, name: &str| {
-        run.report.parameters.iter().find(|found| found.name == name).and_then(|found| found.truth.known())
+    let truth = |run: &RunReport, name: &str| {
+        run.parameters.iter().find(|found| found.name == name).and_then(|found| found.truth.known())
     };
     let moves = |name: &&str| match (truth(&pair.before, name), truth(&pair.after, name)) {
         (Some(before), Some(after)) => (after - before).abs() > 1e-9,
@@ -215,27 +231,13 @@ fn changed(pairs: &[Pair]) -> Vec<&'static str> {
     TABLE_FIVE.iter().map(|line| line.name).filter(moves).collect()
 }
 
-/// Selects the base parameters for the prediction.
-type Values<'v> = dyn Fn(&Pair) -> [f32; ROOM] + 'v;
-
-fn torque(leg: &LegFile, load: &Payload<f64>, pairs: &[Pair]) -> Result<Vec<LoadedTorque>, ToolError> {
-    let model = setup::row_model::<JOINTS, ROOM>(leg)?;
-    let added = model.base.project(&load.parameters::<JOINTS>()).map(|value| value as f32);
-    let with_load = |pair: &Pair| core::array::from_fn(|base| pair.before.values[base] + added[base]);
-    let sets: [(&'static str, &Values<'_>); 3] = [
-        ("before the change", &|pair| pair.before.values),
-        ("before the change, the known load added", &with_load),
-        ("identified again", &|pair| pair.after.values),
-    ];
-    let percent_of = |values: &Values<'_>| -> [Number; JOINTS] {
-        let fits: Vec<_> =
-            pairs.iter().map(|pair| pair.after.verification.fit(&pair.after.model, &values(pair))).collect();
-        core::array::from_fn(|joint| median(fits.iter().map(|fits| fits[joint].percent_of_truth)).into())
+fn torque(pairs: &[LoadRun]) -> Vec<LoadedTorque> {
+    let percent_of = |set: usize| -> [Number; JOINTS] {
+        let of = |joint: usize| pairs.iter().map(move |pair| pair.fits[set][joint].percent_of_truth);
+        core::array::from_fn(|joint| median(of(joint)).into())
     };
-    Ok(sets
-        .into_iter()
-        .map(|(parameters, values)| LoadedTorque { parameters, percent_of_truth: percent_of(values) })
-        .collect())
+    let sets = SETS.into_iter().enumerate();
+    sets.map(|(set, parameters)| LoadedTorque { parameters, percent_of_truth: percent_of(set) }).collect()
 }
 
 fn words(report: &LoadReport) -> String {

@@ -3,14 +3,18 @@
 use std::process::ExitCode;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Parser, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use scarab_host::base::error::{EXIT_ACCEPTED, ToolError};
 use scarab_host::base::output;
-use scarab_host::cli::arguments::{Output, OutputFolder, Updated};
+use scarab_host::base::shard::Shard;
+use scarab_host::cli::arguments::{Input, Output, OutputFolder, Updated};
 use scarab_host::cli::common::write_json;
+use scarab_host::cli::merge::parsed;
 use scarab_host::cli::perform;
+use scarab_host::formats::shard::{Argument, CampaignHeader, Program, ShardFiles, ShardResults};
 use scarab_host::view::{document, figures};
 use scarab_paper::contenders::Algorithm;
+use scarab_paper::runs::PaperRuns;
 use scarab_paper::{PaperOptions, Part};
 
 /// Limit of the runs.
@@ -50,8 +54,10 @@ enum FigureArgument {
 
 /// Reproduce the paper's tables and figures, and compare them with its printed results.
 #[derive(Parser, Debug)]
-#[command(name = "scarab-paper", version)]
+#[command(name = "scarab-paper", version, args_conflicts_with_subcommands = true)]
 struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
     /// Table to compute; may be repeated. Default: all tables and figures.
     #[arg(long, value_enum, ignore_case = true)]
     table: Vec<TableArgument>,
@@ -64,6 +70,33 @@ struct Arguments {
     /// Search of Table IV; may be repeated. Default: all.
     #[arg(long, value_parser = algorithms())]
     algorithm: Vec<Algorithm>,
+    /// Only the runs of shard I of N, from 1, into --json; `merge` joins all of them.
+    #[arg(long, value_name = "I/N", requires = "json", conflicts_with_all = ["out", "docs"])]
+    shard: Option<Shard>,
+    /// Draw into this directory, as SVG files.
+    #[arg(long)]
+    out: Option<OutputFolder>,
+    /// Write the rows as JSON here.
+    #[arg(long)]
+    json: Option<Output>,
+    /// Write the tables into this document, each between its markers.
+    #[arg(long)]
+    docs: Option<Updated>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Join shards to the tables and figures of the whole.
+    #[command(after_help = "Example: cargo paper merge shard-1.json shard-2.json --json paper.json")]
+    Merge(MergeArguments),
+}
+
+/// Shards, and outputs of the whole.
+#[derive(Args, Debug)]
+struct MergeArguments {
+    /// JSON of all shards, in any order.
+    #[arg(required = true, value_name = "FILES")]
+    files: Vec<Input>,
     /// Draw into this directory, as SVG files.
     #[arg(long)]
     out: Option<OutputFolder>,
@@ -83,6 +116,14 @@ fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
 }
 
 impl Arguments {
+    fn options(&self) -> PaperOptions {
+        PaperOptions {
+            seeds: self.seeds,
+            algorithms: self.algorithm.clone(),
+            shard: self.shard.unwrap_or(Shard::WHOLE),
+        }
+    }
+
     fn parts(&self) -> Vec<Part> {
         if self.table.is_empty() && self.figure.is_empty() {
             return Part::ALL.to_vec();
@@ -109,20 +150,66 @@ impl Arguments {
 }
 
 fn main() -> ExitCode {
-    perform(std::env::args_os().collect(), run)
+    perform(std::env::args_os().collect(), |arguments: &Arguments, stated| match &arguments.command {
+        Some(Command::Merge(merged)) => merge(merged),
+        None => run(arguments, stated),
+    })
 }
 
-/// Runs, prints and writes; returns the exit code.
-fn run(arguments: &Arguments) -> Result<u8, ToolError> {
-    let options = PaperOptions { seeds: arguments.seeds, algorithms: arguments.algorithm.clone() };
+/// Name of the campaign in its shards.
+const CAMPAIGN: &str = "paper";
+
+fn program() -> Program {
+    Program::of_sources(env!("SCARAB_SOURCES"))
+}
+
+/// Joins shards and reports them like an undivided campaign.
+fn merge(merged: &MergeArguments) -> Result<u8, ToolError> {
+    let files: Vec<_> = merged.files.iter().map(|file| &**file).collect();
+    let shards = ShardFiles::read(&files, &program(), &[CAMPAIGN])?;
+    let outputs = [
+        ("--out", merged.out.as_deref()),
+        ("--json", merged.json.as_deref()),
+        ("--docs", merged.docs.as_deref()),
+    ];
+    let arguments: Arguments = parsed(shards.campaign(), shards.campaign().command_line(), &outputs)?;
+    check(&arguments)?;
+    conclude(&arguments, shards.parts()?)
+}
+
+/// Computes, and reports what is not a shard; returns the exit code.
+fn run(arguments: &Arguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
+    check(arguments)?;
+    let options = arguments.options();
+    let results = ShardResults::new(options.shard, scarab_paper::runs(&arguments.parts(), &options)?);
+    if let (Some(_), Some(path)) = (arguments.shard, &arguments.json) {
+        let campaign =
+            CampaignHeader { command: CAMPAIGN.into(), arguments: stated, leg: None, program: program() };
+        return results.write(path, &campaign, &format!("{} runs", results.results.count()));
+    }
+    conclude(arguments, vec![results])
+}
+
+/// Rejects arguments that do not fit each other, and documents without places for the tables.
+fn check(arguments: &Arguments) -> Result<(), ToolError> {
     let parts = arguments.parts();
+    if arguments.shard.is_some() && !parts.iter().any(|part| part.is_divided()) {
+        return Err(ToolError::input(
+            "--shard: table III and figure 5 take seconds and are not divided; leave --shard out",
+        ));
+    }
     if !arguments.algorithm.is_empty() && !parts.contains(&Part::TableFour) {
         return Err(ToolError::input("--algorithm: applies to --table IV only"));
     }
     if let Some(path) = &arguments.docs {
         parts.iter().try_for_each(|part| document::check(path, "paper", part.section_name()))?;
     }
-    let sections = scarab_paper::run(&parts, &options)?;
+    Ok(())
+}
+
+/// Reports the runs of all shards; returns the exit code.
+fn conclude(arguments: &Arguments, shards: Vec<ShardResults<PaperRuns>>) -> Result<u8, ToolError> {
+    let sections = scarab_paper::sections(&arguments.parts(), &arguments.options(), shards)?;
     // Outputs are checked first, because runs take minutes.
     for section in &sections {
         output::print(&format!("{}\n", section.markdown))?;

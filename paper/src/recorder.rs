@@ -8,9 +8,10 @@ use std::cell::{Cell, RefCell};
 
 use scarab::real::Real;
 use scarab::swarm::Objective;
+use serde::{Deserialize, Serialize};
 
 /// Time at which a goal was met.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hit {
     /// Iteration in which the goal was met.
     pub iterations: u32,

@@ -1,18 +1,18 @@
-//! All runs of Table IV, in parallel.
+//! All runs of Table IV.
 //!
 //! A row is a function, a search, a precision and a tolerance; one run serves all tolerances of its
 //! precision. Single precision is run for the default swarm and to 0.1 only: it cannot resolve a
 //! millionth at values of 20. Run number r of every row has the same seed, so all searches meet the
 //! same shifts and rotations.
 
-use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
 use scarab::real::Real;
 use scarab_host::base::error::ToolError;
+use scarab_host::base::shard::Shard;
 
 use super::contenders::{self, Algorithm};
 use super::problems::{CASES, Case};
 use super::recorder::{Hit, Recorder};
+use super::runs::{RowRuns, run_rows};
 use super::seeds::ReportSeed;
 use super::statistics::Row;
 
@@ -20,44 +20,47 @@ use super::statistics::Row;
 pub const TOLERANCES: [f64; 2] = [0.1, 1e-6];
 
 /// Hits of one run, by tolerance.
-type Hits = Vec<Option<Hit>>;
+pub type Hits = Vec<Option<Hit>>;
 
-/// All rows of these searches, each from `runs` runs.
-pub fn rows(algorithms: &[Algorithm], runs: u64) -> Result<Vec<Row>, ToolError> {
-    let contests = CASES.iter().flat_map(|case| algorithms.iter().map(move |algorithm| (case, *algorithm)));
-    let precisions = |algorithm: &Algorithm| if *algorithm == Algorithm::Bso { 2 } else { 1 };
-    let in_all: usize = algorithms.iter().map(precisions).sum();
-    let progress = ProgressBar::new(runs * (CASES.len() * in_all) as u64);
-    if let Ok(style) =
-        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} elapsed, {eta} left")
-    {
-        progress.set_style(style);
-    }
-    let mut rows = Vec::new();
-    for (case, algorithm) in contests {
-        let double = hits(runs, &progress, |seed| run_double(case, algorithm, seed))?;
-        rows.extend(tabulated(case, algorithm, "f64", &TOLERANCES, &double));
-        if algorithm == Algorithm::Bso {
-            let single =
-                hits(runs, &progress, |seed| run_own::<f32>(case, algorithm, seed, &TOLERANCES[..1]))?;
-            rows.extend(tabulated(case, algorithm, "f32", &TOLERANCES[..1], &single));
-        }
-    }
-    progress.finish_and_clear();
-    Ok(rows)
+/// A search on a function in one precision.
+struct Contest {
+    case: &'static Case,
+    algorithm: Algorithm,
+    is_single: bool,
 }
 
-fn hits(
-    runs: u64,
-    progress: &ProgressBar,
-    run: impl Fn(ReportSeed) -> Result<Hits, ToolError> + Sync,
-) -> Result<Vec<Hits>, ToolError> {
-    let one = |number: u64| {
-        let hits = run(ReportSeed::of_run(number));
-        progress.inc(1);
-        hits
+/// Contests of these searches, in the order of the report.
+fn contests(algorithms: &[Algorithm]) -> Vec<Contest> {
+    let of_case = |case: &'static Case| {
+        algorithms.iter().flat_map(move |&algorithm| {
+            let precisions: &[bool] = if algorithm == Algorithm::Bso { &[false, true] } else { &[false] };
+            precisions.iter().map(move |&is_single| Contest { case, algorithm, is_single })
+        })
     };
-    (0..runs).into_par_iter().map(one).collect()
+    CASES.iter().flat_map(of_case).collect()
+}
+
+/// Runs of every contest of these searches.
+pub fn runs(algorithms: &[Algorithm], runs: u64, shard: Shard) -> Result<RowRuns<Hits>, ToolError> {
+    run_rows("Table IV", &contests(algorithms), runs, shard, |contest, seed| {
+        let Contest { case, algorithm, is_single } = contest;
+        if *is_single {
+            run_own::<f32>(case, *algorithm, seed, &TOLERANCES[..1])
+        } else {
+            run_double(case, *algorithm, seed)
+        }
+    })
+}
+
+/// All rows of these searches.
+#[must_use]
+pub fn rows(algorithms: &[Algorithm], runs: &[Vec<Hits>]) -> Vec<Row> {
+    let rows = |(contest, hits): (&Contest, &Vec<Hits>)| {
+        let (precision, tolerances) =
+            if contest.is_single { ("f32", &TOLERANCES[..1]) } else { ("f64", &TOLERANCES[..]) };
+        tabulated(contest.case, contest.algorithm, precision, tolerances, hits)
+    };
+    contests(algorithms).iter().zip(runs).flat_map(rows).collect()
 }
 
 fn run_double(case: &Case, algorithm: Algorithm, seed: ReportSeed) -> Result<Hits, ToolError> {

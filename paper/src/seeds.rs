@@ -28,11 +28,6 @@ impl ReportSeed {
         Self(REPORT.start.saturating_add(run).min(REPORT.end - 1))
     }
 
-    /// Search seeds of `runs` runs, for a search or a whole experiment.
-    pub fn searches(runs: u64) -> impl Iterator<Item = u64> + Clone {
-        (0..runs).map(|run| Self::of_run(run).search())
-    }
-
     /// Seed of the search.
     #[must_use]
     pub fn search(self) -> u64 {

@@ -10,8 +10,10 @@ use scarab::ident::{
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT};
 use scarab::swarm::{Bso, BsoSettings, Objective};
 use scarab_host::base::error::ToolError;
+use scarab_host::base::words::exact;
 use scarab_host::rig::pair::Context;
 use scarab_host::run::consistent;
+use serde::{Deserialize, Serialize};
 
 use super::raw_cost::RawCost;
 use super::seen_links::SeenLinks;
@@ -24,7 +26,7 @@ const MOST_ITERATIONS: u32 = 400;
 const DIMENSIONS: usize = 42;
 
 /// Result of a search.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
     /// Number of unknowns.
     pub dimension: usize,
@@ -32,6 +34,7 @@ pub struct Trial {
     /// logged samples.
     pub reached: [Option<(u32, u32)>; 2],
     /// Least J - J_opt, chi-square units.
+    #[serde(with = "exact")]
     pub lowest: f64,
 }
 

@@ -7,12 +7,13 @@ use serde_json::Map;
 use super::contenders::{Algorithm, ITERATIONS};
 use super::goals::GOALS;
 use super::problems::{CASES, Case, Reading};
-use super::searches::{self, TOLERANCES};
+use super::runs::RowRuns;
+use super::searches::{self, Hits, TOLERANCES};
 use super::statistics::Row;
 use super::{PaperOptions, Part, Section};
 
 /// Runs of each row by default.
-const RUNS: u64 = 100;
+pub const RUNS: u64 = 100;
 
 /// Iterations on f1 to f4 in the paper's Table IV.
 const PRINTED: [(Algorithm, [u32; 4]); 3] = [
@@ -21,11 +22,20 @@ const PRINTED: [(Algorithm, [u32; 4]); 3] = [
     (Algorithm::BsoPaper, [39, 15, 18, 27]),
 ];
 
-/// Tables, text and JSON of this part.
-pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
+/// Searches that are asked for.
+fn wanted(options: &PaperOptions) -> Vec<Algorithm> {
     let all = Algorithm::ALL.into_iter();
-    let wanted = all.filter(|one| options.algorithms.is_empty() || options.algorithms.contains(one));
-    let rows = searches::rows(&wanted.collect::<Vec<_>>(), options.seeds.unwrap_or(RUNS))?;
+    all.filter(|one| options.algorithms.is_empty() || options.algorithms.contains(one)).collect()
+}
+
+/// Runs the searches.
+pub fn runs(options: &PaperOptions) -> Result<RowRuns<Hits>, ToolError> {
+    searches::runs(&wanted(options), options.runs(RUNS), options.shard)
+}
+
+/// Tables, text and JSON of this part.
+pub fn section(options: &PaperOptions, runs: &[Vec<Hits>]) -> Result<Section, ToolError> {
+    let rows = searches::rows(&wanted(options), runs);
     let runs = rows.first().map_or(0, |row| row.runs);
     let has_default = rows.iter().any(|row| row.algorithm == Algorithm::Bso);
     let of_default = |part: fn(&[Row]) -> String| if has_default { part(&rows) } else { String::new() };

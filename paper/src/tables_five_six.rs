@@ -11,23 +11,22 @@
 //! error/sigma  root mean square over the runs of (value - truth) / sigma, sigma that of each run
 //! ```
 
-use scarab::ident::Plan;
 use scarab_host::base::error::ToolError;
-use scarab_host::base::names::plan_name;
 use scarab_host::base::number::Number;
+use scarab_host::base::shard::Shard;
 use scarab_host::base::table::Table;
 use scarab_host::report::RunReport;
 use serde::Serialize;
 
-use super::chain::{self, ChainOptions, LEG, NOISE_PERCENT, PLANS, median, run_all};
+use super::chain::{self, ChainOptions, LEG, NOISE_PERCENT, PLANS, median};
 use super::printed::{Printed, TABLE_FIVE, TABLE_SIX};
 use super::ranks::Ranks;
-use super::seeds::ReportSeed;
-use super::{PaperOptions, Part, Section};
+use super::runs::{RowRuns, run_rows};
+use super::{Part, Section};
 use crate::digits::{number, percent};
 
 /// Runs of each method by default.
-const RUNS: u64 = 20;
+pub const RUNS: u64 = 20;
 
 /// Estimate of one value by one method, over all runs.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -157,32 +156,32 @@ pub struct TablesReport {
     pub table_vi: Vec<BaseLine>,
 }
 
-/// Runs the experiment and formats its section.
-pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
-    let report = report(options.seeds.unwrap_or(RUNS))?;
+/// Runs both plans.
+pub fn runs(runs: u64, shard: Shard) -> Result<RowRuns<RunReport>, ToolError> {
+    let leg = chain::leg()?;
+    run_rows("Tables V and VI", &PLANS, runs, shard, |plan, seed| {
+        Ok(chain::run(&leg, &leg, &ChainOptions::new(seed.search(), *plan))?.report)
+    })
+}
+
+/// Formats the section of these runs.
+pub fn section(runs: &[Vec<RunReport>]) -> Result<Section, ToolError> {
+    let report = report(runs)?;
     Section::of(Part::TablesFiveSix, "tables_v_vi", &report, words(&report), Vec::new())
 }
 
-/// Runs the experiment.
-pub fn report(runs: u64) -> Result<TablesReport, ToolError> {
+/// Reports these runs.
+pub fn report(runs: &[Vec<RunReport>]) -> Result<TablesReport, ToolError> {
     let leg = chain::leg()?;
-    let options: Vec<_> = PLANS
-        .iter()
-        .flat_map(|&plan| ReportSeed::searches(runs).map(move |seed| ChainOptions::new(seed, plan)))
-        .collect();
-    let reports =
-        run_all("Tables V and VI", &options, |options| Ok(chain::run(&leg, &leg, options)?.report))?;
-    let of = |plan: Plan| -> Vec<&RunReport> {
-        reports.iter().filter(|report| report.plan == plan_name(plan)).collect()
-    };
-    let methods = PLANS.map(of);
+    let of = |plan: usize| -> Vec<&RunReport> { runs.get(plan).into_iter().flatten().collect() };
+    let methods = [of(0), of(1)];
     let accepted = methods.each_ref().map(|runs| runs.iter().filter(|run| run.accepted()).count());
     let iterations_median =
         methods.each_ref().map(|runs| median(runs.iter().map(|run| f64::from(run.bso.iterations))).into());
     Ok(TablesReport {
         leg: LEG,
         noise_percent: NOISE_PERCENT,
-        runs,
+        runs: methods[0].len() as u64,
         accepted,
         iterations_median,
         rank: Ranks::of(&leg, methods[0].first().copied())?,

@@ -1,4 +1,4 @@
-//! Basics that every module uses: errors, numbers and their formatting, output files.
+//! Basics that every module uses: errors, numbers and their formatting, output files, shards.
 
 pub mod error;
 pub mod files;
@@ -7,6 +7,8 @@ pub mod number;
 pub mod output;
 pub mod precision;
 pub mod random;
+pub mod shard;
 pub mod stats;
 pub mod table;
 pub mod toml_file;
+pub mod words;

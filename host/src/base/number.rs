@@ -1,6 +1,6 @@
 //! Numbers of results: unknown ones, and their text.
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Number for JSON: values that are not finite are unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +41,12 @@ impl Serialize for Number {
             Some(value) => serializer.serialize_f64(value),
             None => serializer.serialize_none(),
         }
+    }
+}
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        Option::deserialize(from).map(Self)
     }
 }
 

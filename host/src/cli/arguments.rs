@@ -7,12 +7,15 @@
 //! | --- | --- |
 //! | [`role`] | types of arguments that define the use of a file |
 //! | [`mod@check`] | detects files that a command would overwrite or cannot write |
+//! | [`mod@stated`] | arguments that shards of one campaign have in common |
 //!
 //! Known limits: names that differ in case only count as different files, even on file systems that ignore
 //! case. Redirections of the shell are not checked.
 
 pub mod check;
 pub mod role;
+pub mod stated;
 
 pub use check::check;
 pub use role::{Input, LegName, Output, OutputFolder, Updated};
+pub use stated::stated;

@@ -10,6 +10,7 @@ use crate::base::{files, output};
 use crate::cli::arguments::{Output, OutputFolder};
 use crate::cli::leg_options::LegOptions;
 use crate::formats::leg_file::LegFile;
+use crate::formats::shard::CampaignHeader;
 use crate::formats::temperature;
 use crate::leg::setup::PriorChoice;
 use crate::report::series::Series;
@@ -140,11 +141,9 @@ pub fn draw_into(
     Ok(())
 }
 
-/// Draws many runs of one leg if requested, and prints the paths.
-pub fn draw_runs(leg: &LegFile, common: &Common, runs: &[RunReport]) -> Result<(), ToolError> {
-    if !common.is_drawn() {
-        return Ok(());
-    }
+/// Draws the runs of a campaign if requested, and prints the paths.
+pub fn draw_runs(campaign: &CampaignHeader, common: &Common, runs: &[RunReport]) -> Result<(), ToolError> {
+    let Some(leg) = campaign.leg.as_ref().filter(|_| common.is_drawn()) else { return Ok(()) };
     let spreads = Spread::of(runs);
     let figure = figures::spread(&leg.name, &spreads)?;
     if let Some(directory) = &common.figures {
@@ -152,7 +151,8 @@ pub fn draw_runs(leg: &LegFile, common: &Common, runs: &[RunReport]) -> Result<(
         output::print(&format!("figures: {}\n", directory.display()))?;
     }
     if let Some(path) = &common.report {
-        let page = html::seeds::page(&html::Circumstances::now(leg), runs, &spreads, &figure)?;
+        let circumstances = html::Circumstances::of_command(leg, campaign.command_line());
+        let page = html::seeds::page(&circumstances, runs, &spreads, &figure)?;
         files::write(path, page)?;
         output::print(&format!("report: {}\n", path.display()))?;
     }

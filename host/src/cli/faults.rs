@@ -5,17 +5,19 @@ use std::time::Instant;
 use clap::Args;
 
 use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::base::shard::Shard;
 use crate::base::{files, output};
 use crate::cli::arguments::{Output, Updated};
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
-use crate::faults::campaign::{Campaign, CampaignOptions, campaign};
+use crate::faults::campaign::{CampaignOptions, campaign};
 use crate::faults::entry::{Entry, entries};
 use crate::faults::hours::hours;
 use crate::faults::report::{CampaignReport, line};
+use crate::faults::results::Campaign;
 use crate::faults::run::{Blind, Manner, Outcome};
 use crate::faults::trial::KINDS;
-use crate::formats::leg_file::LegFile;
+use crate::formats::shard::{Argument, CampaignHeader, Program, ShardResults};
 use crate::view::html::{self, Circumstances};
 use crate::view::{document, figures};
 
@@ -64,6 +66,9 @@ pub struct FaultsArguments {
     /// Inject only in the first S seconds of each identification.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
+    /// Only the runs of shard I of N, from 1, into --json; `merge` joins all of them.
+    #[arg(long, value_name = "I/N", requires = "json", conflicts_with_all = ["report", "docs", "replay"])]
+    shard: Option<Shard>,
     /// Write the table here, for exit codes 0 and 3.
     #[arg(long)]
     json: Option<Output>,
@@ -91,7 +96,8 @@ fn rows(names: &[String], full: bool) -> Result<Vec<Entry>, ToolError> {
     Ok(all.into_iter().filter(is_asked).filter(is_meant).collect())
 }
 
-fn page(leg: &LegFile, report: &CampaignReport, found: &Campaign) -> Result<String, ToolError> {
+fn page(whole: &CampaignHeader, report: &CampaignReport, found: &Campaign) -> Result<String, ToolError> {
+    let leg = whole.leg.as_ref().ok_or_else(|| ToolError::input("a campaign without a leg"))?;
     let all = || found.outcomes.iter().chain(&found.trials);
     let recorded = || all().filter_map(|outcome: &Outcome| Some((outcome, outcome.recording.as_ref()?)));
     let lines: Vec<String> = recorded().map(|(outcome, _)| line(outcome)).collect();
@@ -108,7 +114,7 @@ fn page(leg: &LegFile, report: &CampaignReport, found: &Campaign) -> Result<Stri
         runs: &lines,
         figures: &figures,
     };
-    Ok(html::faults::page(&Circumstances::now(leg), &campaign))
+    Ok(html::faults::page(&Circumstances::of_command(leg, whole.command_line()), &campaign))
 }
 
 /// Defaults of the full campaign.
@@ -174,12 +180,13 @@ impl FaultsArguments {
                 brief: false,
             },
             seconds: self.seconds,
+            shard: self.shard.unwrap_or(Shard::WHOLE),
         })
     }
 }
 
 /// Injects and reports; exit code 3 if anything was missed.
-pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
+pub fn run(arguments: &FaultsArguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
     let options = arguments.options()?;
     let leg = arguments.leg.load()?;
     // Checked first: hours of runs must not end without a document for their table.
@@ -187,11 +194,40 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
         document::check(path, DOCUMENT[0], DOCUMENT[1])?;
     }
     let started = Instant::now();
-    let found = campaign(&leg, &options)?;
+    let mut found = campaign(&leg, &options)?;
     let injected_s = started.elapsed().as_secs_f64();
     let simulated = if arguments.full && arguments.hours == 0.0 { FULL_HOURS } else { arguments.hours };
-    let hours = if simulated > 0.0 { Some(hours(&leg, simulated)?) } else { None };
-    let report = CampaignReport::new(&options.rows, &found, hours);
+    if simulated > 0.0 {
+        found.hours = Some(hours(&leg, simulated, options.shard)?);
+    }
+    let whole_s = started.elapsed().as_secs_f64();
+    let whole = CampaignHeader {
+        command: "faults".into(),
+        arguments: stated,
+        leg: Some(leg),
+        program: Program::host(),
+    };
+    let part = ShardResults::new(options.shard, found);
+    let code = match (arguments.shard, &arguments.json) {
+        (Some(_), Some(path)) => part.write(path, &whole, &format!("{} runs", part.results.runs()))?,
+        _ => conclude(arguments, &whole, vec![part])?,
+    };
+    output::print(&format!(
+        "time needed: {whole_s:.0} s, of which faults {injected_s:.0} s, normal motion {:.0} s\n",
+        whole_s - injected_s
+    ))?;
+    Ok(code)
+}
+
+/// Reports the runs of all shards; returns the exit code.
+pub(super) fn conclude(
+    arguments: &FaultsArguments,
+    whole: &CampaignHeader,
+    parts: Vec<ShardResults<Campaign>>,
+) -> Result<u8, ToolError> {
+    let options = arguments.options()?;
+    let found = Campaign::joined(parts, &options.rows)?;
+    let report = CampaignReport::new(&options.rows, &found);
     output::print(&report.table().to_text())?;
     output::print(&report.notes())?;
     if !found.left_out.is_empty() {
@@ -200,11 +236,6 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
             found.left_out.join(", ")
         ))?;
     }
-    let whole_s = started.elapsed().as_secs_f64();
-    output::print(&format!(
-        "time needed: {whole_s:.0} s, of which faults {injected_s:.0} s, normal motion {:.0} s\n",
-        whole_s - injected_s
-    ))?;
     if arguments.replay.is_some() {
         for outcome in found.outcomes.iter().chain(&found.trials) {
             output::print(&format!("{}\n", line(outcome)))?;
@@ -217,7 +248,7 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
         document::replace(path, DOCUMENT[0], DOCUMENT[1], &report.table().to_markdown())?;
     }
     if let Some(path) = &arguments.report {
-        let page = page(&leg, &report, &found)?;
+        let page = page(whole, &report, &found)?;
         files::write(path, page)?;
         output::print(&format!("report: {}\n", path.display()))?;
     }

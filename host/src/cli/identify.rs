@@ -2,16 +2,19 @@
 
 use clap::{Args, ValueEnum};
 use scarab::model::Payload;
+use serde::{Deserialize, Serialize};
 
 use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::base::shard::Shard;
 use crate::cli::arguments::{Input, Output};
 use crate::cli::common::{Common, draw, draw_runs, finish, write_json};
 use crate::cli::model::ModelArguments;
 use crate::cli::noise::NoiseOptions;
 use crate::formats::excitation::Excitation;
+use crate::formats::shard::{Argument, CampaignHeader, Program, ShardResults};
 use crate::leg::placed_mass::PlacedMass;
 use crate::leg::setup::DEFAULT_SEED;
-use crate::report::RunReport;
+use crate::report::{RunReport, RunsReport, SCHEMA};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::perturb::Perturbation;
 use crate::run::excite::run::check;
@@ -32,6 +35,9 @@ pub struct IdentifyArguments {
     /// A run for each seed, A..B with both ends.
     #[arg(long, value_parser = parse_seeds, conflicts_with_all = ["log", "save_model", "compare_model"], help_heading = "Simulation")]
     seeds: Option<(u64, u64)>,
+    /// Only the runs of shard I of N, from 1, into --json; `merge` joins all of them.
+    #[arg(long, value_name = "I/N", requires_all = ["seeds", "json"], conflicts_with_all = ["figures", "report"], help_heading = "Simulation")]
+    shard: Option<Shard>,
     #[command(flatten)]
     noise: NoiseOptions,
     /// Ideal currents, or motors, bridges and sensors under the board's current loops.
@@ -91,7 +97,7 @@ pub(super) fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
 const LARGEST_SEED_COUNT: u64 = 100_000;
 
 /// Identifies and reports; returns the exit code.
-pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
+pub fn run(arguments: &IdentifyArguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
     let leg = &arguments.noise.on(arguments.common.leg()?)?;
     let torque_noise_percent = arguments.noise.percent()?;
     let on_leg = |mass: &Option<PlacedMass>, option: &str| -> Result<Option<Payload<f64>>, ToolError> {
@@ -140,12 +146,46 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         arguments.model.save(leg, &run, leg.bandwidth_hz)?;
         return Ok(code);
     };
-    let options: &Vec<_> = &(first..=last).map(options).collect();
+    let program = Program::host();
+    let campaign =
+        CampaignHeader { command: "identify".into(), arguments: stated, leg: Some(leg.clone()), program };
+    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
+    let seeds: Vec<u64> = (first..=last).collect();
+    let options: &Vec<_> = &shard.part(&seeds).iter().copied().map(options).collect();
     let runs = with_leg_size!(leg, identify_many(leg, options))?;
-    if let Some(path) = &arguments.common.json {
-        write_json(path, &runs)?;
+    let part = ShardResults::new(shard, SeedRuns { runs });
+    if let (Some(_), Some(path)) = (arguments.shard, &arguments.common.json) {
+        return part.write(path, &campaign, &format!("{} of {} runs", options.len(), seeds.len()));
     }
-    print_runs(&runs)?;
-    draw_runs(leg, &arguments.common, &runs.runs)?;
-    Ok(if runs.runs.iter().all(RunReport::accepted) { EXIT_ACCEPTED } else { EXIT_REFUSED })
+    conclude(arguments, &campaign, vec![part])
+}
+
+/// Results of a shard: its runs, in the order of their seeds.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct SeedRuns {
+    runs: Vec<RunReport>,
+}
+
+/// Reports the runs of all shards; returns the exit code.
+pub(super) fn conclude(
+    arguments: &IdentifyArguments,
+    campaign: &CampaignHeader,
+    parts: Vec<ShardResults<SeedRuns>>,
+) -> Result<u8, ToolError> {
+    let seeds: Vec<u64> = arguments.seeds.into_iter().flat_map(|(first, last)| first..=last).collect();
+    for part in &parts {
+        let (due, runs) = (part.shard.part(&seeds), &part.results.runs);
+        part.check_count("runs", runs.len(), seeds.len())?;
+        if let Some((run, due)) = runs.iter().zip(due).find(|(run, due)| run.seed != Some(**due)) {
+            return Err(part.damaged(&format!("a run of seed {}, {due} is due", run.seed.unwrap_or(0))));
+        }
+    }
+    let runs = parts.into_iter().flat_map(|part| part.results.runs).collect();
+    let report = RunsReport { schema: SCHEMA, runs };
+    if let Some(path) = &arguments.common.json {
+        write_json(path, &report)?;
+    }
+    print_runs(&report)?;
+    draw_runs(campaign, &arguments.common, &report.runs)?;
+    Ok(if report.runs.iter().all(RunReport::accepted) { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }

@@ -3,6 +3,8 @@
 //! Forks share their base: it runs once, and every run is a clone of it at the run's period. The base of a
 //! run follows from the run's seed, so that one run can be repeated alone. A row that is run in two ways uses
 //! forks for odd seeds and its bench for even ones.
+//!
+//! A shard takes neighbouring seeds, so it runs few bases ([`Shard`]).
 
 use hal_sim::faults::{Channel, Form, Injection, Timing};
 use hal_sim::world::TICK_S;
@@ -14,14 +16,16 @@ use scarab::safety::DriveState;
 
 use crate::base::error::ToolError;
 use crate::base::random::Random;
+use crate::base::shard::Shard;
 use crate::faults::bench::offsets::OFFSETS;
 use crate::faults::bounds::bounds;
 use crate::faults::catalogue::stop::ROWS as STOP;
 use crate::faults::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::detectors::views;
-use crate::faults::emulated::emulated;
+use crate::faults::emulated::{emulated, emulated_seeds};
 use crate::faults::entry::Entry;
-use crate::faults::run::{Blind, Manner, Outcome, run};
+use crate::faults::results::{Base, Campaign};
+use crate::faults::run::{Manner, Outcome, run};
 use crate::faults::trial::Trial;
 use crate::formats::leg_file::LegFile;
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
@@ -62,26 +66,8 @@ pub struct CampaignOptions {
     pub whole: bool,
     /// Limit on the part of each identification that is used, s.
     pub seconds: Option<f64>,
-}
-
-/// Result of a campaign.
-#[derive(Clone, Debug, Default)]
-pub struct Campaign {
-    /// Outcomes by row and seed.
-    pub outcomes: Vec<Outcome>,
-    /// Outcomes of the sweep and of two faults at once.
-    pub trials: Vec<Outcome>,
-    /// In a blind campaign: the forked rows' runs with every detector enabled, and with one code at a time
-    /// disabled.
-    pub singly: Vec<(Blind, Outcome)>,
-    /// Number of runs with the emergency stop at every tick.
-    pub every_tick: usize,
-    /// Rows that were not run because there is no emulator.
-    pub left_out: Vec<&'static str>,
-    /// Duration of motion without a fault, s.
-    pub undisturbed_s: f64,
-    /// Faults reported during it; the later runs of that base are not run.
-    pub base_alarms: Vec<String>,
+    /// Part of each list of seeds, and of the ticks of the emergency stop, that is run.
+    pub shard: Shard,
 }
 
 /// Task for a fork.
@@ -110,9 +96,13 @@ struct Setting<'a> {
     length: u64,
 }
 
-/// Runs a campaign.
-pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, ToolError> {
+/// Runs a campaign, or its shard.
+pub fn campaign(leg: &LegFile, whole: &CampaignOptions) -> Result<Campaign, ToolError> {
     let bounds = bounds(leg)?;
+    let shard = whole.shard;
+    let part = |seeds: &[u64]| shard.part(seeds).to_vec();
+    let [seeds, sweep, pairs] = [&whole.seeds, &whole.sweep, &whole.pairs].map(|seeds| part(seeds));
+    let options = &CampaignOptions { seeds, sweep, pairs, ..whole.clone() };
     let ids: Vec<&str> = options.rows.iter().map(|entry| entry.head().id).collect();
     let twice = |id: &str| ids.iter().filter(|other| **other == id).count() > 1;
     let seeds = options.seeds.iter().chain(&options.sweep).chain(&options.pairs);
@@ -131,17 +121,11 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
         .map(|(base, widened)| based(leg, options, bounds, &twice, *base, *widened))
         .collect::<Result<_, _>>()?;
     let mut campaign = Campaign::default();
-    for found in found {
-        campaign.outcomes.extend(found.outcomes);
-        campaign.trials.extend(found.trials);
-        campaign.singly.extend(found.singly);
-        campaign.every_tick += found.every_tick;
-        campaign.undisturbed_s += found.undisturbed_s;
-        campaign.base_alarms.extend(found.base_alarms);
-    }
+    found.into_iter().for_each(|found| campaign.add(found));
     for entry in &options.rows {
         if let Entry::Emulated(head) = entry {
-            match emulated(head, leg, &options.seeds)? {
+            let seeds = part(emulated_seeds(head, &whole.seeds));
+            match emulated(head, leg, &seeds)? {
                 Some(outcomes) => campaign.outcomes.extend(outcomes),
                 None => campaign.left_out.push(head.id),
             }
@@ -149,17 +133,15 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
         if let Entry::Bench(bench) = entry {
             let halved = twice(bench.head.id);
             let seeds: Vec<u64> = if options.whole && bench.head.id == "E3" {
-                (1..=OFFSETS).collect()
+                part(&(1..=OFFSETS).collect::<Vec<_>>())
             } else {
                 options.seeds.iter().copied().filter(|seed| !halved || seed.is_multiple_of(2)).collect()
             };
-            campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds, options.manner.is_blind())?);
+            if !seeds.is_empty() {
+                campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds, options.manner.is_blind())?);
+            }
         }
     }
-    campaign.outcomes.sort_by_key(|outcome| {
-        (ids.iter().position(|id| *id == outcome.fault), outcome.seed, outcome.period)
-    });
-    campaign.trials.sort_by_key(|outcome| (outcome.fault, outcome.seed));
     Ok(campaign)
 }
 
@@ -187,21 +169,27 @@ fn based(
     }
     let setting = Setting { leg, bounds, manner: options.manner, widened, length };
     let mut jobs = setting.jobs(options, twice, base);
-    if jobs.is_empty() && !every {
+    let mut stops = if every { stops(length) } else { Vec::new() };
+    let last_of_all = stops.last().copied();
+    stops = options.shard.part(&stops).to_vec();
+    if jobs.is_empty() && stops.is_empty() {
         return Ok(campaign);
     }
     let mut rig = Rig::new(leg, &context, base)?;
     begin(leg, &mut rig)?;
     jobs.sort_by_key(|(period, job)| (*period, job.order()));
-    let last = jobs.last().map_or(0, |(period, _)| *period);
+    // The shard with the last stop runs the identification to its end.
+    let last_stop = stops.last().copied().map(|stop| if Some(stop) == last_of_all { length } else { stop });
+    let last = jobs.last().map_or(0, |(period, _)| *period).max(last_stop.unwrap_or(0));
     let from = rig.period;
-    let mut jobs = jobs.into_iter().peekable();
+    let (mut jobs, mut stops) = (jobs.into_iter().peekable(), stops.into_iter().peekable());
     let mut batch: Vec<(Rig<JOINTS, BASE>, Job)> = Vec::with_capacity(BATCH);
-    while rig.period - from <= last || every && rig.period - from <= length {
+    let mut alarm = None;
+    while rig.period - from <= last {
         while let Some((_, job)) = jobs.next_if(|(period, _)| from + period <= rig.period) {
             batch.push((rig.clone(), job));
         }
-        if every && is_stopped_at(rig.period - from) {
+        if stops.next_if(|stop| *stop <= rig.period - from).is_some() {
             batch.push((rig.clone(), setting.stop(rig.period)));
             campaign.every_tick += 1;
         }
@@ -210,19 +198,24 @@ fn based(
         }
         rig.advance();
         if let Some(code) = rig.alarm() {
-            let words = format!("base {base}, period {}: {}", rig.period, code.words());
-            campaign.base_alarms.push(format!("{words}; {} runs not run", jobs.count()));
+            alarm = Some(format!("period {}: {}", rig.period, code.words()));
             break;
         }
     }
     setting.flush(&mut batch, &mut campaign);
-    campaign.undisturbed_s += (rig.period - from) as f64 / PERIODS_PER_S as f64;
+    let (periods, not_run) = (rig.period - from, jobs.count());
+    campaign.bases.push(Base { seed: base, widened, periods, alarm, not_run });
     Ok(campaign)
 }
 
 /// Returns whether the stop comes in this period: every servo tick, and every period from 1 s to 2 s.
 fn is_stopped_at(period: u64) -> bool {
     period.is_multiple_of(u64::from(PERIODS_PER_TICK)) || (PERIODS_PER_S..2 * PERIODS_PER_S).contains(&period)
+}
+
+/// Periods of an identification of this length in which the stop comes.
+fn stops(length: u64) -> Vec<u64> {
+    (0..=length).filter(|period| is_stopped_at(*period)).collect()
 }
 
 fn base_of(seed: u64) -> u64 {

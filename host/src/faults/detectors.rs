@@ -8,9 +8,9 @@
 use scarab::safety::FaultCode;
 use serde::Serialize;
 
-use crate::faults::campaign::Campaign;
 use crate::faults::catalogue::Row;
 use crate::faults::entry::Entry;
+use crate::faults::results::Campaign;
 use crate::faults::run::{Blind, Outcome};
 
 /// One fault code of the firmware. Field names are part of the JSON interface.

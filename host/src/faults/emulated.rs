@@ -63,18 +63,27 @@ const OVERFLOW: Head = Head {
 /// Descriptions of the rows, in the catalogue's order.
 pub static HEADS: [Head; 3] = [SEARCH, CRASH, OVERFLOW];
 
-/// Runs one row for these seeds, up to its largest number; `None` without an emulator.
+/// Seeds of a row, up to its largest number.
+#[must_use]
+pub fn emulated_seeds<'a>(head: &Head, seeds: &'a [u64]) -> &'a [u64] {
+    let most = HEADS.iter().position(|other| other.id == head.id).map_or(0, |place| MOST[place]);
+    &seeds[..seeds.len().min(most as usize)]
+}
+
+/// Runs one row for these seeds; `None` without an emulator.
 pub fn emulated(head: &Head, leg: &LegFile, seeds: &[u64]) -> Result<Option<Vec<Outcome>>, ToolError> {
     if !is_there() {
         return Ok(None);
     }
-    let most = HEADS.iter().position(|other| other.id == head.id).map_or(0, |place| MOST[place]);
+    if seeds.is_empty() {
+        return Ok(Some(Vec::new()));
+    }
     let image = build(leg, DEFAULT_SEED, false)?;
     let one = |seed: &u64| match head.id {
         "K2" => identified(head, &image, *seed),
         _ => crashed(head, &image, *seed),
     };
-    seeds.iter().take(most as usize).map(one).collect::<Result<_, _>>().map(Some)
+    seeds.iter().map(one).collect::<Result<_, _>>().map(Some)
 }
 
 fn beside(image: &Path, what: &str) -> PathBuf {

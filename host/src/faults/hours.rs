@@ -7,10 +7,11 @@
 use hal_sim::description::PushDescription;
 use rayon::prelude::*;
 use scarab::leg::{Activity, ControlRequest};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::base::error::ToolError;
 use crate::base::number::Number;
+use crate::base::shard::Shard;
 use crate::faults::campaign::{BASE, begin};
 use crate::faults::catalogue::JOINTS;
 use crate::formats::leg_file::LegFile;
@@ -38,7 +39,29 @@ pub struct HoursReport {
     pub false_alarms: Vec<String>,
 }
 
+/// Normal motion of one machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stretch {
+    /// Periods of the motion.
+    pub periods: u64,
+    /// Reported fault, which ends it: code and time.
+    pub alarm: Option<String>,
+}
+
 impl HoursReport {
+    /// Report of all stretches.
+    #[must_use]
+    pub fn new(stretches: &[Stretch]) -> Self {
+        let periods: u64 = stretches.iter().map(|stretch| stretch.periods).sum();
+        Self {
+            hours: (periods as f64 / PERIODS_PER_S as f64 / 3600.0).into(),
+            stretches: stretches.len(),
+            greatest_push_nm: PUSHES.torque,
+            pushes_per_minute: 60.0 * PUSHES.rate,
+            false_alarms: stretches.iter().filter_map(|stretch| stretch.alarm.clone()).collect(),
+        }
+    }
+
     /// Lines for a terminal.
     #[must_use]
     pub fn lines(&self) -> String {
@@ -55,24 +78,16 @@ impl HoursReport {
     }
 }
 
-/// Simulates the hours in stretches.
-pub fn hours(leg: &LegFile, hours: f64) -> Result<HoursReport, ToolError> {
+/// Simulates the shard's stretches of the hours.
+pub fn hours(leg: &LegFile, hours: f64, shard: Shard) -> Result<Vec<Stretch>, ToolError> {
     let stretches = ((3600.0 * hours / STRETCH_S as f64).ceil() as u64).max(1);
     let length = (3600.0 * hours * PERIODS_PER_S as f64 / stretches as f64) as u64;
-    let run = |seed: u64| stretch(leg, seed, length);
-    let found = (1..=stretches).into_par_iter().map(run).collect::<Result<Vec<_>, _>>()?;
-    let periods: u64 = found.iter().map(|(periods, _)| periods).sum();
-    Ok(HoursReport {
-        hours: (periods as f64 / PERIODS_PER_S as f64 / 3600.0).into(),
-        stretches: found.len(),
-        greatest_push_nm: PUSHES.torque,
-        pushes_per_minute: 60.0 * PUSHES.rate,
-        false_alarms: found.into_iter().filter_map(|(_, alarm)| alarm).collect(),
-    })
+    let seeds: Vec<u64> = (1..=stretches).collect();
+    shard.part(&seeds).par_iter().map(|seed| stretch(leg, *seed, length)).collect()
 }
 
-/// Runs one stretch; returns its periods and a reported fault.
-fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<(u64, Option<String>), ToolError> {
+/// Runs one stretch.
+fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
     let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(seed) };
     let context = Context::<JOINTS, BASE>::new(leg, &options)?;
     let mut rig = Rig::new(leg, &context, seed)?;
@@ -85,7 +100,7 @@ fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<(u64, Option<String>
         if let Some(code) = rig.alarm() {
             let at = (rig.period - from) as f64 / PERIODS_PER_S as f64;
             let alarm_text = format!("seed {seed}, {at:.3} s: {}: {:?}", code.words(), rig.state());
-            return Ok((rig.period - from, Some(alarm_text)));
+            return Ok(Stretch { periods: rig.period - from, alarm: Some(alarm_text) });
         }
         if rig.leg.control().activity() == Activity::Idle && !rig.is_asked() {
             if let Some(motion) = gaits.get(next % gaits.len()).copied().flatten() {
@@ -94,5 +109,5 @@ fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<(u64, Option<String>
             next += 1;
         }
     }
-    Ok((rig.period - from, None))
+    Ok(Stretch { periods: rig.period - from, alarm: None })
 }

@@ -13,6 +13,7 @@
 //! | [`trial`] | every channel faulted in every form, and two faults at once: no invariant may break |
 //! | [`hours`] | normal motion, in which no fault may be reported |
 //! | [`recording`] | a run's curves |
+//! | [`results`] | results of all runs, joined from the shards of a divided campaign |
 //! | [`report`] | table, JSON, document |
 //!
 //! All random choices follow from seeds: row and seed repeat a run bit for bit.
@@ -32,5 +33,6 @@ pub mod invariants;
 pub mod outcome;
 pub mod recording;
 pub mod report;
+pub mod results;
 pub mod run;
 pub mod trial;

@@ -1,15 +1,17 @@
 //! Outcome of a run, and the options of a run.
 
 use scarab::safety::FaultCode;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use crate::base::words::{Word, optional_word, word};
 use crate::report::fault_curves::FaultCurves;
 
 /// Outcome of a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Id of the row.
-    pub fault: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub fault: Word,
     /// Seed of the run; 0 for one with the emergency stop at every tick, which its period identifies.
     pub seed: u64,
     /// Period of the injection.
@@ -25,9 +27,11 @@ pub struct Outcome {
     /// Deadline of this run where it is longer than the row's, ms: an intermittent fault.
     pub intermittent_ms: Option<f64>,
     /// `Off`, `Damp`, `Limit`; `None` where the motion continued.
-    pub state: Option<&'static str>,
+    #[serde(deserialize_with = "optional_word")]
+    pub state: Option<Word>,
     /// Fault reported by the firmware.
-    pub alarm: Option<&'static str>,
+    #[serde(deserialize_with = "optional_word")]
+    pub alarm: Option<Word>,
     /// Size of the fault in the row's unit.
     pub magnitude: Option<f64>,
     /// Broken invariants.

@@ -5,10 +5,10 @@ use serde::Serialize;
 
 use crate::base::number::Number;
 use crate::base::table::{Cell, Table, cells};
-use crate::faults::campaign::Campaign;
 use crate::faults::detectors::{DetectorReport, detectors};
 use crate::faults::entry::{Entry, Head, instead};
 use crate::faults::hours::HoursReport;
+use crate::faults::results::Campaign;
 use crate::faults::run::Outcome;
 use crate::faults::trial::KINDS;
 
@@ -120,7 +120,7 @@ pub struct CampaignReport {
 impl CampaignReport {
     /// Creates the report of a campaign.
     #[must_use]
-    pub fn new(entries: &[Entry], campaign: &Campaign, hours: Option<HoursReport>) -> Self {
+    pub fn new(entries: &[Entry], campaign: &Campaign) -> Self {
         let mut heads: Vec<Head> = entries.iter().map(Entry::head).collect();
         // A row that is run in two ways is described as its forks are.
         heads.dedup_by_key(|head| head.id);
@@ -147,9 +147,9 @@ impl CampaignReport {
             every_tick: campaign.every_tick,
             detectors: detectors(entries, campaign),
             trials: KINDS.iter().filter_map(|kind| trials_report(kind, &campaign.trials)).collect(),
-            hours,
-            undisturbed_s: campaign.undisturbed_s,
-            base_alarms: campaign.base_alarms.clone(),
+            hours: campaign.hours.as_deref().map(HoursReport::new),
+            undisturbed_s: campaign.undisturbed_s(),
+            base_alarms: campaign.base_alarms(),
             trace_hash: format!("{hash:016x}"),
         }
     }

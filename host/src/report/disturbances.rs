@@ -1,15 +1,17 @@
 //! Reports of excluded data and of Stribeck friction.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::base::number::Number;
 use crate::base::precision::{plain, sigma, value};
+use crate::base::words::{Word, word};
 
 /// Data excluded from the motion identified from.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OutliersReport {
     /// `robust` or `plain`.
-    pub estimator: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub estimator: Word,
     /// 500 Hz samples accepted.
     pub samples: u32,
     /// Isolated outliers among angles and torques of each joint, replaced before the filter.
@@ -49,7 +51,7 @@ impl OutliersReport {
 }
 
 /// Stribeck friction of one joint.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StribeckReport {
     /// Joint, from 1.
     pub joint: usize,

@@ -1,17 +1,20 @@
 //! Evidence of the verdict: every test with its value and limit, and a sentence for each failure.
 
 use scarab::ident::{Evidence, Reason, Test};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::base::number::Number;
+use crate::base::words::{Word, word};
 
 /// One test of the verdict, with its result.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FindingReport {
     /// Reason for rejection if the test failed: a word of the closed list.
-    pub reason: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub reason: Word,
     /// Name of the test.
-    pub test: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub test: Word,
     /// Joint, from 1; `null` if the test does not concern one joint.
     pub joint: Option<usize>,
     /// Name of the unused motion; `null` for the training motion, or for all.

@@ -18,9 +18,11 @@ pub mod trace;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde_json::Value;
 
 use crate::base::number::Number;
+use crate::base::words::{Word, optional_word, word, words};
 use crate::report::disturbances::{OutliersReport, StribeckReport};
 use crate::report::doubt::{DoubtReport, SampleFinding};
 use crate::report::findings::FindingReport;
@@ -32,7 +34,7 @@ use crate::report::trace::TraceReport;
 pub const SCHEMA: u32 = 1;
 
 /// One of a joint's fourteen parameters.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterReport {
     /// `XX1`, `IA2`: symbol and joint.
     pub name: String,
@@ -41,11 +43,13 @@ pub struct ParameterReport {
     /// Value; unknown if neither torque nor a prior determines it.
     pub value: Number,
     /// SI unit.
-    pub unit: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub unit: Word,
     /// Standard deviation; unknown unless the parameter is identified alone.
     pub sigma: Number,
     /// `identified`, `grouped`, `weak` or `prior`.
-    pub status: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub status: Word,
     /// Other parameters of its base parameters.
     pub grouped_with: Vec<String>,
     /// True value of the simulated leg.
@@ -55,7 +59,7 @@ pub struct ParameterReport {
 }
 
 /// One combination of parameters that torque determines.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BaseReport {
     /// Carrying parameter, with an `R` if others are regrouped into it.
     pub name: String,
@@ -64,11 +68,13 @@ pub struct BaseReport {
     /// Result of the swarm, which is the run's result.
     pub value: Number,
     /// SI unit.
-    pub unit: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub unit: Word,
     /// Standard deviation.
     pub sigma: Number,
     /// Largest part of sigma: `noise`; in a replay also `segments`, `recordings`, `doubt` or `encoder`.
-    pub sigma_from: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub sigma_from: Word,
     /// Standard deviation by the noise of the torque.
     pub sigma_noise: Number,
     /// Standard deviation by the model's misfit: the larger of the scatter over segments and between
@@ -81,7 +87,7 @@ pub struct BaseReport {
 }
 
 /// Prediction error of one joint's torque on one motion.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FitReport {
     /// Joint, from 1.
     pub joint: usize,
@@ -107,7 +113,7 @@ pub struct FitReport {
 }
 
 /// The closed-form solution.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LeastSquaresReport {
     /// Name and value of each base parameter.
     pub base_parameters: BTreeMap<String, Number>,
@@ -116,7 +122,7 @@ pub struct LeastSquaresReport {
 }
 
 /// The beetle swarm on the same data.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SwarmReport {
     /// Seed of the swarm's random numbers.
     pub seed: u64,
@@ -214,7 +220,7 @@ pub struct ModelDetail {
 }
 
 /// Search for a physically consistent leg.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConsistentSearchReport {
     /// Iterations of the swarm.
     pub iterations: u32,
@@ -237,10 +243,11 @@ pub struct ConsistentSearchReport {
 }
 
 /// Both searches for a physically consistent leg.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConsistentReport {
     /// Search whose result is the run's result.
-    pub chosen: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub chosen: Word,
     /// J_C - J_LS: cost of physical consistency within the prior's limits, found in double precision.
     pub optimum_over_least_squares: Number,
     /// J - J_LS of the run's result, as the verdict sees it.
@@ -254,7 +261,7 @@ pub struct ConsistentReport {
 }
 
 /// Position error on the gait motion.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrackingReport {
     /// Joint, from 1.
     pub joint: usize,
@@ -264,8 +271,10 @@ pub struct TrackingReport {
     pub rms_deg_with_model: Number,
 }
 
-/// One identification, simulated or replayed.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// One identification, simulated or replayed. Those of a simulated campaign are read back, without what only
+/// a replay or a comparison has.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
 pub struct RunReport {
     /// [`SCHEMA`].
     pub schema: u32,
@@ -278,13 +287,16 @@ pub struct RunReport {
     /// `none`, `file` or `wrong:P`.
     pub prior: String,
     /// `one-time` or `sequential`.
-    pub plan: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub plan: Word,
     /// `accepted` or `refused`.
-    pub verdict: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub verdict: Word,
     /// Whether unused motions were predicted; if not, `accepted` refers to the training motion.
     pub validated: bool,
     /// Reasons for rejection, from the closed list.
-    pub reasons: Vec<&'static str>,
+    #[serde(deserialize_with = "words")]
+    pub reasons: Vec<Word>,
     /// Every test of the verdict.
     pub findings: Vec<FindingReport>,
     /// Base parameters that the data determine.
@@ -323,27 +335,41 @@ pub struct RunReport {
     #[serde(flatten)]
     pub scale: ScaleReport,
     /// Kind of simulated drives; absent in a replay.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub drive: Option<&'static str>,
+    #[serde(default, deserialize_with = "optional_word", skip_serializing_if = "Option::is_none")]
+    pub drive: Option<Word>,
     /// Simulated or recorded time, s.
     pub simulated_s: f64,
     /// Computing time, s.
     pub wall_s: f64,
     /// Errors of the logging chain of a replay's recordings.
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    #[serde(flatten, skip_deserializing, skip_serializing_if = "Option::is_none")]
     pub doubt: Option<DoubtReport>,
     /// Faults of the recordings' columns; absent for a simulated leg.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
     pub samples: Option<Vec<SampleFinding>>,
     /// Comparison with a stored model, if one was given.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
     pub compared: Option<ComparisonReport>,
     /// Further data of a board's trace.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
     pub trace: Option<TraceReport>,
     /// Data for the model file; not in the JSON.
     #[serde(skip)]
     pub detail: ModelDetail,
+}
+
+impl Serialize for RunReport {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, to)
+    }
+}
+
+/// Through a [`Value`]: `defmt-decoder` switches on serde_json's arbitrary precision, with which flattened
+/// numbers cannot be read from text.
+impl<'de> Deserialize<'de> for RunReport {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        Self::deserialize(Value::deserialize(from)?).map_err(de::Error::custom)
+    }
 }
 
 impl RunReport {
@@ -380,7 +406,7 @@ pub struct Source {
 }
 
 /// Report of many runs.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunsReport {
     /// [`SCHEMA`].
     pub schema: u32,

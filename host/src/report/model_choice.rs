@@ -1,21 +1,25 @@
 //! Model terms of each joint: requested, used, and why.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::base::number::Number;
 use crate::base::precision::{sigma, value};
+use crate::base::words::{Word, word};
 
 /// Decision about one term of one joint's model.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelChoiceReport {
     /// Joint, from 1.
     pub joint: usize,
     /// `rotor`, `offset`, `stribeck` or `asymmetric_coulomb`, as in leg files.
-    pub option: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub option: Word,
     /// `auto`, `on` or `off`.
-    pub asked: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub asked: Word,
     /// `on` or `off`.
-    pub used: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub used: Word,
     /// Chi-square explained by the term; unknown if the data did not decide.
     pub gain_chi2: Number,
     /// Limit below which the term is dropped.
@@ -25,7 +29,7 @@ pub struct ModelChoiceReport {
 }
 
 /// Coulomb friction of one joint in both directions.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DirectionsReport {
     /// Joint, from 1.
     pub joint: usize,

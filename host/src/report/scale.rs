@@ -1,17 +1,19 @@
 //! Report of scale and load.
 
 use scarab::model::Payload;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::base::number::Number;
 use crate::base::precision::{exact, sigma, value};
+use crate::base::words::{Word, word};
 use crate::report::RunReport;
 
 /// Units of a run's parameters, and the load of the leg.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScaleReport {
     /// `relative` to the assumed torque constants, or `absolute`.
-    pub scale: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub scale: Word,
     /// Torque constants, one per joint; empty in a replay without a known mass, whose recordings contain
     /// torques.
     pub torque_constant: Vec<TorqueConstantReport>,
@@ -22,7 +24,7 @@ pub struct ScaleReport {
 }
 
 /// Torque constant of one joint, N m/A at the joint.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TorqueConstantReport {
     /// Joint, from 1.
     pub joint: usize,
@@ -40,7 +42,7 @@ pub struct TorqueConstantReport {
 }
 
 /// A known mass.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MassReport {
     /// Mass, kg.
     pub mass: f64,

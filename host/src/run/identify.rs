@@ -11,8 +11,8 @@ use crate::base::error::ToolError;
 use crate::base::files::NewFile;
 use crate::formats::leg_file::LegFile;
 use crate::formats::recording::{JointSeries, Recording};
+use crate::report::RunReport;
 use crate::report::series::Series;
-use crate::report::{RunReport, RunsReport, SCHEMA};
 use crate::rig::options::SimulationOptions;
 use crate::run::simulate::{SimulatedRun, simulate};
 
@@ -35,7 +35,7 @@ pub fn identify_one<const N: usize, const B: usize>(
 pub fn identify_many<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &[SimulationOptions],
-) -> Result<RunsReport, ToolError> {
+) -> Result<Vec<RunReport>, ToolError> {
     let progress = ProgressBar::new(options.len() as u64);
     if let Ok(style) =
         ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} elapsed, {eta} left")
@@ -49,9 +49,9 @@ pub fn identify_many<const N: usize, const B: usize>(
             progress.inc(1);
             run
         })
-        .collect::<Result<Vec<_>, _>>()?;
+        .collect();
     progress.finish_and_clear();
-    Ok(RunsReport { schema: SCHEMA, runs })
+    runs
 }
 
 /// Writes the training motion in the format of `replay`: anatomical angles and torques.

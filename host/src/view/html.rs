@@ -52,11 +52,16 @@ impl Circumstances {
     /// `SOURCE_DATE_EPOCH` (s since 1970) replaces the time, for reproducible pages.
     #[must_use]
     pub fn now(leg: &LegFile) -> Self {
+        Self::of_command(leg, std::env::args().skip(1).filter(|word| word != BY_CARGO))
+    }
+
+    /// Command line of these words and the current time, as in [`Self::now`].
+    #[must_use]
+    pub fn of_command(leg: &LegFile, words: impl IntoIterator<Item = String>) -> Self {
         let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
         let now =
             stated.and_then(|seconds| Timestamp::from_second(seconds).ok()).unwrap_or_else(Timestamp::now);
-        let words: Vec<String> =
-            std::env::args().skip(1).filter(|word| word != BY_CARGO).map(quoted).collect();
+        let words: Vec<String> = words.into_iter().map(quoted).collect();
         Self {
             time_utc: now.round(Unit::Second).unwrap_or(now).to_string(),
             command: format!("cargo sim {}", words.join(" ")).trim_end().to_owned(),

@@ -10,7 +10,7 @@ use crate::command::{Folder, scarab};
 const CONTENT: &str = "not to be touched";
 
 /// Command with the options of its input files (empty: positional) and of its output files.
-const COMMANDS: [(&str, &[&str], &[&str]); 16] = [
+const COMMANDS: [(&str, &[&str], &[&str]); 17] = [
     (
         "replay",
         &["", "--leg", "--validate", "--compare-model"],
@@ -33,6 +33,7 @@ const COMMANDS: [(&str, &[&str], &[&str]); 16] = [
     ("monitor", &["--leg"], &["--json"]),
     ("motor", &["--leg"], &["--json", "--figures"]),
     ("faults", &["--leg"], &["--json", "--report", "--docs"]),
+    ("merge", &[""], &["--json", "--report", "--figures", "--docs"]),
     ("emulate", &["--leg"], &["--json", "--trace", "--csv"]),
     ("fw", &["--leg"], &["--json", "--source"]),
     ("serve --slcan 127.0.0.1:0", &["--leg"], &["--flash"]),
@@ -94,6 +95,7 @@ fn no_command_writes_one_file_twice() {
             let further: &[&str] = match command {
                 "replay" => &["--leg", "sp", "none.csv"],
                 "trace" => &["none.trace"],
+                "merge" => &["none.json"],
                 _ => &[],
             };
             let mut line: Vec<&Path> = vec![Path::new(one), &file, Path::new(other), &file];

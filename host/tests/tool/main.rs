@@ -35,6 +35,7 @@ mod robust;
 mod samples;
 mod scale;
 mod serve;
+mod shards;
 mod trace;
 mod verdict;
 

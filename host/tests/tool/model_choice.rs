@@ -11,7 +11,7 @@ use serde_json::Value;
 
 fn runs(leg: &LegFile, seeds: std::ops::RangeInclusive<u64>) -> Vec<RunReport> {
     let options: Vec<_> = seeds.map(SimulationOptions::of_seed).collect();
-    identify_many::<2, 13>(leg, &options).expect("it runs").runs
+    identify_many::<2, 13>(leg, &options).expect("it runs")
 }
 
 /// Default leg with this switch for rotor and offset of both joints, this offset in both, and optionally no

@@ -3,6 +3,7 @@
 //!
 //! Few runs each: the claims must hold for every run.
 
+use scarab_host::base::shard::Shard;
 use scarab_paper::printed::{TABLE_FIVE, TABLE_SIX};
 use scarab_paper::{convergence, figure_seven, load_change, tables_five_six};
 
@@ -10,7 +11,8 @@ use crate::command::{Folder, scarab};
 
 #[test]
 fn torque_determines_nine_of_twenty_parameters_and_fifteen_sums() {
-    let report = tables_five_six::report(1).expect("the chain is identified");
+    let runs = tables_five_six::runs(1, Shard::WHOLE).expect("the chain is identified");
+    let report = tables_five_six::report(&runs).expect("a shipped leg");
     assert_eq!((report.rank.of_table_v, report.rank.of_all_inertial), (15, 15));
     assert_eq!(report.rank.joint_by_joint, 15, "one joint at a time determines neither more nor less");
     assert_eq!((report.rank.of_the_leg, report.rank.columns), (25, 42));
@@ -33,7 +35,8 @@ fn torque_determines_nine_of_twenty_parameters_and_fifteen_sums() {
 
 #[test]
 fn both_methods_find_the_fifteen_combinations_within_their_sigma() {
-    let report = tables_five_six::report(2).expect("the chain is identified");
+    let runs = tables_five_six::runs(2, Shard::WHOLE).expect("the chain is identified");
+    let report = tables_five_six::report(&runs).expect("a shipped leg");
     let names: Vec<_> = report.table_vi.iter().map(|line| line.name.trim_end_matches('R')).collect();
     assert_eq!(names, TABLE_SIX.map(|line| line.name));
     for line in &report.table_vi {
@@ -49,7 +52,8 @@ fn both_methods_find_the_fifteen_combinations_within_their_sigma() {
 
 #[test]
 fn the_verification_torque_is_predicted_within_two_percent_of_its_mean() {
-    let report = figure_seven::report(1, &[7.0]).expect("the chain is identified");
+    let runs = figure_seven::runs(1, &[7.0], Shard::WHOLE).expect("the chain is identified");
+    let report = figure_seven::report(&runs, &[7.0]).expect("a shipped leg");
     let of = |method: &str| -> Vec<f64> {
         let lines = report.lines.iter().filter(|line| line.method == method);
         lines.filter_map(|line| line.percent_of_truth_worst.known()).collect()
@@ -66,7 +70,8 @@ fn the_verification_torque_is_predicted_within_two_percent_of_its_mean() {
 
 #[test]
 fn a_changed_load_is_found_on_its_link_only() {
-    let report = load_change::report(1).expect("the chain is identified");
+    let runs = load_change::runs(1, Shard::WHOLE).expect("the chain is identified");
+    let report = load_change::report(&runs).expect("a shipped leg");
     assert_eq!(report.changed_of_table_v, ["XX3", "YY3", "YZ3", "ZZ3", "HY3", "HZ3", "M3"]);
     for line in &report.lines {
         let score = line.error_over_sigma.known().expect("measured");
@@ -88,7 +93,7 @@ fn a_changed_load_is_found_on_its_link_only() {
 
 #[test]
 fn the_swarm_converges_on_all_sets_of_unknowns_of_the_leg() {
-    let report = convergence::report(1).expect("both legs are recorded");
+    let report = convergence::report(&convergence::runs(1, Shard::WHOLE).expect("both legs are recorded"));
     let rows: Vec<_> = report.rows.iter().map(|row| (row.problem.as_str(), row.dimension)).collect();
     // 21 and 10 combinations with friction, 25 and 13 with rotors and offsets. All of Table V but
     // HZ2 and six of friction have an effect.

@@ -4,6 +4,7 @@ mod chain;
 #[path = "../../../host/tests/tool/command.rs"]
 #[allow(dead_code, reason = "shared with the tests of the host tool, which use all of it")]
 mod command;
+mod shards;
 mod tables;
 
 /// Program under test.
