@@ -84,7 +84,7 @@ pub const START: Pin = ('A', 3);
 pub const GATE_FAULT: Pin = ('D', 2);
 
 /// Conversion of an axis' shunts, for measurements of the sampling instant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     /// Axis.
     pub axis: usize,
@@ -96,6 +96,42 @@ pub struct Sampling {
     pub middle: Ticks,
     /// Edges of the other bridge in the time before the hold in which an amplifier settles.
     pub edges: u32,
+    /// Amplitude of the other bridge's voltage, V.
+    pub other_v: f64,
+}
+
+/// Amplitude of three duties' vector, whose common part makes no voltage.
+fn amplitude([a, b, c]: [f64; 3]) -> f64 {
+    let [alpha, beta] = [(2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt()];
+    alpha.hypot(beta)
+}
+
+/// Triggers that do not reach the converters: in a row, then as many that do, and so on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LostTriggers {
+    lost: u32,
+    come: u32,
+    left: u32,
+    phase: u32,
+}
+
+impl LostTriggers {
+    /// Loses `lost` triggers in a row, lets `come` pass, and so on, until `left` were lost.
+    #[must_use]
+    pub const fn new(lost: u32, come: u32, left: u32) -> Self {
+        Self { lost, come, left, phase: 0 }
+    }
+
+    /// Whether this trigger is lost.
+    fn loses(&mut self) -> bool {
+        if self.left == 0 {
+            return false;
+        }
+        let is_lost = self.phase < self.lost;
+        self.phase = (self.phase + 1) % (self.lost + self.come).max(1);
+        self.left -= u32::from(is_lost);
+        is_lost
+    }
 }
 
 /// The chip and the board, except the processor core.
@@ -146,8 +182,12 @@ pub struct Chip {
     /// Last conversions of both axes' shunts, if recorded.
     pub samplings: Option<Vec<Sampling>>,
     triggers: [Ticks; JOINTS],
+    /// Triggers of both axes that the converters miss.
+    pub lost_triggers: [LostTriggers; JOINTS],
     /// Converters that no longer convert.
     pub silent_adc: [bool; adc::COUNT],
+    /// Instant of the first hard fault since this was cleared.
+    pub hard_fault: Option<Ticks>,
     /// Channels reported because their pins have another mode.
     reported: u32,
 }
@@ -185,7 +225,9 @@ impl Chip {
             reset_request: None,
             samplings: None,
             triggers: [0; JOINTS],
+            lost_triggers: [LostTriggers::default(); JOINTS],
             silent_adc: [false; adc::COUNT],
+            hard_fault: None,
             reported: 0,
         };
         for (pin, level) in [(STOP, true), (ENABLING, false), (START, false), (GATE_FAULT, true)] {
@@ -297,7 +339,7 @@ impl Chip {
         if index == 2 && updated {
             self.follow_chopper();
         }
-        if trigger && is_bridge {
+        if trigger && is_bridge && !self.lost_triggers[index].loses() {
             self.triggers[index] = self.now;
             let source = [Trigger::First, Trigger::Second][index];
             let clock = self.adc_clock();
@@ -350,7 +392,17 @@ impl Chip {
         // The time in which an amplifier settles to 1 %: 1.2 us.
         let window = crate::time::ticks(1.2e-6);
         let (edges, _) = self.plant.axes[1 - axis].edges_within(window, self.now);
-        samplings.push(Sampling { axis, trigger: self.triggers[axis], hold: self.now, middle, edges });
+        let duties = [0, 1, 2].map(|channel| self.timers[1 - axis].duty(channel));
+        let is_on = self.plant.axes[1 - axis].is_armed();
+        let other_v = if is_on { self.plant.supply.voltage() * amplitude(duties) } else { 0.0 };
+        samplings.push(Sampling {
+            axis,
+            trigger: self.triggers[axis],
+            hold: self.now,
+            middle,
+            edges,
+            other_v,
+        });
     }
 
     fn adc_clock(&self) -> Ticks {
@@ -690,5 +742,28 @@ impl Chip {
     /// Recomputes all due instants after a part was changed from outside.
     pub fn reschedule(&mut self) {
         (0..SOURCES).for_each(|source| self.update(source));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triggers_are_lost_in_their_pattern_and_then_come() {
+        let pattern = |mut lost: LostTriggers| [(); 8].map(|()| u8::from(lost.loses()));
+        assert_eq!(pattern(LostTriggers::default()), [0; 8]);
+        assert_eq!(pattern(LostTriggers::new(3, 0, 3)), [1, 1, 1, 0, 0, 0, 0, 0]);
+        assert_eq!(pattern(LostTriggers::new(1, 1, 3)), [1, 0, 1, 0, 1, 0, 0, 0]);
+    }
+
+    #[test]
+    fn a_common_part_of_duties_is_no_voltage() {
+        assert!(amplitude([0.7; 3]) < 1e-12);
+        for angle in [0.0_f64, 1.0, 4.0] {
+            let duties =
+                [0.0, 1.0, 2.0].map(|phase| 0.5 + 0.3 * (angle - phase * 2.094_395_102_393_195_5).cos());
+            assert!((amplitude(duties) - 0.3).abs() < 1e-12);
+        }
     }
 }

@@ -218,11 +218,13 @@ fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
         return Err(error);
     }
     let identified = arguments.steps.contains(&Step::Identify);
-    let report = ChipReport::new(&mut session, identified, common.time_factor, common.seed)?;
+    let mut report = ChipReport::new(&mut session, identified, common.time_factor, common.seed)?;
+    report.stop = stops::at_end(&mut session)?;
     print_run(&report, begun.elapsed().as_secs_f64());
     common.write(&report)?;
     let is_sound = report.findings.is_empty() && report.missed_current_ticks == 0;
-    Ok(is_sound && report.verdict != "refused" && report.agrees_with_the_plant())
+    let stops = report.stop.as_ref().is_none_or(stops::Situation::is_sound);
+    Ok(is_sound && stops && report.verdict != "refused" && report.agrees_with_the_plant())
 }
 
 fn operate(session: &mut Session, arguments: &RunArguments) -> Result<(), ToolError> {
@@ -307,6 +309,12 @@ fn print_run(report: &ChipReport, wall_s: f64) {
         report.records[1],
         report.resets.len()
     );
+    if let Some(stop) = &report.stop {
+        println!(
+            "emergency stop: {} phases, off after {:.2} us worst, for good {:.2} us; on again {}, stayed on {}",
+            stop.phases, stop.worst_us, stop.worst_final_us, stop.on_again, stop.stayed_on
+        );
+    }
     println!(
         "simulated {:.3} s in {wall_s:.2} s: {:.2} of real time, {:.1} M instructions/s",
         report.simulated_s,
@@ -422,15 +430,11 @@ fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
 }
 
 fn run_faults(arguments: &FaultArguments) -> Result<bool, ToolError> {
-    let mut session = enabled(&arguments.common)?;
-    let resting = session.save()?;
-    session.press_start()?;
-    session.run(6.0)?;
-    let moving = session.save()?;
-    let reports = faults::run(&mut session, &resting, &moving, arguments.seeds, &arguments.rows)?;
+    let mut session = arguments.common.session()?;
+    let reports = faults::run(&mut session, arguments.seeds, &arguments.rows)?;
     for report in &reports {
         println!(
-            "{:<3} {:<50} missed {} of {}, worst {:.3} ms, deadline {:.3} ms",
+            "{:<3} {:<56} missed {} of {}, worst {:.4} ms, deadline {:.4} ms",
             report.id, report.fault, report.missed, report.runs, report.worst_ms, report.deadline_ms
         );
         report.complaints.iter().take(3).for_each(|complaint| println!("      {complaint}"));
@@ -473,11 +477,8 @@ fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {
 
 fn run_sampling(common: &Common) -> Result<bool, ToolError> {
     let mut session = enabled(common)?;
-    let mut reports = sampling::measure(&mut session, "rest", 0.5)?;
-    session.press_start()?;
-    session.run(4.0)?;
-    reports.extend(sampling::measure(&mut session, "motion", 4.0)?);
-    for report in &reports {
+    let report = sampling::run(&mut session)?;
+    for report in &report.situations {
         println!(
             "{:<8} axis {}: {} conversions, trigger {:.1} to {:.1} ns and hold {:.1} to {:.1} ns after the middle; edges of the other bridge before {}",
             report.situation,
@@ -490,6 +491,23 @@ fn run_sampling(common: &Common) -> Result<bool, ToolError> {
             report.disturbed
         );
     }
-    common.write(&reports)?;
-    Ok(reports.iter().all(sampling::SamplingReport::is_sound))
+    for step in &report.sweep.steps {
+        println!(
+            "other bridge at {:>2} to {:>2} V: {} conversions, {} with an edge before",
+            step.from_v,
+            step.from_v + 1,
+            step.conversions,
+            step.disturbed
+        );
+    }
+    println!(
+        "bus {:.1} V, other bridge up to {:.2} V: no edge up to {:.2} V (documented: {:.1} V); above, edges before {:.1} % of the conversions",
+        report.sweep.bus_v,
+        report.sweep.highest_v,
+        report.sweep.clean_v,
+        sampling::CLEAN_V,
+        100.0 * report.sweep.share_above
+    );
+    common.write(&report)?;
+    Ok(report.is_sound())
 }

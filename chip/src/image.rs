@@ -117,6 +117,14 @@ impl Image {
         all.find(|symbol| symbol.name == name).map(|symbol| symbol.address)
     }
 
+    /// Address and size of the variable whose name ends so, without the crate's hash.
+    #[must_use]
+    pub fn variable(&self, path: &str) -> Option<(u32, u32)> {
+        let named =
+            |symbol: &&Symbol| format!("{:#}", rustc_demangle::demangle(&symbol.name)).ends_with(path);
+        self.objects.iter().find(named).map(|symbol| (symbol.address, symbol.size))
+    }
+
     /// Addresses of all halfwords with a value, which may be instructions.
     #[must_use]
     pub fn find(&self, halfword: u16) -> Vec<u32> {

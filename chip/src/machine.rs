@@ -209,6 +209,18 @@ impl Machine {
         self.core.mem_write(address.into(), bytes).is_ok()
     }
 
+    /// Moves the used part of the stack down until so many bytes are left below it, as deep calls do.
+    pub fn use_up_stack(&mut self, left: u32) {
+        let top = self.image().word(FLASH).unwrap_or(0);
+        let pointer = get(&self.core, Register::SP);
+        let mut used = vec![0; top.wrapping_sub(pointer) as usize % RAM_BYTES];
+        // A frame's place depends on the pointer's alignment.
+        let moved = RAM + (left & !7) + (pointer & 4);
+        if self.memory(pointer, &mut used) && self.set_memory(moved, &used) {
+            put(&mut self.core, Register::SP, moved);
+        }
+    }
+
     /// Starts from the reset vector.
     fn start(&mut self) {
         let image = Rc::clone(self.image());
@@ -660,6 +672,9 @@ fn enter(core: &mut Core<'_>, exception: u8, pc: u32) -> u32 {
 fn vector(core: &mut Core<'_>, exception: u8, status: u32, link: u32, cycles: Ticks) -> u32 {
     let state = core.get_data_mut();
     let chip = &mut state.chip;
+    if exception == HARD_FAULT {
+        chip.hard_fault = chip.hard_fault.or(Some(chip.now));
+    }
     let pended = chip.nvic.pended.get(usize::from(exception)).copied().unwrap_or(chip.now);
     chip.now += cycles * state.cycle;
     chip.nvic.enter(exception);

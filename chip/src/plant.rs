@@ -125,8 +125,11 @@ pub struct Axis {
     pub shunt_faults: [Option<ShuntFault>; 2],
     /// Fault of the encoder.
     pub encoder_fault: EncoderFault,
-    /// Output with a broken wire.
-    pub open: Option<usize>,
+    /// Outputs with a broken wire.
+    pub open: [bool; 3],
+    /// Wraps of the encoder's 16 bits between two readings.
+    pub wraps: u32,
+    last_position: Option<u16>,
 }
 
 impl Axis {
@@ -157,7 +160,9 @@ impl Axis {
             pin_changes: None,
             shunt_faults: [None; 2],
             encoder_fault: EncoderFault::default(),
-            open: description.wiring.open,
+            open: core::array::from_fn(|output| description.wiring.open == Some(output)),
+            wraps: 0,
+            last_position: None,
         }
     }
 
@@ -230,7 +235,7 @@ impl Axis {
     }
 
     fn terminal(&self, output: usize, bus: f64) -> Terminal {
-        if self.open == Some(output) {
+        if self.open[output] {
             return Terminal::Off(f64::NEG_INFINITY, f64::INFINITY);
         }
         match self.pins[output] {
@@ -394,6 +399,13 @@ impl Plant {
         }
     }
 
+    /// Connects a motor or its sensors differently, at rest and before the bridges were on.
+    pub fn reconnect(&mut self, axis: usize, change: impl FnOnce(&mut AxisDescription)) {
+        let mut description = self.axes[axis].description;
+        change(&mut description);
+        self.axes[axis] = Axis::new(&description, self.axes[axis].angle);
+    }
+
     /// Mounts the gears: from now on the rotors turn the leg, which a hand holds where it is.
     pub fn couple(&mut self, now: Ticks) {
         let position = self.position();
@@ -449,7 +461,10 @@ impl Plant {
         let axis = &mut self.axes[axis];
         let fault = axis.encoder_fault;
         let position = axis.counter.read(axis.angle + axis.speed * since).0;
-        fault.frozen.unwrap_or(position).wrapping_add(fault.added as u16)
+        let position = fault.frozen.unwrap_or(position).wrapping_add(fault.added as u16);
+        let last = axis.last_position.replace(position).unwrap_or(position);
+        axis.wraps += u32::from(position.abs_diff(last) > u16::MAX / 2);
+        position
     }
 
     /// Whether the index line of an axis is high at the last mechanical step.
@@ -480,6 +495,10 @@ impl Plant {
             }
             self.supply.advance(charge, self.brake, seconds(end - self.electric));
             self.electric = end;
+            // Pins that change at this very instant would otherwise change with the next edge.
+            if end < now {
+                self.refresh(end, bridges);
+            }
         }
         self.refresh(now, bridges);
     }
@@ -661,4 +680,58 @@ fn turn_freely(axis: &Axis, torque: f64) -> (f64, f64) {
     let driven = axis.speed + PERIOD_S / inertia * (torque - viscous * axis.speed);
     let dry = PERIOD_S / inertia * dry;
     (angle, driven - driven.clamp(-dry, dry))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::findings::{Access, Findings};
+    use crate::peripherals::timer::{Kind, MOE};
+    use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+
+    /// A bridge that switches output A at `compare`, from the counter's zero at time 0 on.
+    fn bridge(compare: u32) -> (Timer, Outputs) {
+        let mut timer = Timer::new("TIM1", Kind::Advanced);
+        timer.set_clock(2, 0);
+        let mut findings = Findings::default();
+        let setup = [
+            (0x00, 0xE0),
+            (0x2C, 3500),
+            (0x18, 0x7878),
+            (0x34, compare),
+            (0x38, 3500),
+            (0x3C, 3500),
+            (0x14, 1),
+            (0x20, 0x555),
+            (0x44, MOE | 0xC00 | 20),
+            (0x00, 0xE1),
+        ];
+        for (offset, value) in setup {
+            timer.write(offset, value, 0, &mut Access { now: 0, findings: &mut findings });
+        }
+        let mut outputs = Outputs::default();
+        outputs.connect([[true; 2]; 3]);
+        (timer, outputs)
+    }
+
+    #[test]
+    fn an_edge_at_the_end_of_a_slice_is_not_late() {
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let plant = Plant::new(
+            &leg.description().expect("two joints"),
+            &leg.complete_description().expect("motors"),
+            1,
+        );
+        // A slice of the motors' integration has 1,750 counts.
+        for compare in [1700, 1749, 1750, 1751] {
+            let (mut plant, mut bridges) = (plant.clone(), [bridge(compare), bridge(compare)]);
+            plant.set_gates(true);
+            plant.axes[0].pin_changes = Some(Vec::new());
+            let [first, second] = &mut bridges;
+            plant.advance(3 * QUARTER, &mut [(&first.0, &mut first.1), (&second.0, &mut second.1)]);
+            let changes = plant.axes[0].pin_changes.take().unwrap_or_default();
+            let off = changes.iter().filter(|(at, _)| *at > 100).map(|(at, _)| *at).next();
+            assert_eq!(off, Some(2 * Ticks::from(compare)), "{changes:?}");
+        }
+    }
 }

@@ -87,8 +87,8 @@ pub struct ChipReport {
     pub interrupts: BTreeMap<&'static str, InterruptReport>,
     /// Most instructions by interrupt.
     pub worst_instructions: BTreeMap<&'static str, u64>,
-    /// Emergency stops, if they were run.
-    pub stop: Option<crate::stops::StopReport>,
+    /// Emergency stops at the end of the run; `None` if no bridge was on then.
+    pub stop: Option<crate::stops::Situation>,
     /// Resets.
     pub resets: Vec<String>,
     /// Deepest use of the stack, bytes, and its size.
@@ -228,5 +228,123 @@ impl ChipReport {
             time_factor,
             seed,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scarab_host::base::number::Number;
+    use serde_json::Value;
+
+    /// A report in which every list has an entry.
+    fn report() -> ChipReport {
+        let base = BaseReport {
+            name: "ZZR1".into(),
+            terms: BTreeMap::from([("ZZ1".into(), 1.0)]),
+            value: Number(Some(1.0)),
+            unit: "kg m^2",
+            sigma: Number(Some(0.01)),
+            sigma_from: "noise",
+            sigma_noise: Number(Some(0.01)),
+            sigma_misfit: Number::UNKNOWN,
+            truth: Number::UNKNOWN,
+            cramer_rao: Number::UNKNOWN,
+        };
+        let used = InterruptReport {
+            per_second: 4000.0,
+            mean_instructions: 2874.0,
+            worst_instructions: 3315,
+            worst_latency_us: 0.1,
+            longest_us: 33.0,
+        };
+        let finding = Finding {
+            what: "reserved bit set",
+            register: "CAN_MCR".into(),
+            pc: 0x0800_0200,
+            function: "start".into(),
+            count: 1,
+        };
+        ChipReport {
+            verdict: "accepted".into(),
+            reasons: vec!["residual".into()],
+            base_parameters: vec![base],
+            errors: BTreeMap::from([("ZZR1".into(), 0.1)]),
+            findings: vec![finding],
+            known_findings: Vec::new(),
+            missed_current_ticks: 0,
+            servo_missed: 0,
+            lost_conversions: 0,
+            load: LoadReport {
+                total: 0.5,
+                level0: 0.3,
+                servo: 0.1,
+                bus: 0.03,
+                housekeeping: 0.03,
+                thread: 0.04,
+            },
+            interrupts: BTreeMap::from([("servo", used)]),
+            worst_instructions: LEVELS.into_iter().map(|(name, _)| (name, 0)).collect(),
+            stop: Some(crate::stops::Situation { name: "end of the run", ..Default::default() }),
+            resets: vec!["Software".into()],
+            stack: [29608, 81920],
+            records: [384, 0],
+            simulated_s: 70.7,
+            instructions: 1,
+            time_factor: 1.34,
+            seed: 1,
+        }
+    }
+
+    /// Compares names and kinds of all fields.
+    fn assert_shape(place: &str, shown: &Value, documented: &Value) {
+        match (shown, documented) {
+            (Value::Object(shown), Value::Object(documented)) => {
+                let names = |object: &serde_json::Map<String, Value>| {
+                    object.keys().cloned().collect::<std::collections::BTreeSet<_>>()
+                };
+                assert_eq!(names(shown), names(documented), "{place}");
+                shown.iter().for_each(|(name, value)| {
+                    assert_shape(&format!("{place}.{name}"), value, &documented[name]);
+                });
+            }
+            (Value::Array(shown), Value::Array(documented)) => {
+                assert_eq!(shown.len(), documented.len(), "{place}");
+                shown.iter().zip(documented).for_each(|(one, other)| assert_shape(place, one, other));
+            }
+            (shown, documented) => {
+                assert_eq!(core::mem::discriminant(shown), core::mem::discriminant(documented), "{place}");
+                assert_eq!(shown.is_f64(), documented.is_f64(), "{place}");
+            }
+        }
+    }
+
+    #[test]
+    fn json_of_a_run_has_the_documented_fields() {
+        let readme = include_str!("../README.md");
+        let documented = readme.split("```json\n").nth(1).and_then(|rest| rest.split("```").next());
+        let documented: Value = serde_json::from_str(documented.expect("an example")).expect("JSON");
+        let shown = serde_json::to_value(report()).expect("JSON");
+        assert_shape("", &shown, &documented);
+        // Fields that programs rely on.
+        for pointer in [
+            "/verdict",
+            "/reasons",
+            "/base_parameters",
+            "/findings/0/what",
+            "/findings/0/register",
+            "/findings/0/pc",
+            "/findings/0/function",
+            "/missed_current_ticks",
+            "/servo_missed",
+            "/load/total",
+            "/load/level0",
+            "/load/servo",
+            "/worst_instructions/current_interrupt",
+            "/worst_instructions/servo",
+            "/stop/worst_us",
+        ] {
+            assert!(shown.pointer(pointer).is_some(), "{pointer}");
+        }
     }
 }

@@ -15,7 +15,7 @@ use crate::time::ticks;
 /// Duration of a situation that does not end by itself, s.
 const MEASURED_S: f64 = 1.0;
 /// Cycle of the host, s.
-const CYCLE_S: f64 = 1e-3;
+pub(crate) const CYCLE_S: f64 = 1e-3;
 /// Cycles before the measurement.
 const LEAD: u32 = 100;
 /// Times per cycle at which the wire is filled.
@@ -24,9 +24,9 @@ const FILLINGS: i32 = 8;
 const WAY: f64 = 20_000.0;
 const MOTION_HZ: f64 = 0.5;
 /// COB-ID of frames that no node of this board uses.
-const OTHER: u16 = 0x5FF;
+pub(crate) const OTHER: u16 = 0x5FF;
 /// Longest time for an answer, s.
-const ANSWER_S: f64 = 0.5;
+pub(crate) const ANSWER_S: f64 = 0.5;
 
 /// Load in one situation.
 #[derive(Clone, Debug, Serialize)]
@@ -93,7 +93,7 @@ fn end(session: &Session, name: &'static str, found: &mut Vec<Situation>) {
 }
 
 /// A host with the compact mapping (docs/bus.md) enables both joints; returns their positions.
-fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
+pub(crate) fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
     session.machine.chip_mut().send_frame(Frame::new(0, &[1, 0]));
     session.run(0.1)?;
     for node in [1_u16, 2] {
@@ -134,21 +134,26 @@ fn reach(session: &mut Session, node: u16, state: u32) -> Result<(), ToolError> 
     Err(ToolError::Refused(format!("node {node} does not reach state {state:#04x}")))
 }
 
+/// Targets of both joints, s after the beginning of a motion from these positions.
+pub(crate) fn targets(start: [i32; 2], time: f64) -> Frame {
+    let offset = WAY * (1.0 - (std::f64::consts::TAU * MOTION_HZ * time).cos());
+    let mut targets = [0; 8];
+    for (bytes, start) in targets.chunks_exact_mut(4).zip(start) {
+        bytes.copy_from_slice(&(start + offset as i32).to_le_bytes());
+    }
+    Frame::new(TARGETS, &targets)
+}
+
 /// Sends SYNC and targets at 1 kHz; frames for others fill the rest of the wire.
 fn follow(session: &mut Session, start: [i32; 2], cycles: Range<u32>) -> Result<(), ToolError> {
     session.machine.chip_mut().can.sent.clear();
     let expected = 2 * cycles.len();
     for cycle in cycles {
         let time = f64::from(cycle) * CYCLE_S;
-        let offset = WAY * (1.0 - (std::f64::consts::TAU * MOTION_HZ * time).cos());
-        let mut targets = [0; 8];
-        for (bytes, start) in targets.chunks_exact_mut(4).zip(start) {
-            bytes.copy_from_slice(&(start + offset as i32).to_le_bytes());
-        }
         let waiting = &mut session.machine.chip_mut().can.partner;
         // The first frame may be on the wire.
         let next = waiting.len().min(1);
-        waiting.insert(next, Frame::new(TARGETS, &targets));
+        waiting.insert(next, targets(start, time));
         waiting.insert(next, Frame::new(0x80, &[]));
         for _ in 0..FILLINGS {
             while session.machine.chip().can.partner.len() < 3 {

@@ -18,6 +18,8 @@ const WATCHED_S: f64 = 2e-3;
 /// Longest time until both bridges are permanently off, us, at up to two cycles per instruction. A tick alone
 /// takes up to a PWM period of 42 us.
 const LONGEST_US: f64 = 1.0;
+/// Stops at the end of a run.
+const PHASES: u32 = 20;
 
 /// Stops in one situation.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -55,11 +57,31 @@ impl StopReport {
     /// Whether every stop turned both bridges off by its own interrupt, not by a later tick.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.situations.iter().all(|situation| {
-            let is_off = situation.stayed_on == 0 && situation.on_again == 0;
-            situation.armed > 0 && is_off && situation.worst_final_us <= LONGEST_US
-        })
+        self.situations.iter().all(Situation::is_sound)
     }
+}
+
+impl Situation {
+    /// Whether a bridge was on at the stops, and all of them ended so.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let is_off = self.stayed_on == 0 && self.on_again == 0;
+        self.armed > 0 && is_off && self.worst_final_us <= LONGEST_US
+    }
+}
+
+/// Runs some stops from the end of a run, and returns to it; `None` if no bridge is on.
+///
+/// # Errors
+/// The model does not know what the processor does.
+pub fn at_end(session: &mut Session) -> Result<Option<Situation>, ToolError> {
+    if !session.machine.chip().plant.axes.iter().any(|axis| axis.is_armed()) {
+        return Ok(None);
+    }
+    let saved = session.save()?;
+    let situation = stops(session, "end of the run", &saved, PHASES)?;
+    session.machine.restore(&saved)?;
+    Ok(Some(situation))
 }
 
 /// Runs `phases` stops in each situation, from a session that has just started.

@@ -10,13 +10,13 @@ use crate::session::Session;
 use crate::time::ticks;
 
 /// Stored object: following error window of the first node.
-const OBJECT: u16 = 0x6065;
+pub(crate) const OBJECT: u16 = 0x6065;
 const OLD: u32 = 1000;
 const NEW: u32 = 2000;
-const SAVE: (u16, [u8; 4]) = (0x1010, *b"save");
-const LOAD: (u16, [u8; 4]) = (0x1011, *b"load");
+pub(crate) const SAVE: (u16, [u8; 4]) = (0x1010, *b"save");
+pub(crate) const LOAD: (u16, [u8; 4]) = (0x1011, *b"load");
 /// Longest answer to a request that changes the flash, s.
-const LONGEST_S: f64 = 12.0;
+pub(crate) const LONGEST_S: f64 = 12.0;
 /// Longest start that repairs the flash, s: two sectors are erased.
 const REPAIR_S: f64 = 6.0;
 /// Instants within an erase at which the power is cut.
@@ -47,8 +47,8 @@ pub struct CutReport {
 }
 
 impl Session {
-    /// Starts the board again after a power cut, waits for its node and reads the stored object.
-    fn read_after_cut(&mut self) -> Result<u32, ToolError> {
+    /// Starts the board again after a power cut and waits for its node.
+    pub(crate) fn power_up(&mut self) -> Result<(), ToolError> {
         self.machine.chip_mut().can.sent.clear();
         self.machine.power_cycle();
         self.boot()?;
@@ -60,6 +60,12 @@ impl Session {
             }
             self.run(1e-3)?;
         }
+        Ok(())
+    }
+
+    /// Starts the board again after a power cut and reads the stored object.
+    fn read_after_cut(&mut self) -> Result<u32, ToolError> {
+        self.power_up()?;
         self.run(1e-2)?;
         self.read_object(1, OBJECT, 0, 0.5)
     }

@@ -103,6 +103,8 @@ pub struct Can {
     pub partner_rate: u64,
     /// Received frames that were lost because the queue was full.
     pub overruns: u64,
+    /// Ends of the partner's frames on the wire, if they are to be recorded.
+    pub heard: Option<Vec<(Ticks, Frame)>>,
 }
 
 impl Can {
@@ -138,6 +140,7 @@ impl Can {
             connected: true,
             partner_rate: 1_000_000,
             overruns: 0,
+            heard: None,
         }
     }
 
@@ -145,7 +148,8 @@ impl Can {
     pub fn reset(&mut self) {
         let (partner, sent) = (std::mem::take(&mut self.partner), std::mem::take(&mut self.sent));
         let (connected, partner_rate, bus_hz) = (self.connected, self.partner_rate, self.bus_hz);
-        *self = Self { partner, sent, connected, partner_rate, bus_hz, ..Self::new() };
+        let heard = self.heard.take();
+        *self = Self { partner, sent, connected, partner_rate, bus_hz, heard, ..Self::new() };
     }
 
     /// Sets the clock of the controller's bus.
@@ -234,6 +238,9 @@ impl Can {
                 Sender::Mailbox(index) => self.finish(index, frame, now),
                 Sender::Partner => {
                     self.partner.pop_front();
+                    if let Some(heard) = &mut self.heard {
+                        heard.push((end, frame));
+                    }
                     self.receive(frame);
                 }
             }

@@ -59,6 +59,8 @@ pub struct Flash {
     stale: [bool; 2],
     /// Time for which the processor stalls.
     pub stall: Ticks,
+    /// Duration of an erasure relative to a typical one: up to 2 (DS8626 table 42).
+    pub slowness: f64,
     /// Words programmed and sectors erased so far.
     pub words: u64,
     /// Erased sectors so far.
@@ -83,6 +85,7 @@ impl Flash {
             cells: vec![0xFF; NUMBERS.len() * SECTOR],
             stale: [false; 2],
             stall: 0,
+            slowness: 1.0,
             words: 0,
             erasures: 0,
             cut: None,
@@ -192,7 +195,7 @@ impl Flash {
         let cells = &mut self.cells[sector * SECTOR..(sector + 1) * SECTOR];
         self.erasures += 1;
         self.stale[sector] = self.access & 1 << 10 != 0;
-        self.stall += ERASURES[(self.control >> 8 & 3) as usize];
+        self.stall += (ERASURES[(self.control >> 8 & 3) as usize] as f64 * self.slowness) as Ticks;
         if let Some(Cut::Erasure(share)) = self.cut {
             self.stall = (self.stall as f64 * share) as Ticks;
             (self.cut, self.is_cut) = (None, true);

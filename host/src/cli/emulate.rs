@@ -90,7 +90,7 @@ fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, To
     output::print(&reading::preface(&reading::read(trace, Some(image), Some(&lines))?))?;
     let text = |path: &Path| {
         let bytes = std::fs::read(path);
-        let bytes = bytes.map_err(|error| FileError::unreadable(&path, &error))?;
+        let bytes = bytes.map_err(|error| FileError::unreadable(path, &error))?;
         Ok::<_, ToolError>(String::from_utf8_lossy(&bytes).into_owned())
     };
     let report = CrashReport::new(kind, &text(&lines)?, &text(&log)?, begun, image)?;

@@ -192,7 +192,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             condition: solver.condition().into(),
             parameters: self.parameters(solver, &estimate),
             stribeck: self.stribeck(solver, &estimate.values),
-            selection: record.selection.clone(),
+            selection: record.selection,
             torque_rms: core::array::from_fn(|joint| record.torque[joint].root_mean_square),
             outliers: OutliersReport::of(record, estimator_name(circumstances.estimator)),
             training: fits(training, &estimate.values),

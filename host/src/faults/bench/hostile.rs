@@ -68,7 +68,7 @@ pub(super) const BABBLE: Bench = Bench {
 };
 
 /// Draws any frame.
-fn frame(random: &mut Random) -> Frame {
+pub fn frame(random: &mut Random) -> Frame {
     let byte = |random: &mut Random| random.below(256) as u8;
     let mut data: [u8; 8] = core::array::from_fn(|_| byte(random));
     let node = 1 + random.below(2) as u16;
@@ -107,7 +107,7 @@ fn frame(random: &mut Random) -> Frame {
 
 /// Draws a frame without legal effect on a leg that its host moves: truncated, for missing objects or
 /// transfers, or for no node.
-fn malformed(random: &mut Random) -> Frame {
+pub fn malformed(random: &mut Random) -> Frame {
     let mut data: [u8; 8] = core::array::from_fn(|_| random.below(256) as u8);
     let node = 1 + random.below(2) as u16;
     match random.below(5) {

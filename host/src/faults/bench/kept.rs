@@ -89,7 +89,10 @@ pub(super) const ARMED: Bench = Bench {
 };
 
 /// Identifies a leg and returns its model as stored.
-fn identified(leg: &LegFile, seed: u64) -> Result<ModelRecord<JOINTS>, ToolError> {
+///
+/// # Errors
+/// The leg cannot be identified.
+pub fn identified(leg: &LegFile, seed: u64) -> Result<ModelRecord<JOINTS>, ToolError> {
     let refused = || leg.error("its identification is refused");
     let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(seed))?;
     let mut pair = Pair::new(leg, &context, seed)?;
@@ -298,7 +301,8 @@ fn rots(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Ou
 fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
     let mut random = Random::new(head.id, seed);
     let mut board = rotting.board.clone();
-    corrupt(&mut board, rotting, if blind { 4 } else { random.below(6) }, &mut random);
+    let way = if blind { 4 } else { random.below(6) };
+    corrupt(board.memory(), &rotting.other, way, &mut random);
     let told_apart = readable(board.memory());
     // Only the store can decide which of its records are intact: each value it reads was stored once, or is
     // absent.
@@ -340,19 +344,20 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
 }
 
 /// Following window among a node's objects, or its start value.
-fn window(bytes: &[u8]) -> u32 {
+#[must_use]
+pub fn window(bytes: &[u8]) -> u32 {
     stored_entries(bytes).find(|(object, _)| object.index == WINDOW).map_or(UNTOUCHED, |(_, value)| value)
 }
 
 /// Returns whether every record can be read, whatever its content.
-fn readable(memory: &mut Memory) -> bool {
+pub fn readable(memory: &mut Memory) -> bool {
     let model = memory.with(|store| block_on(store.load::<ModelRecord<JOINTS>>(Key::Model)));
     (0..2).all(|joint| memory.objects(joint).is_ok()) && model.is_some_and(|model| model.is_ok())
 }
 
 /// Corrupts the memory in one of six ways: bits, stretches, another leg's model, all of it.
-fn corrupt(board: &mut Board<JOINTS, BASE>, rotting: &Rotting, way: u64, random: &mut Random) {
-    let bytes = board.memory().bytes_mut();
+pub fn corrupt(memory: &mut Memory, other: &ModelRecord<JOINTS>, way: u64, random: &mut Random) {
+    let bytes = memory.bytes_mut();
     let used = bytes.iter().rposition(|byte| *byte != 0xFF).map_or(1, |last| last + 1) as u64;
     match way {
         0 | 1 => {
@@ -369,7 +374,7 @@ fn corrupt(board: &mut Board<JOINTS, BASE>, rotting: &Rotting, way: u64, random:
             }
         }
         4 => {
-            board.memory().keep_any(OFF, &rotting.other);
+            memory.keep_any(OFF, other);
         }
         _ => bytes.fill([0x00, 0xFF][random.below(2) as usize]),
     }

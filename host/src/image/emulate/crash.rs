@@ -191,11 +191,11 @@ fn starts(records: &str) -> Vec<Vec<Received>> {
 }
 
 fn crashes(start: &[Received]) -> Vec<&Crash> {
-    let crash = |record| match record {
-        &Received::Crash(ref crash) => Some(crash),
+    let crashes = start.iter().filter_map(|record| match record {
+        Received::Crash(crash) => Some(crash),
         _ => None,
-    };
-    start.iter().filter_map(crash).collect()
+    });
+    crashes.collect()
 }
 
 /// Whether the drive was enabled and identifying at the end.

@@ -213,7 +213,8 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
     let alike = all.take_while(|tried| tried.quality.remaining <= MIRRORED * best.quality.remaining);
     let joints: Vec<String> = alike.filter_map(|tried| Some(tried.cause.joint?.to_string())).collect();
     if !joints.is_empty() {
-        best.cause.words += &format!("; the same correction of joint {} explains it as well", joints.join(" or "));
+        best.cause.words +=
+            &format!("; the same correction of joint {} explains it as well", joints.join(" or "));
     }
     if best.is_shared {
         best.cause.joint = None;

@@ -1,0 +1,266 @@
+//! B1, B3: a host that falls silent, and hostile frames.
+
+use std::rc::Rc;
+
+use scarab::bus::Frame;
+use scarab::safety::FaultCode;
+use scarab_host::base::error::ToolError;
+use scarab_host::base::random::Random;
+use scarab_host::faults::bench::hostile::{frame, malformed};
+use scarab_host::rig::bus::host::TARGETS;
+
+use crate::faults::{DAMP_S, Machines, Verdict, begin, jitter};
+use crate::machine::Snapshot;
+use crate::plant::JOINTS;
+use crate::session::Session;
+use crate::situations::{ANSWER_S, CYCLE_S, OTHER, take_over, targets};
+use crate::time::{Ticks, seconds, ticks};
+
+const NODES: [u16; JOINTS] = [1, 2];
+/// Node-ID of the host, and COB-ID of its heartbeat.
+const HOST: u32 = 0x70;
+const HEARTBEAT: u16 = 0x770;
+const SYNC: u16 = 0x80;
+/// Cycles before a host may fall silent, and cycles of hostile frames.
+const LEAD: u64 = 100;
+const FLOOD: u32 = 100;
+/// Longest time until a lost host has an effect, beyond its own time, s.
+const LATE_S: f64 = 20e-3;
+/// Frames that wait for the wire while it is flooded.
+const WAITING: usize = 12;
+/// Difference of a motion because frames wait for others, rad.
+const OFF_RAD: f64 = 2e-3;
+/// Device type of a servo drive with CiA 402's profile.
+const SERVO_DRIVE: u32 = 0x0002_0192;
+
+/// A drive that a host with the compact mapping has enabled.
+pub struct Hosted {
+    saved: Snapshot,
+    positions: [i32; JOINTS],
+}
+
+impl Machines<'_> {
+    fn hosted(&mut self) -> Result<Rc<Hosted>, ToolError> {
+        if let Some(hosted) = &self.hosted {
+            return Ok(Rc::clone(hosted));
+        }
+        let resting = self.resting()?;
+        self.session.machine.restore(&resting)?;
+        let positions = take_over(self.session)?;
+        let hosted = Rc::new(Hosted { saved: self.session.save()?, positions });
+        self.hosted = Some(Rc::clone(&hosted));
+        Ok(hosted)
+    }
+}
+
+fn send(session: &mut Session, frame: Frame) {
+    session.machine.chip_mut().send_frame(frame);
+}
+
+/// Emergency codes that a node has sent.
+fn emergencies(session: &Session, node: u16) -> Vec<u16> {
+    let sent = session.machine.chip().can.sent.iter();
+    let own = sent.filter(|(_, frame)| frame.id() == SYNC + node && frame.data().len() == 8);
+    own.map(|(_, frame)| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect()
+}
+
+/// Instant at which both bridges went off, of those that were on; an error if one went on again.
+fn release(session: &mut Session) -> Result<Option<Ticks>, String> {
+    let (mut armed, mut released) = ([true; JOINTS], None);
+    for switching in session.machine.chip_mut().plant.switchings.iter().flatten() {
+        armed[switching.axis] = switching.on;
+        released = released.or((armed == [false; JOINTS]).then_some(switching.at));
+        if released.is_some() && switching.on {
+            return Err("a bridge was on again".into());
+        }
+    }
+    Ok(released)
+}
+
+/// B1: heartbeat, targets or both end. The leg is damped in time after the host's own time, then off; the
+/// bus says why, and the host's return does not enable.
+pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
+    let hosted = machines.hosted()?;
+    let mut random = Random::new("B1", seed);
+    let session = &mut *machines.session;
+    begin(session, &hosted.saved, 0)?;
+    let times_ms = [random.logarithmic(5.0, 200.0) as u32, random.logarithmic(4.0, 100.0) as u32];
+    let silent = [[true, false], [false, true], [true, true]][seed as usize % 3];
+    // Fault, or quick stop.
+    let option = if random.coin() { 1 } else { 3 };
+    for node in NODES {
+        let mut write =
+            |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
+        write(0x6007, 0, option, 2)?;
+        write(0x1016, 1, HOST << 16 | times_ms[0], 4)?;
+        write(0x1401, 5, times_ms[1], 2)?;
+        write(0x2013, 0, 0, 1)?;
+    }
+    let can = &mut session.machine.chip_mut().can;
+    can.sent.clear();
+    can.heard = Some(Vec::new());
+    // So often that one lost heartbeat has no effect.
+    let beat = u64::from(times_ms[0] * 4 / 10).max(1);
+    let lead = LEAD + random.below(LEAD);
+    let longest = lead + u64::from(times_ms[0].max(times_ms[1])) + ((LATE_S + DAMP_S) / CYCLE_S) as u64;
+    for cycle in 0..longest {
+        let speaks = silent.map(|silent| !silent || cycle < lead);
+        if speaks[0] && cycle.is_multiple_of(beat) {
+            send(session, Frame::new(HEARTBEAT, &[5]));
+        }
+        if speaks[1] {
+            send(session, Frame::new(SYNC, &[]));
+            send(session, targets(hosted.positions, 0.0));
+        }
+        session.run(CYCLE_S)?;
+    }
+    let heard = session.machine.chip_mut().can.heard.take().unwrap_or_default();
+    let last = |id| heard.iter().rev().find(|(_, frame)| frame.id() == id).map_or(0, |(at, _)| *at);
+    let due = [(0, HEARTBEAT), (1, TARGETS)].into_iter().filter(|(way, _)| silent[*way]);
+    let due = due.map(|(way, id)| last(id) + ticks(1e-3 * f64::from(times_ms[way]))).min().unwrap_or(0);
+    let what = format!("silent {silent:?}, own times {times_ms:?} ms, 6007 = {option}");
+    let released = match release(session) {
+        Ok(Some(released)) => released,
+        Ok(None) => return Ok(Err(format!("{what}: no reaction"))),
+        Err(complaint) => return Ok(Err(format!("{what}: {complaint}"))),
+    };
+    let after = seconds(released) - DAMP_S - seconds(due);
+    if after < 0.0 {
+        return Ok(Err(format!("{what}: {:.3} ms too early, or off without damping", -1e3 * after)));
+    }
+    let codes = [FaultCode::Heartbeat, FaultCode::LatePdo].map(FaultCode::number);
+    for node in NODES {
+        if !emergencies(session, node).iter().any(|code| codes.contains(code)) {
+            return Ok(Err(format!("{what}: node {node} sends no emergency message")));
+        }
+    }
+    // The host is back.
+    send(session, Frame::new(0, &[1, 0]));
+    for cycle in 0..100 {
+        if cycle % 10 == 0 {
+            NODES.into_iter().for_each(|node| send(session, Frame::new(0x200 + node, &[15, 0])));
+        }
+        send(session, Frame::new(HEARTBEAT, &[5]));
+        send(session, Frame::new(SYNC, &[]));
+        send(session, targets(hosted.positions, 0.0));
+        session.run(CYCLE_S)?;
+    }
+    Ok(release(session).map(|_| after).map_err(|complaint| format!("{what}: {complaint}")))
+}
+
+/// B3: frames of any kind, more than the wire carries. A drive that is off stays off; a host's motion goes on
+/// among malformed frames; current ticks come in time, the image does not restart, and its nodes answer.
+pub fn hostile(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
+    let resets = machines.session.resets.len();
+    let findings = crate::report::findings(machines.session).0.len();
+    let mut random = Random::new("B3", seed);
+    let complaint = match seed % 3 {
+        0 => flooded_off(machines, &mut random)?,
+        1 => moved_on(machines, &mut random)?,
+        _ => flooded_on(machines, &mut random)?,
+    };
+    if let Err(complaint) = complaint {
+        return Ok(Err(complaint));
+    }
+    let session = &mut *machines.session;
+    let delay = jitter(session);
+    if session.resets.len() != resets {
+        return Ok(Err(format!("the image restarted: {:?}", session.resets.last())));
+    }
+    if crate::report::findings(session).0.len() != findings {
+        return Ok(Err("the model has new findings".into()));
+    }
+    if let Err(complaint) = answers(session)? {
+        return Ok(Err(complaint));
+    }
+    Ok(delay)
+}
+
+/// Both nodes start again and answer.
+fn answers(session: &mut Session) -> Result<Result<(), String>, ToolError> {
+    session.machine.chip_mut().can.partner.clear();
+    session.run(5e-3)?;
+    session.machine.chip_mut().can.sent.clear();
+    send(session, Frame::new(0, &[129, 0]));
+    session.run(20e-3)?;
+    // Hostile frames may have set other node-IDs.
+    let sent = session.machine.chip().can.sent.iter();
+    let started = sent.filter(|(_, frame)| frame.id() & 0x780 == 0x700 && frame.data() == [0]);
+    let nodes: Vec<u16> = started.map(|(_, frame)| frame.id() & 0x7F).collect();
+    if nodes.len() != JOINTS {
+        return Ok(Err(format!("of both nodes {nodes:?} start again")));
+    }
+    for node in nodes {
+        match session.read_object(node, 0x1000, 0, ANSWER_S) {
+            Ok(SERVO_DRIVE) => {}
+            other => return Ok(Err(format!("node {node} answers {other:?}"))),
+        }
+    }
+    Ok(Ok(()))
+}
+
+/// Keeps the wire full of any frames for a millisecond.
+fn flood(session: &mut Session, random: &mut Random) -> Result<(), ToolError> {
+    while session.machine.chip().can.partner.len() < WAITING {
+        send(session, frame(random));
+    }
+    session.run(CYCLE_S)
+}
+
+fn flooded_off(machines: &mut Machines<'_>, random: &mut Random) -> Result<Result<(), String>, ToolError> {
+    let resting = machines.resting()?;
+    let session = &mut *machines.session;
+    session.machine.restore(&resting)?;
+    session.hold_switch(false);
+    session.run(2.0 * DAMP_S)?;
+    let off = session.save()?;
+    begin(session, &off, random.below(ticks(10e-3)))?;
+    for _ in 0..FLOOD {
+        if random.below(2) == 0 {
+            // In the correct order, as a real host.
+            for (word, node) in [6, 7, 15].into_iter().flat_map(|word| NODES.map(|node| (word, node))) {
+                send(session, Frame::new(0x200 + node, &[word, 0]));
+            }
+        }
+        flood(session, random)?;
+    }
+    let switchings = session.machine.chip_mut().plant.switchings.iter().flatten();
+    Ok(if switchings.count() == 0 { Ok(()) } else { Err("a drive that was off switched".into()) })
+}
+
+fn flooded_on(machines: &mut Machines<'_>, random: &mut Random) -> Result<Result<(), String>, ToolError> {
+    let hosted = machines.hosted()?;
+    let session = &mut *machines.session;
+    begin(session, &hosted.saved, random.below(ticks(10e-3)))?;
+    for cycle in 0..FLOOD {
+        send(session, Frame::new(SYNC, &[]));
+        send(session, targets(hosted.positions, f64::from(cycle) * CYCLE_S));
+        flood(session, random)?;
+    }
+    // Legal frames may have stopped the leg, and enabled it again step by step while the switch is held.
+    Ok(Ok(()))
+}
+
+fn moved_on(machines: &mut Machines<'_>, random: &mut Random) -> Result<Result<(), String>, ToolError> {
+    let hosted = machines.hosted()?;
+    let session = &mut *machines.session;
+    let delay = random.below(ticks(10e-3));
+    let mut ends = [[0.0; JOINTS]; 2];
+    for (end, is_hostile) in ends.iter_mut().zip([false, true]) {
+        begin(session, &hosted.saved, delay)?;
+        for cycle in 0..4 * FLOOD {
+            send(session, Frame::new(SYNC, &[]));
+            send(session, targets(hosted.positions, f64::from(cycle) * CYCLE_S));
+            send(session, if is_hostile { malformed(random) } else { Frame::new(OTHER, &[0x55; 8]) });
+            session.run(CYCLE_S)?;
+        }
+        *end = session.machine.chip().plant.position();
+    }
+    let off = (0..JOINTS).map(|joint| (ends[0][joint] - ends[1][joint]).abs()).fold(0.0, f64::max);
+    Ok(match release(session) {
+        Ok(None) if off < OFF_RAD => Ok(()),
+        Ok(None) => Err(format!("{:.2} mrad beside its motion", 1e3 * off)),
+        Ok(Some(_)) => Err("malformed frames stopped the leg".into()),
+        Err(complaint) => Err(complaint),
+    })
+}

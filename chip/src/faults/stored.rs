@@ -1,0 +1,203 @@
+//! F2, F3: stored data that has rotted or is another leg's, and requests to change the flash.
+
+use std::rc::Rc;
+
+use scarab::leg::{DriveState, Fingerprint};
+use scarab::safety::NoticeCode;
+use scarab::store::ModelRecord;
+use scarab_host::base::error::ToolError;
+use scarab_host::base::random::Random;
+use scarab_host::faults::bench::kept::{corrupt, identified, readable, window};
+use scarab_host::formats::kept_file::memory::Memory;
+
+use crate::faults::{DAMP_S, Machines, Verdict, begin};
+use crate::machine::Snapshot;
+use crate::plant::JOINTS;
+use crate::session::Session;
+use crate::store_cuts::{LOAD, LONGEST_S, OBJECT, SAVE};
+use crate::time::ticks;
+
+/// Values that are stored one after the other.
+const WINDOWS: [u32; 2] = [20_000, 30_000];
+const ANSWER_S: f64 = 0.5;
+/// Number of models accepted so far, in the object dictionary.
+const MODELS: (u16, u8) = (0x2100, 7);
+/// Ways to corrupt a memory.
+const WAYS: u64 = 6;
+/// Answer to a request that is refused in this state of the drive (CiA 301: 0800 0022).
+const REFUSED: [u8; 4] = [0x22, 0, 0, 0x08];
+
+/// A board that has stored two generations of objects and of models.
+pub struct Stored {
+    flash: Vec<u8>,
+    fingerprint: Fingerprint,
+    other: ModelRecord<JOINTS>,
+}
+
+/// What a board does with its stored data at a start.
+#[derive(Debug, PartialEq, Eq)]
+struct Start {
+    windows: [u32; JOINTS],
+    generation: u32,
+    /// Nodes that report the loss of stored data.
+    reports: [bool; JOINTS],
+}
+
+impl Machines<'_> {
+    fn stored(&mut self) -> Result<Rc<Stored>, ToolError> {
+        if let Some(stored) = &self.stored {
+            return Ok(Rc::clone(stored));
+        }
+        let booted = Rc::clone(&self.booted);
+        self.session.machine.restore(&booted)?;
+        for window in WINDOWS {
+            for node in [1, 2] {
+                self.session.write_object(node, OBJECT, 0, window, ANSWER_S)?;
+            }
+            self.session.store(SAVE.0, SAVE.1, LONGEST_S)?;
+        }
+        let mut memory = Memory::new(Some(self.session.machine.chip_mut().flash.cells_mut()));
+        let leg = self.session.leg.clone();
+        let mut longer = leg.clone();
+        longer.joints.iter_mut().for_each(|joint| joint.torque_per_ampere *= 1.1);
+        let [older, own, other] = [identified(&leg, 2)?, identified(&leg, 1)?, identified(&longer, 3)?];
+        let kept =
+            [&older, &own].into_iter().all(|model| memory.keep_any(DriveState::SwitchOnDisabled, model));
+        let stored = Stored { flash: memory.bytes().to_vec(), fingerprint: own.model.fingerprint, other };
+        let expected =
+            Start { windows: [WINDOWS[1]; 2], generation: own.provenance.generation, reports: [false; 2] };
+        let found = start(self.session, &booted, &stored.flash)?;
+        if !kept || found != expected {
+            return Err(ToolError::input(format!("a sound memory gives {found:?} instead of {expected:?}")));
+        }
+        let stored = Rc::new(stored);
+        self.stored = Some(Rc::clone(&stored));
+        Ok(stored)
+    }
+}
+
+/// Starts a board with this flash.
+fn start(session: &mut Session, booted: &Snapshot, flash: &[u8]) -> Result<Start, ToolError> {
+    session.machine.restore(booted)?;
+    session.machine.chip_mut().flash.cells_mut().copy_from_slice(flash);
+    session.power_up()?;
+    session.run(20e-3)?;
+    let reports = [1, 2].map(|node: u16| {
+        let code = NoticeCode::StoreFailed.number().to_le_bytes();
+        let sent = session.machine.chip().can.sent.iter();
+        sent.filter(|(_, frame)| frame.id() == 0x80 + node).any(|(_, frame)| frame.data().starts_with(&code))
+    });
+    let mut read = |node, (index, sub)| session.read_object(node, index, sub, ANSWER_S);
+    let windows = [read(1, (OBJECT, 0))?, read(2, (OBJECT, 0))?];
+    Ok(Start { windows, generation: read(1, MODELS)?, reports })
+}
+
+/// F2: the board takes the newest of its intact records, or its start values; it reports what is lost, and
+/// enables nothing.
+pub fn rotten(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
+    let stored = machines.stored()?;
+    let mut random = Random::new("F2", seed);
+    let way = seed % WAYS;
+    let mut memory = Memory::new(Some(&stored.flash));
+    corrupt(&mut memory, &stored.other, way, &mut random);
+    let flash = memory.bytes().to_vec();
+    let is_readable = readable(&mut memory);
+    let model = memory.any_model::<JOINTS>();
+    let own = model.filter(|model| model.model.fingerprint == stored.fingerprint);
+    let objects = [0, 1].map(|joint| memory.objects(joint).ok().flatten());
+    let default = window(&[]);
+    let expected = Start {
+        windows: objects.map(|objects| objects.as_deref().map_or(default, window)),
+        generation: own.map_or(0, |model| model.provenance.generation),
+        reports: [!is_readable || model.is_some() && own.is_none(); JOINTS],
+    };
+    if !expected.windows.iter().all(|value| WINDOWS.contains(value) || *value == default) {
+        return Err(ToolError::input(format!("the store reads what was never stored: {expected:?}")));
+    }
+    let booted = Rc::clone(&machines.booted);
+    let session = &mut *machines.session;
+    let resets = session.resets.len();
+    let found = start(session, &booted, &flash)?;
+    session.machine.chip_mut().plant.switchings = Some(Vec::new());
+    session.hold_switch(true);
+    session.run(0.3)?;
+    let switched = session.machine.chip().plant.switchings.iter().flatten().count();
+    if found != expected || switched > 0 || session.resets.len() != resets {
+        return Ok(Err(format!("way {way}: {found:?} instead of {expected:?}; {switched} switchings")));
+    }
+    Ok(Ok(0.0))
+}
+
+/// F3: a request to change the flash while the drive is on is refused and changes nothing; with the drive
+/// off the processor stalls, for up to twice the typical time, and nothing resets it.
+pub fn asked(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
+    let mut random = Random::new("F3", seed);
+    let request = if random.coin() { SAVE } else { LOAD };
+    if seed.is_multiple_of(2) {
+        armed(machines, request, &mut random)
+    } else {
+        off(machines, request, &mut random)
+    }
+}
+
+fn armed(
+    machines: &mut Machines<'_>,
+    (index, word): (u16, [u8; 4]),
+    random: &mut Random,
+) -> Result<Verdict, ToolError> {
+    let moving = machines.moving()?;
+    let session = &mut *machines.session;
+    begin(session, &moving, random.below(ticks(0.5)))?;
+    let cells = session.machine.chip_mut().flash.cells_mut().to_vec();
+    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), word);
+    let node = 1 + random.below(2) as u16;
+    let answer = session.ask(node, [0x23, low, high, 1, a, b, c, d], ANSWER_S)?;
+    session.run(0.1)?;
+    let is_refused = answer[..4] == [0x80, low, high, 1] && answer[4..] == REFUSED;
+    let is_same = session.machine.chip_mut().flash.cells_mut() == cells;
+    let switched = session.machine.chip().plant.switchings.iter().flatten().count();
+    if !is_refused || !is_same || switched > 0 {
+        return Ok(Err(format!("answer {answer:02x?}, flash unchanged {is_same}, {switched} switchings")));
+    }
+    Ok(Ok(0.0))
+}
+
+fn off(
+    machines: &mut Machines<'_>,
+    request: (u16, [u8; 4]),
+    random: &mut Random,
+) -> Result<Verdict, ToolError> {
+    let resting = machines.resting()?;
+    let session = &mut *machines.session;
+    begin(session, &resting, random.below(ticks(10e-3)))?;
+    session.hold_switch(false);
+    session.run(2.0 * DAMP_S)?;
+    let resets = session.resets.len();
+    let chip = session.machine.chip_mut();
+    chip.flash.slowness = random.uniform(1.0, 2.0);
+    chip.iwdg.oscillator_hz = random.uniform(17e3, 47e3) as u64;
+    chip.reschedule();
+    chip.plant.switchings = Some(Vec::new());
+    let erasures = chip.flash.erasures;
+    for node in [1, 2] {
+        session.write_object(node, OBJECT, 0, WINDOWS[0], ANSWER_S)?;
+    }
+    // The bus says FF0D before and 0000 afterwards, else this fails.
+    if let Err(error) = session.store(request.0, request.1, LONGEST_S) {
+        return Ok(Err(error.to_string()));
+    }
+    session.run(0.1)?;
+    let erased = session.machine.chip().flash.erasures > erasures;
+    let switched = session.machine.chip().plant.switchings.iter().flatten().count();
+    if session.resets.len() != resets || switched > 0 {
+        return Ok(Err(format!("resets {:?}, {switched} switchings", &session.resets[resets..])));
+    }
+    // After an erasure nobody knows how far the joints have moved: no enabling without a new reference.
+    session.hold_switch(true);
+    session.run(0.5)?;
+    let enabled = session.machine.chip().plant.axes.iter().any(|axis| axis.is_armed());
+    if enabled == erased {
+        return Ok(Err(format!("sector erased {erased}, enabled afterwards {enabled}")));
+    }
+    Ok(Ok(0.0))
+}
