@@ -196,11 +196,11 @@ fn constants_that_are_not_the_stored_ones_are_another_motors_and_what_is_used_is
         (0.15, 0.25, |stored| &mut stored.direct_inductance.0),
         (0.15, 0.25, |stored| &mut stored.quadrature_inductance.0),
     ];
-    for (agrees, differs, position) in changes {
+    for (agrees, differs, field) in changes {
         for (share, end) in [(agrees, true), (-agrees, true), (differs, false), (-differs, false)] {
             let mut changed = stored;
             // The measured value exceeds the stored one by this share.
-            *position(&mut changed) /= 1.0 + share;
+            *field(&mut changed) /= 1.0 + share;
             let calibrator = Calibrator::from_stored(&CONFIGURATION, SETTINGS, changed).expect("usual");
             let found =
                 run(&mut TestMotor { random: TestRandom::new(9), ..TestMotor::default() }, calibrator);
