@@ -160,9 +160,12 @@ pub fn run_own<T: Real>(
             let search = Bso::<T, N, D>::new(recorder, BsoSettings::default(), seed).map_err(refused)?;
             follow(search, recorder, SWARM, ITERATIONS, u32::MAX);
         }
-        _ => {
+        Algorithm::Pso => {
             let search = Pso::<T, N, D>::new(recorder, PsoSettings::default(), seed).map_err(refused)?;
             follow(search, recorder, SWARM, u32::MAX, evaluations);
+        }
+        Algorithm::CmaEs | Algorithm::CmaEsTwenty | Algorithm::CmaEsRestarts | Algorithm::PsoArgmin => {
+            return Err(ToolError::input("this search runs in double precision only"));
         }
     }
     Ok(())

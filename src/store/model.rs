@@ -38,7 +38,7 @@ pub struct Provenance<const N: usize> {
     pub generation: u32,
     /// Seed of the swarm's random generator.
     pub swarm_seed: u64,
-    /// Temperature of the warmer bridge at acceptance; unknown without a thermistor.
+    /// Temperature of the warmer bridge at acceptance; the firmware does not fill it yet.
     pub bridge: Option<Celsius>,
     /// True if the leg was worn; unknown unless the operator said so.
     pub worn: Option<bool>,

@@ -5,6 +5,7 @@
 //! Velocity, per coordinate with fresh random numbers r1, r2 in 0..1 (Eq. 19), limited to the velocity limit:
 //!   v = w v + c1 r1 (P_i - x) + c2 r2 (G - x)
 //! Inertia weight (Eq. 20): w = w_max - (w_max - w_min) t / M
+//!
 //! Symbols: x position, v velocity, P_i personal best, G best of the personal bests, all in box coordinates
 //! (0..1 per coordinate); w inertia weight, c1 and c2 individual and global learning factor; t iteration of
 //! M.

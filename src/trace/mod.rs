@@ -41,5 +41,6 @@ pub use line::{Line, LineError};
 pub use record::Record;
 pub use report::{Report, judged};
 
-/// Version of records and keys; increases with every addition.
+/// Version of records and keys; increases when an older reader would misread a record. A new value gets a new
+/// kind of record, because a reader refuses a record without one of its keys.
 pub const GRAMMAR: u8 = 1;

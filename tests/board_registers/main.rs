@@ -192,7 +192,7 @@ fn currents_voltages_and_temperatures_are_those_of_the_board() {
     assert_eq!([None, Some("48")].map(|volts| analog::divider(analog::stated(volts))), [None; 2]);
     // The temperature grows monotonically with the code.
     let degrees: Vec<f32> = (0..4096_u16).filter_map(analog::temperature_c).collect();
-    assert!(degrees.windows(2).all(|pair| pair[0] < pair[1]), "not monotonous");
+    assert!(degrees.windows(2).all(|pair| pair[0] < pair[1]), "not monotonic");
     assert!(degrees[0] < 0.0 && *degrees.last().expect("some") > 120.0);
     assert_eq!([0, 4095].map(analog::temperature_c), [None; 2]);
 }

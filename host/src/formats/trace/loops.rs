@@ -121,9 +121,14 @@ impl Statistics {
             ));
         }
         if let Some(supply) = self.supply {
+            // A board without a thermistor sends NaN.
+            let celsius = |value: f32| if value.is_nan() { "-".into() } else { format!("{value:.0}") };
             lines.push(format!(
-                "supply: {:.1} to {:.1} V; hottest: bridges {:.0}, chopper {:.0} degrees Celsius",
-                supply.low_v, supply.high_v, supply.bridge_c, supply.chopper_c
+                "supply: {:.1} to {:.1} V; hottest: bridges {}, chopper {} degrees Celsius",
+                supply.low_v,
+                supply.high_v,
+                celsius(supply.bridge_c),
+                celsius(supply.chopper_c)
             ));
         }
         lines

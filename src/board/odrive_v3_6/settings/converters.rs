@@ -33,7 +33,8 @@ pub const JEOC: u32 = 1 << 2;
 
 /// Channels of the shunts of B and C, by axis.
 pub const SHUNTS: [[u32; 2]; 2] = [[10, 11], [13, 12]];
-/// Channels of bus voltage, bridge of axis 0, bridge of axis 1, chopper.
+/// Channels of bus voltage, bridge of axis 0, bridge of axis 1, chopper. All four injected ranks of ADC1 are
+/// used; its regular sequence is free.
 pub const SLOW: [u32; 4] = [6, 15, 4, 5];
 
 /// Ends of either kind.
