@@ -18,7 +18,7 @@
 //! | --- | --- | --- | --- |
 //! | raw | every parameter with an effect on torque | prior's range | active set over single parameters |
 //! | base | base parameters | sums of those ranges | active set |
-//! | log-Cholesky | 10 per link, logs of IA, FC, FV, and OFF | as in `full_search` of the firmware | barriers of 1e-8 |
+//! | log-Cholesky | 10 per link, logs of IA, FC, FV, and OFF | as in `full_search.rs` | barriers of 1e-8 |
 //! | seen | without the nine of a link along gravity, see [`super::seen_links`] | as above | as above |
 //!
 //! `chain` and `leg` have links and friction, as the paper's Equation (6); `whole` adds a rotor and

@@ -9,7 +9,7 @@
 //! | [`Bas`] | beetle antennae search, Eqs (21)-(26) of the exoskeleton paper | 3 |
 //! | [`Pso`] | particle swarm (Kennedy, Eberhart, 1995), Eqs (18)-(20) | N |
 //! | [`Bso`], [`BsoSettings::Paper`] | beetle swarm, Eqs (19)-(29), (29) corrected | 3 N |
-//! | [`Bso`], [`BsoSettings::Adaptive`] | default: shared frame, metric, leaps | about N + 2 min(N, D), 20 to 60 for N = 20 |
+//! | [`Bso`], [`BsoSettings::Adaptive`] | default: shared frame, metric, leaps | 20 to 60 for N = 20 |
 //!
 //! Common contract ([`Search`]): the budget counts evaluations, so a run can be sliced anywhere, even inside
 //! an iteration, with bit-identical results. No evaluation is outside the box. A candidate whose cost is not
