@@ -6,10 +6,11 @@ use hal_sim::drive::description::BridgeDescription;
 use scarab::motor::AxisConfiguration;
 
 use crate::base::error::ToolError;
-use crate::faults::catalogue::{Bounds, JOINTS};
+use crate::faults::scenario::Bounds;
 use crate::formats::leg_file::{JointFile, LegFile, MotorFile};
 use crate::rig::board::{BUS, axis_configuration};
 use crate::rig::faulty_board::PERIODS_PER_S;
+use scarab::model::planar::JOINTS;
 
 /// Thresholds of the firmware's voltage model (`scarab::motor::model_watch`) for this joint, by its
 /// equations.

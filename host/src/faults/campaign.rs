@@ -10,9 +10,7 @@ use hal_sim::faults::{Channel, Form, Injection, Timing};
 use hal_sim::world::TICK_S;
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use rayon::prelude::*;
-use scarab::hal::Contacts;
 use scarab::leg::{Activity, ControlRequest};
-use scarab::safety::DriveState;
 
 use crate::base::error::ToolError;
 use crate::base::random::Random;
@@ -20,19 +18,21 @@ use crate::base::shard::Shard;
 use crate::faults::bench::offsets::OFFSETS;
 use crate::faults::bounds::bounds;
 use crate::faults::catalogue::stop::ROWS as STOP;
-use crate::faults::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::detectors::views;
 use crate::faults::emulated::{emulated, emulated_seeds};
 use crate::faults::entry::Entry;
+use crate::faults::operator::begin;
 use crate::faults::results::{Base, Campaign};
 use crate::faults::run::{Manner, Outcome, run};
+use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::faults::trial::Trial;
 use crate::formats::leg_file::LegFile;
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::{Context, Pair};
+use scarab::model::planar::JOINTS;
 
-pub(super) use scarab::model::planar::BASE;
+use scarab::model::planar::BASE;
 
 /// Runs of a row per base.
 const RUNS_PER_BASE: u64 = 256;
@@ -43,9 +43,6 @@ const WIDENED: f32 = 3.0;
 const BATCH: usize = 128;
 /// Longest identification, s.
 const LONGEST_S: f64 = 300.0;
-/// Periods until the operator's contacts count, and until the drive has to be enabled.
-const OPEN: u64 = PERIODS_PER_S / 5;
-const ENABLED: u64 = PERIODS_PER_S;
 
 /// Options of a campaign.
 #[derive(Clone, Debug)]
@@ -301,30 +298,6 @@ impl Setting<'_> {
         }
         batch.clear();
     }
-}
-
-/// Starts an identification as an operator does: contacts open, the switch held until the drive is enabled,
-/// the button.
-pub(super) fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError> {
-    for _ in 0..OPEN {
-        rig.advance();
-    }
-    rig.hand.enabling = true;
-    for _ in 0..ENABLED {
-        rig.advance();
-        if rig.state() == DriveState::OperationEnabled {
-            break;
-        }
-    }
-    rig.hand = Contacts { enabling: true, start: true };
-    for _ in 0..ENABLED {
-        rig.advance();
-        if matches!(rig.leg.control().activity(), Activity::Identify(_)) {
-            rig.hand.start = false;
-            return Ok(());
-        }
-    }
-    Err(leg.error("the operator's contacts do not begin an identification").into())
 }
 
 /// Periods of an identification from request to verdict, measured with ideal drives, which have the same

@@ -8,10 +8,10 @@
 use scarab::safety::FaultCode;
 use serde::Serialize;
 
-use crate::faults::catalogue::Row;
 use crate::faults::entry::Entry;
 use crate::faults::results::Campaign;
 use crate::faults::run::{Blind, Outcome};
+use crate::faults::scenario::Row;
 
 /// One fault code of the firmware. Field names are part of the JSON interface.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

@@ -3,7 +3,7 @@
 use hal_sim::faults::{Channel, Form, Injection, Timing};
 
 use crate::base::random::Random;
-use crate::faults::catalogue::{Event, Expected, Onset, Scenario};
+use crate::faults::scenario::{Event, Expected, Onset, Scenario};
 use crate::rig::faulty_board::{PERIOD_MS, PERIODS_PER_S};
 use scarab::motor::SenseScale;
 

@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{FileError, ToolError};
 use crate::base::random::Random;
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::image::emulate::crash::{CrashKind, CrashReport};
 use crate::image::emulate::run::{build, crash, is_there, run};

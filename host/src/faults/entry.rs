@@ -1,32 +1,9 @@
 //! Rows of the fault table, independent of the way they are run.
 
-use scarab::safety::FaultCode;
-
 use crate::faults::bench::{BENCHES, Bench};
-use crate::faults::catalogue::{Row, rows};
+use crate::faults::catalogue::rows;
 use crate::faults::emulated::HEADS;
-
-/// Description of a row.
-#[derive(Clone, Copy, Debug)]
-pub struct Head {
-    /// Id in the catalogue.
-    pub id: &'static str,
-    /// Description of the fault.
-    pub fault: &'static str,
-    /// Detector of the fault.
-    pub detector: &'static str,
-    /// Safe state: the catalogue's last column.
-    pub state: &'static str,
-    /// Time limit from the fault to the safe state's first command, ms; infinite where the limit is not a
-    /// time.
-    pub deadline_ms: f64,
-    /// Unit of the magnitude.
-    pub unit: &'static str,
-    /// Fault codes that the firmware reports; empty for a bench.
-    pub codes: &'static [FaultCode],
-    /// Cases that are not detected yet.
-    pub lacking: Option<&'static str>,
-}
+use crate::faults::scenario::{Head, Row};
 
 /// One way to run a row.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,9 @@
 //! Events that act on a machine besides its ports.
 
-use crate::faults::catalogue::{Event, JOINTS};
+use crate::faults::scenario::Event;
 use crate::formats::leg_file::LegFile;
 use crate::rig::faulty_board::Rig;
+use scarab::model::planar::JOINTS;
 
 /// Applies an event now.
 pub fn apply<const B: usize>(event: Event, leg: &LegFile, rig: &mut Rig<JOINTS, B>) {

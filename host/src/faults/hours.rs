@@ -12,12 +12,13 @@ use serde::{Deserialize, Serialize};
 use crate::base::error::ToolError;
 use crate::base::number::Number;
 use crate::base::shard::Shard;
-use crate::faults::campaign::{BASE, begin};
-use crate::faults::catalogue::JOINTS;
+use crate::faults::operator::begin;
 use crate::formats::leg_file::LegFile;
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::Context;
+use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
 
 /// Duration of one stretch, s.
 const STRETCH_S: u64 = 180;

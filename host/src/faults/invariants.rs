@@ -7,8 +7,8 @@ use scarab::hal::AxisCommand;
 use scarab::leg::{Activity, IdentifiedModel};
 use scarab::safety::FaultCode;
 
-use crate::faults::catalogue::Event;
 use crate::faults::catalogue::encoder::LOST_TURNS;
+use crate::faults::scenario::Event;
 use crate::formats::leg_file::{JointFile, LegFile};
 use crate::rig::faulty_board::{Edges, PERIODS_PER_S, Rig};
 

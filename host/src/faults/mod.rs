@@ -3,7 +3,8 @@
 //!
 //! | part | content |
 //! | --- | --- |
-//! | [`catalogue`], [`draw`], [`bounds`] | injected faults and required reactions; rows by group |
+//! | [`scenario`] | a row and a run of it: fault, onset, required reaction |
+//! | [`catalogue`], [`draw`], [`bounds`] | all rows by group |
 //! | [`run`], [`outcome`], [`invariants`] | one run, its outcome, and conditions that hold in every period |
 //! | [`aftermath`] | allowed safe states of each code; an operator who resets and enables again |
 //! | [`campaign`] | many runs, forked from identifications |
@@ -30,9 +31,11 @@ pub mod entry;
 pub mod event;
 pub mod hours;
 pub mod invariants;
+pub mod operator;
 pub mod outcome;
 pub mod recording;
 pub mod report;
 pub mod results;
 pub mod run;
+pub mod scenario;
 pub mod trial;

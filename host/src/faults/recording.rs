@@ -1,8 +1,8 @@
 //! Records the curves of a run.
 
-use crate::faults::catalogue::JOINTS;
 use crate::report::fault_curves::FaultCurves;
 use crate::rig::faulty_board::{PERIOD_MS, Rig};
+use scarab::model::planar::JOINTS;
 
 impl FaultCurves {
     /// Records the period that has ended.

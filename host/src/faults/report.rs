@@ -6,10 +6,11 @@ use serde::Serialize;
 use crate::base::number::Number;
 use crate::base::table::{Cell, Table, cells};
 use crate::faults::detectors::{DetectorReport, detectors};
-use crate::faults::entry::{Entry, Head, instead};
+use crate::faults::entry::{Entry, instead};
 use crate::faults::hours::HoursReport;
 use crate::faults::results::Campaign;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::faults::trial::KINDS;
 
 /// Largest number of failures in the JSON.

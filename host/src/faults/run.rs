@@ -7,9 +7,10 @@ use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
 use crate::faults::aftermath::{RESET, RESET_EVERY, hand};
-use crate::faults::catalogue::{Event, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::event::apply;
 use crate::faults::invariants::{Invariants, Scope};
+use crate::faults::scenario::{Event, Expected, Onset, Row, Scenario};
+use scarab::model::planar::JOINTS;
 
 pub use crate::faults::outcome::{Blind, Manner, Outcome};
 use crate::formats::leg_file::LegFile;

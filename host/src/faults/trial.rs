@@ -15,13 +15,15 @@ use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
 use crate::faults::aftermath::{RESET, RESET_EVERY, hand};
-use crate::faults::catalogue::{Bounds, Event, JOINTS, rows};
+use crate::faults::catalogue::rows;
 use crate::faults::event::apply;
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
+use crate::faults::scenario::{Bounds, Event};
 use crate::formats::leg_file::LegFile;
 use crate::report::fault_curves::FaultCurves;
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
+use scarab::model::planar::JOINTS;
 
 /// Rows excluded from pairs. A hang ends in a reset that removes the other fault, and changed limits cannot
 /// be enforced.
@@ -245,10 +247,11 @@ impl Trial {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::faults::campaign::{BASE, begin};
+    use crate::faults::operator::begin;
     use crate::formats::leg_file::DEFAULT_LEG;
     use crate::rig::options::{DriveModel, SimulationOptions};
     use crate::rig::pair::Context;
+    use scarab::model::planar::BASE;
 
     /// Seeds of the sweep with a lasting fault of this channel, one for each form.
     fn lasting(channel: Channel) -> impl Iterator<Item = u64> {

@@ -6,11 +6,11 @@ use scarab::leg::DriveState;
 use scarab::safety::{FaultCode, InhibitReason};
 
 use crate::faults::aftermath;
-use crate::faults::campaign::BASE;
 use crate::formats::leg_file::{DEFAULT_LEG, LegFile};
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::Context;
+use scarab::model::planar::BASE;
 
 type TestRig = Rig<2, BASE>;
 

@@ -15,14 +15,14 @@ use scarab::units::Radian;
 use crate::base::error::ToolError;
 use crate::base::random::Random;
 use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::JOINTS;
-use crate::faults::entry::Head;
 use crate::faults::invariants::MARGIN_RAD;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, start_position};
 use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
 
 pub(super) const BENCH: Bench = Bench {
     head: Head {

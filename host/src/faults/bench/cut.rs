@@ -10,11 +10,11 @@ use scarab::hal::{AxisCommand, Contacts, SERVO_RATE_HZ};
 use crate::base::error::ToolError;
 use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, forked, started};
-use crate::faults::catalogue::JOINTS;
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
+use scarab::model::planar::JOINTS;
 
 /// Servo ticks until the bus voltage must be zero, of operated contacts, and of an opened switch.
 const PATIENCE: u64 = 2 * SERVO_RATE_HZ as u64;
@@ -60,7 +60,7 @@ fn cut(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
     })
 }
 
-type Board = crate::rig::bus::board::Board<JOINTS, { crate::faults::campaign::BASE }>;
+type Board = crate::rig::bus::board::Board<JOINTS, { scarab::model::planar::BASE }>;
 
 fn set_source(fork: &mut Fork<'_>, volts: f64) {
     if let Some(drives) = fork.host.rig().world.complete_drives_mut() {

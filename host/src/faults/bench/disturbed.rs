@@ -15,15 +15,15 @@ use scarab::servo::TorqueModel;
 use crate::base::error::ToolError;
 use crate::base::random::Random;
 use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::JOINTS;
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::{LegFile, PushesFile};
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::Context;
 use crate::rig::perturb::{self, Perturbation};
 use crate::run::simulate::drive;
 use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
 
 /// Twice the limit for an undisturbed identification.
 const HARMFUL_PERCENT: f64 = 3.0;

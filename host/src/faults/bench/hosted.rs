@@ -9,11 +9,10 @@ use scarab::leg::Permission;
 use crate::base::error::ToolError;
 use crate::base::random::Random;
 use crate::faults::bench::outcome;
-use crate::faults::campaign::{BASE, begin};
-use crate::faults::catalogue::JOINTS;
-use crate::faults::entry::Head;
 use crate::faults::invariants::{Invariants, Scope};
+use crate::faults::operator::begin;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
@@ -21,6 +20,8 @@ use crate::rig::bus::host::Host;
 use crate::rig::faulty_board::Rig;
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::Context;
+use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
 
 /// Servo ticks of the motion in which forks begin: two strokes back and forth.
 const MOTION: u64 = 11_400;

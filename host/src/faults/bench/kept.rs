@@ -30,10 +30,8 @@ use crate::base::random::Random;
 use crate::faults::bench::hosted::{Fork, board, forked, hosted};
 use crate::faults::bench::stall::stall;
 use crate::faults::bench::{Bench, outcome};
-use crate::faults::campaign::BASE;
-use crate::faults::catalogue::JOINTS;
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
@@ -41,6 +39,8 @@ use crate::rig::bus::host::Host;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
 use scarab::hal::SERVO_RATE_HZ;
+use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
 
 /// Longest identification, servo ticks.
 const LONGEST_TICKS: u64 = 300 * SERVO_RATE_HZ as u64;

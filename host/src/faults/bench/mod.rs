@@ -23,8 +23,8 @@ mod stopped;
 use scarab::safety::FaultCode;
 
 use crate::base::error::ToolError;
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 
 /// Runs a bench for some seeds. If blind, the fault's detector is disabled as stated by each bench.

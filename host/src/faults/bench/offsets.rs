@@ -18,11 +18,11 @@ use scarab::units::Ampere;
 
 use crate::base::error::ToolError;
 use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::JOINTS;
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::board::{axis_configuration, calibration_settings, rested};
+use scarab::model::planar::JOINTS;
 
 pub(super) const BENCH: Bench = Bench {
     head: Head {

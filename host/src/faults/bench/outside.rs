@@ -19,15 +19,15 @@ use scarab::units::Radian;
 use crate::base::error::ToolError;
 use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, context, forked_within};
-use crate::faults::catalogue::JOINTS;
-use crate::faults::entry::Head;
 use crate::faults::invariants::{MARGIN_RAD, Scope};
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
 use crate::rig::bus::host::{Host, Speaks};
 use scarab::hal::SERVO_RATE_HZ;
+use scarab::model::planar::JOINTS;
 
 const NODES: [u16; 2] = [1, 2];
 const WIDENED: Radian = Radian(2.0);

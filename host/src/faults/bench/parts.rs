@@ -9,8 +9,8 @@ use scarab::units::Volt;
 use crate::base::error::ToolError;
 use crate::base::random::Random;
 use crate::faults::bench::{Bench, outcome};
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::board::BRAKE;
 

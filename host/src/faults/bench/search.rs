@@ -11,14 +11,14 @@ use scarab::units::Ampere;
 use crate::base::error::ToolError;
 use crate::base::random::Random;
 use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::JOINTS;
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
 
 /// Longest identification, servo ticks.
 const LONGEST: u64 = 300 * SERVO_RATE_HZ as u64;

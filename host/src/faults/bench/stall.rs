@@ -21,8 +21,8 @@ use scarab::safety::{FaultCode, NO_ERROR, NoticeCode};
 use crate::base::error::ToolError;
 use crate::faults::bench::hosted::{Fork, forked, started};
 use crate::faults::bench::lost::watched;
-use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::host::Host;
 

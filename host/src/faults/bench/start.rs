@@ -10,16 +10,16 @@ use scarab::safety::{DriveState, FaultCode};
 use crate::base::error::ToolError;
 use crate::base::random::Random;
 use crate::faults::bench::{Bench, outcome};
-use crate::faults::campaign::BASE;
-use crate::faults::catalogue::JOINTS;
 use crate::faults::draw::{AMPERE_PER_CODE, at};
-use crate::faults::entry::Head;
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::faulty_board::{PERIOD_MS, PERIODS_PER_S, Rig};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::Context;
+use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
 
 /// Periods until the switch is closed; the low-pass of 2.7 ms has settled by then.
 const RELEASED: u64 = PERIODS_PER_S / 10;

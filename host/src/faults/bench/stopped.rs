@@ -19,15 +19,15 @@ use crate::base::error::ToolError;
 use crate::base::random::Random;
 use crate::faults::bench::start::ready;
 use crate::faults::bench::{Bench, outcome};
-use crate::faults::campaign::BASE;
-use crate::faults::catalogue::JOINTS;
 use crate::faults::draw::at;
-use crate::faults::entry::Head;
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::board::{axis_configuration, calibration_settings, rested};
 use crate::rig::faulty_board::{PERIOD_MS, PERIODS_PER_S, Rig};
+use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
 
 pub(super) const BENCH: Bench = Bench {
     head: Head {

@@ -5,9 +5,10 @@ use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
-use crate::faults::catalogue::{Bounds, Expected, JOINTS, Row, Scenario};
 use crate::faults::draw::{at, one};
+use crate::faults::scenario::{Bounds, Expected, Row, Scenario};
 use crate::rig::faulty_board::PERIODS_PER_S;
+use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 2] = [

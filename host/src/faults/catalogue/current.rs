@@ -4,9 +4,10 @@ use hal_sim::faults::{Channel, Form, Timing};
 use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
-use crate::faults::catalogue::{Bounds, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::draw::{AMPERE_PER_CODE, at, now_and_then, one};
+use crate::faults::scenario::{Bounds, Expected, Onset, Row, Scenario};
 use crate::rig::faulty_board::{PERIOD_MS, PERIODS_PER_S};
+use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 3] = [

@@ -4,9 +4,10 @@ use hal_sim::faults::{Channel, Form, Injection, Timing};
 use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
-use crate::faults::catalogue::{Bounds, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::draw::{at, one};
+use crate::faults::scenario::{Bounds, Expected, Onset, Row, Scenario};
 use crate::rig::faulty_board::{PERIOD_MS, PERIODS_PER_S};
+use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 2] = [
@@ -104,12 +105,13 @@ mod tests {
     use scarab::safety::DriveState;
 
     use super::*;
-    use crate::faults::campaign::{BASE, begin};
+    use crate::faults::operator::begin;
     use crate::faults::run::{Manner, Outcome, run};
     use crate::formats::leg_file::{DEFAULT_LEG, LegFile};
     use crate::rig::faulty_board::Rig;
     use crate::rig::options::{DriveModel, SimulationOptions};
     use crate::rig::pair::Context;
+    use scarab::model::planar::BASE;
 
     /// The default leg with its drive off, holding its pose, and during an identification's motion.
     fn machines(leg: &LegFile) -> [Rig<JOINTS, BASE>; 3] {

@@ -4,9 +4,10 @@ use hal_sim::faults::{Channel, Form, Timing};
 use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
-use crate::faults::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::draw::{at, beside, one};
+use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::rig::faulty_board::PERIODS_PER_S;
+use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 2] = [

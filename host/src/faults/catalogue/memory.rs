@@ -5,9 +5,10 @@ use scarab::safety::FaultCode;
 use scarab::servo::Servo;
 
 use crate::base::random::Random;
-use crate::faults::catalogue::{Bounds, Event, Expected, JOINTS, Row, Scenario};
 use crate::faults::draw::beside;
+use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
 use crate::rig::faulty_board::PERIODS_PER_S;
+use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 1] = [Row {

@@ -4,8 +4,8 @@ use hal_sim::faults::{Channel, Form, Timing};
 use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
-use crate::faults::catalogue::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::faults::draw::{VOLT_PER_CODE, at, now_and_then, one};
+use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::rig::faulty_board::{PERIOD_MS, PERIODS_PER_S};
 
 /// Rows of this group.

@@ -4,9 +4,10 @@ use hal_sim::faults::{Channel, Form, Timing};
 use scarab::safety::FaultCode;
 
 use crate::base::random::Random;
-use crate::faults::catalogue::{Bounds, Event, Expected, JOINTS, Row, Scenario};
 use crate::faults::draw::{at, one};
+use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
 use crate::rig::faulty_board::PERIOD_MS;
+use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 2] = [LATE, HUNG];

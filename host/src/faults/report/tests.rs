@@ -2,8 +2,9 @@
 
 use crate::base::random::Random;
 use crate::faults::bounds::bounds;
-use crate::faults::catalogue::{Event, Expected, rows};
+use crate::faults::catalogue::rows;
 use crate::faults::report::{JUDGED, names};
+use crate::faults::scenario::{Event, Expected};
 use crate::formats::leg_file::{DEFAULT_LEG, LegFile};
 
 #[test]

@@ -3,9 +3,9 @@
 use scarab::safety::{DriveState, FaultCode};
 
 use crate::faults::aftermath::leads_to;
-use crate::faults::catalogue::{Event, Expected};
 use crate::faults::entry::instead;
 use crate::faults::run::Watched;
+use crate::faults::scenario::{Event, Expected};
 
 impl<const B: usize> Watched<'_, B> {
     /// Returns whether the state is the catalogue's, or the firmware's alternative.
