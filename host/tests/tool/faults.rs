@@ -158,7 +158,10 @@ fn bad_input_names_the_option() {
         ("--leg mujoco-leg", "has no [joint.motor]"),
         ("--blind --fault K4", "--blind: some rows of --fault K4 have no detectors"),
         ("--blind --fault K4 --fault C2", "--blind: some rows of --fault K4 --fault C2 have no detectors"),
-        ("--blind --fault sweep --fault pairs", "--blind: some rows of --fault sweep --fault pairs have no detectors"),
+        (
+            "--blind --fault sweep --fault pairs",
+            "--blind: some rows of --fault sweep --fault pairs have no detectors",
+        ),
         ("--blind --docs README.md", "cannot be used with"),
         ("--replay 1 --docs README.md", "cannot be used with"),
         ("--json no-such-folder/faults.json", "no-such-folder/faults.json: cannot be written"),
