@@ -38,8 +38,8 @@ fn finds_the_truth(report: &Value) -> f64 {
     let errors = TRUTH.map(|(name, truth)| {
         let (error, sigma) = (base(report, name, "value") - truth, base(report, name, "sigma"));
         assert!(error.abs() < 3.5 * sigma + 3e-4 * truth, "{name}: error {error}, sigma {sigma}");
-        // Noise of 0.2 N m on 15 N m.
-        assert!(sigma < 0.05 * truth, "{name}: sigma {sigma}");
+        // Noise of 0.2 N m on 15 N m; at 137 Hz the scatter over segments is up to twice as large.
+        assert!(sigma < 0.1 * truth, "{name}: sigma {sigma}");
         error.abs() / sigma
     });
     errors.into_iter().fold(0.0, f64::max)
