@@ -7,7 +7,7 @@
 //! | --- | --- |
 //! | [`table_three`] | the test functions as printed and as intended, and their least values |
 //! | [`table_four`] | the searches on test functions: [`searches`], [`contenders`], [`goals`] |
-//! | [`runs`] | runs of all rows, whole or a shard of them |
+//! | [`mod@runs`] | runs of all rows, whole or a shard of them |
 //! | [`figure_five`] | paths of the searches in the plane |
 //! | [`problems`], [`seeds`], [`recorder`], [`statistics`] | test problems, seeds, evaluation counts, rows |
 //! | [`tables_five_six`] | parameters of the three-joint chain, by both methods |

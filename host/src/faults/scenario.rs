@@ -1,8 +1,8 @@
 //! Rows of a campaign and their runs: injected fault, onset, required reaction, thresholds.
 //!
-//! Magnitudes are drawn over the whole range of a fault, so that the smallest detected one is a result. Faults
-//! below a detector's threshold are marked in advance from the firmware's settings ([`Bounds`]). A fault with
-//! an onset condition ([`Onset`]) is judged by the machine's motion before that.
+//! Magnitudes are drawn over the whole range of a fault, so that the smallest detected one is a result.
+//! Faults below a detector's threshold are marked in advance from the firmware's settings ([`Bounds`]). A
+//! fault with an onset condition ([`Onset`]) is judged by the machine's motion before that.
 
 use hal_sim::faults::Injection;
 use scarab::safety::FaultCode;

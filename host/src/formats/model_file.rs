@@ -230,7 +230,7 @@ impl ModelFile {
     /// Loads and checks a model.
     ///
     /// # Errors
-    /// [`ModelFileError`] for an invalid file; [`ToolError::Refused`] for an edited file or one without an
+    /// [`FileError`] for an invalid file; [`ToolError::Refused`] for an edited file or one without an
     /// accepted verdict.
     pub fn load(path: &Path) -> Result<Self, ToolError> {
         let file = path.display().to_string();

@@ -68,7 +68,8 @@ fn a_wrapped_angle_is_refused_with_its_line_and_an_isolated_sample_is_not() {
     assert!(message.contains("unwrap the angle"), "{message}");
     let folder = Folder::new();
     let leg = folder.write("leg.toml", &leg(""));
-    let file = folder.write("walk.csv", &with(&|index| if index == 2_000 { 6.28 } else { 0.0 }));
+    let file =
+        folder.write("walk.csv", &with(&|index| if index == 2_000 { std::f64::consts::TAU } else { 0.0 }));
     scarab("replay", &[&file, Path::new("--leg"), &leg]).ends_with(0);
 }
 

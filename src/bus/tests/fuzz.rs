@@ -53,11 +53,11 @@ fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
     for number in 0..frames {
         let (id, data) = frame(&mut random);
         board.receive(id, &data);
-        if random.bits() % 64 == 0 {
+        if random.bits().is_multiple_of(64) {
             board.now_us += 2_000_000;
         }
         // A correct sequence that enables the leg, now and then.
-        if random.bits() % 512 == 0 {
+        if random.bits().is_multiple_of(512) {
             for (id, data) in [
                 (0, [130, 0]),
                 (0, [1, 0]),
@@ -70,7 +70,7 @@ fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
                 board.tick();
             }
         }
-        if random.bits() % 4096 == 0 {
+        if random.bits().is_multiple_of(4096) {
             let fault = crate::leg::Fault { code: crate::leg::FaultCode::Overspeed, joint: 1 };
             board.drive = board.drive.after(DriveEvent::Failed(fault), 4);
         }

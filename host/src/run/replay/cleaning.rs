@@ -3,10 +3,10 @@
 //! The filter is the board's ([`scarab::ident::signal::hampel`]). Two cases occur in recordings only:
 //!
 //! - Recordings slower than [`SPARSEST_HZ`]: vibrations of the machine are as fast as its samples, and
-//! neighbours do not predict them. In a correct recording at 200 Hz 2 to 3 % would count as outliers. There
-//! only the filter after resampling is used.
+//!   neighbours do not predict them. In a correct recording at 200 Hz 2 to 3 % would count as outliers. There
+//!   only the filter after resampling is used.
 //! - Coarse sensors: a last bit that flickers at rest is not an outlier. Deviations within [`QUANTA`] steps
-//! of the sensor stay.
+//!   of the sensor stay.
 
 use scarab::ident::signal::hampel::{Cleaned, Hampel, Quantity};
 
