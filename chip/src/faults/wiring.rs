@@ -74,7 +74,8 @@ pub fn wraps(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErro
     let from = if seed.is_multiple_of(2) { expected.booted } else { expected.resting };
     let session = &mut *machines.session;
     for axis in 0..JOINTS {
-        // So many counts below the wrap, which a calibration turns towards; in the motion on either side of it.
+        // So many counts below the wrap, which a calibration turns towards; in the motion on either side of
+        // it.
         let below = (seed as u16 / 2).wrapping_mul(APART) / 2 + 2;
         let below = if seed % 4 < 3 { below } else { below.wrapping_neg() };
         let shift = below.wrapping_neg().wrapping_sub(from[axis]);
