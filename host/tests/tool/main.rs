@@ -1,5 +1,5 @@
-//! Command-line tests of the tool: each command with its output, files and rejections. One program,
-//! so helpers are shared.
+//! Tests of the tool: its commands with their output, files and rejections, and its formats. One program, so
+//! helpers are shared and the tool is linked once.
 
 mod bus;
 mod chain;
@@ -10,10 +10,13 @@ mod excite;
 mod faults;
 mod figures;
 mod files;
+mod floor;
 mod fuzz;
 mod image;
+mod image_source;
 mod kept;
 mod kept_file;
+mod leg_files;
 mod leg_options;
 mod model_choice;
 mod model_file;
@@ -22,6 +25,7 @@ mod model_urdf;
 mod monitor;
 mod motor;
 mod pendulum;
+mod recordings;
 mod regressor;
 mod replay;
 mod replay_doubt;
@@ -31,6 +35,7 @@ mod replay_real;
 mod replay_recordings;
 mod replay_refusals;
 mod report_page;
+mod resampling;
 mod robust;
 mod samples;
 mod scale;

@@ -49,7 +49,7 @@ fn shards_that_do_not_make_one_campaign_are_refused() {
     let message = scarab("merge", &[&whole]).refusal();
     assert!(message.contains("whole.json: is no shard of a campaign"), "{message}");
     let message = scarab("merge --json", &[&first, &first, &second]).refusal();
-    assert!(message.contains("that the command reads and would overwrite"), "{message}");
+    assert!(message.contains("which the command reads and would overwrite"), "{message}");
     let message = scarab("--table III --figure 5 --shard 1/2 --json", &[&written]).refusal();
     assert!(message.contains("--shard: table III and figure 5"), "{message}");
     assert!(!written.exists());

@@ -83,7 +83,7 @@ fn the_axes_of_the_board_are_those_of_the_simulated_drive() {
 #[test]
 fn the_shipped_constant_equals_the_default_leg() {
     let (description, _) = describe(&leg(DEFAULT_LEG), 1).expect("two joints");
-    let shipped = include_str!("../legs/x2-wearer-75kg.rs");
+    let shipped = include_str!("../../legs/x2-wearer-75kg.rs");
     assert!(
         source(&description) == shipped,
         "the leg file changed: cargo fw --leg {DEFAULT_LEG} --source host/legs/{DEFAULT_LEG}.rs"
@@ -110,7 +110,7 @@ fn an_image_without_a_described_motor_is_refused() {
 /// Text of the default leg without the lines (of the first joint) that begin with a key.
 fn without(key: &str) -> String {
     let mut left = false;
-    let lines = include_str!("../legs/x2-wearer-75kg.toml").lines();
+    let lines = include_str!("../../legs/x2-wearer-75kg.toml").lines();
     let kept: Vec<&str> = lines
         .filter(|line| {
             left || {
@@ -147,7 +147,7 @@ fn an_image_has_no_defaults_for_safety_relevant_keys() {
         assert!(reason.starts_with(&format!("joint `hip`: `{key}` is missing")), "{reason}");
         assert_eq!(line, Some(13), "the line of the joint");
     }
-    let motor = include_str!("../legs/x2-wearer-75kg.toml");
+    let motor = include_str!("../../legs/x2-wearer-75kg.toml");
     let (before, rest) = motor.split_once("[joint.motor]").expect("a motor");
     let (_, after) = rest.split_once("[[joint]]").expect("another joint");
     let (_, reason) = refused(&format!("{before}[[joint]]{after}"));
@@ -163,7 +163,7 @@ fn an_image_has_no_defaults_for_safety_relevant_keys() {
     assert!(reason.starts_with("`side` is missing"), "{reason}");
     assert_eq!(line, None);
     for key in ["rotor_inertia", "coulomb", "viscous"] {
-        let text = include_str!("../legs/x2-wearer-75kg.toml");
+        let text = include_str!("../../legs/x2-wearer-75kg.toml");
         let (before, prior) = text.split_once("\nprior").expect("a prior");
         let (first, rest) = prior.split_once(&format!("{key} = ")).expect("stated");
         let (_, rest) = rest.split_once(',').expect("another key");
