@@ -26,7 +26,6 @@ pub mod current;
 #[cfg(feature = "board-odrive-v3-6")]
 pub mod housekeeping;
 pub mod identify;
-#[cfg(feature = "board-odrive-v3-6")]
 pub mod leg;
 #[cfg(feature = "board-odrive-v3-6")]
 mod memory;
