@@ -728,7 +728,9 @@ mod tests {
             plant.set_gates(true);
             plant.axes[0].pin_changes = Some(Vec::new());
             let [first, second] = &mut bridges;
-            plant.advance(3 * QUARTER, &mut [(&first.0, &mut first.1), (&second.0, &mut second.1)]);
+            let mut bridges = [(&first.0, &mut first.1), (&second.0, &mut second.1)];
+            plant.refresh(0, &mut bridges);
+            plant.advance(3 * QUARTER, &mut bridges);
             let changes = plant.axes[0].pin_changes.take().unwrap_or_default();
             let off = changes.iter().filter(|(at, _)| *at > 100).map(|(at, _)| *at).next();
             assert_eq!(off, Some(2 * Ticks::from(compare)), "{changes:?}");

@@ -101,8 +101,10 @@ impl SweepReport {
     /// Whether all voltages up to the documented one were seen, and none of them disturbs a conversion.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        let seen = self.steps.iter().filter(|step| step.conversions >= FEWEST).count();
-        seen > CLEAN_V as usize && self.clean_v >= CLEAN_V && self.highest_v > CLEAN_V
+        let documented = &self.steps[..self.steps.len().min(1 + CLEAN_V as usize)];
+        documented.iter().all(|step| step.conversions >= FEWEST)
+            && self.clean_v >= CLEAN_V
+            && self.highest_v > CLEAN_V
     }
 }
 
