@@ -469,7 +469,7 @@ fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {
         "peripheral", "request to the driver", "what the model shows"
     );
     for row in &rows {
-        println!("{:<10} | {:<56} | {:<56} | {}", row.peripheral, row.asked, row.shown, row.verdict());
+        println!("{:<10} | {:<56} | {:<56} | {}", row.peripheral, row.requested, row.shown, row.verdict());
     }
     write(arguments.json.as_deref(), &rows)?;
     Ok(rows.iter().all(drivers::Row::is_sound))

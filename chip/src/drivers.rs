@@ -49,7 +49,7 @@ pub struct Row {
     /// Peripheral.
     pub peripheral: &'static str,
     /// Request to the driver.
-    pub asked: String,
+    pub requested: String,
     /// Behaviour of the model.
     pub shown: String,
     /// Whether both agree.
@@ -178,8 +178,8 @@ impl Check {
         self.machine.run(self.machine.chip().now + ticks(duration))
     }
 
-    fn row(&mut self, peripheral: &'static str, asked: &str, shown: String, agrees: bool) {
-        self.rows.push(Row { peripheral, asked: asked.to_owned(), shown, agrees, reason: None });
+    fn row(&mut self, peripheral: &'static str, requested: &str, shown: String, agrees: bool) {
+        self.rows.push(Row { peripheral, requested: requested.to_owned(), shown, agrees, reason: None });
     }
 
     /// Gives the last row's reason, if it differs.
@@ -199,8 +199,8 @@ impl Check {
             .collect();
         self.findings += texts.len();
         if !texts.is_empty() {
-            let asked = format!("{peripheral}: registers as silicon allows");
-            self.row("findings", &asked, texts.join("; "), false);
+            let requested = format!("{peripheral}: registers as silicon allows");
+            self.row("findings", &requested, texts.join("; "), false);
         }
     }
 
@@ -231,18 +231,24 @@ impl Check {
 
     fn clocks(&mut self) -> Result<(), ToolError> {
         self.next(0.1, 0)?;
-        let asked = self.take::<5>().map(u64::from);
+        let requested = self.take::<5>().map(u64::from);
         let rcc = &self.machine.chip().rcc;
         let timer = |bus| TICK_HZ / rcc.timer_cycle(bus);
         let shown = [rcc.processor_hz(), rcc.bus_hz(1), rcc.bus_hz(2), timer(1), timer(2)];
         let mhz = |hz: [u64; 5]| hz.map(|hz| format!("{}", hz as f64 * 1e-6)).join(", ");
-        self.row("RCC", &format!("{} MHz", mhz(asked)), format!("{} MHz", mhz(shown)), asked == shown);
-        for (asked, expected) in [("block_for 10 ms on TIM4", 10e-3), ("Timer::after 5 ms on TIM4", 5e-3)] {
+        self.row(
+            "RCC",
+            &format!("{} MHz", mhz(requested)),
+            format!("{} MHz", mhz(shown)),
+            requested == shown,
+        );
+        for (requested, expected) in [("block_for 10 ms on TIM4", 10e-3), ("Timer::after 5 ms on TIM4", 5e-3)]
+        {
             let [cycles] = self.take();
             let taken = f64::from(cycles) / CLOCK_HZ;
             // Up to a tick of 1 us earlier or later, and some hundred instructions.
             let agrees = (expected - 1e-6..expected + 12e-6).contains(&taken);
-            self.row("time", asked, format!("{:.4} ms by the cycle counter", 1e3 * taken), agrees);
+            self.row("time", requested, format!("{:.4} ms by the cycle counter", 1e3 * taken), agrees);
         }
         self.note_findings("RCC");
         Ok(())
@@ -255,16 +261,16 @@ impl Check {
         let levels = [('A', 0), ('A', 1)].map(|pin| gpio.level(pin));
         let expected = [Mode::Output, Mode::Output, Mode::Analog, Mode::Input];
         let shown = format!("{modes:?}, PA0 {}, PA1 {}", levels[0], levels[1]);
-        let asked = "PA0 high, PA1 open and pulled up, PA15 dropped, PB2 input";
-        self.row("GPIO", asked, shown, modes == expected && levels == [true; 2]);
+        let requested = "PA0 high, PA1 open and pulled up, PA15 dropped, PB2 input";
+        self.row("GPIO", requested, shown, modes == expected && levels == [true; 2]);
         let chip = self.machine.chip_mut();
         chip.set_pin(('B', 2), true);
         chip.set_pin(('A', 1), false);
         self.next(0.1, 0)?;
         let [levels] = self.take();
         // Open drain: low while driven, otherwise the level from outside.
-        let asked = "pulled up 1, down 0, PB2 0 then 1, PA1 0 then 0 from outside, PA0 set 1";
-        self.row("GPIO", asked, format!("read {levels:07b} from the last"), levels == 0b100_1001);
+        let requested = "pulled up 1, down 0, PB2 0 then 1, PA1 0 then 0 from outside, PA0 set 1";
+        self.row("GPIO", requested, format!("read {levels:07b} from the last"), levels == 0b100_1001);
         self.machine.set_memory(self.symbols.go, &self.step.to_le_bytes());
         let mut steps = Vec::new();
         for level in [true, false, true] {
@@ -314,15 +320,15 @@ impl Check {
             let (period, duty) = if centred { (2 * top, 2 * (top / 4)) } else { (top, top / 4) };
             let expected = [period, duty - dead, period - duty - dead, dead, dead];
             let alignment = if centred { "centre" } else { "edge" };
-            let asked = format!("{alignment}-aligned {hz} Hz, duty 25 %, dead time {dead} clocks");
+            let requested = format!("{alignment}-aligned {hz} Hz, duty 25 %, dead time {dead} clocks");
             let shown = widths.map_or("no such outputs".into(), |[period, high, low, gap, other]| {
                 let hz = 168e6 / period as f64;
                 format!("{hz:.1} Hz; high {high}, low {low}, gaps {gap} and {other} clocks")
             });
-            self.row("TIM1", &asked, shown, widths == Some(expected));
+            self.row("TIM1", &requested, shown, widths == Some(expected));
             let actual = widths.map_or(0.0, |[period, ..]| 168e6 / period as f64);
-            let asked = format!("at most {hz} Hz (\"rounds towards slower\")");
-            self.row("TIM1", &asked, format!("{actual:.1} Hz"), actual <= f64::from(hz));
+            let requested = format!("at most {hz} Hz (\"rounds towards slower\")");
+            self.row("TIM1", &requested, format!("{actual:.1} Hz"), actual <= f64::from(hz));
             if centred && widths == Some(expected) && actual < 1.001 * f64::from(hz) {
                 self.explain(
                     "driver: ARR is one too small, as a centre-aligned period is 2 ARR (RM0090 17.3.2)",
@@ -403,8 +409,8 @@ impl Check {
         self.next(0.1, 0)?;
         let [repeated, error, replaced] = self.take();
         self.row("CAN1", "error without a partner: not acknowledged", format!("kind {error}"), error == 1);
-        let asked = "frame of an identifier that was sent before: accepted";
-        self.row("CAN1", asked, format!("accepted {repeated}"), repeated == 1);
+        let requested = "frame of an identifier that was sent before: accepted";
+        self.row("CAN1", requested, format!("accepted {repeated}"), repeated == 1);
         self.row(
             "CAN1",
             "50 replaces 300 of 300, 124, 100",
@@ -446,7 +452,7 @@ impl Check {
     fn watchdog(&mut self) -> Result<(), ToolError> {
         self.next(0.1, 0)?;
         let (saved, step) = (self.machine.save()?, self.step);
-        for (fed, asked, expected) in
+        for (fed, requested, expected) in
             [(FED, "100 ms, started and fed", 0.1), (0, "100 ms, started without a feed", 0.512)]
         {
             self.machine.restore(&saved)?;
@@ -457,7 +463,7 @@ impl Check {
             let taken = seconds(self.machine.chip().now - begun);
             let shown = format!("{end:?} after {:.2} ms", 1e3 * taken);
             let is_right = end == End::Reset(ResetReason::Watchdog) && (taken - expected).abs() < 1e-3;
-            self.row("IWDG", asked, shown, is_right && fed != 0);
+            self.row("IWDG", requested, shown, is_right && fed != 0);
             if is_right {
                 self.explain(
                     "driver: a start counts from 0xFFF, only a feed loads the reload value (RM0090 21.3)",
@@ -482,8 +488,8 @@ fn emulated(path: &Path, symbols: Symbols) -> Result<Option<Vec<u32>>, ToolError
         let Ok(mut emulator) = command.spawn() else { return Ok(None) };
         std::thread::sleep(Duration::from_secs(wait));
         let Symbols { step, results, .. } = symbols;
-        let asked = format!("xp /1xw {step:#x}\nxp /{WORDS}xw {results:#x}\nquit\n");
-        let said = ask(&mut emulator, &asked);
+        let requested = format!("xp /1xw {step:#x}\nxp /{WORDS}xw {results:#x}\nquit\n");
+        let said = ask(&mut emulator, &requested);
         // Still running only after an error.
         let _ = emulator.kill();
         let _ = emulator.wait();

@@ -685,34 +685,8 @@ fn turn_freely(axis: &Axis, torque: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::findings::{Access, Findings};
-    use crate::peripherals::timer::{Kind, MOE};
+    use crate::peripherals::pwm::tests::bridge;
     use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
-
-    /// A bridge that switches output A at `compare`, from the counter's zero at time 0 on.
-    fn bridge(compare: u32) -> (Timer, Outputs) {
-        let mut timer = Timer::new("TIM1", Kind::Advanced);
-        timer.set_clock(2, 0);
-        let mut findings = Findings::default();
-        let setup = [
-            (0x00, 0xE0),
-            (0x2C, 3500),
-            (0x18, 0x7878),
-            (0x34, compare),
-            (0x38, 3500),
-            (0x3C, 3500),
-            (0x14, 1),
-            (0x20, 0x555),
-            (0x44, MOE | 0xC00 | 20),
-            (0x00, 0xE1),
-        ];
-        for (offset, value) in setup {
-            timer.write(offset, value, 0, &mut Access { now: 0, findings: &mut findings });
-        }
-        let mut outputs = Outputs::default();
-        outputs.connect([[true; 2]; 3]);
-        (timer, outputs)
-    }
 
     #[test]
     fn an_edge_at_the_end_of_a_slice_is_not_late() {

@@ -91,7 +91,7 @@ pub enum AxisFault {
     Encoder,
     /// Target, voltage or duty not finite.
     NotANumber,
-    /// The counter stands still while the motor turns. The motor brakes until the fault is cleared; the rotor
+    /// The counter is constant while the motor turns. The motor brakes until the fault is cleared; the rotor
     /// position is lost.
     EncoderFrozen,
     /// Voltage and current disagree: a phase does not conduct.

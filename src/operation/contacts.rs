@@ -219,7 +219,11 @@ mod tests {
         Situation { calibrated: true, referenced: true, drive: Some(DriveState::SwitchOnDisabled), ..REST };
 
     /// Requests within some ticks of one situation.
-    fn asked(operator: &mut Operator, now: Situation, ticks: u32) -> impl Iterator<Item = OperatorRequest> {
+    fn requested(
+        operator: &mut Operator,
+        now: Situation,
+        ticks: u32,
+    ) -> impl Iterator<Item = OperatorRequest> {
         let mut all = [None; 8];
         let mut count = 0;
         for _ in 0..ticks {
@@ -234,13 +238,13 @@ mod tests {
     /// An operator that has seen both contacts open and then the switch held.
     fn holding() -> Operator {
         let mut operator = trusted();
-        assert_eq!(asked(&mut operator, Situation { enabling: true, ..REST }, RATE_HZ).count(), 0);
+        assert_eq!(requested(&mut operator, Situation { enabling: true, ..REST }, RATE_HZ).count(), 0);
         operator
     }
 
     fn trusted() -> Operator {
         let mut operator = Operator::default();
-        assert_eq!(asked(&mut operator, REST, 2 * STEADY_TICKS).count(), 0);
+        assert_eq!(requested(&mut operator, REST, 2 * STEADY_TICKS).count(), 0);
         operator
     }
 
@@ -248,10 +252,10 @@ mod tests {
     fn a_contact_stuck_closed_at_the_start_requests_nothing() {
         for stuck in [Situation { enabling: true, ..READY }, Situation { start: true, ..READY }] {
             let mut operator = Operator::default();
-            assert_eq!(asked(&mut operator, stuck, 10 * RESET_TICKS).count(), 0);
+            assert_eq!(requested(&mut operator, stuck, 10 * RESET_TICKS).count(), 0);
             // After it has been open it counts.
-            assert_eq!(asked(&mut operator, READY, 2 * STEADY_TICKS).count(), 0);
-            let request = asked(&mut operator, Situation { enabling: true, ..READY }, RATE_HZ).next();
+            assert_eq!(requested(&mut operator, READY, 2 * STEADY_TICKS).count(), 0);
+            let request = requested(&mut operator, Situation { enabling: true, ..READY }, RATE_HZ).next();
             assert_eq!(request, Some(OperatorRequest::Power(PowerRequest::Shutdown)));
         }
     }
@@ -272,14 +276,14 @@ mod tests {
         }
         assert_eq!((drive, steps), (DriveState::OperationEnabled, 3));
         // After a fault reset with the switch held, the drive is not enabled again.
-        assert_eq!(asked(&mut operator, held, RATE_HZ).count(), 0);
+        assert_eq!(requested(&mut operator, held, RATE_HZ).count(), 0);
         // A refused step is not repeated before the switch was open.
         let refused = Situation { drive: Some(DriveState::SwitchedOn), ..held };
-        assert_eq!(asked(&mut operator, refused, RATE_HZ).count(), 0);
+        assert_eq!(requested(&mut operator, refused, RATE_HZ).count(), 0);
         let open = Situation { enabling: false, drive: Some(DriveState::SwitchOnDisabled), ..READY };
-        assert_eq!(asked(&mut operator, open, STEADY_TICKS).count(), 0);
+        assert_eq!(requested(&mut operator, open, STEADY_TICKS).count(), 0);
         assert_eq!(
-            asked(&mut operator, held, RATE_HZ).next(),
+            requested(&mut operator, held, RATE_HZ).next(),
             Some(OperatorRequest::Power(PowerRequest::Shutdown))
         );
     }
@@ -304,7 +308,7 @@ mod tests {
         let mut operator = Operator::default();
         let enabled =
             Situation { enabling: true, start: true, drive: Some(DriveState::OperationEnabled), ..READY };
-        assert_eq!(asked(&mut operator, enabled, RATE_HZ).count(), 0);
+        assert_eq!(requested(&mut operator, enabled, RATE_HZ).count(), 0);
         let stop = Some(OperatorRequest::Power(PowerRequest::QuickStop));
         assert_eq!(operator.tick(&Situation { enabling: false, ..enabled }), stop);
         assert!(!operator.holds());
@@ -314,11 +318,11 @@ mod tests {
     fn closing_while_inhibited_enables_nothing_later() {
         let mut operator = trusted();
         let held = Situation { enabling: true, ..READY };
-        assert_eq!(asked(&mut operator, Situation { blocked: true, ..held }, RATE_HZ).count(), 0);
-        assert_eq!(asked(&mut operator, held, RATE_HZ).count(), 0);
-        assert_eq!(asked(&mut operator, READY, STEADY_TICKS).count(), 0);
+        assert_eq!(requested(&mut operator, Situation { blocked: true, ..held }, RATE_HZ).count(), 0);
+        assert_eq!(requested(&mut operator, held, RATE_HZ).count(), 0);
+        assert_eq!(requested(&mut operator, READY, STEADY_TICKS).count(), 0);
         assert_eq!(
-            asked(&mut operator, held, RATE_HZ).next(),
+            requested(&mut operator, held, RATE_HZ).next(),
             Some(OperatorRequest::Power(PowerRequest::Shutdown))
         );
     }
@@ -332,27 +336,28 @@ mod tests {
             Situation { referenced: false, ..held },
             Situation { blocked: true, calibrated: false, start: true, ..held },
         ] {
-            assert_eq!(asked(&mut trusted(), now, RATE_HZ).count(), 0, "{now:?}");
+            assert_eq!(requested(&mut trusted(), now, RATE_HZ).count(), 0, "{now:?}");
         }
     }
 
     #[test]
     fn the_button_requests_the_next_step() {
-        let with = |now: Situation| asked(&mut holding(), Situation { start: true, ..now }, RATE_HZ).next();
+        let with =
+            |now: Situation| requested(&mut holding(), Situation { start: true, ..now }, RATE_HZ).next();
         assert_eq!(with(Situation { enabling: true, ..REST }), Some(OperatorRequest::Calibrate));
         let enabled = Situation { enabling: true, drive: Some(DriveState::OperationEnabled), ..READY };
         assert_eq!(with(enabled), Some(OperatorRequest::Identify));
 
         let mut operator = trusted();
         let stands = Situation { calibrated: true, ..REST };
-        assert_eq!(asked(&mut operator, Situation { start: true, ..stands }, RATE_HZ / 2).count(), 0);
-        assert_eq!(asked(&mut operator, stands, RATE_HZ).next(), Some(OperatorRequest::Reference));
+        assert_eq!(requested(&mut operator, Situation { start: true, ..stands }, RATE_HZ / 2).count(), 0);
+        assert_eq!(requested(&mut operator, stands, RATE_HZ).next(), Some(OperatorRequest::Reference));
         // A long press is a reset, without a reference when it is released.
         assert!(
-            asked(&mut operator, Situation { start: true, ..stands }, 2 * RESET_TICKS)
+            requested(&mut operator, Situation { start: true, ..stands }, 2 * RESET_TICKS)
                 .eq([OperatorRequest::Reset])
         );
-        assert_eq!(asked(&mut operator, stands, RATE_HZ).count(), 0);
+        assert_eq!(requested(&mut operator, stands, RATE_HZ).count(), 0);
     }
 
     #[test]
@@ -363,12 +368,15 @@ mod tests {
             let welded = Situation { start: true, ..now };
             for _ in 0..3 {
                 let held = Situation { enabling: true, blocked: true, ..welded };
-                assert_eq!(asked(&mut operator, held, RATE_HZ).count(), 0);
-                assert_eq!(asked(&mut operator, welded, 2 * RESET_TICKS).count(), 0, "{now:?}");
+                assert_eq!(requested(&mut operator, held, RATE_HZ).count(), 0);
+                assert_eq!(requested(&mut operator, welded, 2 * RESET_TICKS).count(), 0, "{now:?}");
             }
             // Releasing it requests nothing; after it was open it counts again.
-            assert_eq!(asked(&mut operator, now, RATE_HZ).count(), 0, "{now:?}");
-            assert!(asked(&mut operator, welded, 2 * RESET_TICKS).eq([OperatorRequest::Reset]), "{now:?}");
+            assert_eq!(requested(&mut operator, now, RATE_HZ).count(), 0, "{now:?}");
+            assert!(
+                requested(&mut operator, welded, 2 * RESET_TICKS).eq([OperatorRequest::Reset]),
+                "{now:?}"
+            );
         }
     }
 

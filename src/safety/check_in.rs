@@ -3,7 +3,7 @@
 //! Why here: counters and watchdog belong to the board, but the decision depends on values only. So the same
 //! code is tested on the host against a hang of each level (row K3 of docs/safety.md).
 //!
-//! The watchdog is not fed while any count stands still since the last feed. A count that moves again within
+//! The watchdog is not fed while any count is unchanged since the last feed. A count that moves again within
 //! the watchdog's time is forgiven. Checks run every 4 ms, so the reset follows at most 4 ms plus the
 //! watchdog's time after a hang began. That is 15 to 34.1 ms over the oscillator's 47 to 17 kHz, 20 ms
 //! nominally.

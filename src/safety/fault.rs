@@ -83,7 +83,7 @@ faults! {
     EncoderStep = 0x7305, "E2", "encoder_step", Damp, "its encoder jumped";
     /// Counts were lost, so the rotor angle is unknown until the next calibration.
     EncoderPosition = 0xFF02, "E4", "encoder_place", ActiveShort, "its counts jumped or the index came at another place";
-    /// The counter stands still although the motor's voltage shows that it turns.
+    /// The counter is constant although the motor's voltage shows that it turns.
     EncoderFrozen = 0xFF09, "E1", "encoder_frozen", ActiveShort, "its encoder stopped while the motor turned";
     /// A phase with voltage carries no current.
     OpenPhase = 0xFF0A, "P1", "open_phase", Off, "a phase does not conduct";

@@ -58,22 +58,27 @@ enum Expected {
 /// Injection that changes the chip at an instant after the first: returns whether it goes on.
 type Later = fn(&mut Session, Ticks, u32) -> bool;
 
+/// The injection.
+type Inject = fn(&mut Chip, &mut Xoshiro256PlusPlus);
+
 /// One injection.
 struct Injected {
     situation: Situation,
     expected: Expected,
-    inject: fn(&mut Chip, &mut Xoshiro256PlusPlus),
+    inject: Inject,
     later: Option<Later>,
 }
 
 /// Time of the reaction or the like, s, or what went wrong.
 type Verdict = Result<f64, String>;
 
+/// Run of a seed.
+type OwnRun = fn(&mut Machines<'_>, u64) -> Result<Verdict, ToolError>;
+
 /// How a row runs.
 enum Run {
     Injected(Injected),
-    /// A run with this seed.
-    Own(fn(&mut Machines<'_>, u64) -> Result<Verdict, ToolError>),
+    Own(OwnRun),
 }
 
 /// Row of the catalogue.

@@ -130,7 +130,7 @@ pub fn rotten(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErr
 
 /// F3: a request to change the flash while the drive is on is refused and changes nothing; with the drive
 /// off the processor stalls, for up to twice the typical time, and nothing resets it.
-pub fn asked(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
+pub fn requested(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let mut random = Random::new("F3", seed);
     let request = if random.coin() { SAVE } else { LOAD };
     if seed.is_multiple_of(2) {
@@ -192,7 +192,7 @@ fn off(
     if session.resets.len() != resets || switched > 0 {
         return Ok(Err(format!("resets {:?}, {switched} switchings", &session.resets[resets..])));
     }
-    // After an erasure nobody knows how far the joints have moved: no enabling without a new reference.
+    // After an erasure the joints may have moved by any angle: no enabling without a new reference.
     session.hold_switch(true);
     session.run(0.5)?;
     let enabled = session.machine.chip().plant.axes.iter().any(|axis| axis.is_armed());

@@ -123,7 +123,7 @@ fn driven(bits: u32, reference: bool, settled: bool) -> Pins {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::findings::{Access, Findings};
     use crate::peripherals::timer::Kind;
@@ -133,8 +133,8 @@ mod tests {
         assert_eq!([20, 127, 128, 191, 192, 224, 255].map(dead_time), [20, 127, 128, 254, 256, 512, 1008]);
     }
 
-    #[test]
-    fn both_switches_of_a_half_bridge_are_off_for_the_dead_time() {
+    /// A bridge that switches output A at `compare`, from the counter's zero at time 0 on.
+    pub(crate) fn bridge(compare: u32) -> (Timer, Outputs) {
         let mut timer = Timer::new("TIM1", Kind::Advanced);
         timer.set_clock(2, 0);
         let mut findings = Findings::default();
@@ -142,7 +142,9 @@ mod tests {
             (0x00, 0xE0),
             (0x2C, 3500),
             (0x18, 0x7878),
-            (0x34, 1000),
+            (0x34, compare),
+            (0x38, 3500),
+            (0x3C, 3500),
             (0x14, 1),
             (0x20, 0x555),
             (0x44, MOE | 0xC00 | 20),
@@ -153,6 +155,12 @@ mod tests {
         }
         let mut outputs = Outputs::default();
         outputs.connect([[true; 2]; 3]);
+        (timer, outputs)
+    }
+
+    #[test]
+    fn both_switches_of_a_half_bridge_are_off_for_the_dead_time() {
+        let (timer, mut outputs) = bridge(1000);
         outputs.follow(&timer, 0);
         let mut changes = Vec::new();
         let mut now = 0;

@@ -175,7 +175,7 @@ impl FaultsArguments {
             whole: self.full && self.seeds.is_none(),
             every_tick: self.every_tick || self.full && self.fault.is_empty(),
             manner: Manner {
-                blind: if self.blind { Blind::Row } else { Blind::Nobody },
+                blind: if self.blind { Blind::Row } else { Blind::None },
                 recorded: self.replay.is_some(),
                 brief: false,
             },

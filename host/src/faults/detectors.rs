@@ -52,7 +52,7 @@ pub(super) fn views(row: &'static Row, rows: &[Entry]) -> Vec<Blind> {
     }
     let alone = row.codes.len() == 1;
     let codes = codes(rows).filter(|code| !alone && row.codes.contains(code)).map(Blind::Code);
-    [Blind::Nobody].into_iter().chain(codes).collect()
+    [Blind::None].into_iter().chain(codes).collect()
 }
 
 /// Detector reports of a blind campaign; empty for another.
@@ -78,8 +78,8 @@ fn detector(code: FaultCode, rows: &[Entry], campaign: &Campaign) -> DetectorRep
             let singly = campaign.singly.iter().filter(move |(how, _)| *how == blind);
             singly.map(|(_, outcome)| outcome).filter(|outcome| outcome.fault == row.id)
         };
-        let told = |outcome: &&Outcome| outcome.detected && outcome.alarm == Some(code.name());
-        for seen in of(Blind::Nobody).filter(told) {
+        let reported = |outcome: &&Outcome| outcome.detected && outcome.alarm == Some(code.name());
+        for seen in of(Blind::None).filter(reported) {
             let same = |outcome: &&Outcome| outcome.fault == row.id && outcome.seed == seen.seed;
             let without = if row.codes.len() == 1 {
                 campaign.outcomes.iter().find(same)

@@ -103,7 +103,7 @@ fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> 
             let alarm_text = format!("seed {seed}, {at:.3} s: {}: {:?}", code.words(), rig.state());
             return Ok(Stretch { periods: rig.period - from, alarm: Some(alarm_text) });
         }
-        if rig.leg.control().activity() == Activity::Idle && !rig.is_asked() {
+        if rig.leg.control().activity() == Activity::Idle && !rig.is_requested() {
             if let Some(motion) = gaits.get(next % gaits.len()).copied().flatten() {
                 rig.ask(ControlRequest::Track { motion, with_model: true });
             }

@@ -48,7 +48,7 @@ pub struct Outcome {
 pub enum Blind {
     /// No detector is disabled.
     #[default]
-    Nobody,
+    None,
     /// All detectors of the row.
     Row,
     /// Detectors of this code.
@@ -70,6 +70,6 @@ impl Manner {
     /// Returns whether detectors are disabled.
     #[must_use]
     pub fn is_blind(&self) -> bool {
-        self.blind != Blind::Nobody
+        self.blind != Blind::None
     }
 }

@@ -128,11 +128,11 @@ impl Campaign {
     }
 }
 
-/// Written as `nobody`, `row` or the name of the code.
+/// Written as `none`, `row` or the name of the code.
 impl Serialize for Blind {
     fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         to.serialize_str(match self {
-            Self::Nobody => "nobody",
+            Self::None => "none",
             Self::Row => "row",
             Self::Code(code) => code.name(),
         })
@@ -144,7 +144,7 @@ impl<'de> Deserialize<'de> for Blind {
         let word = String::deserialize(from)?;
         let code = || FaultCode::ALL.into_iter().find(|code| code.name() == word).map(Self::Code);
         match word.as_str() {
-            "nobody" => Ok(Self::Nobody),
+            "none" => Ok(Self::None),
             "row" => Ok(Self::Row),
             _ => code().ok_or_else(|| serde::de::Error::custom(format!("`{word}` is no fault code"))),
         }
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn disabled_detectors_are_read_back() {
-        for blind in [Blind::Nobody, Blind::Row].into_iter().chain(FaultCode::ALL.map(Blind::Code)) {
+        for blind in [Blind::None, Blind::Row].into_iter().chain(FaultCode::ALL.map(Blind::Code)) {
             let text = serde_json::to_string(&blind).expect("JSON");
             assert_eq!(serde_json::from_str::<Blind>(&text).expect("read"), blind);
         }

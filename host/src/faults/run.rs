@@ -80,7 +80,7 @@ struct Watched<'a, const B: usize> {
     /// Angles of the joints at the injection, anatomical, rad.
     angles: [f64; JOINTS],
     /// Requested currents of the phases with shunts at the injection, and in the previous period, A.
-    asked: [f64; 2],
+    requested: [f64; 2],
     before: [f64; 2],
     /// Largest change of them within a period since then, A.
     steepest: [f64; 2],
@@ -92,8 +92,8 @@ struct Watched<'a, const B: usize> {
 }
 
 /// Requested currents of a joint's phases B and C at the present rotor angle, A.
-fn asked<const B: usize>(rig: &Rig<JOINTS, B>, joint: usize) -> [f64; 2] {
-    let current = rig.asked(joint);
+fn requested<const B: usize>(rig: &Rig<JOINTS, B>, joint: usize) -> [f64; 2] {
+    let current = rig.requested(joint);
     let angle = rig.world.complete_drives().map_or(0.0, |drives| drives.axes()[joint].electrical_angle());
     [1.0, 2.0].map(|phase| -current * (angle - phase * core::f64::consts::TAU / 3.0).sin())
 }
@@ -117,7 +117,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         let begun = rig.period;
         rig.injector = Injector::new(seed);
         rig.blind = match manner.blind {
-            Blind::Nobody => &[],
+            Blind::None => &[],
             Blind::Row => row.codes,
             Blind::Code(code) => {
                 row.codes.iter().find(|own| **own == code).map_or(&[], core::slice::from_ref)
@@ -145,7 +145,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             begun,
             onset,
             angles: rig.world.anatomical_position(),
-            asked: asked(&rig, scenario.injections[0].map_or(0, |injection| injection.joint)),
+            requested: requested(&rig, scenario.injections[0].map_or(0, |injection| injection.joint)),
             before: [f64::NAN; 2],
             steepest: [0.0; 2],
             swing: [f64::INFINITY, f64::NEG_INFINITY],
@@ -169,16 +169,16 @@ impl<'a, const B: usize> Watched<'a, B> {
         if let Some(recording) = &mut self.recording {
             recording.see(&self.rig, self.begun);
         }
-        let phases = self.asked();
+        let phases = self.requested();
         let step = |shunt: usize| self.steepest[shunt].max((phases[shunt] - self.before[shunt]).abs());
         (self.steepest, self.before) = ([0, 1].map(step), phases);
-        let asked = self.rig.asked(self.joint());
+        let requested = self.rig.requested(self.joint());
         self.swing = if self.rig.period > self.begun + SETTLED {
-            [self.swing[0].min(asked), self.swing[1].max(asked)]
+            [self.swing[0].min(requested), self.swing[1].max(requested)]
         } else {
             // The braking current of a joint that comes to rest vanishes, which is not a swing.
-            let before = if self.swing[0].is_finite() { self.swing[0] } else { asked };
-            [asked.clamp(before.min(0.0), before.max(0.0)); 2]
+            let before = if self.swing[0].is_finite() { self.swing[0] } else { requested };
+            [requested.clamp(before.min(0.0), before.max(0.0)); 2]
         };
         match (self.onset, self.has_begun()) {
             (None, true) => self.onset = Some(self.rig.period),
@@ -189,8 +189,10 @@ impl<'a, const B: usize> Watched<'a, B> {
     }
 
     fn has_begun(&self) -> bool {
-        let lasts =
-            matches!(self.scenario.onset, Onset::Driven { .. } | Onset::Uncounted { .. } | Onset::Asked(_));
+        let lasts = matches!(
+            self.scenario.onset,
+            Onset::Driven { .. } | Onset::Uncounted { .. } | Onset::Requested(_)
+        );
         if self.onset.is_some() && !lasts {
             return true;
         }
@@ -201,17 +203,17 @@ impl<'a, const B: usize> Watched<'a, B> {
             Onset::BusAbove(volts) => bus() > volts,
             Onset::BusBelow(volts) => bus() < volts,
             Onset::Driven { speed, per_ampere, current } => {
-                self.turns(joint, speed, per_ampere) && self.rig.asked(joint).abs() > current
+                self.turns(joint, speed, per_ampere) && self.rig.requested(joint).abs() > current
             }
             Onset::Uncounted { speed, per_ampere, swing } => {
                 self.turns(joint, speed, per_ampere) || self.swing[1] - self.swing[0] > swing
             }
-            Onset::Asked(amperes) => {
-                let asked = self.asked();
+            Onset::Requested(amperes) => {
+                let requested = self.requested();
                 // The axis knows the rotor angle, and so the current at the injection, with an error of a
                 // period or two.
                 let has_changed = |shunt: usize| {
-                    (asked[shunt] - self.asked[shunt]).abs() > amperes + 2.0 * self.steepest[shunt]
+                    (requested[shunt] - self.requested[shunt]).abs() > amperes + 2.0 * self.steepest[shunt]
                 };
                 (0..2).any(|shunt| has_changed(shunt) && self.spoils(shunt))
             }
@@ -224,7 +226,7 @@ impl<'a, const B: usize> Watched<'a, B> {
     }
 
     fn turns(&self, joint: usize, speed: f64, per_ampere: f64) -> bool {
-        self.rig.world.velocity()[joint].abs() > speed + per_ampere * self.rig.asked(joint).abs()
+        self.rig.world.velocity()[joint].abs() > speed + per_ampere * self.rig.requested(joint).abs()
     }
 
     /// Joint of the first injection.
@@ -238,8 +240,8 @@ impl<'a, const B: usize> Watched<'a, B> {
     }
 
     /// Requested currents of the phases with shunts, A.
-    fn asked(&self) -> [f64; 2] {
-        asked(&self.rig, self.joint())
+    fn requested(&self) -> [f64; 2] {
+        requested(&self.rig, self.joint())
     }
 
     /// Deadline of this run where it is longer than the row's, ms.

@@ -91,7 +91,7 @@ pub enum Onset {
     },
     /// While the requested current of the phase with the faulted shunt differs from that at the injection by
     /// more than this, A.
-    Asked(f64),
+    Requested(f64),
 }
 
 /// Event in the same period, besides the injections.

@@ -10,7 +10,7 @@
 //! Why on top of a current: as long as no phase current changes its sign, dead time adds only a constant. So
 //! u is raised until `di` is 0.3 of the holding current, or until the allowed voltage is reached with at
 //! least 0.03. The swing across then bends the smallest phase current (half the holding one) by 0.26 of the
-//! holding current. Across the flux the rotor feels an alternating torque at 6 kHz and stands still.
+//! holding current. Across the flux the rotor feels an alternating torque at 6 kHz and does not turn.
 //!
 //! The command after sample k acts between the samples k+1 and k+2. So the maximum is read three samples
 //! after the wave's beginning, the minimum two later. The mean of 512 waves each (85 ms) reduces noise of 0.1

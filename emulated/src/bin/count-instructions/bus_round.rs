@@ -148,8 +148,8 @@ pub fn report() -> Option<bool> {
     );
     let read = [0x40, 0x41, 0x60, 0, 0, 0, 0, 0];
     let all = [
-        ("nobody's, without data", Frame::new(0x7F0, &[])),
-        ("nobody's, of eight bytes", Frame::new(0x7F0, &[0; 8])),
+        ("of no node, without data", Frame::new(0x7F0, &[])),
+        ("of no node, of eight bytes", Frame::new(0x7F0, &[0; 8])),
         ("SYNC", Frame::new(0x80, &[])),
         ("a PDO that is too short", Frame::new(0x301, &[])),
         ("targets", Frame::new(0x301, &[1, 2, 3, 4])),

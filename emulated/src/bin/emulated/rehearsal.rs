@@ -168,7 +168,7 @@ pub fn in_thread() {
         2 if clock::left() > TICK_WENT => {
             fill_the_stack(0);
         }
-        3 if TICK_COMES.contains(&clock::left()) => call_nobody(),
+        3 if TICK_COMES.contains(&clock::left()) => raise_unhandled(),
         _ => {}
     }
 }
@@ -207,7 +207,7 @@ fn fill_the_stack(depth: u32) -> u32 {
 }
 
 #[inline(never)]
-fn call_nobody() {
+fn raise_unhandled() {
     begin();
     NVIC::pend(UNHANDLED);
     // SAFETY: outside any critical section; the missing handler is intended.

@@ -159,7 +159,7 @@ fn missing_ticks_during_a_flash_write_are_no_fault() {
         let mut rig = ready();
         rig.board.signals.inhibit.raise_bits(if storing { InhibitReason::Storing.bit() } else { 0 });
         for joint in 0..2 {
-            // On the board the watchdog's timeout is longer meanwhile; here it is not.
+            // The board lengthens the watchdog's timeout during the write; here it does not.
             let timing = Timing::lasting(rig.period, periods);
             rig.injector.add(Injection { channel: Channel::Tick, joint, form: Form::Off, timing });
         }

@@ -149,11 +149,11 @@ impl All {
             let [first, second] = all.objects.clone();
             [(first, None), (second, None), (None, all.model)]
         };
-        let (told, old, new) = (parts(self), parts(old), parts(new));
+        let (read, old, new) = (parts(self), parts(old), parts(new));
         let mut may_be_new = true;
-        (0..told.len()).all(|part| {
-            let is_new = told[part] == new[part];
-            let holds = is_new && may_be_new || told[part] == old[part];
+        (0..read.len()).all(|part| {
+            let is_new = read[part] == new[part];
+            let holds = is_new && may_be_new || read[part] == old[part];
             may_be_new &= is_new;
             holds
         })
@@ -219,14 +219,14 @@ fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
         All::of(&mut memory);
         memory.fail_after(None);
     }
-    let mut told = All::of(&mut memory);
+    let mut read = All::of(&mut memory);
     if blind && let [Some(old), Some(new)] = [&old.objects[0], &new.objects[0]] {
         let cut = random.below(new.len() as u64) as usize;
-        told.objects[0] = Some(new[..cut].iter().chain(old.iter().skip(cut)).copied().collect());
+        read.objects[0] = Some(new[..cut].iter().chain(old.iter().skip(cut)).copied().collect());
     }
-    let whole = told.is_between(old, new);
+    let whole = read.is_between(old, new);
     let mut found = outcome(head, seed, whole.then_some(head.state));
-    if kept && told != *new {
+    if kept && read != *new {
         found.broken.push("an interrupted save was reported as done".into());
     }
     let mut again = old.clone();
@@ -383,12 +383,12 @@ pub fn corrupt(memory: &mut Memory, other: &ModelRecord<JOINTS>, way: u64, rando
 fn armed(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let (off, on): (Vec<u64>, Vec<u64>) = seeds.iter().partition(|seed| seed.is_multiple_of(2));
     let mut outcomes = stall(head, leg, &off, blind)?;
-    outcomes.extend(forked(head, leg, hosted(leg)?, &on, |fork| asked(fork, blind))?);
+    outcomes.extend(forked(head, leg, hosted(leg)?, &on, |fork| requested(fork, blind))?);
     Ok(outcomes)
 }
 
 /// Blind: the flash is written as if the drive were off.
-fn asked(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
+fn requested(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let before = fork.host.board().memory().bytes().to_vec();
     let node = 1 + fork.random.below(2) as u16;
     let (object, word) = if fork.random.coin() { (0x1010_u16, *b"save") } else { (0x1011, *b"load") };

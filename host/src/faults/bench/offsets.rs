@@ -57,7 +57,7 @@ struct Driven {
     joint: Vec<JointSample>,
 }
 
-fn asked(period: usize) -> AxisRequest {
+fn requested(period: usize) -> AxisRequest {
     let turns = ASKED_HZ * period as f64 / f64::from(CURRENT_RATE_HZ);
     AxisRequest { enabled: true, current: Ampere((ASKED_A * (TAU * turns).sin()) as f32) }
 }
@@ -70,7 +70,7 @@ fn run(
     let (mut commands, mut joint) = (Vec::with_capacity(PERIODS), Vec::new());
     let mut command = AxisCommand::OFF;
     for period in 0..PERIODS {
-        command = axis.tick(&sample(period, &command), asked(period));
+        command = axis.tick(&sample(period, &command), requested(period));
         commands.push(command);
         if (period + 1) % PERIODS_PER_TICK as usize == PERIODS_PER_TICK as usize / 2 {
             axis.check();

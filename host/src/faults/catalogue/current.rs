@@ -71,7 +71,7 @@ fn conversion(random: &mut Random, bounds: &Bounds) -> Scenario {
         let stuck = at(channel, joint, Form::Stuck, Timing::from(0));
         return Scenario {
             // Detection threshold, with 10 % for the deviation of rotor and estimate.
-            onset: Onset::Asked(1.1 * bounds.stuck_a),
+            onset: Onset::Requested(1.1 * bounds.stuck_a),
             patience: PERIODS_PER_S / 2,
             ..one(stuck, Expected::Off)
         };

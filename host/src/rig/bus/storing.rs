@@ -28,7 +28,7 @@ const QUEUE: usize = 3;
 
 /// Pending store request.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<const N: usize> {
+pub struct StorageRequest<const N: usize> {
     /// Store all, or restore the defaults.
     pub what: StoreCommand,
     /// Objects of each node.
@@ -37,7 +37,7 @@ pub struct Asked<const N: usize> {
     pub model: Option<ModelRecord<N>>,
 }
 
-impl<const N: usize> Asked<N> {
+impl<const N: usize> StorageRequest<N> {
     /// Stores all objects and a model, or erases everything; returns whether this succeeded.
     fn change(&self, memory: &mut Memory, state: DriveState) -> bool {
         match self.what {
@@ -64,7 +64,7 @@ impl<const N: usize> Asked<N> {
 #[derive(Clone, Debug)]
 pub struct Flashing<const N: usize> {
     storing: Storing,
-    asked: Option<Asked<N>>,
+    requested: Option<StorageRequest<N>>,
     /// An accepted model that is not stored yet.
     accepted: Option<ModelRecord<N>>,
     /// Whether the flash was changed.
@@ -89,7 +89,7 @@ impl<const N: usize> Flashing<N> {
     pub fn new() -> Self {
         Self {
             storing: Storing::new(),
-            asked: None,
+            requested: None,
             accepted: None,
             has_kept: false,
             due_ns: 0,
@@ -105,7 +105,7 @@ impl<const N: usize> Flashing<N> {
     /// Whether a store request is in progress.
     #[must_use]
     pub fn is_under_way(&self) -> bool {
-        self.asked.is_some()
+        self.requested.is_some()
     }
 
     /// Sets the model to be stored with the next request.
@@ -153,17 +153,17 @@ impl<const N: usize> Flashing<N> {
         let Some(mut keep) = storage.given() else {
             return self.storing.look_after(inhibit, registers);
         };
-        if self.asked.is_none() {
+        if self.requested.is_none() {
             let model = self.accepted.map(|mut model| {
                 model.provenance.generation = keep.generation + 1;
                 model
             });
-            self.asked = Some(Asked { what: keep.what, objects: keep.objects, model });
+            self.requested = Some(StorageRequest { what: keep.what, objects: keep.objects, model });
         }
-        let Some(asked) = &self.asked else { return };
+        let Some(requested) = &self.requested else { return };
         let done = self.storing.step(inhibit, signals.permission(), registers, || {
             self.has_kept = true;
-            asked.change(memory, state)
+            requested.change(memory, state)
         });
         let after = memory.worked();
         let sectors = u64::from(after.1 - before.1);
@@ -173,14 +173,14 @@ impl<const N: usize> Flashing<N> {
             self.until_ns = now_ns + TICK_NS + words * WORD_NS + sectors * self.erasing_ns;
         }
         let Some(done) = done else { return };
-        if let Some(generation) = asked.generation().filter(|_| done) {
+        if let Some(generation) = requested.generation().filter(|_| done) {
             keep.generation = generation;
             self.accepted = None;
-            if asked.what == StoreCommand::Defaults {
+            if requested.what == StoreCommand::Defaults {
                 signals.forget_stored();
             }
         }
-        self.asked = None;
+        self.requested = None;
         keep.done = done;
         drop(keep);
         storage.give_back();

@@ -14,7 +14,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// Returns whether a request waits for the servo's next tick.
     #[must_use]
-    pub fn is_asked(&mut self) -> bool {
+    pub fn is_requested(&mut self) -> bool {
         !self.board.queues().requests().is_empty()
     }
 
@@ -69,7 +69,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// Requested current of a joint, A; zero while the drive is off.
     #[must_use]
-    pub fn asked(&self, joint: usize) -> f64 {
+    pub fn requested(&self, joint: usize) -> f64 {
         let target = self.board.signals.target(joint);
         if target.enabled { f64::from(target.current.0) } else { 0.0 }
     }

@@ -65,7 +65,7 @@ pub fn whole(
     entries.extend([
         ("residual", Key::Curve(measured_error())),
         ("\u{b1}2 sigma of the noise", Key::Field(BAND)),
-        ("stands still, left out", Key::Field(SHADE)),
+        ("at rest, excluded", Key::Field(SHADE)),
     ]);
     legend(area, (LEFT, 35), &entries)?;
     let (_, cells) = area.split_vertically(px(HEAD));
@@ -105,7 +105,7 @@ pub fn small(area: &Area<'_>, joints: &[&str], motion: &MotionSeries) -> Result<
     legend(area, (LEFT, 34), &entries)?;
     let (_, charts) = area.split_vertically(px(44));
     let (charts, foot) = charts.split_vertically(px(JOINT_HEIGHT * joints.len().max(1) as i32));
-    let entries = [("residual", Key::Curve(measured_error())), ("stands still, left out", Key::Field(SHADE))];
+    let entries = [("residual", Key::Curve(measured_error())), ("at rest, excluded", Key::Field(SHADE))];
     legend(&foot, (LEFT, 14), &entries)?;
     let parts = charts.split_evenly((joints.len().max(1), 1));
     for (index, ((part, joint), curves)) in parts.iter().zip(joints).zip(&motion.joints).enumerate() {

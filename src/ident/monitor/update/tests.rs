@@ -146,7 +146,7 @@ fn the_sigma_of_a_payload_counts_the_models_own_error() {
     for (parameter, truth) in truth {
         let index = place(parameter);
         let squares = runs.iter().map(|run| {
-            let off = (run.payload[1].values[index] - truth) / run.payload[1].sigma(index).expect("told");
+            let off = (run.payload[1].values[index] - truth) / run.payload[1].sigma(index).expect("known");
             off * off
         });
         let mean = squares.sum::<f64>() / runs.len() as f64;
@@ -169,7 +169,7 @@ fn the_updated_base_values_have_the_covariance_they_claim() {
         let update = updated::<f64>(&after, WALKING, 300 + seed);
         assert_eq!(update.cause, Cause::Payload { link: 1 });
         for (base, (sum, truth)) in squares.iter_mut().zip(truth).enumerate() {
-            let off = (update.estimate.values[base] - truth) / update.estimate.sigma(base).expect("told");
+            let off = (update.estimate.values[base] - truth) / update.estimate.sigma(base).expect("known");
             *sum += off * off / runs as f64;
         }
     }
@@ -185,7 +185,7 @@ fn single_precision_agrees_with_double() {
     assert_eq!(single.cause, double.cause);
     for (base, (one, other)) in single.estimate.values.iter().zip(&double.estimate.values).enumerate() {
         // Two triangular factors with a condition number of some hundred, in units of the sigma.
-        let sigma = double.estimate.sigma(base).expect("told");
+        let sigma = double.estimate.sigma(base).expect("known");
         assert!((f64::from(*one) - other).abs() < 0.02 * sigma, "{base}: {one} {other} sigma {sigma}");
     }
 }
