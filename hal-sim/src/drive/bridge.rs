@@ -262,6 +262,9 @@ mod tests {
         shares(&mut bridge, [5.0 / 3500.0, 1.0 - 5.0 / 3500.0, 0.5]);
         let swallowed = shares(&mut bridge, [5.0 / 3500.0, 1.0 - 5.0 / 3500.0, 0.5]);
         assert_eq!(swallowed[0][0], 0.0);
+        // The low side conducts again one dead time after the pulse.
+        let off = 5.0 / 3500.0 * PERIOD + 20.0 / 168e6;
+        assert!((swallowed[0][2] - off).abs() < 1e-15, "{swallowed:?}");
         assert!(swallowed[1][1] < 1e-15, "{swallowed:?}");
     }
 
