@@ -14,7 +14,7 @@ import random
 import re
 import time
 
-from scarab_bus import MICRO, Joint, connect, until
+from scarab_bus import MICRO, Joint, connect, holds, until
 
 NODES = (1, 2)
 DEFAULT_LEG = "x2-wearer-75kg.toml"
@@ -45,14 +45,15 @@ class Leg:
 
 
 def is_up(joints, longest_s):
-    """Sends 6, 7, F and returns whether the leg is enabled."""
-    end = time.monotonic() + longest_s
+    """Sends 6, 7, F and returns whether the leg is enabled. Each step has its own time.
+
+    On a busy machine a write may take longer than a step: the library sends it again after 5 s.
+    """
     for word, state in STEPS:
         for joint in joints:
             joint.write(0x6040, 0, word, "<H")
-        while any(joint.read(0x6041, 0, "<H") & 0x806F != state for joint in joints):
-            if time.monotonic() > end:
-                return False
+        if not holds(lambda: all(joint.read(0x6041, 0, "<H") & 0x806F == state for joint in joints), longest_s):
+            return False
     return True
 
 
@@ -188,7 +189,8 @@ def main():
             continue
         refused += 1
         why = reason(leg.joints)
-        print(f"{where}: not enabled; {'; '.join(why) or 'NO REASON'}", flush=True)
+        states = ", ".join(f"{joint.read(0x6041, 0, '<H'):04X}" for joint in leg.joints)
+        print(f"{where}: not enabled; {'; '.join(why) or f'NO REASON, statuswords {states}'}", flush=True)
         if not why:
             silent.append(where)
         if not is_up_again(leg.joints):

@@ -48,16 +48,26 @@ def connect(address):
     return network
 
 
-def until(what, condition, longest_s=20.0):
-    """Waits for a condition and returns its value."""
+def holds(condition, longest_s):
+    """Waits for a condition and returns its value, which is false after this time.
+
+    The clock is read before the condition, because a busy machine may suspend this process in between.
+    """
     end = time.monotonic() + longest_s
     while True:
+        is_last = time.monotonic() > end
         value = condition()
-        if value:
+        if value or is_last:
             return value
-        if time.monotonic() > end:
-            raise SystemExit(f"waited {longest_s} s for: {what}")
         time.sleep(0.002)
+
+
+def until(what, condition, longest_s=20.0):
+    """Waits for a condition and returns its value."""
+    value = holds(condition, longest_s)
+    if not value:
+        raise SystemExit(f"waited {longest_s} s for: {what}")
+    return value
 
 
 def send_until(what, send, condition, longest_s=20.0):
@@ -68,11 +78,8 @@ def send_until(what, send, condition, longest_s=20.0):
     end = time.monotonic() + longest_s
     while time.monotonic() < end:
         send()
-        again = min(time.monotonic() + 1.0, end)
-        while time.monotonic() < again:
-            if condition():
-                return
-            time.sleep(0.002)
+        if holds(condition, 1.0):
+            return
     raise SystemExit(f"waited {longest_s} s for: {what}")
 
 

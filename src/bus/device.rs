@@ -333,6 +333,10 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             (None, None) => None,
         };
         self.explain(status, rises || self.refused);
+        // Here and not where frames are sent: a refusal of one tick is also reported while no frame can be sent.
+        for (node, axis) in self.nodes.iter_mut().zip(&self.axes) {
+            node.on_drive(axis.error());
+        }
     }
 
     /// Digital inputs of each joint (60FD).

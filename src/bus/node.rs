@@ -165,7 +165,6 @@ impl Node {
         }
         self.look_around(now_us, objects);
         let communication = &mut self.communication;
-        communication.emergency.set(Source::Drive, objects.error());
         // A stopped node holds its emergency messages back until it leaves the state.
         let emergency =
             if communication.state.serves() { communication.emergency.poll(now_us) } else { None };
@@ -200,6 +199,11 @@ impl Node {
             Controller::Off | Controller::Overrun => objects.lost(Lost::Bus(true)),
         }
         self.communication.emergency.set(Source::Controller, controller.error());
+    }
+
+    /// Handles the drive's error after a tick of the leg.
+    pub(super) fn on_drive(&mut self, error: Option<ErrorReport>) {
+        self.communication.emergency.set(Source::Drive, error);
     }
 
     /// Handles a change of the store's state.

@@ -5,7 +5,6 @@
 
 use super::abort::Abort;
 use super::dictionary::Object;
-use super::emergency::ErrorReport;
 
 /// Event after which the host can no longer be relied on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,9 +47,6 @@ pub trait Objects {
         let _ = (object, offset, into);
         Err(Abort::NoObject)
     }
-
-    /// Returns the active error, for an emergency message.
-    fn error(&self) -> Option<ErrorReport>;
 
     /// Handles a lost host, a lost bus or a stop command: the drive stops as its option codes say.
     fn lost(&mut self, why: Lost);

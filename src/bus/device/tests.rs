@@ -62,30 +62,7 @@ impl Bench {
     fn run(&mut self, ticks: u32) -> Vec<Frame> {
         let mut frames = Vec::new();
         for _ in 0..ticks {
-            self.now_us += 250;
-            self.drive = self.drive.after(crate::leg::DriveEvent::Tick, 4);
-            let drive = if self.rests { DriveState::NotReadyToSwitchOn } else { self.drive };
-            let velocity = crate::units::RadianPerSecond(self.velocity);
-            let joint = JointStatus { drive, velocity, ..JointStatus::NONE };
-            let (held, blocked) = (self.held, self.blocked);
-            self.device.update(&LegStatus {
-                joints: [joint; 2],
-                held,
-                blocked,
-                rests: self.rests,
-                causes: self.causes,
-                calibrated: self.calibrated,
-                refused: self.refused.take(),
-                ..LegStatus::NONE
-            });
-            let order = self.device.order();
-            if order.request == Some(LegRequest::Power(PowerRequest::EnableOperation)) {
-                self.refused = self.refuses;
-            }
-            if let Some(LegRequest::Power(power)) = order.request.filter(|_| self.refused.is_none()) {
-                self.drive = self.drive.after(crate::leg::DriveEvent::Requested(power), 4);
-            }
-            self.orders.push(order);
+            self.tick();
             for joint in 0..2 {
                 while let Some(frame) = self.device.poll(joint, self.now_us, &NOTHING) {
                     self.device.receive(&frame, self.now_us, Some(joint), &NOTHING);
@@ -94,6 +71,34 @@ impl Bench {
             }
         }
         frames
+    }
+
+    /// Runs one tick of the leg, in which nothing is sent.
+    fn tick(&mut self) {
+        self.now_us += 250;
+        self.drive = self.drive.after(crate::leg::DriveEvent::Tick, 4);
+        let drive = if self.rests { DriveState::NotReadyToSwitchOn } else { self.drive };
+        let velocity = crate::units::RadianPerSecond(self.velocity);
+        let joint = JointStatus { drive, velocity, ..JointStatus::NONE };
+        let (held, blocked) = (self.held, self.blocked);
+        self.device.update(&LegStatus {
+            joints: [joint; 2],
+            held,
+            blocked,
+            rests: self.rests,
+            causes: self.causes,
+            calibrated: self.calibrated,
+            refused: self.refused.take(),
+            ..LegStatus::NONE
+        });
+        let order = self.device.order();
+        if order.request == Some(LegRequest::Power(PowerRequest::EnableOperation)) {
+            self.refused = self.refuses;
+        }
+        if let Some(LegRequest::Power(power)) = order.request.filter(|_| self.refused.is_none()) {
+            self.drive = self.drive.after(crate::leg::DriveEvent::Requested(power), 4);
+        }
+        self.orders.push(order);
     }
 
     fn send(&mut self, id: u16, data: &[u8]) -> Vec<Frame> {
@@ -460,6 +465,29 @@ fn a_refusal_of_the_leg_is_reported_with_its_joint_until_it_ends() {
     (bench.refuses, bench.velocity) = (None, 0.0);
     assert_eq!(bench.insist(1), [0x81, 0x82].map(|id| Frame::new(id, &[0; 8])));
     assert_eq!((bench.drive, bench.read(2, 0x60FD) >> 21), (DriveState::OperationEnabled, 0));
+}
+
+#[test]
+fn a_refusal_of_one_tick_is_reported_after_the_bus_was_busy() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    for word in [6, 7] {
+        assert_eq!(bench.word(word), []);
+    }
+    bench.refuses = Some(Refusal { joint: 0, reason: RefusalReason::Moving });
+    for node in [0x201, 0x202] {
+        bench.device.receive(&Frame::new(node, &[15, 0]), bench.now_us, None, &NOTHING);
+    }
+    // The joint comes to rest at once, and every mailbox is occupied meanwhile.
+    (0..4).for_each(|_| bench.tick());
+    let sent: Vec<Frame> = bench.run(1).into_iter().filter(|frame| frame.id() & !3 == 0x80).collect();
+    let begin = [0x0E, 0xFF, 0x81, 1, 21, 0, 0, 0];
+    assert_eq!(
+        sent,
+        [(0x81, begin), (0x81, [0; 8]), (0x82, begin), (0x82, [0; 8])]
+            .map(|(id, data)| Frame::new(id, &data))
+    );
+    assert_eq!((bench.read(1, 0x603F), bench.read(2, 0x603F)), (0xFF0E, 0xFF0E));
 }
 
 #[test]

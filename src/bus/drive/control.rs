@@ -255,6 +255,12 @@ impl Axis {
             && matches!(self.own, DriveState::SwitchOnDisabled | DriveState::QuickStopActive { .. })
     }
 
+    /// Error to be reported: a fault, or else why a step towards enabled is refused.
+    pub(in crate::bus) fn error(&self) -> Option<ErrorReport> {
+        let Some(fault) = self.own.fault() else { return self.refused };
+        Some(ErrorReport { code: fault.code.number(), information: [fault.joint + 1, 0, 0, 0, 0] })
+    }
+
     /// Returns the state of the leg's drive.
     #[must_use]
     pub const fn drive(&self) -> DriveState {

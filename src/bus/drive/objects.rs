@@ -4,7 +4,6 @@ use super::Mode;
 use super::control::{Axis, Settings};
 use crate::bus::abort::Abort;
 use crate::bus::dictionary::Object;
-use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::{Lost, Objects};
 
 /// Low bytes of a signed number.
@@ -160,11 +159,6 @@ impl Objects for Axis {
             _ => return Err(Abort::NoObject),
         }
         Ok(())
-    }
-
-    fn error(&self) -> Option<ErrorReport> {
-        let Some(fault) = self.own.fault() else { return self.refused };
-        Some(ErrorReport { code: fault.code.number(), information: [fault.joint + 1, 0, 0, 0, 0] })
     }
 
     fn lost(&mut self, why: Lost) {

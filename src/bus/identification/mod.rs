@@ -22,7 +22,6 @@ pub use results_copy::ResultsCopy;
 use super::abort::Abort;
 use super::dictionary::Object;
 use super::drive::Axis;
-use super::emergency::ErrorReport;
 use super::objects::{Lost, Objects};
 use crate::leg::{Activity, IdentifyPhase, Parameter, Permission, Plan, Reason, Status, Step};
 
@@ -243,10 +242,6 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
             (0x2140, 2) => Ok(self.leg.log.bytes(offset, into)),
             _ => self.axis.bytes(object, offset, into),
         }
-    }
-
-    fn error(&self) -> Option<ErrorReport> {
-        self.axis.error()
     }
 
     fn lost(&mut self, why: Lost) {

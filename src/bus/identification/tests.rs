@@ -208,17 +208,3 @@ fn nothing_is_stored_while_the_drive_may_switch() {
     let mut objects = JointObjects { axis: &mut axis, joint: 0, leg: &mut leg, results: &ACCEPTED };
     assert_eq!(objects.store(true), Err(Abort::State));
 }
-
-#[test]
-fn the_error_of_a_joint_is_that_of_its_axis() {
-    use crate::bus::drive::Coupling;
-    use crate::leg::{DriveState, Fault, FaultCode, JointStatus};
-    let mut leg = leg();
-    assert_eq!(with(&mut leg, &ACCEPTED, |objects| objects.error()), None);
-    let (mut axis, mut other) = (super::super::tests::axis(), super::super::tests::axis());
-    let drive = DriveState::Fault { fault: Fault { code: FaultCode::Overspeed, joint: 1 } };
-    axis.update(&JointStatus { drive, ..JointStatus::NONE });
-    let _ = Coupling::default().power([&mut other, &mut axis], drive, false);
-    let objects = JointObjects { axis: &mut axis, joint: 1, leg: &mut leg, results: &ACCEPTED };
-    assert_eq!(objects.error(), Some(ErrorReport { code: 0x8400, information: [2, 0, 0, 0, 0] }));
-}

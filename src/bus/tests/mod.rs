@@ -98,6 +98,9 @@ impl Board {
                 self.drive = self.drive.after(DriveEvent::Requested(request), 4);
             }
         }
+        for (node, axis) in self.nodes.iter_mut().zip(&self.axes) {
+            node.on_drive(axis.error());
+        }
         self.frames()
     }
 

@@ -3,7 +3,7 @@
 //! Why: a frame that waited too long must not start a motion, and a stop must never be lost.
 
 use scarab::bus::dictionary::Object;
-use scarab::bus::{Abort, ErrorReport, Frame, Lost, Node, Objects};
+use scarab::bus::{Abort, Frame, Lost, Node, Objects};
 
 const NMT: u16 = 0;
 const SYNC: u16 = 0x80;
@@ -53,10 +53,6 @@ impl Objects for Recorder {
             _ => self.moves |= TARGETS.contains(&index) || (index, sub) == IDENTIFICATION,
         }
         Ok(())
-    }
-
-    fn error(&self) -> Option<ErrorReport> {
-        None
     }
 
     fn lost(&mut self, _: Lost) {}
