@@ -333,7 +333,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             (None, None) => None,
         };
         self.explain(status, rises || self.refused);
-        // Here and not where frames are sent: a refusal of one tick is also reported while no frame can be sent.
+        // Here and not where frames are sent: a refusal of one tick is reported although no mailbox is free.
         for (node, axis) in self.nodes.iter_mut().zip(&self.axes) {
             node.on_drive(axis.error());
         }

@@ -103,6 +103,10 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
         }
         Test::NotFinite => format!("{value:.0} samples or rows{on} are not finite"),
         Test::Torque => format!("the torque of joint {joint} is always zero"),
+        Test::Search if known => format!(
+            "the search has not converged: it ended {value:.2} chi-square units above least squares, limit {limit:.2}; \
+             try another --swarm-seed"
+        ),
         Test::Search => "the search did not finish".into(),
         Test::Drive => "the drive stopped during the identification".into(),
         Test::Speed => {

@@ -23,8 +23,8 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         let problem = Problem::new(record, model);
         thresholds.judge_input(model, record, builder);
         thresholds.judge_excitation(&problem.whole(), least_squares.rank(), builder);
-        let done = if self.consistency().is_some() { T::one() } else { T::zero() };
-        builder.at_least(Reason::Input, Test::Search, None, done, T::one());
+        let excess = self.search_excess().unwrap_or(T::LARGEST);
+        builder.at_most(Reason::Input, Test::Search, None, None, excess, thresholds.search_excess);
         let found = self.found();
         let estimate = self.estimate();
         if !builder.verdict().has(Reason::Unexcited) {

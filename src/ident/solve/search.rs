@@ -9,7 +9,7 @@ use core::mem::MaybeUninit;
 use super::constrained::ParameterBox;
 use super::estimate::{Plan, Problem, Stage};
 use crate::place::{Slot, empty_slot, fill};
-use crate::real::Real;
+use crate::real::{self, Real};
 use crate::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
 
 /// Beetles in the swarm (paper, 4.1).
@@ -55,7 +55,7 @@ pub enum SearchState {
 #[derive(Clone, Debug, PartialEq)]
 pub struct SwarmSearch<T: Real, const B: usize> {
     plan: Plan,
-    settings: BsoSettings<T>,
+    pub(super) settings: BsoSettings<T>,
     seed: u64,
     bounds: ParameterBox<T, B>,
     stage: Stage<T, B>,
@@ -66,6 +66,7 @@ pub struct SwarmSearch<T: Real, const B: usize> {
     determined: [bool; B],
     iterations: u32,
     evaluations: u32,
+    excess: T,
     watched_value: T,
     watched_iteration: u32,
 }
@@ -95,6 +96,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
             determined: determined,
             iterations: 0,
             evaluations: 0,
+            excess: T::zero(),
             watched_value: T::LARGEST,
             watched_iteration: 0,
         }, { swarm: empty_slot })
@@ -106,7 +108,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         self.stage = problem.stage(self.plan, 0, &self.values, &self.determined);
         self.swarm.clear();
         (self.stage_index, self.state) = (0, SearchState::Running);
-        (self.iterations, self.evaluations) = (0, 0);
+        (self.iterations, self.evaluations, self.excess) = (0, 0, T::zero());
         (self.watched_value, self.watched_iteration) = (T::LARGEST, 0);
     }
 
@@ -177,6 +179,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
                 self.values[column] = value;
                 self.determined[column] = true;
             }
+            self.excess = real::max(self.excess, best.value);
         }
         self.next_stage(problem);
     }
@@ -208,6 +211,12 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
     #[must_use]
     pub fn stage_excess(&self) -> Option<T> {
         self.swarm.as_ref().and_then(Search::best).map(|best| best.value)
+    }
+
+    /// Largest cost at which a stage ended above its least-squares optimum, chi-square units.
+    #[must_use]
+    pub fn excess(&self) -> T {
+        self.excess
     }
 
     /// Base parameters found so far: closed stages, and the best of the open one.

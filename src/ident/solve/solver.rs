@@ -100,6 +100,13 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         })
     }
 
+    /// Searches with other settings; before the first [`Self::advance`].
+    #[cfg(test)]
+    pub(crate) fn with_settings(mut self, settings: BsoSettings<T>) -> Self {
+        self.search.settings = settings;
+        self
+    }
+
     /// True when the selection of columns has ended, or no column may be dropped.
     #[must_use]
     pub fn is_selected(&self) -> bool {
@@ -150,15 +157,26 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         state
     }
 
-    /// Base values from which the cost of constraints is counted: the swarm's, unless its box limits them.
-    /// The box is wider than the allowed set, so its edges mean nothing; least squares itself then serves.
-    fn centre(&self) -> [T; B] {
+    /// Whether least squares lies in the box of the search.
+    fn is_inside(&self) -> bool {
         let (low, high) = (&self.bounds.low, &self.bounds.high);
         let mut free =
             self.least_squares.values.iter().zip(low).zip(high).zip(&self.least_squares.determined);
-        let inside =
-            free.all(|(((value, low), high), determined)| !determined || (low..=high).contains(&value));
-        if inside { self.search.values() } else { self.least_squares.values }
+        free.all(|(((value, low), high), determined)| !determined || (low..=high).contains(&value))
+    }
+
+    /// Base values from which the cost of constraints is counted: the swarm's, unless its box limits them.
+    /// The box is wider than the allowed set, so its edges mean nothing; least squares itself then serves.
+    fn centre(&self) -> [T; B] {
+        if self.is_inside() { self.search.values() } else { self.least_squares.values }
+    }
+
+    /// Cost of the search's end above least squares, chi-square units; zero where the box keeps it away from
+    /// least squares, whose values then count. `None` until the result is complete.
+    #[must_use]
+    pub fn search_excess(&self) -> Option<T> {
+        self.completed.as_ref()?;
+        Some(if self.is_inside() { self.search.excess() } else { T::zero() })
     }
 
     #[inline(never)]

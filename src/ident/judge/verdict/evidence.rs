@@ -12,7 +12,7 @@ pub enum Test {
     NotFinite,
     /// Root mean square of a joint's torque, N m.
     Torque,
-    /// Search ended: 1, or 0.
+    /// Cost of the search's end above least squares, chi-square units; the largest value if it did not end.
     Search,
     /// Drive enabled until the end: 1, or 0.
     Drive,

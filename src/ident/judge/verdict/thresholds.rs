@@ -18,6 +18,9 @@ pub struct Thresholds<T> {
     /// Largest condition number of the scaled problem. Above, an error of 0.1 % in the rows
     /// moves the result by its size.
     pub largest_condition: T,
+    /// Largest cost of the search's end above least squares, chi-square units. A quarter moves no parameter
+    /// by more than half of its standard deviation; a converged search ends below 0.01.
+    pub search_excess: T,
     /// Negative excess that a nonnegative quantity may have, in standard deviations.
     pub largest_negative_sigmas: T,
     /// Spreads of chi-square by which a consistent leg may be worse than least squares: five are not noise.
@@ -64,6 +67,7 @@ impl<T: Real> Default for Thresholds<T> {
             smallest_speed: T::of(0.05),
             largest_pulse_share: T::of(0.2),
             largest_condition: T::of(1000.0),
+            search_excess: T::of(0.25),
             largest_negative_sigmas: T::of(3.0),
             largest_excess_spreads: T::of(5.0),
             noise_quantile: T::of(5.2),
