@@ -21,7 +21,7 @@ DEFAULT_LEG = "x2-wearer-75kg.toml"
 WAYS = ("disable voltage", "quick stop", "reset of the nodes", "connection cut", "disable operation, then shut-down and off")
 STEPS = ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27))
 # Time for a fallen leg to come to rest.
-ENABLE_WITHIN_S, BACK_WITHIN_S, FALL_S = 2.0, 60.0, 1.5
+ENABLE_WITHIN_S, ANSWER_WITHIN_S, BACK_WITHIN_S, FALL_S = 2.0, 10.0, 60.0, 1.5
 # A step towards enabled was refused.
 NOT_ENABLED = 0xFF0E
 # Time to return into the range at 0.1 rad/s from the end stops, 7 degrees outside, and the range's tolerance.
@@ -187,9 +187,14 @@ def main():
         if is_up(leg.joints, ENABLE_WITHIN_S):
             arrive(leg.joints, limits, where)
             continue
-        refused += 1
+        # A busy machine delays answers by seconds; a leg that is silent stays silent.
+        holds(lambda: reason(leg.joints) or all(joint.state() == 0x27 for joint in leg.joints), ANSWER_WITHIN_S)
         why = reason(leg.joints)
+        if not why and all(joint.state() == 0x27 for joint in leg.joints):
+            arrive(leg.joints, limits, where)
+            continue
         states = ", ".join(f"{joint.read(0x6041, 0, '<H'):04X}" for joint in leg.joints)
+        refused += 1
         print(f"{where}: not enabled; {'; '.join(why) or f'NO REASON, statuswords {states}'}", flush=True)
         if not why:
             silent.append(where)
