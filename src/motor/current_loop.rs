@@ -152,13 +152,27 @@ impl CurrentLoop {
         speed_rad_per_s: f32,
         limit: Volt,
     ) -> Rotating<Volt> {
+        let target = Rotating { d: Ampere::ZERO, q: target };
+        self.voltage_for(gains, target, measured, speed_rad_per_s, limit)
+    }
+
+    /// [`Self::voltage`] for a current with both components.
+    #[inline(always)]
+    pub(super) fn voltage_for(
+        &mut self,
+        gains: &CurrentGains,
+        target: Rotating<Ampere>,
+        measured: Rotating<Ampere>,
+        speed_rad_per_s: f32,
+        limit: Volt,
+    ) -> Rotating<Volt> {
         let forward = Rotating {
             d: -speed_rad_per_s * gains.inductance_h.q * measured.q.0,
             q: speed_rad_per_s * (gains.inductance_h.d * measured.d.0 + gains.flux_vs),
         };
         let wanted = Rotating {
-            d: gains.proportional_ohm.d * -measured.d.0 + self.integral_v.d + forward.d,
-            q: gains.proportional_ohm.q * (target.0 - measured.q.0) + self.integral_v.q + forward.q,
+            d: gains.proportional_ohm.d * (target.d.0 - measured.d.0) + self.integral_v.d + forward.d,
+            q: gains.proportional_ohm.q * (target.q.0 - measured.q.0) + self.integral_v.q + forward.q,
         };
         let given = limited(wanted, limit.0);
         self.integral_v.d += gains.renewal.d * (given.d - forward.d - self.integral_v.d);

@@ -11,7 +11,6 @@ use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::board::odrive_v3_6::identity::{Identity, Reset};
 use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
-use crate::board::odrive_v3_6::settings::drives::CALIBRATION;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
 use crate::board::odrive_v3_6::{brake, can, converter, watchdog};
@@ -111,7 +110,8 @@ fn hand_out(
         None => SIGNALS.inhibit.raise(InhibitReason::Configuration),
     }
     let axes = drives::axes(&leg::LEG, divider);
-    let settings = HousekeepingSettings { axes, calibration: [CALIBRATION; JOINTS], hottest_c: HOTTEST_C };
+    let calibration = drives::calibrations(&leg::LEG);
+    let settings = HousekeepingSettings { axes, calibration, hottest_c: HOTTEST_C };
     let housekeeper = Housekeeper::new(settings).with_stored(stored);
     let thread = built.map(|(configuration, built)| identify::Thread {
         identification: built,

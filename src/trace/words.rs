@@ -149,6 +149,8 @@ pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
         Why::PolePairs(pairs) => ("pole_pairs", pairs as u32),
         Why::CountsPerTurn(counts) => ("counts_per_turn", counts),
         Why::Slipped => ("slipped", 0),
+        Why::Load(percent) => ("load", percent as u32),
+        Why::Travel => ("travel", 0),
         Why::NoIndex => ("no_index", 0),
         Why::IndexMoved => ("index_moved", 0),
         Why::StoredOffset => ("stored_offset", 0),

@@ -25,14 +25,18 @@ pub struct Trial {
     pub settings: CalibrationSettings,
 }
 
-struct TestRandom(Xoshiro256PlusPlus);
+pub struct TestRandom(Xoshiro256PlusPlus);
 
 impl TestRandom {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn new(seed: u64) -> Self {
+        Self(Xoshiro256PlusPlus::seed_from_u64(seed))
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn one_of<T: Copy, const N: usize>(&mut self, all: [T; N]) -> T {
+    pub fn one_of<T: Copy, const N: usize>(&mut self, all: [T; N]) -> T {
         all[(self.0.next_u64() >> 33) as usize % N]
     }
 }
@@ -43,7 +47,7 @@ const CURRENT: f64 = 20.0;
 impl Trial {
     /// Trial wired according to its configuration.
     pub fn sound(seed: u64) -> Self {
-        let mut random = TestRandom(Xoshiro256PlusPlus::seed_from_u64(seed));
+        let mut random = TestRandom::new(seed);
         let pole_pairs = random.one_of([4, 5, 7, 10, 14, 21]);
         let counts = random.one_of([2400.0, 4000.0, 8192.0, 10_000.0, 16_384.0]);
         // Ranges: 30 mOhm to 0.3 Ohm, small and large ones equally often; L/R of 0.3 ms to 1.5 ms; 20 to
@@ -54,7 +58,8 @@ impl Trial {
         let holding = torque_per_ampere * CURRENT;
         let flux = torque_per_ampere / (1.5 * f64::from(pole_pairs));
         // If saliency outweighed the magnets, the rotor would not rest along them.
-        let inductance_q = (inductance_d * random.between(1.0, 1.4)).min(inductance_d + 0.8 * flux / CURRENT);
+        let inductance_q =
+            (inductance_d * random.between(1.0, 1.4)).min(inductance_d + 0.8 * flux / (1.25 * CURRENT));
         // Current along the flux of a salient rotor holds it with less torque: 3/2 p i sin(x)
         // (flux - (Lq - Ld) i cos(x)).
         let held = holding * (1.0 - (inductance_q - inductance_d) * CURRENT / flux).max(0.2);
@@ -88,8 +93,9 @@ impl Trial {
             index: random.between(0.0, TAU),
         };
         let bridge = BridgeDescription::default();
+        let inertia = random.between(0.5e-4, 10e-4);
         let load = Load::Free {
-            inertia: random.between(0.5e-4, 10e-4),
+            inertia,
             coulomb: random.between(0.0, 0.15) * held,
             viscous: random.between(1e-4, 5e-4),
             torque: 0.0,
@@ -123,6 +129,8 @@ impl Trial {
                 current: Ampere(CURRENT as f32),
                 voltage: Volt(9.0),
                 turns_per_s: 12.0,
+                travel_turns: 2.0,
+                inertia_kg_m2: inertia as f32,
             },
         }
     }

@@ -64,6 +64,14 @@ pub fn refusal(reason: Refusal) -> String {
         Refusal::Slipped => {
             "the rotor did not follow the field evenly: load, friction or cogging (`motor.cogging_nm`) need more than half of the holding torque".into()
         }
+        Refusal::Load(percent) => format!(
+            "the load takes {percent} % of the torque that the calibration's current holds, at most 60 are permitted: \
+             calibrate in a pose with less load, such as with the leg hanging"
+        ),
+        Refusal::Travel => {
+            "the rotor moved further than a calibration may: a load tore it away, or it has fewer pole pairs than \
+             configured (`motor.pole_pairs`)".into()
+        }
         Refusal::NoIndex => "no index pulse within a whole turn".into(),
         Refusal::IndexMoved => "the index pulse came at different positions of the turn".into(),
         Refusal::StoredOffset => "the rotor position contradicts the stored offset".into(),

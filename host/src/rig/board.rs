@@ -43,7 +43,6 @@ const CALIBRATION_CURRENT_A: f64 = drives::CALIBRATION.current.0 as f64;
 /// Voltage vectors of a calibration: sufficient for motors of the default leg, and less than half
 /// of the lowest bus voltage.
 const CALIBRATION_VOLTAGE_V: [f64; 2] = [3.0, 9.5];
-const CALIBRATION_TURNS_PER_S: f32 = drives::CALIBRATION.turns_per_s;
 /// Half-wave with which the firmware measures inductances, s, and its share of the calibration current.
 const HALF_WAVE_S: f64 = 2.0 / CURRENT_RATE_HZ as f64;
 const WAVE_SHARE: f64 = 0.3;
@@ -75,11 +74,11 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
     let current = CALIBRATION_CURRENT_A.min(limit).min(0.7 * most / motor.resistance_ohm);
     let inductance = 1e-6 * motor.inductance_d_uh.max(motor.inductance_q_uh);
     let wave = WAVE_SHARE * current * inductance / HALF_WAVE_S;
-    let voltage = (1.4 * current * motor.resistance_ohm).max(wave).clamp(usual, most);
+    let voltage = (1.7 * current * motor.resistance_ohm).max(wave).clamp(usual, most);
     CalibrationSettings {
         current: Ampere(current as f32),
         voltage: Volt(voltage as f32),
-        turns_per_s: CALIBRATION_TURNS_PER_S,
+        ..drives::CALIBRATION
     }
 }
 

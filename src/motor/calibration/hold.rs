@@ -41,6 +41,11 @@ impl Hold {
         Ok(())
     }
 
+    /// Turns the angle; the voltage stays.
+    pub(super) fn turn_to(&mut self, angle: ElectricalAngle) {
+        self.axis = angle.rotation();
+    }
+
     /// Component of a current along the angle.
     pub(super) fn along_axis(&self, current: Stationary<Ampere>) -> Ampere {
         current.to_rotating(self.axis).d

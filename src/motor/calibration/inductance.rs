@@ -1,6 +1,7 @@
 //! Inductances along and across the flux, by a square wave on top of the current that holds the rotor.
 //!
-//! The voltage is offset by +u for two periods and by -u for two, first along the flux, then across it:
+//! The voltage is offset by +u for two periods and by -u for two: along the held current, across it, and
+//! between both:
 //!
 //! ```text
 //! di = 2 u / R tanh(R t / (2 L)),   t = two periods      exact for a resistance and an inductance
@@ -15,11 +16,24 @@
 //! The command after sample k acts between the samples k+1 and k+2. So the maximum is read three samples
 //! after the wave's beginning, the minimum two later. The mean of 512 waves each (85 ms) reduces noise of 0.1
 //! A to 6 mA of some amperes.
+//!
+//! **A loaded rotor** does not lie along the current that holds it. The inverse of the inductance seen
+//! along a direction is a constant and a cosine of twice the angle from the flux. Three directions
+//! determine it, so the inductances along and across the flux follow as soon as the rotor's angle is known:
+//!
+//! ```text
+//! m(x) = A + B cos 2 (x + y)            x from the held current, y held current from the flux
+//! A = (m(0) + m(90)) / 2,  B = (m(0) - m(90)) / 2 cos 2 y + (A - m(45)) sin 2 y
+//! L_d = 1 / (A + B),  L_q = 1 / (A - B)
+//! ```
 
 use super::hold::Hold;
-use super::{Outcome, Reading, Refusal};
+use super::{Outcome, Reading, Refusal, STRONG_SHARE};
 use crate::hal::CURRENT_RATE_HZ;
+use crate::motor::{ElectricalAngle, Rotation};
+use crate::real::min;
 use crate::units::{Henry, Ohm, Volt};
+use core::f32::consts::FRAC_1_SQRT_2;
 
 const HALF_WAVE_TICKS: u32 = 2;
 const WAVE_TICKS: u32 = 2 * HALF_WAVE_TICKS;
@@ -40,10 +54,34 @@ pub(super) struct Inductances {
     pub quadrature: Henry,
 }
 
+/// Inductances seen along the held current, across it, and at 45 degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct SeenInductances([Henry; 3]);
+
+impl SeenInductances {
+    /// The smallest of them.
+    pub(super) fn least(&self) -> Henry {
+        let [along, across, between] = self.0;
+        Henry(min(along.0, min(across.0, between.0)))
+    }
+
+    /// Inductances along and across the flux; the held current is `ahead` of it.
+    pub(super) fn along_flux(&self, ahead: ElectricalAngle) -> Inductances {
+        let [along, across, between] = self.0.map(|inductance| 1.0 / inductance.0);
+        let Rotation { sine, cosine } = ahead.plus(ahead).rotation();
+        let mean = 0.5 * (along + across);
+        let swing = 0.5 * (along - across) * cosine + (mean - between) * sine;
+        Inductances { direct: Henry(1.0 / (mean + swing)), quadrature: Henry(1.0 / (mean - swing)) }
+    }
+}
+
+/// Components along and across the held current of each direction of the wave.
+const DIRECTIONS: [[f32; 2]; 3] = [[1.0, 0.0], [0.0, 1.0], [FRAC_1_SQRT_2; 2]];
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct InductanceStage {
     hold: Hold,
-    across: bool,
+    direction: usize,
     tick: u32,
     amplitude: f32,
     /// Waves since the amplitude was found.
@@ -51,21 +89,21 @@ pub(super) struct InductanceStage {
     rising: bool,
     highest: f32,
     swing_sum: f32,
-    direct: Henry,
+    found: SeenInductances,
 }
 
 impl InductanceStage {
     pub(super) fn new(hold: Hold) -> Self {
         Self {
             hold,
-            across: false,
+            direction: 0,
             tick: 0,
             amplitude: 0.0,
             waves: 0,
             rising: true,
             highest: 0.0,
             swing_sum: 0.0,
-            direct: Henry::ZERO,
+            found: SeenInductances::default(),
         }
     }
 
@@ -73,36 +111,33 @@ impl InductanceStage {
         &mut self,
         reading: &Reading<'_>,
         resistance: Ohm,
-    ) -> Result<Outcome<(Inductances, Hold)>, Refusal> {
+    ) -> Result<Outcome<(SeenInductances, Hold)>, Refusal> {
         let settings = &reading.bench.settings;
-        self.hold.tick(reading, settings.current)?;
-        let current = if self.across {
-            self.hold.across_axis(reading.current)
-        } else {
-            self.hold.along_axis(reading.current)
-        };
+        self.hold.tick(reading, settings.current * STRONG_SHARE)?;
+        let [along, across] = DIRECTIONS.get(self.direction).copied().unwrap_or_default();
+        let current =
+            self.hold.along_axis(reading.current) * along + self.hold.across_axis(reading.current) * across;
         match self.tick % WAVE_TICKS {
             3 => self.highest = current.0,
             1 => self.wave(self.highest - current.0, reading)?,
             _ => {}
         }
         if self.waves == SETTLE_WAVES + MEAN_WAVES {
-            let found = self.inductance(resistance)?;
-            if self.across {
-                let found = Inductances { direct: self.direct, quadrature: found };
+            let inductance = self.inductance(resistance)?;
+            if let Some(found) = self.found.0.get_mut(self.direction) {
+                *found = inductance;
+            }
+            let (direction, found) = (self.direction + 1, self.found);
+            if direction == DIRECTIONS.len() {
                 return Ok(Outcome::Passed((found, self.hold)));
             }
-            *self = Self { across: true, direct: found, ..Self::new(self.hold) };
+            *self = Self { direction, found, ..Self::new(self.hold) };
             return Ok(Outcome::Running(self.hold.voltage()));
         }
         let sign = if self.tick % WAVE_TICKS < HALF_WAVE_TICKS { 1.0 } else { -1.0 };
         self.tick += 1;
         let wave = Volt(sign * self.amplitude);
-        Ok(Outcome::Running(if self.across {
-            self.hold.voltage_with(Volt::ZERO, wave)
-        } else {
-            self.hold.voltage_with(wave, Volt::ZERO)
-        }))
+        Ok(Outcome::Running(self.hold.voltage_with(wave * along, wave * across)))
     }
 
     /// Evaluates one wave's swing.
@@ -145,7 +180,6 @@ impl InductanceStage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motor::ElectricalAngle;
 
     /// Inductance found for the swing of a known resistance and inductance at an amplitude.
     fn found(resistance: f64, inductance: f64, amplitude: f64) -> Result<Henry, Refusal> {
@@ -170,6 +204,22 @@ mod tests {
             // Tolerance: truncation of the series, and single precision.
             let error = x * x * x * x / 5.0 + 1e-5;
             assert!((found / inductance - 1.0).abs() < error, "{found} for {inductance}, x {x}");
+        }
+    }
+
+    #[test]
+    fn the_inductances_of_the_flux_follow_from_any_angle_of_the_rotor() {
+        let (direct, quadrature) = (24e-6_f32, 30e-6);
+        for degrees in [0.0_f32, 20.0, 45.0, -60.0, 110.0] {
+            let seen = DIRECTIONS.map(|[along, across]| {
+                let (sine, cosine) = crate::real::sin_cos(degrees.to_radians());
+                // The direction's components along and across the flux.
+                let (d, q) = (along * cosine - across * sine, along * sine + across * cosine);
+                Henry(1.0 / (d * d / direct + q * q / quadrature))
+            });
+            let found = SeenInductances(seen).along_flux(ElectricalAngle::from_turns(degrees / 360.0));
+            assert!((found.direct.0 / direct - 1.0).abs() < 1e-4, "{degrees}: {found:?}");
+            assert!((found.quadrature.0 / quadrature - 1.0).abs() < 1e-4, "{degrees}: {found:?}");
         }
     }
 

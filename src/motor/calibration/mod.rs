@@ -3,15 +3,16 @@
 //! ```text
 //! current-sensor offsets (bridge off) -> resistance at C, B, A: wiring of phases and shunts
 //!    -> inductances at A
-//!    -> scan, the field turns slowly forwards and back: counts, direction, pole pairs, offset, index
+//!    -> scan, the field turns slowly forwards and back: counts, direction, pole pairs, index
+//!    -> refinement, the rotor turns under load with both signs of the direct current: offset
 //!    -> Calibration
 //! ```
 //!
 //! Why here and nowhere else: an [`super::Axis`] cannot be made without a [`Calibration`], and a
 //! [`Calibration`] has no constructor but the end of a [`Calibrator`]. Until then the motor receives voltages
-//! along angles that the state machine chooses, never a quadrature current. A free rotor follows the field
-//! and stops with it, whatever the encoder reads. Limits apply in every tick: current vector, voltage, bus,
-//! rails, time of every stage.
+//! along angles that the state machine chooses. Only the refinement, after direction and counts were found
+//! right, controls the rotor's position. Limits apply in every tick: current vector, voltage, bus, rails,
+//! travel, time of every stage.
 //!
 //! | defect | symptom | reason |
 //! | --- | --- | --- |
@@ -25,6 +26,8 @@
 //! | counts per turn | counts per electrical turn | [`Refusal::CountsPerTurn`] |
 //! | no index, or at several positions | index | [`Refusal::NoIndex`], [`Refusal::IndexMoved`] |
 //! | load, friction or cogging too large | travel and deviation, both ways | [`Refusal::Slipped`] |
+//! | load too large | torque while the rotor turns | [`Refusal::Load`] |
+//! | rotor torn away by a load, or too long a path | travel | [`Refusal::Travel`] |
 //! | encoder moved on its shaft since it was stored | offset at the index | [`Refusal::StoredOffset`] |
 //! | not the stored motor | resistance, inductances | [`Refusal::OtherMotor`] |
 //!
@@ -43,15 +46,17 @@
 //! Results are valid for the calibrated configuration only: [`super::Axis::new`] refuses another direction,
 //! other pole pairs and other counts.
 //!
-//! Known limits: gain errors of shunts and of the bus divider scale R and L. A constant torque
-//! (gravity) shifts the offset by asin(torque / holding torque), friction does not. Calibrate with the
-//! leg hanging or unloaded.
+//! The gear and the leg may stay on: a load of up to 0.6 of the torque that the current holds is permitted.
+//! The rotor returns to where it began; then the current falls and the leg with it, unless friction holds it.
+//!
+//! Known limits: gain errors of shunts and of the bus divider scale R and L.
 
 mod current_offsets;
 mod field;
 mod found;
 mod hold;
 mod inductance;
+mod refine;
 mod refusal;
 mod resistance;
 mod scan;
@@ -59,18 +64,22 @@ mod track;
 
 use super::configuration::{AxisConfiguration, AxisError, Direction};
 use super::{
-    CountScale, CurrentGains, ElectricalAngle, Modulator, MotorConstants, Rotating, SenseScale, Stationary,
+    CountScale, CurrentGains, CurrentLoop, ElectricalAngle, Modulator, MotorConstants, Rotating, Rotation,
+    SenseScale, Stationary,
 };
 use crate::hal::{AxisCommand, AxisSample};
+use crate::real::min;
 use crate::units::{Ampere, Hertz, Ohm, Volt, Weber};
 use current_offsets::CurrentOffsets;
 pub use found::{Calibration, EncoderSetting, StoredCalibration};
 use hold::Hold;
-use inductance::{InductanceStage, Inductances};
+use inductance::{InductanceStage, Inductances, SeenInductances};
+use refine::{QUADRATURE_SHARE, Refine, Refined};
 pub use refusal::{Phase, Refusal};
 use resistance::ResistanceStage;
-use scan::{Scan, ScanResult};
+use scan::Scan;
 pub(super) use track::INDEX_WIDTH;
+use track::Track;
 
 /// Limits of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,6 +90,11 @@ pub struct CalibrationSettings {
     pub voltage: Volt,
     /// Speed of the scan's field, electrical turns per second, 0.5..=20.
     pub turns_per_s: f32,
+    /// Greatest travel of the rotor from where it began, motor turns, at most 2. The index is passed for
+    /// certain with a turn and 1.4 electrical turns.
+    pub travel_turns: f32,
+    /// Inertia that the motor turns, at the rotor, kg m^2: rotor, gear and leg. Within a factor of three.
+    pub inertia_kg_m2: f32,
 }
 
 /// Result of one calibration tick.
@@ -107,13 +121,65 @@ struct Bench {
     encoder: EncoderSetting,
     bus_codes: [u16; 2],
     overcurrent_square: f32,
+    flux: Weber,
+    /// Greatest quadrature current of the refinement, A.
+    quadrature_a: f32,
+}
+
+impl Bench {
+    /// Converts counts to electrical turns by the configured scale.
+    fn electrical(&self, counts: i32) -> f32 {
+        counts as f32 * f32::from(self.pole_pairs) / self.scale.counts_per_turn() as f32
+    }
+
+    /// Assumed electrical angle after so many counts.
+    fn angle(&self, way: i32) -> ElectricalAngle {
+        self.scale.angle(self.scale.within_turn(way))
+    }
+}
+
+/// Current of both components in a frame, for instance that of a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct FieldCurrent {
+    gains: CurrentGains,
+    current_loop: CurrentLoop,
+}
+
+impl FieldCurrent {
+    /// Takes over from a voltage along the frame's first axis.
+    fn holding(gains: CurrentGains, along: Volt) -> Self {
+        Self { gains, current_loop: CurrentLoop::holding(Rotating { d: along, q: Volt::ZERO }) }
+    }
+
+    /// Describes this current in a frame that lies back by this angle.
+    fn turned(self, back: ElectricalAngle) -> Self {
+        let Rotating { d, q } = self.current_loop.integral_v();
+        let Rotation { sine, cosine } = back.rotation();
+        let turned = Rotating { d: Volt(d * cosine - q * sine), q: Volt(d * sine + q * cosine) };
+        Self { current_loop: CurrentLoop::holding(turned), ..self }
+    }
+
+    fn voltage(
+        &mut self,
+        reading: &Reading<'_>,
+        frame: ElectricalAngle,
+        target: Rotating<Ampere>,
+    ) -> Stationary<Volt> {
+        let frame = frame.rotation();
+        let measured = reading.current.to_rotating(frame);
+        let limit = reading.bench.settings.voltage;
+        self.current_loop.voltage_for(&self.gains, target, measured, 0.0, limit).to_stationary(frame)
+    }
 }
 
 /// Input of a stage in one tick.
 #[derive(Clone, Copy)]
 struct Reading<'a> {
     bench: &'a Bench,
-    sample: &'a AxisSample,
+    /// Motion since the calibration began.
+    track: &'a Track,
+    /// Whether the rotor is beyond the permitted travel.
+    is_beyond: bool,
     current: Stationary<Ampere>,
     bus: Volt,
 }
@@ -137,6 +203,7 @@ enum Stage {
     Resistance(ResistanceStage),
     Inductance(InductanceStage),
     Scan(Scan),
+    Refine(Refine),
     Finished(Result<Calibration, Refusal>),
 }
 
@@ -147,7 +214,10 @@ pub struct Calibrator {
     stored: Option<StoredCalibration>,
     current_offsets: [f32; 2],
     resistance: Ohm,
-    inductances: Inductances,
+    seen: SeenInductances,
+    /// Travel at which the inductances were measured along phase A.
+    seen_at: i32,
+    track: Track,
     stage: Stage,
 }
 
@@ -159,10 +229,13 @@ impl Calibrator {
         configuration.check()?;
         let sensible = settings.current.0 > 0.0
             && settings.current <= configuration.current_limit
-            && settings.current.0 * 1.3 < configuration.overcurrent.0
             && settings.voltage.0 > 0.0
             && settings.voltage.0 < 0.5 * configuration.bus[0].0
-            && (0.5..=20.0).contains(&settings.turns_per_s);
+            && (0.5..=20.0).contains(&settings.turns_per_s)
+            && settings.current.0 * LONGEST_SHARE < configuration.overcurrent.0
+            && settings.travel_turns * f32::from(configuration.pole_pairs) >= LEAST_TRAVEL_TURNS
+            && settings.travel_turns <= 2.0
+            && (1e-6..=10.0).contains(&settings.inertia_kg_m2);
         if !sensible {
             return Err(AxisError::Current);
         }
@@ -177,13 +250,17 @@ impl Calibrator {
             encoder: EncoderSetting::of(configuration),
             bus_codes: configuration.bus_codes(),
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
+            flux: configuration.flux,
+            quadrature_a: min(settings.current.0 * QUADRATURE_SHARE, configuration.current_limit.0),
         };
         Ok(Self {
             bench,
             stored: None,
             current_offsets: [0.0; 2],
             resistance: Ohm::ZERO,
-            inductances: Inductances::default(),
+            seen: SeenInductances::default(),
+            seen_at: 0,
+            track: Track::default(),
             stage: Stage::CurrentOffsets(CurrentOffsets::default()),
         })
     }
@@ -224,7 +301,13 @@ impl Calibrator {
         if !(low..=high).contains(&sample.bus_code) {
             return Err(Err(Refusal::BusVoltage));
         }
+        self.track.follow(&self.bench, sample);
         let current_offsets = self.current_offsets;
+        let travel = self.bench.electrical(self.track.way).abs();
+        let is_beyond = travel > self.bench.settings.travel_turns * f32::from(self.bench.pole_pairs);
+        if is_beyond && !matches!(self.stage, Stage::Scan(_) | Stage::Finished(_)) {
+            return Err(Err(Refusal::Travel));
+        }
         let reading = |current_offsets| {
             let current = self
                 .bench
@@ -236,7 +319,7 @@ impl Calibrator {
                 return Err(Refusal::Overcurrent);
             }
             let bus = self.bench.sense.bus(sample.bus_code);
-            Ok(Reading { bench: &self.bench, sample, current, bus })
+            Ok(Reading { bench: &self.bench, track: &self.track, is_beyond, current, bus })
         };
         match &mut self.stage {
             Stage::Finished(end) => Err(*end),
@@ -254,7 +337,8 @@ impl Calibrator {
                     Outcome::Passed((resistance, hold)) => {
                         let command = reading.command(hold.voltage());
                         self.resistance = resistance;
-                        self.agrees(|stored| (stored.resistance.0, resistance.0), RESISTANCE_SHARE)?;
+                        self.agrees(|stored| (stored.resistance.0, resistance.0), RESISTANCE_SHARE)
+                            .map_err(Err)?;
                         self.stage = Stage::Inductance(InductanceStage::new(hold));
                         Ok(command)
                     }
@@ -264,15 +348,9 @@ impl Calibrator {
                 let reading = reading(current_offsets).map_err(Err)?;
                 match stage.tick(&reading, self.resistance).map_err(Err)? {
                     Outcome::Running(voltage) => Ok(reading.command(voltage)),
-                    Outcome::Passed((inductances, hold)) => {
+                    Outcome::Passed((seen, hold)) => {
                         let command = reading.command(hold.voltage());
-                        let Inductances { direct, quadrature } = inductances;
-                        self.inductances = inductances;
-                        self.agrees(|stored| (stored.direct_inductance.0, direct.0), INDUCTANCE_SHARE)?;
-                        self.agrees(
-                            |stored| (stored.quadrature_inductance.0, quadrature.0),
-                            INDUCTANCE_SHARE,
-                        )?;
+                        (self.seen, self.seen_at) = (seen, self.track.way);
                         self.stage = self.scan(hold).map_err(Err)?;
                         Ok(command)
                     }
@@ -282,7 +360,21 @@ impl Calibrator {
                 let reading = reading(current_offsets).map_err(Err)?;
                 match stage.tick(&reading).map_err(Err)? {
                     Outcome::Running(voltage) => Ok(reading.command(voltage)),
-                    Outcome::Passed(found) => Err(Ok(self.passed(found, sample))),
+                    Outcome::Passed((found, mut current)) => {
+                        let held =
+                            Rotating { d: self.bench.settings.current * STRONG_SHARE, q: Ampere::ZERO };
+                        let command = reading.command(current.voltage(&reading, found.field, held));
+                        self.stage = Stage::Refine(Refine::new(&self.bench, current, found));
+                        Ok(command)
+                    }
+                }
+            }
+            Stage::Refine(stage) => {
+                let reading = reading(current_offsets).map_err(Err)?;
+                let seen = (&self.seen, self.seen_at);
+                match stage.tick(&reading, seen).map_err(Err)? {
+                    Outcome::Running(voltage) => Ok(reading.command(voltage)),
+                    Outcome::Passed(found) => Err(self.passed(&found, sample)),
                 }
             }
         }
@@ -290,44 +382,63 @@ impl Calibrator {
 
     /// Ends with [`Refusal::OtherMotor`] where stored and measured value differ by more than this share of
     /// the stored one.
-    fn agrees(
-        &self,
-        values: impl Fn(&StoredCalibration) -> (f32, f32),
-        share: f32,
-    ) -> Result<(), Result<Calibration, Refusal>> {
+    fn agrees(&self, values: impl Fn(&StoredCalibration) -> (f32, f32), share: f32) -> Result<(), Refusal> {
         match self.stored.as_ref().map(values) {
-            Some((stored, found)) if !((found - stored).abs() <= share * stored) => {
-                Err(Err(Refusal::OtherMotor))
-            }
+            Some((stored, found)) if !((found - stored).abs() <= share * stored) => Err(Refusal::OtherMotor),
             _ => Ok(()),
         }
     }
 
     fn scan(&self, hold: Hold) -> Result<Stage, Refusal> {
+        // The smaller inductance: where the frame lies in the rotor is not known yet.
+        let least = self.seen.least();
         let motor = MotorConstants {
             resistance: self.resistance,
-            direct_inductance: self.inductances.direct,
-            quadrature_inductance: self.inductances.quadrature,
+            direct_inductance: least,
+            quadrature_inductance: least,
             flux: Weber::ZERO,
         };
         let gains = CurrentGains::new(&motor, SCAN_BANDWIDTH, false).ok_or(Refusal::MotorConstants)?;
-        Ok(Stage::Scan(Scan::new(gains, hold.volts(), self.stored.map(|stored| stored.offset))))
+        Ok(Stage::Scan(Scan::new(FieldCurrent::holding(gains, hold.volts()))))
     }
 
-    fn passed(&self, found: ScanResult, sample: &AxisSample) -> Calibration {
-        Calibration {
+    /// The calibration, or what contradicts the stored one.
+    fn passed(&self, found: &Refined, sample: &AxisSample) -> Result<Calibration, Refusal> {
+        let Inductances { direct, quadrature } = found.inductances;
+        self.agrees(|stored| (stored.direct_inductance.0, direct.0), INDUCTANCE_SHARE)?;
+        self.agrees(|stored| (stored.quadrature_inductance.0, quadrature.0), INDUCTANCE_SHARE)?;
+        // Rotor positions count from the index, if there is one.
+        let index = self.track.index.unwrap_or(0);
+        let measured = found.offset.plus(self.bench.angle(index)).minus(self.bench.angle(0));
+        let offset = match self.stored {
+            Some(stored) if measured.since(stored.offset).abs() > GREATEST_STORED_ERROR => {
+                return Err(Refusal::StoredOffset);
+            }
+            Some(stored) => stored.offset,
+            None => measured,
+        };
+        Ok(Calibration {
             encoder: self.bench.encoder,
             current_offsets: self.current_offsets,
             resistance: self.resistance,
-            inductances: self.inductances,
-            offset: found.offset,
+            inductances: found.inductances,
+            offset,
             counter: sample.encoder_count,
-            position: found.position,
+            position: self.bench.scale.within_turn(self.track.way.wrapping_sub(index)),
             indexed: self.bench.index,
-        }
+        })
     }
 }
 
+/// Current that holds and drags the rotor, over the calibration's.
+const STRONG_SHARE: f32 = 1.25;
+/// Greatest difference of measured and stored offset, electrical turns.
+const GREATEST_STORED_ERROR: f32 = 5.0 / 360.0;
+/// Longest current vector of the refinement over the calibration's current, with a margin: the direct
+/// current and 1.6 of it across.
+const LONGEST_SHARE: f32 = 1.1 * 1.89;
+/// Least permitted travel, electrical turns: alignment and a path of two turns.
+const LEAST_TRAVEL_TURNS: f32 = 3.4;
 /// Copper 100 K warmer or colder has 39 % more or less resistance.
 const RESISTANCE_SHARE: f32 = 0.4;
 /// Both measurements are within 2 % each (100 motors of `hal-sim/tests/calibration`), so 4 % together.

@@ -52,6 +52,10 @@ pub enum Refusal {
     CountsPerTurn(u32),
     /// The rotor did not follow the field evenly: load, friction or a blocked joint.
     Slipped,
+    /// The load takes this many percent of the torque that the calibration's current holds; 60 are permitted.
+    Load(u8),
+    /// The rotor moved beyond the permitted travel.
+    Travel,
     /// No index pulse in a whole turn.
     NoIndex,
     /// Index pulses at different positions of the turn.

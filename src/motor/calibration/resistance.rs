@@ -1,6 +1,7 @@
 //! Phase resistance, and with it the wiring of phases and shunts.
 //!
-//! Current is held along the axes of C, B and A in turn, at half and at full current:
+//! Current is held along the axes of C, B and A in turn, first the calibration's and then a quarter more.
+//! Less would not hold a loaded rotor:
 //!
 //! ```text
 //! R = (v_2 - v_1) / (i_2 - i_1)
@@ -18,19 +19,25 @@
 //! saw tooth of 16 ticks and 4/3 of a step. Centred modulation turns that into one step in every phase, up in
 //! one and down in two.
 //!
+//! **From axis to axis** the voltage turns slowly and its size stays, so that a loaded rotor is never
+//! released. Sensors decide only when it stands along the next axis.
+//!
 //! While the rotor swings towards the field, its back-EMF adds to the voltage along it. So means of 0.1 s are
 //! taken until two in a row agree to 0.2 %. That takes 0.3 to 4 s, twice per axis.
 
 use super::hold::Hold;
-use super::{ElectricalAngle, Outcome, Phase, Reading, Refusal, Stationary};
+use super::{ElectricalAngle, Outcome, Phase, Reading, Refusal, STRONG_SHARE, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
+use crate::real::min;
 use crate::units::{Ampere, Ohm, Volt};
 
 const RISE_TICKS: u32 = CURRENT_RATE_HZ / 10;
 const MEAN_TICKS: u32 = CURRENT_RATE_HZ / 10;
 /// Period of the dither's saw tooth.
 const DITHER_TICKS: u32 = 16;
-const RELEASE_TICKS: u32 = CURRENT_RATE_HZ / 10;
+/// Time in which the voltage turns to the next axis, and the time after it until the current is judged.
+const TURN_TICKS: u32 = CURRENT_RATE_HZ / 2;
+const TURNED_TICKS: u32 = TURN_TICKS + CURRENT_RATE_HZ / 10;
 const LEVEL_TICKS: u32 = 4 * CURRENT_RATE_HZ;
 /// Greatest relative difference of two means of a settled rotor.
 const SETTLED_SHARE: f32 = 0.002;
@@ -56,15 +63,16 @@ pub(super) struct ResistanceStage {
     sums: Sums,
     /// Sums of the preceding mean.
     before: Option<Sums>,
-    half: Sums,
+    low: Sums,
     found: [f32; 3],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Level {
-    Half,
+    Low,
     Full,
-    Release,
+    /// The voltage turns to the next axis.
+    Turn,
 }
 
 /// Sums over the ticks of one mean.
@@ -78,12 +86,12 @@ impl Default for ResistanceStage {
     fn default() -> Self {
         Self {
             axis: 0,
-            level: Level::Half,
+            level: Level::Low,
             ticks: 0,
             hold: Hold::along(angle_of(AXES[0])),
             sums: Sums::default(),
             before: None,
-            half: Sums::default(),
+            low: Sums::default(),
             found: [0.0; 3],
         }
     }
@@ -99,31 +107,24 @@ fn angle_of(phase: Phase) -> ElectricalAngle {
 
 impl ResistanceStage {
     pub(super) fn tick(&mut self, reading: &Reading<'_>) -> Result<Outcome<(Ohm, Hold)>, Refusal> {
-        let full = reading.bench.settings.current;
+        let low = reading.bench.settings.current;
+        let full = low * STRONG_SHARE;
         let phase = AXES.get(self.axis).copied().unwrap_or(Phase::A);
-        let target = match self.level {
-            Level::Half => full * 0.5,
-            Level::Full => full,
-            Level::Release => Ampere::ZERO,
-        };
+        if self.level == Level::Turn {
+            return self.turn(reading);
+        }
+        let target = if self.level == Level::Low { low } else { full };
         let held = self.hold.tick(reading, target);
         if self.hold.along_axis(reading.current) < full * -JUDGED_SHARE {
             return Err(diagnosis(reading.current, phase));
         }
         held.map_err(|reason| self.without_current(reading, phase, reason))?;
         self.ticks += 1;
-        if self.level == Level::Release {
-            if self.ticks == RELEASE_TICKS {
-                let axis = self.axis + 1;
-                let next = AXES.get(axis).copied().unwrap_or(Phase::A);
-                *self =
-                    Self { axis, found: self.found, hold: Hold::along(angle_of(next)), ..Self::default() };
-            }
-        } else if let Some(settled) = self.settled(reading)? {
+        if let Some(settled) = self.settled(reading)? {
             match self.level {
-                Level::Half => {
-                    self.judge_direction(settled, phase)?;
-                    self.half = settled;
+                Level::Low => {
+                    self.judge_direction(settled.current, phase)?;
+                    self.low = settled;
                     self.level = Level::Full;
                 }
                 _ => {
@@ -131,12 +132,33 @@ impl ResistanceStage {
                     if self.axis + 1 == AXES.len() {
                         return Ok(Outcome::Passed((self.mean()?, self.hold)));
                     }
-                    self.level = Level::Release;
+                    self.level = Level::Turn;
                 }
             }
             (self.ticks, self.before) = (0, None);
         }
         Ok(Outcome::Running(self.hold.voltage_with(self.dither(reading), Volt::ZERO)))
+    }
+
+    #[cfg(test)]
+    pub(super) fn is_after_the_first_axis(&self) -> bool {
+        self.axis > 0
+    }
+
+    /// Turns the voltage to the next axis and judges the current there.
+    fn turn(&mut self, reading: &Reading<'_>) -> Result<Outcome<(Ohm, Hold)>, Refusal> {
+        let [from, to] = [self.axis, self.axis + 1].map(|axis| AXES.get(axis).copied().unwrap_or(Phase::A));
+        self.ticks += 1;
+        let share = min(self.ticks as f32 / TURN_TICKS as f32, 1.0);
+        // Smooth at both ends.
+        let share = share * share * (3.0 - 2.0 * share);
+        let way = angle_of(to).since(angle_of(from)) * share;
+        self.hold.turn_to(angle_of(from).plus(ElectricalAngle::from_turns(way)));
+        if self.ticks == TURNED_TICKS {
+            self.judge_direction(reading.current, to)?;
+            *self = Self { axis: self.axis + 1, found: self.found, hold: self.hold, ..Self::default() };
+        }
+        Ok(Outcome::Running(self.hold.voltage()))
     }
 
     /// Saw tooth of the dither, symmetric about zero.
@@ -164,13 +186,13 @@ impl ResistanceStage {
     }
 
     fn take(&mut self, settled: Sums, full: Ampere) -> Result<(), Refusal> {
-        let (i1, i2) = (self.hold.along_axis(self.half.current).0, self.hold.along_axis(settled.current).0);
+        let (i1, i2) = (self.hold.along_axis(self.low.current).0, self.hold.along_axis(settled.current).0);
         let reached = i2 > 0.95 * MEAN_TICKS as f32 * full.0;
-        if !reached || !(i2 > 1.5 * i1) {
+        if !reached || !(i2 > 1.1 * i1) {
             return Err(Refusal::TimeOut);
         }
         if let Some(found) = self.found.get_mut(self.axis) {
-            *found = (settled.volts - self.half.volts) / (i2 - i1);
+            *found = (settled.volts - self.low.volts) / (i2 - i1);
         }
         Ok(())
     }
@@ -196,10 +218,11 @@ impl ResistanceStage {
         }
     }
 
-    /// Judges the mean at half current: a rotor that swings towards the field bends the current as well.
-    fn judge_direction(&self, half: Sums, phase: Phase) -> Result<(), Refusal> {
-        let (along, across) = (self.hold.along_axis(half.current), self.hold.across_axis(half.current));
-        if across.abs() <= along * GREATEST_BEND { Ok(()) } else { Err(diagnosis(half.current, phase)) }
+    /// Judges a current along the hold's axis, that of `phase`, after the rotor has come to rest: a rotor
+    /// that swings towards the field bends the current as well.
+    fn judge_direction(&self, current: Stationary<Ampere>, phase: Phase) -> Result<(), Refusal> {
+        let (along, across) = (self.hold.along_axis(current), self.hold.across_axis(current));
+        if across.abs() <= along * GREATEST_BEND { Ok(()) } else { Err(diagnosis(current, phase)) }
     }
 }
 
@@ -244,12 +267,12 @@ mod tests {
 
     #[test]
     fn the_dither_spans_one_step_of_the_duty() {
-        use crate::motor::{CalibrationSettings, testing::CONFIGURATION};
-        let settings = CalibrationSettings { current: Ampere(20.0), voltage: Volt(4.0), turns_per_s: 8.0 };
-        let calibrator = super::super::Calibrator::new(&CONFIGURATION, settings).expect("usual");
-        let sample = crate::motor::testing::TestMotor::default().sample();
+        use super::super::tests::SETTINGS;
+        use crate::motor::testing::CONFIGURATION;
+        let calibrator = super::super::Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
         let (bench, bus) = (&calibrator.bench, Volt(48.0));
-        let reading = Reading { bench, sample: &sample, current: Stationary::default(), bus };
+        let track = super::super::Track::default();
+        let reading = Reading { bench, track: &track, is_beyond: false, current: Stationary::default(), bus };
         let at = |ticks| ResistanceStage { ticks, ..ResistanceStage::default() }.dither(&reading).0;
         // 4/3 of one step of the duty: 48 V in 3,500 steps.
         let span = (at(DITHER_TICKS - 1) - at(0)) * DITHER_TICKS as f32 / (DITHER_TICKS - 1) as f32;

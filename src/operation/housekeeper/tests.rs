@@ -158,7 +158,7 @@ fn carried_out(motor: &mut TestMotor, order: Order) -> Outcome {
     let mut stage = AxisState::OFF;
     stage.obey(order);
     let mut sample = motor.sample();
-    for _ in 0..240_000 {
+    for _ in 0..720_000 {
         let (command, event) = stage.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF);
         if let Some((outcome, _)) = event {
             motor.period(AxisCommand::OFF);

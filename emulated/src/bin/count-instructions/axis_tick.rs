@@ -48,7 +48,13 @@ pub fn calibrated(
     configuration: &AxisConfiguration,
     tally: &mut Tally,
 ) -> Option<Calibration> {
-    let settings = CalibrationSettings { current: Ampere(20.0), voltage: Volt(4.0), turns_per_s: 16.0 };
+    let settings = CalibrationSettings {
+        current: Ampere(20.0),
+        voltage: Volt(4.0),
+        turns_per_s: 16.0,
+        travel_turns: 1.25,
+        inertia_kg_m2: 2e-4,
+    };
     let mut calibrator = Calibrator::new(configuration, settings).ok()?;
     let mut sample = motor.sample(None);
     loop {

@@ -10,10 +10,15 @@ use scarab::units::{Ampere, Volt};
 
 use super::motor::{CONFIGURATION, Motor};
 
-const SETTINGS: CalibrationSettings =
-    CalibrationSettings { current: Ampere(10.0), voltage: Volt(2.0), turns_per_s: 10.0 };
-/// Limit in PWM periods; a calibration takes some seconds.
-const LONGEST: u32 = 20 * CURRENT_RATE_HZ;
+const SETTINGS: CalibrationSettings = CalibrationSettings {
+    current: Ampere(10.0),
+    voltage: Volt(2.0),
+    turns_per_s: 10.0,
+    travel_turns: 1.25,
+    inertia_kg_m2: 2e-4,
+};
+/// Limit in PWM periods; a calibration takes some 20 s.
+const LONGEST: u32 = 40 * CURRENT_RATE_HZ;
 
 /// Both axes with their simulated sensors.
 pub struct Axes {

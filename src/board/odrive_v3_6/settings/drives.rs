@@ -20,9 +20,14 @@ pub const BUS: [[Volt; 2]; 2] = [[Volt(20.0), Volt(58.0)], [Volt(12.0), Volt(25.
 pub const CHOPPER: [[Volt; 2]; 2] = [[Volt(50.0), Volt(54.0)], [Volt(25.0), Volt(25.5)]];
 /// Greatest plausible speed of a counter, relative to the joint's limit.
 pub const SPEED_MARGIN: f32 = 2.0;
-/// Current, voltage and speed of a calibration.
-pub const CALIBRATION: CalibrationSettings =
-    CalibrationSettings { current: Ampere(15.0), voltage: Volt(3.0), turns_per_s: 10.0 };
+/// Current, voltage, speed and travel of a calibration, and the inertia of a motor with a gear of 50:1.
+pub const CALIBRATION: CalibrationSettings = CalibrationSettings {
+    current: Ampere(15.0),
+    voltage: Volt(3.0),
+    turns_per_s: 6.0,
+    travel_turns: 1.25,
+    inertia_kg_m2: 1e-3,
+};
 
 /// Index of the board's variant in the tables above, by its divider.
 const fn is_low(divider: f32) -> usize {
@@ -81,6 +86,15 @@ pub fn axis(
         bus: bus(divider),
         greatest_speed: RadianPerSecond(SPEED_MARGIN * motor.ratio * speed.0),
     }
+}
+
+/// Calibrations of a leg's motors in place: the inertia is the largest that the joint moves, seen at the rotor.
+#[must_use]
+pub fn calibrations<const N: usize>(leg: &LegDescription<N>) -> [CalibrationSettings; N] {
+    leg.joints.map(|joint| CalibrationSettings {
+        inertia_kg_m2: joint.inertia.0 / (joint.motor.ratio * joint.motor.ratio),
+        ..CALIBRATION
+    })
 }
 
 /// Configurations of all axes of a leg.

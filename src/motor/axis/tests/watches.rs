@@ -38,6 +38,18 @@ impl Bench {
         })
     }
 
+    /// Turns the motor slowly to an angle, without current.
+    fn turn_to(&mut self, angle: f64) {
+        while (self.motor.angle - angle).abs() > 1e-3 {
+            self.motor.speed = 20.0 * (angle - self.motor.angle).signum();
+            self.tick(ask(0.0));
+        }
+        self.motor.speed = 0.0;
+        for _ in 0..600 {
+            self.tick(ask(0.0));
+        }
+    }
+
     fn settled(speed: f64, current: f32) -> Self {
         let mut bench = Self::at(speed, &CONFIGURATION);
         assert_eq!(bench.until_fault(ask(current), 100, |_| {}), None, "{speed} rad/s, {current} A");
@@ -233,6 +245,8 @@ fn a_code_that_stays_while_its_target_changes_is_detected_in_the_fourth_tick() {
         assert_eq!(bench.axis.fault(), Some(AxisFault::StuckConversion));
         // After a step, the fourth tick shows the fault.
         let mut bench = Bench::settled(0.0, 0.0);
+        // Along phase A the quadrature current flows through both shunts.
+        bench.turn_to(0.0);
         let stuck = bench.sample.shunt_codes[shunt];
         for tick in 0..100 {
             bench.sample.shunt_codes[shunt] = stuck;
