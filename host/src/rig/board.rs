@@ -47,7 +47,8 @@ const CALIBRATION_VOLTAGE_V: [f64; 2] = [3.0, 9.5];
 const HALF_WAVE_S: f64 = 2.0 / CURRENT_RATE_HZ as f64;
 const WAVE_SHARE: f64 = 0.3;
 /// Load on the stand: the rotor alone, kg m^2; bearings, N m; slight drag, N m s/rad.
-const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
+const ROTOR: Load = Load::Free { inertia: ROTOR_INERTIA, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
+const ROTOR_INERTIA: f64 = 1e-4;
 /// Rest before a calibration: half a second.
 const REST_PERIODS: u32 = 12_000;
 /// Limit of a calibration, periods; it takes some seconds.
@@ -78,6 +79,7 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
     CalibrationSettings {
         current: Ampere(current as f32),
         voltage: Volt(voltage as f32),
+        inertia_kg_m2: ROTOR_INERTIA as f32,
         ..drives::CALIBRATION
     }
 }

