@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! AxisSample -> sense -> frames -> current loop -> frames -> modulation -> AxisCommand        24 kHz
-//! Calibrator: offsets -> resistance, wiring -> inductances -> scan of the encoder -> Calibration -> Axis
+//! Calibrator: offsets -> resistance, wiring -> inductances -> scan -> refinement -> Calibration -> Axis
 //! ```
 //!
 //! | part | what it is |

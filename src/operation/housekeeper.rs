@@ -19,7 +19,9 @@ use super::contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
 use super::queues::HousekeepingEnds;
 use super::signals::Signals;
 use crate::hal::{AxisSample, Contacts, Hardware, JointSample};
-use crate::leg::{AxisFault, Calibration, ControlRequest, DriveState, PowerRequest, StoredCalibration};
+use crate::leg::{
+    AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, PowerRequest, StoredCalibration,
+};
 use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator};
 use crate::real::max;
@@ -238,8 +240,10 @@ impl<const N: usize> Housekeeper<N> {
                 let (result, number) = words::calibration(*refusal);
                 level.record(refused(joint, result, number));
                 self.calibrating = None;
-                // The stored calibration does not fit the motor or its mounting: measure again next time.
-                if let Some(stored) = self.stored.get_mut(axis) {
+                // The stored calibration does not fit the motor or its mounting: measure again next time. A
+                // load says nothing about it.
+                let is_load = matches!(refusal, CalibrationRefusal::Load(_) | CalibrationRefusal::Travel);
+                if let Some(stored) = self.stored.get_mut(axis).filter(|_| !is_load) {
                     *stored = None;
                 }
             }

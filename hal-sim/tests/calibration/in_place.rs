@@ -11,7 +11,7 @@ use scarab::units::{Ampere, Volt};
 use crate::offset_error;
 use crate::trial::{TestRandom, Trial};
 
-/// Settings of the board (`drives::CALIBRATION`).
+/// Settings of the board (`drives::CALIBRATION`), with an inertia between those of hip and knee.
 const SETTINGS: CalibrationSettings = CalibrationSettings {
     current: Ampere(15.0),
     voltage: Volt(3.0),

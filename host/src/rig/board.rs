@@ -22,6 +22,7 @@ use scarab::board::odrive_v3_6::settings::analog::HOTTEST_C;
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::hal::{AxisCommand, CURRENT_RATE_HZ, LegDrives};
 use scarab::leg::MotorDescription;
+use scarab::motor::calibration::STRONG_SHARE;
 use scarab::motor::{
     Axis, AxisConfiguration, Calibration, CalibrationSettings, CalibrationStep, Calibrator, Chopper,
     SenseScale,
@@ -71,7 +72,7 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
 #[must_use]
 pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile) -> CalibrationSettings {
     let [usual, most] = CALIBRATION_VOLTAGE_V;
-    let limit = f64::from(configuration.current_limit.0);
+    let limit = f64::from(configuration.current_limit.0 / STRONG_SHARE);
     let current = CALIBRATION_CURRENT_A.min(limit).min(0.7 * most / motor.resistance_ohm);
     let inductance = 1e-6 * motor.inductance_d_uh.max(motor.inductance_q_uh);
     let wave = WAVE_SHARE * current * inductance / HALF_WAVE_S;
@@ -80,6 +81,7 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
         current: Ampere(current as f32),
         voltage: Volt(voltage as f32),
         inertia_kg_m2: ROTOR_INERTIA as f32,
+        travel_turns: drives::travel_turns(configuration.pole_pairs),
         ..drives::CALIBRATION
     }
 }

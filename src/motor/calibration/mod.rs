@@ -68,7 +68,7 @@ use super::{
     SenseScale, Stationary,
 };
 use crate::hal::{AxisCommand, AxisSample};
-use crate::real::min;
+use crate::real::{min, sqrt};
 use crate::units::{Ampere, Hertz, Ohm, Volt, Weber};
 use current_offsets::CurrentOffsets;
 pub use found::{Calibration, EncoderSetting, StoredCalibration};
@@ -77,6 +77,7 @@ use inductance::{InductanceStage, Inductances, SeenInductances};
 use refine::{QUADRATURE_SHARE, Refine, Refined};
 pub use refusal::{Phase, Refusal};
 use resistance::ResistanceStage;
+pub use scan::ALIGNMENT_TURNS;
 use scan::Scan;
 pub(super) use track::INDEX_WIDTH;
 use track::Track;
@@ -84,11 +85,12 @@ use track::Track;
 /// Limits of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrationSettings {
-    /// Current that holds and turns the rotor; must overcome friction and cogging several times.
+    /// Current for which loads are permitted up to 0.6 of the torque that it holds. Stages use up to 1.25
+    /// of it along the field, the refinement 1.6 of it across the flux.
     pub current: Ampere,
     /// Longest voltage vector while the motor's constants are unknown.
     pub voltage: Volt,
-    /// Speed of the scan's field, electrical turns per second, 0.5..=20.
+    /// Speed of the scan's field and of the refinement's motions, electrical turns per second, 0.5..=20.
     pub turns_per_s: f32,
     /// Greatest travel of the rotor from where it began, motor turns, at most 2. The index is passed for
     /// certain with a turn and 1.4 electrical turns.
@@ -227,13 +229,15 @@ impl Calibrator {
     /// # Errors Names the invalid part of the configuration; invalid settings give [`AxisError::Current`].
     pub fn new(configuration: &AxisConfiguration, settings: CalibrationSettings) -> Result<Self, AxisError> {
         configuration.check()?;
+        let pairs = f32::from(configuration.pole_pairs);
         let sensible = settings.current.0 > 0.0
-            && settings.current <= configuration.current_limit
+            && settings.current * STRONG_SHARE <= configuration.current_limit
             && settings.voltage.0 > 0.0
             && settings.voltage.0 < 0.5 * configuration.bus[0].0
             && (0.5..=20.0).contains(&settings.turns_per_s)
             && settings.current.0 * LONGEST_SHARE < configuration.overcurrent.0
-            && settings.travel_turns * f32::from(configuration.pole_pairs) >= LEAST_TRAVEL_TURNS
+            && settings.travel_turns * pairs >= LEAST_TRAVEL_TURNS
+            && (!configuration.index || settings.travel_turns * pairs >= pairs + ALIGNMENT_TURNS)
             && settings.travel_turns <= 2.0
             && (1e-6..=10.0).contains(&settings.inertia_kg_m2);
         if !sensible {
@@ -251,7 +255,7 @@ impl Calibrator {
             bus_codes: configuration.bus_codes(),
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
             flux: configuration.flux,
-            quadrature_a: min(settings.current.0 * QUADRATURE_SHARE, configuration.current_limit.0),
+            quadrature_a: min(QUADRATURE_SHARE * settings.current.0, across(configuration, settings.current)),
         };
         Ok(Self {
             bench,
@@ -404,6 +408,10 @@ impl Calibrator {
 
     /// The calibration, or what contradicts the stored one.
     fn passed(&self, found: &Refined, sample: &AxisSample) -> Result<Calibration, Refusal> {
+        // Counts were lost after the scan.
+        if self.track.index_distance.is_some() {
+            return Err(Refusal::IndexMoved);
+        }
         let Inductances { direct, quadrature } = found.inductances;
         self.agrees(|stored| (stored.direct_inductance.0, direct.0), INDUCTANCE_SHARE)?;
         self.agrees(|stored| (stored.quadrature_inductance.0, quadrature.0), INDUCTANCE_SHARE)?;
@@ -430,8 +438,14 @@ impl Calibrator {
     }
 }
 
+/// Current across that the axis' limit leaves beside this one, A.
+fn across(configuration: &AxisConfiguration, along: Ampere) -> f32 {
+    let limit = configuration.current_limit.0;
+    sqrt(limit * limit - along.0 * along.0)
+}
+
 /// Current that holds and drags the rotor, over the calibration's.
-const STRONG_SHARE: f32 = 1.25;
+pub const STRONG_SHARE: f32 = 1.25;
 /// Greatest difference of measured and stored offset, electrical turns.
 const GREATEST_STORED_ERROR: f32 = 5.0 / 360.0;
 /// Longest current vector of the refinement over the calibration's current, with a margin: the direct

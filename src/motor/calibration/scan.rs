@@ -49,12 +49,12 @@ const REST_TICKS: u32 = CURRENT_RATE_HZ / 5;
 const RUN_IN_TURNS: [f32; 2] = [0.25, 1.0];
 /// Travel kept for the first alignment (half a turn), the turn from axis C to A (two thirds) and lag,
 /// electrical turns.
-const ALIGNMENT_TURNS: f32 = 1.4;
+pub const ALIGNMENT_TURNS: f32 = 1.4;
 /// Greatest error of the forward travel, electrical turns. A load that changes on the way makes up to 0.15.
 const GREATEST_TRAVEL_ERROR: f32 = 0.2;
 /// Turns of the field are equal to one part in so many where only the counts are wrong.
 const STEADY_SHARE: i32 = 8;
-/// From here on other counts per turn are named if the refinement fails at the path's end.
+/// Above this error, a refinement that fails at the path's end names other counts per turn.
 const DOUBTFUL_TRAVEL_ERROR: f32 = 0.1;
 /// Lower bound of the error by wrong pole pairs, electrical turns: p and p + 1 differ by p / (p + 1).
 const LEAST_MISTAKE: f32 = 0.4;
@@ -164,7 +164,9 @@ impl Scan {
             self.followed.push(&bench.scale, reading.track.way, self.field(), turns);
         }
         if reading.is_beyond {
-            self.judge(reading, steady.unwrap_or(turned))?;
+            if let Some(turns) = steady {
+                self.judge(reading, turns)?;
+            }
             return Err(Refusal::Travel);
         }
         if way.ended(turned) {

@@ -4,9 +4,9 @@ use super::{Bench, Refusal};
 use crate::hal::AxisSample;
 use crate::motor::{CountScale, ElectricalAngle};
 
-/// Greatest change of the deviation of a rotor that follows, electrical turns. Lightly damped rotors swing
-/// by up to 39 degrees (100 simulated motors), salient ones that hardly hold by 65. A leg that hangs at the
-/// path's beginning changes it by 60, and after a reversal friction holds the rotor at first.
+/// Greatest change of the deviation of a rotor that follows, electrical turns: beyond 108 degrees from the
+/// first one the field no longer holds it. Lightly damped rotors swing by up to 39 degrees (100 simulated
+/// motors), salient ones that hardly hold by 65; a load that grows on the way adds to that.
 const GREATEST_UNEVENNESS: f32 = 0.3;
 /// Counts between index pulses captured from either side.
 pub(in crate::motor) const INDEX_WIDTH: i32 = 4;

@@ -5,7 +5,9 @@
 
 use super::analog;
 use crate::leg::{DeratingRamps, LegDescription, MotorDescription};
+use crate::motor::calibration::ALIGNMENT_TURNS;
 use crate::motor::{AxisConfiguration, BridgeTiming, CalibrationSettings, DeadTime, Direction};
+use crate::real::max;
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt};
 
 /// Bandwidth of the current loops.
@@ -20,7 +22,7 @@ pub const BUS: [[Volt; 2]; 2] = [[Volt(20.0), Volt(58.0)], [Volt(12.0), Volt(25.
 pub const CHOPPER: [[Volt; 2]; 2] = [[Volt(50.0), Volt(54.0)], [Volt(25.0), Volt(25.5)]];
 /// Greatest plausible speed of a counter, relative to the joint's limit.
 pub const SPEED_MARGIN: f32 = 2.0;
-/// Current, voltage, speed and travel of a calibration, and the inertia of a motor with a gear of 50:1.
+/// Current, voltage, speed and travel of a calibration; each joint has its own inertia ([`calibrations`]).
 pub const CALIBRATION: CalibrationSettings = CalibrationSettings {
     current: Ampere(15.0),
     voltage: Volt(3.0),
@@ -88,12 +90,19 @@ pub fn axis(
     }
 }
 
+/// Permitted travel of a calibration, motor turns: 1.25, and more where few pole pairs would miss the index.
+#[must_use]
+pub fn travel_turns(pole_pairs: u8) -> f32 {
+    max(CALIBRATION.travel_turns, 1.01 + ALIGNMENT_TURNS / f32::from(pole_pairs.max(1)))
+}
+
 /// Calibrations of a leg's motors in place: the inertia is the largest that the joint moves, seen at the
 /// rotor.
 #[must_use]
 pub fn calibrations<const N: usize>(leg: &LegDescription<N>) -> [CalibrationSettings; N] {
     leg.joints.map(|joint| CalibrationSettings {
         inertia_kg_m2: joint.inertia.0 / (joint.motor.ratio * joint.motor.ratio),
+        travel_turns: travel_turns(joint.motor.pole_pairs),
         ..CALIBRATION
     })
 }
