@@ -171,7 +171,10 @@ fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSe
     for joint in leg.joints.iter().take(N) {
         let motor = joint.motor.as_ref().ok_or_else(unfit)?;
         let configuration = axis_configuration(joint, motor);
-        parts.push((configuration, calibration_settings(&configuration, motor)));
+        // These motors carry gear and leg.
+        let inertia_kg_m2 = drives::CALIBRATION.inertia_kg_m2;
+        let settings = CalibrationSettings { inertia_kg_m2, ..calibration_settings(&configuration, motor) };
+        parts.push((configuration, settings));
     }
     let parts: [_; N] = parts.try_into().map_err(|_| unfit())?;
     Ok(HousekeepingSettings {
