@@ -57,6 +57,11 @@ def is_up(joints, longest_s):
     return True
 
 
+def is_enabled(joints):
+    """Whether the leg is enabled."""
+    return all(joint.read(0x6041, 0, "<H") & 0x806F == 0x27 for joint in joints)
+
+
 def off(joints):
     """Resets faults and sends controlword 0."""
     for joint in joints:
@@ -188,9 +193,9 @@ def main():
             arrive(leg.joints, limits, where)
             continue
         # A busy machine delays answers by seconds; a leg that is silent stays silent.
-        holds(lambda: reason(leg.joints) or all(joint.state() == 0x27 for joint in leg.joints), ANSWER_WITHIN_S)
+        holds(lambda: reason(leg.joints) or is_enabled(leg.joints), ANSWER_WITHIN_S)
         why = reason(leg.joints)
-        if not why and all(joint.state() == 0x27 for joint in leg.joints):
+        if not why and is_enabled(leg.joints):
             arrive(leg.joints, limits, where)
             continue
         states = ", ".join(f"{joint.read(0x6041, 0, '<H'):04X}" for joint in leg.joints)

@@ -38,18 +38,14 @@ const fn injected(
     Row { id, fault, deadline_s, run: Run::Injected(injected) }
 }
 
-/// A row of one injection with changes after the injection.
-const fn changing(
-    id: &'static str,
-    fault: &'static str,
-    deadline_s: f64,
-    situation: Situation,
-    expected: Expected,
-    inject: Inject,
-    later: Later,
-) -> Row {
-    let injected = Injected { situation, expected, inject, later: Some(later) };
-    Row { id, fault, deadline_s, run: Run::Injected(injected) }
+impl Row {
+    /// Adds changes after the injection.
+    const fn changing(mut self, later: Later) -> Self {
+        if let Run::Injected(injected) = &mut self.run {
+            injected.later = Some(later);
+        }
+        self
+    }
 }
 
 /// A row with a run of its own.
@@ -71,21 +67,21 @@ pub(super) const ROWS: &[Row] = &[
             chip.plant.axes[axis].encoder_fault.frozen = Some(position);
         },
     ),
-    changing(
+    injected(
         "E2",
         "single jump of the counter",
         0.0,
         Situation::Motion,
         Expected::Nothing,
         |chip, random| chip.plant.axes[axis(random)].encoder_fault.added = 3000,
-        |session, since, _| {
-            if since >= STEP {
-                let axes = &mut session.machine.chip_mut().plant.axes;
-                axes.iter_mut().for_each(|axis| axis.encoder_fault.added = 0);
-            }
-            since < STEP
-        },
-    ),
+    )
+    .changing(|session, since, _| {
+        if since >= STEP {
+            let axes = &mut session.machine.chip_mut().plant.axes;
+            axes.iter_mut().for_each(|axis| axis.encoder_fault.added = 0);
+        }
+        since < STEP
+    }),
     own("E3", "16-bit counters wrap in calibration and motion", 0.0, wiring::wraps),
     injected("E4", "counts lost in motion", 0.5, Situation::Motion, Expected::Shorted, |chip, random| {
         chip.plant.axes[axis(random)].encoder_fault.added = 150
@@ -165,34 +161,32 @@ pub(super) const ROWS: &[Row] = &[
     injected("X1", "emergency stop", PERIOD_S, Situation::Motion, Expected::Released, |chip, _| {
         chip.set_pin(STOP, false)
     }),
-    changing(
+    injected(
         "X2",
         "emergency stop that bounces for 20 ms and closes",
         PERIOD_S,
         Situation::Rest,
         Expected::Released,
         |chip, _| chip.set_pin(STOP, false),
-        |session, since, count| {
-            let bounces = since < ticks(20e-3);
-            session.machine.chip_mut().set_pin(STOP, !bounces || count % 7 < 3);
-            bounces
-        },
-    ),
-    Row {
-        id: "X3",
-        fault: "supply cut in motion, then back: starts off",
-        deadline_s: 2.0 * PERIOD_S,
-        run: Run::Injected(Injected {
-            situation: Situation::Motion,
-            expected: Expected::Released,
-            // The cut itself comes a period after the beginning.
-            inject: |_, _| {},
-            later: Some(|session, _, _| {
-                session.machine.power_cycle();
-                false
-            }),
-        }),
-    },
+    )
+    .changing(|session, since, count| {
+        let bounces = since < ticks(20e-3);
+        session.machine.chip_mut().set_pin(STOP, !bounces || count % 7 < 3);
+        bounces
+    }),
+    injected(
+        "X3",
+        "supply cut in motion, then back: starts off",
+        2.0 * PERIOD_S,
+        Situation::Motion,
+        Expected::Released,
+        // The cut itself comes a period after the beginning.
+        |_, _| {},
+    )
+    .changing(|session, _, _| {
+        session.machine.power_cycle();
+        false
+    }),
     injected(
         "K1",
         "3 to 12 current ticks of an axis missing in a row",
@@ -216,33 +210,26 @@ pub(super) const ROWS: &[Row] = &[
             chip.lost_triggers[axis(random)] = lost;
         },
     ),
-    changing(
+    injected(
         "K1",
         "all current ticks held up for 8 periods",
         1e-3,
         Situation::Motion,
         Expected::Released,
         |_, _| {},
-        |session, since, _| {
-            let held_up = since < 9 * STEP;
-            session.machine.hang(held_up.then_some(CURRENT));
-            held_up
-        },
-    ),
+    )
+    .changing(|session, since, _| {
+        let held_up = since < 9 * STEP;
+        session.machine.hang(held_up.then_some(CURRENT));
+        held_up
+    }),
     own("K1", "one current tick missing: counted, no reaction", 0.0, search::counted),
     own("K2", "search without end, unread records, full wire", JITTER_S, search::starves),
-    changing(
-        "K3",
-        "servo hangs",
-        4e-3 + 512.0 / 32e3,
-        Situation::Motion,
-        Expected::Released,
-        |_, _| {},
-        |session, _, _| {
+    injected("K3", "servo hangs", 4e-3 + 512.0 / 32e3, Situation::Motion, Expected::Released, |_, _| {})
+        .changing(|session, _, _| {
             session.machine.hang(Some(SERVO));
             false
-        },
-    ),
+        }),
     own("B1", "host's heartbeat or targets end", 3.0 * SERVO_S + PERIOD_S, bus::lost),
     injected(
         "B2",

@@ -6,7 +6,7 @@ use core::f64::consts::{PI, TAU};
 
 use hal_sim::drive::stand::{Geared, Load};
 use scarab::motor::{CalibrationSettings, Refusal};
-use scarab::units::{Ampere, Volt};
+use scarab::units::{Ampere, KilogramMetreSquared, Volt};
 
 use crate::offset_error;
 use crate::trial::{TestRandom, Trial};
@@ -17,7 +17,7 @@ const SETTINGS: CalibrationSettings = CalibrationSettings {
     voltage: Volt(3.0),
     turns_per_s: 6.0,
     travel_turns: 1.25,
-    inertia_kg_m2: 1e-3,
+    inertia: KilogramMetreSquared(1e-3),
 };
 
 /// A motor like those of the default leg, with gear and leg. `load` is gravity's torque at the start as a

@@ -14,7 +14,7 @@ use scarab::motor::{
     AxisConfiguration, BridgeTiming, Calibration, CalibrationSettings, CalibrationStep, Calibrator, DeadTime,
     Direction, Refusal, SenseScale, StoredCalibration,
 };
-use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
+use scarab::units::{Ampere, Hertz, KilogramMetreSquared, RadianPerSecond, Volt, Weber};
 
 #[derive(Debug)]
 pub struct Trial {
@@ -130,7 +130,7 @@ impl Trial {
                 voltage: Volt(9.0),
                 turns_per_s: 12.0,
                 travel_turns: 2.0,
-                inertia_kg_m2: inertia as f32,
+                inertia: KilogramMetreSquared(inertia as f32),
             },
         }
     }

@@ -11,7 +11,7 @@ use hal_sim::drive::description::{
     SHIFT_QUARTERS, ShuntDescription, SupplyDescription, Wiring,
 };
 use hal_sim::drive::motor::{Direction, Motor, Terminal};
-use hal_sim::drive::stand::{Load, Stand};
+use hal_sim::drive::stand::{Geared, Load, Stand};
 use hal_sim::world::World;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -499,4 +499,43 @@ fn a_coasting_leg_swings_as_with_ideal_drives_off() {
         assert!((one - two).abs() < 1e-5, "{one} {two}");
     }
     assert!((ideal.anatomical_position()[0] - 1.2).abs() > 0.1, "it swings");
+}
+
+/// Period of a leg of 2 kg m^2 and 40 N m that swings freely behind a gear with this backlash, s.
+fn swing(backlash: f64) -> f64 {
+    let leg = Geared {
+        rotor_inertia: 1e-3,
+        rotor_coulomb: 0.0,
+        rotor_viscous: 0.0,
+        ratio: 50.0,
+        backlash,
+        inertia: 2.0,
+        coulomb: 0.0,
+        viscous: 0.0,
+        gravity: 40.0,
+        start: 0.02,
+        supported_s: 0.0,
+    };
+    let supply = SupplyDescription::default();
+    let mut stand = Stand::new(&axis(), &supply, Load::Geared(leg), 0.3, 1);
+    let mut crossings = Vec::new();
+    let mut before = leg.start;
+    for period in 0..120_000 {
+        stand.period(&AxisCommand::OFF, 0.0);
+        let angle = leg.start + stand.joint().angle;
+        if before > 0.0 && angle <= 0.0 {
+            crossings.push(f64::from(period) * PERIOD_S);
+        }
+        before = angle;
+    }
+    (crossings[1] - crossings[0]).max(crossings[2] - crossings[1])
+}
+
+#[test]
+fn a_leg_behind_a_gear_swings_with_the_rotor_and_within_the_backlash_without_it() {
+    let period = |inertia: f64| TAU * (inertia / 40.0).sqrt();
+    // The rotor counts with the square of the ratio: 2.5 kg m^2.
+    assert!((swing(0.0) / period(2.0 + 2.5) - 1.0).abs() < 2e-3, "{}", swing(0.0));
+    // Half of the backlash is more than the swing's whole width.
+    assert!((swing(0.1) / period(2.0) - 1.0).abs() < 2e-3, "{}", swing(0.1));
 }

@@ -28,7 +28,7 @@ use scarab::motor::{
     SenseScale,
 };
 use scarab::operation::HousekeepingSettings;
-use scarab::units::{Ampere, RadianPerSecond, Volt, Weber};
+use scarab::units::{Ampere, KilogramMetreSquared, RadianPerSecond, Volt, Weber};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::{JointFile, LegFile, MotorFile};
@@ -80,7 +80,7 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
     CalibrationSettings {
         current: Ampere(current as f32),
         voltage: Volt(voltage as f32),
-        inertia_kg_m2: ROTOR_INERTIA as f32,
+        inertia: KilogramMetreSquared(ROTOR_INERTIA as f32),
         travel_turns: drives::travel_turns(configuration.pole_pairs),
         ..drives::CALIBRATION
     }
@@ -172,8 +172,8 @@ fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSe
         let motor = joint.motor.as_ref().ok_or_else(unfit)?;
         let configuration = axis_configuration(joint, motor);
         // These motors carry gear and leg.
-        let inertia_kg_m2 = drives::CALIBRATION.inertia_kg_m2;
-        let settings = CalibrationSettings { inertia_kg_m2, ..calibration_settings(&configuration, motor) };
+        let inertia = drives::CALIBRATION.inertia;
+        let settings = CalibrationSettings { inertia, ..calibration_settings(&configuration, motor) };
         parts.push((configuration, settings));
     }
     let parts: [_; N] = parts.try_into().map_err(|_| unfit())?;

@@ -73,8 +73,8 @@ fn the_axes_of_the_board_are_those_of_the_simulated_drive() {
         assert_eq!(AxisConfiguration { greatest_speed, ..axis }, simulated, "{}", joint.name);
         axis.check().expect("sensible");
         // The board's motors carry gear and leg.
-        let CalibrationSettings { inertia_kg_m2, .. } = drives::CALIBRATION;
-        let settings = CalibrationSettings { inertia_kg_m2, ..calibration_settings(&axis, motor) };
+        let CalibrationSettings { inertia, .. } = drives::CALIBRATION;
+        let settings = CalibrationSettings { inertia, ..calibration_settings(&axis, motor) };
         assert_eq!(drives::CALIBRATION, settings);
     }
     assert_eq!(drives::chopper(19.0), BRAKE);

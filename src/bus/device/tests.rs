@@ -478,7 +478,7 @@ fn a_refusal_of_one_tick_is_reported_after_the_bus_was_busy() {
     for node in [0x201, 0x202] {
         bench.device.receive(&Frame::new(node, &[15, 0]), bench.now_us, None, &NOTHING);
     }
-    // The joint comes to rest at once, and every mailbox is occupied meanwhile.
+    // The joint comes to rest at once, while every mailbox is occupied.
     (0..4).for_each(|_| bench.tick());
     let sent: Vec<Frame> = bench.run(1).into_iter().filter(|frame| frame.id() & !3 == 0x80).collect();
     let begin = [0x0E, 0xFF, 0x81, 1, 21, 0, 0, 0];

@@ -69,7 +69,7 @@ use super::{
 };
 use crate::hal::{AxisCommand, AxisSample};
 use crate::real::{min, sqrt};
-use crate::units::{Ampere, Hertz, Ohm, Volt, Weber};
+use crate::units::{Ampere, Hertz, KilogramMetreSquared, Ohm, Volt, Weber};
 use current_offsets::CurrentOffsets;
 pub use found::{Calibration, EncoderSetting, StoredCalibration};
 use hold::Hold;
@@ -95,8 +95,8 @@ pub struct CalibrationSettings {
     /// Greatest travel of the rotor from where it began, motor turns, at most 2. The index is passed for
     /// certain with a turn and 1.4 electrical turns.
     pub travel_turns: f32,
-    /// Inertia that the motor turns, at the rotor, kg m^2: rotor, gear and leg. Within a factor of three.
-    pub inertia_kg_m2: f32,
+    /// Inertia that the motor turns, at the rotor: rotor, gear and leg. Within a factor of three.
+    pub inertia: KilogramMetreSquared,
 }
 
 /// Result of one calibration tick.
@@ -239,7 +239,7 @@ impl Calibrator {
             && settings.travel_turns * pairs >= LEAST_TRAVEL_TURNS
             && (!configuration.index || settings.travel_turns * pairs >= pairs + ALIGNMENT_TURNS)
             && settings.travel_turns <= 2.0
-            && (1e-6..=10.0).contains(&settings.inertia_kg_m2);
+            && (1e-6..=10.0).contains(&settings.inertia.0);
         if !sensible {
             return Err(AxisError::Current);
         }

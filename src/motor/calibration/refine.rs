@@ -159,7 +159,7 @@ impl Refine {
     pub(super) fn new(bench: &Bench, current: FieldCurrent, scan: ScanResult) -> Self {
         let holding = bench.settings.current.0;
         let pairs = f32::from(bench.pole_pairs);
-        let gain = 1.5 * pairs * pairs * bench.flux.0 / bench.settings.inertia_kg_m2;
+        let gain = 1.5 * pairs * pairs * bench.flux.0 / bench.settings.inertia.0;
         let frequency = min(sqrt(2.0 * gain * holding), GREATEST_FREQUENCY);
         let stiffness = frequency * frequency / gain;
         let rotor = bench.angle(scan.way).plus(scan.offset);
@@ -182,6 +182,12 @@ impl Refine {
             work: [[Work::default(); 2]; 2],
             friction: STRONG_SHARE * holding * scan.lag.rotation().sine,
         }
+    }
+
+    /// Number of the present action.
+    #[cfg(test)]
+    pub(super) fn number(&self) -> usize {
+        self.action
     }
 
     /// The present action; `None` when the current falls at the end.

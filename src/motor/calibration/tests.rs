@@ -11,20 +11,19 @@ pub(crate) const SETTINGS: CalibrationSettings = CalibrationSettings {
     voltage: Volt(4.0),
     turns_per_s: 8.0,
     travel_turns: 1.25,
-    inertia_kg_m2: 2e-4,
+    inertia: KilogramMetreSquared(2e-4),
 };
 
-/// Runs a calibration to its end and checks that quadrature torque never runs the rotor away. `inject` can
-/// change every sample, by its number.
-fn run_with(
+/// Runs a calibration to its end. `change` can change the motor, and every sample before its tick.
+fn run_changing(
     motor: &mut TestMotor,
     mut calibrator: Calibrator,
-    mut inject: impl FnMut(&mut AxisSample, u32),
+    mut change: impl FnMut(&Calibrator, &mut TestMotor, &mut AxisSample),
 ) -> Result<Calibration, Refusal> {
     let mut sample = motor.sample();
     // At most thirty seconds.
-    for tick in 0..720_000 {
-        inject(&mut sample, tick);
+    for _ in 0..720_000 {
+        change(&calibrator, motor, &mut sample);
         let command = match calibrator.tick(&sample) {
             CalibrationStep::Running(command) => command,
             CalibrationStep::Done(calibration) => return Ok(calibration),
@@ -33,6 +32,19 @@ fn run_with(
         sample = motor.period(command);
     }
     panic!("no end");
+}
+
+/// Runs a calibration to its end. `inject` can change every sample, by its number.
+fn run_with(
+    motor: &mut TestMotor,
+    calibrator: Calibrator,
+    mut inject: impl FnMut(&mut AxisSample, u32),
+) -> Result<Calibration, Refusal> {
+    let mut tick = 0;
+    run_changing(motor, calibrator, |_, _, sample| {
+        inject(sample, tick);
+        tick += 1;
+    })
 }
 
 fn run(motor: &mut TestMotor, calibrator: Calibrator) -> Result<Calibration, Refusal> {
@@ -76,20 +88,13 @@ fn a_load_does_not_shift_the_offset_and_is_refused_where_it_is_too_large() {
     // The current of 20 A holds 0.61 N m.
     for (load, permitted) in [(0.0, true), (0.3, true), (-0.35, true), (0.45, false), (-0.45, false)] {
         let mut motor = TestMotor { coulomb: 0.05, angle: 1.0, ..TestMotor::default() };
-        let mut calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
-        let mut sample = motor.sample();
-        let result = loop {
-            let command = match calibrator.tick(&sample) {
-                CalibrationStep::Running(command) => command,
-                CalibrationStep::Done(calibration) => break Ok(calibration),
-                CalibrationStep::Refused(reason) => break Err(reason),
-            };
+        let calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
+        let result = run_changing(&mut motor, calibrator, |calibrator, motor, _| {
             // A hand bears the load until the current does.
             let holds = matches!(&calibrator.stage, Stage::Resistance(stage) if stage.is_after_the_first_axis())
                 || matches!(calibrator.stage, Stage::Inductance(_) | Stage::Scan(_) | Stage::Refine(_));
             motor.load = if holds { load } else { 0.0 };
-            sample = motor.period(command);
-        };
+        });
         match result {
             Ok(found) => {
                 let error = offset_error_deg(&mut motor, &CONFIGURATION, &found);
@@ -100,6 +105,31 @@ fn a_load_does_not_shift_the_offset_and_is_refused_where_it_is_too_large() {
                 assert!(!permitted && matches!(reason, Refusal::Load(70..=76)), "{load}: {reason:?}")
             }
         }
+    }
+}
+
+#[test]
+fn counts_lost_and_a_counter_that_freezes_during_the_refinement_are_refused() {
+    let calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
+    // A hundred counts, 31 electrical degrees: less than the position loop notices. The index shows them.
+    let result = run_changing(&mut TestMotor::default(), calibrator, |calibrator, _, sample| {
+        if matches!(&calibrator.stage, Stage::Refine(stage) if stage.number() >= 3) {
+            sample.encoder_count = sample.encoder_count.wrapping_add(100);
+            sample.index_count = sample.index_count.map(|count| count.wrapping_add(100));
+        }
+    });
+    assert_eq!(result, Err(Refusal::IndexMoved));
+    // On the way home, action 21, it freezes half an electrical turn before.
+    for (first, near) in [(8, f32::INFINITY), (21, f32::INFINITY), (21, 0.5)] {
+        let mut frozen = None;
+        let result = run_changing(&mut TestMotor::default(), calibrator, |calibrator, _, sample| {
+            let is_near = calibrator.bench.electrical(calibrator.track.way).abs() < near;
+            if matches!(&calibrator.stage, Stage::Refine(stage) if stage.number() >= first && is_near) {
+                sample.encoder_count = *frozen.get_or_insert(sample.encoder_count);
+                sample.index_count = None;
+            }
+        });
+        assert_eq!(result, Err(Refusal::Slipped), "from action {first}");
     }
 }
 
@@ -342,6 +372,16 @@ fn settings_that_ask_for_too_much_are_refused() {
     };
     // The axis allows 40 A.
     assert_eq!(refused(|s| s.current.0 = 40.5), AxisError::Current);
+    // A quarter more flows along the field.
+    assert_eq!(refused(|s| s.current.0 = 32.5), AxisError::Current);
+    assert_eq!(refused(|s| s.inertia.0 = 0.0), AxisError::Current);
+    // With 7 pole pairs the index needs 1.2 turns.
+    assert_eq!(refused(|s| s.travel_turns = 1.19), AxisError::Current);
+    assert_eq!(refused(|s| s.travel_turns = 2.1), AxisError::Current);
+    let without_index = AxisConfiguration { index: false, ..CONFIGURATION };
+    let travels = |travel_turns| CalibrationSettings { travel_turns, ..SETTINGS };
+    assert!(Calibrator::new(&without_index, travels(0.5)).is_ok());
+    assert!(Calibrator::new(&without_index, travels(0.45)).is_err());
     assert_eq!(refused(|s| s.current.0 = f32::NAN), AxisError::Current);
     assert_eq!(refused(|s| s.voltage.0 = 30.0), AxisError::Current);
     assert_eq!(refused(|s| s.turns_per_s = 0.0), AxisError::Current);

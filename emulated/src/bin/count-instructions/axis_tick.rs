@@ -7,7 +7,7 @@ use scarab::hal::{AxisCommand, AxisSample};
 use scarab::motor::{
     Axis, AxisConfiguration, AxisRequest, Calibration, CalibrationSettings, CalibrationStep, Calibrator,
 };
-use scarab::units::{Ampere, Volt};
+use scarab::units::{Ampere, KilogramMetreSquared, Volt};
 
 use crate::axis_parts;
 use crate::counter::{Tally, count, heading};
@@ -53,7 +53,7 @@ pub fn calibrated(
         voltage: Volt(4.0),
         turns_per_s: 16.0,
         travel_turns: 1.25,
-        inertia_kg_m2: 2e-4,
+        inertia: KilogramMetreSquared(2e-4),
     };
     let mut calibrator = Calibrator::new(configuration, settings).ok()?;
     let mut sample = motor.sample(None);

@@ -6,7 +6,7 @@
 use scarab::hal::{AxisSample, CURRENT_RATE_HZ};
 use scarab::motor::{Axis, AxisRequest, CalibrationSettings, CalibrationStep, Calibrator};
 use scarab::task::leg::JOINTS;
-use scarab::units::{Ampere, Volt};
+use scarab::units::{Ampere, KilogramMetreSquared, Volt};
 
 use super::motor::{CONFIGURATION, Motor};
 
@@ -15,7 +15,7 @@ const SETTINGS: CalibrationSettings = CalibrationSettings {
     voltage: Volt(2.0),
     turns_per_s: 10.0,
     travel_turns: 1.25,
-    inertia_kg_m2: 2e-4,
+    inertia: KilogramMetreSquared(2e-4),
 };
 /// Limit in PWM periods; a calibration takes some 20 s.
 const LONGEST: u32 = 40 * CURRENT_RATE_HZ;

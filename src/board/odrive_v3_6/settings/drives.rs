@@ -8,7 +8,7 @@ use crate::leg::{DeratingRamps, LegDescription, MotorDescription};
 use crate::motor::calibration::ALIGNMENT_TURNS;
 use crate::motor::{AxisConfiguration, BridgeTiming, CalibrationSettings, DeadTime, Direction};
 use crate::real::max;
-use crate::units::{Ampere, Hertz, RadianPerSecond, Volt};
+use crate::units::{Ampere, Hertz, KilogramMetreSquared, RadianPerSecond, Volt};
 
 /// Bandwidth of the current loops.
 pub const BANDWIDTH: Hertz = Hertz(1000.0);
@@ -22,13 +22,14 @@ pub const BUS: [[Volt; 2]; 2] = [[Volt(20.0), Volt(58.0)], [Volt(12.0), Volt(25.
 pub const CHOPPER: [[Volt; 2]; 2] = [[Volt(50.0), Volt(54.0)], [Volt(25.0), Volt(25.5)]];
 /// Greatest plausible speed of a counter, relative to the joint's limit.
 pub const SPEED_MARGIN: f32 = 2.0;
-/// Current, voltage, speed and travel of a calibration; each joint has its own inertia ([`calibrations`]).
+/// Current, voltage, speed and travel of a calibration. The inertia lies between those of the default leg's
+/// hip (2.1e-3) and knee (0.9e-3); the image takes each joint's own ([`calibrations`]).
 pub const CALIBRATION: CalibrationSettings = CalibrationSettings {
     current: Ampere(15.0),
     voltage: Volt(3.0),
     turns_per_s: 6.0,
     travel_turns: 1.25,
-    inertia_kg_m2: 1e-3,
+    inertia: KilogramMetreSquared(1e-3),
 };
 
 /// Index of the board's variant in the tables above, by its divider.
@@ -101,7 +102,7 @@ pub fn travel_turns(pole_pairs: u8) -> f32 {
 #[must_use]
 pub fn calibrations<const N: usize>(leg: &LegDescription<N>) -> [CalibrationSettings; N] {
     leg.joints.map(|joint| CalibrationSettings {
-        inertia_kg_m2: joint.inertia.0 / (joint.motor.ratio * joint.motor.ratio),
+        inertia: KilogramMetreSquared(joint.inertia.0 / (joint.motor.ratio * joint.motor.ratio)),
         travel_turns: travel_turns(joint.motor.pole_pairs),
         ..CALIBRATION
     })
