@@ -1,7 +1,7 @@
 //! Leg constant of an image, and the size of an image.
 
 use scarab::board::odrive_v3_6::settings::drives;
-use scarab::motor::{AxisConfiguration, CalibrationSettings};
+use scarab::motor::{AxisConfiguration, CalibrationSettings, Calibrator};
 use scarab_host::formats::leg_file::{BodySide, DEFAULT_LEG, EncoderFile, LegFile, Side};
 use scarab_host::image::leg_source::{describe, source};
 use scarab_host::image::size::{ImageSize, Section};
@@ -81,6 +81,20 @@ fn the_axes_of_the_board_are_those_of_the_simulated_drive() {
     // Also on a 24 V board.
     drives::axes(&description, 11.0).iter().for_each(|axis| axis.check().expect("sensible"));
     assert!(scarab::motor::Chopper::new(drives::chopper(11.0)[0], drives::chopper(11.0)[1]).is_some());
+}
+
+/// With few pole pairs, first alignment and turn take more of a motor turn.
+#[test]
+fn a_calibration_on_the_board_may_travel_far_enough_to_pass_the_index() {
+    let (mut description, _) = describe(&leg(DEFAULT_LEG), 1).expect("two joints");
+    for pole_pairs in [2, 4, 7, 21] {
+        description.joints.iter_mut().for_each(|joint| joint.motor.pole_pairs = pole_pairs);
+        let axes = drives::axes(&description, 19.0);
+        for (axis, settings) in axes.iter().zip(drives::calibrations(&description)) {
+            assert!(axis.index);
+            assert!(Calibrator::new(axis, settings).is_ok(), "{pole_pairs} pole pairs: {settings:?}");
+        }
+    }
 }
 
 #[test]

@@ -142,6 +142,17 @@ fn a_wrong_stored_calibration_is_refused_once_and_then_measured() {
 }
 
 #[test]
+fn a_stored_calibration_outlives_a_load_that_is_too_large() {
+    let stored = measured().stored().expect("an index");
+    for refusal in [CalibrationRefusal::Load(70), CalibrationRefusal::Travel] {
+        let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
+        assert_eq!(bench.press(), [(0, checked(stored))]);
+        assert_eq!(bench.ends(0, Outcome::Refused(refusal)), []);
+        assert_eq!(bench.press(), [(0, checked(stored))], "{refusal:?}");
+    }
+}
+
+#[test]
 fn an_erased_or_foreign_calibration_is_not_used() {
     let stored = measured().stored().expect("an index");
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
