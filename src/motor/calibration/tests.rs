@@ -373,7 +373,11 @@ fn settings_that_ask_for_too_much_are_refused() {
     // The axis allows 40 A.
     assert_eq!(refused(|s| s.current.0 = 40.5), AxisError::Current);
     // A quarter more flows along the field.
-    assert_eq!(refused(|s| s.current.0 = 32.5), AxisError::Current);
+    let weak = AxisConfiguration { current_limit: Ampere(20.0), ..CONFIGURATION };
+    for (ampere, possible) in [(15.9, true), (16.1, false)] {
+        let settings = CalibrationSettings { current: Ampere(ampere), ..SETTINGS };
+        assert_eq!(Calibrator::new(&weak, settings).is_ok(), possible, "{ampere} A");
+    }
     assert_eq!(refused(|s| s.inertia.0 = 0.0), AxisError::Current);
     // With 7 pole pairs the index needs 1.2 turns.
     assert_eq!(refused(|s| s.travel_turns = 1.19), AxisError::Current);
