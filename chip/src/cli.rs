@@ -224,7 +224,11 @@ fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
     common.write(&report)?;
     let is_sound = report.findings.is_empty() && report.missed_current_ticks == 0;
     let stops = report.stop.as_ref().is_none_or(stops::Situation::is_sound);
-    Ok(is_sound && stops && report.verdict != "refused" && report.agrees_with_the_plant())
+    Ok(is_sound
+        && stops
+        && report.stack_suffices()
+        && report.verdict != "refused"
+        && report.agrees_with_the_plant())
 }
 
 fn operate(session: &mut Session, arguments: &RunArguments) -> Result<(), ToolError> {

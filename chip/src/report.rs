@@ -175,6 +175,13 @@ fn errors(leg: &LegFile, run: &RunReport, seed: u64) -> Result<BTreeMap<String, 
 }
 
 impl ChipReport {
+    /// Returns whether the stack is at least 1.5 times its deepest use.
+    #[must_use]
+    pub const fn stack_suffices(&self) -> bool {
+        let [used, size] = self.stack;
+        3 * used <= 2 * size
+    }
+
     /// Whether every base parameter is within one sigma of the plant's.
     #[must_use]
     pub fn agrees_with_the_plant(&self) -> bool {
@@ -287,7 +294,7 @@ mod tests {
             worst_instructions: LEVELS.into_iter().map(|(name, _)| (name, 0)).collect(),
             stop: Some(crate::stops::Situation { name: "end of the run", ..Default::default() }),
             resets: vec!["Software".into()],
-            stack: [29608, 81920],
+            stack: [29608, 57344],
             records: [384, 0],
             simulated_s: 70.7,
             instructions: 1,
