@@ -6,6 +6,7 @@ use crate::ident::{Choice::*, Constant::*, DriveChoice, Estimator::*, Plan::*};
 use crate::leg::{JointDescription, LegDescription, LinkDescription, MotorDescription};
 use crate::model::DenavitHartenberg;
 use crate::motion::ExcitationTable;
+use crate::safety::WindingRating;
 use crate::units::*;
 
 /// The leg.
@@ -71,6 +72,12 @@ pub const LEG: LegDescription<2> = LegDescription {
                 ),
                 counts_per_turn: 8192,
                 ratio: 50.0,
+                winding: WindingRating {
+                    rise: 0.07685294,
+                    time_s: 300.0,
+                    ambient_c: 40.0,
+                    limit_c: 100.0,
+                },
             },
         },
         JointDescription {
@@ -127,6 +134,12 @@ pub const LEG: LegDescription<2> = LegDescription {
                 ),
                 counts_per_turn: 8192,
                 ratio: 50.0,
+                winding: WindingRating {
+                    rise: 0.07685294,
+                    time_s: 300.0,
+                    ambient_c: 40.0,
+                    limit_c: 100.0,
+                },
             },
         },
     ],

@@ -11,3 +11,5 @@ pub mod critical_section;
 pub mod odrive_v3_6;
 #[cfg(all(feature = "tasks", target_os = "none"))]
 pub mod stack;
+#[cfg(all(feature = "tasks", target_os = "none"))]
+pub mod windings;

@@ -160,8 +160,8 @@ impl<const N: usize> Control<N> {
         self.servo.permit_return(joints);
     }
 
-    /// Sets the derating of the torque caps by temperature and bus voltage, from the next tick on.
-    pub fn derate(&mut self, derating: &Derating) {
+    /// Sets the derating of each joint's torque cap by temperatures and bus voltage, from the next tick on.
+    pub fn derate(&mut self, derating: &[Derating; N]) {
         self.servo.derate(derating);
     }
 

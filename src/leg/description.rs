@@ -16,6 +16,7 @@ use crate::model::{
     RigidBody,
 };
 use crate::motion::{ExcitationTable, MotionError, Periodic};
+use crate::safety::WindingRating;
 use crate::servo::{JointConfiguration, JointScale, SERVO_RATE_HZ};
 use crate::units::{
     Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
@@ -70,6 +71,8 @@ pub struct MotorDescription {
     pub counts_per_turn: u32,
     /// Motor revolutions per joint revolution.
     pub ratio: f32,
+    /// Thermal constants of the winding.
+    pub winding: WindingRating,
 }
 
 impl MotorDescription {

@@ -181,8 +181,8 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.control.report(fault);
     }
 
-    /// Sets the derating of the torque caps by temperature and bus voltage, see [`Control::derate`].
-    pub fn derate(&mut self, derating: &Derating) {
+    /// Sets the derating of each joint's torque cap, see [`Control::derate`].
+    pub fn derate(&mut self, derating: &[Derating; N]) {
         self.control.derate(derating);
     }
 

@@ -89,6 +89,17 @@ impl AxisState {
         }
     }
 
+    /// Square of the motor's current vector, A^2: the mean since the last joint sample, and during a
+    /// calibration that of this sample.
+    #[inline(always)]
+    pub fn square_a2(&self, sample: &AxisSample) -> f32 {
+        match &self.doing {
+            Doing::Nothing => 0.0,
+            Doing::Calibrating(calibrator) => calibrator.square_a2(sample),
+            Doing::Running(axis) => axis.square_a2(),
+        }
+    }
+
     /// Executes an order. Returns a calibration that it interrupts, or a lost rotor position.
     #[inline(never)]
     pub fn obey(&mut self, order: Order) -> Option<Outcome> {

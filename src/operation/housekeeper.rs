@@ -1,4 +1,5 @@
-//! Level 6: the operator's contacts, gate drivers, temperatures, calibration and reference, resets.
+//! Level 6: the operator's contacts, gate drivers, temperatures of bridges and windings, calibration and
+//! reference, resets.
 //!
 //! ```text
 //! not calibrated --calibrate--> first axis --measured-> next axis --measured-> calibrated -reference-> ready
@@ -17,7 +18,7 @@
 use super::axis_state::{Order, Outcome};
 use super::contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
 use super::queues::HousekeepingEnds;
-use super::signals::Signals;
+use super::signals::{SQUARE_UNIT, Signals};
 use crate::hal::{AxisSample, Contacts, Hardware, JointSample};
 use crate::leg::{
     AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, PowerRequest, StoredCalibration,
@@ -25,7 +26,9 @@ use crate::leg::{
 use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator};
 use crate::real::max;
-use crate::safety::{CheckClock, InhibitReason, of_gate_driver, of_temperature};
+use crate::safety::{
+    BoardFault, CheckClock, InhibitReason, Winding, WindingRating, of_gate_driver, of_temperature,
+};
 use crate::trace::{Record, words};
 use crate::units::Hertz;
 
@@ -42,6 +45,8 @@ pub struct HousekeepingSettings<const N: usize> {
     pub calibration: [CalibrationSettings; N],
     /// Temperature from which a bridge is too hot, degrees Celsius.
     pub hottest_c: f32,
+    /// Thermal constants of each motor's winding.
+    pub windings: [WindingRating; N],
 }
 
 /// Access of a round to queues, signals and hardware.
@@ -90,12 +95,15 @@ pub struct Housekeeper<const N: usize> {
     /// Rounds since a reset was requested.
     resetting: Option<u8>,
     drive: Option<DriveState>,
+    windings: [Winding; N],
+    /// Integrals of the squared currents in the previous round.
+    squares: [u32; N],
     round: u32,
     recorded: u32,
 }
 
 impl<const N: usize> Housekeeper<N> {
-    /// State without any calibration.
+    /// State without any calibration; windings are assumed warm.
     #[must_use]
     pub fn new(settings: HousekeepingSettings<N>) -> Self {
         Self {
@@ -109,6 +117,8 @@ impl<const N: usize> Housekeeper<N> {
             placed: false,
             resetting: None,
             drive: None,
+            windings: settings.windings.map(|rating| Winding::new(rating, None)),
+            squares: [0; N],
             round: 0,
             recorded: 0,
         }
@@ -118,6 +128,14 @@ impl<const N: usize> Housekeeper<N> {
     #[must_use]
     pub fn ready(settings: HousekeepingSettings<N>) -> Self {
         Self { calibrated: [true; N], ..Self::new(settings) }
+    }
+
+    /// Sets the temperatures of the windings, degrees Celsius.
+    #[must_use]
+    pub fn with_windings(self, celsius: [f32; N]) -> Self {
+        let mut celsius = celsius.into_iter();
+        let windings = self.settings.windings.map(|rating| Winding::new(rating, celsius.next()));
+        Self { windings, ..self }
     }
 
     /// Adds stored calibrations.
@@ -141,6 +159,7 @@ impl<const N: usize> Housekeeper<N> {
 
     fn act(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         self.round = self.round.wrapping_add(1);
+        self.warm(level.signals);
         if self.advance_reset(level) {
             return;
         }
@@ -150,6 +169,17 @@ impl<const N: usize> Housekeeper<N> {
             self.accept(request, level);
         }
         self.advance_reference(level);
+    }
+
+    /// Advances the windings by one round. A late round counts as one, so a winding cools less.
+    fn warm(&mut self, signals: &Signals<N>) {
+        for (axis, (winding, before)) in self.windings.iter_mut().zip(&mut self.squares).enumerate() {
+            let now = signals.squares(axis);
+            let added = now.wrapping_sub(*before);
+            *before = now;
+            winding.advance(added as f32 * SQUARE_UNIT, 1.0 / RATE_HZ as f32);
+            signals.set_winding(axis, winding);
+        }
     }
 
     /// Returns whether the operator permits enabling, by contact or host; never during a reset.
@@ -198,6 +228,9 @@ impl<const N: usize> Housekeeper<N> {
                 }
             }
             level.signals.set_hottest_c(hottest_c);
+            for (axis, _) in self.windings.iter().enumerate().filter(|(_, winding)| winding.is_too_hot()) {
+                level.signals.report(BoardFault::Winding, axis);
+            }
         }
         for axis in 0..N {
             let outcome = level.ends.outcomes.get_mut(axis).and_then(|outcomes| outcomes.dequeue());

@@ -10,6 +10,8 @@
 //! out         report to the bus; limits, requests, states, samples as events for identification and trace
 //! ```
 
+use core::array;
+
 use super::host_side::HostSide;
 use super::queues::{LegEvent, RESERVED, ServoEnds};
 use super::signals::Signals;
@@ -183,7 +185,8 @@ impl<const N: usize> ServoLevel<N> {
         if self.supply.look(bus) {
             control.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
         }
-        control.derate(&self.ramps.at(signals.hottest_c(), bus));
+        let derating = self.ramps.at(signals.hottest_c(), bus);
+        control.derate(&array::from_fn(|joint| derating.with_winding(signals.winding_share(joint))));
     }
 
     /// Records a refusal by the bus.

@@ -8,7 +8,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use crate::hal::DriveCommand;
 use crate::leg::Permission;
 use crate::motor::AxisRequest;
-use crate::safety::{BoardFault, InhibitReason};
+use crate::safety::{BoardFault, InhibitReason, Winding};
+use crate::servo::SERVO_RATE_HZ;
 use crate::units::Ampere;
 
 /// A word that is read and written atomically.
@@ -229,6 +230,12 @@ impl<const N: usize> Statistics<N> {
     }
 }
 
+/// Unit of the integrals of squared currents, A^2 s: a sixteenth of A^2 over one servo period.
+pub const SQUARE_UNIT: f32 = 1.0 / (UNITS_PER_SQUARE * SERVO_RATE_HZ as f32);
+const UNITS_PER_SQUARE: f32 = 16.0;
+/// A winding that has not been looked at takes nothing.
+const FULL_SHARE: u32 = 1.0_f32.to_bits();
+
 /// Target bits that turn an axis off: a NaN pattern that no computation produces.
 const OFF: u32 = u32::MAX;
 
@@ -247,6 +254,10 @@ pub struct Signals<const N: usize> {
     reported: [Word; N],
     /// Temperature of the hottest bridge, degrees Celsius, as bits.
     hottest_c: Word,
+    /// Integral of each motor's squared current, in [`SQUARE_UNIT`], wrapping.
+    squares: [Word; N],
+    /// Temperature of each winding, degrees Celsius, and its share of the torque cap, as bits.
+    windings: [[Word; 2]; N],
     permission: Word,
     hosted: Word,
     permits: Word,
@@ -265,6 +276,8 @@ impl<const N: usize> Signals<N> {
             begun: Word::new(0),
             reported: [const { Word::new(0) }; N],
             hottest_c: Word::new(0),
+            squares: [const { Word::new(0) }; N],
+            windings: [const { [Word::new(0), Word::new(FULL_SHARE)] }; N],
             permission: Word::new(0),
             hosted: Word::new(0),
             permits: Word::new(0),
@@ -337,6 +350,40 @@ impl<const N: usize> Signals<N> {
     /// Sets the temperature of the hottest bridge, degrees Celsius.
     pub fn set_hottest_c(&self, degrees_c: f32) {
         self.hottest_c.set(degrees_c.to_bits());
+    }
+
+    /// Adds a motor's squared current (A^2) over one servo period.
+    #[inline(always)]
+    pub fn add_square(&self, axis: usize, square_a2: f32) {
+        if let Some(sum) = self.squares.get(axis) {
+            sum.set(sum.get().wrapping_add((square_a2 * UNITS_PER_SQUARE) as u32));
+        }
+    }
+
+    /// Integral of a motor's squared current in [`SQUARE_UNIT`], wrapping after 18 s at 60 A.
+    #[must_use]
+    pub fn squares(&self, axis: usize) -> u32 {
+        self.squares.get(axis).map_or(0, Word::get)
+    }
+
+    /// Temperature of a winding, degrees Celsius, by its model.
+    #[must_use]
+    pub fn winding_c(&self, joint: usize) -> f32 {
+        self.windings.get(joint).map_or(f32::NAN, |[celsius, _]| f32::from_bits(celsius.get()))
+    }
+
+    /// Share of a joint's torque cap that its winding leaves; NaN leaves no torque.
+    #[must_use]
+    pub fn winding_share(&self, joint: usize) -> f32 {
+        self.windings.get(joint).map_or(f32::NAN, |[_, share]| f32::from_bits(share.get()))
+    }
+
+    /// Sets temperature and share of a winding.
+    pub fn set_winding(&self, joint: usize, winding: &Winding) {
+        if let Some([celsius, share]) = self.windings.get(joint) {
+            celsius.set(winding.temperature_c().to_bits());
+            share.set(winding.share().to_bits());
+        }
     }
 
     /// Permission of the drive since the servo's last tick; off before its first.

@@ -1,12 +1,12 @@
-//! Derating: reduces the requested torque while a bridge is hot or the bus voltage is low or high.
+//! Derating: reduces the requested torque while a bridge or winding is hot or the bus voltage is low or high.
 //!
 //! Why ramps and not switches: a drive that turns off at a threshold drops its leg. A drive that weakens well
 //! before it warns the wearer and mostly never reaches the threshold.
 //!
 //! ```text
 //! ramp(x) = clamp((x - none) / (all - none), 0, 1)
-//! |torque| <= cap * ramp(temperature) * ramp(bus, low)       where it drives the joint
-//! |torque| <= cap * ramp(temperature) * ramp(bus, high)      where the joint drives it
+//! |torque| <= cap * ramp(bridge) * ramp(winding) * ramp(bus, low)       where it drives the joint
+//! |torque| <= cap * ramp(bridge) * ramp(winding) * ramp(bus, high)      where the joint drives it
 //! ```
 //!
 //! Applied to the request before range and speed are checked ([`super::Barrier`]): stopping a joint at its
@@ -58,16 +58,18 @@ limit_codes! {
     BusLow = 6, "bus_low";
     /// The bus voltage is high.
     BusHigh = 7, "bus_high";
+    /// The motor's winding is hot ([`super::Winding`]).
+    Winding = 8, "winding";
 }
 
 /// A set of codes: bit n for code n.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LimitCodes(u8);
+pub struct LimitCodes(u16);
 
 impl LimitCodes {
     /// Returns the bit set.
     #[must_use]
-    pub const fn bits(self) -> u8 {
+    pub const fn bits(self) -> u16 {
         self.0
     }
 
@@ -80,7 +82,7 @@ impl LimitCodes {
     /// Adds a code if `holds`.
     #[must_use]
     pub const fn with(self, holds: bool, code: LimitCode) -> Self {
-        Self(self.0 | (holds as u8) << code as u8)
+        Self(self.0 | (holds as u16) << code as u8)
     }
 
     /// Removes the codes of another set.
@@ -92,7 +94,7 @@ impl LimitCodes {
     /// Returns the code with the lowest number.
     #[must_use]
     pub fn first(self) -> Option<LimitCode> {
-        // Codes start at 1, so an empty set gives 31 or more, and no entry.
+        // Codes start at 1, so an empty set gives 15 or more, and no entry.
         LimitCode::ALL.get((self.0.trailing_zeros() as usize).wrapping_sub(1)).copied()
     }
 
@@ -109,28 +111,37 @@ impl LimitCodes {
             .with(limited.torque && by_current, LimitCode::Current)
             .with(limited.speed, LimitCode::Speed)
             .with(limited.range, LimitCode::Position)
-            .with(limited.derated && derating.temperature < 1.0, LimitCode::Temperature)
+            .with(limited.derated && derating.bridge < 1.0, LimitCode::Temperature)
+            .with(limited.derated && derating.winding < 1.0, LimitCode::Winding)
             .with(limited.derated && derating.low < 1.0, LimitCode::BusLow)
             .with(limited.derated && derating.high < 1.0, LimitCode::BusHigh)
     }
 }
 
-/// Remaining shares of the torque cap, 0..=1.
+/// Remaining shares of a joint's torque cap, 0..=1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derating {
-    temperature: f32,
+    bridge: f32,
+    winding: f32,
     low: f32,
     high: f32,
 }
 
 impl Derating {
     /// No derating.
-    pub const NONE: Self = Self { temperature: 1.0, low: 1.0, high: 1.0 };
+    pub const NONE: Self = Self { bridge: 1.0, winding: 1.0, low: 1.0, high: 1.0 };
 
     /// Shares for a torque that drives the joint and for one that the joint drives.
     #[must_use]
     pub fn shares(&self) -> [f32; 2] {
-        [self.temperature * self.low, self.temperature * self.high]
+        let heat = self.bridge * self.winding;
+        [heat * self.low, heat * self.high]
+    }
+
+    /// These shares with that of the joint's winding.
+    #[must_use]
+    pub fn with_winding(self, share: f32) -> Self {
+        Self { winding: share, ..self }
     }
 }
 
@@ -181,11 +192,12 @@ impl DeratingRamps {
         }
     }
 
-    /// Shares at a temperature (degrees Celsius) and a bus voltage.
+    /// Shares at a temperature of the bridges (degrees Celsius) and a bus voltage, with a cold winding.
     #[must_use]
     pub fn at(&self, temperature_c: f32, bus: Volt) -> Derating {
         Derating {
-            temperature: self.temperature_c.share(temperature_c),
+            bridge: self.temperature_c.share(temperature_c),
+            winding: 1.0,
             low: self.low.share(bus.0),
             high: self.high.share(bus.0),
         }
@@ -244,6 +256,7 @@ mod tests {
             (LimitCode::Temperature, 5),
             (LimitCode::BusLow, 6),
             (LimitCode::BusHigh, 7),
+            (LimitCode::Winding, 8),
         ];
         assert_eq!(numbers.map(|(code, _)| code), LimitCode::ALL);
         assert!(numbers.iter().all(|(code, number)| *code as u8 == *number));
@@ -268,6 +281,11 @@ mod tests {
     }
 
     #[test]
+    fn a_winding_and_a_bridge_multiply_their_shares() {
+        assert_eq!(RAMPS.at(90.0, Volt(22.5)).with_winding(0.5).shares(), [0.125, 0.25]);
+    }
+
+    #[test]
     fn every_limit_has_its_code() {
         let none = Limited::default();
         let hot = RAMPS.at(90.0, Volt(48.0));
@@ -281,6 +299,7 @@ mod tests {
         assert_eq!(of(Limited { derated: true, ..none }, &hot), 1 << 5);
         assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(22.0))), 1 << 6);
         assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(56.0))), 1 << 7);
+        assert_eq!(of(Limited { derated: true, ..none }, &Derating::NONE.with_winding(0.9)), 1 << 8);
     }
 
     #[test]

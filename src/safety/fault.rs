@@ -111,6 +111,8 @@ faults! {
     Temperature = 0x4210, "T1", "temperature", Damp, "a bridge is too hot";
     /// A thermistor is open or shorted.
     Thermistor = 0xFF04, "T1", "thermistor", Damp, "a thermistor is open or shorted";
+    /// A winding reached its limit by its thermal model (2350: load level, thermal state).
+    WindingTemperature = 0x2350, "T2", "winding", Damp, "its winding is too hot";
     /// A measured or requested value is NaN or infinite.
     NotFinite = 0xFF01, "N1", "not_finite", Off, "a signal was not a number";
     /// The emergency stop's contact is open (9000: external error).
@@ -228,6 +230,7 @@ mod tests {
             (FaultCode::SupplyLost, 0x3220),
             (FaultCode::Temperature, 0x4210),
             (FaultCode::Thermistor, 0xFF04),
+            (FaultCode::WindingTemperature, 0x2350),
             (FaultCode::NotFinite, 0xFF01),
             (FaultCode::EmergencyStop, 0x9000),
             (FaultCode::CurrentTicks, 0xFF05),

@@ -12,6 +12,7 @@
 //! | [`StepGate`] | rejection of impossible encoder steps |
 //! | [`Barrier`] | torque bounds that stop a joint before its range or speed limit |
 //! | [`DeratingRamps`], [`LimitCode`] | derating by temperature and bus voltage; codes of active limits |
+//! | [`Winding`] | temperature of a motor's winding, from its current |
 //! | [`SupplyWatch`] | detection of a failing supply |
 //! | [`Monitor`] | all of the above, once per tick |
 //! | [`RefusalReason`] | reasons why enabling is refused |
@@ -41,6 +42,7 @@ pub mod periodic_checks;
 pub mod refusal;
 pub mod state;
 pub mod step_gate;
+pub mod winding;
 
 pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
 pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
@@ -53,3 +55,4 @@ pub use periodic_checks::{BoardFault, CheckClock, of_gate_driver, of_temperature
 pub use refusal::{Refusal, RefusalReason};
 pub use state::{DriveState, Event, Permission, PowerRequest};
 pub use step_gate::{Reading, StepGate};
+pub use winding::{Winding, WindingRating};

@@ -8,6 +8,7 @@
 //! | wrong gate register, read twice | 8 ms | 8 ms + a tick | [`InhibitReason::GateConfiguration`], Off |
 //! | thermistor open or shorted | 50 ms | 50 ms + servo tick | [`FaultCode::Thermistor`], Damp |
 //! | bridge at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::Temperature`], Damp |
+//! | winding at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::WindingTemperature`], Damp |
 //!
 //! A register that changes and recovers between two checks is not detected, nor is a thermistor stuck within
 //! its range. Cost: about ten instructions.
@@ -25,11 +26,13 @@ pub enum BoardFault {
     Temperature,
     /// A thermistor is open or shorted.
     Thermistor,
+    /// A winding is too hot.
+    Winding,
 }
 
 impl BoardFault {
     /// All faults, in the order of their bits.
-    pub const ALL: [Self; 3] = [Self::CurrentTicks, Self::Temperature, Self::Thermistor];
+    pub const ALL: [Self; 4] = [Self::CurrentTicks, Self::Temperature, Self::Thermistor, Self::Winding];
 
     /// Bit of the fault.
     #[must_use]
@@ -44,6 +47,7 @@ impl BoardFault {
             Self::CurrentTicks => FaultCode::CurrentTicks,
             Self::Temperature => FaultCode::Temperature,
             Self::Thermistor => FaultCode::Thermistor,
+            Self::Winding => FaultCode::WindingTemperature,
         }
     }
 }

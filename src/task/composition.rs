@@ -111,8 +111,13 @@ fn hand_out(
     }
     let axes = drives::axes(&leg::LEG, divider);
     let calibration = drives::calibrations(&leg::LEG);
-    let settings = HousekeepingSettings { axes, calibration, hottest_c: HOTTEST_C };
-    let housekeeper = Housekeeper::new(settings).with_stored(stored);
+    let windings = leg::LEG.joints.map(|joint| joint.motor.winding);
+    let settings = HousekeepingSettings { axes, calibration, hottest_c: HOTTEST_C, windings };
+    let mut housekeeper = Housekeeper::new(settings).with_stored(stored);
+    // After a power-up the memory's content is random.
+    if let Some(celsius) = windings::kept().filter(|_| board.identity.reset != Reset::PowerOn) {
+        housekeeper = housekeeper.with_windings(celsius);
+    }
     let thread = built.map(|(configuration, built)| identify::Thread {
         identification: built,
         ends: identification,

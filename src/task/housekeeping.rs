@@ -5,6 +5,7 @@ use embassy_time::{Duration, Ticker};
 use super::SIGNALS;
 use super::leg::JOINTS;
 use crate::board::odrive_v3_6::hardware::Odrive;
+use crate::board::windings;
 use crate::operation::{Housekeeper, HousekeepingEnds, RATE_HZ, Watch};
 use crate::safety::GUARD_RATE_HZ;
 
@@ -34,5 +35,6 @@ pub async fn run(
         // A late round is not made up for: the waits of a gate drivers' reset are counted in rounds.
         ticker.reset();
         keeper.round(&mut ends, &SIGNALS, &mut board);
+        windings::keep(core::array::from_fn(|joint| SIGNALS.winding_c(joint)));
     }
 }

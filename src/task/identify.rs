@@ -263,6 +263,7 @@ impl Thread {
             bridge_c: [first, second],
             chopper_c: chopper,
             chopper_duty: (board.chopper_duty)(),
+            winding_c: core::array::from_fn(|joint| SIGNALS.winding_c(joint)),
         });
     }
 

@@ -383,7 +383,7 @@ macro_rules! trace_records {
         records_lost: u32,
     }
     /// Supply and temperatures.
-    Supply "supply n={=u32} tick={=u32} bus_v={=f32} bus_low_v={=f32} bus_high_v={=f32} bridge_c={=?} chopper_c={=f32} chopper_duty={=f32}" {
+    Supply "supply n={=u32} tick={=u32} bus_v={=f32} bus_low_v={=f32} bus_high_v={=f32} bridge_c={=?} chopper_c={=f32} chopper_duty={=f32} winding_c={=?}" {
         /// Servo tick.
         tick: u32,
         /// Present bus voltage.
@@ -398,6 +398,9 @@ macro_rules! trace_records {
         chopper_c: f32,
         /// Present duty of the brake chopper, 0..1.
         chopper_duty: f32,
+    } + {
+        /// Temperature of each motor's winding by its model, degrees Celsius.
+        winding_c: [f32; N],
     }
     /// One sample of the 500 Hz log, on request.
     Log "log n={=u32} tick={=u32} segment={=str} motion={=u8} position_rad={=?} torque_nm={=?} counts={=?}" {

@@ -52,6 +52,7 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
         | Code::SupplyLost
         | Code::Temperature
         | Code::Thermistor
+        | Code::WindingTemperature
         | Code::PositionLimit
         | Code::Overspeed
         | Code::FollowingError

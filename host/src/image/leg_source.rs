@@ -28,11 +28,10 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, FileError> 
     let background = background::<JOINTS, BASE>(leg, PriorChoice::Default, swarm_seed)?;
     let (configuration, _) = configuration(leg, &background, Plan::default(), swarm_seed)?;
     chain::<JOINTS>(leg)?;
-    let mut motors =
-        [MotorDescription { pole_pairs: 0, flux: Weber(0.0), counts_per_turn: 0, ratio: 0.0 }; JOINTS];
-    for (slot, joint) in motors.iter_mut().zip(&leg.joints) {
-        *slot = motor(joint).map_err(|reason| leg.error(format!("joint `{}`: {reason}", joint.name)))?;
-    }
+    let named = |joint: &JointFile| {
+        motor(joint).map_err(|reason| leg.error(format!("joint `{}`: {reason}", joint.name)))
+    };
+    let motors = [named(&leg.joints[0])?, named(&leg.joints[1])?];
     let model = &configuration.model;
     let joints = core::array::from_fn(|index| {
         let (joint, file) = (&configuration.joints[index], &leg.joints[index]);
@@ -88,6 +87,7 @@ fn motor(joint: &JointFile) -> Result<MotorDescription, &'static str> {
         flux: Weber(motor.flux(joint) as f32),
         counts_per_turn: joint.encoder.counts,
         ratio: joint.encoder.ratio as f32,
+        winding: motor.winding(),
     })
 }
 
@@ -128,6 +128,7 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
          use crate::leg::{{JointDescription, LegDescription, LinkDescription, MotorDescription}};\n\
          use crate::model::DenavitHartenberg;\n\
          use crate::motion::ExcitationTable;\n\
+         use crate::safety::WindingRating;\n\
          use crate::units::*;\n\n\
          /// The leg.\n\
          pub const LEG: LegDescription<{JOINTS}> = {description:#?};\n\

@@ -62,6 +62,7 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
         flux: Weber(motor.flux(joint) as f32),
         counts_per_turn: joint.encoder.counts,
         ratio: joint.encoder.ratio as f32,
+        winding: motor.winding(),
     };
     let speed = RadianPerSecond(joint.speed_limit_deg_s.to_radians() as f32);
     drives::axis(&motor, Ampere(joint.current_limit() as f32), speed, SenseScale::DIVIDER)
@@ -174,12 +175,13 @@ fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSe
         // These motors carry gear and leg.
         let inertia = drives::CALIBRATION.inertia;
         let settings = CalibrationSettings { inertia, ..calibration_settings(&configuration, motor) };
-        parts.push((configuration, settings));
+        parts.push((configuration, settings, motor.winding()));
     }
     let parts: [_; N] = parts.try_into().map_err(|_| unfit())?;
     Ok(HousekeepingSettings {
-        axes: parts.map(|(axis, _)| axis),
-        calibration: parts.map(|(_, calibration)| calibration),
+        axes: parts.map(|(axis, ..)| axis),
+        calibration: parts.map(|(_, calibration, _)| calibration),
         hottest_c: HOTTEST_C,
+        windings: parts.map(|(.., winding)| winding),
     })
 }

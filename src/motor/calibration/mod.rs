@@ -299,6 +299,19 @@ impl Calibrator {
         }
     }
 
+    /// Square of the current vector of a sample, A^2; that of the overcurrent bound where the shunts are
+    /// beyond their range.
+    #[must_use]
+    pub fn square_a2(&self, sample: &AxisSample) -> f32 {
+        if matches!(self.stage, Stage::CurrentOffsets(_)) {
+            return 0.0;
+        }
+        let current = self.bench.sense.currents(sample.shunt_codes, self.current_offsets);
+        current.map_or(self.bench.overcurrent_square, |Stationary { alpha, beta }| {
+            alpha.0 * alpha.0 + beta.0 * beta.0
+        })
+    }
+
     /// Returns the command, or the end of the calibration.
     fn advance(&mut self, sample: &AxisSample) -> Result<AxisCommand, Result<Calibration, Refusal>> {
         let [low, high] = self.bench.bus_codes;

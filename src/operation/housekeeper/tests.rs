@@ -12,12 +12,17 @@ use crate::motor::calibration::tests::{SETTINGS, calibrate};
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::operation::AxisState;
 use crate::safety::Bridges;
+use crate::safety::winding::tests::RATING;
 use crate::testing::TestRandom;
 
 mod reports;
 
-const HOUSEKEEPING: HousekeepingSettings<2> =
-    HousekeepingSettings { axes: [CONFIGURATION; 2], calibration: [SETTINGS; 2], hottest_c: 100.0 };
+const HOUSEKEEPING: HousekeepingSettings<2> = HousekeepingSettings {
+    axes: [CONFIGURATION; 2],
+    calibration: [SETTINGS; 2],
+    hottest_c: 100.0,
+    windings: [RATING; 2],
+};
 
 struct Bench {
     keeper: Housekeeper<2>,

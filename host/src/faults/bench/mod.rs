@@ -9,6 +9,7 @@ mod cut;
 mod disturbed;
 mod hosted;
 pub mod hostile;
+mod hot;
 pub mod kept;
 mod lost;
 pub mod offsets;
@@ -40,10 +41,11 @@ pub struct Bench {
 }
 
 /// All benches.
-pub static BENCHES: [Bench; 20] = [
+pub static BENCHES: [Bench; 21] = [
     offsets::BENCH,
     calibration::BENCH,
     start::ZEROS,
+    hot::BENCH,
     stopped::BENCH,
     parts::BENCH,
     command::BENCH,

@@ -9,6 +9,8 @@ use hal_sim::drive::description::{
     AxisDescription, BridgeDescription, CompleteDescription, CounterDescription, MotorDescription,
     ShuntDescription, SupplyDescription, Wiring,
 };
+use scarab::safety::WindingRating;
+use scarab::units::Ohm;
 use serde::{Deserialize, Serialize};
 
 use crate::base::error::FileError;
@@ -55,6 +57,12 @@ pub struct MotorFile {
     /// Thermal time constant of the winding, s.
     #[serde(default = "default_thermal_time")]
     pub thermal_time_s: f64,
+    /// Highest ambient temperature of the motor, degrees Celsius.
+    #[serde(default = "default_ambient")]
+    pub ambient_c: f64,
+    /// Temperature of the winding at which no torque is left, degrees Celsius.
+    #[serde(default = "default_winding_limit")]
+    pub winding_limit_c: f64,
 }
 
 fn default_cogging_periods() -> u32 {
@@ -67,6 +75,14 @@ fn default_thermal_resistance() -> f64 {
 
 fn default_thermal_time() -> f64 {
     300.0
+}
+
+fn default_ambient() -> f64 {
+    40.0
+}
+
+fn default_winding_limit() -> f64 {
+    100.0
 }
 
 /// Supply of the board.
@@ -145,6 +161,8 @@ impl MotorFile {
         index_deg: 0.0,
         thermal_resistance_k_w: 1.0,
         thermal_time_s: 300.0,
+        ambient_c: 40.0,
+        winding_limit_c: 100.0,
     };
 
     pub(super) fn check(&self, number: usize, joint: &JointFile) -> Result<(), Fault> {
@@ -170,6 +188,9 @@ impl MotorFile {
         place.within("index_deg", self.index_deg, -360.0, 360.0)?;
         place.within("thermal_resistance_k_w", self.thermal_resistance_k_w, 0.01, 100.0)?;
         place.within("thermal_time_s", self.thermal_time_s, 1.0, 1e5)?;
+        place.within("ambient_c", self.ambient_c, -40.0, 100.0)?;
+        // The derating takes the last 20 degrees.
+        place.within("winding_limit_c", self.winding_limit_c, self.ambient_c + 30.0, 250.0)?;
         let whole = Place { joint: place.joint, table: None };
         if joint.encoder.side != Side::Motor || joint.encoder.counts > MOST_COUNTS {
             let complaint = format!("needs an encoder at the motor with at most {MOST_COUNTS} counts");
@@ -189,6 +210,18 @@ impl MotorFile {
     #[must_use]
     pub fn flux(&self, joint: &JointFile) -> f64 {
         joint.torque_per_ampere / (1.5 * f64::from(self.pole_pairs) * joint.encoder.ratio)
+    }
+
+    /// Thermal constants for the firmware.
+    #[must_use]
+    pub fn winding(&self) -> WindingRating {
+        WindingRating::new(
+            Ohm(self.resistance_ohm as f32),
+            self.thermal_resistance_k_w as f32,
+            self.thermal_time_s as f32,
+            self.ambient_c as f32,
+            self.winding_limit_c as f32,
+        )
     }
 
     /// Description of the simulated axis.

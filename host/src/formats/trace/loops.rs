@@ -14,6 +14,8 @@ pub struct SupplySeen {
     pub bridge_c: f32,
     /// Temperature of the brake chopper, degrees Celsius.
     pub chopper_c: f32,
+    /// Hottest winding by its model, degrees Celsius.
+    pub winding_c: f32,
 }
 
 /// Collects the records of loops and supply.
@@ -51,12 +53,15 @@ impl Statistics {
             high_v: f32::NAN,
             bridge_c: f32::NAN,
             chopper_c: f32::NAN,
+            winding_c: f32::NAN,
         });
+        let windings = supply.winding_c.as_deref().unwrap_or_default();
         self.supply = Some(SupplySeen {
             low_v: before.low_v.min(supply.bus_low_v),
             high_v: before.high_v.max(supply.bus_high_v),
             bridge_c: supply.bridge_c.iter().copied().fold(before.bridge_c, f32::max),
             chopper_c: before.chopper_c.max(supply.chopper_c),
+            winding_c: windings.iter().copied().fold(before.winding_c, f32::max),
         });
     }
 
@@ -121,14 +126,15 @@ impl Statistics {
             ));
         }
         if let Some(supply) = self.supply {
-            // A board without a thermistor sends NaN.
+            // A board without a thermistor sends NaN, and an older image no windings.
             let celsius = |value: f32| if value.is_nan() { "-".into() } else { format!("{value:.0}") };
             lines.push(format!(
-                "supply: {:.1} to {:.1} V; hottest: bridges {}, chopper {} degrees Celsius",
+                "supply: {:.1} to {:.1} V; hottest: bridges {}, chopper {}, windings {} degrees Celsius",
                 supply.low_v,
                 supply.high_v,
                 celsius(supply.bridge_c),
-                celsius(supply.chopper_c)
+                celsius(supply.chopper_c),
+                celsius(supply.winding_c)
             ));
         }
         lines

@@ -5,6 +5,7 @@ use super::*;
 use crate::leg::testing::{LEG, configuration};
 use crate::leg::{Control, DeratingRamps, Fault, FaultCode};
 use crate::motor::SenseScale;
+use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
 
 const RAMPS: DeratingRamps =
@@ -54,6 +55,37 @@ fn the_hottest_bridge_derates_and_an_open_thermistor_leaves_no_torque() {
         bench.hold(false, false);
         assert_eq!(bench.signals.hottest_c(), hottest_c);
     }
+}
+
+#[test]
+fn a_winding_warms_with_its_squared_current_and_leaves_less_torque() {
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_windings([40.0; 2]));
+    let mut expected = Winding::new(RATING, Some(40.0));
+    // The integral wraps after 18 s at 60 A.
+    for _ in 0..25 * RATE_HZ {
+        for _ in 0..SERVO_RATE_HZ / RATE_HZ {
+            bench.signals.add_square(1, 3600.0);
+        }
+        expected.advance(3600.0 / RATE_HZ as f32, 1.0 / RATE_HZ as f32);
+        bench.round();
+    }
+    let [cold, hot] =
+        [0, 1].map(|joint| (bench.signals.winding_c(joint), bench.signals.winding_share(joint)));
+    assert_eq!(cold, (40.0, 1.0));
+    assert!((hot.0 - expected.temperature_c()).abs() < 0.01, "{hot:?} {expected:?}");
+    assert!(hot.1 < 1.0 && (hot.1 - expected.share()).abs() < 1e-3, "{hot:?}");
+}
+
+#[test]
+fn windings_are_assumed_warm_until_their_temperature_is_known() {
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
+    assert_eq!(bench.signals.winding_share(0), 1.0, "before the first round");
+    bench.round();
+    assert!((79.9..80.0).contains(&bench.signals.winding_c(0)));
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_windings([95.0, 45.0]));
+    bench.round();
+    let shares = [0, 1].map(|joint| bench.signals.winding_share(joint));
+    assert!((0.25..0.26).contains(&shares[0]) && shares[1] == 1.0, "{shares:?}");
 }
 
 #[test]

@@ -3,6 +3,8 @@
 use super::super::super::queues::RESERVED;
 use super::*;
 use crate::leg::LimitCode;
+use crate::safety::Winding;
+use crate::safety::winding::tests::RATING;
 
 /// Tick and joint of every reported limit.
 fn limits(bench: &Bench) -> Vec<(u32, u8)> {
@@ -37,6 +39,24 @@ fn limits_are_reported_once_a_second_and_one_per_tick() {
     bench.counts = bench.counts.map(|counts| counts + 10);
     bench.run(100);
     assert!(!bench.names().contains(&"limit"));
+}
+
+#[test]
+fn a_hot_winding_limits_its_own_joint() {
+    let mut bench = Bench::enabled();
+    bench.signals.set_winding(1, &Winding::new(RATING, Some(RATING.limit_c)));
+    for _ in 0..20 {
+        bench.counts = bench.counts.map(|counts| counts + 1);
+        bench.tick();
+    }
+    let limited = |event: &LegEvent<2>| match event {
+        LegEvent::Record(Record::Limit { code, joint, .. }) => Some((*code, *joint)),
+        _ => None,
+    };
+    let limits: Vec<(u8, u8)> = bench.events.iter().filter_map(limited).collect();
+    assert_eq!(limits, [(LimitCode::Winding as u8, 2)]);
+    let targets = [0, 1].map(|joint| bench.signals.target(joint).current.0);
+    assert!(targets[0] != 0.0 && targets[1] == 0.0, "{targets:?}");
 }
 
 #[test]
