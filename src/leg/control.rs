@@ -161,7 +161,7 @@ impl<const N: usize> Control<N> {
     }
 
     /// Sets the derating of each joint's torque cap by temperatures and bus voltage, from the next tick on.
-    pub fn derate(&mut self, derating: &[Derating; N]) {
+    pub fn derate(&mut self, derating: &Derating<N>) {
         self.servo.derate(derating);
     }
 

@@ -182,7 +182,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     }
 
     /// Sets the derating of each joint's torque cap, see [`Control::derate`].
-    pub fn derate(&mut self, derating: &[Derating; N]) {
+    pub fn derate(&mut self, derating: &Derating<N>) {
         self.control.derate(derating);
     }
 

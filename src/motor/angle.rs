@@ -122,6 +122,7 @@ impl SpeedTracker {
     }
 
     /// Updates angle and speed with the angle of one tick.
+    #[inline(always)]
     pub fn track(&mut self, angle: ElectricalAngle) {
         let error = angle.0.wrapping_sub(self.estimate.0).cast_signed() as f32;
         self.speed += TRACKING_SPEED * error;

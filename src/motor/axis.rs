@@ -51,7 +51,7 @@ use super::model_watch::Shown;
 use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, ShuntWatch, SpeedTracker};
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample};
-use crate::real::{abs, clamp, is_finite, max};
+use crate::real::{abs, clamp, is_finite};
 use crate::units::{Ampere, RadianPerSecond};
 
 mod index;
@@ -328,9 +328,7 @@ impl Axis {
             None if switching => self.measured,
             None => Rotating::default(),
         };
-        let (d, q) = (self.measured.d.0, self.measured.q.0);
-        let square = d * d + q * q;
-        self.window.push(self.counts, q * constants.current_sign, square);
+        self.window.push(self.counts, self.measured.q.0 * constants.current_sign);
 
         let [low, high] = constants.bus_codes;
         // Braking needs neither rotor position nor bus voltage.
@@ -362,7 +360,7 @@ impl Axis {
             self.current_loop.reset();
             return Ok(AxisCommand::OFF);
         }
-        if square > constants.overcurrent_square {
+        if self.square_a2() > constants.overcurrent_square {
             return Err(AxisFault::Overcurrent);
         }
         let BridgeRequest::Follow(wanted) = request else {
@@ -418,10 +416,12 @@ impl Axis {
         *indexed && self.index.is_lost(self.counts, scale, *unindexed)
     }
 
-    /// Mean square of the current vector since the last joint sample, A^2.
+    /// Square of the current vector at the last tick, A^2.
+    #[inline(always)]
     #[must_use]
-    pub fn square_a2(&self) -> f32 {
-        self.window.square_a2 / max(self.window.ticks as f32, 1.0)
+    pub const fn square_a2(&self) -> f32 {
+        let (d, q) = (self.measured.d.0, self.measured.q.0);
+        d * d + q * q
     }
 
     /// Takes the means of count and current since the last call, in the joint's sense. Both cover the same
@@ -484,22 +484,21 @@ struct Window {
     /// Sum of counts minus `first`.
     counts: i32,
     current_a: f32,
-    square_a2: f32,
     ticks: i32,
 }
 
 impl Window {
-    const EMPTY: Self = Self { first: 0, counts: 0, current_a: 0.0, square_a2: 0.0, ticks: 0 };
+    const EMPTY: Self = Self { first: 0, counts: 0, current_a: 0.0, ticks: 0 };
     /// Longest window, ticks. If no one reads the sample, averaging restarts.
     const MOST: i32 = 48;
 
-    fn push(&mut self, counts: i32, current_a: f32, square_a2: f32) {
+    #[inline(always)]
+    fn push(&mut self, counts: i32, current_a: f32) {
         if self.ticks == 0 || self.ticks == Self::MOST {
             *self = Self { first: counts, ..Self::EMPTY };
         }
         self.counts += counts.wrapping_sub(self.first);
         self.current_a += current_a;
-        self.square_a2 += square_a2;
         self.ticks += 1;
     }
 

@@ -169,7 +169,8 @@ impl Modulator {
         // within range.
         let within =
             low + shift - self.dead_duty >= 0.0 && high + shift + self.dead_duty <= self.greatest_duty;
-        if within { duties } else { duties.map(|duty| self.limited(duty)) }
+        let [a, b, c] = duties;
+        if within { duties } else { [self.limited(a), self.limited(b), self.limited(c)] }
     }
 
     /// Makes every further duty NaN. Host only; row N1 of docs/safety.md.

@@ -89,13 +89,12 @@ impl AxisState {
         }
     }
 
-    /// Square of the motor's current vector, A^2: the mean since the last joint sample, and during a
-    /// calibration that of this sample.
+    /// Square of the motor's current vector at this tick, A^2.
     #[inline(always)]
-    pub fn square_a2(&self, sample: &AxisSample) -> f32 {
+    pub const fn square_a2(&self) -> f32 {
         match &self.doing {
             Doing::Nothing => 0.0,
-            Doing::Calibrating(calibrator) => calibrator.square_a2(sample),
+            Doing::Calibrating(calibrator) => calibrator.square_a2(),
             Doing::Running(axis) => axis.square_a2(),
         }
     }

@@ -185,8 +185,8 @@ impl<const N: usize> ServoLevel<N> {
         if self.supply.look(bus) {
             control.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
         }
-        let derating = self.ramps.at(signals.hottest_c(), bus);
-        control.derate(&array::from_fn(|joint| derating.with_winding(signals.winding_share(joint))));
+        let windings = array::from_fn(|joint| signals.winding_share(joint));
+        control.derate(&self.ramps.at(signals.hottest_c(), bus, windings));
     }
 
     /// Records a refusal by the bus.

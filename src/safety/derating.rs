@@ -101,7 +101,12 @@ impl LimitCodes {
     /// Codes of the limits that reduced a joint's request.
     #[must_use]
     #[inline(never)]
-    pub fn of(limited: &Limited, limits: &JointLimits, derating: &Derating) -> Self {
+    pub fn of<const N: usize>(
+        limited: &Limited,
+        limits: &JointLimits,
+        derating: &Derating<N>,
+        joint: usize,
+    ) -> Self {
         if !limited.any() {
             return Self::default();
         }
@@ -112,36 +117,34 @@ impl LimitCodes {
             .with(limited.speed, LimitCode::Speed)
             .with(limited.range, LimitCode::Position)
             .with(limited.derated && derating.bridge < 1.0, LimitCode::Temperature)
-            .with(limited.derated && derating.winding < 1.0, LimitCode::Winding)
+            .with(limited.derated && derating.winding_of(joint) < 1.0, LimitCode::Winding)
             .with(limited.derated && derating.low < 1.0, LimitCode::BusLow)
             .with(limited.derated && derating.high < 1.0, LimitCode::BusHigh)
     }
 }
 
-/// Remaining shares of a joint's torque cap, 0..=1.
+/// Remaining shares of the joints' torque caps, 0..=1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Derating {
+pub struct Derating<const N: usize> {
     bridge: f32,
-    winding: f32,
     low: f32,
     high: f32,
+    windings: [f32; N],
 }
 
-impl Derating {
+impl<const N: usize> Derating<N> {
     /// No derating.
-    pub const NONE: Self = Self { bridge: 1.0, winding: 1.0, low: 1.0, high: 1.0 };
+    pub const NONE: Self = Self { bridge: 1.0, low: 1.0, high: 1.0, windings: [1.0; N] };
 
-    /// Shares for a torque that drives the joint and for one that the joint drives.
+    /// Shares of a joint for a torque that drives it and for one that it drives.
     #[must_use]
-    pub fn shares(&self) -> [f32; 2] {
-        let heat = self.bridge * self.winding;
+    pub fn shares(&self, joint: usize) -> [f32; 2] {
+        let heat = self.bridge * self.winding_of(joint);
         [heat * self.low, heat * self.high]
     }
 
-    /// These shares with that of the joint's winding.
-    #[must_use]
-    pub fn with_winding(self, share: f32) -> Self {
-        Self { winding: share, ..self }
+    fn winding_of(&self, joint: usize) -> f32 {
+        self.windings.get(joint).copied().unwrap_or(0.0)
     }
 }
 
@@ -192,12 +195,13 @@ impl DeratingRamps {
         }
     }
 
-    /// Shares at a temperature of the bridges (degrees Celsius) and a bus voltage, with a cold winding.
+    /// Shares at a temperature of the bridges (degrees Celsius), a bus voltage, and shares that the windings
+    /// leave.
     #[must_use]
-    pub fn at(&self, temperature_c: f32, bus: Volt) -> Derating {
+    pub fn at<const N: usize>(&self, temperature_c: f32, bus: Volt, windings: [f32; N]) -> Derating<N> {
         Derating {
             bridge: self.temperature_c.share(temperature_c),
-            winding: 1.0,
+            windings,
             low: self.low.share(bus.0),
             high: self.high.share(bus.0),
         }
@@ -264,7 +268,7 @@ mod tests {
 
     #[test]
     fn shares_follow_their_ramps_and_nan_leaves_none() {
-        let left = |temperature, bus| RAMPS.at(temperature, Volt(bus)).shares();
+        let left = |temperature, bus| RAMPS.at(temperature, Volt(bus), [1.0]).shares(0);
         assert_eq!(left(25.0, 48.0), [1.0; 2]);
         for (temperature, bus, expected) in [
             (90.0, 48.0, [0.5, 0.5]),
@@ -282,24 +286,26 @@ mod tests {
 
     #[test]
     fn a_winding_and_a_bridge_multiply_their_shares() {
-        assert_eq!(RAMPS.at(90.0, Volt(22.5)).with_winding(0.5).shares(), [0.125, 0.25]);
+        let derating = RAMPS.at(90.0, Volt(22.5), [1.0, 0.5]);
+        assert_eq!([0, 1].map(|joint| derating.shares(joint)), [[0.25, 0.5], [0.125, 0.25]]);
     }
 
     #[test]
     fn every_limit_has_its_code() {
         let none = Limited::default();
-        let hot = RAMPS.at(90.0, Volt(48.0));
-        let of = |limited: Limited, derating: &Derating| LimitCodes::of(&limited, &HIP, derating).bits();
+        let hot = RAMPS.at(90.0, Volt(48.0), [1.0]);
+        let of =
+            |limited: Limited, derating: &Derating<1>| LimitCodes::of(&limited, &HIP, derating, 0).bits();
         assert_eq!(of(none, &hot), 0, "nothing was limited");
         assert_eq!(of(Limited { torque: true, ..none }, &Derating::NONE), 1 << 1);
         let weak = JointLimits { current: crate::units::Ampere(40.0), ..HIP };
-        let codes = LimitCodes::of(&Limited { torque: true, ..none }, &weak, &Derating::NONE);
+        let codes = LimitCodes::of(&Limited { torque: true, ..none }, &weak, &Derating::<1>::NONE, 0);
         assert!(codes.contains(LimitCode::Current) && !codes.contains(LimitCode::Torque));
         assert_eq!(of(Limited { speed: true, range: true, ..none }, &Derating::NONE), 1 << 3 | 1 << 4);
         assert_eq!(of(Limited { derated: true, ..none }, &hot), 1 << 5);
-        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(22.0))), 1 << 6);
-        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(56.0))), 1 << 7);
-        assert_eq!(of(Limited { derated: true, ..none }, &Derating::NONE.with_winding(0.9)), 1 << 8);
+        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(22.0), [1.0])), 1 << 6);
+        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(56.0), [1.0])), 1 << 7);
+        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(48.0), [0.9])), 1 << 8);
     }
 
     #[test]

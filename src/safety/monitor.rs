@@ -95,7 +95,7 @@ pub struct Monitor<const N: usize> {
     limits: Limits<N>,
     barriers: [Barrier; N],
     ampere_per_nm: [f32; N],
-    derating: [Derating; N],
+    derating: Derating<N>,
     /// 1.1 times the speed limits, rad/s. Below: ends of the ranges with their tolerance.
     fault_speed: [f32; N],
     fault_range: [[Radian; 2]; N],
@@ -121,7 +121,7 @@ impl<const N: usize> Monitor<N> {
             limits,
             barriers: limits.joints().map(|joint| Barrier::new(&joint)),
             ampere_per_nm: limits.joints().map(|joint| 1.0 / joint.torque_per_ampere.0),
-            derating: [Derating::NONE; N],
+            derating: Derating::NONE,
             fault_speed: limits.joints().map(|joint| OVERSPEED_FACTOR * joint.speed.0),
             fault_range: limits
                 .joints()
@@ -158,11 +158,11 @@ impl<const N: usize> Monitor<N> {
     }
 
     /// Sets the derating of each joint's torque cap from the next tick on.
-    pub fn derate(&mut self, derating: &[Derating; N]) {
+    pub fn derate(&mut self, derating: &Derating<N>) {
         if self.derating != *derating {
             self.derating = *derating;
-            for (barrier, derating) in self.barriers.iter_mut().zip(derating) {
-                barrier.derate(derating.shares());
+            for (joint, barrier) in self.barriers.iter_mut().enumerate() {
+                barrier.derate(derating.shares(joint));
             }
         }
     }
@@ -182,7 +182,7 @@ impl<const N: usize> Monitor<N> {
     #[must_use]
     pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
         core::array::from_fn(|joint| {
-            LimitCodes::of(&decision.limited[joint], &self.limits.joints()[joint], &self.derating[joint])
+            LimitCodes::of(&decision.limited[joint], &self.limits.joints()[joint], &self.derating, joint)
         })
     }
 

@@ -179,7 +179,7 @@ impl<const N: usize> Servo<N> {
     }
 
     /// Sets the torque caps that temperature and bus voltage allow, from the next tick on.
-    pub fn derate(&mut self, derating: &[Derating; N]) {
+    pub fn derate(&mut self, derating: &Derating<N>) {
         self.monitor.derate(derating);
     }
 

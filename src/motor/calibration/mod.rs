@@ -215,6 +215,7 @@ pub struct Calibrator {
     bench: Bench,
     stored: Option<StoredCalibration>,
     current_offsets: [f32; 2],
+    square_a2: f32,
     resistance: Ohm,
     seen: SeenInductances,
     /// Travel at which the inductances were measured along phase A.
@@ -261,6 +262,7 @@ impl Calibrator {
             bench,
             stored: None,
             current_offsets: [0.0; 2],
+            square_a2: 0.0,
             resistance: Ohm::ZERO,
             seen: SeenInductances::default(),
             seen_at: 0,
@@ -299,17 +301,10 @@ impl Calibrator {
         }
     }
 
-    /// Square of the current vector of a sample, A^2; that of the overcurrent bound where the shunts are
-    /// beyond their range.
+    /// Square of the current vector at the last tick with a bridge on, A^2.
     #[must_use]
-    pub fn square_a2(&self, sample: &AxisSample) -> f32 {
-        if matches!(self.stage, Stage::CurrentOffsets(_)) {
-            return 0.0;
-        }
-        let current = self.bench.sense.currents(sample.shunt_codes, self.current_offsets);
-        current.map_or(self.bench.overcurrent_square, |Stationary { alpha, beta }| {
-            alpha.0 * alpha.0 + beta.0 * beta.0
-        })
+    pub const fn square_a2(&self) -> f32 {
+        self.square_a2
     }
 
     /// Returns the command, or the end of the calibration.
@@ -325,14 +320,16 @@ impl Calibrator {
         if is_beyond && !matches!(self.stage, Stage::Scan(_) | Stage::Finished(_)) {
             return Err(Err(Refusal::Travel));
         }
-        let reading = |current_offsets| {
+        let square_a2 = &mut self.square_a2;
+        let mut reading = |current_offsets| {
             let current = self
                 .bench
                 .sense
                 .currents(sample.shunt_codes, current_offsets)
                 .ok_or(Refusal::CurrentSense)?;
             let (alpha, beta) = (current.alpha.0, current.beta.0);
-            if alpha * alpha + beta * beta > self.bench.overcurrent_square {
+            *square_a2 = alpha * alpha + beta * beta;
+            if *square_a2 > self.bench.overcurrent_square {
                 return Err(Refusal::Overcurrent);
             }
             let bus = self.bench.sense.bus(sample.bus_code);

@@ -64,7 +64,7 @@ fn the_checksum_stays_in_motion_and_differs_for_other_gains_and_limits() {
     let servo = Servo::new(joints).expect("sensible");
     let sum = servo.checksum();
     let mut derated = servo;
-    derated.derate(&[Derating::NONE; 2]);
+    derated.derate(&Derating::NONE);
     derated.restart();
     assert_eq!(derated.checksum(), sum);
     let mut changed = joints;
