@@ -5,9 +5,9 @@
 //! hides an error of the model. The leg has moved for three time constants when a fork begins.
 //!
 //! Required: the winding's share of the torque cap falls before the winding reaches its limit, and the
-//! plant's winding exceeds the limit by at most 15 degrees (1.5 at the usual time constant). A joint that is pushed against the end of its
-//! range keeps the whole cap there, until the leg is damped at the limit. Runs whose windings stay below the
-//! ramp count as undetectable.
+//! plant's winding exceeds the limit by at most 15 degrees (1.5 at the usual time constant). A joint that is
+//! pushed against the end of its range keeps the whole cap there, until the leg is damped at the limit. Runs
+//! whose windings stay below the ramp count as undetectable.
 //!
 //! Blind: the firmware's thermal resistance is a thousandth of the motor's.
 
