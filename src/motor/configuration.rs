@@ -188,7 +188,7 @@ impl Constants {
             self.counter_sign.cast_unsigned(),
             self.flexion_sign.cast_unsigned(),
             self.scale.counts_per_turn().cast_unsigned(),
-            u32::from(self.indexed),
+            u32::from(self.indexed) | u32::from(self.pole_pairs) << 8,
             self.unindexed,
         ];
         let limits = [

@@ -1,4 +1,7 @@
 //! State of one axis: off, under calibration, or running.
+//!
+//! Until an axis runs, its counter and index pulses are followed, so that a stored calibration can be checked
+//! without motion ([`IndexSearch`]).
 
 use crate::hal::{AxisCommand, AxisSample};
 use crate::leg::{Calibration, CalibrationRefusal};
@@ -10,7 +13,7 @@ use crate::safety::Bridges;
 pub enum Order {
     /// Turn the outputs off.
     Off,
-    /// Calibrate.
+    /// Calibrate, with the index that was found until now.
     Calibrate(Calibrator),
     /// Control the current.
     Run(Axis),
@@ -100,8 +103,9 @@ impl AxisState {
                 self.doing = Doing::Nothing;
                 return measuring.then_some(Outcome::Interrupted);
             }
-            Order::Calibrate(calibrator) => {
-                self.doing = Doing::Calibrating(calibrator.with_index(&self.search));
+            Order::Calibrate(mut calibrator) => {
+                calibrator.take_index(&self.search);
+                self.doing = Doing::Calibrating(calibrator);
             }
             Order::Run(axis) => *self = Self::running(axis),
             Order::Place(counts) => {

@@ -64,7 +64,8 @@ impl PowerUp {
             let end = self.stand.rotor().angle + part * TAU;
             let mut seconds = 0.0;
             while (end - self.stand.rotor().angle) * part > 0.0 {
-                let now = speed * (1.0 + 0.8 * (9.0_f64 * seconds).sin());
+                // From 0.2 to 1.8 of the speed, 1.5 times a second.
+                let now = speed * (0.2 + 3.2 * ((1.5 * seconds).fract() - 0.5).abs());
                 self.stand.set_load(Load::Turned(now * part.signum()));
                 assert_eq!(self.period(AxisRequest::OFF, &inject), None);
                 seconds += PERIOD_S;
@@ -119,9 +120,9 @@ impl PowerUp {
         }
     }
 
-    /// Runs the calibrated axis with these currents by turns, each for a second, until it is proven or finds
-    /// a fault. A hand may turn the joint instead, at a speed of the rotor in rad/s. Returns whether the angle
-    /// was proven, the fault, and the greatest speed of the rotor.
+    /// Runs the calibrated axis with these currents by turns, each for a second, until it is proven or
+    /// finds a fault. A hand may turn the joint instead, at a speed of the rotor in rad/s. Returns whether
+    /// the angle was proven, the fault, and the greatest speed of the rotor.
     fn first_motion(
         &mut self,
         found: &Calibration,

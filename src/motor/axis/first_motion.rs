@@ -19,7 +19,9 @@
 //! counted speed (0.6 rad/s).
 //!
 //! Known limits: an angle that is wrong by less than 60 degrees may count as proven. Its torque keeps the
-//! sign and at least half of the size. The watch goes on and finds smaller errors at more speed.
+//! sign and at least half of the size. The watch goes on and finds smaller errors at more speed. A motor
+//! with `L I / 4` above 1.7 flux is never proven. Where the speed limit exceeds that of braking, the outputs
+//! go off.
 
 use crate::motor::ElectricalAngle;
 use crate::real::abs;

@@ -294,7 +294,7 @@ impl Calibrator {
 
     /// Starts a calibration after a power-up. Everything is measured as by [`Self::new`] and must agree with
     /// the stored values; of these only the offset is used. Where an index search is certain
-    /// ([`Self::with_index`]), the motor stands still and the offset is not measured.
+    /// ([`Self::take_index`]), the motor stands still and the offset is not measured.
     ///
     /// # Errors As [`Self::new`]. Also [`AxisError::Encoder`] without an index, and
     /// [`AxisError::Calibration`] where the stored values belong to another configuration.
@@ -318,16 +318,13 @@ impl Calibrator {
         Self { may_stand: false, ..self }
     }
 
-    /// Takes the rotor position of an index search, if that is certain and there are stored values to check.
-    #[must_use]
-    pub fn with_index(self, search: &IndexSearch) -> Self {
-        let Bench { scale, greatest_step, direction, .. } = self.bench;
-        match search.position(&scale, greatest_step).filter(|_| self.may_stand) {
-            Some((counter, since)) => {
-                let track = Track::beyond_index(counter, direction.sign() * since);
-                Self { track, stands_at: Some(0), ..self }
-            }
-            None => self,
+    /// Takes the rotor position of an index search, before the first tick. Where that is certain and stored
+    /// values may be checked at standstill, the motor does not turn.
+    pub fn take_index(&mut self, search: &IndexSearch) {
+        let Bench { scale, greatest_step, direction, .. } = &self.bench;
+        if let Some((counter, since)) = search.position(scale, *greatest_step).filter(|_| self.may_stand) {
+            self.track = Track::beyond_index(counter, direction.sign() * since);
+            self.stands_at = Some(0);
         }
     }
 

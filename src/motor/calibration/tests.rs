@@ -313,6 +313,11 @@ fn turned_by_hand(motor: &mut TestMotor, turns: f64) -> IndexSearch {
     search
 }
 
+fn indexed(mut calibrator: Calibrator, search: &IndexSearch) -> Calibrator {
+    calibrator.take_index(search);
+    calibrator
+}
+
 /// Motor and stored calibration of the day before; the counter begins elsewhere.
 fn second_day(counter: Direction) -> (TestMotor, AxisConfiguration, StoredCalibration) {
     let encoder_sign = f64::from(counter.sign());
@@ -331,7 +336,7 @@ fn stored_values_are_confirmed_at_standstill_once_the_index_is_certain() {
         let search = turned_by_hand(&mut motor, turns);
         let calibrator = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
         let (begin, mut ticks) = (motor.angle, 0_u32);
-        let found = run_with(&mut motor, calibrator.with_index(&search), |_, _| ticks += 1).expect("sound");
+        let found = run_with(&mut motor, indexed(calibrator, &search), |_, _| ticks += 1).expect("sound");
         assert!(!found.is_proven() && found.indexed() && found.offset() == stored.offset);
         // A fifth of a second for the offsets, 0.3 s for each current, 0.1 s and a rise for each inductance.
         assert!((20_000..36_000).contains(&ticks), "{ticks}");
@@ -356,8 +361,8 @@ fn the_motor_turns_without_a_certain_index_without_stored_values_or_on_request()
     for (calibrator, turns) in [(checked, 0.6), (checked.turning(), 2.1), (anew, 2.1)] {
         let mut motor = motor.clone();
         let search = turned_by_hand(&mut motor, turns);
-        assert_eq!(calibrator.with_index(&search), calibrator);
-        let found = run(&mut motor, calibrator.with_index(&search)).expect("sound");
+        assert_eq!(indexed(calibrator, &search), calibrator);
+        let found = run(&mut motor, indexed(calibrator, &search)).expect("sound");
         assert!(found.is_proven() && offset_error_deg(&mut motor, &configuration, &found).abs() < 1.0);
     }
 }
@@ -371,7 +376,7 @@ fn a_rotor_that_moves_at_standstill_is_refused_before_it_is_far() {
         let wrong = StoredCalibration { offset: stored.offset.plus(off), ..stored };
         let calibrator = Calibrator::from_stored(&configuration, SETTINGS, wrong).expect("usual");
         let begin = motor.angle;
-        assert_eq!(run(&mut motor, calibrator.with_index(&search)), Err(Refusal::Moved), "{degrees}");
+        assert_eq!(run(&mut motor, indexed(calibrator, &search)), Err(Refusal::Moved), "{degrees}");
         let moved = (motor.angle - begin) * 7.0 / core::f64::consts::TAU;
         assert!(moved.abs() < 0.05, "{degrees}: {moved} electrical turns");
     }
@@ -382,7 +387,7 @@ fn an_index_at_another_position_during_the_check_is_refused() {
     let (mut motor, configuration, stored) = second_day(Direction::Up);
     let search = turned_by_hand(&mut motor, 2.1);
     let calibrator = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
-    let end = run_with(&mut motor, calibrator.with_index(&search), |sample, tick| {
+    let end = run_with(&mut motor, indexed(calibrator, &search), |sample, tick| {
         if tick == 15_000 {
             sample.index_count = Some(sample.encoder_count);
         }
@@ -409,7 +414,7 @@ fn wiring_that_changed_since_the_store_is_refused_at_standstill() {
         let search = turned_by_hand(&mut motor, 2.35);
         change(&mut motor);
         let calibrator = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
-        assert_eq!(run(&mut motor, calibrator.with_index(&search)), Err(refusal));
+        assert_eq!(run(&mut motor, indexed(calibrator, &search)), Err(refusal));
     }
 }
 
