@@ -62,7 +62,7 @@ impl PowerUp {
     fn turn_with(&mut self, turns: f64, speed: f64, inject: impl Fn(&mut AxisSample)) {
         for part in [-0.1 * turns.signum(), turns + 0.1 * turns.signum()] {
             let end = self.stand.rotor().angle + part * TAU;
-            let mut seconds = 0.0;
+            let mut seconds = 0.0_f64;
             while (end - self.stand.rotor().angle) * part > 0.0 {
                 // From 0.2 to 1.8 of the speed, 1.5 times a second.
                 let now = speed * (0.2 + 3.2 * ((1.5 * seconds).fract() - 0.5).abs());
