@@ -191,7 +191,7 @@ impl Session {
         self.press_start()?;
         for _ in 0..JOINTS {
             let line = self.wait("calibration", &[], CALIBRATION_S)?;
-            if field(&line, "result") != Some("done") {
+            if !matches!(field(&line, "result"), Some("done" | "confirmed")) {
                 return Err(ToolError::Refused(format!("the calibration was refused: {line}")));
             }
         }

@@ -30,6 +30,10 @@
 //! open phase and a drifted current-sensor offset turn the outputs off. A frozen counter turns the motor into
 //! a passive brake ([`Axis::brake`]), so that a leg does not drop when its encoder fails.
 //!
+//! **First motion.** After a check at standstill the rotor angle is the stored one. Until the back-EMF has
+//! agreed, current and speed are limited, and a contradiction counts as a lost rotor position
+//! (`first_motion.rs`).
+//!
 //! **Limit of braking.** A shorted motor carries `w flux / sqrt(R^2 + w^2 L^2)`. The outputs go off with an
 //! overcurrent fault where that exceeds the overcurrent bound, or where the measured current does. On the
 //! default leg the first happens above 2.5 rad/s of the joint.
@@ -54,8 +58,11 @@ use crate::hal::{AxisCommand, AxisSample, JointSample};
 use crate::real::{abs, clamp, is_finite};
 use crate::units::{Ampere, RadianPerSecond};
 
+mod first_motion;
 mod index;
 
+use first_motion::FirstMotion;
+pub(super) use first_motion::{CURRENT_SHARE as FIRST_CURRENT_SHARE, SPEED_SHARE as FIRST_SPEED_SHARE};
 use index::IndexWatch;
 
 /// Weight of a rejected shunt or bus reading. Each accepted reading subtracts one. A sum above
@@ -142,6 +149,7 @@ pub struct Axis {
     /// The model watch has not run since the bridge began to switch.
     begins: bool,
     shunt_watch: ShuntWatch,
+    first_motion: FirstMotion,
     /// Checksum of the constants at construction.
     checksum: Checksum,
     /// Calls of [`Axis::check`] since that checksum was compared; wraps at 256.
@@ -183,6 +191,11 @@ impl Axis {
             model_watch: ModelWatch::EMPTY,
             begins: true,
             shunt_watch: ShuntWatch::EMPTY,
+            first_motion: if calibration.is_proven() {
+                FirstMotion::PROVEN
+            } else {
+                FirstMotion::before(configuration.pole_pairs)
+            },
             checksum: constants.checksum(),
             unchecked: 0,
             last: AxisCommand::OFF,
@@ -238,6 +251,13 @@ impl Axis {
     #[must_use]
     pub fn fault(&self) -> Option<AxisFault> {
         self.fault
+    }
+
+    /// Whether the rotor angle was measured or has agreed with the back-EMF. Until then current and speed are
+    /// limited.
+    #[must_use]
+    pub fn is_proven(&self) -> bool {
+        !self.first_motion.is_limited()
     }
 
     /// Rotor position or parameters are lost and require a new calibration.
@@ -380,7 +400,11 @@ impl Axis {
             }
         }
         let bus = constants.sense.bus(sample.bus_code);
-        let limit = constants.current_limit;
+        let limit = if self.first_motion.is_limited() {
+            constants.first_current_limit
+        } else {
+            constants.current_limit
+        };
         let target = Ampere(clamp(wanted.0 * constants.current_sign, -limit, limit));
         let voltage = self.current_loop.voltage(
             &constants.gains,
@@ -453,10 +477,13 @@ impl Axis {
         // While braking, no commanded voltage exists to compare with.
         let follows = self.last.enabled && self.last != AxisCommand::BRAKE;
         if follows && self.fault.is_none() && self.window.ticks > 0 {
+            let angle = self.angle();
             if core::mem::take(&mut self.begins) {
                 self.model_watch = ModelWatch::EMPTY;
+                if self.first_motion.is_limited() {
+                    self.first_motion.begin(self.constants.pole_pairs, angle);
+                }
             }
-            let angle = self.angle();
             let shown = Shown {
                 current_loop: &self.current_loop,
                 current: self.measured,
@@ -464,7 +491,19 @@ impl Axis {
                 position: self.position,
                 angle,
             };
-            if let Some(fault) = self.model_watch.look(&self.constants.model, &shown) {
+            let mut found = self.model_watch.look(&self.constants.model, &shown);
+            if self.first_motion.is_limited() {
+                let model = &self.constants.model;
+                let volts = [model.back_emf(&shown), self.model_watch.residual(), model.tolerance(&shown)];
+                self.first_motion.look(self.constants.pole_pairs, angle, volts);
+                // A wrong angle looks like an open phase.
+                if found == Some(AxisFault::OpenPhase)
+                    || found.is_none() && abs(shown.speed_rad_per_s) > self.constants.first_speed
+                {
+                    found = Some(AxisFault::Encoder);
+                }
+            }
+            if let Some(fault) = found {
                 if fault == AxisFault::EncoderFrozen {
                     // The brake's speed limit needs the speed that the frozen counter did not show.
                     self.speed =

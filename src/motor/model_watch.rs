@@ -154,6 +154,21 @@ impl ModelLimits {
         Ampere(self.swing_a)
     }
 
+    /// Greatest residual of a sound axis, V.
+    #[inline(always)]
+    pub(super) fn tolerance(&self, now: &Shown<'_>) -> f32 {
+        let speed = abs(now.speed_rad_per_s);
+        let current = abs(now.current.d.0) + abs(now.current.q.0);
+        self.still_v
+            + current * (self.volt_per_ampere + self.volt_per_speed_ampere * speed)
+            + self.volt_per_speed * speed
+    }
+
+    /// Back-EMF at the counts' speed, V.
+    pub(super) fn back_emf(&self, now: &Shown<'_>) -> f32 {
+        self.back_emf_per_speed * abs(now.speed_rad_per_s)
+    }
+
     fn is_still(&self, position: i32, before: i32) -> bool {
         let distance = self.scale.within_turn(position - before);
         distance <= STANDSTILL || self.scale.counts_per_turn() - distance <= STANDSTILL
@@ -260,6 +275,11 @@ impl ModelWatch {
         self.suspicion > 0 && limits.is_still(position, self.position)
     }
 
+    /// Residual of the last period, V.
+    pub(super) fn residual(&self) -> f32 {
+        sqrt(self.square)
+    }
+
     /// Electrical speed whose back-EMF equals the last period's residual, rad/s.
     #[must_use]
     pub fn uncounted(&self, limits: &ModelLimits) -> f32 {
@@ -272,11 +292,7 @@ impl ModelWatch {
         let residual = residual(limits, now);
         let square = residual.d * residual.d + residual.q * residual.q;
         self.square = square;
-        let speed = abs(now.speed_rad_per_s);
-        let current = abs(now.current.d.0) + abs(now.current.q.0);
-        let limit = limits.still_v
-            + current * (limits.volt_per_ampere + limits.volt_per_speed_ampere * speed)
-            + limits.volt_per_speed * speed;
+        let limit = limits.tolerance(now);
         if self.suspicion == 0 {
             self.position = now.position;
         }

@@ -1,8 +1,11 @@
 //! State of one axis: off, under calibration, or running.
+//!
+//! Until an axis runs, its counter and index pulses are followed, so that a stored calibration can be checked
+//! without motion ([`IndexSearch`]).
 
 use crate::hal::{AxisCommand, AxisSample};
 use crate::leg::{Calibration, CalibrationRefusal};
-use crate::motor::{Axis, AxisFault, AxisRequest, BridgeRequest, CalibrationStep, Calibrator};
+use crate::motor::{Axis, AxisFault, AxisRequest, BridgeRequest, CalibrationStep, Calibrator, IndexSearch};
 use crate::safety::Bridges;
 
 /// Order for an axis, effective from its next tick.
@@ -10,7 +13,7 @@ use crate::safety::Bridges;
 pub enum Order {
     /// Turn the outputs off.
     Off,
-    /// Calibrate.
+    /// Calibrate, with the index that was found until now.
     Calibrate(Calibrator),
     /// Control the current.
     Run(Axis),
@@ -53,16 +56,18 @@ pub struct AxisState {
     doing: Doing,
     /// Fault that was already reported.
     faulted: Option<AxisFault>,
+    /// Index pulses since the axis was last calibrated, for the next calibration.
+    search: IndexSearch,
 }
 
 impl AxisState {
     /// Initial state: outputs off.
-    pub const OFF: Self = Self { doing: Doing::Nothing, faulted: None };
+    pub const OFF: Self = Self { doing: Doing::Nothing, faulted: None, search: IndexSearch::EMPTY };
 
     /// A running axis that was calibrated elsewhere.
     #[must_use]
     pub const fn running(axis: Axis) -> Self {
-        Self { doing: Doing::Running(axis), faulted: None }
+        Self { doing: Doing::Running(axis), ..Self::OFF }
     }
 
     /// Returns whether the axis has a calibration.
@@ -108,7 +113,10 @@ impl AxisState {
                 self.doing = Doing::Nothing;
                 return measuring.then_some(Outcome::Interrupted);
             }
-            Order::Calibrate(calibrator) => self.doing = Doing::Calibrating(calibrator),
+            Order::Calibrate(mut calibrator) => {
+                calibrator.take_index(&self.search);
+                self.doing = Doing::Calibrating(calibrator);
+            }
             Order::Run(axis) => *self = Self::running(axis),
             Order::Place(counts) => {
                 if let Some(axis) = self.axis_mut() {
@@ -135,6 +143,8 @@ impl AxisState {
     #[cold]
     #[inline(never)]
     pub fn stood_still(&mut self, sample: &AxisSample, long: bool) -> bool {
+        // Counter and index of an axis that is not calibrated may have missed a pulse.
+        self.search = IndexSearch::EMPTY;
         let axis = self.axis_mut();
         axis.map(|axis| axis.resume(sample, long)).is_some()
     }
@@ -149,13 +159,22 @@ impl AxisState {
         target: AxisRequest,
     ) -> (AxisCommand, Option<(Outcome, bool)>) {
         match &mut self.doing {
-            Doing::Nothing => (AxisCommand::OFF, None),
-            Doing::Calibrating(_) if bridges != Bridges::Follow => self.end(Outcome::Interrupted),
-            Doing::Calibrating(calibrator) => match calibrator.tick(sample) {
-                CalibrationStep::Running(command) => (command, None),
-                CalibrationStep::Done(calibration) => self.end(Outcome::Calibrated(calibration)),
-                CalibrationStep::Refused(refusal) => self.end(Outcome::Refused(refusal)),
-            },
+            Doing::Nothing => {
+                self.search.follow(sample);
+                (AxisCommand::OFF, None)
+            }
+            Doing::Calibrating(calibrator) => {
+                // An interrupted check at standstill can be repeated at once.
+                self.search.follow(sample);
+                if bridges != Bridges::Follow {
+                    return self.end(Outcome::Interrupted);
+                }
+                match calibrator.tick(sample) {
+                    CalibrationStep::Running(command) => (command, None),
+                    CalibrationStep::Done(calibration) => self.end(Outcome::Calibrated(calibration)),
+                    CalibrationStep::Refused(refusal) => self.end(Outcome::Refused(refusal)),
+                }
+            }
             Doing::Running(running) => {
                 let request = match bridges {
                     Bridges::Follow => target.into(),

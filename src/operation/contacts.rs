@@ -51,7 +51,7 @@ pub struct Situation {
 pub enum OperatorRequest {
     /// A step of the drive's power states.
     Power(PowerRequest),
-    /// Measure both axes; the motors turn.
+    /// Calibrate both axes. The motors turn, unless stored values can be checked at standstill.
     Calibrate,
     /// Turn the bridges off and end the calibration.
     EndCalibration,

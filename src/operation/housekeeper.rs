@@ -9,7 +9,13 @@
 //!
 //! An axis with a stored calibration is checked against it. Everything is measured again, and resistance,
 //! inductances and offset have to agree. If one does not, the axis is refused with a record, and its next
-//! calibration measures everything again.
+//! calibration measures everything again. Once the joint was turned over its index by hand, the check needs
+//! no motion and cannot measure the offset.
+//!
+//! If the rotor moves during such a check, a push cannot be told from a wrong offset or index. So the stored
+//! values stay, but the next calibration turns the motor and measures the offset against them. The same holds
+//! after a lost rotor position. A push thus costs one calibration in motion, and no check at standstill
+//! follows another one that failed.
 //!
 //! A reset takes 24 ms. Gate drivers are turned off and on and configured again; then faults are cleared, and
 //! those that still hold come back. Until then the registers are not checked and contacts are ignored;
@@ -86,6 +92,8 @@ pub struct Housekeeper<const N: usize> {
     calibrated: [bool; N],
     /// Stored calibrations, checked at the motor instead of measured again.
     stored: [Option<StoredCalibration>; N],
+    /// Axes whose next calibration has to turn the motor.
+    turning: [bool; N],
     /// The axis that is being calibrated.
     calibrating: Option<usize>,
     /// Joints that must stand still for the reference, and which of them have.
@@ -112,6 +120,7 @@ impl<const N: usize> Housekeeper<N> {
             operator: Operator::default(),
             calibrated: [false; N],
             stored: [None; N],
+            turning: [false; N],
             calibrating: None,
             reference: None,
             placed: false,
@@ -266,17 +275,28 @@ impl<const N: usize> Housekeeper<N> {
         match outcome {
             Outcome::Calibrated(calibration) => {
                 level.record(found(joint, calibration));
-                let _ = level.ends.calibrated.enqueue((axis, calibration.stored()));
+                // A check at standstill changes nothing that is stored.
+                let stored = if calibration.is_proven() {
+                    calibration.stored()
+                } else {
+                    self.stored.get(axis).copied().flatten()
+                };
+                let _ = level.ends.calibrated.enqueue((axis, stored));
+                self.must_turn(axis, false);
                 self.run_axis(axis, calibration, level);
             }
             Outcome::Refused(refusal) => {
                 let (result, number) = words::calibration(*refusal);
                 level.record(refused(joint, result, number));
                 self.calibrating = None;
+                use CalibrationRefusal::{Load, Moved, Travel, Turning};
+                if matches!(refusal, Moved) {
+                    self.must_turn(axis, true);
+                }
                 // The stored calibration does not fit the motor or its mounting: measure again next time. A
-                // load says nothing about it.
-                let is_load = matches!(refusal, CalibrationRefusal::Load(_) | CalibrationRefusal::Travel);
-                if let Some(stored) = self.stored.get_mut(axis).filter(|_| !is_load) {
+                // load or a hand says nothing about it.
+                let is_pushed = matches!(refusal, Load(_) | Moved | Travel | Turning);
+                if let Some(stored) = self.stored.get_mut(axis).filter(|_| !is_pushed) {
                     *stored = None;
                 }
             }
@@ -293,6 +313,7 @@ impl<const N: usize> Housekeeper<N> {
                 level.record(Record::AxisFault { tick: self.round, joint, name: words::axis_fault(*fault) });
                 if *lost {
                     self.forget_zeros(level);
+                    self.must_turn(axis, true);
                     if let Some(calibrated) = self.calibrated.get_mut(axis) {
                         *calibrated = false;
                     }
@@ -302,6 +323,13 @@ impl<const N: usize> Housekeeper<N> {
                     }
                 }
             }
+        }
+    }
+
+    /// Sets whether the next calibration of an axis has to turn its motor.
+    fn must_turn(&mut self, axis: usize, turns: bool) {
+        if let Some(turning) = self.turning.get_mut(axis) {
+            *turning = turns;
         }
     }
 
@@ -340,6 +368,7 @@ impl<const N: usize> Housekeeper<N> {
     fn calibrate(&mut self, axis: usize, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         let settings = self.settings.axes.get(axis).zip(self.settings.calibration.get(axis));
         let stored = self.stored.get(axis).copied().flatten();
+        let turns = self.turning.get(axis).is_some_and(|turns| *turns);
         let calibrator = settings.map(|(axis, settings)| match stored {
             // A calibration for another configuration is not used.
             Some(stored) => {
@@ -350,6 +379,7 @@ impl<const N: usize> Housekeeper<N> {
         match calibrator {
             Some(Ok(calibrator)) => {
                 self.calibrating = Some(axis);
+                let calibrator = if turns { calibrator.turning() } else { calibrator };
                 level.order(axis, Order::Calibrate(calibrator));
             }
             _ => level.signals.inhibit.raise(InhibitReason::Configuration),
@@ -464,7 +494,7 @@ fn found<const N: usize>(joint: u8, calibration: &Calibration) -> Record<N> {
     let [zero_b, zero_c] = calibration.current_offsets();
     Record::Calibration {
         joint,
-        result: "done",
+        result: if calibration.is_proven() { "done" } else { "confirmed" },
         number: 0,
         resistance_ohm: calibration.resistance().0,
         direct_h: calibration.direct_inductance().0,

@@ -154,6 +154,7 @@ pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
         Why::NoIndex => ("no_index", 0),
         Why::IndexMoved => ("index_moved", 0),
         Why::StoredOffset => ("stored_offset", 0),
+        Why::Moved => ("moved", 0),
     }
 }
 

@@ -129,7 +129,7 @@ pub fn wrong(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErro
     session.press_start()?;
     for joint in 0..=axis {
         let line = session.wait("calibration", &[], CALIBRATION_S)?;
-        let done = field(&line, "result") == Some("done");
+        let done = matches!(field(&line, "result"), Some("done" | "confirmed"));
         if done == (joint == axis) {
             return Ok(Err(format!("way {way} of axis {axis}: {line}")));
         }

@@ -135,9 +135,13 @@ impl Stand {
         }
     }
 
-    /// Changes the load.
+    /// Changes the load. A gear begins at rest, with its leg at the start.
     pub fn set_load(&mut self, load: Load) {
         self.load = load;
+        if matches!(load, Load::Geared(_)) {
+            (self.begin, self.joint, self.periods) = (self.rotor.angle, Rotor::default(), 0);
+            self.rotor.speed = 0.0;
+        }
     }
 
     /// Breaks the wire of an output (A, B, C from 0).

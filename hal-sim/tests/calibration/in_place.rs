@@ -22,7 +22,7 @@ const SETTINGS: CalibrationSettings = CalibrationSettings {
 
 /// A motor like those of the default leg, with gear and leg. `load` is gravity's torque at the start as a
 /// share of what the current holds; `None` for any up to 0.6.
-fn geared(seed: u64, load: Option<f64>) -> Trial {
+pub fn geared(seed: u64, load: Option<f64>) -> Trial {
     let mut trial = Trial::sound(seed);
     let mut random = TestRandom::new(seed + 1_000_000);
     let motor = &mut trial.axis.motor;

@@ -5,6 +5,7 @@ use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{AxisConfiguration, DeadTime, Direction};
 use crate::units::{Volt, Weber};
 
+mod first_motion;
 mod index;
 mod watches;
 

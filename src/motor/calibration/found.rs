@@ -39,6 +39,8 @@ pub struct Calibration {
     pub(super) counter: u16,
     pub(super) position: i32,
     pub(super) indexed: bool,
+    /// The motor has turned, so the offset was measured.
+    pub(super) proven: bool,
 }
 
 /// Part of a calibration stored while the power is off: positions relative to the index.
@@ -67,6 +69,13 @@ impl Calibration {
     #[must_use]
     pub fn indexed(&self) -> bool {
         self.indexed
+    }
+
+    /// Whether the offset was measured with the motor turning. Otherwise it is the stored one, and
+    /// [`Axis`](crate::motor::Axis) limits the first motion.
+    #[must_use]
+    pub fn is_proven(&self) -> bool {
+        self.proven
     }
 
     /// Current-sensor offsets: shunt codes without current.

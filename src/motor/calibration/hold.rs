@@ -4,6 +4,10 @@
 //! v += k (i_target - i . n),   v n the voltage,   k = 10 V/(A s)
 //! ```
 //!
+//! Along the axis of a phase the current across must show a wrong wiring, so only the current along is
+//! controlled. Along any other angle dead time bends the current: up to 1.8 A for 50 mOhm at 48 V. A straight
+//! hold therefore also controls the current across to zero.
+//!
 //! Integral control alone is slow and needs neither R nor L. With them its damping is R / (2 sqrt(k L)): 1.6
 //! for 50 mOhm and 25 uH, above 0.3 down to 10 mOhm. The target rises in 50 ms.
 
@@ -20,11 +24,19 @@ pub(super) struct Hold {
     axis: Rotation,
     target_a: f32,
     volts: f32,
+    /// Voltage across the angle; zero unless the current is kept straight.
+    across_v: f32,
+    straight: bool,
 }
 
 impl Hold {
     pub(super) fn along(angle: ElectricalAngle) -> Self {
-        Self { axis: angle.rotation(), target_a: 0.0, volts: 0.0 }
+        Self { axis: angle.rotation(), target_a: 0.0, volts: 0.0, across_v: 0.0, straight: false }
+    }
+
+    /// Holds the current along any angle, and none across it.
+    pub(super) fn straight_along(angle: ElectricalAngle) -> Self {
+        Self { straight: true, ..Self::along(angle) }
     }
 
     /// Runs one tick: moves the target towards `target` and adapts the voltage. The target's slope follows
@@ -35,7 +47,10 @@ impl Hold {
         let rise = reading.bench.settings.current.0 * RISE_PER_TICK;
         self.target_a += (target.0 - self.target_a).max(-rise).min(rise);
         self.volts += INTEGRAL_V_PER_A * (self.target_a - self.along_axis(reading.current).0);
-        if self.volts.abs() > reading.bench.settings.voltage.0 {
+        if self.straight {
+            self.across_v -= INTEGRAL_V_PER_A * self.across_axis(reading.current).0;
+        }
+        if self.volts.abs().max(self.across_v.abs()) > reading.bench.settings.voltage.0 {
             return Err(Refusal::MotorConstants);
         }
         Ok(())
@@ -66,6 +81,6 @@ impl Hold {
 
     /// The holding voltage plus components along and across the angle.
     pub(super) fn voltage_with(&self, along: Volt, across: Volt) -> Stationary<Volt> {
-        super::Rotating { d: self.volts() + along, q: across }.to_stationary(self.axis)
+        super::Rotating { d: self.volts() + along, q: Volt(self.across_v) + across }.to_stationary(self.axis)
     }
 }

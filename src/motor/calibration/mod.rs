@@ -8,6 +8,17 @@
 //!    -> Calibration
 //! ```
 //!
+//! After a power-up with stored values, and once the joint was turned by hand over its index
+//! ([`IndexSearch`]), the rotor's angle is known and nothing has to turn:
+//!
+//! ```text
+//! current-sensor offsets (bridge off) -> resistance along the rotor's flux -> inductances there
+//!    -> Calibration with the stored offset, unproven until the motor has turned
+//! ```
+//!
+//! A current along the flux makes no torque. A rotor that moves all the same is refused, and the next
+//! calibration has to turn the motor ([`Calibrator::turning`]).
+//!
 //! Why here and nowhere else: an [`super::Axis`] cannot be made without a [`Calibration`], and a
 //! [`Calibration`] has no constructor but the end of a [`Calibrator`]. Until then the motor receives voltages
 //! along angles that the state machine chooses. Only the refinement, after direction and counts were found
@@ -29,6 +40,7 @@
 //! | load too large | torque while the rotor turns | [`Refusal::Load`] |
 //! | rotor torn away by a load, or too long a path | travel | [`Refusal::Travel`] |
 //! | encoder moved on its shaft since it was stored | offset at the index | [`Refusal::StoredOffset`] |
+//! | wrong stored offset or index, or a push | travel at standstill | [`Refusal::Moved`] |
 //! | not the stored motor | resistance, inductances | [`Refusal::OtherMotor`] |
 //!
 //! Nothing is corrected silently. Exchanged motor leads and an exchanged encoder look alike here: the counter
@@ -60,6 +72,7 @@ mod refine;
 mod refusal;
 mod resistance;
 mod scan;
+mod search;
 mod track;
 
 use super::configuration::{AxisConfiguration, AxisError, Direction};
@@ -79,6 +92,7 @@ pub use refusal::{Phase, Refusal};
 use resistance::ResistanceStage;
 pub use scan::ALIGNMENT_TURNS;
 use scan::Scan;
+pub use search::IndexSearch;
 pub(super) use track::INDEX_WIDTH;
 use track::Track;
 
@@ -121,6 +135,8 @@ struct Bench {
     direction: Direction,
     index: bool,
     encoder: EncoderSetting,
+    /// Greatest plausible step of the counter in a period.
+    greatest_step: i32,
     bus_codes: [u16; 2],
     overcurrent_square: f32,
     flux: Weber,
@@ -214,6 +230,10 @@ enum Stage {
 pub struct Calibrator {
     bench: Bench,
     stored: Option<StoredCalibration>,
+    /// Stored values may be checked at standstill.
+    may_stand: bool,
+    /// Travel at which the field was laid along the flux; `None` where the motor turns.
+    stands_at: Option<i32>,
     current_offsets: [f32; 2],
     square_a2: f32,
     resistance: Ohm,
@@ -253,6 +273,7 @@ impl Calibrator {
             direction: configuration.counter,
             index: configuration.index,
             encoder: EncoderSetting::of(configuration),
+            greatest_step: configuration.greatest_step()?,
             bus_codes: configuration.bus_codes(),
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
             flux: configuration.flux,
@@ -261,6 +282,8 @@ impl Calibrator {
         Ok(Self {
             bench,
             stored: None,
+            may_stand: false,
+            stands_at: None,
             current_offsets: [0.0; 2],
             square_a2: 0.0,
             resistance: Ohm::ZERO,
@@ -272,7 +295,8 @@ impl Calibrator {
     }
 
     /// Starts a calibration after a power-up. Everything is measured as by [`Self::new`] and must agree with
-    /// the stored values; of these only the offset is used.
+    /// the stored values; of these only the offset is used. Where an index search is certain
+    /// ([`Self::take_index`]), the motor stands still and the offset is not measured.
     ///
     /// # Errors As [`Self::new`]. Also [`AxisError::Encoder`] without an index, and
     /// [`AxisError::Calibration`] where the stored values belong to another configuration.
@@ -287,7 +311,31 @@ impl Calibrator {
         if stored.encoder != EncoderSetting::of(configuration) {
             return Err(AxisError::Calibration);
         }
-        Ok(Self { stored: Some(stored), ..Self::new(configuration, settings)? })
+        Ok(Self { stored: Some(stored), may_stand: true, ..Self::new(configuration, settings)? })
+    }
+
+    /// Forbids a check at standstill: the motor turns, whatever an index search has found.
+    #[must_use]
+    pub fn turning(self) -> Self {
+        Self { may_stand: false, ..self }
+    }
+
+    /// Takes the rotor position of an index search, before the first tick. Where that is certain and stored
+    /// values may be checked at standstill, the motor does not turn.
+    pub fn take_index(&mut self, search: &IndexSearch) {
+        let Bench { scale, greatest_step, direction, .. } = &self.bench;
+        if let Some((counter, since)) = search.position(scale, *greatest_step).filter(|_| self.may_stand) {
+            self.track = Track::beyond_index(counter, direction.sign() * since);
+            self.stands_at = Some(0);
+        }
+    }
+
+    /// Electrical angle at travel zero by the stored offset, where the motor stands still and its index is
+    /// known.
+    fn offset_at_standstill(&self) -> Option<ElectricalAngle> {
+        self.stands_at?;
+        let index = self.track.index?;
+        Some(self.stored?.offset.plus(self.bench.angle(0)).minus(self.bench.angle(index)))
     }
 
     /// Runs one PWM period.
@@ -320,6 +368,14 @@ impl Calibrator {
         if is_beyond && !matches!(self.stage, Stage::Scan(_) | Stage::Finished(_)) {
             return Err(Err(Refusal::Travel));
         }
+        let moved = self.stands_at.map_or(0.0, |at| self.bench.electrical(self.track.way.wrapping_sub(at)));
+        if moved.abs() > GREATEST_MOTION {
+            match self.stage {
+                Stage::CurrentOffsets(_) => return Err(Err(Refusal::Turning)),
+                Stage::Resistance(_) | Stage::Inductance(_) => return Err(Err(Refusal::Moved)),
+                Stage::Scan(_) | Stage::Refine(_) | Stage::Finished(_) => {}
+            }
+        }
         let square_a2 = &mut self.square_a2;
         let mut reading = |current_offsets| {
             let current = self
@@ -340,7 +396,7 @@ impl Calibrator {
             Stage::CurrentOffsets(stage) => {
                 if let Some(found) = stage.tick(sample).map_err(Err)? {
                     self.current_offsets = found;
-                    self.stage = Stage::Resistance(ResistanceStage::default());
+                    self.stage = Stage::Resistance(self.resistance_stage());
                 }
                 Ok(AxisCommand::OFF)
             }
@@ -365,6 +421,9 @@ impl Calibrator {
                     Outcome::Passed((seen, hold)) => {
                         let command = reading.command(hold.voltage());
                         (self.seen, self.seen_at) = (seen, self.track.way);
+                        if let Some(found) = self.at_standstill() {
+                            return Err(self.passed(&found, sample));
+                        }
                         self.stage = self.scan(hold).map_err(Err)?;
                         Ok(command)
                     }
@@ -401,6 +460,21 @@ impl Calibrator {
             Some((stored, found)) if !((found - stored).abs() <= share * stored) => Err(Refusal::OtherMotor),
             _ => Ok(()),
         }
+    }
+
+    /// Resistance stage along the phases, or along the known flux of a rotor that stands still.
+    fn resistance_stage(&mut self) -> ResistanceStage {
+        let way = self.track.way;
+        let Some(offset) = self.offset_at_standstill() else { return ResistanceStage::default() };
+        self.stands_at = Some(way);
+        ResistanceStage::along_flux(self.bench.angle(way).plus(offset))
+    }
+
+    /// Results at standstill: the stored offset, and the inductances seen from the held current.
+    fn at_standstill(&self) -> Option<Refined> {
+        let offset = self.offset_at_standstill()?;
+        let ahead = self.bench.angle(self.stands_at?).minus(self.bench.angle(self.seen_at));
+        Some(Refined { offset, inductances: self.seen.along_flux(ahead) })
     }
 
     fn scan(&self, hold: Hold) -> Result<Stage, Refusal> {
@@ -444,6 +518,7 @@ impl Calibrator {
             counter: sample.encoder_count,
             position: self.bench.scale.within_turn(self.track.way.wrapping_sub(index)),
             indexed: self.bench.index,
+            proven: self.stands_at.is_none(),
         })
     }
 }
@@ -456,6 +531,9 @@ fn across(configuration: &AxisConfiguration, along: Ampere) -> f32 {
 
 /// Current that holds and drags the rotor, over the calibration's.
 pub const STRONG_SHARE: f32 = 1.25;
+/// Greatest travel of a rotor whose flux the field lies along, electrical turns: 11 degrees. A stored offset
+/// that is 5 degrees off, as permitted, moves a rotor without friction by 5.
+const GREATEST_MOTION: f32 = 1.0 / 32.0;
 /// Greatest difference of measured and stored offset, electrical turns.
 const GREATEST_STORED_ERROR: f32 = 5.0 / 360.0;
 /// Longest current vector of the refinement over the calibration's current, with a margin: the direct

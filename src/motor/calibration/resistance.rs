@@ -22,6 +22,10 @@
 //! **From axis to axis** the voltage turns slowly and its size stays, so that a loaded rotor is never
 //! released. Sensors decide only when it stands along the next axis.
 //!
+//! **Along the flux** ([`ResistanceStage::along_flux`]) of a rotor at a known angle the current makes no
+//! torque. One axis suffices there, and the current across is controlled to zero. A wrong wiring is refused,
+//! but only an open phase by name: the calibration in motion excluded the others before it was stored.
+//!
 //! While the rotor swings towards the field, its back-EMF adds to the voltage along it. So means of 0.1 s are
 //! taken until two in a row agree to 0.2 %. That takes 0.3 to 4 s, twice per axis.
 
@@ -65,6 +69,8 @@ pub(super) struct ResistanceStage {
     before: Option<Sums>,
     low: Sums,
     found: [f32; 3],
+    /// Angle of the rotor's flux, if the current flows along that alone.
+    flux: Option<ElectricalAngle>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +99,7 @@ impl Default for ResistanceStage {
             before: None,
             low: Sums::default(),
             found: [0.0; 3],
+            flux: None,
         }
     }
 }
@@ -106,6 +113,11 @@ fn angle_of(phase: Phase) -> ElectricalAngle {
 }
 
 impl ResistanceStage {
+    /// Measures along the flux of a rotor at this angle only.
+    pub(super) fn along_flux(angle: ElectricalAngle) -> Self {
+        Self { axis: AXES.len() - 1, hold: Hold::straight_along(angle), flux: Some(angle), ..Self::default() }
+    }
+
     pub(super) fn tick(&mut self, reading: &Reading<'_>) -> Result<Outcome<(Ohm, Hold)>, Refusal> {
         let low = reading.bench.settings.current;
         let full = low * STRONG_SHARE;
@@ -115,8 +127,10 @@ impl ResistanceStage {
         }
         let target = if self.level == Level::Low { low } else { full };
         let held = self.hold.tick(reading, target);
-        if self.hold.along_axis(reading.current) < full * -JUDGED_SHARE {
-            return Err(diagnosis(reading.current, phase));
+        let is_bent =
+            self.flux.is_some() && self.hold.across_axis(reading.current).abs() > full * JUDGED_SHARE;
+        if is_bent || self.hold.along_axis(reading.current) < full * -JUDGED_SHARE {
+            return Err(self.diagnosis(reading.current, phase));
         }
         held.map_err(|reason| self.without_current(reading, phase, reason))?;
         self.ticks += 1;
@@ -191,8 +205,11 @@ impl ResistanceStage {
         if !reached || !(i2 > 1.1 * i1) {
             return Err(Refusal::TimeOut);
         }
-        if let Some(found) = self.found.get_mut(self.axis) {
-            *found = (settled.volts - self.low.volts) / (i2 - i1);
+        let resistance = (settled.volts - self.low.volts) / (i2 - i1);
+        if self.flux.is_some() {
+            self.found = [resistance; 3];
+        } else if let Some(found) = self.found.get_mut(self.axis) {
+            *found = resistance;
         }
         Ok(())
     }
@@ -212,9 +229,17 @@ impl ResistanceStage {
     fn without_current(&self, reading: &Reading<'_>, phase: Phase, reason: Refusal) -> Refusal {
         let current = self.hold.along_axis(reading.current).abs();
         if current < reading.bench.settings.current * NO_CURRENT_SHARE {
-            Refusal::PhaseOpen(phase)
+            Refusal::PhaseOpen(self.flux.map_or(phase, nearest))
         } else {
-            reason
+            self.flux.and_then(|flux| silent_phase(reading.current, flux)).map_or(reason, Refusal::PhaseOpen)
+        }
+    }
+
+    /// Cause of a bent current along the hold's axis, that of `phase` or the flux.
+    fn diagnosis(&self, current: Stationary<Ampere>, phase: Phase) -> Refusal {
+        match self.flux {
+            None => diagnosis(current, phase),
+            Some(angle) => silent_phase(current, angle).map_or(Refusal::CurrentDirection, Refusal::PhaseOpen),
         }
     }
 
@@ -222,7 +247,7 @@ impl ResistanceStage {
     /// that swings towards the field bends the current as well.
     fn judge_direction(&self, current: Stationary<Ampere>, phase: Phase) -> Result<(), Refusal> {
         let (along, across) = (self.hold.along_axis(current), self.hold.across_axis(current));
-        if across.abs() <= along * GREATEST_BEND { Ok(()) } else { Err(diagnosis(current, phase)) }
+        if across.abs() <= along * GREATEST_BEND { Ok(()) } else { Err(self.diagnosis(current, phase)) }
     }
 }
 
@@ -244,6 +269,33 @@ fn diagnosis(current: Stationary<Ampere>, phase: Phase) -> Refusal {
         [_, false, true] => Refusal::ShuntInverted(Phase::C),
         [_, false, false] => Refusal::CurrentDirection,
     }
+}
+
+/// Phases with the current that each carries of one ampere along an angle.
+fn shares(angle: ElectricalAngle) -> [(Phase, f32); 3] {
+    let along = super::Rotating { d: Ampere(1.0), q: Ampere::ZERO };
+    let shares = along.to_stationary(angle.rotation()).to_phases();
+    [(Phase::A, shares.a.0), (Phase::B, shares.b.0), (Phase::C, shares.c.0)]
+}
+
+/// Phase whose axis lies nearest to an angle.
+fn nearest(angle: ElectricalAngle) -> Phase {
+    let larger =
+        |one: (Phase, f32), other: (Phase, f32)| if other.1.abs() > one.1.abs() { other } else { one };
+    shares(angle).into_iter().fold((Phase::A, 0.0), larger).0
+}
+
+/// Phase that should carry current along an angle and does not.
+fn silent_phase(current: Stationary<Ampere>, angle: ElectricalAngle) -> Option<Phase> {
+    let currents = current.to_phases();
+    let currents = [currents.a.0, currents.b.0, currents.c.0];
+    let largest = currents.iter().fold(0.0_f32, |largest, current| largest.max(current.abs()));
+    let mut phases = shares(angle).into_iter().zip(currents);
+    phases
+        .find(|((_, share), current)| {
+            share.abs() > 2.0 * NO_CURRENT_SHARE && current.abs() < NO_CURRENT_SHARE * largest
+        })
+        .map(|((phase, _), _)| phase)
 }
 
 /// Saw tooth between -0.5 and 0.5.

@@ -58,6 +58,12 @@ pub(crate) fn calibrate(
     run(motor, Calibrator::new(configuration, SETTINGS).expect("usual"))
 }
 
+/// A calibration as a check at standstill leaves it, with an offset that is so many degrees off.
+pub(crate) fn unproven(found: &Calibration, degrees: f32) -> Calibration {
+    let off = ElectricalAngle::from_turns(degrees / 360.0);
+    Calibration { offset: found.offset.plus(off), proven: false, ..*found }
+}
+
 /// Error of the offset found, electrical degrees.
 fn offset_error_deg(motor: &mut TestMotor, configuration: &AxisConfiguration, found: &Calibration) -> f64 {
     let scale = configuration.scale().expect("usual");
@@ -291,6 +297,124 @@ fn what_is_stored_excuses_no_wrong_wiring() {
         change(&mut motor);
         let calibrator = Calibrator::from_stored(&CONFIGURATION, SETTINGS, stored).expect("usual");
         assert_eq!(run(&mut motor, calibrator), Err(reason));
+    }
+}
+
+/// A hand turns the rotor by so many turns with the bridge off; returns what the search saw.
+fn turned_by_hand(motor: &mut TestMotor, turns: f64) -> IndexSearch {
+    let mut search = IndexSearch::EMPTY;
+    (motor.driven, motor.speed) = (true, 40.0 * turns.signum());
+    let end = motor.angle + turns * core::f64::consts::TAU;
+    while (end - motor.angle) * turns > 0.0 {
+        search.follow(&motor.period(AxisCommand::OFF));
+    }
+    (motor.driven, motor.speed) = (false, 0.0);
+    search.follow(&motor.period(AxisCommand::OFF));
+    search
+}
+
+fn indexed(mut calibrator: Calibrator, search: &IndexSearch) -> Calibrator {
+    calibrator.take_index(search);
+    calibrator
+}
+
+/// Motor and stored calibration of the day before; the counter begins elsewhere.
+fn second_day(counter: Direction) -> (TestMotor, AxisConfiguration, StoredCalibration) {
+    let encoder_sign = f64::from(counter.sign());
+    let configuration = AxisConfiguration { counter, ..CONFIGURATION };
+    let first = TestMotor { encoder_sign, ..TestMotor::default() };
+    let stored = calibrate(&mut first.clone(), &configuration).expect("sound").stored().expect("an index");
+    let encoder_zero = first.encoder_zero + 3.0;
+    let random = TestRandom::new(7);
+    (TestMotor { encoder_zero, angle: first.angle + 11.0, random, ..first }, configuration, stored)
+}
+
+#[test]
+fn stored_values_are_confirmed_at_standstill_once_the_index_is_certain() {
+    for (counter, turns) in [(Direction::Up, 2.1), (Direction::Up, -2.1), (Direction::Down, 2.6)] {
+        let (mut motor, configuration, stored) = second_day(counter);
+        let search = turned_by_hand(&mut motor, turns);
+        let calibrator = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
+        let (begin, mut ticks) = (motor.angle, 0_u32);
+        let found = run_with(&mut motor, indexed(calibrator, &search), |_, _| ticks += 1).expect("sound");
+        assert!(!found.is_proven() && found.indexed() && found.offset() == stored.offset);
+        // A fifth of a second for the offsets, 0.3 s for each current, 0.1 s and a rise for each inductance.
+        assert!((20_000..36_000).contains(&ticks), "{ticks}");
+        let moved = (motor.angle - begin) * 7.0 / core::f64::consts::TAU;
+        assert!(moved.abs() < 0.005, "{moved} electrical turns");
+        let error = offset_error_deg(&mut motor, &configuration, &found);
+        assert!(error.abs() < 1.0, "{error} degrees");
+        let shares = [
+            found.resistance().0 / stored.resistance.0,
+            found.direct_inductance().0 / stored.direct_inductance.0,
+            found.quadrature_inductance().0 / stored.quadrature_inductance.0,
+        ];
+        assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.04 && *share != 1.0), "{shares:?}");
+    }
+}
+
+#[test]
+fn the_motor_turns_without_a_certain_index_without_stored_values_or_on_request() {
+    let (motor, configuration, stored) = second_day(Direction::Up);
+    let checked = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
+    let anew = Calibrator::new(&configuration, SETTINGS).expect("usual");
+    for (calibrator, turns) in [(checked, 0.6), (checked.turning(), 2.1), (anew, 2.1)] {
+        let mut motor = motor.clone();
+        let search = turned_by_hand(&mut motor, turns);
+        assert_eq!(indexed(calibrator, &search), calibrator);
+        let found = run(&mut motor, indexed(calibrator, &search)).expect("sound");
+        assert!(found.is_proven() && offset_error_deg(&mut motor, &configuration, &found).abs() < 1.0);
+    }
+}
+
+#[test]
+fn a_rotor_that_moves_at_standstill_is_refused_before_it_is_far() {
+    for degrees in [30.0, -60.0, 90.0, 150.0] {
+        let (mut motor, configuration, stored) = second_day(Direction::Up);
+        let search = turned_by_hand(&mut motor, 2.1);
+        let off = ElectricalAngle::from_turns(degrees / 360.0);
+        let wrong = StoredCalibration { offset: stored.offset.plus(off), ..stored };
+        let calibrator = Calibrator::from_stored(&configuration, SETTINGS, wrong).expect("usual");
+        let begin = motor.angle;
+        assert_eq!(run(&mut motor, indexed(calibrator, &search)), Err(Refusal::Moved), "{degrees}");
+        let moved = (motor.angle - begin) * 7.0 / core::f64::consts::TAU;
+        assert!(moved.abs() < 0.05, "{degrees}: {moved} electrical turns");
+    }
+}
+
+#[test]
+fn an_index_at_another_position_during_the_check_is_refused() {
+    let (mut motor, configuration, stored) = second_day(Direction::Up);
+    let search = turned_by_hand(&mut motor, 2.1);
+    let calibrator = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
+    let end = run_with(&mut motor, indexed(calibrator, &search), |sample, tick| {
+        if tick == 15_000 {
+            sample.index_count = Some(sample.encoder_count);
+        }
+    });
+    assert_eq!(end, Err(Refusal::IndexMoved));
+}
+
+#[test]
+fn wiring_that_changed_since_the_store_is_refused_at_standstill() {
+    let changes: [(Change, Refusal); 7] = [
+        // The pattern of signs is not that of a phase's axis.
+        (|motor| motor.shunts = |[b, c]| [c, b], Refusal::PhaseOpen(Phase::C)),
+        (|motor| motor.shunts = |[b, c]| [-b, c], Refusal::CurrentDirection),
+        (|motor| motor.shunts = |[b, c]| [-b, -c], Refusal::CurrentDirection),
+        // The current of two phases turns the rotor before its bend is judged.
+        (|motor| motor.open = true, Refusal::Moved),
+        (|motor| motor.shunts = |[_, c]| [0.0, c], Refusal::Moved),
+        // The counter jumps to zero and stays there.
+        (|motor| motor.encoder_dead = true, Refusal::Turning),
+        (|motor| motor.bus = 12.0, Refusal::BusVoltage),
+    ];
+    for (change, refusal) in changes {
+        let (mut motor, configuration, stored) = second_day(Direction::Up);
+        let search = turned_by_hand(&mut motor, 2.35);
+        change(&mut motor);
+        let calibrator = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
+        assert_eq!(run(&mut motor, indexed(calibrator, &search)), Err(refusal));
     }
 }
 

@@ -27,6 +27,11 @@ pub(super) struct Track {
 }
 
 impl Track {
+    /// Starts at this counter, so many counts (in the field's direction) beyond the index.
+    pub(super) fn beyond_index(counter: u16, counts: i32) -> Self {
+        Self { counter: Some(counter), index: Some(counts.wrapping_neg()), ..Self::default() }
+    }
+
     /// Adds the counter's step to the travel, and records the index.
     pub(super) fn follow(&mut self, bench: &Bench, sample: &AxisSample) {
         let sign = bench.direction.sign();

@@ -16,6 +16,7 @@ use crate::safety::winding::tests::RATING;
 use crate::testing::TestRandom;
 
 mod reports;
+mod second_day;
 
 const HOUSEKEEPING: HousekeepingSettings<2> = HousekeepingSettings {
     axes: [CONFIGURATION; 2],
@@ -147,9 +148,9 @@ fn a_wrong_stored_calibration_is_refused_once_and_then_measured() {
 }
 
 #[test]
-fn a_stored_calibration_outlives_a_load_that_is_too_large() {
+fn a_stored_calibration_outlives_a_load_or_a_hand() {
     let stored = measured().stored().expect("an index");
-    for refusal in [CalibrationRefusal::Load(70), CalibrationRefusal::Travel] {
+    for refusal in [CalibrationRefusal::Load(70), CalibrationRefusal::Travel, CalibrationRefusal::Turning] {
         let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
         assert_eq!(bench.press(), [(0, checked(stored))]);
         assert_eq!(bench.ends(0, Outcome::Refused(refusal)), []);
@@ -171,7 +172,11 @@ fn an_erased_or_foreign_calibration_is_not_used() {
 
 /// Executes the housekeeper's order on a motor whose power was off, and returns the outcome.
 fn carried_out(motor: &mut TestMotor, order: Order) -> Outcome {
-    let mut stage = AxisState::OFF;
+    let mut state = AxisState::OFF;
+    carried_out_by(&mut state, motor, order)
+}
+
+fn carried_out_by(stage: &mut AxisState, motor: &mut TestMotor, order: Order) -> Outcome {
     stage.obey(order);
     let mut sample = motor.sample();
     for _ in 0..720_000 {

@@ -178,7 +178,7 @@ pub fn doing(state: &State) -> String {
 
 fn calibrated(found: &Calibration) -> (Weight, String) {
     let (joint, number) = (found.joint, found.number);
-    if found.result != "done" {
+    if !matches!(found.result.as_str(), "done" | "confirmed") {
         let number = if number == 0 { String::new() } else { format!(" ({number})") };
         return (
             Weight::Warning,
@@ -186,7 +186,8 @@ fn calibrated(found: &Calibration) -> (Weight, String) {
         );
     }
     let words = format!(
-        "calibration of joint {joint} done: R {:.4} ohm, L {:.1} and {:.1} uH, offset {:.4} turns, shunts at {:.1} and {:.1}",
+        "calibration of joint {joint} {}: R {:.4} ohm, L {:.1} and {:.1} uH, offset {:.4} turns, shunts at {:.1} and {:.1}",
+        if found.result == "done" { "done" } else { "confirmed at standstill" },
         found.resistance_ohm,
         1e6 * f64::from(found.direct_h),
         1e6 * f64::from(found.quadrature_h),

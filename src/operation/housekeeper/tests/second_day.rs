@@ -1,0 +1,240 @@
+//! Stored calibrations after a power-up: joints turned by hand, checked at standstill, referenced, enabled.
+
+use core::num::NonZeroU32;
+
+use super::super::super::{CurrentLoops, ServoLevel, Tick};
+use super::*;
+use crate::hal::CURRENT_RATE_HZ;
+use crate::leg::testing::{LEG, configuration};
+use crate::leg::{Control, DeratingRamps};
+use crate::motor::SenseScale;
+use crate::units::Volt;
+
+const PERIOD: NonZeroU32 = NonZeroU32::new(7000).expect("more than none");
+const VOLT_PER_CODE: Volt = SenseScale::ODRIVE_3_6.volt_per_code;
+const RAMPS: DeratingRamps =
+    DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
+
+/// Levels 0, 1 and 6 of a board with two motors, from the power-up on.
+struct Machine {
+    loops: CurrentLoops<2>,
+    keeper: Housekeeper<2>,
+    level: ServoLevel<2>,
+    control: Control<2>,
+    hardware: TestHardware<2>,
+    signals: Signals<2>,
+    queues: Queues<2>,
+    events: Box<EventQueue<2>>,
+    motors: [TestMotor; 2],
+    samples: [AxisSample; 2],
+    period: u32,
+    records: Vec<Record<2>>,
+    /// Greatest current of any motor so far, A.
+    most_ampere: f64,
+}
+
+impl Machine {
+    fn new(mut motors: [TestMotor; 2], stored: [Option<StoredCalibration>; 2]) -> Self {
+        let control = Control::new(&configuration()).expect("a leg");
+        Self {
+            loops: CurrentLoops::new([AxisState::OFF; 2], PERIOD, None, VOLT_PER_CODE),
+            keeper: Housekeeper::new(HOUSEKEEPING).with_stored(stored),
+            level: ServoLevel::new(&control, RAMPS, VOLT_PER_CODE, None),
+            control,
+            hardware: TestHardware::new(),
+            signals: Signals::new(),
+            queues: Queues::new(),
+            events: Box::default(),
+            samples: motors.each_mut().map(TestMotor::sample),
+            motors,
+            period: 0,
+            records: Vec::new(),
+            most_ampere: 0.0,
+        }
+    }
+
+    fn period(&mut self) {
+        let Ends { mut current, mut servo, mut housekeeping, mut identification, calibrated: _ } =
+            self.queues.split(&mut self.events);
+        if self.period.is_multiple_of(CURRENT_RATE_HZ / RATE_HZ) {
+            self.keeper.round(&mut housekeeping, &self.signals, &mut self.hardware);
+        }
+        self.period += 1;
+        let now = self.period.wrapping_mul(PERIOD.get());
+        for axis in 0..2 {
+            let sample = self.samples[axis];
+            self.hardware.encoder_counts[axis] = sample.encoder_count;
+            let requested = self.hardware.servo_pended;
+            let tick =
+                Tick { now, emergency_stop: false, gate_fault: false, complete: true, supply: true, sample };
+            self.loops.tick(axis, &tick, &mut current, &self.signals, &mut self.hardware);
+            if self.hardware.servo_pended != requested {
+                let gravity = LEG.gravity;
+                let Self { level, control, signals, hardware, .. } = self;
+                level.tick(control, gravity, &mut servo, signals, hardware);
+                signals.statistics.servo_ticks.add();
+            }
+            self.samples[axis] = self.motors[axis].period(self.hardware.bridges[axis]);
+            let [d, q] = self.motors[axis].current;
+            self.most_ampere = self.most_ampere.max(d.hypot(q));
+        }
+        while let Some(record) = identification.notes.dequeue() {
+            self.records.push(record);
+        }
+        while identification.events.dequeue().is_some() {}
+    }
+
+    /// Holds the contacts for some seconds.
+    fn hold(&mut self, enabling: bool, start: bool, seconds: f64) {
+        self.hardware.contacts = Contacts { enabling, start };
+        (0..(seconds * f64::from(CURRENT_RATE_HZ)) as u32).for_each(|_| self.period());
+    }
+
+    /// A hand turns both motors by an angle in rad, at 60 rad/s.
+    fn turn(&mut self, angle: f64) {
+        for motor in &mut self.motors {
+            (motor.driven, motor.speed) = (true, 60.0 * angle.signum());
+        }
+        let contacts = self.hardware.contacts;
+        self.hold(contacts.enabling, contacts.start, angle.abs() / 60.0);
+        for motor in &mut self.motors {
+            (motor.driven, motor.speed) = (false, 0.0);
+        }
+    }
+
+    fn results(&self) -> Vec<(u8, &'static str)> {
+        let result = |record: &Record<2>| match record {
+            Record::Calibration { joint, result, .. } => Some((*joint, *result)),
+            _ => None,
+        };
+        self.records.iter().filter_map(result).collect()
+    }
+
+    fn is_proven(&mut self) -> [bool; 2] {
+        [0, 1].map(|axis| {
+            let axis = self.loops.axis_state_mut(axis).and_then(AxisState::axis_mut);
+            axis.is_some_and(|axis| axis.is_proven())
+        })
+    }
+}
+
+/// Motors with the joint's inertia and friction at the rotor, elsewhere than at their stored calibration.
+fn second_day() -> ([TestMotor; 2], [Option<StoredCalibration>; 2]) {
+    let stored = measured().stored().expect("an index");
+    let motors = [5.0, -8.0].map(|moved| {
+        let motor = TestMotor::default();
+        TestMotor {
+            angle: motor.angle + moved,
+            encoder_zero: motor.encoder_zero + 2.0,
+            inertia: 1.5e-3,
+            coulomb: 0.06,
+            viscous: 1e-3,
+            random: TestRandom::new(9),
+            ..motor
+        }
+    });
+    (motors, [Some(stored); 2])
+}
+
+#[test]
+fn a_second_day_is_enabled_without_motion_by_the_motors() {
+    let (motors, stored) = second_day();
+    let mut machine = Machine::new(motors, stored);
+    machine.hold(false, false, 0.1);
+    machine.turn(2.3 * core::f64::consts::TAU);
+    assert_eq!(machine.most_ampere, 0.0);
+    let begin = machine.motors.each_ref().map(|motor| motor.angle);
+    machine.hold(true, false, 0.1);
+    machine.hold(true, true, 0.1);
+    machine.hold(true, false, 2.9);
+    assert_eq!(machine.results(), [(1, "confirmed"), (2, "confirmed")]);
+    for (motor, begin) in machine.motors.iter().zip(begin) {
+        let moved = (motor.angle - begin) * 7.0 / core::f64::consts::TAU;
+        assert!(moved.abs() < 0.005, "{moved} electrical turns");
+    }
+    // Reference, then by hand into the range: 0.4 rad of the joint.
+    machine.hold(false, false, 0.1);
+    machine.hold(false, true, 0.2);
+    machine.hold(false, false, 0.7);
+    assert!(machine.signals.has_begun());
+    machine.turn(20.0);
+    machine.hold(false, false, 0.3);
+    machine.hold(true, false, 0.5);
+    assert_eq!(machine.control.state(), DriveState::OperationEnabled);
+    assert_eq!(machine.is_proven(), [false; 2]);
+    // The held pose resists a hand; its motion proves both angles.
+    machine.turn(-4.0);
+    machine.hold(true, false, 0.1);
+    assert_eq!(machine.is_proven(), [true; 2]);
+    assert_eq!(machine.control.state(), DriveState::OperationEnabled);
+}
+
+#[test]
+fn an_interrupted_check_can_be_repeated_without_turning_the_joints_again() {
+    let (motors, stored) = second_day();
+    let mut machine = Machine::new(motors, stored);
+    machine.hold(false, false, 0.1);
+    machine.turn(2.3 * core::f64::consts::TAU);
+    for _ in 0..2 {
+        machine.hold(true, false, 0.1);
+        machine.hold(true, true, 0.1);
+        machine.hold(true, false, 0.5);
+        machine.hold(false, false, 0.1);
+    }
+    machine.hold(true, false, 0.1);
+    machine.hold(true, true, 0.1);
+    machine.hold(true, false, 2.9);
+    let interrupted = (1, "interrupted");
+    assert_eq!(machine.results(), [interrupted, interrupted, (1, "confirmed"), (2, "confirmed")]);
+}
+
+#[test]
+fn a_check_at_standstill_leaves_what_is_stored() {
+    let (mut motor, stored) = (TestMotor::default(), measured().stored().expect("an index"));
+    let mut state = AxisState::OFF;
+    (motor.driven, motor.speed) = (true, 60.0);
+    for _ in 0..6000 {
+        let sample = motor.period(AxisCommand::OFF);
+        state.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF);
+    }
+    (motor.driven, motor.speed) = (false, 0.0);
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
+    let (_, order) = bench.press().remove(0);
+    let outcome = carried_out_by(&mut state, &mut motor, order);
+    let Outcome::Calibrated(found) = outcome else { panic!("{outcome:?}") };
+    assert!(!found.is_proven() && found.stored() != Some(stored));
+    bench.ends(0, outcome);
+    assert_eq!(bench.calibrated, [(0, Some(stored))]);
+}
+
+#[test]
+fn a_moved_rotor_keeps_what_is_stored_but_has_to_turn_next() {
+    let calibration = measured();
+    let stored = calibration.stored().expect("an index");
+    let turning = |stored| {
+        let calibrator = Calibrator::from_stored(&CONFIGURATION, SETTINGS, stored).expect("usual");
+        Order::Calibrate(calibrator.turning())
+    };
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
+    assert_eq!(bench.press(), [(0, checked(stored))]);
+    bench.ends(0, Outcome::Refused(CalibrationRefusal::Moved));
+    for _ in 0..2 {
+        // A further push or an opened switch changes nothing.
+        assert_eq!(bench.press(), [(0, turning(stored))]);
+        bench.ends(0, Outcome::Refused(CalibrationRefusal::Turning));
+        assert_eq!(bench.press(), [(0, turning(stored))]);
+        bench.ends(0, Outcome::Interrupted);
+    }
+    assert_eq!(bench.press(), [(0, turning(stored))]);
+    // The other axis may still be checked at standstill.
+    let orders = bench.ends(0, Outcome::Calibrated(calibration));
+    assert!(matches!(&orders[..], [(0, Order::Run(_)), (1, order)] if *order == checked(stored)));
+    bench.ends(1, Outcome::Calibrated(calibration));
+    // A lost rotor position, such as one found by the first motion, has to turn as well.
+    bench.ends(0, Outcome::Fault { fault: AxisFault::Encoder, lost: true });
+    bench.hold(false, false);
+    assert_eq!(bench.press(), [(0, turning(stored))]);
+    // An offset that the motion contradicts is measured anew.
+    bench.ends(0, Outcome::Refused(CalibrationRefusal::StoredOffset));
+    assert_eq!(bench.press(), [(0, anew())]);
+}
