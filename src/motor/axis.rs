@@ -61,8 +61,9 @@ use crate::units::{Ampere, RadianPerSecond};
 mod first_motion;
 mod index;
 
+pub use first_motion::CURRENT_SHARE as FIRST_CURRENT_SHARE;
 use first_motion::FirstMotion;
-pub(super) use first_motion::{CURRENT_SHARE as FIRST_CURRENT_SHARE, SPEED_SHARE as FIRST_SPEED_SHARE};
+pub(super) use first_motion::SPEED_SHARE as FIRST_SPEED_SHARE;
 use index::IndexWatch;
 
 /// Weight of a rejected shunt or bus reading. Each accepted reading subtracts one. A sum above
@@ -255,6 +256,7 @@ impl Axis {
 
     /// Whether the rotor angle was measured or has agreed with the back-EMF. Until then current and speed are
     /// limited.
+    #[inline(always)]
     #[must_use]
     pub fn is_proven(&self) -> bool {
         !self.first_motion.is_limited()

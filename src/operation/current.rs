@@ -178,6 +178,7 @@ impl<const N: usize> CurrentLoops<N> {
             if let Some(running) = this.stage.axis_mut()
                 && let Some(samples) = ends.samples.get_mut(axis)
             {
+                signals.set_proven(axis, running.is_proven());
                 // A servo that does not read its samples is detected below.
                 let _ = samples.enqueue(running.joint_sample());
             }

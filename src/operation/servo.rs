@@ -21,7 +21,8 @@ use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Plan,
     Refusal, permitted,
 };
-use crate::safety::{DeratingRamps, Fault, FaultCode, SupplyWatch};
+use crate::motor::FIRST_CURRENT_SHARE;
+use crate::safety::{DeratingRamps, Fault, FaultCode, JointShares, SupplyWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::trace::{Record, words};
 use crate::units::Volt;
@@ -185,8 +186,11 @@ impl<const N: usize> ServoLevel<N> {
         if self.supply.look(bus) {
             control.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
         }
-        let windings = array::from_fn(|joint| signals.winding_share(joint));
-        control.derate(&self.ramps.at(signals.hottest_c(), bus, windings));
+        let joints = array::from_fn(|joint| JointShares {
+            winding: signals.winding_share(joint),
+            first_motion: if signals.is_unproven(joint) { FIRST_CURRENT_SHARE } else { 1.0 },
+        });
+        control.derate(&self.ramps.at(signals.hottest_c(), bus, joints));
     }
 
     /// Records a refusal by the bus.

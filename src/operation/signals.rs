@@ -258,6 +258,8 @@ pub struct Signals<const N: usize> {
     squares: [Word; N],
     /// Temperature of each winding, degrees Celsius, and its share of the torque cap, as bits.
     windings: [[Word; 2]; N],
+    /// Whether each axis' rotor angle still has to be proven.
+    unproven: [Word; N],
     permission: Word,
     hosted: Word,
     permits: Word,
@@ -278,6 +280,7 @@ impl<const N: usize> Signals<N> {
             hottest_c: Word::new(0),
             squares: [const { Word::new(0) }; N],
             windings: [const { [Word::new(0), Word::new(FULL_SHARE)] }; N],
+            unproven: [const { Word::new(0) }; N],
             permission: Word::new(0),
             hosted: Word::new(0),
             permits: Word::new(0),
@@ -364,6 +367,20 @@ impl<const N: usize> Signals<N> {
     #[must_use]
     pub fn squares(&self, axis: usize) -> u32 {
         self.squares.get(axis).map_or(0, Word::get)
+    }
+
+    /// Sets whether an axis' rotor angle is proven ([`crate::motor::Axis::is_proven`]).
+    #[inline(always)]
+    pub fn set_proven(&self, axis: usize, proven: bool) {
+        if let Some(unproven) = self.unproven.get(axis) {
+            unproven.set((!proven).into());
+        }
+    }
+
+    /// Returns whether an axis' rotor angle still has to be proven.
+    #[must_use]
+    pub fn is_unproven(&self, axis: usize) -> bool {
+        self.unproven.get(axis).is_some_and(|unproven| unproven.get() != 0)
     }
 
     /// Temperature of a winding, degrees Celsius, by its model.

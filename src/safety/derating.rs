@@ -5,8 +5,9 @@
 //!
 //! ```text
 //! ramp(x) = clamp((x - none) / (all - none), 0, 1)
-//! |torque| <= cap * ramp(bridge) * ramp(winding) * ramp(bus, low)       where it drives the joint
-//! |torque| <= cap * ramp(bridge) * ramp(winding) * ramp(bus, high)      where the joint drives it
+//! |torque| <= cap * ramp(bridge) * joint * ramp(bus, low)       where it drives the joint
+//! |torque| <= cap * ramp(bridge) * joint * ramp(bus, high)      where the joint drives it
+//! joint = ramp(winding) * share of the first motion
 //! ```
 //!
 //! Applied to the request before range and speed are checked ([`super::Barrier`]): stopping a joint at its
@@ -60,6 +61,8 @@ limit_codes! {
     BusHigh = 7, "bus_high";
     /// The motor's winding is hot ([`super::Winding`]).
     Winding = 8, "winding";
+    /// The motor's rotor angle is stored and has not been proven by a motion (`motor::Axis`).
+    FirstMotion = 9, "first_motion";
 }
 
 /// A set of codes: bit n for code n.
@@ -117,10 +120,26 @@ impl LimitCodes {
             .with(limited.speed, LimitCode::Speed)
             .with(limited.range, LimitCode::Position)
             .with(limited.derated && derating.bridge < 1.0, LimitCode::Temperature)
-            .with(limited.derated && derating.winding_of(joint) < 1.0, LimitCode::Winding)
+            .with(limited.derated && derating.of_joint(joint).winding < 1.0, LimitCode::Winding)
+            .with(limited.derated && derating.of_joint(joint).first_motion < 1.0, LimitCode::FirstMotion)
             .with(limited.derated && derating.low < 1.0, LimitCode::BusLow)
             .with(limited.derated && derating.high < 1.0, LimitCode::BusHigh)
     }
+}
+
+/// Remaining shares of one joint's torque cap by its motor, 0..=1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointShares {
+    /// What the temperature of the winding leaves.
+    pub winding: f32,
+    /// What is permitted before the rotor angle is proven.
+    pub first_motion: f32,
+}
+
+impl JointShares {
+    /// The whole cap.
+    pub const ALL: Self = Self { winding: 1.0, first_motion: 1.0 };
+    const NONE: Self = Self { winding: 0.0, first_motion: 0.0 };
 }
 
 /// Remaining shares of the joints' torque caps, 0..=1.
@@ -129,22 +148,23 @@ pub struct Derating<const N: usize> {
     bridge: f32,
     low: f32,
     high: f32,
-    windings: [f32; N],
+    joints: [JointShares; N],
 }
 
 impl<const N: usize> Derating<N> {
     /// No derating.
-    pub const NONE: Self = Self { bridge: 1.0, low: 1.0, high: 1.0, windings: [1.0; N] };
+    pub const NONE: Self = Self { bridge: 1.0, low: 1.0, high: 1.0, joints: [JointShares::ALL; N] };
 
     /// Shares of a joint for a torque that drives it and for one that it drives.
     #[must_use]
     pub fn shares(&self, joint: usize) -> [f32; 2] {
-        let heat = self.bridge * self.winding_of(joint);
-        [heat * self.low, heat * self.high]
+        let JointShares { winding, first_motion } = self.of_joint(joint);
+        let both = self.bridge * winding * first_motion;
+        [both * self.low, both * self.high]
     }
 
-    fn winding_of(&self, joint: usize) -> f32 {
-        self.windings.get(joint).copied().unwrap_or(0.0)
+    fn of_joint(&self, joint: usize) -> JointShares {
+        self.joints.get(joint).copied().unwrap_or(JointShares::NONE)
     }
 }
 
@@ -195,13 +215,12 @@ impl DeratingRamps {
         }
     }
 
-    /// Shares at a temperature of the bridges (degrees Celsius), a bus voltage, and shares that the windings
-    /// leave.
+    /// Shares at a temperature of the bridges (degrees Celsius) and a bus voltage, with those of each joint.
     #[must_use]
-    pub fn at<const N: usize>(&self, temperature_c: f32, bus: Volt, windings: [f32; N]) -> Derating<N> {
+    pub fn at<const N: usize>(&self, temperature_c: f32, bus: Volt, joints: [JointShares; N]) -> Derating<N> {
         Derating {
             bridge: self.temperature_c.share(temperature_c),
-            windings,
+            joints,
             low: self.low.share(bus.0),
             high: self.high.share(bus.0),
         }
@@ -261,6 +280,7 @@ mod tests {
             (LimitCode::BusLow, 6),
             (LimitCode::BusHigh, 7),
             (LimitCode::Winding, 8),
+            (LimitCode::FirstMotion, 9),
         ];
         assert_eq!(numbers.map(|(code, _)| code), LimitCode::ALL);
         assert!(numbers.iter().all(|(code, number)| *code as u8 == *number));
@@ -268,7 +288,7 @@ mod tests {
 
     #[test]
     fn shares_follow_their_ramps_and_nan_leaves_none() {
-        let left = |temperature, bus| RAMPS.at(temperature, Volt(bus), [1.0]).shares(0);
+        let left = |temperature, bus| RAMPS.at(temperature, Volt(bus), [JointShares::ALL]).shares(0);
         assert_eq!(left(25.0, 48.0), [1.0; 2]);
         for (temperature, bus, expected) in [
             (90.0, 48.0, [0.5, 0.5]),
@@ -285,15 +305,17 @@ mod tests {
     }
 
     #[test]
-    fn a_winding_and_a_bridge_multiply_their_shares() {
-        let derating = RAMPS.at(90.0, Volt(22.5), [1.0, 0.5]);
-        assert_eq!([0, 1].map(|joint| derating.shares(joint)), [[0.25, 0.5], [0.125, 0.25]]);
+    fn a_joints_shares_and_those_of_the_board_are_multiplied() {
+        let half = JointShares { winding: 0.5, first_motion: 0.5 };
+        let derating = RAMPS.at(90.0, Volt(22.5), [JointShares::ALL, half]);
+        assert_eq!([0, 1, 2].map(|joint| derating.shares(joint)), [[0.25, 0.5], [0.0625, 0.125], [0.0; 2]]);
     }
 
     #[test]
     fn every_limit_has_its_code() {
         let none = Limited::default();
-        let hot = RAMPS.at(90.0, Volt(48.0), [1.0]);
+        let usual = [JointShares::ALL];
+        let hot = RAMPS.at(90.0, Volt(48.0), usual);
         let of =
             |limited: Limited, derating: &Derating<1>| LimitCodes::of(&limited, &HIP, derating, 0).bits();
         assert_eq!(of(none, &hot), 0, "nothing was limited");
@@ -303,9 +325,13 @@ mod tests {
         assert!(codes.contains(LimitCode::Current) && !codes.contains(LimitCode::Torque));
         assert_eq!(of(Limited { speed: true, range: true, ..none }, &Derating::NONE), 1 << 3 | 1 << 4);
         assert_eq!(of(Limited { derated: true, ..none }, &hot), 1 << 5);
-        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(22.0), [1.0])), 1 << 6);
-        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(56.0), [1.0])), 1 << 7);
-        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(48.0), [0.9])), 1 << 8);
+        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(22.0), usual)), 1 << 6);
+        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(56.0), usual)), 1 << 7);
+        let joint = |joint| RAMPS.at(25.0, Volt(48.0), [joint]);
+        let winding = joint(JointShares { winding: 0.9, ..JointShares::ALL });
+        assert_eq!(of(Limited { derated: true, ..none }, &winding), 1 << 8);
+        let first = joint(JointShares { first_motion: 0.25, ..JointShares::ALL });
+        assert_eq!(of(Limited { derated: true, ..none }, &first), 1 << 9);
     }
 
     #[test]

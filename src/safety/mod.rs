@@ -46,7 +46,7 @@ pub mod winding;
 
 pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
 pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
-pub use derating::{Derating, DeratingRamps, LimitCode, LimitCodes, Ramp, SupplyWatch};
+pub use derating::{Derating, DeratingRamps, JointShares, LimitCode, LimitCodes, Ramp, SupplyWatch};
 pub use fault::{Fault, FaultCode, NO_ERROR, NoticeCode, Reaction};
 pub use interlock::{Bridges, InhibitReason, ServoWatch, TickState, TickWatch, stays_active};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};

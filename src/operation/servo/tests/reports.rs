@@ -41,10 +41,10 @@ fn limits_are_reported_once_a_second_and_one_per_tick() {
     assert!(!bench.names().contains(&"limit"));
 }
 
-#[test]
-fn a_hot_winding_limits_its_own_joint() {
+/// Limits reported, code and joint, and current targets after a small move of both joints.
+fn after_a_move(change: impl Fn(&Signals<2>)) -> (Vec<(u8, u8)>, [f32; 2]) {
     let mut bench = Bench::enabled();
-    bench.signals.set_winding(1, &Winding::new(RATING, Some(RATING.limit_c)));
+    change(&bench.signals);
     for _ in 0..20 {
         bench.counts = bench.counts.map(|counts| counts + 1);
         bench.tick();
@@ -53,10 +53,30 @@ fn a_hot_winding_limits_its_own_joint() {
         LegEvent::Record(Record::Limit { code, joint, .. }) => Some((*code, *joint)),
         _ => None,
     };
-    let limits: Vec<(u8, u8)> = bench.events.iter().filter_map(limited).collect();
+    let limits = bench.events.iter().filter_map(limited).collect();
+    (limits, [0, 1].map(|joint| bench.signals.target(joint).current.0))
+}
+
+#[test]
+fn a_hot_winding_limits_its_own_joint() {
+    let hot = Winding::new(RATING, Some(RATING.limit_c));
+    let (limits, targets) = after_a_move(|signals| signals.set_winding(1, &hot));
     assert_eq!(limits, [(LimitCode::Winding as u8, 2)]);
-    let targets = [0, 1].map(|joint| bench.signals.target(joint).current.0);
     assert!(targets[0] != 0.0 && targets[1] == 0.0, "{targets:?}");
+}
+
+#[test]
+fn an_unproven_rotor_angle_leaves_a_quarter_of_its_joints_torque() {
+    let quarter = LEG.joints[0].current.0 * FIRST_CURRENT_SHARE;
+    let (limits, limited) = after_a_move(|signals| signals.set_proven(0, false));
+    assert_eq!(limits, [(LimitCode::FirstMotion as u8, 1)]);
+    let (none, whole) = after_a_move(|signals| signals.set_proven(0, true));
+    assert_eq!(none, []);
+    assert!(
+        (limited[0].abs() - quarter).abs() < 0.1 && whole[0].abs() > quarter + 1.0,
+        "{limited:?} {whole:?}"
+    );
+    assert!((limited[1] - whole[1]).abs() < 0.1, "{limited:?} {whole:?}");
 }
 
 #[test]
