@@ -80,3 +80,38 @@ impl FirstMotion {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Servo periods of a hundredth of an electrical turn each until 7 pole pairs are proven, of 400.
+    fn proven_after(volts: impl Fn(u32) -> [f32; 3]) -> Option<u32> {
+        let mut motion = FirstMotion::before(7);
+        motion.begin(7, ElectricalAngle::from_turns(0.3));
+        (1..=400).find(|period| {
+            // To and fro: travel in either direction counts.
+            let way = if *period <= 100 { *period } else { 200 - *period % 200 };
+            motion.look(7, ElectricalAngle::from_turns(0.3 + 0.01 * way as f32), volts(*period));
+            !motion.is_limited()
+        })
+    }
+
+    #[test]
+    fn a_quarter_of_a_motor_turn_in_a_row_proves_the_angle() {
+        // 1.75 electrical turns.
+        assert!(proven_after(|_| [1.0, 0.5, 0.9]).is_some_and(|period| (175..=177).contains(&period)));
+        // The back-EMF does not exceed the tolerance.
+        assert_eq!(proven_after(|_| [0.89, 0.5, 0.9]), None);
+        // A single residual beyond it, or one that is not finite, starts anew.
+        for residual in [0.91, f32::NAN] {
+            let once = |period| [1.0, if period == 150 { residual } else { 0.5 }, 0.9];
+            assert!(proven_after(once).is_some_and(|period| (325..=327).contains(&period)), "{residual}");
+            let again = |period: u32| [1.0, if period.is_multiple_of(150) { residual } else { 0.5 }, 0.9];
+            assert_eq!(proven_after(again), None, "{residual}");
+        }
+        // Slow periods in between count nothing and take nothing.
+        let slow = |period: u32| [if period.is_multiple_of(2) { 1.0 } else { 0.5 }, 0.5, 0.9];
+        assert!(proven_after(slow).is_some_and(|period| (349..=353).contains(&period)));
+    }
+}

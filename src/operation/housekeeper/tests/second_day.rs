@@ -189,6 +189,26 @@ fn an_interrupted_check_can_be_repeated_without_turning_the_joints_again() {
 }
 
 #[test]
+fn a_joint_that_still_moves_when_start_is_pressed_can_be_checked_afterwards() {
+    let (motors, stored) = second_day();
+    let mut machine = Machine::new(motors, stored);
+    machine.hold(false, false, 0.1);
+    machine.turn(2.3 * core::f64::consts::TAU);
+    machine.hold(true, false, 0.1);
+    for motor in &mut machine.motors {
+        (motor.driven, motor.speed) = (true, 20.0);
+    }
+    machine.hold(true, true, 0.1);
+    for motor in &mut machine.motors {
+        (motor.driven, motor.speed) = (false, 0.0);
+    }
+    machine.hold(true, false, 0.1);
+    machine.hold(true, true, 0.1);
+    machine.hold(true, false, 2.9);
+    assert_eq!(machine.results(), [(1, "turning"), (1, "confirmed"), (2, "confirmed")]);
+}
+
+#[test]
 fn a_check_at_standstill_leaves_what_is_stored() {
     let (mut motor, stored) = (TestMotor::default(), measured().stored().expect("an index"));
     let mut state = AxisState::OFF;
@@ -237,4 +257,29 @@ fn a_moved_rotor_keeps_what_is_stored_but_has_to_turn_next() {
     // An offset that the motion contradicts is measured anew.
     bench.ends(0, Outcome::Refused(CalibrationRefusal::StoredOffset));
     assert_eq!(bench.press(), [(0, anew())]);
+}
+
+#[test]
+fn a_stall_or_a_lost_axis_forgets_the_index() {
+    let (mut motor, calibration) = (TestMotor::default(), measured());
+    let mut state = AxisState::OFF;
+    let turned = |state: &mut AxisState, motor: &mut TestMotor| {
+        (motor.driven, motor.speed) = (true, 60.0);
+        for _ in 0..6000 {
+            let sample = motor.period(AxisCommand::OFF);
+            state.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF);
+        }
+    };
+    for long in [false, true] {
+        turned(&mut state, &mut motor);
+        assert_ne!(state, AxisState::OFF);
+        state.stood_still(&motor.sample(), long);
+        assert_eq!(state, AxisState::OFF);
+    }
+    turned(&mut state, &mut motor);
+    let axis = Axis::new(&CONFIGURATION, &calibration, &motor.sample()).expect("usual");
+    state.obey(Order::Run(axis));
+    turned(&mut state, &mut motor);
+    state.obey(Order::Off);
+    assert_eq!(state, AxisState::OFF);
 }
