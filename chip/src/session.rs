@@ -38,6 +38,12 @@ pub enum Step {
     Enable,
     /// Identify the leg.
     Identify,
+    /// Store the calibrations, by a host ("save" to 1010:1); the drive is off.
+    Save,
+    /// Cut the power and switch it on again; the leg is held by hand.
+    PowerCycle,
+    /// Turn each joint by hand over its motor's index, twice.
+    Turn,
 }
 
 /// Image, board, leg and operator.
@@ -57,6 +63,11 @@ pub struct Session {
 /// Records that are printed when they arrive.
 const TIMELINE: [&str; 9] =
     ["boot", "crash", "refused", "gate_driver", "state", "not_enabled", "fault", "axis_fault", "calibration"];
+
+/// Longest write of the flash, s.
+const STORE_S: f64 = 5.0;
+/// Angle that passes an index twice at a ratio of 50: 15 degrees.
+const TURNED_RAD: f64 = 0.262;
 
 impl Session {
     /// Powers a board with this image and leg.
@@ -182,6 +193,9 @@ impl Session {
             Step::Reference => self.reference(),
             Step::Enable => self.enable(),
             Step::Identify => self.identify(),
+            Step::Save => self.store(0x1010, *b"save", STORE_S),
+            Step::PowerCycle => self.power_cycle(),
+            Step::Turn => self.turn(),
         }
     }
 
@@ -203,7 +217,7 @@ impl Session {
     fn reference(&mut self) -> Result<(), ToolError> {
         let now = self.now();
         self.machine.chip_mut().plant.couple(now);
-        self.run(0.2)?;
+        self.move_by_hand([0.0; JOINTS], 1.0)?;
         let from = self.probe.lines.len();
         self.press_start()?;
         self.run(1.0)?;
@@ -211,10 +225,29 @@ impl Session {
             return Err(ToolError::Refused("the reference was refused".into()));
         }
         // By hand into the range.
-        let to = start_position(&self.leg);
+        self.move_by_hand(start_position(&self.leg), 1.0)
+    }
+
+    /// Moves both joints to these angles (rad, anatomical) within a duration, s, and holds them there.
+    fn move_by_hand(&mut self, to: [f64; JOINTS], duration: f64) -> Result<(), ToolError> {
         let now = self.now();
-        self.machine.chip_mut().plant.move_by_hand(to, now, 1.0);
-        self.run(1.3)
+        self.machine.chip_mut().plant.move_by_hand(to, now, duration);
+        self.run(duration + 0.3)
+    }
+
+    fn power_cycle(&mut self) -> Result<(), ToolError> {
+        self.hold_switch(false);
+        self.run(1.0)?;
+        let position = self.machine.chip().plant.position();
+        self.move_by_hand(position, 0.1)?;
+        self.machine.power_cycle();
+        self.boot()
+    }
+
+    fn turn(&mut self) -> Result<(), ToolError> {
+        let from = self.machine.chip().plant.position();
+        self.move_by_hand(from.map(|angle| angle + TURNED_RAD), 2.0)?;
+        self.move_by_hand(from, 2.0)
     }
 
     fn enable(&mut self) -> Result<(), ToolError> {

@@ -151,6 +151,8 @@ pub struct Axis {
     begins: bool,
     shunt_watch: ShuntWatch,
     first_motion: FirstMotion,
+    /// Greatest quadrature current, A; from the constants, in every check.
+    current_limit: f32,
     /// Checksum of the constants at construction.
     checksum: Checksum,
     /// Calls of [`Axis::check`] since that checksum was compared; wraps at 256.
@@ -178,7 +180,14 @@ impl Axis {
     ) -> Result<Self, AxisError> {
         let constants = Constants::new(configuration, calibration)?;
         let position = calibration.position_of(&constants.scale, configuration.counter, sample.encoder_count);
+        let first_motion = if calibration.is_proven() {
+            FirstMotion::PROVEN
+        } else {
+            FirstMotion::before(configuration.pole_pairs)
+        };
         Ok(Self {
+            current_limit: current_limit(&constants, &first_motion),
+            first_motion,
             constants,
             current_loop: CurrentLoop::default(),
             speed: SpeedTracker::at(constants.scale.angle(position).plus(constants.offset)),
@@ -192,11 +201,6 @@ impl Axis {
             model_watch: ModelWatch::EMPTY,
             begins: true,
             shunt_watch: ShuntWatch::EMPTY,
-            first_motion: if calibration.is_proven() {
-                FirstMotion::PROVEN
-            } else {
-                FirstMotion::before(configuration.pole_pairs)
-            },
             checksum: constants.checksum(),
             unchecked: 0,
             last: AxisCommand::OFF,
@@ -402,11 +406,7 @@ impl Axis {
             }
         }
         let bus = constants.sense.bus(sample.bus_code);
-        let limit = if self.first_motion.is_limited() {
-            constants.first_current_limit
-        } else {
-            constants.current_limit
-        };
+        let limit = self.current_limit;
         let target = Ampere(clamp(wanted.0 * constants.current_sign, -limit, limit));
         let voltage = self.current_loop.voltage(
             &constants.gains,
@@ -467,6 +467,7 @@ impl Axis {
     /// constants with their checksum. Called once per servo period, halfway between two joint samples, so
     /// that no tick has both to do. A fault found here acts from the next tick on.
     pub fn check(&mut self) {
+        self.current_limit = current_limit(&self.constants, &self.first_motion);
         // Every 64 ms.
         self.unchecked = self.unchecked.wrapping_add(1);
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
@@ -515,6 +516,11 @@ impl Axis {
             }
         }
     }
+}
+
+/// Greatest quadrature current, A.
+fn current_limit(constants: &Constants, first_motion: &FirstMotion) -> f32 {
+    if first_motion.is_limited() { constants.first_current_limit } else { constants.current_limit }
 }
 
 /// Sums since the last joint sample: means of count and current cover the same ticks, so belong to one

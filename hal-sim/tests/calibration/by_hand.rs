@@ -129,9 +129,11 @@ impl PowerUp {
         currents: [f32; 2],
         hand: Option<f64>,
     ) -> (bool, Option<AxisFault>, f64) {
-        let axis = Axis::new(&self.trial.configuration, found, &self.sample).expect("sensible");
-        self.state.obey(Order::Run(axis));
-        self.run(240);
+        if !self.state.is_running() {
+            let axis = Axis::new(&self.trial.configuration, found, &self.sample).expect("sensible");
+            self.state.obey(Order::Run(axis));
+            self.run(240);
+        }
         let mut fastest = 0.0_f64;
         for period in 0..2 * CURRENT_RATE_HZ {
             if let Some(speed) = hand {
@@ -192,10 +194,12 @@ fn ready(trial: Trial, seed: u64) -> PowerUp {
     power_up
 }
 
-#[test]
-fn stored_values_of_50_legs_are_confirmed_without_motion() {
-    let (mut worst, mut by_motor) = ([0.0_f64; 6], 0);
-    for seed in 1..=50 {
+/// Confirms the ideal stored values of random legs. Returns the share of legs whose angle their own motor
+/// proved with a quarter of the current; a hand turns the others.
+fn confirms(seeds: core::ops::RangeInclusive<u64>) -> f64 {
+    let legs = seeds.clone().count() as f64;
+    let (mut worst, mut by_motor) = ([0.0_f64; 6], 0.0);
+    for seed in seeds {
         let mut leg = ready(geared(seed, None), seed);
         let stored = ideal(&leg.trial);
         assert!(leg.most_ampere < 1e-9, "seed {seed}: {} A before the order", leg.most_ampere);
@@ -204,10 +208,12 @@ fn stored_values_of_50_legs_are_confirmed_without_motion() {
         let (result, travel, periods) = leg.calibrate(calibrator, |_, _| {});
         let found = result.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{:?}", leg.trial));
         assert!(!found.is_proven() && found.indexed() && found.offset() == stored.offset, "seed {seed}");
+        let offset = offset_error(&mut leg.stand, &leg.trial, &found, seed);
+        leg.sample = leg.stand.period(&AxisCommand::OFF, 0.0);
         leg.let_go(0.0);
         // A quarter of the limit, 10 A, moves some legs too slowly. Then a hand turns the joint.
         let (mut proven, mut fault, _) = leg.first_motion(&found, [10.0, -10.0], None);
-        by_motor += u32::from(proven);
+        by_motor += f64::from(u8::from(proven));
         if !proven {
             (proven, fault, _) = leg.first_motion(&found, [0.0; 2], Some(80.0));
         }
@@ -216,7 +222,7 @@ fn stored_values_of_50_legs_are_confirmed_without_motion() {
             f64::from(found.resistance().0 / stored.resistance.0) - 1.0,
             f64::from(found.direct_inductance().0 / stored.direct_inductance.0) - 1.0,
             f64::from(found.quadrature_inductance().0 / stored.quadrature_inductance.0) - 1.0,
-            offset_error(&mut leg.stand, &leg.trial, &found, seed),
+            offset,
             travel,
             f64::from(periods) * PERIOD_S,
         ];
@@ -226,11 +232,23 @@ fn stored_values_of_50_legs_are_confirmed_without_motion() {
         }
     }
     println!("worst R, Ld, Lq, offset, travel, seconds: {worst:.4?}; {by_motor} proven by the motor");
-    assert!(by_motor >= 40, "{by_motor}");
     // Where the flux lies across a phase, that phase's current changes its sign with the wave, and dead time
-    // with it: up to 3.5 % of inductance. A count of the coarsest encoder is 2.1 electrical degrees.
-    let limits = [0.02, 0.02, 0.04, 0.2, 1e-3, 1.5];
+    // with it: up to 4 % of inductance. A count of the coarsest encoder is 2.1 electrical degrees.
+    let limits = [0.02, 0.02, 0.045, 0.2, 1e-3, 1.5];
     assert!(worst.iter().zip(limits).all(|(worst, limit)| *worst < limit), "{worst:?}");
+    by_motor / legs
+}
+
+#[test]
+fn stored_values_of_50_legs_are_confirmed_without_motion() {
+    assert!(confirms(1..=50) > 0.9);
+}
+
+/// `cargo test -p hal-sim --test calibration 400_legs -- --ignored --nocapture`.
+#[test]
+#[ignore = "half a minute"]
+fn stored_values_of_400_legs_are_confirmed_without_motion() {
+    assert!(confirms(1..=400) > 0.9);
 }
 
 #[test]

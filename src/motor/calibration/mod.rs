@@ -543,9 +543,9 @@ const LONGEST_SHARE: f32 = 1.1 * 1.89;
 const LEAST_TRAVEL_TURNS: f32 = 3.4;
 /// Copper 100 K warmer or colder has 39 % more or less resistance.
 const RESISTANCE_SHARE: f32 = 0.4;
-/// Both measurements are within 2 % each (100 motors of `hal-sim/tests/calibration`), so 4 % together.
-/// Magnets 100 K warmer have 12 % less flux, and so saturate the iron less: at most 12 % of inductance.
-/// Together 16 %, and a margin.
+/// A measurement is within 2 % (100 motors of `hal-sim/tests/calibration`), at standstill within 4 % (400
+/// legs there), so 6 % together. Magnets 100 K warmer have 12 % less flux, and so saturate the iron less: at
+/// most 12 % of inductance. Together 18 %, and a margin.
 const INDUCTANCE_SHARE: f32 = 0.2;
 /// The field turns slowly. A loop this fast holds the current and tolerates an inductance of half the
 /// measured one.
