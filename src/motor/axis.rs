@@ -32,7 +32,7 @@
 //!
 //! **First motion.** After a check at standstill the rotor angle is the stored one. Until the back-EMF has
 //! agreed, current and speed are limited, and a contradiction counts as a lost rotor position
-//! (`first_motion.rs`).
+//! (`first_motion.rs`). Afterwards the current limit rises within 0.75 s.
 //!
 //! **Limit of braking.** A shorted motor carries `w flux / sqrt(R^2 + w^2 L^2)`. The outputs go off with an
 //! overcurrent fault where that exceeds the overcurrent bound, or where the measured current does. On the
@@ -54,22 +54,24 @@ use super::current_loop::DELAY_PERIODS;
 use super::model_watch::Shown;
 use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, ShuntWatch, SpeedTracker};
 use crate::checksum::Checksum;
-use crate::hal::{AxisCommand, AxisSample, JointSample};
-use crate::real::{abs, clamp, is_finite};
+use crate::hal::{AxisCommand, AxisSample, JointSample, SERVO_RATE_HZ};
+use crate::real::{abs, clamp, is_finite, min};
 use crate::units::{Ampere, RadianPerSecond};
 
 mod first_motion;
 mod index;
 
-pub use first_motion::CURRENT_SHARE as FIRST_CURRENT_SHARE;
 use first_motion::FirstMotion;
-pub(super) use first_motion::SPEED_SHARE as FIRST_SPEED_SHARE;
+pub(super) use first_motion::{CURRENT_SHARE as FIRST_CURRENT_SHARE, SPEED_SHARE as FIRST_SPEED_SHARE};
 use index::IndexWatch;
 
 /// Weight of a rejected shunt or bus reading. Each accepted reading subtracts one. A sum above
 /// [`MOST_DOUBTS`] is a fault: the third rejection of every other tick, or the sixth of one in four.
 const DOUBT: u8 = 4;
 const MOST_DOUBTS: u8 = 8;
+/// Rise of the current limit per check once the rotor angle is proven, as share of the limit: 0.75 s. A step
+/// would throw the joint against the hand that pushed it.
+const RISE_PER_CHECK: f32 = 1.0 / SERVO_RATE_HZ as f32;
 
 /// Request to an axis for one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -186,7 +188,11 @@ impl Axis {
             FirstMotion::before(configuration.pole_pairs)
         };
         Ok(Self {
-            current_limit: current_limit(&constants, &first_motion),
+            current_limit: if first_motion.is_limited() {
+                constants.first_current_limit
+            } else {
+                constants.current_limit
+            },
             first_motion,
             constants,
             current_loop: CurrentLoop::default(),
@@ -264,6 +270,12 @@ impl Axis {
     #[must_use]
     pub fn is_proven(&self) -> bool {
         !self.first_motion.is_limited()
+    }
+
+    /// Share of the current limit that is permitted now, 0..=1.
+    #[must_use]
+    pub fn current_share(&self) -> f32 {
+        self.current_limit / self.constants.current_limit
     }
 
     /// Rotor position or parameters are lost and require a new calibration.
@@ -467,7 +479,12 @@ impl Axis {
     /// constants with their checksum. Called once per servo period, halfway between two joint samples, so
     /// that no tick has both to do. A fault found here acts from the next tick on.
     pub fn check(&mut self) {
-        self.current_limit = current_limit(&self.constants, &self.first_motion);
+        self.current_limit = if self.first_motion.is_limited() {
+            self.constants.first_current_limit
+        } else {
+            let rise = RISE_PER_CHECK * self.constants.current_limit;
+            min(self.current_limit + rise, self.constants.current_limit)
+        };
         // Every 64 ms.
         self.unchecked = self.unchecked.wrapping_add(1);
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
@@ -516,11 +533,6 @@ impl Axis {
             }
         }
     }
-}
-
-/// Greatest quadrature current, A.
-fn current_limit(constants: &Constants, first_motion: &FirstMotion) -> f32 {
-    if first_motion.is_limited() { constants.first_current_limit } else { constants.current_limit }
 }
 
 /// Sums since the last joint sample: means of count and current cover the same ticks, so belong to one

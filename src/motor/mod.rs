@@ -36,7 +36,7 @@ pub mod shunt_watch;
 pub mod transmission;
 
 pub use angle::{CountScale, ElectricalAngle, Rotation, SpeedTracker};
-pub use axis::{Axis, AxisFault, AxisRequest, BridgeRequest, FIRST_CURRENT_SHARE};
+pub use axis::{Axis, AxisFault, AxisRequest, BridgeRequest};
 pub use calibration::{
     Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, IndexSearch, Phase,
     Refusal, StoredCalibration,

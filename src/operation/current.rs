@@ -178,7 +178,7 @@ impl<const N: usize> CurrentLoops<N> {
             if let Some(running) = this.stage.axis_mut()
                 && let Some(samples) = ends.samples.get_mut(axis)
             {
-                signals.set_proven(axis, running.is_proven());
+                signals.set_current_share(axis, running.current_share());
                 // A servo that does not read its samples is detected below.
                 let _ = samples.enqueue(running.joint_sample());
             }

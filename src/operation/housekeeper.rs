@@ -14,8 +14,8 @@
 //!
 //! If the rotor moves during such a check, a push cannot be told from a wrong offset or index. So the stored
 //! values stay, but the next calibration turns the motor and measures the offset against them. The same holds
-//! after a lost rotor position. A push thus costs one calibration in motion, and no check at standstill
-//! follows another one that failed.
+//! after a lost rotor position. A push thus costs one calibration in motion, and until the
+//! next start no check at standstill follows another one that failed.
 //!
 //! A reset takes 24 ms. Gate drivers are turned off and on and configured again; then faults are cleared, and
 //! those that still hold come back. Until then the registers are not checked and contacts are ignored;

@@ -21,7 +21,6 @@ use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Plan,
     Refusal, permitted,
 };
-use crate::motor::FIRST_CURRENT_SHARE;
 use crate::safety::{DeratingRamps, Fault, FaultCode, JointShares, SupplyWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::trace::{Record, words};
@@ -188,7 +187,7 @@ impl<const N: usize> ServoLevel<N> {
         }
         let joints = array::from_fn(|joint| JointShares {
             winding: signals.winding_share(joint),
-            first_motion: if signals.is_unproven(joint) { FIRST_CURRENT_SHARE } else { 1.0 },
+            first_motion: signals.current_share(joint),
         });
         control.derate(&self.ramps.at(signals.hottest_c(), bus, joints));
     }

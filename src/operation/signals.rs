@@ -233,7 +233,7 @@ impl<const N: usize> Statistics<N> {
 /// Unit of the integrals of squared currents, A^2 s: a sixteenth of A^2 over one servo period.
 pub const SQUARE_UNIT: f32 = 1.0 / (UNITS_PER_SQUARE * SERVO_RATE_HZ as f32);
 const UNITS_PER_SQUARE: f32 = 16.0;
-/// A winding that has not been looked at takes nothing.
+/// Share before the first round: the whole cap.
 const FULL_SHARE: u32 = 1.0_f32.to_bits();
 
 /// Target bits that turn an axis off: a NaN pattern that no computation produces.
@@ -258,8 +258,9 @@ pub struct Signals<const N: usize> {
     squares: [Word; N],
     /// Temperature of each winding, degrees Celsius, and its share of the torque cap, as bits.
     windings: [[Word; 2]; N],
-    /// Whether each axis' rotor angle still has to be proven.
-    unproven: [Word; N],
+    /// Share of each axis' current limit that is permitted now, as bits. The axis itself enforces it; the
+    /// servo limits its torque likewise and reports it.
+    current_shares: [Word; N],
     permission: Word,
     hosted: Word,
     permits: Word,
@@ -280,7 +281,7 @@ impl<const N: usize> Signals<N> {
             hottest_c: Word::new(0),
             squares: [const { Word::new(0) }; N],
             windings: [const { [Word::new(0), Word::new(FULL_SHARE)] }; N],
-            unproven: [const { Word::new(0) }; N],
+            current_shares: [const { Word::new(FULL_SHARE) }; N],
             permission: Word::new(0),
             hosted: Word::new(0),
             permits: Word::new(0),
@@ -369,18 +370,18 @@ impl<const N: usize> Signals<N> {
         self.squares.get(axis).map_or(0, Word::get)
     }
 
-    /// Sets whether an axis' rotor angle is proven ([`crate::motor::Axis::is_proven`]).
+    /// Sets the permitted share of an axis' current limit ([`crate::motor::Axis::current_share`]).
     #[inline(always)]
-    pub fn set_proven(&self, axis: usize, proven: bool) {
-        if let Some(unproven) = self.unproven.get(axis) {
-            unproven.set((!proven).into());
+    pub fn set_current_share(&self, axis: usize, share: f32) {
+        if let Some(current_share) = self.current_shares.get(axis) {
+            current_share.set(share.to_bits());
         }
     }
 
-    /// Returns whether an axis' rotor angle still has to be proven.
+    /// Permitted share of an axis' current limit; NaN leaves no torque.
     #[must_use]
-    pub fn is_unproven(&self, axis: usize) -> bool {
-        self.unproven.get(axis).is_some_and(|unproven| unproven.get() != 0)
+    pub fn current_share(&self, axis: usize) -> f32 {
+        self.current_shares.get(axis).map_or(f32::NAN, |share| f32::from_bits(share.get()))
     }
 
     /// Temperature of a winding, degrees Celsius, by its model.

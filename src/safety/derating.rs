@@ -130,9 +130,9 @@ impl LimitCodes {
 /// Remaining shares of one joint's torque cap by its motor, 0..=1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointShares {
-    /// What the temperature of the winding leaves.
+    /// Share that the winding's temperature permits.
     pub winding: f32,
-    /// What is permitted before the rotor angle is proven.
+    /// Share that is permitted until the rotor angle is proven, and while the limit rises afterwards.
     pub first_motion: f32,
 }
 

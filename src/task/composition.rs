@@ -114,8 +114,8 @@ fn hand_out(
     let windings = leg::LEG.joints.map(|joint| joint.motor.winding);
     let settings = HousekeepingSettings { axes, calibration, hottest_c: HOTTEST_C, windings };
     let mut housekeeper = Housekeeper::new(settings).with_stored(stored);
-    // After a power-up the memory's content is random.
-    if let Some(celsius) = windings::kept().filter(|_| board.identity.reset != Reset::PowerOn) {
+    // Random memory after a power-up does not have the checksum.
+    if let Some(celsius) = windings::stored() {
         housekeeper = housekeeper.with_windings(celsius);
     }
     let thread = built.map(|(configuration, built)| identify::Thread {

@@ -35,6 +35,6 @@ pub async fn run(
         // A late round is not made up for: the waits of a gate drivers' reset are counted in rounds.
         ticker.reset();
         keeper.round(&mut ends, &SIGNALS, &mut board);
-        windings::keep(core::array::from_fn(|joint| SIGNALS.winding_c(joint)));
+        windings::store(core::array::from_fn(|joint| SIGNALS.winding_c(joint)));
     }
 }

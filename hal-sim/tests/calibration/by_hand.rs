@@ -296,7 +296,7 @@ fn a_wrong_stored_offset_moves_the_rotor_and_is_refused() {
         println!(
             "{degrees:>4} degrees: {refused} of 20 refused, travel {worst:.3} electrical turns, then {rolled:.4} turns"
         );
-        // Friction of 13 A holds up to 25 degrees of 15 A.
+        // Friction of up to 4 A stops the rotor up to 12 degrees off, and 11 degrees of travel are permitted.
         assert!(degrees > 5.0 || refused == 0, "{degrees}: {refused}");
         assert!(degrees < 25.0 || refused == 20, "{degrees}: {refused}");
         // 0.05 turns are 0.36 degrees of the joint.
@@ -313,7 +313,7 @@ fn half_a_turn_off_rests_and_is_found_by_the_first_motion() {
         leg.let_go(f64::INFINITY);
         let calibrator = leg.calibrator(wrong);
         let (result, travel, _) = leg.calibrate(calibrator, |_, _| {});
-        let found = result.expect("at rest on the summit");
+        let found = result.expect("at rest at the unstable equilibrium");
         leg.let_go(0.0);
         let (proven, fault, speed) = leg.first_motion(&found, [8.0, -8.0], None);
         assert!(!proven && fault == Some(AxisFault::Encoder), "seed {seed}: {fault:?} {travel}");

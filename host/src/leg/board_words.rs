@@ -76,8 +76,8 @@ pub fn refusal(reason: Refusal) -> String {
         Refusal::IndexMoved => "the index pulse came at different positions of the turn".into(),
         Refusal::StoredOffset => "the rotor position contradicts the stored offset".into(),
         Refusal::Moved => {
-            "the rotor moved while the field lay along its flux: the stored offset or the index is wrong, or the \
-             joint was pushed; the next calibration turns the motor".into()
+            "the rotor moved while the field lay along its flux: the stored offset or the index is wrong, a phase \
+             is open, or the joint was pushed; the next calibration turns the motor".into()
         }
     };
     format!("the calibration is refused: {words}")

@@ -4,7 +4,7 @@ use scarab::board::odrive_v3_6::settings::drives;
 use scarab::motor::{AxisConfiguration, CalibrationSettings, Calibrator};
 use scarab_host::formats::leg_file::{BodySide, DEFAULT_LEG, EncoderFile, LegFile, Side};
 use scarab_host::image::leg_source::{describe, source};
-use scarab_host::image::size::{ImageSize, Section};
+use scarab_host::image::size::{ImageSize, MEMORY_GOAL, Section};
 use scarab_host::leg::posture::on_side;
 use scarab_host::rig::board::{BRAKE, axis_configuration, calibration_settings};
 
@@ -194,6 +194,13 @@ fn an_image_has_no_defaults_for_safety_relevant_keys() {
     let reason = LegFile::load_for_image("mujoco-leg", true).expect_err("no motor").reason;
     assert!(reason.starts_with("joint `hip`: `encoder.side` is \"joint\": the board commutates"), "{reason}");
     assert!(reason.contains("`motor` are missing"), "{reason}");
+}
+
+#[test]
+fn the_memory_goal_is_what_the_stack_leaves() {
+    let layout = include_str!("../../../src/board/odrive_v3_6/layout.x");
+    let stack = format!("STACK_BYTES = {}K;", 128 - MEMORY_GOAL / 1024);
+    assert!(layout.contains(&stack), "{stack}");
 }
 
 #[test]

@@ -9,7 +9,7 @@
 //! T   = tolerance of the model watch     V + 0.35 R |i| + |w| (0.2 flux + 0.3 L |i|)
 //!
 //! counted   travel of servo periods with |w| flux > T: there 60 degrees and more show
-//! proven    a quarter of a motor turn counted in a row, each period with |r| <= T
+//! proven    a quarter of a motor turn counted in total, without a period of |r| > T
 //! lost      |r| > T for 8 ms (the model watch), or |w| flux > 3.5 (V + 0.35 R I / 4)
 //! ```
 //!
@@ -18,8 +18,9 @@
 //! the watch: 14 ms at the speed limit of the default leg (2.2 rad/s of the joint), 50 ms at the lowest
 //! counted speed (0.6 rad/s).
 //!
-//! Known limits: an angle that is wrong by less than 60 degrees may count as proven. Its torque keeps the
-//! sign and at least half of the size. The watch goes on and finds smaller errors at more speed. A motor
+//! Known limits: a flux 20 % lower than stated and other errors of the constants hide up to 75 degrees. Such
+//! an angle may count as proven; its torque keeps the sign and at least a quarter of the size. The watch goes
+//! on and finds smaller errors at more speed. The barrier and damping have no more current either. A motor
 //! with `L I / 4` above 1.7 flux is never proven. Where the speed limit exceeds that of braking, the outputs
 //! go off.
 

@@ -50,7 +50,8 @@ impl Hold {
         if self.straight {
             self.across_v -= INTEGRAL_V_PER_A * self.across_axis(reading.current).0;
         }
-        if self.volts.abs().max(self.across_v.abs()) > reading.bench.settings.voltage.0 {
+        let most = reading.bench.settings.voltage.0;
+        if self.volts * self.volts + self.across_v * self.across_v > most * most {
             return Err(Refusal::MotorConstants);
         }
         Ok(())

@@ -62,7 +62,7 @@ pub enum Refusal {
     IndexMoved,
     /// The measured offset differs from the stored one.
     StoredOffset,
-    /// The rotor moved while the field lay along its flux: the stored offset or the index is wrong, or the
-    /// joint was pushed.
+    /// The rotor moved while the field lay along its flux: the stored offset or the index is wrong, a phase
+    /// is open, or the joint was pushed.
     Moved,
 }

@@ -8,8 +8,8 @@
 //!            no step beyond the axis' greatest plausible one since the first of them
 //! ```
 //!
-//! Any other distance means a glitch or lost counts, and the search goes on from the newest pulse. The same
-//! pulse again, at its position, proves nothing about the counts and contradicts nothing.
+//! Any other distance means a glitch or lost counts, and the search goes on from the newest pulse. A
+//! repeated pulse at the same position is ignored.
 //!
 //! The state needs no configuration: the order to calibrate brings it ([`IndexSearch::position`]).
 //! Known limit: two glitches a turn apart, within 4 counts, look like an index. With 8,192 counts that is one
@@ -185,8 +185,8 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_no_axis_makes_spoils_the_pulses_around_it() {
-        for (step, spoils) in
+    fn an_implausible_step_invalidates_the_pulses_around_it() {
+        for (step, invalid) in
             [(GREATEST_STEP, false), (GREATEST_STEP + 1, true), (-8192, true), (-32_768, true)]
         {
             let pulses = [0, TURN, 2 * TURN, 3 * TURN];
@@ -200,12 +200,12 @@ mod tests {
             };
             let between =
                 jump(Hand { travel: -100, ..Hand::new() }.turn(3000, &pulses)).turn(TURN + 50, &pulses);
-            assert_eq!(between.position().is_none(), spoils, "{step}");
+            assert_eq!(between.position().is_none(), invalid, "{step}");
             assert!(between.turn(2 * TURN + 50, &pulses).position().is_some(), "{step}");
             let after = jump(Hand { travel: -100, ..Hand::new() }.turn(TURN + 50, &pulses));
-            assert_eq!(after.position().is_none(), spoils, "{step}");
+            assert_eq!(after.position().is_none(), invalid, "{step}");
             let after = after.turn(2 * TURN + 50, &pulses);
-            assert_eq!(after.position().is_none(), spoils, "{step}");
+            assert_eq!(after.position().is_none(), invalid, "{step}");
             assert!(after.turn(3 * TURN + 50, &pulses).position().is_some(), "{step}");
         }
     }

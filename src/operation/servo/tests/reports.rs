@@ -67,10 +67,10 @@ fn a_hot_winding_limits_its_own_joint() {
 
 #[test]
 fn an_unproven_rotor_angle_leaves_a_quarter_of_its_joints_torque() {
-    let quarter = LEG.joints[0].current.0 * FIRST_CURRENT_SHARE;
-    let (limits, limited) = after_a_move(|signals| signals.set_proven(0, false));
+    let quarter = 0.25 * LEG.joints[0].current.0;
+    let (limits, limited) = after_a_move(|signals| signals.set_current_share(0, 0.25));
     assert_eq!(limits, [(LimitCode::FirstMotion as u8, 1)]);
-    let (none, whole) = after_a_move(|signals| signals.set_proven(0, true));
+    let (none, whole) = after_a_move(|signals| signals.set_current_share(0, 1.0));
     assert_eq!(none, []);
     assert!(
         (limited[0].abs() - quarter).abs() < 0.1 && whole[0].abs() > quarter + 1.0,
