@@ -61,8 +61,7 @@ use crate::units::{Ampere, RadianPerSecond};
 mod first_motion;
 mod index;
 
-use first_motion::FirstMotion;
-pub(super) use first_motion::{CURRENT_SHARE as FIRST_CURRENT_SHARE, SPEED_SHARE as FIRST_SPEED_SHARE};
+use first_motion::{FirstMotion, SPEED_SHARE};
 use index::IndexWatch;
 
 /// Weight of a rejected shunt or bus reading. Each accepted reading subtracts one. A sum above
@@ -185,14 +184,10 @@ impl Axis {
         let first_motion = if calibration.is_proven() {
             FirstMotion::PROVEN
         } else {
-            FirstMotion::before(configuration.pole_pairs)
+            FirstMotion::before(&constants.scale, 0)
         };
         Ok(Self {
-            current_limit: if first_motion.is_limited() {
-                constants.first_current_limit
-            } else {
-                constants.current_limit
-            },
+            current_limit: constants.current_limit * first_motion.current_share(),
             first_motion,
             constants,
             current_loop: CurrentLoop::default(),
@@ -222,6 +217,9 @@ impl Axis {
     pub fn set_counts(&mut self, counts: i32) {
         self.index.shift(counts.wrapping_sub(self.counts));
         self.counts = counts;
+        if self.first_motion.is_limited() {
+            self.first_motion = FirstMotion::before(&self.constants.scale, counts);
+        }
         self.window = Window::EMPTY;
     }
 
@@ -479,12 +477,8 @@ impl Axis {
     /// constants with their checksum. Called once per servo period, halfway between two joint samples, so
     /// that no tick has both to do. A fault found here acts from the next tick on.
     pub fn check(&mut self) {
-        self.current_limit = if self.first_motion.is_limited() {
-            self.constants.first_current_limit
-        } else {
-            let rise = RISE_PER_CHECK * self.constants.current_limit;
-            min(self.current_limit + rise, self.constants.current_limit)
-        };
+        let most = self.constants.current_limit * self.first_motion.current_share();
+        self.current_limit = min(self.current_limit + RISE_PER_CHECK * most, most);
         // Every 64 ms.
         self.unchecked = self.unchecked.wrapping_add(1);
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
@@ -501,7 +495,7 @@ impl Axis {
             if core::mem::take(&mut self.begins) {
                 self.model_watch = ModelWatch::EMPTY;
                 if self.first_motion.is_limited() {
-                    self.first_motion.begin(self.constants.pole_pairs, angle);
+                    self.first_motion = FirstMotion::before(&self.constants.scale, self.counts);
                 }
             }
             let shown = Shown {
@@ -515,10 +509,11 @@ impl Axis {
             if self.first_motion.is_limited() {
                 let model = &self.constants.model;
                 let volts = [model.back_emf(&shown), self.model_watch.residual(), model.tolerance(&shown)];
-                self.first_motion.look(self.constants.pole_pairs, angle, volts);
+                self.first_motion.look(&self.constants.scale, self.counts, volts);
+                let greatest = SPEED_SHARE * model.frozen_speed(Ampere(self.current_limit));
                 // A wrong angle looks like an open phase.
                 if found == Some(AxisFault::OpenPhase)
-                    || found.is_none() && abs(shown.speed_rad_per_s) > self.constants.first_speed
+                    || found.is_none() && abs(shown.speed_rad_per_s) > greatest
                 {
                     found = Some(AxisFault::Encoder);
                 }

@@ -1,6 +1,5 @@
 //! Configuration of an axis, its validation, and the constants derived from it.
 
-use super::axis::{FIRST_CURRENT_SHARE, FIRST_SPEED_SHARE};
 use super::{
     BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, EncoderSetting,
     ModelLimits, Modulator, MotorConstants, SenseScale, ShuntWatch,
@@ -172,10 +171,6 @@ pub(super) struct Constants {
     pub overcurrent_square: f32,
     /// Electrical speed at which a shorted motor carries the overcurrent bound, rad/s.
     pub brake_speed: f32,
-    pub pole_pairs: u8,
-    /// Current limit and greatest electrical speed, rad/s, until the rotor angle is proven.
-    pub first_current_limit: f32,
-    pub first_speed: f32,
 }
 
 impl Constants {
@@ -188,7 +183,7 @@ impl Constants {
             self.counter_sign.cast_unsigned(),
             self.flexion_sign.cast_unsigned(),
             self.scale.counts_per_turn().cast_unsigned(),
-            u32::from(self.indexed) | u32::from(self.pole_pairs) << 8,
+            u32::from(self.indexed),
             self.unindexed,
         ];
         let limits = [
@@ -198,8 +193,6 @@ impl Constants {
             self.current_limit,
             self.overcurrent_square,
             self.brake_speed,
-            self.first_current_limit,
-            self.first_speed,
         ];
         words.into_iter().fold(self.gains.add_to(Checksum::EMPTY), Checksum::word).numbers(limits)
     }
@@ -223,8 +216,6 @@ impl Constants {
         let scale = configuration.scale()?;
         let dead = configuration.bus[1] * (configuration.timing.dead_time.0 * CURRENT_RATE_HZ as f32);
         let signs = [configuration.counter.sign(), configuration.flexion.sign()];
-        let model = ModelLimits::new(configuration, &motor, scale);
-        let first_current_limit = configuration.current_limit * FIRST_CURRENT_SHARE;
         Ok(Self {
             sense: configuration.sense,
             current_offsets: calibration.current_offsets(),
@@ -244,14 +235,11 @@ impl Constants {
             greatest_step: configuration.greatest_step()?,
             gains,
             modulator: configuration.modulator()?,
-            model,
+            model: ModelLimits::new(configuration, &motor, scale),
             stuck_change: ShuntWatch::target_change(dead, gains.least_ohm()).0,
             current_limit: configuration.current_limit.0,
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
             brake_speed: brake_speed(&motor, configuration.overcurrent),
-            pole_pairs: configuration.pole_pairs,
-            first_current_limit: first_current_limit.0,
-            first_speed: FIRST_SPEED_SHARE * model.frozen_speed(first_current_limit),
         })
     }
 }

@@ -24,60 +24,60 @@
 //! with `L I / 4` above 1.7 flux is never proven. Where the speed limit exceeds that of braking, the outputs
 //! go off.
 
-use crate::motor::ElectricalAngle;
-use crate::real::abs;
+use crate::motor::CountScale;
 
 /// Share of the axis' current limit that is permitted before the angle is proven.
-pub const CURRENT_SHARE: f32 = 0.25;
+const CURRENT_SHARE: f32 = 0.25;
 /// Greatest speed until then, over that at which a frozen counter shows at the greatest permitted current.
-pub const SPEED_SHARE: f32 = 3.5;
-/// Travel that proves the angle, motor turns.
-const PROOF_TURNS: f32 = 0.25;
+pub(super) const SPEED_SHARE: f32 = 3.5;
+/// Travel that proves the angle, as part of a motor turn.
+const PROOF_PART: i32 = 4;
 
 /// State of the first motion; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FirstMotion {
-    /// Travel still to be counted, electrical turns; zero once the angle is proven.
-    left: f32,
-    /// Angle in the last servo period.
-    angle: ElectricalAngle,
+    /// Travel still to be counted, counts; zero or less once the angle is proven.
+    left: i32,
+    /// Counts in the last servo period.
+    counts: i32,
 }
 
 impl FirstMotion {
     /// Whether the limits apply.
     #[inline(always)]
     pub(super) fn is_limited(&self) -> bool {
-        self.left > 0.0
+        self.left > 0
+    }
+
+    /// Share of the axis' current limit that is permitted.
+    pub(super) fn current_share(&self) -> f32 {
+        if self.is_limited() { CURRENT_SHARE } else { 1.0 }
     }
 
     /// State of an axis whose angle is proven.
-    pub(super) const PROVEN: Self = Self { left: 0.0, angle: ElectricalAngle::ZERO };
+    pub(super) const PROVEN: Self = Self { left: 0, counts: 0 };
 
-    /// State before the first motion of a motor with so many pole pairs.
-    pub(super) fn before(pole_pairs: u8) -> Self {
-        Self { left: PROOF_TURNS * f32::from(pole_pairs), ..Self::PROVEN }
-    }
-
-    /// Starts a motion at an angle: none of it is counted yet.
-    pub(super) fn begin(&mut self, pole_pairs: u8, angle: ElectricalAngle) {
-        *self = Self { angle, ..Self::before(pole_pairs) };
+    /// State before the first motion, at these counts of the joint.
+    pub(super) fn before(scale: &CountScale, counts: i32) -> Self {
+        Self { left: scale.counts_per_turn() / PROOF_PART, counts }
     }
 
     /// Runs one servo period with the back-EMF, the residual and the tolerance of the model watch, V.
     pub(super) fn look(
         &mut self,
-        pole_pairs: u8,
-        angle: ElectricalAngle,
+        scale: &CountScale,
+        counts: i32,
         [back_emf, residual, tolerance]: [f32; 3],
     ) {
-        let step = abs(angle.since(self.angle));
+        let step = counts.wrapping_sub(self.counts).wrapping_abs();
         // A residual that is not finite is beyond every tolerance.
         if !(residual <= tolerance) {
-            return self.begin(pole_pairs, angle);
+            *self = Self::before(scale, counts);
+            return;
         }
-        self.angle = angle;
+        self.counts = counts;
         if back_emf > tolerance {
-            self.left -= step;
+            self.left = self.left.saturating_sub(step);
         }
     }
 }
@@ -86,21 +86,20 @@ impl FirstMotion {
 mod tests {
     use super::*;
 
-    /// Servo periods of a hundredth of an electrical turn each until 7 pole pairs are proven, of 400.
+    /// Servo periods of a 700th of a motor turn each until the angle is proven, of 400.
     fn proven_after(volts: impl Fn(u32) -> [f32; 3]) -> Option<u32> {
-        let mut motion = FirstMotion::before(7);
-        motion.begin(7, ElectricalAngle::from_turns(0.3));
+        let scale = CountScale::new(7000, 7).expect("usual");
+        let mut motion = FirstMotion::before(&scale, i32::MAX - 400);
         (1..=400).find(|period| {
-            // To and fro: travel in either direction counts.
-            let way = if *period <= 100 { *period } else { 200 - *period % 200 };
-            motion.look(7, ElectricalAngle::from_turns(0.3 + 0.01 * way as f32), volts(*period));
+            // To and fro: travel in either direction counts. The counts wrap.
+            let way = 100 - (*period % 200).abs_diff(100);
+            motion.look(&scale, (i32::MAX - 400).wrapping_add(10 * way as i32), volts(*period));
             !motion.is_limited()
         })
     }
 
     #[test]
     fn a_quarter_of_a_motor_turn_in_a_row_proves_the_angle() {
-        // 1.75 electrical turns.
         assert!(proven_after(|_| [1.0, 0.5, 0.9]).is_some_and(|period| (175..=177).contains(&period)));
         // The back-EMF does not exceed the tolerance.
         assert_eq!(proven_after(|_| [0.89, 0.5, 0.9]), None);

@@ -39,7 +39,7 @@ impl IndexSearch {
         Self { counter: None, came: false, since: 0, distance: None, greatest_steps: [0; 2] };
 
     /// Follows one PWM period.
-    #[inline(always)]
+    #[inline(never)]
     pub fn follow(&mut self, sample: &AxisSample) {
         let now = sample.encoder_count;
         let step = now.wrapping_sub(self.counter.unwrap_or(now)).cast_signed();

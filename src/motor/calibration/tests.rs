@@ -398,7 +398,7 @@ fn an_index_at_another_position_during_the_check_is_refused() {
 #[test]
 fn wiring_that_changed_since_the_store_is_refused_at_standstill() {
     let changes: [(Change, Refusal); 7] = [
-        // At this angle C seems silent. Shunts are soldered; a phase is more often open than they are exchanged.
+        // At this angle C seems silent. A phase is more often open than soldered shunts are exchanged.
         (|motor| motor.shunts = |[b, c]| [c, b], Refusal::PhaseOpen(Phase::C)),
         (|motor| motor.shunts = |[b, c]| [-b, c], Refusal::CurrentDirection),
         (|motor| motor.shunts = |[b, c]| [-b, -c], Refusal::CurrentDirection),

@@ -92,7 +92,9 @@ fn only_travel_in_a_row_with_a_back_emf_beyond_the_tolerance_counts() {
 #[test]
 fn more_than_the_first_speed_loses_the_position_and_brakes() {
     // 3.5 (0.44 V + 0.35 * 0.05 ohm * 10 A) / 2.9 mV s / 7.
-    let limit = f64::from(Bench::unproven(0.0, |_| {}).axis.constants.first_speed) / 7.0;
+    let limit =
+        f64::from(SPEED_SHARE * Bench::unproven(0.0, |_| {}).axis.constants.model.frozen_speed(Ampere(10.0)))
+            / 7.0;
     assert!((limit - 106.0).abs() < 2.0, "{limit}");
     for (share, lost) in [(0.97, false), (1.03, true), (-1.03, true)] {
         let mut bench = Bench::unproven(0.0, |_| {});
