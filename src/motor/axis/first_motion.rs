@@ -90,7 +90,7 @@ mod tests {
     fn proven_after(volts: impl Fn(u32) -> [f32; 3]) -> Option<u32> {
         let scale = CountScale::new(7000, 7).expect("usual");
         let mut motion = FirstMotion::before(&scale, i32::MAX - 400);
-        (1..=400).find(|period| {
+        (1..=400_u32).find(|period| {
             // To and fro: travel in either direction counts. The counts wrap.
             let way = 100 - (*period % 200).abs_diff(100);
             motion.look(&scale, (i32::MAX - 400).wrapping_add(10 * way as i32), volts(*period));
