@@ -58,6 +58,8 @@ pub struct Session {
     pub resets: Vec<ResetReason>,
     /// Whether records of the timeline are printed when they arrive.
     pub prints: bool,
+    /// The joints were turned over their indexes since the start: stored calibrations need no motion.
+    is_turned: bool,
 }
 
 /// Records that are printed when they arrive.
@@ -79,7 +81,7 @@ impl Session {
         let plant = Plant::new(&leg.description::<JOINTS>()?, &drives, seed);
         let machine = Machine::new(image, Chip::new(plant, seed), options)?;
         let probe = Probe::new(&machine)?;
-        Ok(Self { machine, probe, leg: leg.clone(), resets: Vec::new(), prints: false })
+        Ok(Self { machine, probe, leg: leg.clone(), resets: Vec::new(), prints: false, is_turned: false })
     }
 
     /// Present time.
@@ -205,8 +207,9 @@ impl Session {
         self.press_start()?;
         for _ in 0..JOINTS {
             let line = self.wait("calibration", &[], CALIBRATION_S)?;
-            if !matches!(field(&line, "result"), Some("done" | "confirmed")) {
-                return Err(ToolError::Refused(format!("the calibration was refused: {line}")));
+            let expected = if self.is_turned { "confirmed" } else { "done" };
+            if field(&line, "result") != Some(expected) {
+                return Err(ToolError::Refused(format!("the calibration is not `{expected}`: {line}")));
             }
         }
         self.run(0.1)?;
@@ -241,12 +244,14 @@ impl Session {
         let position = self.machine.chip().plant.position();
         self.move_by_hand(position, 0.1)?;
         self.machine.power_cycle();
+        self.is_turned = false;
         self.boot()
     }
 
     fn turn(&mut self) -> Result<(), ToolError> {
         let from = self.machine.chip().plant.position();
         self.move_by_hand(from.map(|angle| angle + TURNED_RAD), 2.0)?;
+        self.is_turned = true;
         self.move_by_hand(from, 2.0)
     }
 

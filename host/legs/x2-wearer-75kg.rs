@@ -78,6 +78,7 @@ pub const LEG: LegDescription<2> = LegDescription {
                     ambient_c: 40.0,
                     limit_c: 100.0,
                 },
+                calibration_turns: 1.25,
             },
         },
         JointDescription {
@@ -140,6 +141,7 @@ pub const LEG: LegDescription<2> = LegDescription {
                     ambient_c: 40.0,
                     limit_c: 100.0,
                 },
+                calibration_turns: 1.25,
             },
         },
     ],

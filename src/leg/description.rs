@@ -73,6 +73,8 @@ pub struct MotorDescription {
     pub ratio: f32,
     /// Thermal constants of the winding.
     pub winding: WindingRating,
+    /// Permitted travel of a calibration, motor turns.
+    pub calibration_turns: f32,
 }
 
 impl MotorDescription {

@@ -88,6 +88,7 @@ fn motor(joint: &JointFile) -> Result<MotorDescription, &'static str> {
         counts_per_turn: joint.encoder.counts,
         ratio: joint.encoder.ratio as f32,
         winding: motor.winding(),
+        calibration_turns: motor.calibration_turns(),
     })
 }
 

@@ -63,6 +63,7 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
         counts_per_turn: joint.encoder.counts,
         ratio: joint.encoder.ratio as f32,
         winding: motor.winding(),
+        calibration_turns: motor.calibration_turns(),
     };
     let speed = RadianPerSecond(joint.speed_limit_deg_s.to_radians() as f32);
     drives::axis(&motor, Ampere(joint.current_limit() as f32), speed, SenseScale::DIVIDER)
@@ -82,7 +83,7 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
         current: Ampere(current as f32),
         voltage: Volt(voltage as f32),
         inertia: KilogramMetreSquared(ROTOR_INERTIA as f32),
-        travel_turns: drives::travel_turns(configuration.pole_pairs),
+        travel_turns: motor.calibration_turns(),
         ..drives::CALIBRATION
     }
 }

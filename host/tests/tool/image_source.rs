@@ -86,9 +86,12 @@ fn the_axes_of_the_board_are_those_of_the_simulated_drive() {
 /// With few pole pairs, first alignment and turn take more of a motor turn.
 #[test]
 fn a_calibration_on_the_board_may_travel_far_enough_to_pass_the_index() {
-    let (mut description, _) = describe(&leg(DEFAULT_LEG), 1).expect("two joints");
     for pole_pairs in [2, 4, 7, 21] {
-        description.joints.iter_mut().for_each(|joint| joint.motor.pole_pairs = pole_pairs);
+        let mut file = leg(DEFAULT_LEG);
+        for motor in file.joints.iter_mut().filter_map(|joint| joint.motor.as_mut()) {
+            motor.pole_pairs = pole_pairs;
+        }
+        let (description, _) = describe(&file, 1).expect("two joints");
         let axes = drives::axes(&description, 19.0);
         for (axis, settings) in axes.iter().zip(drives::calibrations(&description)) {
             assert!(axis.index);
@@ -194,6 +197,15 @@ fn an_image_has_no_defaults_for_safety_relevant_keys() {
     let reason = LegFile::load_for_image("mujoco-leg", true).expect_err("no motor").reason;
     assert!(reason.starts_with("joint `hip`: `encoder.side` is \"joint\": the board commutates"), "{reason}");
     assert!(reason.contains("`motor` are missing"), "{reason}");
+}
+
+#[test]
+fn a_leg_file_limits_the_travel_of_a_calibration() {
+    let mut file = leg(DEFAULT_LEG);
+    file.joints[1].motor.as_mut().expect("the default leg has motors").calibration_turns = Some(1.6);
+    let (description, _) = describe(&file, 1).expect("two joints");
+    let turns = drives::calibrations(&description).map(|settings| settings.travel_turns);
+    assert_eq!(turns, [1.25, 1.6]);
 }
 
 #[test]

@@ -129,6 +129,16 @@ fn every_error_names_file_line_and_reason() {
         (motor("inductance_d_uh = 15.0", "1.5"), Some(10), "its time constant is below 0.08 ms"),
         (motor("pole_pairs = 7", "0"), Some(8), "`motor.pole_pairs` is 0, outside 1..64"),
         (
+            joint(&format!("{MOTOR}calibration_turns = 2.1")),
+            Some(12),
+            "`motor.calibration_turns` is 2.1, outside 1.21..2",
+        ),
+        (
+            joint(&format!("{MOTOR}winding_limit_c = 60.0")),
+            Some(12),
+            "`motor.winding_limit_c` is 60, outside 70..250",
+        ),
+        (
             joint(&format!("encoder = {{ side = \"joint\", counts = 8192, ratio = 1.0 }}\n{MOTOR}")),
             Some(8),
             "joint `hip`: `motor` needs an encoder at the motor",

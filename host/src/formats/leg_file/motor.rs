@@ -9,6 +9,7 @@ use hal_sim::drive::description::{
     AxisDescription, BridgeDescription, CompleteDescription, CounterDescription, MotorDescription,
     ShuntDescription, SupplyDescription, Wiring,
 };
+use scarab::board::odrive_v3_6::settings::drives;
 use scarab::safety::WindingRating;
 use scarab::units::Ohm;
 use serde::{Deserialize, Serialize};
@@ -63,6 +64,9 @@ pub struct MotorFile {
     /// Temperature of the winding at which no torque is left, degrees Celsius.
     #[serde(default = "default_winding_limit")]
     pub winding_limit_c: f64,
+    /// Permitted travel of a calibration, motor turns; `None` for the usual one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_turns: Option<f64>,
 }
 
 fn default_cogging_periods() -> u32 {
@@ -163,6 +167,7 @@ impl MotorFile {
         thermal_time_s: 300.0,
         ambient_c: 40.0,
         winding_limit_c: 100.0,
+        calibration_turns: None,
     };
 
     pub(super) fn check(&self, number: usize, joint: &JointFile) -> Result<(), Fault> {
@@ -191,6 +196,11 @@ impl MotorFile {
         place.within("ambient_c", self.ambient_c, -40.0, 100.0)?;
         // The derating takes the last 20 degrees.
         place.within("winding_limit_c", self.winding_limit_c, self.ambient_c + 30.0, 250.0)?;
+        if let Some(turns) = self.calibration_turns {
+            // Rounded for the message.
+            let least = (1e3 * f64::from(drives::least_travel_turns(self.pole_pairs as u8))).round() / 1e3;
+            place.within("calibration_turns", turns, least, 2.0)?;
+        }
         let whole = Place { joint: place.joint, table: None };
         if joint.encoder.side != Side::Motor || joint.encoder.counts > MOST_COUNTS {
             let complaint = format!("needs an encoder at the motor with at most {MOST_COUNTS} counts");
@@ -210,6 +220,13 @@ impl MotorFile {
     #[must_use]
     pub fn flux(&self, joint: &JointFile) -> f64 {
         joint.torque_per_ampere / (1.5 * f64::from(self.pole_pairs) * joint.encoder.ratio)
+    }
+
+    /// Permitted travel of a calibration, motor turns.
+    #[must_use]
+    pub fn calibration_turns(&self) -> f32 {
+        let usual = drives::usual_travel_turns(self.pole_pairs as u8);
+        self.calibration_turns.map_or(usual, |turns| turns as f32)
     }
 
     /// Thermal constants for the firmware.

@@ -91,10 +91,17 @@ pub fn axis(
     }
 }
 
-/// Permitted travel of a calibration, motor turns: 1.25, and more where few pole pairs would miss the index.
+/// Least travel of a calibration that passes the index, motor turns.
 #[must_use]
-pub fn travel_turns(pole_pairs: u8) -> f32 {
-    max(CALIBRATION.travel_turns, 1.01 + ALIGNMENT_TURNS / f32::from(pole_pairs.max(1)))
+pub fn least_travel_turns(pole_pairs: u8) -> f32 {
+    1.01 + ALIGNMENT_TURNS / f32::from(pole_pairs.max(1))
+}
+
+/// Travel of a calibration where the leg file states none, motor turns: 1.25, and more where few pole pairs
+/// would miss the index.
+#[must_use]
+pub fn usual_travel_turns(pole_pairs: u8) -> f32 {
+    max(CALIBRATION.travel_turns, least_travel_turns(pole_pairs))
 }
 
 /// Calibrations of a leg's motors in place: the inertia is the largest that the joint moves, seen at the
@@ -103,7 +110,7 @@ pub fn travel_turns(pole_pairs: u8) -> f32 {
 pub fn calibrations<const N: usize>(leg: &LegDescription<N>) -> [CalibrationSettings; N] {
     leg.joints.map(|joint| CalibrationSettings {
         inertia: KilogramMetreSquared(joint.inertia.0 / (joint.motor.ratio * joint.motor.ratio)),
-        travel_turns: travel_turns(joint.motor.pole_pairs),
+        travel_turns: joint.motor.calibration_turns,
         ..CALIBRATION
     })
 }
