@@ -9,9 +9,8 @@
 //! mechanic   every 1/24 ms: leg by the mean torque; between, the rotors turn at constant speed
 //! ```
 //!
-//! A calibration needs motors that are free of their gears. So the plant begins with free rotors and a leg
-//! held by a fixture; [`Plant::couple`] mounts the gears. A hand holds joints, or moves them. Known limits: a
-//! hand is stronger than every motor.
+//! The plant begins with free rotors and a leg held by a fixture; [`Plant::couple`] mounts the gears. A hand
+//! holds joints, or moves them. Known limits: gears are rigid, a hand is stronger than every motor.
 
 use core::f64::consts::{PI, TAU};
 

@@ -1,7 +1,7 @@
 //! An operator at the board: contacts, gears and hands, guided by the records that the image sends.
 //!
-//! The steps are those of docs/board.md. Motors are calibrated free of their gears; then the gears are
-//! mounted while the leg is held at its zero, the reference is taken, and the leg is moved by hand into its
+//! The steps are those of docs/board.md. After `mount` the motors are calibrated with gear and leg on;
+//! without it they are free, and the gears are mounted before the reference. Then the leg is moved by hand into its
 //! range.
 
 use std::rc::Rc;
@@ -30,7 +30,9 @@ const IDENTIFICATION_S: f64 = 180.0;
 /// Step of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Step {
-    /// Calibrate both motors.
+    /// Mount gears and leg, which hangs free.
+    Mount,
+    /// Calibrate both motors; without `mount` before, the motors are free of their gears.
     Calibrate,
     /// Mount the gears, take the reference, move the leg into its range.
     Reference,
@@ -191,6 +193,7 @@ impl Session {
     /// The image refuses the step, or does not answer.
     pub fn step(&mut self, step: Step) -> Result<(), ToolError> {
         match step {
+            Step::Mount => self.mount(),
             Step::Calibrate => self.calibrate(),
             Step::Reference => self.reference(),
             Step::Enable => self.enable(),
@@ -199,6 +202,14 @@ impl Session {
             Step::PowerCycle => self.power_cycle(),
             Step::Turn => self.turn(),
         }
+    }
+
+    fn mount(&mut self) -> Result<(), ToolError> {
+        let now = self.now();
+        let plant = &mut self.machine.chip_mut().plant;
+        plant.couple(now);
+        plant.let_go();
+        self.run(0.5)
     }
 
     fn calibrate(&mut self) -> Result<(), ToolError> {

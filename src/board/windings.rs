@@ -1,37 +1,46 @@
 //! Temperatures of the windings in memory that survives a reset and a short power cut.
 //!
 //! Without them a board that restarts again and again would take its hot motors for less hot ones.
-#![expect(unsafe_code, reason = "the section whose memory outlives a reset")]
+#![expect(unsafe_code, reason = "memory that outlives a reset")]
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::mem::MaybeUninit;
+use core::ptr;
 
 use crate::checksum::Checksum;
 
 /// Both temperatures as bits, and their checksum with [`MAGIC`].
 #[unsafe(link_section = ".uninit.windings")]
-static STORED: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+static mut STORED: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
 
+const WORDS: usize = 3;
 const MAGIC: u32 = 0x5749_4E44;
 
 fn sum(words: [u32; 2]) -> u32 {
     words.into_iter().fold(Checksum::EMPTY.word(MAGIC), Checksum::word).value()
 }
 
-/// Writes both temperatures, degrees Celsius.
+/// Writes both temperatures, degrees Celsius. Called by the housekeeping alone.
 pub fn store(celsius: [f32; 2]) {
-    let words = celsius.map(f32::to_bits);
-    let [first, second, check] = &STORED;
-    // A reset between these stores leaves a wrong checksum, and the windings are assumed warm.
-    check.store(!sum(words), Ordering::SeqCst);
-    first.store(words[0], Ordering::SeqCst);
-    second.store(words[1], Ordering::SeqCst);
-    check.store(sum(words), Ordering::SeqCst);
+    let [first, second] = celsius.map(f32::to_bits);
+    let place = (&raw mut STORED).cast::<u32>();
+    // A reset between two of these stores leaves a wrong checksum, and the windings are assumed warm.
+    for (word, value) in [first, second, sum([first, second])].into_iter().enumerate() {
+        // SAFETY: the static exists, is aligned and has so many words. Only this function writes it, at one
+        // priority level, and `stored` reads it before that level runs.
+        unsafe { ptr::write_volatile(place.wrapping_add(word), value) };
+    }
 }
 
-/// Temperatures before the start, degrees Celsius; `None` if the checksum is wrong.
+/// Temperatures before the start, degrees Celsius; `None` if the checksum is wrong. For the start, before the
+/// housekeeping runs.
 #[must_use]
 pub fn stored() -> Option<[f32; 2]> {
-    let [first, second, check] = STORED.each_ref().map(|word| word.load(Ordering::SeqCst));
-    let whole = check == sum([first, second]);
-    whole.then(|| [first, second].map(f32::from_bits)).filter(|celsius| celsius.iter().all(|c| c.is_finite()))
+    let place = (&raw mut STORED).cast::<u32>();
+    // SAFETY: as above; any bit pattern is a valid word. The read is volatile because the content was written
+    // before this image began.
+    let [first, second, check] =
+        core::array::from_fn::<u32, WORDS, _>(|word| unsafe { ptr::read_volatile(place.wrapping_add(word)) });
+    let celsius = [first, second].map(f32::from_bits);
+    let is_sound = check == sum([first, second]) && celsius.iter().all(|celsius| celsius.is_finite());
+    is_sound.then_some(celsius)
 }
