@@ -1,8 +1,8 @@
 //! An operator at the board: contacts, gears and hands, guided by the records that the image sends.
 //!
-//! The steps are those of docs/board.md. After `mount` the motors are calibrated with gear and leg on;
-//! without it they are free, and the gears are mounted before the reference. Then the leg is moved by hand into its
-//! range.
+//! The steps are those of docs/board.md. After `mount` the motors are calibrated with gear and leg on.
+//! Without it they are free, and the gears are mounted before the reference. Then the leg is moved by hand
+//! into its range.
 
 use std::rc::Rc;
 

@@ -50,7 +50,7 @@ pub(super) const BENCH: Bench = Bench {
         state: "Limit, Damp",
         deadline_ms: f64::INFINITY,
         unit: "degrees",
-        codes: &[],
+        codes: &[FaultCode::WindingTemperature],
         lacking: Some("heat that the current does not show: surroundings, iron, gear"),
     },
     run,
@@ -106,9 +106,10 @@ fn one(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     }
     let undetectable = most < LIMIT_C - f64::from(RAMP_K);
     let in_time = limited_at.is_some_and(|celsius| celsius < LIMIT_C) && most <= LIMIT_C + TOLERANCE_K;
-    let alarm = fork.host.rig().alarm().map(FaultCode::name);
-    let is_damped = alarm == Some(FaultCode::WindingTemperature.name());
+    // A push beyond the range has an alarm of its own.
+    let is_damped = fork.host.rig().alarm() == Some(FaultCode::WindingTemperature);
     let state = if is_damped { "Damp" } else { "Limit" };
+    let alarm = is_damped.then(|| FaultCode::WindingTemperature.name());
     let found = fork.ended(in_time.then_some(state), alarm);
     Ok(Outcome { undetectable: undetectable && !in_time, magnitude: Some(most), ..found })
 }
