@@ -364,8 +364,7 @@ impl<const N: usize> Signals<N> {
         }
     }
 
-    /// Integral of a motor's squared current, in sixteenths of A^2 over a servo period.
-    /// It wraps after 18 s at 60 A.
+    /// Wrapping integral of a motor's squared current, unit: a sixteenth of A^2 over a servo period.
     #[must_use]
     pub fn squares(&self, axis: usize) -> u32 {
         self.squares.get(axis).map_or(0, Word::get)
