@@ -174,7 +174,7 @@ impl<const N: usize> CurrentLoops<N> {
         }
         if this.ticks >= TICKS_PER_SERVO {
             this.ticks = 0;
-            signals.add_square(axis, this.stage.square_a2());
+            signals.add_i2t(axis, this.stage.square_a2());
             if let Some(running) = this.stage.axis_mut()
                 && let Some(samples) = ends.samples.get_mut(axis)
             {

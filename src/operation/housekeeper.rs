@@ -12,7 +12,7 @@
 //! calibration measures everything again. Once the joint was turned over its index by hand, the check needs
 //! no motion and cannot measure the offset.
 //!
-//! If the rotor moves during such a check, a push cannot be told from a wrong offset or index. So the stored
+//! If the rotor moves during such a check, a push looks like a wrong offset or index. So the stored
 //! values stay, but the next calibration turns the motor and measures the offset against them. The same holds
 //! after a lost rotor position. A push thus costs one calibration in motion, and until the
 //! next start no check at standstill follows another one that failed.
@@ -24,7 +24,7 @@
 use super::axis_state::{Order, Outcome};
 use super::contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
 use super::queues::HousekeepingEnds;
-use super::signals::{SQUARE_UNIT, Signals};
+use super::signals::{I2T_UNIT, Signals};
 use crate::hal::{AxisSample, Contacts, Hardware, JointSample};
 use crate::leg::{
     AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, PowerRequest, StoredCalibration,
@@ -105,7 +105,7 @@ pub struct Housekeeper<const N: usize> {
     drive: Option<DriveState>,
     windings: [Winding; N],
     /// Integrals of the squared currents in the previous round.
-    squares: [u32; N],
+    i2t: [u32; N],
     round: u32,
     recorded: u32,
 }
@@ -127,7 +127,7 @@ impl<const N: usize> Housekeeper<N> {
             resetting: None,
             drive: None,
             windings: settings.windings.map(|rating| Winding::new(rating, None)),
-            squares: [0; N],
+            i2t: [0; N],
             round: 0,
             recorded: 0,
         }
@@ -168,7 +168,7 @@ impl<const N: usize> Housekeeper<N> {
 
     fn act(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         self.round = self.round.wrapping_add(1);
-        self.warm(level.signals);
+        self.advance_windings(level.signals);
         if self.advance_reset(level) {
             return;
         }
@@ -181,12 +181,12 @@ impl<const N: usize> Housekeeper<N> {
     }
 
     /// Advances the windings by one round. A late round counts as one, so a winding cools less.
-    fn warm(&mut self, signals: &Signals<N>) {
-        for (axis, (winding, before)) in self.windings.iter_mut().zip(&mut self.squares).enumerate() {
-            let now = signals.squares(axis);
+    fn advance_windings(&mut self, signals: &Signals<N>) {
+        for (axis, (winding, before)) in self.windings.iter_mut().zip(&mut self.i2t).enumerate() {
+            let now = signals.i2t(axis);
             let added = now.wrapping_sub(*before);
             *before = now;
-            winding.advance(added as f32 * SQUARE_UNIT, 1.0 / RATE_HZ as f32);
+            winding.advance(added as f32 * I2T_UNIT, 1.0 / RATE_HZ as f32);
             signals.set_winding(axis, winding);
         }
     }

@@ -231,8 +231,8 @@ impl<const N: usize> Statistics<N> {
 }
 
 /// Unit of the integrals of squared currents, A^2 s: a sixteenth of A^2 over one servo period.
-pub const SQUARE_UNIT: f32 = 1.0 / (UNITS_PER_SQUARE * SERVO_RATE_HZ as f32);
-const UNITS_PER_SQUARE: f32 = 16.0;
+pub const I2T_UNIT: f32 = 1.0 / (UNITS_PER_A2 * SERVO_RATE_HZ as f32);
+const UNITS_PER_A2: f32 = 16.0;
 /// Share before the first round: the whole cap.
 const FULL_SHARE: u32 = 1.0_f32.to_bits();
 
@@ -254,8 +254,8 @@ pub struct Signals<const N: usize> {
     reported: [Word; N],
     /// Temperature of the hottest bridge, degrees Celsius, as bits.
     hottest_c: Word,
-    /// Integral of each motor's squared current, in [`SQUARE_UNIT`], wrapping.
-    squares: [Word; N],
+    /// Integral of each motor's squared current, in [`I2T_UNIT`], wrapping.
+    i2t: [Word; N],
     /// Temperature of each winding, degrees Celsius, and its share of the torque cap, as bits.
     windings: [[Word; 2]; N],
     /// Share of each axis' current limit that is permitted now, as bits. The axis itself enforces it; the
@@ -279,7 +279,7 @@ impl<const N: usize> Signals<N> {
             begun: Word::new(0),
             reported: [const { Word::new(0) }; N],
             hottest_c: Word::new(0),
-            squares: [const { Word::new(0) }; N],
+            i2t: [const { Word::new(0) }; N],
             windings: [const { [Word::new(0), Word::new(FULL_SHARE)] }; N],
             current_shares: [const { Word::new(FULL_SHARE) }; N],
             permission: Word::new(0),
@@ -358,16 +358,16 @@ impl<const N: usize> Signals<N> {
 
     /// Adds a motor's squared current (A^2) over one servo period.
     #[inline(always)]
-    pub fn add_square(&self, axis: usize, square_a2: f32) {
-        if let Some(sum) = self.squares.get(axis) {
-            sum.set(sum.get().wrapping_add((square_a2 * UNITS_PER_SQUARE) as u32));
+    pub fn add_i2t(&self, axis: usize, square_a2: f32) {
+        if let Some(sum) = self.i2t.get(axis) {
+            sum.set(sum.get().wrapping_add((square_a2 * UNITS_PER_A2) as u32));
         }
     }
 
     /// Wrapping integral of a motor's squared current, unit: a sixteenth of A^2 over a servo period.
     #[must_use]
-    pub fn squares(&self, axis: usize) -> u32 {
-        self.squares.get(axis).map_or(0, Word::get)
+    pub fn i2t(&self, axis: usize) -> u32 {
+        self.i2t.get(axis).map_or(0, Word::get)
     }
 
     /// Sets the permitted share of an axis' current limit ([`crate::motor::Axis::current_share`]).

@@ -103,7 +103,7 @@ mod tests {
         assert!(proven_after(|_| [1.0, 0.5, 0.9]).is_some_and(|period| (175..=177).contains(&period)));
         // The back-EMF does not exceed the tolerance.
         assert_eq!(proven_after(|_| [0.89, 0.5, 0.9]), None);
-        // A single residual beyond it, or one that is not finite, starts anew.
+        // A single residual beyond it, or one that is not finite, starts the count again.
         for residual in [0.91, f32::NAN] {
             let once = |period| [1.0, if period == 150 { residual } else { 0.5 }, 0.9];
             assert!(proven_after(once).is_some_and(|period| (325..=327).contains(&period)), "{residual}");

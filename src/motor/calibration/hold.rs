@@ -5,8 +5,8 @@
 //! ```
 //!
 //! Along the axis of a phase the current across must show a wrong wiring, so only the current along is
-//! controlled. Along any other angle dead time bends the current: up to 1.8 A for 50 mOhm at 48 V. A straight
-//! hold therefore also controls the current across to zero.
+//! controlled. Along any other angle dead time bends the current: up to 1.8 A for 50 mOhm at 48 V. There
+//! the current across is controlled to zero as well ([`Hold::with_zero_across`]).
 //!
 //! Integral control alone is slow and needs neither R nor L. With them its damping is R / (2 sqrt(k L)): 1.6
 //! for 50 mOhm and 25 uH, above 0.3 down to 10 mOhm. The target rises in 50 ms.
@@ -24,19 +24,19 @@ pub(super) struct Hold {
     axis: Rotation,
     target_a: f32,
     volts: f32,
-    /// Voltage across the angle; zero unless the current is kept straight.
+    /// Voltage across the angle; zero unless the current across is controlled.
     across_v: f32,
-    straight: bool,
+    controls_across: bool,
 }
 
 impl Hold {
     pub(super) fn along(angle: ElectricalAngle) -> Self {
-        Self { axis: angle.rotation(), target_a: 0.0, volts: 0.0, across_v: 0.0, straight: false }
+        Self { axis: angle.rotation(), target_a: 0.0, volts: 0.0, across_v: 0.0, controls_across: false }
     }
 
-    /// Holds the current along any angle, and none across it.
-    pub(super) fn straight_along(angle: ElectricalAngle) -> Self {
-        Self { straight: true, ..Self::along(angle) }
+    /// Holds the current along any angle and controls the current across to zero.
+    pub(super) fn with_zero_across(angle: ElectricalAngle) -> Self {
+        Self { controls_across: true, ..Self::along(angle) }
     }
 
     /// Runs one tick: moves the target towards `target` and adapts the voltage. The target's slope follows
@@ -47,7 +47,7 @@ impl Hold {
         let rise = reading.bench.settings.current.0 * RISE_PER_TICK;
         self.target_a += (target.0 - self.target_a).max(-rise).min(rise);
         self.volts += INTEGRAL_V_PER_A * (self.target_a - self.along_axis(reading.current).0);
-        if self.straight {
+        if self.controls_across {
             self.across_v -= INTEGRAL_V_PER_A * self.across_axis(reading.current).0;
         }
         let most = reading.bench.settings.voltage.0;

@@ -115,7 +115,12 @@ fn angle_of(phase: Phase) -> ElectricalAngle {
 impl ResistanceStage {
     /// Measures along the flux of a rotor at this angle only.
     pub(super) fn along_flux(angle: ElectricalAngle) -> Self {
-        Self { axis: AXES.len() - 1, hold: Hold::straight_along(angle), flux: Some(angle), ..Self::default() }
+        Self {
+            axis: AXES.len() - 1,
+            hold: Hold::with_zero_across(angle),
+            flux: Some(angle),
+            ..Self::default()
+        }
     }
 
     pub(super) fn tick(&mut self, reading: &Reading<'_>) -> Result<Outcome<(Ohm, Hold)>, Refusal> {

@@ -357,8 +357,8 @@ fn stored_values_are_confirmed_at_standstill_once_the_index_is_certain() {
 fn the_motor_turns_without_a_certain_index_without_stored_values_or_on_request() {
     let (motor, configuration, stored) = second_day(Direction::Up);
     let checked = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
-    let anew = Calibrator::new(&configuration, SETTINGS).expect("usual");
-    for (calibrator, turns) in [(checked, 0.6), (checked.turning(), 2.1), (anew, 2.1)] {
+    let unchecked = Calibrator::new(&configuration, SETTINGS).expect("usual");
+    for (calibrator, turns) in [(checked, 0.6), (checked.turning(), 2.1), (unchecked, 2.1)] {
         let mut motor = motor.clone();
         let search = turned_by_hand(&mut motor, turns);
         assert_eq!(indexed(calibrator, &search), calibrator);

@@ -98,7 +98,7 @@ fn measured() -> Calibration {
     calibrate(&mut TestMotor::default(), &CONFIGURATION).expect("sound")
 }
 
-fn anew() -> Order {
+fn unchecked() -> Order {
     Order::Calibrate(Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual"))
 }
 
@@ -111,7 +111,7 @@ fn a_stored_calibration_is_checked_and_a_missing_one_measured() {
     let calibration = measured();
     let stored = calibration.stored().expect("an index");
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
-    assert_eq!(bench.press(), [(0, anew())]);
+    assert_eq!(bench.press(), [(0, unchecked())]);
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored), None]));
     assert_eq!(bench.press(), [(0, checked(stored))]);
     // The axis takes its rotor position from the present counter.
@@ -120,7 +120,7 @@ fn a_stored_calibration_is_checked_and_a_missing_one_measured() {
     let running = Axis::new(&CONFIGURATION, &calibration, &sample).expect("usual");
     let orders = bench.ends(0, Outcome::Calibrated(calibration));
     assert!(matches!(orders[..], [(0, Order::Run(axis)), (1, Order::Calibrate(_))] if axis == running));
-    assert_eq!(orders[1].1, anew());
+    assert_eq!(orders[1].1, unchecked());
     // Both calibrations are sent to the storage.
     bench.ends(1, Outcome::Calibrated(calibration));
     assert_eq!(bench.calibrated, [(0, Some(stored)), (1, Some(stored))]);
@@ -143,7 +143,7 @@ fn a_wrong_stored_calibration_is_refused_once_and_then_measured() {
             matches!(record, Record::Calibration { joint: 1, result, .. } if *result == words::calibration(refusal).0)
         });
         assert!(recorded && !bench.keeper.is_calibrated(), "{refusal:?}");
-        assert_eq!(bench.press(), [(0, anew())], "{refusal:?}");
+        assert_eq!(bench.press(), [(0, unchecked())], "{refusal:?}");
     }
 }
 
@@ -163,11 +163,11 @@ fn an_erased_or_foreign_calibration_is_not_used() {
     let stored = measured().stored().expect("an index");
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
     bench.signals.forget_stored();
-    assert_eq!(bench.press(), [(0, anew())]);
+    assert_eq!(bench.press(), [(0, unchecked())]);
     let mut other = stored;
     other.encoder.pole_pairs += 1;
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(other); 2]));
-    assert_eq!(bench.press(), [(0, anew())]);
+    assert_eq!(bench.press(), [(0, unchecked())]);
 }
 
 /// Executes the housekeeper's order on a motor whose power was off, and returns the outcome.

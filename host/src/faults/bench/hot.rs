@@ -25,7 +25,7 @@ use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
-use crate::rig::bus::host::Host;
+use crate::rig::bus::host::{Host, NODES};
 
 /// Servo ticks per second.
 const SECOND: u64 = SERVO_RATE_HZ as u64;
@@ -38,8 +38,7 @@ const LIMIT_C: f64 = 100.0;
 /// Largest excess over the limit. Before the leg is off, 50 ms and damping for 300 ms with the whole cap
 /// would heat by 23 degrees here; damping never takes all of it.
 const TOLERANCE_K: f64 = 15.0;
-/// Nodes, and the object of the following window, which no push may leave.
-const NODES: [u16; 2] = [1, 2];
+/// Object of the following window, which no push may leave.
 const WINDOW: u16 = 0x6065;
 
 pub(super) const BENCH: Bench = Bench {

@@ -23,7 +23,7 @@ use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::TICK_NS;
-use crate::rig::bus::host::Speaks;
+use crate::rig::bus::host::{NODES, Speaks};
 use crate::rig::faulty_board::PERIOD_MS;
 
 /// Limit after a host's timeout, ms. The bus checks after every second servo tick, the servo takes the order
@@ -37,7 +37,6 @@ const BACK: u64 = 400;
 const TRIES: u64 = 40;
 /// Servo ticks within which an emergency message has to be on the wire.
 const REPORT_TICKS: u64 = 40;
-const NODES: [u16; 2] = [1, 2];
 const HOST: u32 = 0x70;
 /// Value of 6007: fault.
 const FAULT: u32 = 1;

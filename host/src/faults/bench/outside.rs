@@ -25,11 +25,10 @@ use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
-use crate::rig::bus::host::{Host, Speaks};
+use crate::rig::bus::host::{Host, NODES, Speaks};
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
 
-const NODES: [u16; 2] = [1, 2];
 const WIDENED: Radian = Radian(2.0);
 /// Servo ticks per second.
 const SECOND: u64 = SERVO_RATE_HZ as u64;

@@ -18,10 +18,9 @@ use crate::faults::bench::lost::{BUS_MS, LATE_NS, comes_back};
 use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
-use crate::rig::bus::host::Speaks;
+use crate::rig::bus::host::{NODES, Speaks};
 use crate::rig::faulty_board::PERIOD_MS;
 
-const NODES: [u16; 2] = [1, 2];
 /// Timeout for cycles of less than 10 ms, ns.
 const TIME_NS: u64 = 100_000_000;
 /// Longest pause, servo ticks: 95 ms.

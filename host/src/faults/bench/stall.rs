@@ -24,7 +24,7 @@ use crate::faults::bench::lost::watched;
 use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
-use crate::rig::bus::host::Host;
+use crate::rig::bus::host::{Host, NODES};
 
 /// Drive state in which writing is permitted.
 const OFF: DriveState = DriveState::SwitchOnDisabled;
@@ -40,7 +40,6 @@ const ENABLING: u64 = 400;
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 /// Object of the stored following window, micro-radian.
 const WINDOW: u16 = 0x6065;
-const NODES: [u16; 2] = [1, 2];
 /// Emergency codes: a flash write begins; frames were lost; no error.
 const STORING: u16 = NoticeCode::Storing.number();
 const LOST: u16 = NoticeCode::Overrun.number();

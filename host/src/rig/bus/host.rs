@@ -21,7 +21,8 @@ use crate::rig::bus::wire::Sent;
 use crate::rig::faulty_board::Rig;
 use scarab::model::planar::{BASE, JOINTS};
 
-const NODES: [u16; JOINTS] = [1, 2];
+/// Node-IDs of hip and knee.
+pub const NODES: [u16; JOINTS] = [1, 2];
 /// Node-ID of the host.
 const NUMBER: u16 = 0x70;
 const START: u16 = 0;

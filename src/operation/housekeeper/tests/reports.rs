@@ -64,7 +64,7 @@ fn a_winding_warms_with_its_squared_current_and_leaves_less_torque() {
     // The integral wraps after 18 s at 60 A.
     for _ in 0..25 * RATE_HZ {
         for _ in 0..SERVO_RATE_HZ / RATE_HZ {
-            bench.signals.add_square(1, 3600.0);
+            bench.signals.add_i2t(1, 3600.0);
         }
         expected.advance(3600.0 / RATE_HZ as f32, 1.0 / RATE_HZ as f32);
         bench.round();
