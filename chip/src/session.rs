@@ -42,6 +42,8 @@ pub enum Step {
     Identify,
     /// Store the calibrations, by a host ("save" to 1010:1); the drive is off.
     Save,
+    /// Reset the chip by its pin: memory stays, and with it the temperatures of the windings.
+    Reset,
     /// Cut the power and switch it on again; the leg is held by hand.
     PowerCycle,
     /// Turn each joint by hand over its motor's index, twice.
@@ -199,6 +201,7 @@ impl Session {
             Step::Enable => self.enable(),
             Step::Identify => self.identify(),
             Step::Save => self.store(0x1010, *b"save", STORE_S),
+            Step::Reset => self.reset(),
             Step::PowerCycle => self.power_cycle(),
             Step::Turn => self.turn(),
         }
@@ -249,11 +252,42 @@ impl Session {
         self.run(duration + 0.3)
     }
 
-    fn power_cycle(&mut self) -> Result<(), ToolError> {
+    /// Lets go of the switch and holds the leg by hand.
+    fn rest(&mut self) -> Result<(), ToolError> {
         self.hold_switch(false);
         self.run(1.0)?;
         let position = self.machine.chip().plant.position();
-        self.move_by_hand(position, 0.1)?;
+        self.move_by_hand(position, 0.1)
+    }
+
+    /// Temperatures of the windings in the next record, degrees Celsius.
+    fn windings(&mut self) -> Result<Vec<f64>, ToolError> {
+        let line = self.wait("supply", &[], 2.5)?;
+        let list = line.split_once("winding_c=[").and_then(|(_, rest)| rest.split_once(']'));
+        let values = list.map(|(list, _)| list.split(", ").map(str::parse).collect());
+        values.and_then(Result::ok).ok_or_else(|| ToolError::input(format!("no `winding_c` in `{line}`")))
+    }
+
+    fn reset(&mut self) -> Result<(), ToolError> {
+        self.rest()?;
+        let before = self.windings()?;
+        self.machine.reset(ResetReason::Pin);
+        self.is_turned = false;
+        self.boot()?;
+        let after = self.windings()?;
+        // Without memory they are assumed at 80 degrees.
+        let survive =
+            before.iter().zip(&after).all(|(before, after)| *before < 78.0 && (before - after).abs() < 1.0);
+        if survive {
+            return Ok(());
+        }
+        Err(ToolError::Refused(format!(
+            "temperatures of the windings: {before:?} before the reset, {after:?} after"
+        )))
+    }
+
+    fn power_cycle(&mut self) -> Result<(), ToolError> {
+        self.rest()?;
         self.machine.power_cycle();
         self.is_turned = false;
         self.boot()
