@@ -3,8 +3,8 @@
 use embassy_futures::block_on;
 use hal_sim::flash::{Flash, FlashError};
 use scarab::leg::{
-    Constant, CounterDirection, DriveState, ElectricalAngle, EncoderSetting, Fault, FaultCode, Fingerprint,
-    StoredCalibration, StoredModel, Stribeck,
+    AbsoluteAngle, Constant, CounterDirection, DriveState, ElectricalAngle, EncoderSetting, Fault, FaultCode,
+    Fingerprint, JointZero, StoredCalibration, StoredModel, Stribeck,
 };
 use scarab::store::{
     CalibrationRecord, JointProvenance, Key, LoadError, ModelRecord, Permit, Provenance, RecordError,
@@ -33,6 +33,11 @@ fn calibration(number: u32) -> CalibrationRecord {
         quadrature_inductance: Henry(3.1e-5),
         offset: ElectricalAngle::from_units(number.wrapping_mul(0x9E37_79B9).cast_signed()),
         encoder: EncoderSetting { counter: CounterDirection::Down, pole_pairs: 7, counts_per_turn: 8192 },
+        winding_c: (number % 2 == 1).then_some(number as f32 - 100.0),
+        joint_zero: (number % 3 == 1).then_some(JointZero {
+            rotor: -(number as i32),
+            joint: AbsoluteAngle::from_steps(number as u16),
+        }),
     })
 }
 

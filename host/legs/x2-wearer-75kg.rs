@@ -6,6 +6,7 @@ use crate::ident::{Choice::*, Constant::*, DriveChoice, Estimator::*, Plan::*};
 use crate::leg::{JointDescription, LegDescription, LinkDescription, MotorDescription};
 use crate::model::DenavitHartenberg;
 use crate::motion::ExcitationTable;
+use crate::motor::AbsoluteEncoders;
 use crate::safety::WindingRating;
 use crate::units::*;
 
@@ -79,6 +80,10 @@ pub const LEG: LegDescription<2> = LegDescription {
                     limit_c: 100.0,
                 },
                 calibration_turns: 1.25,
+                absolute: AbsoluteEncoders {
+                    rotor: false,
+                    joint: None,
+                },
             },
         },
         JointDescription {
@@ -142,6 +147,10 @@ pub const LEG: LegDescription<2> = LegDescription {
                     limit_c: 100.0,
                 },
                 calibration_turns: 1.25,
+                absolute: AbsoluteEncoders {
+                    rotor: false,
+                    joint: None,
+                },
             },
         },
     ],

@@ -109,6 +109,15 @@ pub struct Contacts {
     pub start: bool,
 }
 
+/// Place of an absolute encoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncoderPlace {
+    /// At the rotor.
+    Rotor,
+    /// At the joint.
+    Joint,
+}
+
 /// Register access of a board of `N` axes, without decisions. Every method returns at once.
 ///
 /// The levels of `operation` decide, on this trait and on plain queues and words. So the board and the
@@ -135,6 +144,9 @@ pub trait Hardware<const N: usize> {
     fn contacts(&self) -> Contacts;
     /// Quadrature counter of an axis.
     fn encoder_count(&self, axis: usize) -> u16;
+    /// Frame with the angle of an absolute encoder ([`crate::motor::AbsoluteAngle::of_frame`]); all ones without
+    /// one.
+    fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16;
     /// Temperature of a bridge, degrees Celsius; `None` if its thermistor is open or shorted.
     fn temperature(&self, axis: usize) -> Option<f32>;
     /// Whether a gate driver still holds its configuration.

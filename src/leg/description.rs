@@ -16,6 +16,7 @@ use crate::model::{
     RigidBody,
 };
 use crate::motion::{ExcitationTable, MotionError, Periodic};
+use crate::motor::AbsoluteEncoders;
 use crate::safety::WindingRating;
 use crate::servo::{JointConfiguration, JointScale, SERVO_RATE_HZ};
 use crate::units::{
@@ -75,6 +76,8 @@ pub struct MotorDescription {
     pub winding: WindingRating,
     /// Permitted travel of a calibration, motor turns.
     pub calibration_turns: f32,
+    /// Absolute encoders.
+    pub absolute: AbsoluteEncoders,
 }
 
 impl MotorDescription {

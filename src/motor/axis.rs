@@ -244,6 +244,11 @@ impl Axis {
         }
     }
 
+    /// Marks the rotor position as lost, because an absolute encoder contradicts it: the motor brakes.
+    pub fn lose_position(&mut self) {
+        self.found(AxisFault::Encoder);
+    }
+
     /// Currents of the last tick, in the electrical sense.
     #[must_use]
     pub fn measured(&self) -> Rotating<Ampere> {

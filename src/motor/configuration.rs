@@ -47,6 +47,8 @@ pub struct AxisConfiguration {
     pub counts_per_turn: u32,
     /// Whether the encoder has an index pulse.
     pub index: bool,
+    /// Whether an absolute encoder at the rotor replaces the index.
+    pub absolute: bool,
     /// Direction of the counter while the field turns from A over B to C, as the axis was commissioned.
     pub counter: Direction,
     /// Direction of the counter while the joint flexes.
@@ -74,7 +76,7 @@ pub enum AxisError {
     /// Dead time, settling or conversion leave less than half of the period, or the compensation's
     /// band is invalid.
     Timing,
-    /// Counts per turn or pole pairs.
+    /// Counts per turn, pole pairs, or an index beside an absolute encoder.
     Encoder,
     /// Greatest speed: must be positive, below a quarter of an electrical turn and below 32,767
     /// counts per tick.
@@ -104,6 +106,7 @@ impl AxisConfiguration {
         self.modulator()?;
         self.scale()?;
         self.greatest_step()?;
+        must(!(self.index && self.absolute), AxisError::Encoder)?;
         must((1e-4..=1.0).contains(&self.flux.0), AxisError::Motor)?;
         must((50.0..=2000.0).contains(&self.bandwidth.0), AxisError::Motor)?;
         let currents = self.current_limit.0 > 0.0
@@ -117,7 +120,10 @@ impl AxisConfiguration {
         must(rectified <= high.0, AxisError::BackEmf)
     }
 
-    pub(super) fn scale(&self) -> Result<CountScale, AxisError> {
+    /// Scale from counts to the electrical angle.
+    ///
+    /// # Errors [`AxisError::Encoder`].
+    pub fn scale(&self) -> Result<CountScale, AxisError> {
         CountScale::new(self.counts_per_turn, self.pole_pairs).ok_or(AxisError::Encoder)
     }
 
@@ -153,7 +159,7 @@ pub(super) struct Constants {
     pub bus_codes: [u16; 2],
     pub scale: CountScale,
     pub offset: ElectricalAngle,
-    /// Rotor positions count from the index.
+    /// Index pulses are checked.
     pub indexed: bool,
     /// Greatest travel without an index pulse, counts; unlimited without an index.
     pub unindexed: u32,
@@ -215,6 +221,8 @@ impl Constants {
             .ok_or(AxisError::Motor)?;
         let scale = configuration.scale()?;
         let dead = configuration.bus[1] * (configuration.timing.dead_time.0 * CURRENT_RATE_HZ as f32);
+        // Without a captured index, its absence is no fault. An absolute encoder is checked elsewhere.
+        let indexed = configuration.index && calibration.indexed();
         let signs = [configuration.counter.sign(), configuration.flexion.sign()];
         Ok(Self {
             sense: configuration.sense,
@@ -222,13 +230,8 @@ impl Constants {
             bus_codes: configuration.bus_codes(),
             scale,
             offset: calibration.offset(),
-            indexed: calibration.indexed(),
-            // Without a captured index, its absence is no fault.
-            unindexed: if calibration.indexed() {
-                scale.counts_per_turn().unsigned_abs() / 8 * 17
-            } else {
-                u32::MAX
-            },
+            indexed,
+            unindexed: if indexed { scale.counts_per_turn().unsigned_abs() / 8 * 17 } else { u32::MAX },
             counter_sign: signs[0],
             flexion_sign: signs[1],
             current_sign: (signs[0] * signs[1]) as f32,

@@ -9,6 +9,7 @@
 //! | --- | --- |
 //! | [`Phases`], [`Stationary`], [`Rotating`] | Clarke and Park as types |
 //! | [`ElectricalAngle`], [`SpeedTracker`] | counts to angle and speed; sine and cosine |
+//! | [`AbsoluteAngle`] | frames of an absolute encoder at rotor or joint |
 //! | [`SenseScale`] | two shunt codes to a current vector, or an error at the rails |
 //! | [`CurrentLoop`] | PI in d and q, feedforward, voltage limit, anti-windup |
 //! | [`Modulator`] | space vectors, sampling window for the shunts, dead time |
@@ -21,6 +22,7 @@
 //!
 //! Equations, the timing within one PWM period and measured figures: docs/motor.md.
 
+pub mod absolute;
 pub mod angle;
 pub mod axis;
 pub mod calibration;
@@ -35,11 +37,12 @@ pub mod sense;
 pub mod shunt_watch;
 pub mod transmission;
 
+pub use absolute::{AbsoluteAngle, AbsoluteEncoders};
 pub use angle::{CountScale, ElectricalAngle, Rotation, SpeedTracker};
 pub use axis::{Axis, AxisFault, AxisRequest, BridgeRequest};
 pub use calibration::{
-    Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, IndexSearch, Phase,
-    Refusal, StoredCalibration,
+    Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, IndexSearch, JointZero,
+    Phase, Refusal, StoredCalibration,
 };
 pub use chopper::{BrakeBudget, Chopper, GREATEST_BRAKE_DUTY};
 pub use configuration::{AxisConfiguration, AxisError, Direction};

@@ -17,6 +17,7 @@ pub(crate) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
     flux: Weber(2.9e-3),
     counts_per_turn: 8192,
     index: true,
+    absolute: false,
     counter: Direction::Up,
     flexion: Direction::Up,
     bandwidth: Hertz(1000.0),
@@ -106,7 +107,8 @@ impl TestMotor {
         self.angle * self.pole_pairs
     }
 
-    fn position(&self) -> f64 {
+    /// Position of the encoder, turns.
+    pub(crate) fn position(&self) -> f64 {
         self.encoder_sign * self.angle / core::f64::consts::TAU + self.encoder_zero
     }
 

@@ -19,6 +19,8 @@ pub enum Order {
     Run(Axis),
     /// Set the joint's position to these counts.
     Place(i32),
+    /// Count the rotor position as lost: an absolute encoder contradicts it.
+    Lose,
     /// Clear a fault.
     ClearFault,
 }
@@ -121,6 +123,11 @@ impl AxisState {
             Order::Place(counts) => {
                 if let Some(axis) = self.axis_mut() {
                     axis.set_counts(counts);
+                }
+            }
+            Order::Lose => {
+                if let Some(axis) = self.axis_mut() {
+                    axis.lose_position();
                 }
             }
             Order::ClearFault => {

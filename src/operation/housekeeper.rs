@@ -17,26 +17,32 @@
 //! after a lost rotor position. A push thus costs one calibration in motion, and until the
 //! next start no check at standstill follows another one that failed.
 //!
+//! An absolute encoder at the rotor replaces the turning by hand; encoders at the joints, with a stored zero,
+//! replace the reference (`zeros.rs`).
+//!
 //! A reset takes 24 ms. Gate drivers are turned off and on and configured again; then faults are cleared, and
 //! those that still hold come back. Until then the registers are not checked and contacts are ignored;
 //! afterwards both contacts have to be open once.
 
 use super::axis_state::{Order, Outcome};
 use super::contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
+use super::encoders::{EncoderCheck, EncoderSettings};
 use super::queues::HousekeepingEnds;
 use super::signals::{I2T_UNIT, Signals};
-use crate::hal::{AxisSample, Contacts, Hardware, JointSample};
+use crate::hal::{AxisSample, Contacts, Hardware};
 use crate::leg::{
     AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, PowerRequest, StoredCalibration,
 };
-use crate::motor::reference::{ReferenceStep, StatedPose};
-use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator};
+use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, JointZero};
 use crate::real::max;
 use crate::safety::{
     BoardFault, CheckClock, InhibitReason, Winding, WindingRating, of_gate_driver, of_temperature,
 };
 use crate::trace::{Record, words};
-use crate::units::Hertz;
+
+mod zeros;
+
+use zeros::Reference;
 
 /// Rounds of a reset with gate drivers off (2 ms), and until they can be configured (22 ms).
 const GATES_ON: u8 = 1;
@@ -53,6 +59,8 @@ pub struct HousekeepingSettings<const N: usize> {
     pub hottest_c: f32,
     /// Thermal constants of each motor's winding.
     pub windings: [WindingRating; N],
+    /// Encoders of each axis.
+    pub encoders: [EncoderSettings; N],
 }
 
 /// Access of a round to queues, signals and hardware.
@@ -96,14 +104,25 @@ pub struct Housekeeper<const N: usize> {
     turning: [bool; N],
     /// The axis that is being calibrated.
     calibrating: Option<usize>,
-    /// Joints that must stand still for the reference, and which of them have.
-    reference: Option<[(StatedPose, bool); N]>,
+    /// Calibration that each axis passed since the start, if it can be stored.
+    passed: [Option<StoredCalibration>; N],
+    /// A reference in progress.
+    reference: Option<Reference<N>>,
     /// The zeros were set in the previous round: the servo may begin.
     placed: bool,
+    checks: [EncoderCheck; N],
+    /// Axes whose absolute encoders contradict the counter; until a reset they are not calibrated.
+    contradicted: [bool; N],
+    /// Rotor position of each axis at count zero, in the joint's sense.
+    origins: [i32; N],
+    /// Readings at each joint's zero.
+    joint_zeros: [Option<JointZero>; N],
     /// Rounds since a reset was requested.
     resetting: Option<u8>,
     drive: Option<DriveState>,
     windings: [Winding; N],
+    /// Windings whose temperature is assumed.
+    assumed: [bool; N],
     /// Integrals of the squared currents in the previous round.
     i2t: [u32; N],
     round: u32,
@@ -122,11 +141,17 @@ impl<const N: usize> Housekeeper<N> {
             stored: [None; N],
             turning: [false; N],
             calibrating: None,
+            passed: [None; N],
             reference: None,
             placed: false,
+            checks: [EncoderCheck::default(); N],
+            contradicted: [false; N],
+            origins: [0; N],
+            joint_zeros: [None; N],
             resetting: None,
             drive: None,
             windings: settings.windings.map(|rating| Winding::new(rating, None)),
+            assumed: [true; N],
             i2t: [0; N],
             round: 0,
             recorded: 0,
@@ -144,13 +169,14 @@ impl<const N: usize> Housekeeper<N> {
     pub fn with_windings(self, celsius: [f32; N]) -> Self {
         let mut celsius = celsius.into_iter();
         let windings = self.settings.windings.map(|rating| Winding::new(rating, celsius.next()));
-        Self { windings, ..self }
+        Self { windings, assumed: [false; N], ..self }
     }
 
     /// Adds stored calibrations.
     #[must_use]
     pub fn with_stored(self, stored: [Option<StoredCalibration>; N]) -> Self {
-        Self { stored, ..self }
+        let joint_zeros = stored.map(|stored| stored?.joint_zero);
+        Self { stored, joint_zeros, ..self }
     }
 
     /// Runs one round, counts it for the watchdog, and sets whether the operator permits enabling.
@@ -169,6 +195,7 @@ impl<const N: usize> Housekeeper<N> {
     fn act(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         self.round = self.round.wrapping_add(1);
         self.advance_windings(level.signals);
+        self.follow_counters(level);
         if self.advance_reset(level) {
             return;
         }
@@ -241,6 +268,9 @@ impl<const N: usize> Housekeeper<N> {
                 level.signals.report(BoardFault::Winding, axis);
             }
         }
+        if due.encoders {
+            self.check_encoders(level);
+        }
         for axis in 0..N {
             let outcome = level.ends.outcomes.get_mut(axis).and_then(|outcomes| outcomes.dequeue());
             if let Some(outcome) = outcome {
@@ -276,12 +306,16 @@ impl<const N: usize> Housekeeper<N> {
             Outcome::Calibrated(calibration) => {
                 level.record(found(joint, calibration));
                 // A check at standstill changes nothing that is stored.
+                let before = self.stored.get(axis).copied().flatten();
+                self.take_temperature(axis, before, calibration);
                 let stored = if calibration.is_proven() {
-                    calibration.stored()
+                    let winding_c = self.windings.get(axis).map(Winding::temperature_c);
+                    let joint_zero = self.joint_zeros.get(axis).copied().flatten();
+                    calibration.stored().map(|stored| StoredCalibration { winding_c, joint_zero, ..stored })
                 } else {
-                    self.stored.get(axis).copied().flatten()
+                    before
                 };
-                let _ = level.ends.calibrated.enqueue((axis, stored));
+                self.passes(axis, stored, level);
                 self.must_turn(axis, false);
                 self.run_axis(axis, calibration, level);
             }
@@ -296,16 +330,21 @@ impl<const N: usize> Housekeeper<N> {
                 // The stored calibration does not fit the motor or its mounting: measure again next time. A
                 // load or a hand says nothing about it.
                 let is_pushed = matches!(refusal, Load(_) | Moved | Travel | Turning);
-                if let Some(stored) = self.stored.get_mut(axis).filter(|_| !is_pushed) {
-                    *stored = None;
+                if let Some((stored, zero)) =
+                    self.stored.get_mut(axis).zip(self.joint_zeros.get_mut(axis)).filter(|_| !is_pushed)
+                {
+                    (*stored, *zero) = (None, None);
                 }
             }
             Outcome::Interrupted => {
                 level.record(refused(joint, "interrupted", 0));
                 self.calibrating = None;
             }
-            // The axis runs on without a zero.
+            // The axis runs on without a zero. The counter may have wrapped.
             Outcome::StoodStill => {
+                if let Some(check) = self.checks.get_mut(axis) {
+                    *check = EncoderCheck::default();
+                }
                 level.record(Record::AxisFault { tick: self.round, joint, name: "zero_forgotten" });
                 self.forget_zeros(level);
             }
@@ -326,17 +365,42 @@ impl<const N: usize> Housekeeper<N> {
         }
     }
 
+    /// Keeps a passed calibration, and offers it to the storage.
+    fn passes(
+        &mut self,
+        axis: usize,
+        stored: Option<StoredCalibration>,
+        level: &mut Level<'_, '_, N, impl Hardware<N>>,
+    ) {
+        if let Some(passed) = self.passed.get_mut(axis) {
+            *passed = stored;
+        }
+        let _ = level.ends.calibrated.enqueue((axis, stored));
+    }
+
+    /// Replaces the assumed temperature of a winding by that of its resistance against the stored one.
+    fn take_temperature(
+        &mut self,
+        axis: usize,
+        stored: Option<StoredCalibration>,
+        calibration: &Calibration,
+    ) {
+        let Some((assumed, winding)) = self.assumed.get_mut(axis).zip(self.windings.get_mut(axis)) else {
+            return;
+        };
+        if let Some(stored) = stored
+            && let Some(celsius) = stored.winding_c
+            && core::mem::take(assumed)
+        {
+            winding.measured(calibration.resistance().0 / stored.resistance.0, celsius);
+        }
+    }
+
     /// Sets whether the next calibration of an axis has to turn its motor.
     fn must_turn(&mut self, axis: usize, turns: bool) {
         if let Some(turning) = self.turning.get_mut(axis) {
             *turning = turns;
         }
-    }
-
-    /// Discards the joints' zeros, also a reference in progress.
-    fn forget_zeros(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
-        level.signals.end_servo();
-        (self.drive, self.reference, self.placed) = (None, None, false);
     }
 
     /// Starts an axis that passed its calibration, with outputs off, and calibrates the next one.
@@ -350,6 +414,7 @@ impl<const N: usize> Housekeeper<N> {
         let sample = AxisSample { encoder_count, ..AxisSample::default() };
         let running =
             self.settings.axes.get(axis).and_then(|axis| Axis::new(axis, calibration, &sample).ok());
+        self.set_origin(axis, calibration, encoder_count);
         let (Some(running), Some(calibrated)) = (running, self.calibrated.get_mut(axis)) else {
             self.calibrating = None;
             return level.signals.inhibit.raise(InhibitReason::Configuration);
@@ -376,10 +441,21 @@ impl<const N: usize> Housekeeper<N> {
             }
             None => Calibrator::new(axis, *settings),
         });
+        let is_absolute = self.settings.encoders.get(axis).is_some_and(|encoders| encoders.absolute.rotor);
+        let position = self.checks.get(axis).and_then(EncoderCheck::position);
+        let is_contradicted = self.contradicted.get(axis).is_some_and(|contradicted| *contradicted);
         match calibrator {
+            Some(Ok(_)) if is_contradicted || is_absolute && position.is_none() => {
+                self.calibrating = None;
+                level.record(refused(axis as u8 + 1, "absolute_encoder", 0));
+            }
             Some(Ok(calibrator)) => {
                 self.calibrating = Some(axis);
                 let calibrator = if turns { calibrator.turning() } else { calibrator };
+                let calibrator = match position {
+                    Some((counter, counts)) => calibrator.at_position(counter, counts),
+                    None => calibrator,
+                };
                 level.order(axis, Order::Calibrate(calibrator));
             }
             _ => level.signals.inhibit.raise(InhibitReason::Configuration),
@@ -409,8 +485,7 @@ impl<const N: usize> Housekeeper<N> {
                 return;
             }
             OperatorRequest::Reference => {
-                let pose = StatedPose::new(Hertz(RATE_HZ as f32));
-                self.reference = pose.map(|pose| [(pose, false); N]);
+                self.reference = Reference::by_operator();
                 self.reference.is_some()
             }
             OperatorRequest::Reset => {
@@ -441,6 +516,7 @@ impl<const N: usize> Housekeeper<N> {
         // A switch closed during the reset must not count as closed after it: both contacts have to be open
         // once.
         self.operator = Operator::default();
+        (self.checks, self.contradicted) = ([EncoderCheck::default(); N], [false; N]);
         level.signals.inhibit.reset();
         if !configured {
             level.signals.inhibit.raise(InhibitReason::GateConfiguration);
@@ -455,38 +531,6 @@ impl<const N: usize> Housekeeper<N> {
             accepted: true,
         });
         true
-    }
-
-    fn advance_reference(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
-        if core::mem::take(&mut self.placed) && self.is_calibrated() {
-            level.signals.begin_servo();
-        }
-        let Some(mut poses) = self.reference else { return };
-        let mut standing = true;
-        for (joint, (pose, found)) in poses.iter_mut().enumerate() {
-            let counts =
-                level.signals.statistics.counts.get(joint).map_or(0, |count| count.get().cast_signed());
-            let sample = JointSample { encoder_counts: counts, ..JointSample::default() };
-            match pose.tick(&sample) {
-                ReferenceStep::Running(_) => {}
-                ReferenceStep::Found(_) => *found = true,
-                ReferenceStep::Refused(_) => standing = false,
-            }
-        }
-        self.reference = Some(poses).filter(|_| standing);
-        if !standing {
-            level.record(Record::Request {
-                tick: self.round,
-                name: OperatorRequest::Reference.name(),
-                accepted: false,
-            });
-        } else if poses.iter().all(|(_, found)| *found) {
-            self.reference = None;
-            self.placed = true;
-            for axis in 0..N {
-                level.order(axis, Order::Place(0));
-            }
-        }
     }
 }
 

@@ -18,7 +18,7 @@ use crate::bus::device::{Device, LegStatus};
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::identification::ResultsCopy;
 use crate::bus::{Identity, NodeId};
-use crate::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
+use crate::hal::{AxisCommand, Contacts, Controller, EncoderPlace, Frame, Hardware};
 use crate::leg::{DriveState, JointCommand, JointStatus, Plan};
 use crate::safety::InhibitReason;
 use crate::units::{Ampere, NewtonMetre};
@@ -137,6 +137,8 @@ pub(super) struct TestHardware<const N: usize> {
     pub bus_pended: u32,
     pub contacts: Contacts,
     pub encoder_counts: [u16; N],
+    /// Frames of the absolute encoders at rotor and joint.
+    pub encoder_frames: [[u16; 2]; N],
     pub temperatures: [Option<f32>; N],
     pub gates_hold: [bool; N],
     pub gate_status: [u32; N],
@@ -173,6 +175,7 @@ impl<const N: usize> TestHardware<N> {
             bus_pended: 0,
             contacts: Contacts::default(),
             encoder_counts: [0; N],
+            encoder_frames: [[u16::MAX; 2]; N],
             temperatures: [Some(30.0); N],
             gates_hold: [true; N],
             gate_status: [0; N],
@@ -272,6 +275,9 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     }
     fn encoder_count(&self, axis: usize) -> u16 {
         self.encoder_counts[axis]
+    }
+    fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16 {
+        self.encoder_frames[axis][place as usize]
     }
     fn temperature(&self, axis: usize) -> Option<f32> {
         self.temperatures[axis]

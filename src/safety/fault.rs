@@ -85,6 +85,8 @@ faults! {
     EncoderPosition = 0xFF02, "E4", "encoder_place", ActiveShort, "its counts jumped or the index came at another place";
     /// The counter is constant although the motor's voltage shows that it turns.
     EncoderFrozen = 0xFF09, "E1", "encoder_frozen", ActiveShort, "its encoder stopped while the motor turned";
+    /// An absolute encoder sends no valid frame (7320: position sensor).
+    AbsoluteEncoder = 0x7320, "E6", "absolute_encoder", Damp, "an absolute encoder does not answer";
     /// A phase with voltage carries no current.
     OpenPhase = 0xFF0A, "P1", "open_phase", Off, "a phase does not conduct";
     /// The offset of a current sensor drifted.
@@ -218,6 +220,7 @@ mod tests {
             (FaultCode::EncoderStep, 0x7305),
             (FaultCode::EncoderPosition, 0xFF02),
             (FaultCode::EncoderFrozen, 0xFF09),
+            (FaultCode::AbsoluteEncoder, 0x7320),
             (FaultCode::OpenPhase, 0xFF0A),
             (FaultCode::CurrentOffset, 0xFF0B),
             (FaultCode::StuckConversion, 0xFF0C),

@@ -1,4 +1,4 @@
-//! Periodic checks every few milliseconds: gate drivers' registers and temperatures.
+//! Periodic checks every few milliseconds: gate drivers' registers, absolute encoders and temperatures.
 //!
 //! Why here: only a board can read the registers over a bus and the thermistors by a converter. The schedule
 //! and the reaction depend on values only, so the same code is tested against every fault on the host.
@@ -6,6 +6,8 @@
 //! | check | period | worst case | reaction |
 //! | --- | --- | --- | --- |
 //! | wrong gate register, read twice | 8 ms | 8 ms + a tick | [`InhibitReason::GateConfiguration`], Off |
+//! | absolute encoder without a valid frame | 8 ms | 40 ms + servo tick | [`FaultCode::AbsoluteEncoder`], Damp |
+//! | absolute encoder contradicts the counter, twice | 8 ms | 16 ms | rotor position lost, Short |
 //! | thermistor open or shorted | 50 ms | 50 ms + servo tick | [`FaultCode::Thermistor`], Damp |
 //! | bridge at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::Temperature`], Damp |
 //! | winding at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::WindingTemperature`], Damp |
@@ -28,11 +30,14 @@ pub enum BoardFault {
     Thermistor,
     /// A winding is too hot.
     Winding,
+    /// An absolute encoder sends no valid frame.
+    AbsoluteEncoder,
 }
 
 impl BoardFault {
     /// All faults, in the order of their bits.
-    pub const ALL: [Self; 4] = [Self::CurrentTicks, Self::Temperature, Self::Thermistor, Self::Winding];
+    pub const ALL: [Self; 5] =
+        [Self::CurrentTicks, Self::Temperature, Self::Thermistor, Self::Winding, Self::AbsoluteEncoder];
 
     /// Bit of the fault.
     #[must_use]
@@ -48,6 +53,7 @@ impl BoardFault {
             Self::Temperature => FaultCode::Temperature,
             Self::Thermistor => FaultCode::Thermistor,
             Self::Winding => FaultCode::WindingTemperature,
+            Self::AbsoluteEncoder => FaultCode::AbsoluteEncoder,
         }
     }
 }
@@ -65,6 +71,8 @@ pub struct CheckClock {
 pub struct Due {
     /// Read the gate drivers' registers.
     pub gates: bool,
+    /// Read the absolute encoders.
+    pub encoders: bool,
     /// Read the thermistors.
     pub temperatures: bool,
 }
@@ -81,6 +89,8 @@ impl CheckClock {
         self.round = self.round.wrapping_add(1);
         Due {
             gates: self.round.is_multiple_of(self.gate_rounds),
+            // Between two checks of the gate drivers, whose SPI they share.
+            encoders: (self.round + self.gate_rounds / 2).is_multiple_of(self.gate_rounds),
             temperatures: self.round.is_multiple_of(self.temperature_rounds),
         }
     }

@@ -20,7 +20,8 @@ use crate::bus::{LONGEST, NodeId, Storing};
 use crate::leg::{Control, Following, StoredCalibration};
 use crate::motor::SenseScale;
 use crate::operation::{
-    Calibrated, Ends, HostEnds, Housekeeper, HousekeepingEnds, HousekeepingSettings, Queues, ServoLevel,
+    Calibrated, EncoderSettings, Ends, HostEnds, Housekeeper, HousekeepingEnds, HousekeepingSettings, Queues,
+    ServoLevel,
 };
 use crate::safety::InhibitReason;
 use crate::trace::Record;
@@ -112,7 +113,8 @@ fn hand_out(
     let axes = drives::axes(&leg::LEG, divider);
     let calibration = drives::calibrations(&leg::LEG);
     let windings = leg::LEG.joints.map(|joint| joint.motor.winding);
-    let settings = HousekeepingSettings { axes, calibration, hottest_c: HOTTEST_C, windings };
+    let encoders = leg::LEG.joints.map(|joint| EncoderSettings::of(&joint.motor));
+    let settings = HousekeepingSettings { axes, calibration, hottest_c: HOTTEST_C, windings, encoders };
     let mut housekeeper = Housekeeper::new(settings).with_stored(stored);
     // Random memory after a power-up does not have the checksum.
     if let Some(celsius) = windings::stored() {
@@ -124,7 +126,8 @@ fn hand_out(
         board: functions,
         bus: results.map(|results| (results, configuration)),
     });
-    (thread, (housekeeper, housekeeping_ends, Odrive::new(board.gate_drivers)), storage)
+    let gate_drivers = board.gate_drivers.with_encoders(leg::LEG.joints.map(|joint| joint.motor.absolute));
+    (thread, (housekeeper, housekeeping_ends, Odrive::new(gate_drivers)), storage)
 }
 
 /// Default node numbers of hip and knee.

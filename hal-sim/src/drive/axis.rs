@@ -111,6 +111,12 @@ impl Axis {
         self.description.wiring.open = Some(output);
     }
 
+    /// Reading of an absolute encoder at the rotor, 14 bits.
+    #[must_use]
+    pub fn rotor_steps(&self) -> u16 {
+        self.counter.steps(self.angle)
+    }
+
     /// Electrical angle of the rotor, rad.
     #[must_use]
     pub fn electrical_angle(&self) -> f64 {

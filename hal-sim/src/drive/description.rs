@@ -124,9 +124,25 @@ pub struct CounterDescription {
     pub counts: f64,
     /// Counter value at rotor angle 0.
     pub start: u16,
-    /// Rotor angle at which the index pulse comes, rad.
+    /// Rotor angle at which the index pulse comes, and at which an absolute encoder reads zero, rad.
     pub index: f64,
+    /// Peak of the encoder's error over a turn, rad.
+    pub error: f64,
 }
+
+/// Absolute encoder at a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointEncoderDescription {
+    /// Direction relative to the motor's encoder, 1 or -1.
+    pub direction: f64,
+    /// Reading at joint angle 0, rad.
+    pub zero: f64,
+    /// Peak of its error over a turn, rad.
+    pub error: f64,
+}
+
+/// Error of an AS5047P with a well mounted magnet, rad: 0.8 degrees.
+pub const AS5047P_ERROR: f64 = 0.8 * core::f64::consts::PI / 180.0;
 
 /// Electrical connections of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -178,6 +194,8 @@ pub struct AxisDescription {
     pub shunts: ShuntDescription,
     /// Encoder.
     pub counter: CounterDescription,
+    /// Absolute encoder at the joint, if there is one.
+    pub joint_encoder: Option<JointEncoderDescription>,
     /// Connectors.
     pub wiring: Wiring,
     /// Rotor turns per joint turn.

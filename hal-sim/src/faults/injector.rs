@@ -16,6 +16,11 @@ pub enum Channel {
     Counter,
     /// Index pulse: `Off` hides it, `Offset` moves the captured count, any other form makes pulses.
     Index,
+    /// Absolute encoder at the rotor, or at the joint: `Off`, `Rail` and `Garbage` replace the frame, any other
+    /// form changes the angle in it.
+    RotorEncoder,
+    /// The same at the joint.
+    JointEncoder,
     /// Shunt code of phase B.
     ShuntB,
     /// Shunt code of phase C.
@@ -107,6 +112,20 @@ impl Injector {
         })
     }
 
+    /// Frame of an absolute encoder with this reading: bit 15 makes the parity even.
+    pub fn frame(&mut self, channel: Channel, joint: usize, tick: u64, steps: u16) -> u16 {
+        let value = wrapped(self.pass(channel, joint, tick, f64::from(steps), COUNTER));
+        let is_frame = self.slots.iter().flatten().any(|(injection, _)| {
+            let replaces = matches!(injection.form, Form::Off | Form::Rail(_) | Form::Garbage);
+            injection.channel == channel
+                && injection.joint == joint
+                && injection.timing.holds(tick)
+                && replaces
+        });
+        let angle = value & 0x3FFF;
+        if is_frame { value } else { angle | ((angle.count_ones() as u16 & 1) << 15) }
+    }
+
     /// Applies faults to an axis' sample.
     pub fn sample(&mut self, joint: usize, tick: u64, sample: &mut AxisSample) {
         let counter = self.pass(Channel::Counter, joint, tick, f64::from(sample.encoder_count), COUNTER);
@@ -184,6 +203,23 @@ mod tests {
         assert_eq!(railed, [SAMPLE, AxisSample { shunt_codes: [2048, 4095], ..SAMPLE }]);
         let unseen = injected(Channel::Index, Form::Off);
         assert_eq!(unseen, [SAMPLE, AxisSample { index_count: None, ..SAMPLE }]);
+    }
+
+    #[test]
+    fn a_frame_has_even_parity_and_faults_replace_frame_or_angle() {
+        let framed = |form: Option<Form>| {
+            let mut injector = Injector::new(1);
+            if let Some(form) = form {
+                let channel = Channel::JointEncoder;
+                assert!(injector.add(Injection { channel, joint: 1, form, timing: Timing::from(5) }));
+            }
+            [4, 5].map(|tick| injector.frame(Channel::JointEncoder, 1, tick, 0x2001))
+        };
+        assert_eq!(framed(None), [0x2001; 2]);
+        assert_eq!(framed(Some(Form::Offset(1.0))), [0x2001, 0x2002]);
+        assert_eq!(framed(Some(Form::Offset(-1.0))), [0x2001, 0xA000]);
+        assert_eq!(framed(Some(Form::Rail(65_535.0))), [0x2001, 0xFFFF]);
+        assert_eq!(framed(Some(Form::Off)), [0x2001, 0]);
     }
 
     #[test]

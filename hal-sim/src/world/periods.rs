@@ -19,7 +19,9 @@ use super::{TICK_S, World};
 use crate::description::LegDescription;
 use crate::drive::axis::PERIOD_S;
 use crate::drive::complete::{CompleteDrives, Rotor};
+use crate::drive::counter::steps;
 use crate::drive::description::CompleteDescription;
+use crate::maths::sin_cos;
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Sample};
@@ -121,6 +123,16 @@ impl<const N: usize> World<N> {
             self.tick += 1;
         }
         samples
+    }
+
+    /// Reading of the absolute encoder at a joint, 14 bits; `None` without one.
+    #[must_use]
+    pub fn joint_steps(&self, joint: usize) -> Option<u16> {
+        let axis = self.electric.as_ref()?.drives.axes().get(joint)?;
+        let encoder = axis.description().joint_encoder?;
+        let angle = self.mounting * self.anatomical_position().get(joint)?;
+        let seen = angle + encoder.error * sin_cos(angle).0;
+        Some(steps(encoder.direction * seen + encoder.zero))
     }
 
     /// Complete drives, if present.

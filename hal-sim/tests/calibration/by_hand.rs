@@ -178,6 +178,8 @@ fn ideal(trial: &Trial) -> StoredCalibration {
         quadrature_inductance: Henry(axis.motor.inductance_q as f32),
         offset: ElectricalAngle::from_turns((offset - offset.floor()) as f32),
         encoder: EncoderSetting::of(configuration),
+        winding_c: None,
+        joint_zero: None,
     }
 }
 

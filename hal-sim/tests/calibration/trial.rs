@@ -91,6 +91,7 @@ impl Trial {
             counts,
             start: random.one_of([0, 1, 40_000, 65_535]),
             index: random.between(0.0, TAU),
+            error: 0.0,
         };
         let bridge = BridgeDescription::default();
         let inertia = random.between(0.5e-4, 10e-4);
@@ -108,6 +109,7 @@ impl Trial {
             flux: Weber(flux as f32),
             counts_per_turn: counts as u32,
             index: true,
+            absolute: false,
             counter: if reversed { Direction::Down } else { Direction::Up },
             flexion: Direction::Up,
             bandwidth: Hertz(1000.0),
@@ -121,7 +123,15 @@ impl Trial {
         let tooth = TAU / f64::from(motor.cogging_periods);
         let angle = (random.between(0.0, 6.0) / tooth).round() * tooth;
         Self {
-            axis: AxisDescription { motor, bridge, shunts, counter, wiring, ratio: 50.0 },
+            axis: AxisDescription {
+                motor,
+                bridge,
+                shunts,
+                counter,
+                joint_encoder: None,
+                wiring,
+                ratio: 50.0,
+            },
             load,
             angle,
             configuration,

@@ -49,6 +49,7 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
         // A motor too fast for a short circuit is turned off; both are, if neither was switching.
         Code::EncoderPosition | Code::EncoderFrozen => &["Short", "Off"],
         Code::EncoderStep
+        | Code::AbsoluteEncoder
         | Code::SupplyLost
         | Code::Temperature
         | Code::Thermistor

@@ -115,6 +115,22 @@ pub struct AxisCalibration {
     pub offset_rad: f64,
     /// Encoder settings of the calibration.
     pub encoder: Encoder,
+    /// Temperature of the winding at the calibration, degrees Celsius, if known.
+    #[serde(default)]
+    pub winding_c: Option<f64>,
+    /// Readings at the joint's zero, with an absolute encoder at the joint.
+    #[serde(default)]
+    pub joint_zero: Option<JointZeroPart>,
+}
+
+/// Readings at a joint's zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointZeroPart {
+    /// Rotor position within a turn, counts.
+    pub rotor_counts: i32,
+    /// Reading of the joint's encoder, 2^-14 turns.
+    pub joint_steps: u16,
 }
 
 /// Settings for which a calibration is valid.

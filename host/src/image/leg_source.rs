@@ -9,7 +9,7 @@ use scarab::leg::{JointDescription, LegConfiguration, LegDescription, LinkDescri
 use scarab::model::DenavitHartenberg;
 use scarab::motion::{ExcitationTable, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
-use scarab::units::{Radian, Weber};
+use scarab::units::Radian;
 
 use crate::base::error::FileError;
 use crate::formats::leg_file::geometry::chain;
@@ -82,14 +82,7 @@ fn motor(joint: &JointFile) -> Result<MotorDescription, &'static str> {
     if joint.encoder.side != Side::Motor {
         return Err("its encoder is at the joint: the board commutates the motor by an encoder at the motor");
     }
-    Ok(MotorDescription {
-        pole_pairs: motor.pole_pairs as u8,
-        flux: Weber(motor.flux(joint) as f32),
-        counts_per_turn: joint.encoder.counts,
-        ratio: joint.encoder.ratio as f32,
-        winding: motor.winding(),
-        calibration_turns: motor.calibration_turns(),
-    })
+    Ok(motor.for_firmware(joint))
 }
 
 fn link_description(link: &LinkPrior<f32>) -> LinkDescription {
@@ -120,6 +113,8 @@ fn table(motion: &Periodic<JOINTS>) -> ExcitationTable<JOINTS> {
 /// Constant as Rust source, to be included where `crate` is the firmware.
 #[must_use]
 pub fn source(description: &LegDescription<JOINTS>) -> String {
+    let has_direction = description.joints.iter().any(|joint| joint.motor.absolute.joint.is_some());
+    let direction = if has_direction { "use crate::motor::Direction::*;\n" } else { "" };
     // The debug form of plain data is valid source; `?` writes numbers that read back bit for bit.
     format!(
         "// The leg `{}`, written by `cargo fw --leg ... --source ...`. Change its leg file instead.\n\n\
@@ -129,6 +124,8 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
          use crate::leg::{{JointDescription, LegDescription, LinkDescription, MotorDescription}};\n\
          use crate::model::DenavitHartenberg;\n\
          use crate::motion::ExcitationTable;\n\
+         use crate::motor::AbsoluteEncoders;\n\
+         {direction}\
          use crate::safety::WindingRating;\n\
          use crate::units::*;\n\n\
          /// The leg.\n\

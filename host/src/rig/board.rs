@@ -21,14 +21,13 @@ use hal_sim::world::periods::PERIODS_PER_TICK;
 use scarab::board::odrive_v3_6::settings::analog::HOTTEST_C;
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::hal::{AxisCommand, CURRENT_RATE_HZ, LegDrives};
-use scarab::leg::MotorDescription;
 use scarab::motor::calibration::STRONG_SHARE;
 use scarab::motor::{
     Axis, AxisConfiguration, Calibration, CalibrationSettings, CalibrationStep, Calibrator, Chopper,
     SenseScale,
 };
-use scarab::operation::HousekeepingSettings;
-use scarab::units::{Ampere, KilogramMetreSquared, RadianPerSecond, Volt, Weber};
+use scarab::operation::{EncoderSettings, HousekeepingSettings};
+use scarab::units::{Ampere, KilogramMetreSquared, RadianPerSecond, Volt};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::{JointFile, LegFile, MotorFile};
@@ -57,16 +56,8 @@ const LONGEST_CALIBRATION: u32 = 60 * CURRENT_RATE_HZ;
 
 /// Configuration of a joint's axis, derived from the leg file by the board's settings.
 pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfiguration {
-    let motor = MotorDescription {
-        pole_pairs: motor.pole_pairs as u8,
-        flux: Weber(motor.flux(joint) as f32),
-        counts_per_turn: joint.encoder.counts,
-        ratio: joint.encoder.ratio as f32,
-        winding: motor.winding(),
-        calibration_turns: motor.calibration_turns(),
-    };
     let speed = RadianPerSecond(joint.speed_limit_deg_s.to_radians() as f32);
-    drives::axis(&motor, Ampere(joint.current_limit() as f32), speed, SenseScale::DIVIDER)
+    drives::axis(&motor.for_firmware(joint), Ampere(joint.current_limit() as f32), speed, SenseScale::DIVIDER)
 }
 
 /// Calibration settings of a motor on its stand. The current is limited by the axis and by the resistance at
@@ -176,13 +167,15 @@ fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSe
         // These motors carry gear and leg.
         let inertia = drives::CALIBRATION.inertia;
         let settings = CalibrationSettings { inertia, ..calibration_settings(&configuration, motor) };
-        parts.push((configuration, settings, motor.winding()));
+        let encoders = EncoderSettings::of(&motor.for_firmware(joint));
+        parts.push((configuration, settings, motor.winding(), encoders));
     }
     let parts: [_; N] = parts.try_into().map_err(|_| unfit())?;
     Ok(HousekeepingSettings {
         axes: parts.map(|(axis, ..)| axis),
-        calibration: parts.map(|(_, calibration, _)| calibration),
+        calibration: parts.map(|(_, calibration, ..)| calibration),
         hottest_c: HOTTEST_C,
-        windings: parts.map(|(.., winding)| winding),
+        windings: parts.map(|(.., winding, _)| winding),
+        encoders: parts.map(|(.., encoders)| encoders),
     })
 }

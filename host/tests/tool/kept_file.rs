@@ -45,6 +45,8 @@ direct_inductance_h = 0.0001
 quadrature_inductance_h = 0.00012
 offset_rad = 1.4629180792671596e-9
 encoder = { counter = "up", pole_pairs = 20, counts_per_turn = 16384 }
+winding_c = 25.3
+joint_zero = { rotor_counts = -1234, joint_steps = 16383 }
 "#;
 
 fn model(fingerprint: &str) -> String {
@@ -261,6 +263,8 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
         ),
         ("resistance_ohm = 0.1\n", "resistance_ohm = 0.0\n", "`resistance_ohm` is 0; it must be above 0"),
         ("inductance_h = 0.0001\n", "inductance_h = 1e300\n", "which a board cannot store"),
+        ("winding_c = 25.3", "winding_c = 1e4", "outside -100..1000"),
+        ("joint_steps = 16383", "joint_steps = 16384", "it must be below 16384"),
         ("offset_rad = -3.14", "offset_rad = -3.15", "it must be from -pi to pi"),
         ("pole_pairs = 20", "pole_pairs = 0", "pole pairs and counts per turn must be above 0"),
         ("pole_pairs = 20", "pole_pairs = 300", "expected u8"),

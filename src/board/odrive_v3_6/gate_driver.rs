@@ -1,4 +1,5 @@
-//! Two DRV8301 on one SPI: reset, configuration and read-back, which is repeated in operation.
+//! Two DRV8301 on one SPI: reset, configuration and read-back, which is repeated in operation. Absolute
+//! encoders share the SPI.
 //!
 //! Both share their enable line and their fault line: a reset affects both. A transfer takes 6 us of busy
 //! waiting, below the servo's level.
@@ -8,8 +9,12 @@ use embassy_stm32::spi::{Config, MODE_1, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
 
 use super::contacts::drive;
+use super::registers::apply;
+use super::settings::absolute_encoders::{self, ERROR, READ_ANGLE, READ_ERRORS};
 use super::settings::CLOCK_HZ;
 use super::settings::gate_driver::{CONTROL_1, CONTROL_2, Register, TIMES, data, read, write};
+use crate::hal::EncoderPlace;
+use crate::leg::AbsoluteEncoders;
 
 /// Select lines, on port C (`main.h:77-80`).
 const SELECT: [u32; 2] = [13, 14];
@@ -17,9 +22,10 @@ const SELECT: [u32; 2] = [13, 14];
 const ENABLE: u32 = 12;
 const CYCLES_PER_US: u32 = CLOCK_HZ / 1_000_000;
 
-/// Both gate drivers.
+/// Both gate drivers, and the encoders on their SPI.
 pub struct GateDrivers {
     spi: Spi<'static, Blocking, Master>,
+    encoders: [AbsoluteEncoders; 2],
 }
 
 /// SPI settings of the drivers: second edge, 42 MHz / 16 (`spi.c:71-76`, `drv8301.cpp:7-19`).
@@ -33,7 +39,32 @@ pub(super) fn configuration() -> Config {
 
 impl GateDrivers {
     pub(super) fn new(spi: Spi<'static, Blocking, Master>) -> Self {
-        Self { spi }
+        Self { spi, encoders: [AbsoluteEncoders::NONE; 2] }
+    }
+
+    /// Adds absolute encoders and deselects them.
+    #[must_use]
+    pub fn with_encoders(self, encoders: [AbsoluteEncoders; 2]) -> Self {
+        for (axis, encoders) in encoders.into_iter().enumerate() {
+            absolute_encoders::prepare(axis, encoders, apply);
+        }
+        Self { encoders, ..self }
+    }
+
+    /// Frame with an encoder's angle; all ones without that encoder. After an error the chip's error register is
+    /// read, so that the next frame is valid again.
+    pub fn encoder(&mut self, axis: usize, place: EncoderPlace) -> u16 {
+        let encoders = self.encoders.get(axis).copied();
+        let Some(pin) = encoders.and_then(|encoders| absolute_encoders::select(axis, place, encoders)) else {
+            return u16::MAX;
+        };
+        let mut ask = |frame| self.exchange(pin.port, pin.number, frame).unwrap_or(u16::MAX);
+        ask(READ_ANGLE);
+        let answer = ask(READ_ANGLE);
+        if answer & ERROR != 0 {
+            ask(READ_ERRORS);
+        }
+        answer
     }
 
     /// Turns both off, for at least 40 us; the bridges must be off.
@@ -88,14 +119,17 @@ impl GateDrivers {
         data(self.frame(axis, read(register))?)
     }
 
-    #[inline(never)]
     fn frame(&mut self, axis: usize, frame: u16) -> Option<u16> {
-        let select = *SELECT.get(axis)?;
+        self.exchange(b'C', *SELECT.get(axis)?, frame)
+    }
+
+    #[inline(never)]
+    fn exchange(&mut self, port: u8, select: u32, frame: u16) -> Option<u16> {
         let mut word = [frame];
-        drive(b'C', select, false);
+        drive(port, select, false);
         let sent = self.spi.blocking_transfer_in_place(&mut word);
-        drive(b'C', select, true);
-        // Minimum of 400 ns between frames (DRV8301, tHI_SCS).
+        drive(port, select, true);
+        // Minimum between frames: 400 ns (DRV8301, tHI_SCS), 350 ns (AS5047P, tCSn).
         cortex_m::asm::delay(CYCLES_PER_US);
         sent.ok().map(|()| word[0])
     }

@@ -6,7 +6,7 @@ use spin::Mutex;
 use super::gate_driver::GateDrivers;
 use super::settings::analog::temperature_c;
 use super::{brake, bridge, can, contacts, converter, encoder, interrupts, watchdog};
-use crate::hal::{Contacts, Controller, Frame, Hardware};
+use crate::hal::{Contacts, Controller, EncoderPlace, Frame, Hardware};
 
 /// Gate drivers, available after the start; only the housekeeping uses them.
 static GATE_DRIVERS: Mutex<Option<GateDrivers>> = Mutex::new(None);
@@ -77,6 +77,10 @@ impl Hardware<2> for Odrive {
 
     fn encoder_count(&self, axis: usize) -> u16 {
         encoder::count(axis)
+    }
+
+    fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16 {
+        gates(|gates| gates.encoder(axis, place)).unwrap_or(u16::MAX)
     }
 
     fn temperature(&self, axis: usize) -> Option<f32> {

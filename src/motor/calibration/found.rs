@@ -1,7 +1,7 @@
 //! Results of a passed calibration, and their persistent part.
 
 use super::inductance::Inductances;
-use crate::motor::{AxisConfiguration, CountScale, Direction, ElectricalAngle};
+use crate::motor::{AbsoluteAngle, AxisConfiguration, CountScale, Direction, ElectricalAngle};
 use crate::units::{Henry, Ohm};
 
 /// Part of a configuration on which the angle offset depends; with another setting the offset is wrong.
@@ -25,6 +25,16 @@ impl EncoderSetting {
             counts_per_turn: configuration.counts_per_turn,
         }
     }
+}
+
+/// Readings at the joint's zero, where an absolute encoder measures the joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JointZero {
+    /// Rotor position within a turn, counts in the joint's sense from the index or the absolute encoder's
+    /// zero.
+    pub rotor: i32,
+    /// Reading of the joint's encoder.
+    pub joint: AbsoluteAngle,
 }
 
 /// Results of a passed calibration. Only a [`super::Calibrator`] can create it.
@@ -52,10 +62,14 @@ pub struct StoredCalibration {
     pub direct_inductance: Henry,
     /// Inductance across the flux.
     pub quadrature_inductance: Henry,
-    /// Electrical angle at the index.
+    /// Electrical angle at the index, or at the absolute encoder's zero.
     pub offset: ElectricalAngle,
     /// Encoder setting of the calibrated configuration.
     pub encoder: EncoderSetting,
+    /// Temperature of the winding at the calibration, degrees Celsius, by its model.
+    pub winding_c: Option<f32>,
+    /// The joint's zero, if a reference has set it.
+    pub joint_zero: Option<JointZero>,
 }
 
 impl Calibration {
@@ -65,7 +79,7 @@ impl Calibration {
         self.encoder
     }
 
-    /// Whether rotor positions count from the index.
+    /// Whether rotor positions count from the index, or from the absolute encoder's zero.
     #[must_use]
     pub fn indexed(&self) -> bool {
         self.indexed
@@ -115,7 +129,8 @@ impl Calibration {
         scale.angle(self.position_of(scale, direction, counter)).plus(self.offset)
     }
 
-    /// Returns the part to store; `None` without an index, because the counter resets with the power.
+    /// Returns the part to store; `None` where positions count from neither an index nor an absolute encoder,
+    /// because the counter resets with the power.
     #[must_use]
     pub fn stored(&self) -> Option<StoredCalibration> {
         self.indexed.then_some(StoredCalibration {
@@ -124,6 +139,8 @@ impl Calibration {
             quadrature_inductance: self.inductances.quadrature,
             offset: self.offset,
             encoder: self.encoder,
+            winding_c: None,
+            joint_zero: None,
         })
     }
 
@@ -135,12 +152,10 @@ impl Calibration {
         Self { counter: self.counter.wrapping_add(offset), ..*self }
     }
 
-    pub(in crate::motor) fn position_of(
-        &self,
-        scale: &CountScale,
-        direction: Direction,
-        counter: u16,
-    ) -> i32 {
+    /// Rotor position at a counter reading, counts from the index or the absolute encoder's zero, in the
+    /// electrical direction. Since the calibration the counter may have moved by half of its range.
+    #[must_use]
+    pub fn position_of(&self, scale: &CountScale, direction: Direction, counter: u16) -> i32 {
         let moved = i32::from(counter.wrapping_sub(self.counter).cast_signed());
         scale.within_turn(self.position + direction.sign() * moved)
     }

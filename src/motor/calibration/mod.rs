@@ -84,7 +84,7 @@ use crate::hal::{AxisCommand, AxisSample};
 use crate::real::{min, sqrt};
 use crate::units::{Ampere, Hertz, KilogramMetreSquared, Ohm, Volt, Weber};
 use current_offsets::CurrentOffsets;
-pub use found::{Calibration, EncoderSetting, StoredCalibration};
+pub use found::{Calibration, EncoderSetting, JointZero, StoredCalibration};
 use hold::Hold;
 use inductance::{InductanceStage, Inductances, SeenInductances};
 use refine::{QUADRATURE_SHARE, Refine, Refined};
@@ -296,16 +296,17 @@ impl Calibrator {
 
     /// Starts a calibration after a power-up. Everything is measured as by [`Self::new`] and must agree with
     /// the stored values; of these only the offset is used. Where an index search is certain
-    /// ([`Self::take_index`]), the motor stands still and the offset is not measured.
+    /// ([`Self::take_index`]), or an absolute encoder gave the position ([`Self::at_position`]), the motor stands
+    /// still and the offset is not measured.
     ///
-    /// # Errors As [`Self::new`]. Also [`AxisError::Encoder`] without an index, and
+    /// # Errors As [`Self::new`]. Also [`AxisError::Encoder`] without index and absolute encoder, and
     /// [`AxisError::Calibration`] where the stored values belong to another configuration.
     pub fn from_stored(
         configuration: &AxisConfiguration,
         settings: CalibrationSettings,
         stored: StoredCalibration,
     ) -> Result<Self, AxisError> {
-        if !configuration.index {
+        if !configuration.index && !configuration.absolute {
             return Err(AxisError::Encoder);
         }
         if stored.encoder != EncoderSetting::of(configuration) {
@@ -324,10 +325,20 @@ impl Calibrator {
     /// values may be checked at standstill, the motor does not turn.
     pub fn take_index(&mut self, search: &IndexSearch) {
         let Bench { scale, greatest_step, direction, .. } = &self.bench;
-        if let Some((counter, since)) = search.position(scale, *greatest_step).filter(|_| self.may_stand) {
+        let may_stand = self.may_stand && self.bench.index;
+        if let Some((counter, since)) = search.position(scale, *greatest_step).filter(|_| may_stand) {
             self.track = Track::beyond_index(counter, direction.sign() * since);
             self.stands_at = Some(0);
         }
+    }
+
+    /// Sets the rotor position by an absolute encoder, before the first tick: a counter reading, and its
+    /// distance from the encoder's zero in the counter's direction. Where stored values may be checked at
+    /// standstill, the motor does not turn.
+    #[must_use]
+    pub fn at_position(self, counter: u16, counts: i32) -> Self {
+        let track = Track::beyond_index(counter, self.bench.direction.sign() * counts);
+        Self { track, stands_at: self.may_stand.then_some(0), ..self }
     }
 
     /// Electrical angle at travel zero by the stored offset, where the motor stands still and its index is
@@ -517,7 +528,7 @@ impl Calibrator {
             offset,
             counter: sample.encoder_count,
             position: self.bench.scale.within_turn(self.track.way.wrapping_sub(index)),
-            indexed: self.bench.index,
+            indexed: self.track.index.is_some(),
             proven: self.stands_at.is_none(),
         })
     }

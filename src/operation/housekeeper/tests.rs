@@ -8,6 +8,7 @@ use super::super::{Ends, EventQueue, Queues};
 use super::*;
 use crate::hal::AxisCommand;
 use crate::leg::CalibrationRefusal;
+use crate::motor::AbsoluteEncoders;
 use crate::motor::calibration::tests::{SETTINGS, calibrate};
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::operation::AxisState;
@@ -15,6 +16,7 @@ use crate::safety::Bridges;
 use crate::safety::winding::tests::RATING;
 use crate::testing::TestRandom;
 
+mod absolute;
 mod reports;
 mod second_day;
 
@@ -23,6 +25,7 @@ const HOUSEKEEPING: HousekeepingSettings<2> = HousekeepingSettings {
     calibration: [SETTINGS; 2],
     hottest_c: 100.0,
     windings: [RATING; 2],
+    encoders: [EncoderSettings { absolute: AbsoluteEncoders::NONE, counts_per_turn: 8192, ratio: 50.0 }; 2],
 };
 
 struct Bench {
@@ -121,9 +124,14 @@ fn a_stored_calibration_is_checked_and_a_missing_one_measured() {
     let orders = bench.ends(0, Outcome::Calibrated(calibration));
     assert!(matches!(orders[..], [(0, Order::Run(axis)), (1, Order::Calibrate(_))] if axis == running));
     assert_eq!(orders[1].1, unchecked());
-    // Both calibrations are sent to the storage.
+    // Both calibrations are sent to the storage, with the temperature of the winding.
     bench.ends(1, Outcome::Calibrated(calibration));
-    assert_eq!(bench.calibrated, [(0, Some(stored)), (1, Some(stored))]);
+    assert_eq!(bench.calibrated.len(), 2);
+    for (axis, (of, offered)) in bench.calibrated.iter().enumerate() {
+        let winding_c = offered.and_then(|offered| offered.winding_c);
+        assert_eq!((*of, *offered), (axis, Some(StoredCalibration { winding_c, ..stored })));
+        assert!(winding_c.is_some_and(|celsius| (79.0..=80.0).contains(&celsius)), "{winding_c:?}");
+    }
     assert!(bench.keeper.is_calibrated());
 }
 

@@ -4,7 +4,7 @@
 //! are those of the flash image. The program sets the values that a level reads.
 
 use scarab::board::odrive_v3_6::settings::timers::{MOE, TOP, bridge, compare};
-use scarab::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
+use scarab::hal::{AxisCommand, Contacts, Controller, EncoderPlace, Frame, Hardware};
 use scarab::operation::Word;
 
 use crate::account::{CYCLES_PER_INSTRUCTION, PROCESSOR_HZ};
@@ -142,6 +142,10 @@ impl Hardware<2> for Machine {
 
     fn encoder_count(&self, axis: usize) -> u16 {
         REGISTERS.counters.get(axis).map_or(0, |counter| counter.get() as u16)
+    }
+
+    fn encoder_frame(&mut self, _: usize, _: EncoderPlace) -> u16 {
+        u16::MAX
     }
 
     fn temperature(&self, _: usize) -> Option<f32> {

@@ -16,6 +16,7 @@ pub const CONFIGURATION: AxisConfiguration = AxisConfiguration {
     flux: Weber(FLUX_VS),
     counts_per_turn: COUNTS as u32,
     index: true,
+    absolute: false,
     counter: Direction::Up,
     flexion: Direction::Up,
     bandwidth: Hertz(1000.0),

@@ -1,6 +1,6 @@
 //! Board functions of the emulated machine, which can only request the servo.
 
-use scarab::hal::{Contacts, Controller, Frame, Hardware};
+use scarab::hal::{Contacts, Controller, EncoderPlace, Frame, Hardware};
 use scarab::task::leg::JOINTS;
 
 use super::vectors;
@@ -27,6 +27,10 @@ impl Hardware<JOINTS> for Machine {
     fn encoder_count(&self, _: usize) -> u16 {
         0
     }
+    fn encoder_frame(&mut self, _: usize, _: EncoderPlace) -> u16 {
+        u16::MAX
+    }
+
     fn temperature(&self, _: usize) -> Option<f32> {
         None
     }

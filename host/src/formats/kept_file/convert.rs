@@ -3,14 +3,15 @@
 use std::f64::consts::PI;
 
 use scarab::leg::{
-    Constant, CounterDirection, ElectricalAngle, EncoderSetting, Fingerprint, StoredCalibration, StoredModel,
-    Stribeck,
+    AbsoluteAngle, Constant, CounterDirection, ElectricalAngle, EncoderSetting, Fingerprint, JointZero,
+    StoredCalibration, StoredModel, Stribeck,
 };
 use scarab::store::{CalibrationRecord, JointProvenance, ModelRecord, Provenance};
 use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
 
 use crate::formats::kept_file::{
-    AxisCalibration, ConstantPart, Counter, Encoder, Joint, ModelJoint, ModelPart, Parameters, StribeckPart,
+    AxisCalibration, ConstantPart, Counter, Encoder, Joint, JointZeroPart, ModelJoint, ModelPart, Parameters,
+    StribeckPart,
 };
 use crate::formats::temperature::RANGE_C;
 
@@ -43,8 +44,15 @@ fn not_below_zero(name: &str, value: f64) -> Result<f32, String> {
 
 impl AxisCalibration {
     pub(super) fn of_kept(joint: Joint, kept: &CalibrationRecord) -> Self {
-        let StoredCalibration { resistance, direct_inductance, quadrature_inductance, offset, encoder } =
-            kept.0;
+        let StoredCalibration {
+            resistance,
+            direct_inductance,
+            quadrature_inductance,
+            offset,
+            encoder,
+            winding_c,
+            joint_zero,
+        } = kept.0;
         Self {
             joint,
             resistance_ohm: resistance.0.into(),
@@ -59,6 +67,9 @@ impl AxisCalibration {
                 pole_pairs: encoder.pole_pairs,
                 counts_per_turn: encoder.counts_per_turn,
             },
+            winding_c: winding_c.map(f64::from),
+            joint_zero: joint_zero
+                .map(|zero| JointZeroPart { rotor_counts: zero.rotor, joint_steps: zero.joint.steps() }),
         }
     }
 
@@ -70,6 +81,14 @@ impl AxisCalibration {
         let Encoder { counter, pole_pairs, counts_per_turn } = self.encoder;
         if pole_pairs == 0 || counts_per_turn == 0 {
             return Err("`encoder`: pole pairs and counts per turn must be above 0".into());
+        }
+        let winding_c = self.winding_c.map(|celsius| finite("winding_c", celsius)).transpose()?;
+        if let Some(celsius) = winding_c.filter(|celsius| !(-100.0..=1000.0).contains(celsius)) {
+            return Err(format!("`winding_c` is {celsius}, outside -100..1000"));
+        }
+        let steps = u32::from(self.joint_zero.map_or(0, |zero| zero.joint_steps));
+        if steps >= AbsoluteAngle::STEPS.unsigned_abs() {
+            return Err(format!("`joint_zero.joint_steps` is {steps}; it must be below 16384"));
         }
         Ok(CalibrationRecord(StoredCalibration {
             resistance: Ohm(above_zero("resistance_ohm", self.resistance_ohm)?),
@@ -87,6 +106,11 @@ impl AxisCalibration {
                 pole_pairs,
                 counts_per_turn,
             },
+            winding_c,
+            joint_zero: self.joint_zero.map(|zero| JointZero {
+                rotor: zero.rotor_counts,
+                joint: AbsoluteAngle::from_steps(zero.joint_steps),
+            }),
         }))
     }
 }

@@ -4,7 +4,8 @@ use std::fmt::Display;
 
 use crate::formats::kept_file::objects::{is_pattern, is_wide};
 use crate::formats::kept_file::{
-    AxisCalibration, ConstantPart, Counter, KeptFile, ModelJoint, ModelPart, NodeObjects, ObjectValue,
+    AxisCalibration, ConstantPart, Counter, JointZeroPart, KeptFile, ModelJoint, ModelPart, NodeObjects,
+    ObjectValue,
 };
 
 const HEAD: &str = "\
@@ -76,6 +77,13 @@ fn calibration(out: &mut String, axis: &AxisCalibration) {
     let (pairs, counts) = (axis.encoder.pole_pairs, axis.encoder.counts_per_turn);
     let setting = format!("{{ counter = \"{counter}\", pole_pairs = {pairs}, counts_per_turn = {counts} }}");
     line(out, "encoder", setting);
+    if let Some(celsius) = axis.winding_c {
+        line(out, "winding_c", format!("{celsius:.1}"));
+    }
+    if let Some(JointZeroPart { rotor_counts, joint_steps }) = axis.joint_zero {
+        let zero = format!("{{ rotor_counts = {rotor_counts}, joint_steps = {joint_steps} }}");
+        line(out, "joint_zero", zero);
+    }
 }
 
 fn model(out: &mut String, model: &ModelPart) {

@@ -6,12 +6,13 @@
 //! ([`hal_sim::drive::description`]).
 
 use hal_sim::drive::description::{
-    AxisDescription, BridgeDescription, CompleteDescription, CounterDescription, MotorDescription,
-    ShuntDescription, SupplyDescription, Wiring,
+    AS5047P_ERROR, AxisDescription, BridgeDescription, CompleteDescription, CounterDescription,
+    JointEncoderDescription, MotorDescription, ShuntDescription, SupplyDescription, Wiring,
 };
 use scarab::board::odrive_v3_6::settings::drives;
+use scarab::leg::{AbsoluteEncoders, CounterDirection};
 use scarab::safety::WindingRating;
-use scarab::units::Ohm;
+use scarab::units::{Ohm, Weber};
 use serde::{Deserialize, Serialize};
 
 use crate::base::error::FileError;
@@ -25,6 +26,10 @@ const LEAST_TIME_CONSTANT_S: f64 = 80e-6;
 /// Range of the supply voltage without load, V. The board's bridges switch from 20 V on, and its
 /// brake resistor begins to conduct at 50 V.
 const SUPPLY_V: [f64; 2] = [22.0, 50.0];
+/// Reading of a simulated joint encoder at the joint's zero, degrees.
+const JOINT_READING_DEG: f64 = 77.0;
+/// Counts per turn of an AS5047P.
+const AS5047P_COUNTS: [u32; 2] = [4000, 4096];
 /// Range of a 16-bit counter.
 const MOST_COUNTS: u32 = 1 << 16;
 
@@ -67,6 +72,26 @@ pub struct MotorFile {
     /// Permitted travel of a calibration, motor turns; `None` for the usual one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_turns: Option<f64>,
+    /// Whether the encoder is an AS5047P that is also read by SPI; it has no index then.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub absolute_encoder: bool,
+    /// AS5047P at the joint, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_encoder: Option<JointEncoder>,
+}
+
+/// Direction of an absolute encoder at a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JointEncoder {
+    /// Its angle grows with the counts of the motor's encoder.
+    WithCounter,
+    /// Its angle falls while the counts grow.
+    AgainstCounter,
+}
+
+fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 fn default_cogging_periods() -> u32 {
@@ -168,6 +193,8 @@ impl MotorFile {
         ambient_c: 40.0,
         winding_limit_c: 100.0,
         calibration_turns: None,
+        absolute_encoder: false,
+        joint_encoder: None,
     };
 
     pub(super) fn check(&self, number: usize, joint: &JointFile) -> Result<(), Fault> {
@@ -206,6 +233,13 @@ impl MotorFile {
             let complaint = format!("needs an encoder at the motor with at most {MOST_COUNTS} counts");
             return Err(whole.fault("motor", &complaint));
         }
+        if self.absolute_encoder && !AS5047P_COUNTS.contains(&joint.encoder.counts) {
+            let complaint = format!(
+                "is true, but `encoder.counts` is {}: an AS5047P has 4000 counts per turn, or 4096",
+                joint.encoder.counts
+            );
+            return Err(place.fault("absolute_encoder", &complaint));
+        }
         let flux = self.flux(joint);
         if !(1e-4..=1.0).contains(&flux) {
             let complaint = format!(
@@ -227,6 +261,26 @@ impl MotorFile {
     pub fn calibration_turns(&self) -> f32 {
         let usual = drives::usual_travel_turns(self.pole_pairs as u8);
         self.calibration_turns.map_or(usual, |turns| turns as f32)
+    }
+
+    /// Motor, encoders and gear for the firmware.
+    #[must_use]
+    pub fn for_firmware(&self, joint: &JointFile) -> scarab::leg::MotorDescription {
+        scarab::leg::MotorDescription {
+            pole_pairs: self.pole_pairs as u8,
+            flux: Weber(self.flux(joint) as f32),
+            counts_per_turn: joint.encoder.counts,
+            ratio: joint.encoder.ratio as f32,
+            winding: self.winding(),
+            calibration_turns: self.calibration_turns(),
+            absolute: AbsoluteEncoders {
+                rotor: self.absolute_encoder,
+                joint: self.joint_encoder.map(|direction| match direction {
+                    JointEncoder::WithCounter => CounterDirection::Up,
+                    JointEncoder::AgainstCounter => CounterDirection::Down,
+                }),
+            },
+        }
     }
 
     /// Thermal constants for the firmware.
@@ -263,7 +317,16 @@ impl MotorFile {
                 counts: f64::from(joint.encoder.counts),
                 start: 0,
                 index: self.index_deg.to_radians(),
+                error: if self.absolute_encoder { AS5047P_ERROR } else { 0.0 },
             },
+            joint_encoder: self.joint_encoder.map(|direction| JointEncoderDescription {
+                direction: match direction {
+                    JointEncoder::WithCounter => 1.0,
+                    JointEncoder::AgainstCounter => -1.0,
+                },
+                zero: JOINT_READING_DEG.to_radians(),
+                error: AS5047P_ERROR,
+            }),
             wiring: Wiring::default(),
             ratio: joint.encoder.ratio,
         }

@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use scarab::board::odrive_v3_6::settings::analog::temperature_c;
-use scarab::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
+use scarab::hal::{AxisCommand, Contacts, Controller, EncoderPlace, Frame, Hardware};
 
 use crate::rig::bus::wire::Mailbox;
 
@@ -55,6 +55,8 @@ pub struct Registers<const N: usize> {
     pub brake: f32,
     /// Encoder counters.
     pub encoders: [u16; N],
+    /// Frames of the absolute encoders at rotor and joint.
+    pub encoder_frames: [[u16; 2]; N],
     /// Whether the gate drivers hold their configuration.
     pub gates: [bool; N],
     /// Whether the gate drivers are powered.
@@ -86,6 +88,7 @@ impl<const N: usize> Registers<N> {
             commands: [AxisCommand::OFF; N],
             brake: 0.0,
             encoders: [0; N],
+            encoder_frames: [[u16::MAX; 2]; N],
             gates: [true; N],
             gates_on: true,
             configured: false,
@@ -156,6 +159,10 @@ impl<const N: usize> Hardware<N> for Registers<N> {
 
     fn encoder_count(&self, axis: usize) -> u16 {
         self.encoders[axis]
+    }
+
+    fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16 {
+        self.encoder_frames[axis][place as usize]
     }
 
     fn temperature(&self, axis: usize) -> Option<f32> {

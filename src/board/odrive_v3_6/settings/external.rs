@@ -26,5 +26,11 @@ pub const EXTERNAL: [Write; 7] = [
     Write::bits("EXTI_IMR", EXTI, LINES, LINES),
 ];
 
+/// Write that masks a line.
+#[must_use]
+pub const fn masked(line: u32) -> Write {
+    Write::bits("EXTI_IMR", EXTI, 1 << line, 0)
+}
+
 const INDICES: u32 = 1 << INDEX_LINES[0] | 1 << INDEX_LINES[1];
 const LINES: u32 = INDICES | 1 << STOP_LINE;

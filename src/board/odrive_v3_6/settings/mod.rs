@@ -3,6 +3,7 @@
 //! A test on the host (`cargo test --test board_registers -- --nocapture`) applies these lists to empty
 //! registers. The test derives frequency, phase, dead time, channels and pins, and prints the table.
 
+pub mod absolute_encoders;
 pub mod analog;
 pub mod can;
 pub mod chopper;

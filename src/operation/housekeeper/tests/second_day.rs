@@ -7,38 +7,56 @@ use super::*;
 use crate::hal::CURRENT_RATE_HZ;
 use crate::leg::testing::{LEG, configuration};
 use crate::leg::{Control, DeratingRamps};
-use crate::motor::SenseScale;
+use crate::motor::{AbsoluteAngle, SenseScale};
 use crate::units::Volt;
 
 const PERIOD: NonZeroU32 = NonZeroU32::new(7000).expect("more than none");
+/// Motor angle of one joint turn.
+const RATIO_RAD: f64 = 50.0 * core::f64::consts::TAU;
 const VOLT_PER_CODE: Volt = SenseScale::ODRIVE_3_6.volt_per_code;
 const RAMPS: DeratingRamps =
     DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
 
 /// Levels 0, 1 and 6 of a board with two motors, from the power-up on.
-struct Machine {
+pub(super) struct Machine {
     loops: CurrentLoops<2>,
-    keeper: Housekeeper<2>,
+    pub(super) keeper: Housekeeper<2>,
     level: ServoLevel<2>,
     control: Control<2>,
     hardware: TestHardware<2>,
-    signals: Signals<2>,
+    pub(super) signals: Signals<2>,
     queues: Queues<2>,
     events: Box<EventQueue<2>>,
-    motors: [TestMotor; 2],
+    pub(super) motors: [TestMotor; 2],
+    /// Added to each counter.
+    pub(super) counted: [u16; 2],
+    /// The SPI's angle grows with the rotor's, whatever the counter does.
+    pub(super) is_spi_forward: bool,
+    /// Error of each joint's encoder, steps, or no valid frame.
+    pub(super) joint_steps: [Option<i32>; 2],
     samples: [AxisSample; 2],
     period: u32,
-    records: Vec<Record<2>>,
+    pub(super) records: Vec<Record<2>>,
+    /// Calibrations offered to the storage.
+    pub(super) offered: [Option<StoredCalibration>; 2],
     /// Greatest current of any motor so far, A.
-    most_ampere: f64,
+    pub(super) most_ampere: f64,
 }
 
 impl Machine {
-    fn new(mut motors: [TestMotor; 2], stored: [Option<StoredCalibration>; 2]) -> Self {
+    fn new(motors: [TestMotor; 2], stored: [Option<StoredCalibration>; 2]) -> Self {
+        Self::with(HOUSEKEEPING, motors, stored)
+    }
+
+    pub(super) fn with(
+        settings: HousekeepingSettings<2>,
+        mut motors: [TestMotor; 2],
+        stored: [Option<StoredCalibration>; 2],
+    ) -> Self {
         let control = Control::new(&configuration()).expect("a leg");
         Self {
             loops: CurrentLoops::new([AxisState::OFF; 2], PERIOD, None, VOLT_PER_CODE),
-            keeper: Housekeeper::new(HOUSEKEEPING).with_stored(stored),
+            keeper: Housekeeper::new(settings).with_stored(stored),
             level: ServoLevel::new(&control, RAMPS, VOLT_PER_CODE, None),
             control,
             hardware: TestHardware::new(),
@@ -47,14 +65,18 @@ impl Machine {
             events: Box::default(),
             samples: motors.each_mut().map(TestMotor::sample),
             motors,
+            counted: [0; 2],
+            is_spi_forward: false,
+            joint_steps: [Some(0); 2],
             period: 0,
             records: Vec::new(),
+            offered: [None; 2],
             most_ampere: 0.0,
         }
     }
 
     fn period(&mut self) {
-        let Ends { mut current, mut servo, mut housekeeping, mut identification, calibrated: _ } =
+        let Ends { mut current, mut servo, mut housekeeping, mut identification, mut calibrated } =
             self.queues.split(&mut self.events);
         if self.period.is_multiple_of(CURRENT_RATE_HZ / RATE_HZ) {
             self.keeper.round(&mut housekeeping, &self.signals, &mut self.hardware);
@@ -62,7 +84,8 @@ impl Machine {
         self.period += 1;
         let now = self.period.wrapping_mul(PERIOD.get());
         for axis in 0..2 {
-            let sample = self.samples[axis];
+            let mut sample = self.samples[axis];
+            sample.encoder_count = sample.encoder_count.wrapping_add(self.counted[axis]);
             self.hardware.encoder_counts[axis] = sample.encoder_count;
             let requested = self.hardware.servo_pended;
             let tick =
@@ -75,8 +98,19 @@ impl Machine {
                 signals.statistics.servo_ticks.add();
             }
             self.samples[axis] = self.motors[axis].period(self.hardware.bridges[axis]);
+            let steps = |turns: f64| (turns.rem_euclid(1.0) * 16_384.0) as u16;
+            let frame = |steps: u16| AbsoluteAngle::from_steps(steps).to_frame();
+            let motor = &self.motors[axis];
+            let position = motor.position();
+            let rotor = frame(steps(if self.is_spi_forward { -position } else { position }));
+            let joint = self.joint_steps[axis]
+                .map_or(u16::MAX, |error| frame(steps(motor.angle / RATIO_RAD).wrapping_add(error as u16)));
+            self.hardware.encoder_frames[axis] = [rotor, joint];
             let [d, q] = self.motors[axis].current;
             self.most_ampere = self.most_ampere.max(d.hypot(q));
+        }
+        while let Some((axis, stored)) = calibrated.dequeue() {
+            self.offered[axis] = stored;
         }
         while let Some(record) = identification.notes.dequeue() {
             self.records.push(record);
@@ -85,7 +119,7 @@ impl Machine {
     }
 
     /// Holds the contacts for some seconds.
-    fn hold(&mut self, enabling: bool, start: bool, seconds: f64) {
+    pub(super) fn hold(&mut self, enabling: bool, start: bool, seconds: f64) {
         self.hardware.contacts = Contacts { enabling, start };
         (0..(seconds * f64::from(CURRENT_RATE_HZ)) as u32).for_each(|_| self.period());
     }
@@ -100,13 +134,13 @@ impl Machine {
     }
 
     /// The operator holds the switch and presses start.
-    fn press(&mut self) {
+    pub(super) fn press(&mut self) {
         self.hold(true, false, 0.1);
         self.hold(true, true, 0.1);
     }
 
     /// A hand turns both motors by an angle in rad, at 60 rad/s.
-    fn turn(&mut self, angle: f64) {
+    pub(super) fn turn(&mut self, angle: f64) {
         for motor in &mut self.motors {
             (motor.driven, motor.speed) = (true, 60.0 * angle.signum());
         }
@@ -117,7 +151,7 @@ impl Machine {
         }
     }
 
-    fn results(&self) -> Vec<(u8, &'static str)> {
+    pub(super) fn results(&self) -> Vec<(u8, &'static str)> {
         let result = |record: &Record<2>| match record {
             Record::Calibration { joint, result, .. } => Some((*joint, *result)),
             _ => None,
@@ -134,7 +168,7 @@ impl Machine {
 }
 
 /// Motors with the joint's inertia and friction at the rotor, elsewhere than at their stored calibration.
-fn second_day() -> ([TestMotor; 2], [Option<StoredCalibration>; 2]) {
+pub(super) fn second_day() -> ([TestMotor; 2], [Option<StoredCalibration>; 2]) {
     let stored = measured().stored().expect("an index");
     let motors = [5.0, -8.0].map(|moved| {
         let motor = TestMotor::default();

@@ -1,0 +1,60 @@
+//! Select lines and frames of AS5047P encoders on the gate drivers' SPI (SCK PC10, MISO PC11, MOSI PC12).
+//!
+//! | encoders of an axis | select of the rotor's | select of the joint's |
+//! | --- | --- | --- |
+//! | at the rotor | GPIO7 (M0), GPIO8 (M1) | - |
+//! | at the joint, rotor with index | - | GPIO7 (M0), GPIO8 (M1) |
+//! | at both | GPIO7 (M0), GPIO8 (M1) | Z input: PC9 (M0), PC15 (M1) |
+//!
+//! Each axis has its own row. GPIO7 and GPIO8 are JTAG's TDI and TDO; a debug probe on SWD does not use them.
+//!
+//! Source: ams AS5047P data sheet; second edge, 16 bits and at most 10 MHz, as for the DRV8301. Pins:
+//! `Board/v3/Inc/main.h:77-156`.
+
+use super::Write;
+use super::external::{INDEX_LINES, masked};
+use super::pins::{Mode, Pin, pin};
+use crate::hal::EncoderPlace;
+use crate::leg::AbsoluteEncoders;
+
+/// Command to read the angle (register 0x3FFF, bit 14 read, bit 15 even parity); the answer comes with the
+/// next frame.
+pub const READ_ANGLE: u16 = 0xFFFF;
+/// Command to read the error register (0x0001), which clears it.
+pub const READ_ERRORS: u16 = 0x4001;
+/// Bit of an answer after a command with an error.
+pub const ERROR: u16 = 1 << 14;
+
+/// Select lines on GPIO7 and GPIO8.
+const FIRST: [Pin; 2] = [pin(b'A', 15, Mode::Output(true)), pin(b'B', 3, Mode::Output(true))];
+/// Select lines on the index inputs.
+const SECOND: [Pin; 2] =
+    [pin(b'C', INDEX_LINES[0], Mode::Output(true)), pin(b'C', INDEX_LINES[1], Mode::Output(true))];
+
+/// Select line of an encoder, low while it is selected; `None` without that encoder.
+#[must_use]
+pub fn select(axis: usize, place: EncoderPlace, encoders: AbsoluteEncoders) -> Option<Pin> {
+    let lines = match place {
+        EncoderPlace::Rotor if encoders.rotor => &FIRST,
+        EncoderPlace::Joint if encoders.joint.is_none() => return None,
+        EncoderPlace::Joint if encoders.rotor => &SECOND,
+        EncoderPlace::Joint => &FIRST,
+        EncoderPlace::Rotor => return None,
+    };
+    lines.get(axis).copied()
+}
+
+/// Writes the select lines of an axis' encoders, all deselected. Without an index its interrupt is masked.
+pub fn prepare(axis: usize, encoders: AbsoluteEncoders, mut write: impl FnMut(&[Write])) {
+    if encoders.rotor
+        && let Some(line) = INDEX_LINES.get(axis)
+    {
+        write(&[masked(*line)]);
+    }
+    for pin in [EncoderPlace::Rotor, EncoderPlace::Joint]
+        .into_iter()
+        .filter_map(|place| select(axis, place, encoders))
+    {
+        write(&pin.writes());
+    }
+}

@@ -1,0 +1,162 @@
+//! Absolute encoders at rotor and joint: power-up without turning and without reference, and contradictions.
+
+use super::second_day::{Machine, second_day};
+use super::*;
+use crate::hal::EncoderPlace;
+use crate::motor::{AbsoluteAngle, Direction};
+use crate::safety::BoardFault;
+
+/// Axes with an absolute encoder at rotor and joint.
+fn settings() -> HousekeepingSettings<2> {
+    let axis = AxisConfiguration { index: false, absolute: true, ..CONFIGURATION };
+    let absolute = AbsoluteEncoders { rotor: true, joint: Some(Direction::Up) };
+    let encoders = HOUSEKEEPING.encoders.map(|encoders| EncoderSettings { absolute, ..encoders });
+    HousekeepingSettings { axes: [axis; 2], encoders, ..HOUSEKEEPING }
+}
+
+/// Both motors of the first day after calibration and reference: the calibrations that would be stored, and
+/// the motors' angles at the joints' zero.
+fn first_day() -> ([Option<StoredCalibration>; 2], [f64; 2]) {
+    let mut machine = Machine::with(settings(), second_day().0, [None; 2]);
+    machine.hold(false, false, 0.1);
+    machine.press();
+    machine.hold(true, false, 45.0);
+    assert_eq!(machine.results(), [(1, "done"), (2, "done")]);
+    machine.hold(false, false, 0.1);
+    let angles = machine.motors.each_ref().map(|motor| motor.angle);
+    machine.hold(false, true, 0.2);
+    machine.hold(false, false, 0.7);
+    assert!(machine.signals.has_begun());
+    (machine.offered, angles)
+}
+
+/// A board that starts again, with motors turned by these angles (rad) and counters that begin elsewhere.
+fn restarted(turned: [f64; 2], stored: [Option<StoredCalibration>; 2], zeros: [f64; 2]) -> Machine {
+    let mut motors = second_day().0;
+    for axis in 0..2 {
+        motors[axis].angle = zeros[axis] + turned[axis];
+    }
+    let mut machine = Machine::with(settings(), motors, stored);
+    machine.counted = [12_345, 60_001];
+    machine.hold(false, false, 0.1);
+    machine
+}
+
+/// Axis faults recorded by the housekeeping.
+fn faults(machine: &Machine) -> Vec<(u8, &'static str)> {
+    let fault = |record: &Record<2>| match record {
+        Record::AxisFault { joint, name, .. } => Some((*joint, *name)),
+        _ => None,
+    };
+    machine.records.iter().filter_map(fault).collect()
+}
+
+#[test]
+fn a_second_day_needs_neither_hand_nor_reference() {
+    let (stored, zeros) = first_day();
+    assert!(stored.iter().flatten().all(|stored| stored.joint_zero.is_some() && stored.winding_c.is_some()));
+    // Far from the zero, by whole motor turns and parts of one; 300 rad are 344 degrees of the joint.
+    for turned in [[40.0, -61.7], [-3.3, 120.0]] {
+        let mut machine = restarted(turned, stored, zeros);
+        machine.press();
+        machine.hold(true, false, 2.9);
+        assert_eq!(machine.results(), [(1, "confirmed"), (2, "confirmed")]);
+        machine.hold(true, false, 0.8);
+        assert!(machine.signals.has_begun(), "no reference by the operator");
+        machine.hold(true, false, 0.05);
+        for (axis, turned) in turned.into_iter().enumerate() {
+            let counts = machine.signals.statistics.counts[axis].get().cast_signed();
+            let expected = turned / core::f64::consts::TAU * 8192.0;
+            // Friction lets the rotor rest a little apart, and the zero was that of the pose.
+            assert!((f64::from(counts) - expected).abs() < 8.0, "{counts} {expected}");
+        }
+        assert_eq!(faults(&machine), []);
+    }
+}
+
+#[test]
+fn a_gear_that_slipped_while_the_power_was_off_needs_a_reference() {
+    let (stored, zeros) = first_day();
+    // A third of a motor turn, 2.4 degrees of the joint.
+    let mut machine = restarted([40.0; 2], stored, zeros);
+    machine.joint_steps[1] = Some(16_384 / 150);
+    machine.press();
+    machine.hold(true, false, 3.7);
+    assert_eq!(machine.results(), [(1, "confirmed"), (2, "confirmed")]);
+    assert!(!machine.signals.has_begun());
+    let refused =
+        |record: &&Record<2>| matches!(record, Record::Request { name: "reference", accepted: false, .. });
+    assert_eq!(machine.records.iter().filter(refused).count(), 1);
+    // The operator states the pose.
+    machine.hold(false, false, 0.1);
+    machine.hold(false, true, 0.2);
+    machine.hold(false, false, 0.7);
+    assert!(machine.signals.has_begun());
+    let joint_zero = |stored: Option<StoredCalibration>| stored.and_then(|stored| stored.joint_zero);
+    assert_ne!(
+        joint_zero(machine.offered[1]),
+        joint_zero(stored[1]),
+        "the new zero is offered to the storage"
+    );
+}
+
+#[test]
+fn encoders_that_contradict_each_other_brake_once_and_end_the_zero() {
+    let (stored, zeros) = first_day();
+    for (lost, steps, name) in
+        [(24, 0, "absolute_encoder"), (0, 16_384 / 120, "joint_encoder"), (0, -16_384 / 120, "joint_encoder")]
+    {
+        let mut machine = restarted([40.0; 2], stored, zeros);
+        machine.press();
+        machine.hold(true, false, 3.7);
+        assert!(machine.signals.has_begun());
+        machine.counted[0] = machine.counted[0].wrapping_add(lost);
+        machine.joint_steps[0] = Some(steps);
+        machine.hold(true, false, 0.03);
+        assert_eq!(faults(&machine), [(1, name), (1, "encoder")], "{lost} {steps}");
+        assert!(!machine.signals.has_begun());
+        machine.hold(true, false, 0.2);
+        assert_eq!(faults(&machine).len(), 2, "recorded once");
+    }
+}
+
+#[test]
+fn a_silent_encoder_is_reported_and_forbids_a_calibration() {
+    for place in [EncoderPlace::Rotor, EncoderPlace::Joint] {
+        let mut bench = Bench::new(Housekeeper::new(settings()));
+        let valid = AbsoluteAngle::from_steps(77).to_frame();
+        bench.hardware.encoder_frames = [[valid; 2]; 2];
+        bench.hold(false, false);
+        (0..2).for_each(|axis| bench.signals.take_reported(axis).for_each(drop));
+        bench.hardware.encoder_frames[1][place as usize] = 0xFFFF;
+        bench.hold(false, false);
+        assert!(bench.signals.take_reported(0).next().is_none());
+        assert!(bench.signals.take_reported(1).eq([BoardFault::AbsoluteEncoder]), "{place:?}");
+    }
+    let mut bench = Bench::new(Housekeeper::new(settings()));
+    assert_eq!(bench.press(), []);
+    let refused =
+        |record: &Record<2>| matches!(record, Record::Calibration { result: "absolute_encoder", .. });
+    assert!(bench.records.iter().any(refused));
+}
+
+#[test]
+fn exchanged_lines_of_the_encoder_end_the_calibration_until_a_reset() {
+    let mut machine = Machine::with(settings(), second_day().0, [None; 2]);
+    // A and B exchanged, and motor leads as well, so that the counter runs with the field.
+    for axis in &mut machine.keeper.settings.axes {
+        axis.counter = Direction::Down;
+    }
+    for motor in &mut machine.motors {
+        motor.encoder_sign = -1.0;
+    }
+    machine.is_spi_forward = true;
+    machine.hold(false, false, 0.1);
+    machine.press();
+    machine.hold(true, false, 12.0);
+    assert_eq!(faults(&machine), [(1, "absolute_encoder")]);
+    assert_eq!(machine.results(), [(1, "interrupted")]);
+    machine.hold(false, false, 0.1);
+    machine.press();
+    assert_eq!(machine.results(), [(1, "interrupted"), (1, "absolute_encoder")]);
+}

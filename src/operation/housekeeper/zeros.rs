@@ -1,0 +1,225 @@
+//! Zeros of the joints: stated by the operator, or by absolute encoders at the joints; and the checks of all
+//! absolute encoders.
+//!
+//! A stated pose is the anatomical zero. Where each joint has an encoder of its own, the readings at that pose
+//! are kept with the calibration. After the next power-up they set the zeros as soon as all axes are
+//! calibrated and the leg has stood still for half a second.
+
+use super::super::axis_state::Order;
+use super::super::contacts::{OperatorRequest, RATE_HZ};
+use super::super::encoders::{EncoderCheck, Finding};
+use super::{Calibration, Housekeeper, Level};
+use crate::hal::{EncoderPlace, Hardware, JointSample};
+use crate::leg::StoredCalibration;
+use crate::motor::reference::{ReferenceStep, StatedPose};
+use crate::motor::{AbsoluteAngle, JointZero};
+use crate::safety::BoardFault;
+use crate::trace::Record;
+use crate::units::Hertz;
+
+/// A reference in progress: joints that must stand still, and which of them have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reference<const N: usize> {
+    poses: [(StatedPose, bool); N],
+    /// The encoders at the joints set the zeros, not the pose.
+    is_absolute: bool,
+}
+
+impl<const N: usize> Reference<N> {
+    /// The pose is the zero.
+    pub(super) fn by_operator() -> Option<Self> {
+        let pose = StatedPose::new(Hertz(RATE_HZ as f32))?;
+        Some(Self { poses: [(pose, false); N], is_absolute: false })
+    }
+
+    fn by_encoders() -> Option<Self> {
+        Some(Self { is_absolute: true, ..Self::by_operator()? })
+    }
+}
+
+/// Reading of an absolute encoder.
+fn reading<const N: usize>(
+    axis: usize,
+    place: EncoderPlace,
+    level: &mut Level<'_, '_, N, impl Hardware<N>>,
+) -> Option<AbsoluteAngle> {
+    AbsoluteAngle::of_frame(level.hardware.encoder_frame(axis, place))
+}
+
+/// Counts of a joint at the servo's last tick.
+fn counts<const N: usize, H>(axis: usize, level: &Level<'_, '_, N, H>) -> i32 {
+    level.signals.statistics.counts.get(axis).map_or(0, |count| count.get().cast_signed())
+}
+
+impl<const N: usize> Housekeeper<N> {
+    /// Follows the counters of axes with an absolute encoder at the rotor.
+    pub(super) fn follow_counters(&mut self, level: &Level<'_, '_, N, impl Hardware<N>>) {
+        for (axis, (check, encoders)) in self.checks.iter_mut().zip(&self.settings.encoders).enumerate() {
+            if encoders.absolute.rotor {
+                check.follow(encoders, level.hardware.encoder_count(axis));
+            }
+        }
+    }
+
+    /// Compares all absolute encoders with the counters.
+    pub(super) fn check_encoders(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        for axis in 0..N {
+            let Some(encoders) = self.settings.encoders.get(axis).copied() else { return };
+            if encoders.absolute.rotor {
+                let reading = reading(axis, EncoderPlace::Rotor, level);
+                let after = level.hardware.encoder_count(axis);
+                let check = |check: &mut EncoderCheck| check.rotor(&encoders, reading, after);
+                let finding = self.checks.get_mut(axis).map_or(Finding::Sound, check);
+                self.react(axis, finding, "absolute_encoder", level);
+            }
+            if encoders.absolute.joint.is_some() {
+                let reading = reading(axis, EncoderPlace::Joint, level);
+                let counts = counts(axis, level);
+                let zero = self.joint_zeros.get(axis).and_then(Option::as_ref);
+                let zero = zero.filter(|_| level.signals.has_begun());
+                let check = |check: &mut EncoderCheck| check.joint(&encoders, reading, zero, counts);
+                let finding = self.checks.get_mut(axis).map_or(Finding::Sound, check);
+                self.react(axis, finding, "joint_encoder", level);
+            }
+        }
+    }
+
+    /// Acts on a finding. A contradiction is recorded once; which encoder is wrong is not known, so the rotor
+    /// position is lost, and a stored zero of the joint is not used again.
+    fn react(
+        &mut self,
+        axis: usize,
+        finding: Finding,
+        name: &'static str,
+        level: &mut Level<'_, '_, N, impl Hardware<N>>,
+    ) {
+        match finding {
+            Finding::Sound => {}
+            Finding::Silent => level.signals.report(BoardFault::AbsoluteEncoder, axis),
+            Finding::Contradiction => {
+                let Some(contradicted) = self.contradicted.get_mut(axis) else { return };
+                if core::mem::replace(contradicted, true) {
+                    return;
+                }
+                level.record(Record::AxisFault { tick: self.round, joint: axis as u8 + 1, name });
+                if let Some(zero) = self.joint_zeros.get_mut(axis) {
+                    *zero = None;
+                }
+                let is_calibrating = self.calibrating == Some(axis);
+                level.order(axis, if is_calibrating { Order::Off } else { Order::Lose });
+            }
+        }
+    }
+
+    /// Discards the joints' zeros, also a reference in progress.
+    pub(super) fn forget_zeros(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        level.signals.end_servo();
+        (self.drive, self.reference, self.placed) = (None, None, false);
+    }
+
+    /// Sets the rotor position at count zero of an axis that begins to run at this counter reading.
+    pub(super) fn set_origin(&mut self, axis: usize, calibration: &Calibration, counter: u16) {
+        if let Some((origin, configuration)) = self.origins.get_mut(axis).zip(self.settings.axes.get(axis))
+            && let Ok(scale) = configuration.scale()
+        {
+            let position = calibration.position_of(&scale, configuration.counter, counter);
+            *origin = configuration.flexion.sign() * configuration.counter.sign() * position;
+        }
+    }
+
+    /// Begins a reference by the joints' encoders, once all axes are calibrated and all zeros are known.
+    fn begin_reference(&mut self, level: &Level<'_, '_, N, impl Hardware<N>>) {
+        let is_known = self.joint_zeros.iter().all(Option::is_some);
+        let is_due = self.is_calibrated() && !level.signals.has_begun() && !self.placed;
+        if is_known && is_due && self.reference.is_none() && !self.contradicted.contains(&true) {
+            self.reference = Reference::by_encoders();
+        }
+    }
+
+    pub(super) fn advance_reference(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        if core::mem::take(&mut self.placed) && self.is_calibrated() {
+            level.signals.begin_servo();
+        }
+        self.begin_reference(level);
+        let Some(mut reference) = self.reference else { return };
+        let mut standing = true;
+        for (joint, (pose, found)) in reference.poses.iter_mut().enumerate() {
+            let sample = JointSample { encoder_counts: counts(joint, level), ..JointSample::default() };
+            match pose.tick(&sample) {
+                ReferenceStep::Running(_) => {}
+                ReferenceStep::Found(_) => *found = true,
+                ReferenceStep::Refused(_) => standing = false,
+            }
+        }
+        self.reference = Some(reference).filter(|_| standing);
+        let all = reference.poses.iter().all(|(_, found)| *found);
+        let accepted = match (standing, reference.is_absolute) {
+            (true, _) if !all => return,
+            // The encoders need no decision of the operator, so they wait for a leg at rest.
+            (false, true) => return,
+            (true, true) => self.place_by_encoders(level),
+            (true, false) => self.place_at_zero(level),
+            (false, false) => false,
+        };
+        self.reference = None;
+        // The operator's accepted request was recorded when it came.
+        if reference.is_absolute || !accepted {
+            let name = OperatorRequest::Reference.name();
+            level.record(Record::Request { tick: self.round, name, accepted });
+        }
+    }
+
+    /// Takes the pose as zero, and keeps the readings of the joints' encoders.
+    fn place_at_zero(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
+        for axis in 0..N {
+            let encoders = self.settings.encoders.get(axis);
+            let has_encoder = encoders.is_some_and(|encoders| encoders.absolute.joint.is_some());
+            let joint = if has_encoder { reading(axis, EncoderPlace::Joint, level) } else { None };
+            let rotor = self.place(axis, 0, level);
+            let zero = joint.map(|joint| JointZero { rotor, joint });
+            if let Some(place) = self.joint_zeros.get_mut(axis) {
+                *place = zero;
+            }
+            if has_encoder && let Some(passed) = self.passed.get(axis).copied().flatten() {
+                self.passes(axis, Some(StoredCalibration { joint_zero: zero, ..passed }), level);
+            }
+        }
+        true
+    }
+
+    /// Sets the zeros by the joints' encoders. Returns whether they agree with the rotors' positions; otherwise
+    /// the operator has to state the pose.
+    fn place_by_encoders(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
+        let mut places = [0; N];
+        for (axis, place) in places.iter_mut().enumerate() {
+            let rotor = self.origins.get(axis).map_or(0, |origin| origin.wrapping_add(counts(axis, level)));
+            let reading = reading(axis, EncoderPlace::Joint, level);
+            let zero = self.joint_zeros.get(axis).copied().flatten().zip(reading);
+            let found = self
+                .settings
+                .encoders
+                .get(axis)
+                .zip(zero)
+                .and_then(|(encoders, (zero, reading))| encoders.counts_from_zero(&zero, rotor, reading));
+            let Some(counts) = found else {
+                self.joint_zeros = [None; N];
+                return false;
+            };
+            *place = counts;
+        }
+        for (axis, place) in places.into_iter().enumerate() {
+            self.place(axis, place, level);
+        }
+        true
+    }
+
+    /// Sets a joint's present count; returns the rotor's position in the joint's sense.
+    fn place(&mut self, axis: usize, to: i32, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> i32 {
+        self.placed = true;
+        let Some(origin) = self.origins.get_mut(axis) else { return 0 };
+        let rotor = origin.wrapping_add(counts(axis, level));
+        *origin = rotor.wrapping_sub(to);
+        level.order(axis, Order::Place(to));
+        rotor
+    }
+}
