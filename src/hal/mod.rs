@@ -144,8 +144,7 @@ pub trait Hardware<const N: usize> {
     fn contacts(&self) -> Contacts;
     /// Quadrature counter of an axis.
     fn encoder_count(&self, axis: usize) -> u16;
-    /// Frame with the angle of an absolute encoder ([`crate::motor::AbsoluteAngle::of_frame`]); all ones without
-    /// one.
+    /// Frame with the angle of an absolute encoder; all ones without one.
     fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16;
     /// Temperature of a bridge, degrees Celsius; `None` if its thermistor is open or shorted.
     fn temperature(&self, axis: usize) -> Option<f32>;

@@ -5,7 +5,7 @@
 //! counts  floor(angle * counts per turn / 2^14)
 //! ```
 //!
-//! The same chip makes A and B of the incremental interface. With A on A and B on B both grow together.
+//! A and B of the incremental interface come from the same chip. With A on A and B on B both grow together.
 //!
 //! Source: ams AS5047P data sheet (SPI, register ANGLECOM); the same checks as in ODrive v0.5.6
 //! (`encoder.cpp`, AMS). Known limits: a magnet that is too far away shows only in a register that is not

@@ -6,7 +6,7 @@
 //! joint   expected = reading at the joint's zero + direction * counts / counts per step
 //!         contradicts   |reading - expected| > 2.5 degrees
 //! zero    coarse = distance of the joint's readings in counts
-//!         counts = coarse + r,   r = rotor position - rotor position at the zero - coarse, within half a turn
+//!         counts = coarse + r,   r = rotor position - that at the zero - coarse, within half a turn
 //!         refused   |r| > a quarter of a motor turn, or 2.5 degrees of the joint
 //! ```
 //!

@@ -172,6 +172,12 @@ impl<const N: usize> Housekeeper<N> {
         Self { windings, assumed: [false; N], ..self }
     }
 
+    /// Sets the readings at the joints' zeros, of axes that are ready.
+    #[must_use]
+    pub fn with_joint_zeros(self, joint_zeros: [Option<JointZero>; N]) -> Self {
+        Self { joint_zeros, ..self }
+    }
+
     /// Adds stored calibrations.
     #[must_use]
     pub fn with_stored(self, stored: [Option<StoredCalibration>; N]) -> Self {
@@ -269,7 +275,7 @@ impl<const N: usize> Housekeeper<N> {
             }
         }
         if due.encoders {
-            self.check_encoders(level);
+            (0..N).for_each(|axis| self.check_encoders(axis, level));
         }
         for axis in 0..N {
             let outcome = level.ends.outcomes.get_mut(axis).and_then(|outcomes| outcomes.dequeue());

@@ -6,7 +6,7 @@
 //! | check | period | worst case | reaction |
 //! | --- | --- | --- | --- |
 //! | wrong gate register, read twice | 8 ms | 8 ms + a tick | [`InhibitReason::GateConfiguration`], Off |
-//! | absolute encoder without a valid frame | 8 ms | 40 ms + servo tick | [`FaultCode::AbsoluteEncoder`], Damp |
+//! | absolute encoder silent | 8 ms | 40 ms + servo tick | [`FaultCode::AbsoluteEncoder`], Damp |
 //! | absolute encoder contradicts the counter, twice | 8 ms | 16 ms | rotor position lost, Short |
 //! | thermistor open or shorted | 50 ms | 50 ms + servo tick | [`FaultCode::Thermistor`], Damp |
 //! | bridge at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::Temperature`], Damp |

@@ -16,10 +16,10 @@ pub enum Channel {
     Counter,
     /// Index pulse: `Off` hides it, `Offset` moves the captured count, any other form makes pulses.
     Index,
-    /// Absolute encoder at the rotor, or at the joint: `Off`, `Rail` and `Garbage` replace the frame, any other
-    /// form changes the angle in it.
+    /// Absolute encoder at the rotor: `Off`, `Rail` and `Garbage` replace its frame, any other form changes
+    /// the angle in it.
     RotorEncoder,
-    /// The same at the joint.
+    /// Absolute encoder at the joint, with the forms of [`Self::RotorEncoder`].
     JointEncoder,
     /// Shunt code of phase B.
     ShuntB,

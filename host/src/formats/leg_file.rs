@@ -48,7 +48,7 @@ mod motor;
 mod segments;
 mod switch;
 
-pub use motor::{MotorFile, SupplyFile};
+pub use motor::{JointEncoder, MotorFile, SupplyFile};
 pub use segments::{BodySide, SegmentsFile};
 pub use switch::Switch;
 

@@ -51,8 +51,8 @@ impl GateDrivers {
         Self { encoders, ..self }
     }
 
-    /// Frame with an encoder's angle; all ones without that encoder. After an error the chip's error register is
-    /// read, so that the next frame is valid again.
+    /// Frame with an encoder's angle; all ones without that encoder. After an error the chip's error register
+    /// is read, so that the next frame is valid again.
     pub fn encoder(&mut self, axis: usize, place: EncoderPlace) -> u16 {
         let encoders = self.encoders.get(axis).copied();
         let Some(pin) = encoders.and_then(|encoders| absolute_encoders::select(axis, place, encoders)) else {

@@ -296,8 +296,8 @@ impl Calibrator {
 
     /// Starts a calibration after a power-up. Everything is measured as by [`Self::new`] and must agree with
     /// the stored values; of these only the offset is used. Where an index search is certain
-    /// ([`Self::take_index`]), or an absolute encoder gave the position ([`Self::at_position`]), the motor stands
-    /// still and the offset is not measured.
+    /// ([`Self::take_index`]), or an absolute encoder gave the position ([`Self::at_position`]), the motor
+    /// stands still and the offset is not measured.
     ///
     /// # Errors As [`Self::new`]. Also [`AxisError::Encoder`] without index and absolute encoder, and
     /// [`AxisError::Calibration`] where the stored values belong to another configuration.

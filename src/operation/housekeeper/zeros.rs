@@ -1,8 +1,8 @@
 //! Zeros of the joints: stated by the operator, or by absolute encoders at the joints; and the checks of all
 //! absolute encoders.
 //!
-//! A stated pose is the anatomical zero. Where each joint has an encoder of its own, the readings at that pose
-//! are kept with the calibration. After the next power-up they set the zeros as soon as all axes are
+//! A stated pose is the anatomical zero. Where each joint has an encoder of its own, the readings at that
+//! pose are kept with the calibration. After the next power-up they set the zeros as soon as all axes are
 //! calibrated and the leg has stood still for half a second.
 
 use super::super::axis_state::Order;
@@ -61,31 +61,32 @@ impl<const N: usize> Housekeeper<N> {
         }
     }
 
-    /// Compares all absolute encoders with the counters.
-    pub(super) fn check_encoders(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
-        for axis in 0..N {
-            let Some(encoders) = self.settings.encoders.get(axis).copied() else { return };
-            if encoders.absolute.rotor {
-                let reading = reading(axis, EncoderPlace::Rotor, level);
-                let after = level.hardware.encoder_count(axis);
-                let check = |check: &mut EncoderCheck| check.rotor(&encoders, reading, after);
-                let finding = self.checks.get_mut(axis).map_or(Finding::Sound, check);
-                self.react(axis, finding, "absolute_encoder", level);
-            }
-            if encoders.absolute.joint.is_some() {
-                let reading = reading(axis, EncoderPlace::Joint, level);
-                let counts = counts(axis, level);
-                let zero = self.joint_zeros.get(axis).and_then(Option::as_ref);
-                let zero = zero.filter(|_| level.signals.has_begun());
-                let check = |check: &mut EncoderCheck| check.joint(&encoders, reading, zero, counts);
-                let finding = self.checks.get_mut(axis).map_or(Finding::Sound, check);
-                self.react(axis, finding, "joint_encoder", level);
-            }
+    /// Compares an axis' absolute encoders with its counter.
+    #[inline(never)]
+    pub(super) fn check_encoders(&mut self, axis: usize, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        let Some(encoders) = self.settings.encoders.get(axis).copied() else { return };
+        if encoders.absolute.rotor {
+            let reading = reading(axis, EncoderPlace::Rotor, level);
+            let after = level.hardware.encoder_count(axis);
+            let check = |check: &mut EncoderCheck| check.rotor(&encoders, reading, after);
+            let finding = self.checks.get_mut(axis).map_or(Finding::Sound, check);
+            self.react(axis, finding, "absolute_encoder", level);
+        }
+        if encoders.absolute.joint.is_some() {
+            let reading = reading(axis, EncoderPlace::Joint, level);
+            let counts = counts(axis, level);
+            let zero = self.joint_zeros.get(axis).and_then(Option::as_ref);
+            let zero = zero.filter(|_| level.signals.has_begun());
+            let check = |check: &mut EncoderCheck| check.joint(&encoders, reading, zero, counts);
+            let finding = self.checks.get_mut(axis).map_or(Finding::Sound, check);
+            self.react(axis, finding, "joint_encoder", level);
         }
     }
 
     /// Acts on a finding. A contradiction is recorded once; which encoder is wrong is not known, so the rotor
     /// position is lost, and a stored zero of the joint is not used again.
+    #[cold]
+    #[inline(never)]
     fn react(
         &mut self,
         axis: usize,
@@ -118,6 +119,7 @@ impl<const N: usize> Housekeeper<N> {
     }
 
     /// Sets the rotor position at count zero of an axis that begins to run at this counter reading.
+    #[inline(never)]
     pub(super) fn set_origin(&mut self, axis: usize, calibration: &Calibration, counter: u16) {
         if let Some((origin, configuration)) = self.origins.get_mut(axis).zip(self.settings.axes.get(axis))
             && let Ok(scale) = configuration.scale()
@@ -158,7 +160,10 @@ impl<const N: usize> Housekeeper<N> {
             // The encoders need no decision of the operator, so they wait for a leg at rest.
             (false, true) => return,
             (true, true) => self.place_by_encoders(level),
-            (true, false) => self.place_at_zero(level),
+            (true, false) => {
+                (0..N).for_each(|axis| self.place_at_zero(axis, level));
+                true
+            }
             (false, false) => false,
         };
         self.reference = None;
@@ -169,51 +174,49 @@ impl<const N: usize> Housekeeper<N> {
         }
     }
 
-    /// Takes the pose as zero, and keeps the readings of the joints' encoders.
-    fn place_at_zero(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
-        for axis in 0..N {
-            let encoders = self.settings.encoders.get(axis);
-            let has_encoder = encoders.is_some_and(|encoders| encoders.absolute.joint.is_some());
-            let joint = if has_encoder { reading(axis, EncoderPlace::Joint, level) } else { None };
-            let rotor = self.place(axis, 0, level);
-            let zero = joint.map(|joint| JointZero { rotor, joint });
-            if let Some(place) = self.joint_zeros.get_mut(axis) {
-                *place = zero;
-            }
-            if has_encoder && let Some(passed) = self.passed.get(axis).copied().flatten() {
-                self.passes(axis, Some(StoredCalibration { joint_zero: zero, ..passed }), level);
-            }
+    /// Takes a joint's pose as its zero, and keeps the reading of the joint's encoder.
+    #[inline(never)]
+    fn place_at_zero(&mut self, axis: usize, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        let encoders = self.settings.encoders.get(axis);
+        let has_encoder = encoders.is_some_and(|encoders| encoders.absolute.joint.is_some());
+        let joint = if has_encoder { reading(axis, EncoderPlace::Joint, level) } else { None };
+        let rotor = self.place(axis, 0, level);
+        let zero = joint.map(|joint| JointZero { rotor, joint });
+        if let Some(place) = self.joint_zeros.get_mut(axis) {
+            *place = zero;
         }
-        true
+        if has_encoder && let Some(passed) = self.passed.get(axis).copied().flatten() {
+            self.passes(axis, Some(StoredCalibration { joint_zero: zero, ..passed }), level);
+        }
     }
 
-    /// Sets the zeros by the joints' encoders. Returns whether they agree with the rotors' positions; otherwise
-    /// the operator has to state the pose.
+    /// Present counts of a joint from its zero by its encoder; `None` where that and the rotor's position
+    /// contradict each other.
+    #[inline(never)]
+    fn counts_from_zero(&self, axis: usize, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> Option<i32> {
+        let rotor = self.origins.get(axis)?.wrapping_add(counts(axis, level));
+        let zero = self.joint_zeros.get(axis)?.as_ref()?;
+        let reading = reading(axis, EncoderPlace::Joint, level)?;
+        self.settings.encoders.get(axis)?.counts_from_zero(zero, rotor, reading)
+    }
+
+    /// Sets the zeros by the joints' encoders. Returns whether all agree with the rotors' positions;
+    /// otherwise the operator has to state the pose.
     fn place_by_encoders(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
-        let mut places = [0; N];
-        for (axis, place) in places.iter_mut().enumerate() {
-            let rotor = self.origins.get(axis).map_or(0, |origin| origin.wrapping_add(counts(axis, level)));
-            let reading = reading(axis, EncoderPlace::Joint, level);
-            let zero = self.joint_zeros.get(axis).copied().flatten().zip(reading);
-            let found = self
-                .settings
-                .encoders
-                .get(axis)
-                .zip(zero)
-                .and_then(|(encoders, (zero, reading))| encoders.counts_from_zero(&zero, rotor, reading));
-            let Some(counts) = found else {
-                self.joint_zeros = [None; N];
-                return false;
-            };
-            *place = counts;
+        let places: [_; N] = core::array::from_fn(|axis| self.counts_from_zero(axis, level));
+        let agree = places.iter().all(Option::is_some);
+        if !agree {
+            self.joint_zeros = [None; N];
+            return false;
         }
-        for (axis, place) in places.into_iter().enumerate() {
-            self.place(axis, place, level);
+        for (axis, counts) in places.into_iter().enumerate() {
+            self.place(axis, counts.unwrap_or_default(), level);
         }
         true
     }
 
     /// Sets a joint's present count; returns the rotor's position in the joint's sense.
+    #[inline(never)]
     fn place(&mut self, axis: usize, to: i32, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> i32 {
         self.placed = true;
         let Some(origin) = self.origins.get_mut(axis) else { return 0 };

@@ -3,6 +3,7 @@
 //!
 //! A run is judged by its outcome, and repeated by its row and its seed.
 
+mod absolute;
 mod calibration;
 mod command;
 mod cut;
@@ -41,7 +42,9 @@ pub struct Bench {
 }
 
 /// All benches.
-pub static BENCHES: [Bench; 21] = [
+pub static BENCHES: [Bench; 23] = [
+    absolute::SILENT,
+    absolute::CONTRADICTION,
     offsets::BENCH,
     calibration::BENCH,
     start::ZEROS,

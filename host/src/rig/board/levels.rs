@@ -18,13 +18,14 @@
 
 use core::num::NonZeroU32;
 
-use hal_sim::drive::description::CompleteDescription;
+use hal_sim::drive::counter::steps;
+use hal_sim::drive::description::{AxisDescription, CompleteDescription};
 use hal_sim::world::World;
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::bus::device::Device;
 use scarab::bus::identification::Results;
 use scarab::hal::{AxisSample, CURRENT_RATE_HZ, Frame, JointSample};
-use scarab::leg::{AxisFault, Control, ControlOutput, ControlRequest, Following};
+use scarab::leg::{AbsoluteAngle, AxisFault, Control, ControlOutput, ControlRequest, Following, JointZero};
 use scarab::motor::{Chopper, SenseScale};
 use scarab::operation::{
     AxisState, BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings,
@@ -113,7 +114,12 @@ impl<const N: usize> Levels<N> {
         levels.signals.statistics.see_bus(BUS_CODE);
         levels.registers.servo_due = true;
         levels.loops = loops(axes.map(AxisState::running), chopper);
-        levels.housekeeper = Housekeeper::ready(settings);
+        // A ready joint counts from its zero.
+        let zero = |axis: AxisDescription| {
+            let joint = AbsoluteAngle::from_steps(steps(axis.joint_encoder?.zero));
+            Some(JointZero { rotor: 0, joint })
+        };
+        levels.housekeeper = Housekeeper::ready(settings).with_joint_zeros(description.axes.map(zero));
         Ok(levels)
     }
 

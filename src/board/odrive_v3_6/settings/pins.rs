@@ -2,9 +2,9 @@
 //!
 //! Source: `Board/v3/Inc/main.h:77-156`, `board.cpp:35-254`; registers RM0090 8.4.
 //!
-//! Pins of the bus: [`super::can`]; of absolute encoders: [`super::absolute_encoders`]. Unused and left in their
-//! reset state: UART_A (PA0, PA1), USB (PA11, PA12), GPIO6 (PB2), and GPIO7 and GPIO8 (PA15, PB3) without such
-//! encoders.
+//! Pins of the bus: [`super::can`]; of absolute encoders: [`super::absolute_encoders`]. Unused and left in
+//! their reset state: UART_A (PA0, PA1), USB (PA11, PA12), GPIO6 (PB2), and GPIO7 and GPIO8 (PA15, PB3)
+//! without such encoders.
 
 use super::Write;
 
