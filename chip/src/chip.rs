@@ -7,6 +7,7 @@ use crate::findings::{Access, Findings, NOT_MODELLED};
 use crate::load::Load;
 use crate::nvic::{NMI, Nvic};
 use crate::peripherals::adc::{self, Adc, Trigger};
+use crate::peripherals::as5047p::Encoder;
 use crate::peripherals::can::Can;
 use crate::peripherals::debug::Debug;
 use crate::peripherals::drv8301::Drivers;
@@ -59,6 +60,8 @@ const ENCODER_PINS: [[Pin; 2]; JOINTS] = [[('B', 4), ('B', 5)], [('B', 6), ('B',
 const INDEX_PINS: [Pin; JOINTS] = [('C', 9), ('C', 15)];
 const SPI_PINS: [Pin; 3] = [('C', 10), ('C', 11), ('C', 12)];
 const SELECTS: [Pin; 2] = [('C', 13), ('C', 14)];
+/// Select lines of absolute encoders: an axis' first on GPIO7 or GPIO8, its second on the index input.
+const ENCODER_SELECTS: [[Pin; 2]; JOINTS] = [[('A', 15), ('C', 9)], [('B', 3), ('C', 15)]];
 const GATE_ENABLE: Pin = ('B', 12);
 const CAN_PINS: [Pin; 2] = [('B', 8), ('B', 9)];
 const CHOPPER_PIN: Pin = ('B', 11);
@@ -167,6 +170,8 @@ pub struct Chip {
     spi: Spi,
     /// Gate drivers.
     pub drivers: Drivers,
+    /// Absolute encoders of each axis, by select line.
+    pub encoders: [[Encoder; 2]; JOINTS],
     /// CAN controller and wire.
     pub can: Can,
     /// Watchdog.
@@ -217,6 +222,7 @@ impl Chip {
             common: adc::Common::default(),
             spi: Spi::default(),
             drivers: Drivers::default(),
+            encoders: [[Encoder::default(); 2]; JOINTS],
             can: Can::new(),
             iwdg: Iwdg::new(),
             debug: Debug::new(),
@@ -480,8 +486,20 @@ impl Chip {
         self.plant.set_gates(self.drivers.drive());
     }
 
+    fn is_selected(&self, pin: Pin) -> bool {
+        self.gpio.mode(pin) == Mode::Output && !self.gpio.level(pin)
+    }
+
     fn selected(&self) -> [bool; 2] {
-        SELECTS.map(|pin| self.gpio.mode(pin) == Mode::Output && !self.gpio.level(pin))
+        SELECTS.map(|pin| self.is_selected(pin))
+    }
+
+    /// Axis and line of the selected encoder.
+    fn selected_encoder(&self) -> Option<(usize, usize)> {
+        let lines = (0..JOINTS).flat_map(|axis| [(axis, 0), (axis, 1)]);
+        lines.into_iter().find(|(axis, line)| {
+            self.plant.encoder_at(*axis, *line).is_some() && self.is_selected(ENCODER_SELECTS[*axis][*line])
+        })
     }
 
     /// Duty of the brake resistor from TIM2: high side on channel 4, low side on channel 3.
@@ -650,7 +668,7 @@ impl Chip {
     }
 
     fn write_gpio(&mut self, offset: u32, value: u32) {
-        let before = self.selected();
+        let (before, encoder) = (self.selected(), self.selected_encoder());
         let changes_outputs = offset & 0x3FF != 0x18 || value & 0x1000_1000 != 0;
         if changes_outputs {
             self.advance_plant();
@@ -661,6 +679,12 @@ impl Chip {
                 self.findings.add("gate driver deselected while a frame is on the wire", "GPIOC_BSRR");
             }
             self.drivers.release(self.now);
+        }
+        if let Some((axis, line)) = encoder.filter(|_| self.selected_encoder().is_none()) {
+            if self.spi.is_busy(self.now) {
+                self.findings.add("encoder deselected while a frame is on the wire", "GPIO_BSRR");
+            }
+            self.encoders[axis][line].release(self.now);
         }
         if changes_outputs {
             self.follow_pins();
@@ -711,8 +735,13 @@ impl Chip {
             return self.spi.answer(u16::MAX);
         }
         let selected = self.selected();
+        let encoder = self.selected_encoder().filter(|_| selected == [false; 2]);
+        let angle = encoder.and_then(|(axis, line)| self.plant.encoder_steps(axis, line, self.now));
         let access = &mut Access { now: self.now, findings: &mut self.findings };
-        let answer = self.drivers.frame(&sent, selected, access);
+        let answer = match (encoder, angle) {
+            (Some((axis, line)), Some(angle)) => self.encoders[axis][line].frame(&sent, angle, access),
+            _ => self.drivers.frame(&sent, selected, access),
+        };
         self.spi.answer(answer);
     }
 

@@ -57,6 +57,9 @@ struct Common {
     /// Shipped leg or leg file, for image and plant.
     #[arg(long, default_value = DEFAULT_LEG)]
     leg: String,
+    /// The leg has an absolute encoder at each rotor and each joint.
+    #[arg(long)]
+    absolute_encoders: bool,
     /// Image (ELF) of that leg; built unless given.
     #[arg(long)]
     image: Option<PathBuf>,
@@ -181,6 +184,7 @@ pub fn main() -> ExitCode {
 impl Common {
     fn session(&self) -> Result<Session, ToolError> {
         let leg = LegFile::load_for_image(&self.leg, false)?;
+        let leg = if self.absolute_encoders { leg.with_absolute_encoders() } else { leg };
         let options =
             build::Options { leg: leg.clone(), log: false, brake_resistor: true, board_volts: None };
         let path = match &self.image {

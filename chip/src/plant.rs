@@ -17,7 +17,7 @@ use core::f64::consts::{PI, TAU};
 use hal_sim::conventions::Anatomy;
 use hal_sim::description::LegDescription;
 use hal_sim::drive::axis::{PERIOD_S, QUARTER_S};
-use hal_sim::drive::counter::Counter;
+use hal_sim::drive::counter::{Counter, steps};
 use hal_sim::drive::description::{
     AxisDescription, CompleteDescription, CouplingDescription, EncoderWiring, SupplyDescription,
 };
@@ -291,9 +291,14 @@ impl Axis {
         }
     }
 
+    /// Whether no index pulses come.
+    fn has_no_index(&self) -> bool {
+        self.encoder_fault.no_index || self.description.counter.absolute
+    }
+
     /// Instants within the next step at which the index line rises and falls, if it does.
     fn index_pulse(&self, now: Ticks) -> Vec<(Ticks, bool)> {
-        if self.speed == 0.0 || self.encoder_fault.no_index {
+        if self.speed == 0.0 || self.has_no_index() {
             return Vec::new();
         }
         let width = TAU / self.description.counter.counts;
@@ -466,13 +471,35 @@ impl Plant {
         position
     }
 
+    /// Absolute encoder on an axis' select line: at the rotor (0) or at the joint (1). The first line is the
+    /// rotor's, or the joint's where the rotor has none.
+    #[must_use]
+    pub fn encoder_at(&self, axis: usize, line: usize) -> Option<usize> {
+        let description = &self.axes[axis].description;
+        let present = [description.counter.absolute, description.joint_encoder.is_some()];
+        (0..2).filter(|place| present[*place]).nth(line)
+    }
+
+    /// Reading of that encoder at an instant, 14 bits.
+    #[must_use]
+    pub fn encoder_steps(&self, axis: usize, line: usize, now: Ticks) -> Option<u16> {
+        let place = self.encoder_at(axis, line)?;
+        let since = seconds(now.saturating_sub(self.mechanic));
+        let (axis, joint) = (&self.axes[axis], axis);
+        if place == 0 {
+            return Some(axis.counter.steps(axis.angle + axis.speed * since));
+        }
+        let encoder = axis.description.joint_encoder?;
+        let angle = self.mirrored * (self.position()[joint] + self.velocity()[joint] * since);
+        Some(steps(encoder.direction * (angle + encoder.error * angle.sin()) + encoder.zero))
+    }
+
     /// Whether the index line of an axis is high at the last mechanical step.
     #[must_use]
     pub fn index_level(&self, axis: usize) -> bool {
         let axis = &self.axes[axis];
         let width = TAU / axis.description.counter.counts;
-        let missing =
-            axis.encoder_fault.no_index || axis.description.wiring.encoder == EncoderWiring::Missing;
+        let missing = axis.has_no_index() || axis.description.wiring.encoder == EncoderWiring::Missing;
         !missing && (axis.angle - axis.description.counter.index).rem_euclid(TAU) < width
     }
 

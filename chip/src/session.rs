@@ -48,6 +48,8 @@ pub enum Step {
     PowerCycle,
     /// Turn each joint by hand over its motor's index, twice.
     Turn,
+    /// Wait until absolute encoders at the joints have set the zeros.
+    Zeros,
 }
 
 /// Image, board, leg and operator.
@@ -62,8 +64,11 @@ pub struct Session {
     pub resets: Vec<ResetReason>,
     /// Whether records of the timeline are printed when they arrive.
     pub prints: bool,
-    /// The joints were turned over their indexes since the start: stored calibrations need no motion.
-    is_turned: bool,
+    /// The joints were turned over their indexes since the start, or absolute encoders replace that: stored
+    /// calibrations need no motion.
+    is_known: bool,
+    /// Records before the last start.
+    started: usize,
 }
 
 /// Records that are printed when they arrive.
@@ -85,7 +90,15 @@ impl Session {
         let plant = Plant::new(&leg.description::<JOINTS>()?, &drives, seed);
         let machine = Machine::new(image, Chip::new(plant, seed), options)?;
         let probe = Probe::new(&machine)?;
-        Ok(Self { machine, probe, leg: leg.clone(), resets: Vec::new(), prints: false, is_turned: false })
+        Ok(Self {
+            machine,
+            probe,
+            leg: leg.clone(),
+            resets: Vec::new(),
+            prints: false,
+            is_known: false,
+            started: 0,
+        })
     }
 
     /// Present time.
@@ -177,6 +190,7 @@ impl Session {
     /// # Errors
     /// The image sends no record of its start.
     pub fn boot(&mut self) -> Result<(), ToolError> {
+        self.started = self.probe.lines.len();
         self.wait("boot", &[], 1.0)?;
         self.run(0.2)
     }
@@ -204,6 +218,7 @@ impl Session {
             Step::Reset => self.reset(),
             Step::PowerCycle => self.power_cycle(),
             Step::Turn => self.turn(),
+            Step::Zeros => self.zeros(),
         }
     }
 
@@ -221,7 +236,7 @@ impl Session {
         self.press_start()?;
         for _ in 0..JOINTS {
             let line = self.wait("calibration", &[], CALIBRATION_S)?;
-            let expected = if self.is_turned { "confirmed" } else { "done" };
+            let expected = if self.is_known { "confirmed" } else { "done" };
             if field(&line, "result") != Some(expected) {
                 return Err(ToolError::Refused(format!("the calibration is not `{expected}`: {line}")));
             }
@@ -272,7 +287,7 @@ impl Session {
         self.rest()?;
         let before = self.windings()?;
         self.machine.reset(ResetReason::Pin);
-        self.is_turned = false;
+        self.is_known = self.has_absolute_encoders();
         self.boot()?;
         let after = self.windings()?;
         // Without memory they are assumed at 80 degrees.
@@ -286,17 +301,30 @@ impl Session {
         )))
     }
 
+    /// Whether each rotor has an absolute encoder.
+    fn has_absolute_encoders(&self) -> bool {
+        self.leg.joints.iter().all(|joint| joint.motor.is_some_and(|motor| motor.absolute_encoder))
+    }
+
     fn power_cycle(&mut self) -> Result<(), ToolError> {
         self.rest()?;
         self.machine.power_cycle();
-        self.is_turned = false;
+        self.is_known = self.has_absolute_encoders();
         self.boot()
+    }
+
+    fn zeros(&mut self) -> Result<(), ToolError> {
+        let words = ["name=reference", "accepted=true"];
+        if self.probe.find(self.started, "request", &words).is_some() {
+            return Ok(());
+        }
+        self.wait("request", &words, 2.0).map(drop)
     }
 
     fn turn(&mut self) -> Result<(), ToolError> {
         let from = self.machine.chip().plant.position();
         self.move_by_hand(from.map(|angle| angle + TURNED_RAD), 2.0)?;
-        self.is_turned = true;
+        self.is_known = true;
         self.move_by_hand(from, 2.0)
     }
 

@@ -10,12 +10,14 @@
 //! | [`pwm`] | outputs of TIM1 and TIM8: dead time, main output | 17 |
 //! | [`adc`] | converters ADC1 to ADC3 | 13 |
 //! | [`spi`] | SPI3 | 28 |
+//! | [`as5047p`] | absolute encoders on it | AS5047P data sheet |
 //! | [`drv8301`] | both gate drivers on it | DRV8301 data sheet |
 //! | [`can`] | CAN1 | 32 |
 //! | [`iwdg`] | independent watchdog | 21 |
 //! | [`debug`] | DBGMCU, unique number, one-time programmable memory, cycle counter | 38, 39 |
 
 pub mod adc;
+pub mod as5047p;
 pub mod can;
 pub mod debug;
 pub mod drv8301;

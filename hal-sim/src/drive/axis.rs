@@ -111,10 +111,10 @@ impl Axis {
         self.description.wiring.open = Some(output);
     }
 
-    /// Reading of an absolute encoder at the rotor, 14 bits.
+    /// Reading of the absolute encoder at the rotor, 14 bits; `None` without one.
     #[must_use]
-    pub fn rotor_steps(&self) -> u16 {
-        self.counter.steps(self.angle)
+    pub fn rotor_steps(&self) -> Option<u16> {
+        self.description.counter.absolute.then(|| self.counter.steps(self.angle))
     }
 
     /// Electrical angle of the rotor, rad.

@@ -84,8 +84,13 @@ mod tests {
     const COUNT: f64 = TAU / 8192.0;
 
     fn counter(wiring: EncoderWiring) -> Counter {
-        let description =
-            CounterDescription { counts: 8192.0, start: 65_530, index: 100.5 * COUNT, error: 0.0 };
+        let description = CounterDescription {
+            counts: 8192.0,
+            start: 65_530,
+            index: 100.5 * COUNT,
+            error: 0.0,
+            absolute: false,
+        };
         Counter::new(&description, wiring, 0.0)
     }
 

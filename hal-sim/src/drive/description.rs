@@ -128,6 +128,8 @@ pub struct CounterDescription {
     pub index: f64,
     /// Peak of the encoder's error over a turn, rad.
     pub error: f64,
+    /// Whether it is also read as an absolute encoder, and has no index.
+    pub absolute: bool,
 }
 
 /// Absolute encoder at a joint.

@@ -3,6 +3,7 @@
 //! Everything varies with the seed: motor, encoder, shunts, friction, cogging, and rotated motor leads.
 //! Figures: `cargo test -p hal-sim --test calibration -- --nocapture`.
 
+mod absolute;
 mod by_hand;
 mod in_place;
 mod trial;

@@ -92,6 +92,7 @@ impl Trial {
             start: random.one_of([0, 1, 40_000, 65_535]),
             index: random.between(0.0, TAU),
             error: 0.0,
+            absolute: false,
         };
         let bridge = BridgeDescription::default();
         let inertia = random.between(0.5e-4, 10e-4);

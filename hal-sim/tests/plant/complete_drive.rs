@@ -38,7 +38,7 @@ fn axis() -> AxisDescription {
         motor: MOTOR,
         bridge: BridgeDescription { on_resistance: 0.0, ..BridgeDescription::default() },
         shunts: ShuntDescription { offset_codes: [0.0; 2], noise_codes: 0.0, ..ShuntDescription::default() },
-        counter: CounterDescription { counts: 8192.0, start: 0, index: 0.0, error: 0.0 },
+        counter: CounterDescription { counts: 8192.0, start: 0, index: 0.0, error: 0.0, absolute: false },
         joint_encoder: None,
         wiring: Wiring::default(),
         ratio: 50.0,

@@ -288,7 +288,7 @@ fn encoder_frames<const N: usize>(
     now: u64,
 ) -> [u16; 2] {
     let drives = world.complete_drives();
-    let rotor = drives.and_then(|drives| drives.axes().get(joint)).map(|axis| axis.rotor_steps());
+    let rotor = drives.and_then(|drives| drives.axes().get(joint)).and_then(|axis| axis.rotor_steps());
     let readings = [(Channel::RotorEncoder, rotor), (Channel::JointEncoder, world.joint_steps(joint))];
     readings
         .map(|(channel, steps)| steps.map_or(u16::MAX, |steps| injector.frame(channel, joint, now, steps)))

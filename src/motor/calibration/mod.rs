@@ -142,6 +142,8 @@ struct Bench {
     flux: Weber,
     /// Greatest quadrature current of the refinement, A.
     quadrature_a: f32,
+    /// Greatest difference of the encoder's errors at two positions, electrical turns.
+    encoder_error: f32,
 }
 
 impl Bench {
@@ -278,6 +280,7 @@ impl Calibrator {
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
             flux: configuration.flux,
             quadrature_a: min(QUADRATURE_SHARE * settings.current.0, across(configuration, settings.current)),
+            encoder_error: if configuration.absolute { pairs * MAGNETIC_ERROR_TURNS } else { 0.0 },
         };
         Ok(Self {
             bench,
@@ -514,7 +517,9 @@ impl Calibrator {
         let index = self.track.index.unwrap_or(0);
         let measured = found.offset.plus(self.bench.angle(index)).minus(self.bench.angle(0));
         let offset = match self.stored {
-            Some(stored) if measured.since(stored.offset).abs() > GREATEST_STORED_ERROR => {
+            Some(stored)
+                if measured.since(stored.offset).abs() > GREATEST_STORED_ERROR + self.bench.encoder_error =>
+            {
                 return Err(Refusal::StoredOffset);
             }
             Some(stored) => stored.offset,
@@ -547,6 +552,9 @@ pub const STRONG_SHARE: f32 = 1.25;
 const GREATEST_MOTION: f32 = 1.0 / 32.0;
 /// Greatest difference of measured and stored offset, electrical turns.
 const GREATEST_STORED_ERROR: f32 = 5.0 / 360.0;
+/// Error of an absolute encoder, which is a magnetic one, at two positions: twice 0.8 degrees (AS5047P,
+/// nonlinearity with an aligned magnet), motor turns.
+const MAGNETIC_ERROR_TURNS: f32 = 2.0 * 0.8 / 360.0;
 /// Longest current vector of the refinement over the calibration's current, with a margin: the direct
 /// current and 1.6 of it across.
 const LONGEST_SHARE: f32 = 1.1 * 1.89;

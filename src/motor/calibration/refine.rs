@@ -73,7 +73,7 @@ const GREATEST_ERROR: f32 = 0.75;
 const GREATEST_LOADS: [f32; 2] = [0.63, 0.9];
 /// Greatest distance from home at the end, electrical turns.
 const GREATEST_DISTANCE: f32 = 0.2;
-/// Greatest difference of the offsets at both ends, electrical turns.
+/// Greatest difference of the offsets at both ends, electrical turns, beside the encoder's own errors.
 const GREATEST_DRIFT: f32 = 6.0 / 360.0;
 
 /// Work of the quadrature current over a path: sums of ampere times counts, and of counts.
@@ -332,7 +332,7 @@ impl Refine {
             // Centres of both paths, electrical turns apart.
             let apart =
                 self.place(bench, Place::Low(Path::Last)) - self.place(bench, Place::Low(Path::First));
-            if abs(error) > GREATEST_DRIFT {
+            if abs(error) > GREATEST_DRIFT + bench.encoder_error {
                 let stated = bench.scale.counts_per_turn() as f32;
                 let drift = error / apart;
                 return Err(Refusal::CountsPerTurn((stated / (1.0 - drift) + 0.5) as u32));

@@ -26,7 +26,7 @@ use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
-use crate::formats::leg_file::{JointEncoder, LegFile};
+use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
 use crate::rig::bus::host::Host;
 use crate::rig::faulty_board::PERIOD_MS;
@@ -78,20 +78,12 @@ pub(super) const CONTRADICTION: Bench = Bench {
 };
 
 fn base(leg: &LegFile, blind: bool) -> Result<Host, ToolError> {
-    let equipped = |is_blind: bool| {
-        let mut leg = leg.clone();
-        let directions = [JointEncoder::WithCounter, JointEncoder::AgainstCounter];
-        for (joint, direction) in leg.joints.iter_mut().zip(directions) {
-            joint.encoder.counts = 4096;
-            if let Some(motor) = joint.motor.as_mut() {
-                motor.absolute_encoder = !is_blind;
-                motor.joint_encoder = (!is_blind).then_some(direction);
-            }
-        }
-        leg
-    };
-    let mut base =
-        Host::new(Board::new(&equipped(false), context(&equipped(blind))?, 1, 1, Memory::new(None))?);
+    let motors = leg.with_absolute_encoders();
+    let mut believed = motors.clone();
+    for motor in believed.joints.iter_mut().filter_map(|joint| joint.motor.as_mut()).filter(|_| blind) {
+        (motor.absolute_encoder, motor.joint_encoder) = (false, None);
+    }
+    let mut base = Host::new(Board::new(&motors, context(&believed)?, 1, 1, Memory::new(None))?);
     base.begin()?;
     base.move_leg(leg)?;
     Ok(base)
@@ -181,7 +173,7 @@ enum Kind {
 /// True readings of a joint's encoders, steps.
 fn readings(fork: &mut Fork<'_>, joint: usize) -> [f64; 2] {
     let world = &fork.host.rig().world;
-    let rotor = world.complete_drives().map(|drives| drives.axes()[joint].rotor_steps());
+    let rotor = world.complete_drives().and_then(|drives| drives.axes()[joint].rotor_steps());
     [rotor, world.joint_steps(joint)].map(|steps| steps.map_or(f64::NAN, f64::from))
 }
 

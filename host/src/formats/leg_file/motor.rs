@@ -318,6 +318,7 @@ impl MotorFile {
                 start: 0,
                 index: self.index_deg.to_radians(),
                 error: if self.absolute_encoder { AS5047P_ERROR } else { 0.0 },
+                absolute: self.absolute_encoder,
             },
             joint_encoder: self.joint_encoder.map(|direction| JointEncoderDescription {
                 direction: match direction {
@@ -334,6 +335,21 @@ impl MotorFile {
 }
 
 impl LegFile {
+    /// The leg with an AS5047P at each rotor and each joint, at the distal joints against their counters.
+    #[must_use]
+    pub fn with_absolute_encoders(&self) -> Self {
+        let mut leg = self.clone();
+        for (place, joint) in leg.joints.iter_mut().enumerate() {
+            joint.encoder.counts = AS5047P_COUNTS[1];
+            if let Some(motor) = joint.motor.as_mut() {
+                let first = place == 0;
+                let direction = if first { JointEncoder::WithCounter } else { JointEncoder::AgainstCounter };
+                (motor.absolute_encoder, motor.joint_encoder) = (true, Some(direction));
+            }
+        }
+        leg
+    }
+
     /// Complete drives of the simulated leg. Fails if the leg does not have `N` joints or a joint
     /// has no motor.
     pub fn complete_description<const N: usize>(&self) -> Result<CompleteDescription<N>, FileError> {
