@@ -41,6 +41,8 @@ pub enum Outcome {
         /// A new calibration is required.
         lost: bool,
     },
+    /// An index pulse came while the axis was off.
+    Index(IndexSearch),
     /// The flash was erased. The joint may have moved by any amount during the erase, so its zero is unknown.
     StoodStill,
 }
@@ -167,8 +169,8 @@ impl AxisState {
     ) -> (AxisCommand, Option<(Outcome, bool)>) {
         match &mut self.doing {
             Doing::Nothing => {
-                self.search.follow(sample);
-                (AxisCommand::OFF, None)
+                let came = self.search.follow(sample);
+                (AxisCommand::OFF, came.then_some((Outcome::Index(self.search), false)))
             }
             Doing::Calibrating(calibrator) => {
                 // An interrupted check at standstill can be repeated at once.

@@ -102,6 +102,8 @@ pub struct Housekeeper<const N: usize> {
     stored: [Option<StoredCalibration>; N],
     /// Axes whose next calibration has to turn the motor.
     turning: [bool; N],
+    /// Axes whose index is certain, while they are off.
+    certain: [bool; N],
     /// The axis that is being calibrated.
     calibrating: Option<usize>,
     /// Calibration that each axis passed since the start, if it can be stored.
@@ -140,6 +142,7 @@ impl<const N: usize> Housekeeper<N> {
             calibrated: [false; N],
             stored: [None; N],
             turning: [false; N],
+            certain: [false; N],
             calibrating: None,
             passed: [None; N],
             reference: None,
@@ -342,6 +345,14 @@ impl<const N: usize> Housekeeper<N> {
                     (*stored, *zero) = (None, None);
                 }
             }
+            Outcome::Index(search) => {
+                let axes = &self.settings.axes;
+                let certain = axes.get(axis).is_some_and(|axis| axis.index && search.is_certain(axis));
+                if self.certain.get(axis).is_some_and(|before| *before != certain) {
+                    level.record(Record::Index { joint, certain });
+                }
+                self.set_certain(axis, certain);
+            }
             Outcome::Interrupted => {
                 level.record(refused(joint, "interrupted", 0));
                 self.calibrating = None;
@@ -351,6 +362,7 @@ impl<const N: usize> Housekeeper<N> {
                 if let Some(check) = self.checks.get_mut(axis) {
                     *check = EncoderCheck::default();
                 }
+                self.set_certain(axis, false);
                 level.record(Record::AxisFault { tick: self.round, joint, name: "zero_forgotten" });
                 self.forget_zeros(level);
             }
@@ -402,6 +414,13 @@ impl<const N: usize> Housekeeper<N> {
         }
     }
 
+    /// Sets whether the index of an axis is certain.
+    fn set_certain(&mut self, axis: usize, certain: bool) {
+        if let Some(place) = self.certain.get_mut(axis) {
+            *place = certain;
+        }
+    }
+
     /// Sets whether the next calibration of an axis has to turn its motor.
     fn must_turn(&mut self, axis: usize, turns: bool) {
         if let Some(turning) = self.turning.get_mut(axis) {
@@ -426,6 +445,8 @@ impl<const N: usize> Housekeeper<N> {
             return level.signals.inhibit.raise(InhibitReason::Configuration);
         };
         *calibrated = true;
+        // The search begins anew with a running axis.
+        self.set_certain(axis, false);
         // Counting restarts without a zero.
         level.signals.end_servo();
         level.order(axis, Order::Run(running));

@@ -149,6 +149,13 @@ macro_rules! trace_records {
         /** Word for the limit. */ name: &'static str,
         /** Joint, from 1. */ joint: u8,
     }
+    /// An index pulse while an axis is off changed whether its index is certain.
+    Index "index n={=u32} joint={=u8} certain={=bool}" {
+        /// Joint, from 1.
+        joint: u8,
+        /// Two pulses came whole motor turns apart, so a stored calibration needs no motion.
+        certain: bool,
+    }
     /// Result of a calibration.
     Calibration "calibration n={=u32} joint={=u8} result={=str} number={=u32} resistance_ohm={=f32} direct_h={=f32} quadrature_h={=f32} offset_turns={=f32} zero_b={=f32} zero_c={=f32}" {
         /// Joint, from 1.

@@ -17,7 +17,7 @@
 
 use super::INDEX_WIDTH;
 use crate::hal::AxisSample;
-use crate::motor::CountScale;
+use crate::motor::{AxisConfiguration, CountScale};
 
 /// Counter and index pulses of an axis whose bridge is off; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,9 +38,9 @@ impl IndexSearch {
     pub const EMPTY: Self =
         Self { counter: None, came: false, since: 0, distance: None, greatest_steps: [0; 2] };
 
-    /// Follows one PWM period.
+    /// Follows one PWM period. Returns whether an index pulse came.
     #[inline(never)]
-    pub fn follow(&mut self, sample: &AxisSample) {
+    pub fn follow(&mut self, sample: &AxisSample) -> bool {
         let now = sample.encoder_count;
         let step = now.wrapping_sub(self.counter.unwrap_or(now)).cast_signed();
         self.counter = Some(now);
@@ -51,6 +51,14 @@ impl IndexSearch {
             let late = i32::from(now.wrapping_sub(at).cast_signed());
             self.came(self.since.wrapping_sub(late));
         }
+        sample.index_count.is_some()
+    }
+
+    /// Whether the index of this axis is certain.
+    #[must_use]
+    pub fn is_certain(&self, axis: &AxisConfiguration) -> bool {
+        let (Ok(scale), Ok(greatest_step)) = (axis.scale(), axis.greatest_step()) else { return false };
+        self.position(&scale, greatest_step).is_some()
     }
 
     /// Takes a pulse that came so many counts after the newest one.

@@ -86,6 +86,7 @@ impl Machine {
         for axis in 0..2 {
             let mut sample = self.samples[axis];
             sample.encoder_count = sample.encoder_count.wrapping_add(self.counted[axis]);
+            sample.index_count = sample.index_count.map(|at| at.wrapping_add(self.counted[axis]));
             self.hardware.encoder_counts[axis] = sample.encoder_count;
             let requested = self.hardware.servo_pended;
             let tick =
@@ -212,6 +213,30 @@ fn a_second_day_is_enabled_without_motion_by_the_motors() {
     machine.hold(true, false, 0.1);
     assert_eq!(machine.is_proven(), [true; 2]);
     assert_eq!(machine.control.state(), DriveState::OperationEnabled);
+}
+
+#[test]
+fn the_operator_is_told_when_an_index_is_certain_and_when_no_more() {
+    let certain = |machine: &Machine| {
+        let index = |record: &Record<2>| match record {
+            Record::Index { joint, certain } => Some((*joint, *certain)),
+            _ => None,
+        };
+        machine.records.iter().filter_map(index).collect::<Vec<_>>()
+    };
+    let (motors, stored) = second_day();
+    let mut machine = Machine::new(motors, stored);
+    machine.hold(false, false, 0.1);
+    machine.turn(0.9 * core::f64::consts::TAU);
+    assert_eq!(certain(&machine), []);
+    machine.turn(1.3 * core::f64::consts::TAU);
+    assert_eq!(certain(&machine), [(1, true), (2, true)]);
+    // Counts are lost at the second motor.
+    machine.counted[1] = 20;
+    machine.turn(core::f64::consts::TAU);
+    assert_eq!(certain(&machine), [(1, true), (2, true), (2, false)]);
+    machine.turn(core::f64::consts::TAU);
+    assert_eq!(certain(&machine), [(1, true), (2, true), (2, false), (2, true)]);
 }
 
 #[test]
