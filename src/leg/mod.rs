@@ -57,8 +57,8 @@ pub use crate::model::friction::Stribeck;
 pub use crate::model::planar::{BASE, JOINTS};
 pub use crate::model::{Fingerprint, PARAMETERS_PER_JOINT, Parameter};
 pub use crate::motor::{
-    AxisFault, Calibration, Direction as CounterDirection, ElectricalAngle, EncoderSetting, Phase,
-    Refusal as CalibrationRefusal, StoredCalibration,
+    AxisFault, Calibration, Direction as CounterDirection, ElectricalAngle, EncoderSetting, Mismatch,
+    MotorConstant, MotorFindings, Phase, Refusal as CalibrationRefusal, StoredCalibration,
 };
 pub use crate::safety::{
     DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,

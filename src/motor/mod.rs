@@ -38,8 +38,8 @@ pub mod transmission;
 pub use angle::{CountScale, ElectricalAngle, Rotation, SpeedTracker};
 pub use axis::{Axis, AxisFault, AxisRequest, BridgeRequest};
 pub use calibration::{
-    Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, IndexSearch, Phase,
-    Refusal, StoredCalibration,
+    Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, IndexSearch, Mismatch,
+    MotorConstant, MotorFindings, Phase, Refusal, StoredCalibration,
 };
 pub use chopper::{BrakeBudget, Chopper, GREATEST_BRAKE_DUTY};
 pub use configuration::{AxisConfiguration, AxisError, Direction};
