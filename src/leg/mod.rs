@@ -58,7 +58,8 @@ pub use crate::model::planar::{BASE, JOINTS};
 pub use crate::model::{Fingerprint, PARAMETERS_PER_JOINT, Parameter};
 pub use crate::motor::{
     AbsoluteAngle, AbsoluteEncoders, AxisFault, Calibration, Direction as CounterDirection, ElectricalAngle,
-    EncoderSetting, JointZero, Phase, Refusal as CalibrationRefusal, StoredCalibration,
+    EncoderSetting, JointZero, Mismatch, MotorConstant, MotorFindings, Phase, Refusal as CalibrationRefusal,
+    StoredCalibration,
 };
 pub use crate::safety::{
     DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,

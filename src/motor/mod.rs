@@ -42,7 +42,7 @@ pub use angle::{CountScale, ElectricalAngle, Rotation, SpeedTracker};
 pub use axis::{Axis, AxisFault, AxisRequest, BridgeRequest};
 pub use calibration::{
     Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, IndexSearch, JointZero,
-    Phase, Refusal, StoredCalibration,
+    Mismatch, MotorConstant, MotorFindings, Phase, Refusal, StoredCalibration,
 };
 pub use chopper::{BrakeBudget, Chopper, GREATEST_BRAKE_DUTY};
 pub use configuration::{AxisConfiguration, AxisError, Direction};

@@ -31,7 +31,8 @@ use super::queues::HousekeepingEnds;
 use super::signals::{I2T_UNIT, Signals};
 use crate::hal::{AxisSample, Contacts, Hardware};
 use crate::leg::{
-    AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, PowerRequest, StoredCalibration,
+    AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Mismatch, MotorFindings,
+    PowerRequest, StoredCalibration,
 };
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, JointZero};
 use crate::real::max;
@@ -314,6 +315,9 @@ impl<const N: usize> Housekeeper<N> {
         match outcome {
             Outcome::Calibrated(calibration) => {
                 level.record(found(joint, calibration));
+                if let Some(findings) = calibration.findings() {
+                    level.record(motor(joint, &findings));
+                }
                 // A check at standstill changes nothing that is stored.
                 let before = self.stored.get(axis).copied().flatten();
                 self.take_temperature(axis, before, calibration);
@@ -330,7 +334,7 @@ impl<const N: usize> Housekeeper<N> {
             }
             Outcome::Refused(refusal) => {
                 let (result, number) = words::calibration(*refusal);
-                level.record(refused(joint, result, number));
+                level.record(refused(joint, result, number, refusal.mismatch()));
                 self.calibrating = None;
                 use CalibrationRefusal::{Load, Moved, Travel, Turning};
                 if matches!(refusal, Moved) {
@@ -354,7 +358,7 @@ impl<const N: usize> Housekeeper<N> {
                 self.set_certain(axis, certain);
             }
             Outcome::Interrupted => {
-                level.record(refused(joint, "interrupted", 0));
+                level.record(refused(joint, "interrupted", 0, None));
                 self.calibrating = None;
             }
             // The axis runs on without a zero. The counter may have wrapped.
@@ -474,7 +478,7 @@ impl<const N: usize> Housekeeper<N> {
         match calibrator {
             Some(Ok(_)) if is_contradicted || is_absolute && position.is_none() => {
                 self.calibrating = None;
-                level.record(refused(axis as u8 + 1, "absolute_encoder", 0));
+                level.record(refused(axis as u8 + 1, "absolute_encoder", 0, None));
             }
             Some(Ok(calibrator)) => {
                 self.calibrating = Some(axis);
@@ -573,10 +577,33 @@ fn found<const N: usize>(joint: u8, calibration: &Calibration) -> Record<N> {
         offset_turns: calibration.offset().turns(),
         zero_b,
         zero_c,
+        stated: f32::NAN,
+        found: f32::NAN,
     }
 }
 
-fn refused<const N: usize>(joint: u8, result: &'static str, number: u32) -> Record<N> {
+fn motor<const N: usize>(joint: u8, findings: &MotorFindings) -> Record<N> {
+    Record::CalibrationFindings {
+        joint,
+        flux_wb: findings.flux.0,
+        friction_a: findings.friction.0,
+        load_a: findings.load.0,
+        resistance_sigma_ohm: findings.resistance_sigma.0,
+        direct_sigma_h: findings.direct_sigma.0,
+        quadrature_sigma_h: findings.quadrature_sigma.0,
+        offset_sigma_turns: findings.offset_sigma_turns,
+        flux_sigma_wb: findings.flux_sigma.0,
+        friction_sigma_a: findings.friction_sigma.0,
+    }
+}
+
+fn refused<const N: usize>(
+    joint: u8,
+    result: &'static str,
+    number: u32,
+    mismatch: Option<Mismatch>,
+) -> Record<N> {
+    let Mismatch { stated, found } = mismatch.unwrap_or(Mismatch { stated: f32::NAN, found: f32::NAN });
     Record::Calibration {
         joint,
         result,
@@ -587,6 +614,8 @@ fn refused<const N: usize>(joint: u8, result: &'static str, number: u32) -> Reco
         offset_turns: f32::NAN,
         zero_b: f32::NAN,
         zero_c: f32::NAN,
+        stated,
+        found,
     }
 }
 

@@ -157,7 +157,7 @@ macro_rules! trace_records {
         certain: bool,
     }
     /// Result of a calibration.
-    Calibration "calibration n={=u32} joint={=u8} result={=str} number={=u32} resistance_ohm={=f32} direct_h={=f32} quadrature_h={=f32} offset_turns={=f32} zero_b={=f32} zero_c={=f32}" {
+    Calibration "calibration n={=u32} joint={=u8} result={=str} number={=u32} resistance_ohm={=f32} direct_h={=f32} quadrature_h={=f32} offset_turns={=f32} zero_b={=f32} zero_c={=f32} stated={=f32} found={=f32}" {
         /// Joint, from 1.
         joint: u8,
         /// Result: `done`, or see [`super::words::calibration`].
@@ -176,6 +176,35 @@ macro_rules! trace_records {
         zero_b: f32,
         /// Current-sensor offset of phase C, converter codes.
         zero_c: f32,
+    } + {
+        /// Value of the leg file or of the stored calibration that a refusal contradicts; NaN without one.
+        stated: f32,
+        /// Value found instead, in the same unit.
+        found: f32,
+    }
+    /// Further results of a calibration in motion. A sigma is one standard deviation of a value here or in
+    /// the record `calibration` before it.
+    CalibrationFindings "calibration_findings n={=u32} joint={=u8} flux_wb={=f32} friction_a={=f32} load_a={=f32} resistance_sigma_ohm={=f32} direct_sigma_h={=f32} quadrature_sigma_h={=f32} offset_sigma_turns={=f32} flux_sigma_wb={=f32} friction_sigma_a={=f32}" {
+        /// Joint, from 1.
+        joint: u8,
+        /// Flux linkage of the magnets; torque per ampere is 1.5 pole pairs times as much.
+        flux_wb: f32,
+        /// Quadrature current that friction takes at the calibration's speed.
+        friction_a: f32,
+        /// Quadrature current that the load takes on the path.
+        load_a: f32,
+        /// Uncertainty of the resistance.
+        resistance_sigma_ohm: f32,
+        /// Uncertainty of the inductance along the flux.
+        direct_sigma_h: f32,
+        /// Uncertainty of the inductance across the flux.
+        quadrature_sigma_h: f32,
+        /// Uncertainty of the offset.
+        offset_sigma_turns: f32,
+        /// Uncertainty of the flux linkage.
+        flux_sigma_wb: f32,
+        /// Uncertainty of the friction.
+        friction_sigma_a: f32,
     }
     /// Progress of the search.
     Progress "progress n={=u32} tick={=u32} iterations={=u32} evaluations={=u32} excess_chi2={=f32}" {

@@ -3,8 +3,8 @@
 //! No match has a wildcard: a new state needs a word to compile.
 
 use crate::leg::{
-    Activity, AxisFault, CalibrationRefusal, Cause, DriveState, FaultCode, IdentifyPhase, Parameter, Phase,
-    RefusalReason, Segment, Step,
+    Activity, AxisFault, CalibrationRefusal, Cause, DriveState, FaultCode, IdentifyPhase, MotorConstant,
+    Parameter, Phase, RefusalReason, Segment, Step,
 };
 
 /// Word for the drive state.
@@ -124,8 +124,8 @@ pub const fn unit(parameter: Parameter) -> &'static str {
     }
 }
 
-/// Word for the refusal of a calibration, and its number: a phase from 1, or pole
-/// pairs or counts that would fit.
+/// Word for the refusal of a calibration, and its number: a phase from 1, a stored constant (resistance 1,
+/// direct inductance 2, quadrature inductance 3), or pole pairs or counts that would fit.
 #[must_use]
 pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
     use CalibrationRefusal as Why;
@@ -142,18 +142,21 @@ pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
         Why::CurrentDirection => ("current_direction", 0),
         Why::PhaseImbalance => ("phase_imbalance", 0),
         Why::MotorConstants => ("motor_constants", 0),
-        Why::OtherMotor => ("other_motor", 0),
+        Why::OtherMotor(MotorConstant::Resistance, _) => ("other_motor", 1),
+        Why::OtherMotor(MotorConstant::DirectInductance, _) => ("other_motor", 2),
+        Why::OtherMotor(MotorConstant::QuadratureInductance, _) => ("other_motor", 3),
+        Why::Flux(_) => ("flux", 0),
         Why::TimeOut => ("time_out", 0),
         Why::NoCounts => ("no_counts", 0),
         Why::Direction => ("direction", 0),
-        Why::PolePairs(pairs) => ("pole_pairs", pairs as u32),
-        Why::CountsPerTurn(counts) => ("counts_per_turn", counts),
+        Why::PolePairs { found, .. } => ("pole_pairs", found as u32),
+        Why::CountsPerTurn { found, .. } => ("counts_per_turn", found),
         Why::Slipped => ("slipped", 0),
         Why::Load(percent) => ("load", percent as u32),
         Why::Travel => ("travel", 0),
         Why::NoIndex => ("no_index", 0),
         Why::IndexMoved => ("index_moved", 0),
-        Why::StoredOffset => ("stored_offset", 0),
+        Why::StoredOffset(_) => ("stored_offset", 0),
         Why::Moved => ("moved", 0),
     }
 }
@@ -189,7 +192,7 @@ mod tests {
             refusal(RefusalReason::Moving),
             axis_fault(AxisFault::NotANumber),
             cause(Cause::Payload { link: 1 }).0,
-            calibration(CalibrationRefusal::CountsPerTurn(4000)).0,
+            calibration(CalibrationRefusal::CountsPerTurn { stated: 8192, found: 4000 }).0,
         ];
         for word in words {
             assert!(!word.is_empty() && !word.contains([' ', '[']), "{word}");

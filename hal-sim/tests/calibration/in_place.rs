@@ -5,7 +5,8 @@
 use core::f64::consts::{PI, TAU};
 
 use hal_sim::drive::stand::{Geared, Load};
-use scarab::motor::{CalibrationSettings, Refusal};
+use scarab::motor::{Calibration, CalibrationSettings, Mismatch, Refusal};
+use scarab::real::sqrt;
 use scarab::units::{Ampere, KilogramMetreSquared, Volt};
 
 use crate::offset_error;
@@ -72,29 +73,83 @@ pub fn geared(seed: u64, load: Option<f64>) -> Trial {
     trial
 }
 
-/// Error of the offset, electrical degrees; furthest motion of the rotor and its place at the end, turns.
-fn outcome(seed: u64) -> [f64; 3] {
+/// Friction of a motor that turns its leg, in amperes of quadrature current.
+fn friction_a(trial: &Trial) -> f64 {
+    let Load::Geared(leg) = trial.load else { unreachable!() };
+    let pairs = f64::from(trial.axis.motor.pole_pairs);
+    let speed = TAU * f64::from(SETTINGS.turns_per_s) / pairs;
+    let at_joint = leg.coulomb + leg.viscous * speed / leg.ratio;
+    let torque = leg.rotor_coulomb + leg.rotor_viscous * speed + at_joint / leg.ratio;
+    torque / (1.5 * pairs * trial.axis.motor.flux)
+}
+
+/// Quantities with an uncertainty.
+const NAMES: [&str; 6] = ["R", "Ld", "Lq", "flux", "friction", "offset"];
+
+/// Error and standard deviation of each quantity: relative, of the offset in degrees, of the friction in A.
+fn errors(trial: &Trial, found: &Calibration, offset_degrees: f64) -> [[f64; 2]; 6] {
+    let findings = found.findings().expect("the motor has turned");
+    let motor = &trial.axis.motor;
+    let relative =
+        |value: f32, sigma: f32, truth: f64| [f64::from(value) / truth - 1.0, f64::from(sigma) / truth];
+    let resistance = motor.resistance + trial.axis.bridge.on_resistance;
+    [
+        relative(found.resistance().0, findings.resistance_sigma.0, resistance),
+        relative(found.direct_inductance().0, findings.direct_sigma.0, motor.inductance_d),
+        relative(found.quadrature_inductance().0, findings.quadrature_sigma.0, motor.inductance_q),
+        relative(findings.flux.0, findings.flux_sigma.0, motor.flux),
+        [f64::from(findings.friction.0) - friction_a(trial), findings.friction_sigma.0.into()],
+        [offset_degrees, 360.0 * f64::from(findings.offset_sigma_turns)],
+    ]
+}
+
+/// Furthest motion of the rotor and its place at the end, turns; errors of all quantities.
+fn outcome(seed: u64) -> ([f64; 2], [[f64; 2]; 6]) {
     let trial = geared(seed, None);
     let (mut stand, result, furthest) = trial.run(seed);
     let found = result.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{trial:?}"));
     let end = (stand.rotor().angle - trial.angle) / TAU;
-    [offset_error(&mut stand, &trial, &found, seed), furthest, end]
+    let offset = offset_error(&mut stand, &trial, &found, seed);
+    ([furthest, end], errors(&trial, &found, offset))
 }
 
 fn calibrates(seeds: core::ops::RangeInclusive<u64>) {
-    let mut worst = [0.0_f64; 3];
+    let legs = seeds.clone().count() as f64;
+    let (mut worst, mut worst_errors) = ([0.0_f64; 2], [0.0_f64; 6]);
+    let (mut squares, mut within) = ([[0.0; 2]; 6], [0.0; 6]);
     for seed in seeds {
-        let found = outcome(seed);
-        println!(
-            "{seed:>3}  offset {:+.2} degrees  travel {:.3} turns  end {:+.4} turns",
-            found[0], found[1], found[2]
-        );
-        for (worst, found) in worst.iter_mut().zip(found) {
+        let (travel, errors) = outcome(seed);
+        println!("{seed:>3}  travel {:.3} turns  end {:+.4} turns", travel[0], travel[1]);
+        for (index, [error, sigma]) in errors.into_iter().enumerate() {
+            println!("     {:<8} {error:+.4} sigma {sigma:.4}", NAMES[index]);
+            worst_errors[index] = worst_errors[index].max(error.abs());
+            within[index] += f64::from(u8::from(error.abs() < 2.0 * sigma)) / legs;
+            squares[index][0] += error * error / legs;
+            squares[index][1] += sigma * sigma / legs;
+        }
+        for (worst, found) in worst.iter_mut().zip(travel) {
             *worst = worst.max(found.abs());
         }
     }
-    println!("worst offset {:.2} degrees, travel {:.3} turns, end {:.4} turns", worst[0], worst[1], worst[2]);
-    assert!(worst[0] < 0.6 && worst[1] < 1.25 && worst[2] < 0.02, "{worst:?}");
+    println!("worst travel {:.3} turns, end {:.4} turns", worst[0], worst[1]);
+    for (index, name) in NAMES.into_iter().enumerate() {
+        let [error, sigma] = squares[index].map(sqrt);
+        println!(
+            "{name:<8} worst {:.4}, rms {error:.4}, sigma rms {sigma:.4}, {:.0} % within 2 sigma",
+            worst_errors[index],
+            100.0 * within[index]
+        );
+    }
+    assert!(worst[0] < 1.25 && worst[1] < 0.02, "{worst:?}");
+    // Half as much again as the worst of 200 legs.
+    let limits = [0.007, 0.02, 0.03, 0.02, 0.4, 0.5];
+    assert!(worst_errors.iter().zip(limits).all(|(worst, limit)| *worst < limit), "{worst_errors:?}");
+    // With two, three and four repetitions Student's distribution has 70, 82 and 86 % within 2 sigma. Sigma
+    // does not include the gains of the shunts, 0.3 % off: they turn a current by up to 0.1 degrees. The
+    // offset's reference is measured with these shunts too.
+    assert!(within.iter().all(|share| *share > 0.4), "{within:?}");
+    // Nor is sigma too large to say anything.
+    assert!(squares.iter().all(|[error, sigma]| *sigma < 4.0 * error), "{squares:?}");
 }
 
 #[test]
@@ -107,6 +162,23 @@ fn a_motor_is_calibrated_with_gear_and_leg_in_poses_that_its_current_holds() {
 #[ignore = "a minute"]
 fn motors_of_200_legs_are_calibrated_in_place() {
     calibrates(1..=200);
+}
+
+#[test]
+fn a_wrong_torque_per_ampere_is_refused_with_both_numbers() {
+    for seed in 1..=5 {
+        for share in [1.4, 0.72] {
+            let mut trial = geared(seed, None);
+            let flux = trial.axis.motor.flux;
+            trial.configuration.flux.0 = (share * flux) as f32;
+            let (_, result, _) = trial.run(seed);
+            let Err(Refusal::Flux(Mismatch { stated, found })) = result else {
+                panic!("seed {seed}: {share}: {result:?}")
+            };
+            assert_eq!(stated, trial.configuration.flux.0);
+            assert!((f64::from(found) / flux - 1.0).abs() < 0.02, "seed {seed}: {share}: {found} {flux}");
+        }
+    }
 }
 
 #[test]

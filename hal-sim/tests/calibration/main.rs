@@ -13,7 +13,9 @@ use core::f64::consts::TAU;
 use hal_sim::drive::description::EncoderWiring;
 use hal_sim::drive::stand::{Load, Stand};
 use scarab::hal::AxisCommand;
-use scarab::motor::{Axis, AxisRequest, Calibration, Direction, Phase, Refusal, StoredCalibration};
+use scarab::motor::{
+    Axis, AxisRequest, Calibration, Direction, Mismatch, MotorConstant, Phase, Refusal, StoredCalibration,
+};
 use scarab::units::Ampere;
 use trial::Trial;
 
@@ -125,7 +127,7 @@ fn apply_wiring_fault(trial: &mut Trial, seed: u64) -> Refusal {
         11 => {
             let pairs = if trial.configuration.pole_pairs == 7 { 8 } else { 7 };
             trial.axis.motor.pole_pairs = u32::from(pairs);
-            Refusal::PolePairs(pairs)
+            Refusal::PolePairs { stated: trial.configuration.pole_pairs, found: pairs }
         }
         // One phase reads 40 % too much: resistances differ by 18 %, currents are rotated by 13 degrees.
         12 => {
@@ -214,7 +216,18 @@ fn another_inductance_is_detected_at_the_next_power_up() {
             let motor = &mut trial.axis.motor;
             *if across { &mut motor.inductance_q } else { &mut motor.inductance_d } *= share;
             let (_, result, _) = trial.run_stored(seed, stored);
-            assert_eq!(result.err(), seen.then_some(Refusal::OtherMotor), "seed {seed}: {share}");
+            match result {
+                Err(Refusal::OtherMotor(constant, Mismatch { stated, found })) => {
+                    let expected = [MotorConstant::DirectInductance, MotorConstant::QuadratureInductance];
+                    assert_eq!(
+                        (constant, seen),
+                        (expected[usize::from(across)], true),
+                        "seed {seed}: {share}"
+                    );
+                    assert!((f64::from(found / stated) / share - 1.0).abs() < 0.04, "seed {seed}: {share}");
+                }
+                other => assert!(other.is_ok() && !seen, "seed {seed}: {share}: {other:?}"),
+            }
         }
     }
 }
@@ -226,7 +239,14 @@ fn an_encoder_turned_on_its_shaft_is_detected_at_power_up() {
         let stored = stored(&trial, seed);
         trial.axis.motor.electrical_zero += f64::to_radians(degrees);
         let (_, result, _) = trial.run_stored(seed, stored);
-        assert_eq!(result.err(), seen.then_some(Refusal::StoredOffset), "{degrees} degrees");
+        match result {
+            Err(Refusal::StoredOffset(Mismatch { stated, found })) => {
+                let moved = f64::from(found - stated) * 360.0;
+                let apart = (moved - degrees + 180.0).rem_euclid(360.0) - 180.0;
+                assert!(seen && stated == stored.offset.turns() && apart.abs() < 1.5, "{degrees}: {moved}");
+            }
+            other => assert!(other.is_ok() && !seen, "{degrees} degrees: {other:?}"),
+        }
     }
 }
 
@@ -255,10 +275,12 @@ fn wrong_counts_per_turn_are_refused() {
         let (_, result, _) = trial.run(seed);
         let true_counts = trial.axis.counter.counts;
         let found = match result {
-            Err(Refusal::CountsPerTurn(found)) => found,
+            Err(Refusal::CountsPerTurn { found, .. }) => found,
             // Equal counts per electrical turn and only one index pulse: other pole pairs cannot be
             // distinguished.
-            Err(Refusal::PolePairs(pairs)) if !near => 6000 * trial.axis.motor.pole_pairs / u32::from(pairs),
+            Err(Refusal::PolePairs { found: pairs, .. }) if !near => {
+                6000 * trial.axis.motor.pole_pairs / u32::from(pairs)
+            }
             other => panic!("seed {seed}: {other:?}"),
         };
         // Friction causes a lag of an eighth of an electrical turn; the line through many swings

@@ -1,6 +1,6 @@
 //! Describes rejections and faults of the firmware's axes, with the key of the leg file that corrects them.
 
-use scarab::motor::{AxisError, AxisFault, Phase, Refusal};
+use scarab::motor::{AxisError, AxisFault, Mismatch, MotorConstant, Phase, Refusal};
 
 /// Reason why the firmware rejects an axis configuration.
 #[must_use]
@@ -51,16 +51,29 @@ pub fn refusal(reason: Refusal) -> String {
         Refusal::MotorConstants => {
             "resistance or inductance is out of range, or too large for 9.5 V at the calibration's current (`motor.resistance_ohm`, `motor.inductance_d_uh`, `motor.inductance_q_uh`)".into()
         }
-        Refusal::OtherMotor => {
-            "the resistance is more than 40 % or an inductance more than 20 % from the stored one: another motor".into()
+        Refusal::OtherMotor(constant, Mismatch { stated, found }) => {
+            let (constant, limit) = match constant {
+                MotorConstant::Resistance => ("resistance (ohm)", 40),
+                MotorConstant::DirectInductance => ("inductance along the flux (H)", 20),
+                MotorConstant::QuadratureInductance => ("inductance across the flux (H)", 20),
+            };
+            format!("the {constant} is {found:.3e}, stored {stated:.3e}, limit {limit} %: another motor")
         }
+        Refusal::Flux(Mismatch { stated, found }) => format!(
+            "the back-EMF shows a flux linkage of {found:.3e} V s, stated {stated:.3e}, limit 25 %: check \
+             `torque_per_ampere`, `motor.pole_pairs` and `encoder.ratio`"
+        ),
         Refusal::TimeOut => "the current does not settle".into(),
         Refusal::NoCounts => "the field turned, but the counter did not: check the encoder, or whether the rotor is blocked".into(),
         Refusal::Direction => {
             "the counter runs against the field: two motor leads or the encoder's A and B are exchanged".into()
         }
-        Refusal::PolePairs(pairs) => format!("the counts fit {pairs} pole pairs (`motor.pole_pairs`)"),
-        Refusal::CountsPerTurn(counts) => format!("the counts fit {counts} per turn (`encoder.counts`)"),
+        Refusal::PolePairs { stated, found } => {
+            format!("the counts fit {found} pole pairs, stated {stated} (`motor.pole_pairs`)")
+        }
+        Refusal::CountsPerTurn { stated, found } => {
+            format!("the counts fit {found} per turn, stated {stated} (`encoder.counts`)")
+        }
         Refusal::Slipped => {
             "the rotor did not follow the field evenly: load, friction or cogging (`motor.cogging_nm`) need more than half of the holding torque".into()
         }
@@ -74,7 +87,9 @@ pub fn refusal(reason: Refusal) -> String {
         }
         Refusal::NoIndex => "no index pulse within a whole turn".into(),
         Refusal::IndexMoved => "the index pulse came at different positions of the turn".into(),
-        Refusal::StoredOffset => "the rotor position contradicts the stored offset".into(),
+        Refusal::StoredOffset(Mismatch { stated, found }) => {
+            format!("the offset is {found:.4} electrical turns, stored {stated:.4}, limit 5 degrees")
+        }
         Refusal::Moved => {
             "the rotor moved while the field lay along its flux: the stored offset or the index is wrong, a phase \
              is open, or the joint was pushed; the next calibration turns the motor".into()

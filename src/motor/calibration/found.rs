@@ -2,7 +2,7 @@
 
 use super::inductance::Inductances;
 use crate::motor::{AbsoluteAngle, AxisConfiguration, CountScale, Direction, ElectricalAngle};
-use crate::units::{Henry, Ohm};
+use crate::units::{Ampere, Henry, Ohm, Weber};
 
 /// Part of a configuration on which the angle offset depends; with another setting the offset is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +37,31 @@ pub struct JointZero {
     pub joint: AbsoluteAngle,
 }
 
+/// Values that a calibration finds while the motor turns, and the uncertainty of all values: one standard
+/// deviation, by the scatter of repeated measurements. Gain errors of the shunts and of the bus divider are
+/// common to all repetitions, so they are not included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorFindings {
+    /// Flux linkage of the magnets.
+    pub flux: Weber,
+    /// Quadrature current that friction takes at the calibration's speed.
+    pub friction: Ampere,
+    /// Quadrature current that the load takes on the path, positive against the field's forward direction.
+    pub load: Ampere,
+    /// Uncertainty of the resistance.
+    pub resistance_sigma: Ohm,
+    /// Uncertainty of the inductance along the flux.
+    pub direct_sigma: Henry,
+    /// Uncertainty of the inductance across the flux.
+    pub quadrature_sigma: Henry,
+    /// Uncertainty of the offset, electrical turns.
+    pub offset_sigma_turns: f32,
+    /// Uncertainty of the flux linkage.
+    pub flux_sigma: Weber,
+    /// Uncertainty of the friction.
+    pub friction_sigma: Ampere,
+}
+
 /// Results of a passed calibration. Only a [`super::Calibrator`] can create it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
@@ -49,8 +74,8 @@ pub struct Calibration {
     pub(super) counter: u16,
     pub(super) position: i32,
     pub(super) indexed: bool,
-    /// The motor has turned, so the offset was measured.
-    pub(super) proven: bool,
+    /// `None` where the motor has not turned, so that the offset is the stored one.
+    pub(super) findings: Option<MotorFindings>,
 }
 
 /// Part of a calibration stored while the power is off: positions relative to the index.
@@ -89,7 +114,13 @@ impl Calibration {
     /// [`Axis`](crate::motor::Axis) limits the first motion.
     #[must_use]
     pub fn is_proven(&self) -> bool {
-        self.proven
+        self.findings.is_some()
+    }
+
+    /// Flux, friction and uncertainties; `None` where the motor has not turned.
+    #[must_use]
+    pub fn findings(&self) -> Option<MotorFindings> {
+        self.findings
     }
 
     /// Current-sensor offsets: shunt codes without current.

@@ -31,7 +31,7 @@ use super::hold::Hold;
 use super::{Outcome, Reading, Refusal, STRONG_SHARE};
 use crate::hal::CURRENT_RATE_HZ;
 use crate::motor::{ElectricalAngle, Rotation};
-use crate::real::min;
+use crate::real::{abs, min};
 use crate::units::{Henry, Ohm, Volt};
 use core::f32::consts::FRAC_1_SQRT_2;
 
@@ -52,6 +52,8 @@ const RISE_SHARE: f32 = 1.0 / 1024.0;
 pub(super) struct Inductances {
     pub direct: Henry,
     pub quadrature: Henry,
+    /// Part of the inverses' swing that contradicts the rotor's angle, over the inverses' mean.
+    pub residual: f32,
 }
 
 /// Inductances seen along the held current, across it, and at 45 degrees.
@@ -70,8 +72,13 @@ impl SeenInductances {
         let [along, across, between] = self.0.map(|inductance| 1.0 / inductance.0);
         let Rotation { sine, cosine } = ahead.plus(ahead).rotation();
         let mean = 0.5 * (along + across);
-        let swing = 0.5 * (along - across) * cosine + (mean - between) * sine;
-        Inductances { direct: Henry(1.0 / (mean + swing)), quadrature: Henry(1.0 / (mean - swing)) }
+        let [half, other] = [0.5 * (along - across), mean - between];
+        let swing = half * cosine + other * sine;
+        Inductances {
+            direct: Henry(1.0 / (mean + swing)),
+            quadrature: Henry(1.0 / (mean - swing)),
+            residual: abs(half * sine - other * cosine) / mean,
+        }
     }
 }
 
@@ -180,6 +187,7 @@ impl InductanceStage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::f32::consts::TAU;
 
     /// Inductance found for the swing of a known resistance and inductance at an amplitude.
     fn found(resistance: f64, inductance: f64, amplitude: f64) -> Result<Henry, Refusal> {
@@ -221,6 +229,21 @@ mod tests {
             assert!((found.direct.0 / direct - 1.0).abs() < 1e-4, "{degrees}: {found:?}");
             assert!((found.quadrature.0 / quadrature - 1.0).abs() < 1e-4, "{degrees}: {found:?}");
         }
+    }
+
+    #[test]
+    fn a_measurement_that_contradicts_the_angle_shows_in_the_residual() {
+        let angle = ElectricalAngle::from_turns(0.1);
+        let seen = |error: f32| {
+            // Inverses 1.0 and 0.8 along and across the flux.
+            let inverse = |turns: f32| 0.9 + 0.1 * crate::real::sin_cos(2.0 * TAU * (turns + 0.1)).1;
+            let [along, across, between] = [0.0, 0.25, 0.125].map(|turns| Henry(1.0 / inverse(turns)));
+            SeenInductances([along, across, Henry(between.0 * (1.0 + error))])
+        };
+        let found = |error| seen(error).along_flux(angle).residual;
+        assert!(found(0.0) < 1e-6, "{}", found(0.0));
+        // The inverse at 45 degrees, 0.805, falls by 1 %; its part is cos 72 degrees, over the mean of 0.9.
+        assert!((found(0.01) - 0.0028).abs() < 1e-4, "{}", found(0.01));
     }
 
     #[test]

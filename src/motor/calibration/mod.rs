@@ -4,7 +4,7 @@
 //! current-sensor offsets (bridge off) -> resistance at C, B, A: wiring of phases and shunts
 //!    -> inductances at A
 //!    -> scan, the field turns slowly forwards and back: counts, direction, pole pairs, index
-//!    -> refinement, the rotor turns under load with both signs of the direct current: offset
+//!    -> refinement, the rotor turns under load with both signs of the direct current: offset, flux, friction
 //!    -> Calibration
 //! ```
 //!
@@ -35,6 +35,7 @@
 //! | encoder without counts, rotor blocked | travel | [`Refusal::NoCounts`] |
 //! | pole pairs | counts per electrical turn | [`Refusal::PolePairs`] |
 //! | counts per turn | counts per electrical turn | [`Refusal::CountsPerTurn`] |
+//! | torque per ampere | back-EMF while the rotor turns | [`Refusal::Flux`] |
 //! | no index, or at several positions | index | [`Refusal::NoIndex`], [`Refusal::IndexMoved`] |
 //! | load, friction or cogging too large | travel and deviation, both ways | [`Refusal::Slipped`] |
 //! | load too large | torque while the rotor turns | [`Refusal::Load`] |
@@ -61,7 +62,7 @@
 //! The gear and the leg may stay on: a load of up to 0.6 of the torque that the current holds is permitted.
 //! The rotor returns to where it began; then the current falls and the leg with it, unless friction holds it.
 //!
-//! Known limits: gain errors of shunts and of the bus divider scale R and L.
+//! Known limits: gain errors of shunts and of the bus divider scale R, L and flux.
 
 mod current_offsets;
 mod field;
@@ -70,6 +71,7 @@ mod hold;
 mod inductance;
 mod refine;
 mod refusal;
+mod repeated;
 mod resistance;
 mod scan;
 mod search;
@@ -82,14 +84,14 @@ use super::{
 };
 use crate::hal::{AxisCommand, AxisSample};
 use crate::real::{min, sqrt};
-use crate::units::{Ampere, Hertz, KilogramMetreSquared, Ohm, Volt, Weber};
+use crate::units::{Ampere, Hertz, KilogramMetreSquared, Volt, Weber};
 use current_offsets::CurrentOffsets;
-pub use found::{Calibration, EncoderSetting, JointZero, StoredCalibration};
+pub use found::{Calibration, EncoderSetting, JointZero, MotorFindings, StoredCalibration};
 use hold::Hold;
 use inductance::{InductanceStage, Inductances, SeenInductances};
 use refine::{QUADRATURE_SHARE, Refine, Refined};
-pub use refusal::{Phase, Refusal};
-use resistance::ResistanceStage;
+pub use refusal::{Mismatch, MotorConstant, Phase, Refusal};
+use resistance::{ResistanceStage, VoltageDrop};
 pub use scan::ALIGNMENT_TURNS;
 use scan::Scan;
 pub use search::IndexSearch;
@@ -155,6 +157,11 @@ impl Bench {
     /// Assumed electrical angle after so many counts.
     fn angle(&self, way: i32) -> ElectricalAngle {
         self.scale.angle(self.scale.within_turn(way))
+    }
+
+    /// Refusal where so many counts per turn fit instead of the configured ones.
+    fn other_counts(&self, found: u32) -> Refusal {
+        Refusal::CountsPerTurn { stated: self.scale.counts_per_turn().unsigned_abs(), found }
     }
 }
 
@@ -238,7 +245,7 @@ pub struct Calibrator {
     stands_at: Option<i32>,
     current_offsets: [f32; 2],
     square_a2: f32,
-    resistance: Ohm,
+    drop: VoltageDrop,
     seen: SeenInductances,
     /// Travel at which the inductances were measured along phase A.
     seen_at: i32,
@@ -289,7 +296,7 @@ impl Calibrator {
             stands_at: None,
             current_offsets: [0.0; 2],
             square_a2: 0.0,
-            resistance: Ohm::ZERO,
+            drop: VoltageDrop::default(),
             seen: SeenInductances::default(),
             seen_at: 0,
             track: Track::default(),
@@ -418,11 +425,10 @@ impl Calibrator {
                 let reading = reading(current_offsets).map_err(Err)?;
                 match stage.tick(&reading).map_err(Err)? {
                     Outcome::Running(voltage) => Ok(reading.command(voltage)),
-                    Outcome::Passed((resistance, hold)) => {
+                    Outcome::Passed((drop, hold)) => {
                         let command = reading.command(hold.voltage());
-                        self.resistance = resistance;
-                        self.agrees(|stored| (stored.resistance.0, resistance.0), RESISTANCE_SHARE)
-                            .map_err(Err)?;
+                        self.drop = drop;
+                        self.agrees(MotorConstant::Resistance, drop.resistance.0).map_err(Err)?;
                         self.stage = Stage::Inductance(InductanceStage::new(hold));
                         Ok(command)
                     }
@@ -430,7 +436,7 @@ impl Calibrator {
             }
             Stage::Inductance(stage) => {
                 let reading = reading(current_offsets).map_err(Err)?;
-                match stage.tick(&reading, self.resistance).map_err(Err)? {
+                match stage.tick(&reading, self.drop.resistance).map_err(Err)? {
                     Outcome::Running(voltage) => Ok(reading.command(voltage)),
                     Outcome::Passed((seen, hold)) => {
                         let command = reading.command(hold.voltage());
@@ -459,7 +465,7 @@ impl Calibrator {
             Stage::Refine(stage) => {
                 let reading = reading(current_offsets).map_err(Err)?;
                 let seen = (&self.seen, self.seen_at);
-                match stage.tick(&reading, seen).map_err(Err)? {
+                match stage.tick(&reading, seen, &self.drop).map_err(Err)? {
                     Outcome::Running(voltage) => Ok(reading.command(voltage)),
                     Outcome::Passed(found) => Err(self.passed(&found, sample)),
                 }
@@ -467,13 +473,16 @@ impl Calibrator {
         }
     }
 
-    /// Ends with [`Refusal::OtherMotor`] where stored and measured value differ by more than this share of
-    /// the stored one.
-    fn agrees(&self, values: impl Fn(&StoredCalibration) -> (f32, f32), share: f32) -> Result<(), Refusal> {
-        match self.stored.as_ref().map(values) {
-            Some((stored, found)) if !((found - stored).abs() <= share * stored) => Err(Refusal::OtherMotor),
-            _ => Ok(()),
-        }
+    /// Ends with [`Refusal::OtherMotor`] where the measured value contradicts the stored one.
+    fn agrees(&self, constant: MotorConstant, found: f32) -> Result<(), Refusal> {
+        let Some(stored) = &self.stored else { return Ok(()) };
+        let (share, stored) = match constant {
+            MotorConstant::Resistance => (RESISTANCE_SHARE, stored.resistance.0),
+            MotorConstant::DirectInductance => (INDUCTANCE_SHARE, stored.direct_inductance.0),
+            MotorConstant::QuadratureInductance => (INDUCTANCE_SHARE, stored.quadrature_inductance.0),
+        };
+        let mismatch = Mismatch::beyond(share, stored, found);
+        mismatch.map_or(Ok(()), |mismatch| Err(Refusal::OtherMotor(constant, mismatch)))
     }
 
     /// Resistance stage along the phases, or along the known flux of a rotor that stands still.
@@ -488,14 +497,14 @@ impl Calibrator {
     fn at_standstill(&self) -> Option<Refined> {
         let offset = self.offset_at_standstill()?;
         let ahead = self.bench.angle(self.stands_at?).minus(self.bench.angle(self.seen_at));
-        Some(Refined { offset, inductances: self.seen.along_flux(ahead) })
+        Some(Refined { offset, inductances: self.seen.along_flux(ahead), findings: None })
     }
 
     fn scan(&self, hold: Hold) -> Result<Stage, Refusal> {
         // The smaller inductance: where the frame lies in the rotor is not known yet.
         let least = self.seen.least();
         let motor = MotorConstants {
-            resistance: self.resistance,
+            resistance: self.drop.resistance,
             direct_inductance: least,
             quadrature_inductance: least,
             flux: Weber::ZERO,
@@ -510,9 +519,13 @@ impl Calibrator {
         if self.track.index_distance.is_some() {
             return Err(Refusal::IndexMoved);
         }
-        let Inductances { direct, quadrature } = found.inductances;
-        self.agrees(|stored| (stored.direct_inductance.0, direct.0), INDUCTANCE_SHARE)?;
-        self.agrees(|stored| (stored.quadrature_inductance.0, quadrature.0), INDUCTANCE_SHARE)?;
+        let Inductances { direct, quadrature, .. } = found.inductances;
+        self.agrees(MotorConstant::DirectInductance, direct.0)?;
+        self.agrees(MotorConstant::QuadratureInductance, quadrature.0)?;
+        let flux = found.findings.map_or(self.bench.flux, |found| found.flux);
+        if let Some(mismatch) = Mismatch::beyond(FLUX_SHARE, self.bench.flux.0, flux.0) {
+            return Err(Refusal::Flux(mismatch));
+        }
         // Rotor positions count from the index, if there is one.
         let index = self.track.index.unwrap_or(0);
         let measured = found.offset.plus(self.bench.angle(index)).minus(self.bench.angle(0));
@@ -520,7 +533,8 @@ impl Calibrator {
             Some(stored)
                 if measured.since(stored.offset).abs() > GREATEST_STORED_ERROR + self.bench.encoder_error =>
             {
-                return Err(Refusal::StoredOffset);
+                let (stated, found) = (stored.offset.turns(), measured.turns());
+                return Err(Refusal::StoredOffset(Mismatch { stated, found }));
             }
             Some(stored) => stored.offset,
             None => measured,
@@ -528,13 +542,13 @@ impl Calibrator {
         Ok(Calibration {
             encoder: self.bench.encoder,
             current_offsets: self.current_offsets,
-            resistance: self.resistance,
+            resistance: self.drop.resistance,
             inductances: found.inductances,
             offset,
             counter: sample.encoder_count,
             position: self.bench.scale.within_turn(self.track.way.wrapping_sub(index)),
             indexed: self.track.index.is_some(),
-            proven: self.stands_at.is_none(),
+            findings: found.findings,
         })
     }
 }
@@ -566,6 +580,8 @@ const RESISTANCE_SHARE: f32 = 0.4;
 /// legs there), so 6 % together. Magnets 100 K warmer have 12 % less flux, and so saturate the iron less: at
 /// most 12 % of inductance. Together 18 %, and a margin.
 const INDUCTANCE_SHARE: f32 = 0.2;
+/// The flux of a data sheet is up to 10 % off, magnets 100 K warmer have 12 % less, and a margin.
+const FLUX_SHARE: f32 = 0.25;
 /// The field turns slowly. A loop this fast holds the current and tolerates an inductance of half the
 /// measured one.
 const SCAN_BANDWIDTH: Hertz = Hertz(300.0);

@@ -10,7 +10,7 @@
 //! tan e  = (i_q(-a) - i_q(+a)) / (2 a)                 30 A tan e: 1.05 A for 2 degrees at 15 A
 //!
 //! i_q    = work over the path / angle                  the sum of i_q times counts, over the counts
-//! saliency: i_q counts (1 + (L_d - L_q) i_d / flux) times
+//! saliency: i_q counts (1 + (L_d - L_q) i_d / psi) times, psi as measured
 //! load = mean of i_q forwards and backwards,   friction = half of their difference
 //! ```
 //!
@@ -24,6 +24,21 @@
 //!
 //! The offset is the mean of both ends. Each path begins with a part in which nothing is measured, so that
 //! the gear has passed its backlash.
+//!
+//! **Flux linkage.** The same motions show the back-EMF, w (psi + L_d i_d), in the voltage across the flux:
+//!
+//! ```text
+//! e   = v_q - R i_q - u_q                              u: dead time and diodes, by the signs of the currents
+//! psi = sum of e / (f_PWM angle)                       Wb, whatever the speed does in between
+//! ```
+//!
+//! The mean over +a and -a removes L_d i_d and an error of the angle. The mean over both directions removes
+//! the rest of R i_q. At 6 electrical turns per second and 2 mWb e is 75 mV, and u_q up to 100 mV. So u is
+//! taken from the resistance's measurement, as the voltage that does not grow with the current. v_q is the
+//! current loop's integral: it is the voltage, delayed as much as L delays the current.
+//!
+//! **Friction.** Forwards the measured path lies further on than backwards. The load's growth from one end of
+//! the path to the other removes what the load adds to the friction by that.
 //!
 //! Position loop: PI on the angle, damped by the speed. With the stated inertia J its poles lie at -1.42 w_n
 //! and, with a damping of 0.69, at 0.42 w_n:
@@ -39,13 +54,16 @@
 //! Dynamics of AC Drives, 1996. Limit: friction must not change while the direct current is reversed.
 
 use super::field::FieldWay;
+use super::found::MotorFindings;
 use super::inductance::{Inductances, SeenInductances};
+use super::repeated::Repeated;
+use super::resistance::VoltageDrop;
 use super::scan::ScanResult;
 use super::{Bench, FieldCurrent, Outcome, Reading, Refusal, STRONG_SHARE};
 use crate::hal::CURRENT_RATE_HZ;
 use crate::motor::{ElectricalAngle, Rotating, Rotation, SpeedTracker};
-use crate::real::{abs, atan2, clamp, min, sign, sqrt};
-use crate::units::Ampere;
+use crate::real::{abs, atan2, clamp, max, min, sign, sqrt};
+use crate::units::{Ampere, Henry, Weber};
 use core::f32::consts::TAU;
 
 const TICK_S: f32 = 1.0 / CURRENT_RATE_HZ as f32;
@@ -73,20 +91,115 @@ const GREATEST_ERROR: f32 = 0.75;
 const GREATEST_LOADS: [f32; 2] = [0.63, 0.9];
 /// Greatest distance from home at the end, electrical turns.
 const GREATEST_DISTANCE: f32 = 0.2;
+/// Least distance of both paths that shows the load's growth, electrical turns.
+const LEAST_APART: f32 = 1.0;
 /// Greatest difference of the offsets at both ends, electrical turns, beside the encoder's own errors.
 const GREATEST_DRIFT: f32 = 6.0 / 360.0;
 
-/// Work of the quadrature current over a path: sums of ampere times counts, and of counts.
+/// Sums over the path of one motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Work {
+    /// Work of the quadrature current, ampere times counts.
     sum: f32,
     counts: i32,
+    /// Back-EMF of all ticks, V.
+    emf: f32,
+    /// Work and counts without the run-out, which returns kinetic energy.
+    steady_sum: f32,
+    steady_counts: i32,
+}
+
+/// Results of one motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Motion {
+    /// Mean quadrature current over the path, and without its run-out, A.
+    mean: f32,
+    steady: f32,
+    /// Back-EMF over time by the angle, Wb.
+    linkage: f32,
 }
 
 impl Work {
-    /// Mean current; zero where the rotor did not move.
-    fn mean(&self) -> f32 {
-        if self.counts == 0 { 0.0 } else { self.sum / self.counts as f32 }
+    /// Evaluates the motion; zero where the rotor did not move.
+    #[inline(never)]
+    fn motion(&self, bench: &Bench) -> Motion {
+        if self.counts == 0 || self.steady_counts == 0 {
+            return Motion::default();
+        }
+        Motion {
+            mean: self.sum / self.counts as f32,
+            steady: self.steady_sum / self.steady_counts as f32,
+            linkage: self.emf * TICK_S / (TAU * bench.electrical(self.counts)),
+        }
+    }
+}
+
+/// Measurements of one round.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Round {
+    /// Error of the assumed offset, electrical turns.
+    error: f32,
+    /// Half of the difference of that error between forward and backward motions. Weighted by counts, the
+    /// rotor is half a count behind its mean position, so the difference has a constant part.
+    one_way: f32,
+    /// Flux linkage forwards and backwards, Wb.
+    flux: [f32; 2],
+    /// Friction with a positive and with a negative direct current, A.
+    friction: [f32; 2],
+    load: f32,
+}
+
+impl Round {
+    /// Evaluates the motions of a round with this direct current. `difference_h` is L_d - L_q.
+    fn of(works: &[[Work; 2]; 2], bench: &Bench, direct: f32, difference_h: f32) -> Self {
+        let [plus, minus] = works.each_ref().map(|[forth, back]| [forth.motion(bench), back.motion(bench)]);
+        let flux = [0.5 * (plus[0].linkage + minus[0].linkage), 0.5 * (plus[1].linkage + minus[1].linkage)];
+        // A flux this wrong is refused at the end.
+        let saliency = difference_h * direct / max(0.5 * (flux[0] + flux[1]), 0.5 * bench.flux.0);
+        let (with_plus, with_minus) = (1.0 + saliency, 1.0 - saliency);
+        let [forth, back] =
+            [0, 1].map(|way: usize| [with_plus * plus[way].mean, with_minus * minus[way].mean]);
+        let rises = [forth[1] - forth[0], back[1] - back[0]];
+        let error = atan2(0.25 * (rises[0] + rises[1]), direct) / TAU;
+        // An error of the angle makes the same torque with more current.
+        let Rotation { cosine, .. } = ElectricalAngle::from_turns(error).rotation();
+        let apart =
+            |[forth, back]: [Motion; 2], share: f32| 0.5 * cosine * share * (forth.steady - back.steady);
+        Self {
+            error,
+            one_way: 0.25 * (rises[0] - rises[1]) / (TAU * direct),
+            flux,
+            friction: [apart(plus, with_plus), apart(minus, with_minus)],
+            load: 0.25 * cosine * (forth[0] + forth[1] + back[0] + back[1]),
+        }
+    }
+}
+
+/// Results of the rounds at both ends of the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct BothEnds {
+    flux: Repeated,
+    friction: Repeated,
+    load: f32,
+    /// Electrical turns.
+    offset_sigma: f32,
+}
+
+impl BothEnds {
+    /// Evaluates two rounds `apart` electrical turns from each other. The path that is measured forwards lies
+    /// `ahead` electrical turns of the one measured backwards.
+    fn of([begin, end]: [Round; 2], apart: f32, ahead: f32) -> Self {
+        let growth = if abs(apart) < LEAST_APART { 0.0 } else { (end.load - begin.load) / apart };
+        let four = |[one, two]: [f32; 2], [three, four]: [f32; 2]| Repeated::of(&[one, two, three, four]);
+        let mut friction = four(begin.friction, end.friction);
+        friction.mean -= 0.5 * growth * ahead;
+        let ways = end.one_way - begin.one_way;
+        Self {
+            flux: four(begin.flux, end.flux),
+            friction,
+            load: 0.5 * (begin.load + end.load),
+            offset_sigma: sqrt((end.error * end.error + ways * ways) / 8.0),
+        }
     }
 }
 
@@ -122,12 +235,24 @@ const ROUNDS: [[Action; 7]; 3] =
     [round(Path::First, FIRST_SHARE), round(Path::First, 1.0), round(Path::Last, 1.0)];
 const ACTIONS_PER_ROUND: usize = 7;
 
+/// Run-in and run-out of a motion of this length, electrical turns.
+fn run_in(length: f32) -> f32 {
+    min(RUN_IN_TURNS, 0.25 * length)
+}
+
+/// Part of a motion in which the gear passes its backlash, electrical turns.
+fn approach(length: f32) -> f32 {
+    APPROACH_TURNS / (APPROACH_TURNS + PATH_TURNS) * length
+}
+
 /// Results of the refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Refined {
     /// Electrical angle at travel zero.
     pub offset: ElectricalAngle,
     pub inductances: Inductances,
+    /// `None` where the motor has not turned.
+    pub findings: Option<MotorFindings>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,6 +277,9 @@ pub(super) struct Refine {
     work: [[Work; 2]; 2],
     /// Quadrature current that friction takes.
     friction: f32,
+    /// Measurements of the preceding round.
+    round: Round,
+    both_ends: BothEnds,
 }
 
 impl Refine {
@@ -181,6 +309,8 @@ impl Refine {
             way: scan.way,
             work: [[Work::default(); 2]; 2],
             friction: STRONG_SHARE * holding * scan.lag.rotation().sine,
+            round: Round::default(),
+            both_ends: BothEnds::default(),
         }
     }
 
@@ -198,10 +328,14 @@ impl Refine {
         ROUNDS.as_flattened().get(self.action).copied()
     }
 
+    /// Length of a motion on a path, electrical turns.
+    fn length(&self, bench: &Bench) -> f32 {
+        min((APPROACH_TURNS + PATH_TURNS) * f32::from(bench.pole_pairs), abs(self.scan.path))
+    }
+
     /// Position of a place, electrical turns.
     fn place(&self, bench: &Bench, place: Place) -> f32 {
-        let pairs = f32::from(bench.pole_pairs);
-        let length = min((APPROACH_TURNS + PATH_TURNS) * pairs, abs(self.scan.path)) * sign(self.scan.path);
+        let length = self.length(bench) * sign(self.scan.path);
         let begin = bench.electrical(self.scan.way);
         let end = begin + self.scan.path;
         match place {
@@ -218,6 +352,7 @@ impl Refine {
         &mut self,
         reading: &Reading<'_>,
         seen: (&SeenInductances, i32),
+        drop: &VoltageDrop,
     ) -> Result<Outcome<Refined>, Refusal> {
         let bench = reading.bench;
         let way = reading.track.way;
@@ -231,11 +366,7 @@ impl Refine {
             None => (self.from, 0.0),
         };
         let distance = to - self.from;
-        let motion = FieldWay::over(
-            abs(distance),
-            min(RUN_IN_TURNS, 0.25 * abs(distance)),
-            bench.settings.turns_per_s,
-        );
+        let motion = FieldWay::over(abs(distance), run_in(abs(distance)), bench.settings.turns_per_s);
         let is_ramp = abs(distance) < LEAST_DISTANCE;
         let (moved, speed) =
             if is_ramp { (0.0, 0.0) } else { (motion.travelled(seconds), motion.speed(seconds)) };
@@ -245,10 +376,9 @@ impl Refine {
             // With wrong counts per turn the angle is lost on the way to the path's end.
             let is_last = self.action / ACTIONS_PER_ROUND + 1 == ROUNDS.len();
             let counts = self.scan.fitting_counts.filter(|_| is_last);
-            return Err(counts.map_or(Refusal::Slipped, Refusal::CountsPerTurn));
+            return Err(counts.map_or(Refusal::Slipped, |found| bench.other_counts(found)));
         }
-        let measured = reading.current.to_rotating(rotor.rotation());
-        self.measure(bench, way, direct, distance, measured.q.0);
+        self.measure(reading, drop, rotor.rotation(), (direct, distance));
 
         let most = bench.quadrature_a;
         self.integral = clamp(self.integral + self.integral_gain * error * TICK_S, -most, most);
@@ -270,7 +400,8 @@ impl Refine {
             }
             if self.ticks >= FALL_TICKS {
                 let inductances = self.inductances(bench, seen);
-                return Ok(Outcome::Passed(Refined { offset: self.offset, inductances }));
+                let findings = Some(self.findings(&inductances, drop));
+                return Ok(Outcome::Passed(Refined { offset: self.offset, inductances, findings }));
             }
         } else if is_over {
             if self.direct != 0.0 && direct == 0.0 {
@@ -284,18 +415,30 @@ impl Refine {
 
     /// Adds this tick's work. The approach of each motion is left out, and motions in which the direct
     /// current changes.
-    fn measure(&mut self, bench: &Bench, way: i32, direct: f32, distance: f32, quadrature: f32) {
+    fn measure(
+        &mut self,
+        reading: &Reading<'_>,
+        drop: &VoltageDrop,
+        rotor: Rotation,
+        (direct, distance): (f32, f32),
+    ) {
+        let (bench, way) = (reading.bench, reading.track.way);
         let step = way.wrapping_sub(self.way);
         self.way = way;
-        let approach = APPROACH_TURNS / (APPROACH_TURNS + PATH_TURNS) * abs(distance);
-        let begun = abs(bench.electrical(way) - self.from) > approach && self.direct == direct;
+        let (length, travelled) = (abs(distance), abs(bench.electrical(way) - self.from));
+        let is_measured = self.direct == direct && length >= LEAST_DISTANCE && travelled > approach(length);
         let (reversed, back) = (usize::from(direct < 0.0), usize::from(distance < 0.0));
         if let Some(work) = self.work.get_mut(reversed).and_then(|work| work.get_mut(back))
-            && begun
-            && abs(distance) >= LEAST_DISTANCE
+            && is_measured
         {
-            work.sum += step as f32 * quadrature;
+            let work_now = step as f32 * reading.current.to_rotating(rotor).q.0;
+            work.sum += work_now;
             work.counts += step;
+            work.emf += self.current.current_loop.integral_v().q - drop.across(reading.current, rotor).0;
+            if travelled < length - run_in(length) {
+                work.steady_sum += work_now;
+                work.steady_counts += step;
+            }
         }
     }
 
@@ -303,29 +446,43 @@ impl Refine {
         seen.along_flux(ElectricalAngle::ZERO.minus(bench.angle(at).plus(self.offset)))
     }
 
+    /// Results beside the offset and the inductances.
+    fn findings(&self, inductances: &Inductances, drop: &VoltageDrop) -> MotorFindings {
+        let Inductances { direct, quadrature, residual } = *inductances;
+        let BothEnds { flux, friction, load, offset_sigma } = self.both_ends;
+        MotorFindings {
+            flux: Weber(flux.mean),
+            friction: Ampere(friction.mean),
+            load: Ampere(load),
+            resistance_sigma: drop.resistance_sigma,
+            direct_sigma: Henry(residual * direct.0),
+            quadrature_sigma: Henry(residual * quadrature.0),
+            offset_sigma_turns: offset_sigma,
+            flux_sigma: Weber(flux.sigma),
+            friction_sigma: Ampere(friction.sigma),
+        }
+    }
+
     /// Corrects the offset by what a round found.
     fn evaluate(&mut self, bench: &Bench, seen: (&SeenInductances, i32)) -> Result<(), Refusal> {
-        let [[forth, back], [forth_reversed, back_reversed]] = core::mem::take(&mut self.work);
+        let works = core::mem::take(&mut self.work);
         let round = self.action / ACTIONS_PER_ROUND;
+        let (is_first, is_last) = (round == 0, round + 1 == ROUNDS.len());
         let holding = bench.settings.current.0;
-        let direct = holding * if round == 0 { FIRST_SHARE } else { 1.0 };
-        let Inductances { direct: along, quadrature: across } = self.inductances(bench, seen);
-        // The first round's error is too large for a correction by saliency.
-        let saliency = if round == 0 { 0.0 } else { (along.0 - across.0) * direct / bench.flux.0 };
-        let [forth, back] = [forth, back].map(|work| work.mean() * (1.0 + saliency));
-        let [forth_reversed, back_reversed] =
-            [forth_reversed, back_reversed].map(|work| work.mean() * (1.0 - saliency));
-        let rise = 0.5 * (forth_reversed - forth + back_reversed - back);
-        let error = atan2(0.5 * rise, direct) / TAU;
-        let (forth, back) = (0.5 * (forth + forth_reversed), 0.5 * (back + back_reversed));
-        // An error of the angle makes the same torque with more current.
-        let Rotation { cosine, .. } = ElectricalAngle::from_turns(error).rotation();
-        self.friction = 0.5 * (forth - back) * cosine;
-        let load = 0.5 * abs(forth + back) * cosine;
+        let Inductances { direct, quadrature, .. } = self.inductances(bench, seen);
+        let found = if is_first {
+            // This round's error is too large for a correction by saliency.
+            Round::of(&works, bench, holding * FIRST_SHARE, 0.0)
+        } else {
+            Round::of(&works, bench, holding, direct.0 - quadrature.0)
+        };
+        let before = core::mem::replace(&mut self.round, found);
+        let Round { error, load, .. } = found;
+        let [plus, minus] = found.friction;
+        self.friction = 0.5 * (plus + minus);
         let [first, last] = GREATEST_LOADS;
-        let is_last = round + 1 == ROUNDS.len();
-        if load > holding * if is_last { last } else { first } {
-            return Err(Refusal::Load((100.0 * load / holding) as u8));
+        if abs(load) > holding * if is_last { last } else { first } {
+            return Err(Refusal::Load((100.0 * abs(load) / holding) as u8));
         }
         let mut correction = error;
         if is_last {
@@ -335,14 +492,42 @@ impl Refine {
             if abs(error) > GREATEST_DRIFT + bench.encoder_error {
                 let stated = bench.scale.counts_per_turn() as f32;
                 let drift = error / apart;
-                return Err(Refusal::CountsPerTurn((stated / (1.0 - drift) + 0.5) as u32));
+                return Err(bench.other_counts((stated / (1.0 - drift) + 0.5) as u32));
             }
             correction = 0.5 * error;
+            let length = self.length(bench);
+            self.both_ends = BothEnds::of([before, found], apart, approach(length) - run_in(length));
         }
         let correction = ElectricalAngle::from_turns(correction);
         self.offset = self.offset.minus(correction);
         self.current = self.current.turned(correction);
         self.tracker = SpeedTracker::at(bench.angle(self.way).plus(self.offset));
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_load_s_growth_on_the_path_is_no_friction() {
+        // 0.5 A per electrical turn over 4 turns; forwards the load is measured 0.6 turns further on.
+        let at = |load: f32, friction: f32| Round { load, friction: [friction; 2], ..Round::default() };
+        let found = BothEnds::of([at(1.0, 2.15), at(3.0, 2.15)], 4.0, 0.6);
+        assert!((found.friction.mean - 2.0).abs() < 1e-6 && found.load == 2.0, "{found:?}");
+        // Paths too close to each other show no growth.
+        let found = BothEnds::of([at(1.0, 2.15), at(3.0, 2.15)], 0.9, 0.6);
+        assert!((found.friction.mean - 2.15).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn the_offset_s_sigma_is_that_of_the_ends_and_directions() {
+        let round = |error, one_way| Round { error, one_way, ..Round::default() };
+        // A difference between the directions that both rounds share says nothing.
+        let found = BothEnds::of([round(0.3, 0.01), round(0.004, 0.01)], 4.0, 0.6);
+        assert!((found.offset_sigma - 0.004 / sqrt(8.0)).abs() < 1e-7, "{found:?}");
+        let found = BothEnds::of([round(0.3, 0.01), round(0.0, 0.014)], 4.0, 0.6);
+        assert!((found.offset_sigma - 0.004 / sqrt(8.0)).abs() < 1e-7, "{found:?}");
     }
 }

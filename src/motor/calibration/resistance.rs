@@ -7,8 +7,9 @@
 //! R = (v_2 - v_1) / (i_2 - i_1)
 //! ```
 //!
-//! The difference removes what dead time and diodes take, which does not change with the current's size. The
-//! voltage is the modulator's, so the bridge's own resistance correctly counts as the motor's.
+//! The difference removes what dead time and diodes take, which does not change with the current's size. That
+//! constant is the remainder; the back-EMF's measurement needs it. The voltage is the modulator's, so the
+//! bridge's own resistance correctly counts as the motor's.
 //!
 //! The measured current must lie within 15 degrees of the voltage; each wrong wiring bends it by 30 or more
 //! on one of the axes, with its own pattern of signs. Where a wrong sign reverses the hold's feedback, a
@@ -30,9 +31,11 @@
 //! taken until two in a row agree to 0.2 %. That takes 0.3 to 4 s, twice per axis.
 
 use super::hold::Hold;
+use super::repeated::Repeated;
 use super::{ElectricalAngle, Outcome, Phase, Reading, Refusal, STRONG_SHARE, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::min;
+use crate::motor::{Phases, Rotation};
+use crate::real::{min, sign};
 use crate::units::{Ampere, Ohm, Volt};
 
 const RISE_TICKS: u32 = CURRENT_RATE_HZ / 10;
@@ -69,6 +72,8 @@ pub(super) struct ResistanceStage {
     before: Option<Sums>,
     low: Sums,
     found: [f32; 3],
+    /// Sum over the axes of the voltage that does not grow with the current, V.
+    constant_sum: f32,
     /// Angle of the rotor's flux, if the current flows along that alone.
     flux: Option<ElectricalAngle>,
 }
@@ -79,6 +84,27 @@ enum Level {
     Full,
     /// The voltage turns to the next axis.
     Turn,
+}
+
+/// Voltage that a current takes at rest: a resistance, and a constant by the sign of every phase current.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct VoltageDrop {
+    pub resistance: Ohm,
+    /// Standard deviation by the three axes; zero where only one was measured.
+    pub resistance_sigma: Ohm,
+    /// Part of dead time and diodes, with the current along the axis of a phase.
+    constant: Volt,
+}
+
+impl VoltageDrop {
+    /// Voltage across the flux of a rotor at an angle.
+    pub(super) fn across(&self, current: Stationary<Ampere>, rotor: Rotation) -> Volt {
+        let Phases { a, b, c } = current.to_phases();
+        // Along the axis of a phase the signs are 1, -1 and -1: a vector of 4/3.
+        let signs = Phases { a: sign(a.0), b: sign(b.0), c: sign(c.0) }.to_stationary();
+        let resistive = self.resistance.0 * current.to_rotating(rotor).q.0;
+        Volt(resistive + 0.75 * self.constant.0 * signs.to_rotating(rotor).q)
+    }
 }
 
 /// Sums over the ticks of one mean.
@@ -99,6 +125,7 @@ impl Default for ResistanceStage {
             before: None,
             low: Sums::default(),
             found: [0.0; 3],
+            constant_sum: 0.0,
             flux: None,
         }
     }
@@ -123,7 +150,7 @@ impl ResistanceStage {
         }
     }
 
-    pub(super) fn tick(&mut self, reading: &Reading<'_>) -> Result<Outcome<(Ohm, Hold)>, Refusal> {
+    pub(super) fn tick(&mut self, reading: &Reading<'_>) -> Result<Outcome<(VoltageDrop, Hold)>, Refusal> {
         let low = reading.bench.settings.current;
         let full = low * STRONG_SHARE;
         let phase = AXES.get(self.axis).copied().unwrap_or(Phase::A);
@@ -149,7 +176,7 @@ impl ResistanceStage {
                 _ => {
                     self.take(settled, full)?;
                     if self.axis + 1 == AXES.len() {
-                        return Ok(Outcome::Passed((self.mean()?, self.hold)));
+                        return Ok(Outcome::Passed((self.drop()?, self.hold)));
                     }
                     self.level = Level::Turn;
                 }
@@ -165,7 +192,7 @@ impl ResistanceStage {
     }
 
     /// Turns the voltage to the next axis and judges the current there.
-    fn turn(&mut self, reading: &Reading<'_>) -> Result<Outcome<(Ohm, Hold)>, Refusal> {
+    fn turn(&mut self, reading: &Reading<'_>) -> Result<Outcome<(VoltageDrop, Hold)>, Refusal> {
         let [from, to] = [self.axis, self.axis + 1].map(|axis| AXES.get(axis).copied().unwrap_or(Phase::A));
         self.ticks += 1;
         let share = min(self.ticks as f32 / TURN_TICKS as f32, 1.0);
@@ -175,7 +202,8 @@ impl ResistanceStage {
         self.hold.turn_to(angle_of(from).plus(ElectricalAngle::from_turns(way)));
         if self.ticks == TURNED_TICKS {
             self.judge_direction(reading.current, to)?;
-            *self = Self { axis: self.axis + 1, found: self.found, hold: self.hold, ..Self::default() };
+            let Self { axis, found, constant_sum, hold, .. } = *self;
+            *self = Self { axis: axis + 1, found, constant_sum, hold, ..Self::default() };
         }
         Ok(Outcome::Running(self.hold.voltage()))
     }
@@ -211,6 +239,7 @@ impl ResistanceStage {
             return Err(Refusal::TimeOut);
         }
         let resistance = (settled.volts - self.low.volts) / (i2 - i1);
+        self.constant_sum += (self.low.volts - resistance * i1) / MEAN_TICKS as f32;
         if self.flux.is_some() {
             self.found = [resistance; 3];
         } else if let Some(found) = self.found.get_mut(self.axis) {
@@ -219,15 +248,16 @@ impl ResistanceStage {
         Ok(())
     }
 
-    fn mean(&self) -> Result<Ohm, Refusal> {
-        let mean = self.found.iter().sum::<f32>() / 3.0;
+    fn drop(&self) -> Result<VoltageDrop, Refusal> {
+        let Repeated { mean, sigma } = Repeated::of(&self.found);
         if !(1e-3..=10.0).contains(&mean) {
             return Err(Refusal::MotorConstants);
         }
         if self.found.iter().any(|found| (found - mean).abs() > GREATEST_IMBALANCE * mean) {
             return Err(Refusal::PhaseImbalance);
         }
-        Ok(Ohm(mean))
+        let constant = Volt(self.constant_sum / AXES.len() as f32);
+        Ok(VoltageDrop { resistance: Ohm(mean), resistance_sigma: Ohm(sigma), constant })
     }
 
     /// The voltage reached its limit: either no current flows, or the resistance is too large.
@@ -320,6 +350,24 @@ mod tests {
             assert!((level + 0.5 - (tick as f32 + 0.5) * step).abs() < 1e-6, "{tick}: {level}");
         }
         assert!(levels.sum::<f32>().abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_current_s_voltage_across_the_flux_is_that_of_resistance_and_dead_time() {
+        let drop = VoltageDrop { resistance: Ohm(0.05), constant: Volt(0.18), ..VoltageDrop::default() };
+        // Mean over a turn of a current of 15 A along and 8 A across: dead time takes 3 / pi of the constant
+        // along the current's direction.
+        let current = super::super::Rotating { d: Ampere(-15.0), q: Ampere(8.0) };
+        let mean = (0..360_u16).map(|degree| {
+            let rotor = ElectricalAngle::from_turns((f32::from(degree) + 0.5) / 360.0).rotation();
+            f64::from(drop.across(current.to_stationary(rotor), rotor).0) / 360.0
+        });
+        let expected = 8.0 * (0.05 + 0.18 * 3.0 / core::f64::consts::PI / 17.0);
+        assert!((mean.sum::<f64>() / expected - 1.0).abs() < 1e-3);
+        // Along the axis of phase A.
+        let along = Stationary { alpha: Ampere(10.0), beta: Ampere::ZERO };
+        let rotor = ElectricalAngle::from_turns(-0.25).rotation();
+        assert!((drop.across(along, rotor).0 - 0.68).abs() < 1e-5);
     }
 
     #[test]

@@ -241,15 +241,17 @@ impl Scan {
             let fitting = pairs * turns / electrical;
             let whole = (fitting + 0.5) as u8;
             return Err(match reading.track.index_distance {
-                Some(distance) => Refusal::CountsPerTurn(distance.unsigned_abs()),
-                None if (fitting - f32::from(whole)).abs() < WHOLE => Refusal::PolePairs(whole),
-                None => Refusal::CountsPerTurn(fitting_counts),
+                Some(distance) => bench.other_counts(distance.unsigned_abs()),
+                None if (fitting - f32::from(whole)).abs() < WHOLE => {
+                    Refusal::PolePairs { stated: bench.pole_pairs, found: whole }
+                }
+                None => bench.other_counts(fitting_counts),
             });
         }
         if (electrical - turns).abs() > GREATEST_TRAVEL_ERROR {
             // Other counts leave the turns of the field equal; cogging does not.
             let is_steady = self.followed.travel.is_even(STEADY_SHARE);
-            return Err(if is_steady { Refusal::CountsPerTurn(fitting_counts) } else { Refusal::Slipped });
+            return Err(if is_steady { bench.other_counts(fitting_counts) } else { Refusal::Slipped });
         }
         self.followed.must_keep_to_the_field()?;
         self.fitting_counts = ((electrical - turns).abs() > DOUBTFUL_TRAVEL_ERROR).then_some(fitting_counts);

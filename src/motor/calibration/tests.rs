@@ -61,7 +61,7 @@ pub(crate) fn calibrate(
 /// A calibration as a check at standstill leaves it, with an offset that is so many degrees off.
 pub(crate) fn unproven(found: &Calibration, degrees: f32) -> Calibration {
     let off = ElectricalAngle::from_turns(degrees / 360.0);
-    Calibration { offset: found.offset.plus(off), proven: false, ..*found }
+    Calibration { offset: found.offset.plus(off), findings: None, ..*found }
 }
 
 /// Error of the offset found, electrical degrees.
@@ -170,6 +170,47 @@ fn a_sound_motor_is_measured_and_its_offset_found() {
 }
 
 #[test]
+fn flux_and_friction_are_measured_while_the_motor_turns() {
+    for (angle, direction) in [(0.3, 1.0), (2.0, -1.0)] {
+        let mut motor = TestMotor { angle, encoder_sign: direction, coulomb: 0.05, ..TestMotor::default() };
+        let counter = if direction > 0.0 { Direction::Up } else { Direction::Down };
+        let configuration = AxisConfiguration { counter, flux: Weber(3.2e-3), ..CONFIGURATION };
+        let found = calibrate(&mut motor, &configuration).expect("sound").findings().expect("turned");
+        assert!((f64::from(found.flux.0) / 2.9e-3 - 1.0).abs() < 0.02, "{found:?}");
+        // Coulomb friction, and viscous friction at 8 electrical turns per second.
+        let torque = 0.05 + 2e-4 * core::f64::consts::TAU * 8.0 / 7.0;
+        let friction = torque / (1.5 * 7.0 * 2.9e-3);
+        assert!((f64::from(found.friction.0) - friction).abs() < 0.05, "{found:?} {friction}");
+        assert!(found.load.0.abs() < 0.05, "{found:?}");
+        let sigmas = [
+            found.resistance_sigma.0 / 0.05,
+            found.direct_sigma.0 / 24e-6,
+            found.quadrature_sigma.0 / 27e-6,
+            found.flux_sigma.0 / 2.9e-3,
+            found.friction_sigma.0,
+            360.0 * found.offset_sigma_turns,
+        ];
+        // Not zero, since every measurement scatters; at most the tolerances above.
+        assert!(sigmas.iter().all(|sigma| (1e-6..0.05).contains(sigma)), "{sigmas:?}");
+    }
+}
+
+#[test]
+fn a_torque_per_ampere_that_contradicts_the_back_emf_is_refused_with_both_numbers() {
+    let true_flux = CONFIGURATION.flux.0;
+    for (share, permitted) in [(1.2, true), (0.85, true), (1.4, false), (0.72, false)] {
+        let configuration = AxisConfiguration { flux: Weber(share * true_flux), ..CONFIGURATION };
+        match calibrate(&mut TestMotor::default(), &configuration) {
+            Err(Refusal::Flux(Mismatch { stated, found })) => {
+                assert!(!permitted && stated == share * true_flux, "{share}: {stated}");
+                assert!((found / true_flux - 1.0).abs() < 0.02, "{share}: {found}");
+            }
+            other => assert!(permitted && other.is_ok(), "{share}: {other:?}"),
+        }
+    }
+}
+
+#[test]
 fn every_wrong_wiring_is_refused_with_its_own_reason() {
     for (change, reason) in WRONG {
         let mut motor = TestMotor::default();
@@ -179,7 +220,7 @@ fn every_wrong_wiring_is_refused_with_its_own_reason() {
     let configuration = AxisConfiguration { counts_per_turn: 10_000, index: false, ..CONFIGURATION };
     assert!(matches!(
         calibrate(&mut TestMotor::default(), &configuration),
-        Err(Refusal::CountsPerTurn(8100..=8300))
+        Err(Refusal::CountsPerTurn { stated: 10_000, found: 8100..=8300 })
     ));
 }
 
@@ -193,7 +234,7 @@ const WRONG: [(Change, Refusal); 18] = [
     (|motor| motor.shunts = |[_, c]| [0.0, c], Refusal::PhaseOpen(Phase::B)),
     (|motor| motor.encoder_sign = -1.0, Refusal::Direction),
     (|motor| motor.encoder_dead = true, Refusal::NoCounts),
-    (|motor| motor.pole_pairs = 11.0, Refusal::PolePairs(11)),
+    (|motor| motor.pole_pairs = 11.0, Refusal::PolePairs { stated: 7, found: 11 }),
     (|motor| motor.current_offsets[1] = 400.0, Refusal::ShuntOffset(Phase::C)),
     (|motor| motor.bus = 12.0, Refusal::BusVoltage),
     // The holding torque is 0.61 N m: friction of 0.4 is a lag of 41 degrees, although the rotor follows.
@@ -212,7 +253,7 @@ const WRONG: [(Change, Refusal); 18] = [
         },
         Refusal::Turning,
     ),
-    (|motor| motor.encoder_sign = 0.5, Refusal::PolePairs(14)),
+    (|motor| motor.encoder_sign = 0.5, Refusal::PolePairs { stated: 7, found: 14 }),
 ];
 
 #[test]
@@ -227,8 +268,12 @@ fn the_index_separates_counts_per_turn_from_pole_pairs() {
             calibrate(&mut motor, &configuration).expect_err("half of the counts")
         })
         .collect();
-    let found = refusals.iter().filter(|&&reason| reason == Refusal::CountsPerTurn(2048)).count();
-    let mistaken = refusals.iter().filter(|&&reason| reason == Refusal::PolePairs(14)).count();
+    let found = refusals
+        .iter()
+        .filter(|&&reason| reason == Refusal::CountsPerTurn { stated: 4096, found: 2048 })
+        .count();
+    let mistaken =
+        refusals.iter().filter(|&&reason| reason == Refusal::PolePairs { stated: 7, found: 14 }).count();
     assert_eq!((found, mistaken), (1, 13), "{refusals:?}");
 }
 
@@ -254,8 +299,14 @@ fn what_is_stored_is_found_again_by_the_index() {
         let off = ElectricalAngle::from_turns(degrees / 360.0);
         let turned = StoredCalibration { offset: stored.offset.plus(off), ..stored };
         let calibrator = Calibrator::from_stored(&CONFIGURATION, SETTINGS, turned).expect("usual");
-        let refusal = run(&mut motor, calibrator).err();
-        assert_eq!(refusal, end.map(|()| Refusal::StoredOffset), "{degrees} degrees");
+        match run(&mut motor, calibrator) {
+            Err(Refusal::StoredOffset(Mismatch { stated, found })) => {
+                assert!(end.is_some() && stated == turned.offset.turns(), "{degrees} degrees");
+                let apart = ElectricalAngle::from_turns(stated - found).turns() * 360.0;
+                assert!((apart - degrees).abs() < 1.0, "{degrees} degrees: {apart}");
+            }
+            other => assert!(end.is_none() && other.is_ok(), "{degrees} degrees: {other:?}"),
+        }
     }
 }
 
@@ -264,13 +315,13 @@ fn constants_that_are_not_the_stored_ones_are_another_motors_and_what_is_used_is
     let first = calibrate(&mut TestMotor::default(), &CONFIGURATION).expect("sound");
     let stored = first.stored().expect("an index");
     type Place = fn(&mut StoredCalibration) -> &mut f32;
-    let changes: [(f32, f32, Place); 3] = [
-        (0.37, 0.43, |stored| &mut stored.resistance.0),
+    let changes: [(f32, f32, MotorConstant, Place); 3] = [
+        (0.37, 0.43, MotorConstant::Resistance, |stored| &mut stored.resistance.0),
         // The two measurements are within 4 % of each other.
-        (0.15, 0.25, |stored| &mut stored.direct_inductance.0),
-        (0.15, 0.25, |stored| &mut stored.quadrature_inductance.0),
+        (0.15, 0.25, MotorConstant::DirectInductance, |stored| &mut stored.direct_inductance.0),
+        (0.15, 0.25, MotorConstant::QuadratureInductance, |stored| &mut stored.quadrature_inductance.0),
     ];
-    for (agrees, differs, field) in changes {
+    for (agrees, differs, constant, field) in changes {
         for (share, end) in [(agrees, true), (-agrees, true), (differs, false), (-differs, false)] {
             let mut changed = stored;
             // The measured value exceeds the stored one by this share.
@@ -278,8 +329,15 @@ fn constants_that_are_not_the_stored_ones_are_another_motors_and_what_is_used_is
             let calibrator = Calibrator::from_stored(&CONFIGURATION, SETTINGS, changed).expect("usual");
             let found =
                 run(&mut TestMotor { random: TestRandom::new(9), ..TestMotor::default() }, calibrator);
-            assert_eq!(found.err(), (!end).then_some(Refusal::OtherMotor), "{share}");
-            let Ok(found) = found else { continue };
+            let found = match found {
+                Err(Refusal::OtherMotor(which, Mismatch { stated, found })) => {
+                    assert_eq!((which, stated, end), (constant, *field(&mut changed), false), "{share}");
+                    assert!((found / stated - 1.0 - share).abs() < 0.05, "{share}: {found} {stated}");
+                    continue;
+                }
+                other => other.expect("agrees"),
+            };
+            assert!(end, "{share}");
             let near = |found: f32, first: f32| (found / first - 1.0).abs() < 0.04;
             assert!(near(found.resistance().0, first.resistance().0), "{share}");
             assert!(near(found.direct_inductance().0, first.direct_inductance().0), "{share}");

@@ -7,9 +7,9 @@ use super::super::testing::TestHardware;
 use super::super::{Ends, EventQueue, Queues};
 use super::*;
 use crate::hal::AxisCommand;
-use crate::leg::CalibrationRefusal;
+use crate::leg::{CalibrationRefusal, Mismatch, MotorConstant};
 use crate::motor::AbsoluteEncoders;
-use crate::motor::calibration::tests::{SETTINGS, calibrate};
+use crate::motor::calibration::tests::{SETTINGS, calibrate, unproven};
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::operation::AxisState;
 use crate::safety::Bridges;
@@ -139,8 +139,8 @@ fn a_stored_calibration_is_checked_and_a_missing_one_measured() {
 fn a_wrong_stored_calibration_is_refused_once_and_then_measured() {
     let stored = measured().stored().expect("an index");
     for refusal in [
-        CalibrationRefusal::OtherMotor,
-        CalibrationRefusal::StoredOffset,
+        CalibrationRefusal::OtherMotor(MotorConstant::Resistance, Mismatch { stated: 0.04, found: 0.09 }),
+        CalibrationRefusal::StoredOffset(Mismatch { stated: 0.1, found: 0.2 }),
         // A wrong constant may lead to any refusal.
         CalibrationRefusal::TimeOut,
     ] {
@@ -152,6 +152,33 @@ fn a_wrong_stored_calibration_is_refused_once_and_then_measured() {
         });
         assert!(recorded && !bench.keeper.is_calibrated(), "{refusal:?}");
         assert_eq!(bench.press(), [(0, unchecked())], "{refusal:?}");
+    }
+}
+
+#[test]
+fn the_records_show_both_values_of_a_contradiction_and_what_a_turning_motor_shows() {
+    let stored = measured().stored().expect("an index");
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
+    bench.press();
+    let mismatch = Mismatch { stated: 2e-3, found: 3e-3 };
+    bench.ends(0, Outcome::Refused(CalibrationRefusal::Flux(mismatch)));
+    let shown = bench.records.iter().any(|record| {
+        matches!(record, Record::Calibration { result: "flux", stated: 2e-3, found: 3e-3, .. })
+    });
+    assert!(shown, "{:?}", bench.records);
+
+    let findings = measured().findings().expect("turned");
+    for (calibration, shown) in [(measured(), true), (unproven(&measured(), 0.0), false)] {
+        let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
+        bench.press();
+        bench.ends(0, Outcome::Calibrated(calibration));
+        let found = bench.records.iter().find_map(|record| match *record {
+            Record::CalibrationFindings { joint: 1, flux_wb, friction_sigma_a, .. } => {
+                Some([flux_wb, friction_sigma_a])
+            }
+            _ => None,
+        });
+        assert_eq!(found, shown.then_some([findings.flux.0, findings.friction_sigma.0]));
     }
 }
 
@@ -212,7 +239,7 @@ fn an_encoder_moved_without_power_is_refused_and_then_measured() {
         let outcome = carried_out(&mut motor, order);
         assert_eq!(matches!(outcome, Outcome::Calibrated(_)), fits, "{outcome:?}");
         if !fits {
-            assert_eq!(outcome, Outcome::Refused(CalibrationRefusal::StoredOffset));
+            assert!(matches!(outcome, Outcome::Refused(CalibrationRefusal::StoredOffset(_))), "{outcome:?}");
             bench.ends(0, outcome);
             let (_, order) = bench.press().remove(0);
             let outcome = carried_out(&mut motor, order);

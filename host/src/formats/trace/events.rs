@@ -6,8 +6,8 @@
 use scarab::trace::GRAMMAR;
 
 use crate::formats::trace::records::{
-    AxisFault, Board, Boot, Calibration, Change, Crash, Fault, GateDriver, Limit, NotEnabled, Received,
-    Refused, Request, State, Update,
+    AxisFault, Board, Boot, Calibration, CalibrationFindings, Change, Crash, Fault, GateDriver, Limit,
+    NotEnabled, Received, Refused, Request, State, Update,
 };
 
 /// Severity of an event.
@@ -94,6 +94,7 @@ pub fn of(record: &Received, servo_hz: f64) -> Option<Event> {
             let (weight, words) = calibrated(calibration);
             (None, weight, words)
         }
+        Received::CalibrationFindings(found) => (None, Weight::Note, findings(found)),
         Received::Change(change) => (None, Weight::Warning, changed(change)),
         Received::Update(update) => (None, Weight::Note, updated(update)),
         _ => return None,
@@ -182,7 +183,11 @@ fn calibrated(found: &Calibration) -> (Weight, String) {
         let number = if number == 0 { String::new() } else { format!(" ({number})") };
         return (
             Weight::Warning,
-            format!("calibration of joint {joint} REFUSED: {}{number}", spaced(&found.result)),
+            format!(
+                "calibration of joint {joint} REFUSED: {}{number}{}",
+                spaced(&found.result),
+                values(found)
+            ),
         );
     }
     let words = format!(
@@ -196,6 +201,31 @@ fn calibrated(found: &Calibration) -> (Weight, String) {
         found.zero_c
     );
     (Weight::Note, words)
+}
+
+/// Both values of a contradiction; empty without one, and for traces of older images.
+fn values(refused: &Calibration) -> String {
+    match (refused.stated, refused.found) {
+        (Some(stated), Some(found)) if found.is_finite() => format!(", stated {stated}, found {found}"),
+        _ => String::new(),
+    }
+}
+
+fn findings(found: &CalibrationFindings) -> String {
+    format!(
+        "calibration of joint {}: flux {:.4} +- {:.4} mWb, friction {:.2} +- {:.2} A, load {:.2} A; sigma of \
+         R {:.1e} ohm, of L {:.1} and {:.1} uH, of the offset {:.1e} turns",
+        found.joint,
+        1e3 * found.flux_wb,
+        1e3 * found.flux_sigma_wb,
+        found.friction_a,
+        found.friction_sigma_a,
+        found.load_a,
+        found.resistance_sigma_ohm,
+        1e6 * found.direct_sigma_h,
+        1e6 * found.quadrature_sigma_h,
+        found.offset_sigma_turns
+    )
 }
 
 fn changed(change: &Change) -> String {

@@ -316,7 +316,7 @@ fn a_moved_rotor_keeps_what_is_stored_but_has_to_turn_next() {
     bench.hold(false, false);
     assert_eq!(bench.press(), [(0, turning(stored))]);
     // An offset that the motion contradicts is measured again.
-    bench.ends(0, Outcome::Refused(CalibrationRefusal::StoredOffset));
+    bench.ends(0, Outcome::Refused(CalibrationRefusal::StoredOffset(Mismatch { stated: 0.1, found: 0.2 })));
     assert_eq!(bench.press(), [(0, unchecked())]);
 }
 
