@@ -6,7 +6,7 @@ use crate::ident::{Choice::*, Constant::*, DriveChoice, Estimator::*, Plan::*};
 use crate::leg::{JointDescription, LegDescription, LinkDescription, MotorDescription};
 use crate::model::DenavitHartenberg;
 use crate::motion::ExcitationTable;
-use crate::safety::WindingRating;
+use crate::safety::{SupplyLimits, WindingRating};
 use crate::units::*;
 
 /// The leg.
@@ -17,6 +17,13 @@ pub const LEG: LegDescription<2> = LegDescription {
         0.0,
         0.0,
     ],
+    supply: SupplyLimits {
+        draw: None,
+        charge: None,
+        brake: Ohm(
+            2.0,
+        ),
+    },
     joints: [
         JointDescription {
             geometry: DenavitHartenberg {

@@ -16,7 +16,7 @@ use crate::model::{
     RigidBody,
 };
 use crate::motion::{ExcitationTable, MotionError, Periodic};
-use crate::safety::WindingRating;
+use crate::safety::{SupplyLimits, WindingRating};
 use crate::servo::{JointConfiguration, JointScale, SERVO_RATE_HZ};
 use crate::units::{
     Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
@@ -111,6 +111,8 @@ pub struct LegDescription<const N: usize> {
     pub name: &'static str,
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: [f32; 3],
+    /// Limits of the supply.
+    pub supply: SupplyLimits,
     /// Joints, proximal first.
     pub joints: [JointDescription; N],
     /// Prior knowledge of links and drives, if any.
