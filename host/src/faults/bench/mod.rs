@@ -20,6 +20,7 @@ mod silent;
 mod stall;
 mod start;
 mod stopped;
+mod supply;
 
 use scarab::safety::FaultCode;
 
@@ -41,11 +42,13 @@ pub struct Bench {
 }
 
 /// All benches.
-pub static BENCHES: [Bench; 21] = [
+pub static BENCHES: [Bench; 23] = [
     offsets::BENCH,
     calibration::BENCH,
     start::ZEROS,
     hot::BENCH,
+    supply::DRAW,
+    supply::CHARGE,
     stopped::BENCH,
     parts::BENCH,
     command::BENCH,
