@@ -7,7 +7,7 @@ use crate::leg::{JointDescription, LegDescription, LinkDescription, MotorDescrip
 use crate::model::DenavitHartenberg;
 use crate::motion::ExcitationTable;
 use crate::motor::AbsoluteEncoders;
-use crate::safety::WindingRating;
+use crate::safety::{SupplyLimits, WindingRating};
 use crate::units::*;
 
 /// The leg.
@@ -18,6 +18,13 @@ pub const LEG: LegDescription<2> = LegDescription {
         0.0,
         0.0,
     ],
+    supply: SupplyLimits {
+        draw: None,
+        charge: None,
+        brake: Ohm(
+            2.0,
+        ),
+    },
     joints: [
         JointDescription {
             geometry: DenavitHartenberg {

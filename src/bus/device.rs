@@ -370,8 +370,8 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         let is_own = |refusal: &Refusal| refusal.joint == Refusal::LEG || Some(*refusal) == order;
         self.noted = self.refusal.filter(is_own).or(self.noted);
         let report = self.refusal.map(|refusal| {
-            let [low, high, ..] = status.causes.to_le_bytes();
-            let information = [refusal.number(), refusal.reason as u8, low, high, 0];
+            let [low, middle, high, _] = status.causes.to_le_bytes();
+            let information = [refusal.number(), refusal.reason as u8, low, middle, high];
             ErrorReport { code: NoticeCode::NotEnabled.number(), information }
         });
         self.axes.iter_mut().for_each(|axis| axis.refused = report);

@@ -17,7 +17,7 @@ use crate::model::{
 };
 use crate::motion::{ExcitationTable, MotionError, Periodic};
 use crate::motor::AbsoluteEncoders;
-use crate::safety::WindingRating;
+use crate::safety::{SupplyLimits, WindingRating};
 use crate::servo::{JointConfiguration, JointScale, SERVO_RATE_HZ};
 use crate::units::{
     Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
@@ -114,6 +114,8 @@ pub struct LegDescription<const N: usize> {
     pub name: &'static str,
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: [f32; 3],
+    /// Limits of the supply.
+    pub supply: SupplyLimits,
     /// Joints, proximal first.
     pub joints: [JointDescription; N],
     /// Prior knowledge of links and drives, if any.

@@ -465,6 +465,14 @@ impl Axis {
         d * d + q * q
     }
 
+    /// Electrical power into the motor at the last tick, W; negative where the motor returns energy to the
+    /// bus. Valid while the bridge follows a current or is off, not while it brakes.
+    #[inline(always)]
+    #[must_use]
+    pub fn power_w(&self) -> f32 {
+        self.current_loop.power_w(&self.constants.gains, self.measured, self.speed.rad_per_s())
+    }
+
     /// Takes the means of count and current since the last call, in the joint's sense. Both cover the same
     /// ticks and so belong to one instant, 2.5 ticks (104 us) before the last of six. Without a tick since
     /// then, returns the newest values.

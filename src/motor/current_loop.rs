@@ -186,6 +186,20 @@ impl CurrentLoop {
         self.integral_v
     }
 
+    /// Electrical power into the motor, W: `1.5 (s_d i_d + (s_q + w flux) i_q)`. The integral takes the place
+    /// of the realised voltage, so the energy in the inductances, zero in the mean, is left out. So is the
+    /// power of saliency, because the direct current is zero in the mean.
+    #[inline(always)]
+    pub(super) fn power_w(
+        &self,
+        gains: &CurrentGains,
+        current: Rotating<Ampere>,
+        speed_rad_per_s: f32,
+    ) -> f32 {
+        let quadrature_v = self.integral_v.q + speed_rad_per_s * gains.flux_vs;
+        1.5 * (self.integral_v.d * current.d.0 + quadrature_v * current.q.0)
+    }
+
     /// Sets the integrals to zero.
     pub fn reset(&mut self) {
         *self = Self::default();

@@ -22,7 +22,9 @@ use super::queues::CurrentEnds;
 use super::signals::Signals;
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Hardware};
 use crate::leg::axis_code;
-use crate::motor::{AxisRequest, BrakeBudget, Chopper};
+use crate::motor::{AxisRequest, BrakeBudget, Chopper, GREATEST_BRAKE_DUTY};
+use crate::real::max;
+use crate::safety::supply_current::MOST_BRAKE_DUTY;
 use crate::safety::{BoardFault, Bridges, InhibitReason, ServoWatch, TickState, TickWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
@@ -43,6 +45,9 @@ const UNCONVERTED: u8 = 2;
 /// Ticks after a stall in which the index is ignored. Its interrupt was late by the stall, and so is its
 /// captured count. The interrupt comes after the first of them.
 const LATE_TICKS: u8 = 2;
+
+// The servo may request what the resistor may have.
+const _: () = assert!(MOST_BRAKE_DUTY == GREATEST_BRAKE_DUTY);
 
 /// Board state at a tick of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,6 +111,12 @@ impl<const N: usize> CurrentLoops<N> {
         });
         let servo = ServoWatch::default();
         Self { axes, period, servo, unconverted: 0, chopper, budget: BrakeBudget::FULL, volt_per_code }
+    }
+
+    /// Removes the brake resistor, as in an image that was built without one; host only.
+    #[cfg(not(target_os = "none"))]
+    pub fn remove_chopper(&mut self) {
+        self.chopper = None;
     }
 
     /// State of an axis, mutable.
@@ -179,6 +190,7 @@ impl<const N: usize> CurrentLoops<N> {
                 && let Some(samples) = ends.samples.get_mut(axis)
             {
                 signals.set_current_share(axis, running.current_share());
+                signals.set_power(axis, running.power_w());
                 // A servo that does not read its samples is detected below.
                 let _ = samples.enqueue(running.joint_sample());
             }
@@ -200,8 +212,8 @@ impl<const N: usize> CurrentLoops<N> {
         }
     }
 
-    /// Sets the brake resistor, which stays off without a bus voltage. One missing reading is tolerated, as
-    /// at the start.
+    /// Sets the brake resistor to the larger duty of chopper and servo. Without a bus voltage the resistor
+    /// stays off. One missing reading is tolerated, as at the start.
     #[inline(always)]
     fn brake<H: Hardware<N>>(&mut self, tick: &Tick, signals: &Signals<N>, hardware: &mut H) {
         let stands = signals.inhibit.is_storing();
@@ -211,14 +223,22 @@ impl<const N: usize> CurrentLoops<N> {
         if unknown {
             signals.inhibit.raise(InhibitReason::Conversion);
         }
-        if let Some(chopper) = &self.chopper {
-            // During a flash write no tick would turn the resistor off again.
-            let wanted = match stands || unknown {
-                true => 0.0,
-                false => chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code)),
-            };
-            hardware.set_brake(self.budget.spend(wanted));
+        // During a flash write no tick would turn the resistor off again.
+        if self.chopper.is_some() {
+            let bus = (!stands && !unknown).then(|| self.volt_per_code * f32::from(tick.sample.bus_code));
+            self.resist(bus, signals, hardware);
         }
+    }
+
+    /// Sets the brake resistor at this bus voltage. A separate function, so that an image without a resistor
+    /// does not save its registers.
+    #[inline(never)]
+    fn resist<H: Hardware<N>>(&mut self, bus: Option<Volt>, signals: &Signals<N>, hardware: &mut H) {
+        let chopper = self.chopper.as_ref().zip(bus);
+        let wanted = chopper.map_or(0.0, |(chopper, bus)| max(chopper.duty(bus), signals.wanted_brake()));
+        let duty = self.budget.spend(wanted);
+        hardware.set_brake(duty);
+        signals.set_given_brake(duty);
     }
 
     /// Checks the other axes' ticks. A stopped axis cannot report itself, and its bridge repeats its last

@@ -21,7 +21,9 @@ use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Plan,
     Refusal, permitted,
 };
-use crate::safety::{DeratingRamps, Fault, FaultCode, JointShares, SupplyWatch};
+use crate::safety::{
+    DeratingRamps, Fault, FaultCode, InhibitReason, JointShares, SupplyCurrent, SupplyLimits, SupplyWatch,
+};
 use crate::servo::SERVO_RATE_HZ;
 use crate::trace::{Record, words};
 use crate::units::Volt;
@@ -43,6 +45,7 @@ pub struct ServoLevel<const N: usize> {
     /// Checksum of gains and limits at creation.
     checksum: Checksum,
     supply: SupplyWatch,
+    supply_current: SupplyCurrent,
     ramps: DeratingRamps,
     volt_per_code: Volt,
     /// Side of the bus, where there is one.
@@ -71,12 +74,19 @@ impl<const N: usize> ServoLevel<N> {
             tick: 0,
             checksum: control.checksum(),
             supply: SupplyWatch::default(),
+            supply_current: SupplyCurrent::new(SupplyLimits::NONE),
             ramps,
             volt_per_code,
             host: following.map(|following| HostSide::new(following, volt_per_code)),
             prepared: None,
             refused: None,
         }
+    }
+
+    /// Adds limits of the supply current; without them there are none.
+    #[must_use]
+    pub fn with_supply(self, limits: SupplyLimits) -> Self {
+        Self { supply_current: SupplyCurrent::new(limits), ..self }
     }
 
     /// Runs one tick of the leg; `None` while the joints' samples are invalid. `gravity` in the base frame,
@@ -132,6 +142,12 @@ impl<const N: usize> ServoLevel<N> {
         Some(output)
     }
 
+    /// Shares of the torque that the limits of the supply current leave ([`SupplyCurrent::shares`]).
+    #[must_use]
+    pub fn supply_shares(&self) -> [f32; 2] {
+        self.supply_current.shares()
+    }
+
     /// Ticks with valid joint samples since the start.
     #[must_use]
     pub const fn ticks(&self) -> u32 {
@@ -142,6 +158,7 @@ impl<const N: usize> ServoLevel<N> {
     fn rest<H: Hardware<N>>(&mut self, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>, hardware: &mut H) {
         signals.disable();
         signals.set_permission(Permission::Off);
+        signals.set_wanted_brake(0.0);
         let _ = ends.requests.dequeue();
         if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
             host.rest(ends, signals, hardware);
@@ -189,7 +206,16 @@ impl<const N: usize> ServoLevel<N> {
             winding: signals.winding_share(joint),
             first_motion: signals.current_share(joint),
         });
-        control.derate(&self.ramps.at(signals.hottest_c(), bus, joints));
+        let found = self.supply_current.advance(signals.power_w(), signals.given_brake(), bus);
+        signals.set_wanted_brake(self.supply_current.brake_duty());
+        if let Some(code) = found {
+            if code == FaultCode::ChargeCurrent {
+                signals.inhibit.raise(InhibitReason::ChargeCurrent);
+            }
+            control.report(Fault { code, joint: 0 });
+        }
+        let ramps = self.ramps.at(signals.hottest_c(), bus, joints);
+        control.derate(&ramps.with_supply(self.supply_current.shares()));
     }
 
     /// Records a refusal by the bus.

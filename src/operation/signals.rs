@@ -261,6 +261,10 @@ pub struct Signals<const N: usize> {
     /// Share of each axis' current limit that is permitted now, as bits. The axis itself enforces it; the
     /// servo limits its torque likewise and reports it.
     current_shares: [Word; N],
+    /// Electrical power of each axis, W, as bits.
+    powers: [Word; N],
+    /// Duty of the brake resistor that the servo wants, and the one that it was given, as bits.
+    brake: [Word; 2],
     permission: Word,
     hosted: Word,
     permits: Word,
@@ -282,6 +286,8 @@ impl<const N: usize> Signals<N> {
             i2t: [const { Word::new(0) }; N],
             windings: [const { [Word::new(0), Word::new(FULL_SHARE)] }; N],
             current_shares: [const { Word::new(FULL_SHARE) }; N],
+            powers: [const { Word::new(0) }; N],
+            brake: [const { Word::new(0) }; 2],
             permission: Word::new(0),
             hosted: Word::new(0),
             permits: Word::new(0),
@@ -382,6 +388,49 @@ impl<const N: usize> Signals<N> {
     #[must_use]
     pub fn current_share(&self, axis: usize) -> f32 {
         self.current_shares.get(axis).map_or(f32::NAN, |share| f32::from_bits(share.get()))
+    }
+
+    /// Sets an axis' electrical power, W ([`crate::motor::Axis::power_w`]).
+    #[inline(always)]
+    pub fn set_power(&self, axis: usize, watt: f32) {
+        if let Some(power) = self.powers.get(axis) {
+            power.set(watt.to_bits());
+        }
+    }
+
+    /// Sum of the axes' electrical powers, W; zero while an inhibit reason holds, because shorted motors take
+    /// nothing from the bus.
+    #[must_use]
+    pub fn power_w(&self) -> f32 {
+        if self.inhibit.is_clear() {
+            self.powers.iter().fold(0.0, |sum, power| sum + f32::from_bits(power.get()))
+        } else {
+            0.0
+        }
+    }
+
+    /// Least duty of the brake resistor, 0..=0.95, by the servo.
+    #[inline(always)]
+    #[must_use]
+    pub fn wanted_brake(&self) -> f32 {
+        f32::from_bits(self.brake[0].get())
+    }
+
+    /// Sets the least duty of the brake resistor, which its energy budget still limits.
+    pub fn set_wanted_brake(&self, duty: f32) {
+        self.brake[0].set(duty.to_bits());
+    }
+
+    /// Duty that the brake resistor was given in the last tick; zero without a resistor.
+    #[must_use]
+    pub fn given_brake(&self) -> f32 {
+        f32::from_bits(self.brake[1].get())
+    }
+
+    /// Sets the duty that the brake resistor was given.
+    #[inline(always)]
+    pub fn set_given_brake(&self, duty: f32) {
+        self.brake[1].set(duty.to_bits());
     }
 
     /// Temperature of a winding, degrees Celsius, by its model.

@@ -1,13 +1,15 @@
-//! Derating: reduces the requested torque while a bridge or winding is hot or the bus voltage is low or high.
+//! Derating: reduces the requested torque while a bridge or winding is hot, the bus voltage is low or high,
+//! or the supply current is near its limit.
 //!
 //! Why ramps and not switches: a drive that turns off at a threshold drops its leg. A drive that weakens well
 //! before it warns the wearer and mostly never reaches the threshold.
 //!
 //! ```text
 //! ramp(x) = clamp((x - none) / (all - none), 0, 1)
-//! |torque| <= cap * ramp(bridge) * joint * ramp(bus, low)       where it drives the joint
-//! |torque| <= cap * ramp(bridge) * joint * ramp(bus, high)      where the joint drives it
+//! |torque| <= cap * ramp(bridge) * joint * ramp(bus, low) * draw        where it drives the joint
+//! |torque| <= cap * ramp(bridge) * joint * ramp(bus, high) * charge     where the joint drives it
 //! joint = ramp(winding) * share of the first motion
+//! draw, charge                   shares that the supply current leaves (super::SupplyCurrent)
 //! ```
 //!
 //! Applied to the request before range and speed are checked ([`super::Barrier`]): stopping a joint at its
@@ -63,6 +65,10 @@ limit_codes! {
     Winding = 8, "winding";
     /// The motor's rotor angle is stored and has not been proven by a motion (`motor::Axis`).
     FirstMotion = 9, "first_motion";
+    /// The current from the supply is near its limit ([`super::SupplyCurrent`]).
+    SupplyCurrent = 10, "supply_current";
+    /// The current into the supply is near its limit.
+    ChargeCurrent = 11, "charge_current";
 }
 
 /// A set of codes: bit n for code n.
@@ -124,6 +130,8 @@ impl LimitCodes {
             .with(limited.derated && derating.of_joint(joint).first_motion < 1.0, LimitCode::FirstMotion)
             .with(limited.derated && derating.low < 1.0, LimitCode::BusLow)
             .with(limited.derated && derating.high < 1.0, LimitCode::BusHigh)
+            .with(limited.derated && derating.supply[0] < 1.0, LimitCode::SupplyCurrent)
+            .with(limited.derated && derating.supply[1] < 1.0, LimitCode::ChargeCurrent)
     }
 }
 
@@ -148,19 +156,29 @@ pub struct Derating<const N: usize> {
     bridge: f32,
     low: f32,
     high: f32,
+    /// Shares of the draw limit and of the charge limit.
+    supply: [f32; 2],
     joints: [JointShares; N],
 }
 
 impl<const N: usize> Derating<N> {
     /// No derating.
-    pub const NONE: Self = Self { bridge: 1.0, low: 1.0, high: 1.0, joints: [JointShares::ALL; N] };
+    pub const NONE: Self =
+        Self { bridge: 1.0, low: 1.0, high: 1.0, supply: [1.0; 2], joints: [JointShares::ALL; N] };
+
+    /// Adds the shares of a torque that drives a joint and of one that a joint drives, by the supply current.
+    #[must_use]
+    pub const fn with_supply(self, supply: [f32; 2]) -> Self {
+        Self { supply, ..self }
+    }
 
     /// Shares of a joint for a torque that drives it and for one that it drives.
     #[must_use]
     pub fn shares(&self, joint: usize) -> [f32; 2] {
         let JointShares { winding, first_motion } = self.of_joint(joint);
         let both = self.bridge * winding * first_motion;
-        [both * self.low, both * self.high]
+        let [draw, charge] = self.supply;
+        [both * self.low * draw, both * self.high * charge]
     }
 
     fn of_joint(&self, joint: usize) -> JointShares {
@@ -223,6 +241,7 @@ impl DeratingRamps {
             joints,
             low: self.low.share(bus.0),
             high: self.high.share(bus.0),
+            supply: [1.0; 2],
         }
     }
 }
@@ -281,6 +300,8 @@ mod tests {
             (LimitCode::BusHigh, 7),
             (LimitCode::Winding, 8),
             (LimitCode::FirstMotion, 9),
+            (LimitCode::SupplyCurrent, 10),
+            (LimitCode::ChargeCurrent, 11),
         ];
         assert_eq!(numbers.map(|(code, _)| code), LimitCode::ALL);
         assert!(numbers.iter().all(|(code, number)| *code as u8 == *number));
@@ -309,6 +330,7 @@ mod tests {
         let half = JointShares { winding: 0.5, first_motion: 0.5 };
         let derating = RAMPS.at(90.0, Volt(22.5), [JointShares::ALL, half]);
         assert_eq!([0, 1, 2].map(|joint| derating.shares(joint)), [[0.25, 0.5], [0.0625, 0.125], [0.0; 2]]);
+        assert_eq!(derating.with_supply([0.5, 0.25]).shares(0), [0.125, 0.125]);
     }
 
     #[test]
@@ -332,6 +354,10 @@ mod tests {
         assert_eq!(of(Limited { derated: true, ..none }, &winding), 1 << 8);
         let first = joint(JointShares { first_motion: 0.25, ..JointShares::ALL });
         assert_eq!(of(Limited { derated: true, ..none }, &first), 1 << 9);
+        for (supply, code) in [([0.9, 1.0], 10), ([1.0, 0.9], 11)] {
+            let supplied = Derating::NONE.with_supply(supply);
+            assert_eq!(of(Limited { derated: true, ..none }, &supplied), 1 << code);
+        }
     }
 
     #[test]

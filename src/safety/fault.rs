@@ -109,6 +109,10 @@ faults! {
     BusVoltage = 0x3200, "V1", "bus_voltage", Off, "the bus voltage left its range";
     /// The supply fails while energy is left (3220: DC link undervoltage).
     SupplyLost = 0x3220, "V2", "supply_lost", Damp, "its supply went away";
+    /// More current from the supply than its limit, by the estimate.
+    SupplyCurrent = 0xFF10, "V4", "supply_current", Damp, "its supply current was too large";
+    /// More current into the supply than its limit. Shorted motors return nothing.
+    ChargeCurrent = 0xFF11, "V5", "charge_current", ActiveShort, "it charged its supply with too much current";
     /// A bridge is too hot (4210: excess temperature of the device).
     Temperature = 0x4210, "T1", "temperature", Damp, "a bridge is too hot";
     /// A thermistor is open or shorted.
@@ -231,6 +235,8 @@ mod tests {
             (FaultCode::GateConfiguration, 0x5400),
             (FaultCode::BusVoltage, 0x3200),
             (FaultCode::SupplyLost, 0x3220),
+            (FaultCode::SupplyCurrent, 0xFF10),
+            (FaultCode::ChargeCurrent, 0xFF11),
             (FaultCode::Temperature, 0x4210),
             (FaultCode::Thermistor, 0xFF04),
             (FaultCode::WindingTemperature, 0x2350),

@@ -86,11 +86,13 @@ pub enum InhibitReason {
     Configuration,
     /// The flash is being written, which may stall the processor.
     Storing,
+    /// Too much current into the supply: both axes brake.
+    ChargeCurrent,
 }
 
 impl InhibitReason {
     /// All reasons, in the order of their bits.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::EmergencyStop,
         Self::GateFault,
         Self::GateConfiguration,
@@ -107,6 +109,7 @@ impl InhibitReason {
         Self::BoardVersion,
         Self::Configuration,
         Self::Storing,
+        Self::ChargeCurrent,
     ];
 
     /// Fault that corresponds to the reason. `None` for an axis, which reports its own fault, and for
@@ -128,6 +131,7 @@ impl InhibitReason {
             Self::Timers => FaultCode::Timers,
             Self::BoardVersion => FaultCode::BoardVersion,
             Self::Configuration => FaultCode::Configuration,
+            Self::ChargeCurrent => FaultCode::ChargeCurrent,
         })
     }
 
@@ -190,12 +194,17 @@ impl Bridges {
     #[inline(always)]
     #[must_use]
     pub const fn of(causes: u32) -> Self {
-        const BRAKE: u32 = InhibitReason::EncoderFrozen.bit() | InhibitReason::EncoderPosition.bit();
-        match (causes, causes & !BRAKE) {
-            (0, _) => Self::Follow,
-            (_, 0) => Self::Brake,
-            _ => Self::Off,
-        }
+        if causes == 0 { Self::Follow } else { Self::while_inhibited(causes) }
+    }
+
+    /// Operation while a reason is set. A separate function: in most ticks none is.
+    #[cold]
+    #[inline(never)]
+    const fn while_inhibited(causes: u32) -> Self {
+        const BRAKE: u32 = InhibitReason::EncoderFrozen.bit()
+            | InhibitReason::EncoderPosition.bit()
+            | InhibitReason::ChargeCurrent.bit();
+        if causes & !BRAKE == 0 { Self::Brake } else { Self::Off }
     }
 }
 
@@ -334,11 +343,16 @@ mod tests {
 
     #[test]
     fn bridges_brake_only_without_another_reason() {
-        let (frozen, place) = (InhibitReason::EncoderFrozen.bit(), InhibitReason::EncoderPosition.bit());
+        let brakes =
+            [InhibitReason::EncoderFrozen, InhibitReason::EncoderPosition, InhibitReason::ChargeCurrent]
+                .map(InhibitReason::bit);
+        let all = brakes.iter().fold(0, |bits, bit| bits | bit);
         assert_eq!(Bridges::of(0), Bridges::Follow);
-        assert_eq!([frozen, place, frozen | place].map(Bridges::of), [Bridges::Brake; 3]);
-        for cause in InhibitReason::ALL.into_iter().filter(|cause| cause.bit() & (frozen | place) == 0) {
-            assert_eq!([cause.bit(), cause.bit() | frozen].map(Bridges::of), [Bridges::Off; 2], "{cause:?}");
+        assert_eq!(brakes.map(Bridges::of), [Bridges::Brake; 3]);
+        assert_eq!(Bridges::of(all), Bridges::Brake);
+        for cause in InhibitReason::ALL.into_iter().filter(|cause| cause.bit() & all == 0) {
+            let with_each = brakes.map(|brake| Bridges::of(cause.bit() | brake));
+            assert_eq!((Bridges::of(cause.bit()), with_each), (Bridges::Off, [Bridges::Off; 3]), "{cause:?}");
         }
     }
 

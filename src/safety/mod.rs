@@ -14,6 +14,7 @@
 //! | [`DeratingRamps`], [`LimitCode`] | derating by temperature and bus voltage; codes of active limits |
 //! | [`Winding`] | temperature of a motor's winding, from its current |
 //! | [`SupplyWatch`] | detection of a failing supply |
+//! | [`SupplyCurrent`] | estimate and limits of the current from the supply and into it |
 //! | [`Monitor`] | all of the above, once per tick |
 //! | [`RefusalReason`] | reasons why enabling is refused |
 //! | [`InhibitReason`], [`TickWatch`], [`ServoWatch`] | inhibit reasons; checks of every current tick |
@@ -42,6 +43,7 @@ pub mod periodic_checks;
 pub mod refusal;
 pub mod state;
 pub mod step_gate;
+pub mod supply_current;
 pub mod winding;
 
 pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
@@ -55,4 +57,5 @@ pub use periodic_checks::{BoardFault, CheckClock, of_gate_driver, of_temperature
 pub use refusal::{Refusal, RefusalReason};
 pub use state::{DriveState, Event, Permission, PowerRequest};
 pub use step_gate::{Reading, StepGate};
+pub use supply_current::{SupplyCurrent, SupplyLimits};
 pub use winding::{Winding, WindingRating};

@@ -103,7 +103,8 @@ fn hand_out(
     match control {
         Some(control) => {
             let volt_per_code = analog::sense(divider).volt_per_code;
-            let level = ServoLevel::new(&control, drives::derating(divider), volt_per_code, following);
+            let level = ServoLevel::new(&control, drives::derating(divider), volt_per_code, following)
+                .with_supply(leg::LEG.supply);
             static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
             let clock = functions.clock;
             place(&servo::SERVO, SERVO.init(servo::ServoLoop { control, level, ends: servo_ends, clock }));

@@ -217,11 +217,20 @@ pub struct SupplyDescription {
     pub brake_resistance: f64,
     /// Bus voltage per voltage at the converter.
     pub divider: f64,
+    /// Whether the source takes current, as a battery does; otherwise a diode blocks.
+    pub takes_charge: bool,
 }
 
 impl Default for SupplyDescription {
     fn default() -> Self {
-        Self { voltage: 48.0, resistance: 0.05, capacitance: 1.5e-3, brake_resistance: 2.0, divider: 19.0 }
+        Self {
+            voltage: 48.0,
+            resistance: 0.05,
+            capacitance: 1.5e-3,
+            brake_resistance: 2.0,
+            divider: 19.0,
+            takes_charge: false,
+        }
     }
 }
 

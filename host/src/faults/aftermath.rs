@@ -47,7 +47,7 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
     use FaultCode as Code;
     match code {
         // A motor too fast for a short circuit is turned off; both are, if neither was switching.
-        Code::EncoderPosition | Code::EncoderFrozen => &["Short", "Off"],
+        Code::EncoderPosition | Code::EncoderFrozen | Code::ChargeCurrent => &["Short", "Off"],
         Code::EncoderStep
         | Code::AbsoluteEncoder
         | Code::SupplyLost
@@ -61,7 +61,8 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
         | Code::HostSilent
         | Code::LatePdo
         | Code::BusOff
-        | Code::BusPassive => &["Damp"],
+        | Code::BusPassive
+        | Code::SupplyCurrent => &["Damp"],
         // With too many missing ticks, damping is impossible.
         Code::CurrentTicks => &["Damp", "Off"],
         Code::OpenPhase

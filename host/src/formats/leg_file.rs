@@ -99,6 +99,12 @@ pub struct LegFile {
     /// Supply of complete drives.
     #[serde(default, skip_serializing_if = "SupplyFile::is_default")]
     pub supply: SupplyFile,
+    /// Greatest current from the supply, A; `None` for no limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply_current_a: Option<f64>,
+    /// Greatest current into the supply, A; `None` for a supply whose diode lets none in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub charge_current_a: Option<f64>,
     /// Joints, proximal first.
     #[serde(rename = "joint")]
     pub joints: Vec<JointFile>,
@@ -371,6 +377,8 @@ impl LegFile {
             side: BodySide::default(),
             segments: None,
             supply: SupplyFile::default(),
+            supply_current_a: None,
+            charge_current_a: None,
             joints,
         }
     }

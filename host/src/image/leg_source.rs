@@ -62,6 +62,7 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, FileError> 
     let description = LegDescription {
         name: Box::leak(leg.name.replace(char::is_whitespace, "_").into_boxed_str()),
         gravity: model.gravity.into(),
+        supply: leg.supply_limits(),
         joints,
         prior: configuration.prior.map(|prior| prior.map(|link| link_description(&link))),
         plan: configuration.plan,
@@ -126,7 +127,7 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
          use crate::motion::ExcitationTable;\n\
          use crate::motor::AbsoluteEncoders;\n\
          {direction}\
-         use crate::safety::WindingRating;\n\
+         use crate::safety::{{SupplyLimits, WindingRating}};\n\
          use crate::units::*;\n\n\
          /// The leg.\n\
          pub const LEG: LegDescription<{JOINTS}> = {description:#?};\n\

@@ -141,6 +141,8 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
             prior_wearer_kg: prior_mass,
         }),
         supply: SupplyFile::default(),
+        supply_current_a: None,
+        charge_current_a: None,
         joints: vec![hip, knee],
     }
 }

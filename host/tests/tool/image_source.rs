@@ -2,6 +2,8 @@
 
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::motor::{AxisConfiguration, CalibrationSettings, Calibrator};
+use scarab::safety::SupplyLimits;
+use scarab::units::{Ampere, Ohm};
 use scarab_host::formats::leg_file::{BodySide, DEFAULT_LEG, EncoderFile, LegFile, Side};
 use scarab_host::image::leg_source::{describe, source};
 use scarab_host::image::size::{ImageSize, MEMORY_GOAL, Section};
@@ -206,6 +208,20 @@ fn a_leg_file_limits_the_travel_of_a_calibration() {
     let (description, _) = describe(&file, 1).expect("two joints");
     let turns = drives::calibrations(&description).map(|settings| settings.travel_turns);
     assert_eq!(turns, [1.25, 1.6]);
+}
+
+#[test]
+fn a_leg_file_limits_the_supply_current_of_image_and_simulation() {
+    let mut file = leg(DEFAULT_LEG);
+    assert_eq!((file.supply_limits().draw, file.supply_limits().charge), (None, None));
+    (file.supply_current_a, file.charge_current_a, file.supply.brake_ohm) = (Some(20.0), Some(5.0), 3.0);
+    let (description, _) = describe(&file, 1).expect("two joints");
+    let limits = SupplyLimits { draw: Some(Ampere(20.0)), charge: Some(Ampere(5.0)), brake: Ohm(3.0) };
+    assert_eq!((description.supply, file.supply_limits()), (limits, limits));
+    assert!(source(&description).contains("supply: SupplyLimits {"));
+    // Only a stated limit makes the simulated supply a battery.
+    let takes = |file: &LegFile| file.complete_description::<2>().expect("motors").supply.takes_charge;
+    assert_eq!([takes(&file), takes(&leg(DEFAULT_LEG))], [true, false]);
 }
 
 #[test]

@@ -175,3 +175,21 @@ fn a_loop_that_takes_over_goes_on_with_the_voltage_that_held_the_current() {
     let voltage = CurrentLoop::holding(held).voltage(&gains, Ampere(7.0), current, 0.0, Volt(20.0));
     assert!((voltage.d.0 - 1.5).abs() < 1e-6 && (voltage.q.0 + 0.5).abs() < 1e-6, "{voltage:?}");
 }
+
+#[test]
+fn the_power_is_that_of_the_motors_terminals() {
+    for feedforward in [true, false] {
+        for speed in [-900.0, 0.0, 900.0] {
+            for target in [-30.0, 30.0] {
+                let mut plant = Plant::at(speed);
+                let current_loop = settled(&mut plant, &gains(1000.0, feedforward), target, 20.0, 2000);
+                let [d, q] = plant.current;
+                // The settled voltages act: 1.5 v i.
+                let expected = 1.5 * (plant.pending[0] * d + plant.pending[1] * q);
+                let gains = gains(1000.0, feedforward);
+                let power = f64::from(current_loop.power_w(&gains, plant.measured(), speed as f32));
+                assert!((power - expected).abs() < 0.01 * expected.abs(), "{power} W, not {expected} W");
+            }
+        }
+    }
+}

@@ -281,6 +281,26 @@ fn a_missing_bus_voltage_inhibits_at_the_second_period() {
 }
 
 #[test]
+fn the_brake_resistor_takes_the_larger_duty_of_servo_and_bus_voltage() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    bench.motors.iter_mut().for_each(|motor| motor.bus = 48.0);
+    bench.signals.set_wanted_brake(0.25);
+    bench.run(2);
+    assert_eq!([bench.hardware.brake, bench.signals.given_brake()], [0.25; 2]);
+    bench.motors.iter_mut().for_each(|motor| motor.bus = 53.0);
+    bench.run(2);
+    assert!(bench.hardware.brake > 0.7 && bench.signals.given_brake() == bench.hardware.brake);
+    // The energy budget counts for both.
+    bench.run(24_000);
+    assert_eq!([bench.hardware.brake, bench.signals.given_brake()], [0.0; 2]);
+    let mut bench = Bench::new(&CONFIGURATION);
+    bench.loops.remove_chopper();
+    bench.signals.set_wanted_brake(0.25);
+    bench.run(2);
+    assert_eq!([bench.hardware.brake, bench.signals.given_brake()], [0.0; 2]);
+}
+
+#[test]
 fn only_a_stall_of_more_than_2_ms_discards_the_zeros() {
     for (stood, forgets) in [(CERTAIN_PERIODS, false), (CERTAIN_PERIODS + 1, true)] {
         let mut bench = Bench::new(&CONFIGURATION);

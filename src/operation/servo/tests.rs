@@ -273,7 +273,7 @@ fn an_open_enabling_switch_stops_an_enabled_leg() {
 #[test]
 fn only_requests_that_turn_off_pass_while_inhibited() {
     let mut bench = Bench::enabled();
-    bench.signals.inhibit.raise(crate::safety::InhibitReason::EmergencyStop);
+    bench.signals.inhibit.raise(InhibitReason::EmergencyStop);
     bench.tick();
     assert_eq!(
         (bench.control.state(), bench.signals.target(0).enabled),

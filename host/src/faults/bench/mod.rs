@@ -21,6 +21,7 @@ mod silent;
 mod stall;
 mod start;
 mod stopped;
+mod supply;
 
 use scarab::safety::FaultCode;
 
@@ -42,13 +43,15 @@ pub struct Bench {
 }
 
 /// All benches.
-pub static BENCHES: [Bench; 23] = [
+pub static BENCHES: [Bench; 25] = [
     absolute::SILENT,
     absolute::CONTRADICTION,
     offsets::BENCH,
     calibration::BENCH,
     start::ZEROS,
     hot::BENCH,
+    supply::DRAW,
+    supply::CHARGE,
     stopped::BENCH,
     parts::BENCH,
     command::BENCH,

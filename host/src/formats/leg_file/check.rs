@@ -93,6 +93,14 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
         }
     }
     leg.supply.check()?;
+    // Below, noise and offsets of the estimate count.
+    for (key, limit) in
+        [("supply_current_a", leg.supply_current_a), ("charge_current_a", leg.charge_current_a)]
+    {
+        if let Some(limit) = limit {
+            top.within(key, limit, 0.5, 500.0)?;
+        }
+    }
     if !(1..=3).contains(&leg.joints.len()) {
         return Err(top.fault("joint", &format!("occurs {} times; a leg has 1 to 3", leg.joints.len())));
     }

@@ -11,8 +11,8 @@ use hal_sim::drive::description::{
 };
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::leg::{AbsoluteEncoders, CounterDirection};
-use scarab::safety::WindingRating;
-use scarab::units::{Ohm, Weber};
+use scarab::safety::{SupplyLimits, WindingRating};
+use scarab::units::{Ampere, Ohm, Weber};
 use serde::{Deserialize, Serialize};
 
 use crate::base::error::FileError;
@@ -365,6 +365,19 @@ impl LegFile {
         }
         let count = axes.len();
         let axes = axes.try_into().map_err(|_| self.error(format!("has {count} joints, not {N}")))?;
-        Ok(CompleteDescription::new(axes, self.supply.description()))
+        let mut supply = self.supply.description();
+        supply.takes_charge = self.charge_current_a.is_some();
+        Ok(CompleteDescription::new(axes, supply))
+    }
+
+    /// Limits of the supply for the firmware.
+    #[must_use]
+    pub fn supply_limits(&self) -> SupplyLimits {
+        let limit = |ampere: Option<f64>| ampere.map(|ampere| Ampere(ampere as f32));
+        SupplyLimits {
+            draw: limit(self.supply_current_a),
+            charge: limit(self.charge_current_a),
+            brake: Ohm(self.supply.brake_ohm as f32),
+        }
     }
 }

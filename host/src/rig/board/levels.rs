@@ -31,7 +31,7 @@ use scarab::operation::{
     AxisState, BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings,
     IdentificationLevel, Queues, RATE_HZ, ServoLevel, Signals, Slice, StoreJob, Tick, Watch,
 };
-use scarab::safety::GUARD_RATE_HZ;
+use scarab::safety::{GUARD_RATE_HZ, SupplyLimits};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
@@ -94,6 +94,7 @@ pub struct Levels<const N: usize> {
     watch: Watch<N>,
     settings: HousekeepingSettings<N>,
     chopper: Chopper,
+    supply: SupplyLimits,
     following: Option<Following<N>>,
 }
 
@@ -109,7 +110,7 @@ impl<const N: usize> Levels<N> {
     ) -> Result<Self, ToolError> {
         let (axes, chopper) = ready(believed, description, world, seed)?;
         let settings = housekeeping_settings(believed)?;
-        let mut levels = Self::cold(settings, chopper, leg, None);
+        let mut levels = Self::cold(settings, chopper, believed.supply_limits(), leg, None);
         levels.signals.begin_servo();
         levels.signals.statistics.see_bus(BUS_CODE);
         levels.registers.servo_due = true;
@@ -127,6 +128,7 @@ impl<const N: usize> Levels<N> {
     fn cold<const B: usize>(
         settings: HousekeepingSettings<N>,
         chopper: Chopper,
+        supply: SupplyLimits,
         leg: &DeviceLeg<N, B>,
         following: Option<Following<N>>,
     ) -> Self {
@@ -145,11 +147,13 @@ impl<const N: usize> Levels<N> {
                 drives::derating(SenseScale::DIVIDER),
                 volt_per_code,
                 following,
-            ),
+            )
+            .with_supply(supply),
             housekeeper: Housekeeper::new(settings),
             identification: IdentificationLevel::new(leg.identification().swarm_seed()),
             settings,
             chopper,
+            supply,
             following,
         }
     }
@@ -161,15 +165,29 @@ impl<const N: usize> Levels<N> {
         registers.gates = self.registers.gates;
         registers.thermistors = self.registers.thermistors;
         registers.encoders = self.registers.encoders;
-        *self = Self { registers, ..Self::cold(self.settings, self.chopper, leg, self.following.take()) };
+        let following = self.following.take();
+        *self = Self { registers, ..Self::cold(self.settings, self.chopper, self.supply, leg, following) };
     }
 
     /// Connects the board to a bus, before its first tick.
     pub fn join_bus<const B: usize>(&mut self, leg: &DeviceLeg<N, B>, following: Following<N>) {
         let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
         let derating = drives::derating(SenseScale::DIVIDER);
-        self.servo = ServoLevel::new(leg.control(), derating, volt_per_code, Some(following));
+        self.servo =
+            ServoLevel::new(leg.control(), derating, volt_per_code, Some(following)).with_supply(self.supply);
         (self.bus, self.following) = (Some(Box::default()), Some(following));
+    }
+
+    /// Replaces the limits of the supply current.
+    pub fn limit_supply(&mut self, limits: SupplyLimits) {
+        (self.servo, self.supply) = (self.servo.clone().with_supply(limits), limits);
+    }
+
+    /// Shares of the torque that the limits of the supply current leave: of one that drives a joint, and of
+    /// one that a joint drives.
+    #[must_use]
+    pub fn supply_shares(&self) -> [f32; 2] {
+        self.servo.supply_shares()
     }
 
     /// Exchanges two axes with their calibrations: their motors are on each other's connectors.
