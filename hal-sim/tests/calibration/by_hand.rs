@@ -51,7 +51,8 @@ impl PowerUp {
         self.sample.index_count = self.sample.index_count.map(|count| count.wrapping_sub(self.lost));
         let [d, q] = self.stand.rotor_currents();
         self.most_ampere = self.most_ampere.max(d.hypot(q));
-        event.map(|(outcome, _)| outcome)
+        // The index is followed in the state itself.
+        event.map(|(outcome, _)| outcome).filter(|outcome| !matches!(outcome, Outcome::Index(_)))
     }
 
     /// A hand turns the rotor by so many turns, back and forth by a tenth of a turn at first, and not evenly.

@@ -137,7 +137,9 @@ fn falls_silent(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
             break;
         }
     }
-    let deadline_ms = if form == Form::Garbage { GARBAGE_MS } else { fork.head.deadline_ms };
+    // Random frames are wrong now and then.
+    let intermittent_ms = (form == Form::Garbage).then_some(GARBAGE_MS);
+    let deadline_ms = intermittent_ms.unwrap_or(fork.head.deadline_ms);
     let in_time = after_ms.is_some_and(|after| after <= deadline_ms + 1e-9);
     let is_right = state == Some("Damp") || form == Form::Garbage && matches!(state, Some("Short" | "Off"));
     // An interruption of so many checks spans as many of them, whatever its phase.
@@ -150,6 +152,7 @@ fn falls_silent(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
         undetectable: state.is_none() && may_be,
         false_alarm: is_noise && state.is_some(),
         after_ms,
+        intermittent_ms,
         magnitude,
         ..found
     })
