@@ -32,11 +32,17 @@ fn calibration(number: u32) -> CalibrationRecord {
         direct_inductance: Henry(2.5e-5),
         quadrature_inductance: Henry(3.1e-5),
         offset: ElectricalAngle::from_units(number.wrapping_mul(0x9E37_79B9).cast_signed()),
-        encoder: EncoderSetting { counter: CounterDirection::Down, pole_pairs: 7, counts_per_turn: 8192 },
+        encoder: EncoderSetting {
+            counter: CounterDirection::Down,
+            pole_pairs: 7,
+            counts_per_turn: 8192,
+            absolute: number % 2 == 1,
+        },
         winding_c: (number % 2 == 1).then_some(number as f32 - 100.0),
         joint_zero: (number % 3 == 1).then_some(JointZero {
             rotor: -(number as i32),
             joint: AbsoluteAngle::from_steps(number as u16),
+            setting: number as u8,
         }),
     })
 }

@@ -18,7 +18,7 @@ use super::Direction;
 pub struct AbsoluteEncoders {
     /// Whether there is one at the rotor. Its zero replaces the index.
     pub rotor: bool,
-    /// Direction of the one at the joint while the joint flexes; `None` without one.
+    /// Direction of the one at the joint while the counter grows; `None` without one.
     pub joint: Option<Direction>,
 }
 

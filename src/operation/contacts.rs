@@ -151,11 +151,9 @@ impl Operator {
             }
             _ => {}
         }
-        if now.blocked {
-            // The inhibit reason may clear by itself; this closing must not enable then.
-            self.steps = u8::MAX;
-        }
         if now.blocked || !now.calibrated || !now.referenced {
+            // The reason may end by itself, also a missing reference. This closing must not enable then.
+            self.steps = u8::MAX;
             return None;
         }
         self.next_step(now.drive?)
@@ -336,7 +334,10 @@ mod tests {
             Situation { referenced: false, ..held },
             Situation { blocked: true, calibrated: false, start: true, ..held },
         ] {
-            assert_eq!(requested(&mut trusted(), now, RATE_HZ).count(), 0, "{now:?}");
+            let mut operator = trusted();
+            assert_eq!(requested(&mut operator, now, RATE_HZ).count(), 0, "{now:?}");
+            // A reason that ends while the switch is held.
+            assert_eq!(requested(&mut operator, held, RATE_HZ).count(), 0, "{now:?}");
         }
     }
 

@@ -11,15 +11,17 @@
 //! ```
 //!
 //! One contradiction or invalid frame is noise. Two contradictions in a row make the rotor position lost, and
-//! both motors brake: which of the encoders is wrong cannot be told. Five invalid frames in a row are a fault
+//! both motors brake: which of the encoders is wrong is unknown. Five invalid frames in a row are a fault
 //! that damps, because the counter still works.
 //!
 //! Why 2.5 degrees: an AS5047P errs by up to 0.8 degrees, at the zero and elsewhere in opposite directions;
 //! the rest is for backlash and a mounting off the axis. The rotor's position removes these errors from the
 //! zero.
 //!
-//! Known limits: a gear that slips by whole motor turns while the power is off moves the zero by as much,
-//! unless the joint's encoder shows more than 2.5 degrees.
+//! Known limits: the zero compares both encoders within a motor turn only. A joint encoder that was turned on
+//! its shaft while the power was off goes unnoticed where that is near whole motor turns, for instance 7.2
+//! degrees at 50:1; then the zero is wrong by as much. A gear that slipped by less than a quarter of a motor
+//! turn goes unnoticed too.
 
 use crate::leg::MotorDescription;
 use crate::motor::absolute::within_half_a_turn;
@@ -41,6 +43,13 @@ impl EncoderSettings {
     #[must_use]
     pub const fn of(motor: &MotorDescription) -> Self {
         Self { absolute: motor.absolute, counts_per_turn: motor.counts_per_turn, ratio: motor.ratio }
+    }
+
+    /// Check of direction and ratio, for which a joint's zero holds.
+    pub(super) fn joint_setting(&self) -> u8 {
+        let [a, b, c, d] = self.ratio.to_le_bytes();
+        let direction = if self.absolute.joint == Some(Direction::Down) { 1 } else { 0 };
+        direction ^ a.rotate_left(1) ^ b.rotate_left(2) ^ c.rotate_left(3) ^ d.rotate_left(4)
     }
 
     fn turn(&self) -> i32 {

@@ -34,7 +34,7 @@ use crate::leg::{
     AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Mismatch, MotorFindings,
     PowerRequest, StoredCalibration,
 };
-use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, JointZero};
+use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, EncoderSetting, JointZero};
 use crate::real::max;
 use crate::safety::{
     BoardFault, CheckClock, InhibitReason, Winding, WindingRating, of_gate_driver, of_temperature,
@@ -72,10 +72,9 @@ struct Level<'a, 'q, const N: usize, H> {
 }
 
 impl<const N: usize, H> Level<'_, '_, N, H> {
-    fn order(&mut self, axis: usize, order: Order) {
-        if let Some(orders) = self.ends.orders.get_mut(axis) {
-            let _ = orders.enqueue(order);
-        }
+    /// Sends an order to an axis and returns whether the queue took it.
+    fn order(&mut self, axis: usize, order: Order) -> bool {
+        self.ends.orders.get_mut(axis).is_some_and(|orders| orders.enqueue(order).is_ok())
     }
 
     /// Sends a request to the servo and returns whether the queue took it. While a host has the drive,
@@ -185,7 +184,14 @@ impl<const N: usize> Housekeeper<N> {
     /// Adds stored calibrations.
     #[must_use]
     pub fn with_stored(self, stored: [Option<StoredCalibration>; N]) -> Self {
-        let joint_zeros = stored.map(|stored| stored?.joint_zero);
+        let HousekeepingSettings { axes, encoders, .. } = &self.settings;
+        let joint_zeros = core::array::from_fn(|axis| {
+            // With another setting the readings mean something else.
+            let (stored, axis, encoders) =
+                (stored.get(axis)?.as_ref()?, axes.get(axis)?, encoders.get(axis)?);
+            let zero = stored.joint_zero.filter(|zero| zero.setting == encoders.joint_setting());
+            zero.filter(|_| encoders.absolute.joint.is_some() && stored.encoder == EncoderSetting::of(axis))
+        });
         Self { stored, joint_zeros, ..self }
     }
 
@@ -219,12 +225,16 @@ impl<const N: usize> Housekeeper<N> {
 
     /// Advances the windings by one round. A late round counts as one, so a winding cools less.
     fn advance_windings(&mut self, signals: &Signals<N>) {
+        let seconds = self.round as f32 / RATE_HZ as f32;
         for (axis, (winding, before)) in self.windings.iter_mut().zip(&mut self.i2t).enumerate() {
             let now = signals.i2t(axis);
             let added = now.wrapping_sub(*before);
             *before = now;
             winding.advance(added as f32 * I2T_UNIT, 1.0 / RATE_HZ as f32);
             signals.set_winding(axis, winding);
+            if let Some(assumed) = self.assumed.get_mut(axis) {
+                *assumed &= !winding.has_forgotten(seconds);
+            }
         }
     }
 
@@ -288,7 +298,7 @@ impl<const N: usize> Housekeeper<N> {
             }
         }
         if level.signals.take_forgotten() {
-            self.stored = [None; N];
+            (self.stored, self.passed, self.joint_zeros) = ([None; N], [None; N], [None; N]);
         }
         self.record_causes(level);
     }
@@ -313,6 +323,10 @@ impl<const N: usize> Housekeeper<N> {
     fn receive(&mut self, axis: usize, outcome: &Outcome, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         let joint = axis as u8 + 1;
         match outcome {
+            Outcome::Calibrated(_) if self.is_contradicted(axis) => {
+                level.record(refused(joint, "absolute_encoder", 0, None));
+                self.calibrating = None;
+            }
             Outcome::Calibrated(calibration) => {
                 level.record(found(joint, calibration));
                 if let Some(findings) = calibration.findings() {
@@ -322,7 +336,7 @@ impl<const N: usize> Housekeeper<N> {
                 let before = self.stored.get(axis).copied().flatten();
                 self.take_temperature(axis, before, calibration);
                 let stored = if calibration.is_proven() {
-                    let winding_c = self.windings.get(axis).map(Winding::temperature_c);
+                    let winding_c = self.known_temperature(axis);
                     let joint_zero = self.joint_zeros.get(axis).copied().flatten();
                     calibration.stored().map(|stored| StoredCalibration { winding_c, joint_zero, ..stored })
                 } else {
@@ -336,13 +350,13 @@ impl<const N: usize> Housekeeper<N> {
                 let (result, number) = words::calibration(*refusal);
                 level.record(refused(joint, result, number, refusal.mismatch()));
                 self.calibrating = None;
-                use CalibrationRefusal::{Load, Moved, Travel, Turning};
+                use CalibrationRefusal::{BusVoltage, Load, Moved, Travel, Turning};
                 if matches!(refusal, Moved) {
                     self.must_turn(axis, true);
                 }
                 // The stored calibration does not fit the motor or its mounting: measure again next time. A
-                // load or a hand says nothing about it.
-                let is_pushed = matches!(refusal, Load(_) | Moved | Travel | Turning);
+                // load, a hand or the supply says nothing about it.
+                let is_pushed = matches!(refusal, BusVoltage | Load(_) | Moved | Travel | Turning);
                 if let Some((stored, zero)) =
                     self.stored.get_mut(axis).zip(self.joint_zeros.get_mut(axis)).filter(|_| !is_pushed)
                 {
@@ -361,11 +375,8 @@ impl<const N: usize> Housekeeper<N> {
                 level.record(refused(joint, "interrupted", 0, None));
                 self.calibrating = None;
             }
-            // The axis runs on without a zero. The counter may have wrapped.
+            // The axis runs on without a zero.
             Outcome::StoodStill => {
-                if let Some(check) = self.checks.get_mut(axis) {
-                    *check = EncoderCheck::default();
-                }
                 self.set_certain(axis, false);
                 level.record(Record::AxisFault { tick: self.round, joint, name: "zero_forgotten" });
                 self.forget_zeros(level);
@@ -400,6 +411,17 @@ impl<const N: usize> Housekeeper<N> {
         let _ = level.ends.calibrated.enqueue((axis, stored));
     }
 
+    /// Temperature of a winding, unless it follows from an assumption.
+    fn known_temperature(&self, axis: usize) -> Option<f32> {
+        let is_assumed = self.assumed.get(axis).is_none_or(|assumed| *assumed);
+        self.windings.get(axis).filter(|_| !is_assumed).map(Winding::temperature_c)
+    }
+
+    /// Whether an absolute encoder of an axis contradicts its counter.
+    fn is_contradicted(&self, axis: usize) -> bool {
+        self.contradicted.get(axis).is_some_and(|contradicted| *contradicted)
+    }
+
     /// Replaces the assumed temperature of a winding by that of its resistance against the stored one.
     fn take_temperature(
         &mut self,
@@ -412,7 +434,7 @@ impl<const N: usize> Housekeeper<N> {
         };
         if let Some(stored) = stored
             && let Some(celsius) = stored.winding_c
-            && core::mem::take(assumed)
+            && *assumed
         {
             winding.measured(calibration.resistance().0 / stored.resistance.0, celsius);
         }
@@ -474,7 +496,7 @@ impl<const N: usize> Housekeeper<N> {
         });
         let is_absolute = self.settings.encoders.get(axis).is_some_and(|encoders| encoders.absolute.rotor);
         let position = self.checks.get(axis).and_then(EncoderCheck::position);
-        let is_contradicted = self.contradicted.get(axis).is_some_and(|contradicted| *contradicted);
+        let is_contradicted = self.is_contradicted(axis);
         match calibrator {
             Some(Ok(_)) if is_contradicted || is_absolute && position.is_none() => {
                 self.calibrating = None;

@@ -88,6 +88,13 @@ impl Winding {
         self.temperature_c = next;
     }
 
+    /// Whether an assumption so many seconds ago does not matter any more: after three time constants 5 % of
+    /// its error are left.
+    #[must_use]
+    pub fn has_forgotten(&self, seconds: f32) -> bool {
+        seconds > 3.0 * self.rating.time_s
+    }
+
     /// Sets the temperature by the ratio of the present resistance to that at `then_c`, not below ambient. A
     /// ratio that is not finite changes nothing.
     ///

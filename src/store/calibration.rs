@@ -16,7 +16,9 @@ use crate::units::{Henry, Ohm};
 /// Temperature from which that of a winding is counted, degrees Celsius.
 const LOWEST_C: f32 = -100.0;
 /// Contents without a zero of the joint.
-const NO_ZERO: JointZero = JointZero { rotor: 0, joint: AbsoluteAngle::from_steps(0) };
+const NO_ZERO: JointZero = JointZero { rotor: 0, joint: AbsoluteAngle::from_steps(0), setting: 0 };
+const HAS_ZERO: u8 = 1;
+const IS_ABSOLUTE: u8 = 2;
 
 /// Calibration of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,10 +41,11 @@ pub struct CalibrationLayout {
     winding_tenths: U16,
     /// Rotor position at the joint's zero.
     zero_rotor: I32,
-    /// Reading of the joint's encoder there, and whether there is one.
+    /// Reading of the joint's encoder there, and check of its setting.
     zero_joint: U16,
-    has_zero: u8,
-    _reserved: u8,
+    zero_setting: u8,
+    /// 1: the joint has a zero; 2: the rotor has an absolute encoder.
+    flags: u8,
 }
 
 impl Storable for CalibrationRecord {
@@ -79,8 +82,9 @@ impl Storable for CalibrationRecord {
             ),
             zero_rotor: I32::new(zero.rotor),
             zero_joint: U16::new(zero.joint.steps()),
-            has_zero: joint_zero.is_some().into(),
-            _reserved: 0,
+            zero_setting: zero.setting,
+            flags: if joint_zero.is_some() { HAS_ZERO } else { 0 }
+                | if encoder.absolute { IS_ABSOLUTE } else { 0 },
         }
     }
 
@@ -96,7 +100,7 @@ impl Storable for CalibrationRecord {
         let counts_per_turn = layout.counts_per_turn.get();
         let makes_sense = [resistance, direct, quadrature].into_iter().all(is_size)
             && counts_per_turn > 0
-            && layout.has_zero <= 1
+            && layout.flags <= HAS_ZERO | IS_ABSOLUTE
             && layout.pole_pairs > 0;
         if !makes_sense {
             return Err(RecordError::Range);
@@ -106,14 +110,20 @@ impl Storable for CalibrationRecord {
             direct_inductance: Henry(direct),
             quadrature_inductance: Henry(quadrature),
             offset: ElectricalAngle::from_units(layout.offset.get()),
-            encoder: EncoderSetting { counter, pole_pairs: layout.pole_pairs, counts_per_turn },
+            encoder: EncoderSetting {
+                counter,
+                pole_pairs: layout.pole_pairs,
+                counts_per_turn,
+                absolute: layout.flags & IS_ABSOLUTE != 0,
+            },
             winding_c: match layout.winding_tenths.get() {
                 0 => None,
                 tenths => Some(LOWEST_C + f32::from(tenths) / 10.0),
             },
-            joint_zero: (layout.has_zero == 1).then(|| JointZero {
+            joint_zero: (layout.flags & HAS_ZERO != 0).then(|| JointZero {
                 rotor: layout.zero_rotor.get(),
                 joint: AbsoluteAngle::from_steps(layout.zero_joint.get()),
+                setting: layout.zero_setting,
             }),
         }))
     }

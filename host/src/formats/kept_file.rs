@@ -131,6 +131,8 @@ pub struct JointZeroPart {
     pub rotor_counts: i32,
     /// Reading of the joint's encoder, 2^-14 turns.
     pub joint_steps: u16,
+    /// Check of direction and ratio.
+    pub setting: u8,
 }
 
 /// Settings for which a calibration is valid.
@@ -143,6 +145,9 @@ pub struct Encoder {
     pub pole_pairs: u8,
     /// Encoder counts per turn.
     pub counts_per_turn: u32,
+    /// Whether positions count from an absolute encoder's zero.
+    #[serde(default)]
+    pub absolute: bool,
 }
 
 /// Direction of a counter.

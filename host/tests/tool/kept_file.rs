@@ -44,9 +44,9 @@ resistance_ohm = 0.1
 direct_inductance_h = 0.0001
 quadrature_inductance_h = 0.00012
 offset_rad = 1.4629180792671596e-9
-encoder = { counter = "up", pole_pairs = 20, counts_per_turn = 16384 }
+encoder = { counter = "up", pole_pairs = 20, counts_per_turn = 16384, absolute = true }
 winding_c = 25.3
-joint_zero = { rotor_counts = -1234, joint_steps = 16383 }
+joint_zero = { rotor_counts = -1234, joint_steps = 16383, setting = 200 }
 "#;
 
 fn model(fingerprint: &str) -> String {

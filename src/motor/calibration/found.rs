@@ -13,6 +13,8 @@ pub struct EncoderSetting {
     pub pole_pairs: u8,
     /// Counts per turn of the encoder.
     pub counts_per_turn: u32,
+    /// Whether positions count from an absolute encoder's zero, not from an index.
+    pub absolute: bool,
 }
 
 impl EncoderSetting {
@@ -23,6 +25,7 @@ impl EncoderSetting {
             counter: configuration.counter,
             pole_pairs: configuration.pole_pairs,
             counts_per_turn: configuration.counts_per_turn,
+            absolute: configuration.absolute,
         }
     }
 }
@@ -35,6 +38,8 @@ pub struct JointZero {
     pub rotor: i32,
     /// Reading of the joint's encoder.
     pub joint: AbsoluteAngle,
+    /// Check of the joint encoder's direction and the ratio, for which both readings hold.
+    pub setting: u8,
 }
 
 /// Values that a calibration finds while the motor turns, and the uncertainty of all values: one standard

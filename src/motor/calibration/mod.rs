@@ -287,7 +287,11 @@ impl Calibrator {
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
             flux: configuration.flux,
             quadrature_a: min(QUADRATURE_SHARE * settings.current.0, across(configuration, settings.current)),
-            encoder_error: if configuration.absolute { pairs * MAGNETIC_ERROR_TURNS } else { 0.0 },
+            encoder_error: if configuration.absolute {
+                min(pairs * MAGNETIC_ERROR_TURNS, GREATEST_ENCODER_ERROR)
+            } else {
+                0.0
+            },
         };
         Ok(Self {
             bench,
@@ -569,6 +573,8 @@ const GREATEST_STORED_ERROR: f32 = 5.0 / 360.0;
 /// Error of an absolute encoder, which is a magnetic one, at two positions: twice 0.8 degrees (AS5047P,
 /// nonlinearity with an aligned magnet), motor turns.
 const MAGNETIC_ERROR_TURNS: f32 = 2.0 * 0.8 / 360.0;
+/// Greatest permitted error of an encoder, electrical turns: that of 14 pole pairs.
+const GREATEST_ENCODER_ERROR: f32 = 14.0 * MAGNETIC_ERROR_TURNS;
 /// Longest current vector of the refinement over the calibration's current, with a margin: the direct
 /// current and 1.6 of it across.
 const LONGEST_SHARE: f32 = 1.1 * 1.89;

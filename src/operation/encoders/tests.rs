@@ -142,7 +142,7 @@ fn the_zero_of_a_joint_returns_to_the_count() {
             ..SETTINGS
         };
         let (_, rotor, at_zero) = joint(0.0, 0.0, 1234, sign);
-        let zero = JointZero { rotor, joint: at_zero };
+        let zero = JointZero { rotor, joint: at_zero, setting: 0 };
         for degrees in [-170.0, -20.0, -0.3, 0.0, 5.0, 50.0, 95.5, 170.0] {
             for error in [-1.6, 0.0, 1.6] {
                 // The rotor position of the second day is known within a turn only.
@@ -161,7 +161,7 @@ fn the_zero_of_a_joint_returns_to_the_count() {
 
 #[test]
 fn a_joint_that_leaves_its_counts_contradicts() {
-    let zero = JointZero { rotor: 0, joint: reading(77.0, 360.0) };
+    let zero = JointZero { rotor: 0, joint: reading(77.0, 360.0), setting: 0 };
     for (error, found) in
         [(2.4, Finding::Sound), (2.6, Finding::Contradiction), (-2.6, Finding::Contradiction)]
     {
@@ -173,5 +173,23 @@ fn a_joint_that_leaves_its_counts_contradicts() {
             // Without a zero nothing can be compared.
             assert_eq!(check.joint(&SETTINGS, Some(angle), None, counts), Finding::Sound);
         }
+    }
+}
+
+#[test]
+fn a_zero_holds_for_its_direction_and_ratio_only() {
+    let with = |joint, ratio| {
+        let absolute = AbsoluteEncoders { rotor: true, joint: Some(joint) };
+        EncoderSettings { absolute, ratio, ..SETTINGS }.joint_setting()
+    };
+    let all = [
+        with(Direction::Up, 50.0),
+        with(Direction::Down, 50.0),
+        with(Direction::Up, 51.0),
+        with(Direction::Up, 6.0),
+        with(Direction::Up, 100.0),
+    ];
+    for (place, one) in all.iter().enumerate() {
+        assert!(all[..place].iter().all(|other| other != one), "{all:?}");
     }
 }

@@ -124,15 +124,34 @@ fn a_stored_calibration_is_checked_and_a_missing_one_measured() {
     let orders = bench.ends(0, Outcome::Calibrated(calibration));
     assert!(matches!(orders[..], [(0, Order::Run(axis)), (1, Order::Calibrate(_))] if axis == running));
     assert_eq!(orders[1].1, unchecked());
-    // Both calibrations are sent to the storage, with the temperature of the winding.
+    // Both calibrations are sent to the storage.
     bench.ends(1, Outcome::Calibrated(calibration));
-    assert_eq!(bench.calibrated.len(), 2);
-    for (axis, (of, offered)) in bench.calibrated.iter().enumerate() {
-        let winding_c = offered.and_then(|offered| offered.winding_c);
-        assert_eq!((*of, *offered), (axis, Some(StoredCalibration { winding_c, ..stored })));
-        assert!(winding_c.is_some_and(|celsius| (79.0..=80.0).contains(&celsius)), "{winding_c:?}");
-    }
+    assert_eq!(bench.calibrated, [(0, Some(stored)), (1, Some(stored))]);
     assert!(bench.keeper.is_calibrated());
+}
+
+#[test]
+fn a_temperature_is_stored_if_known_and_replaces_an_assumed_one() {
+    let calibration = measured();
+    let offered = |keeper: Housekeeper<2>| {
+        let mut bench = Bench::new(keeper);
+        bench.press();
+        bench.ends(0, Outcome::Calibrated(calibration));
+        let stored = bench.calibrated[0].1.expect("an index");
+        (stored, bench.signals.winding_c(0))
+    };
+    let (stored, celsius) = offered(Housekeeper::new(HOUSEKEEPING));
+    assert_eq!(stored.winding_c, None, "an assumption is not stored");
+    assert!(celsius > 79.0, "{celsius}");
+    let (stored, _) = offered(Housekeeper::new(HOUSEKEEPING).with_windings([25.0; 2]));
+    assert!(stored.winding_c.is_some_and(|celsius| (celsius - 25.0).abs() < 1.0), "{stored:?}");
+    // After the next power-up the same resistance shows the same temperature, and a margin of 6 K; not below
+    // the ambient temperature of 40 degrees.
+    for (before, found) in [(60.0, 66.0), (25.0, 40.0)] {
+        let stored = StoredCalibration { winding_c: Some(before), ..stored };
+        let (_, celsius) = offered(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
+        assert!((celsius - found).abs() < 1.0, "{celsius} {found}");
+    }
 }
 
 #[test]

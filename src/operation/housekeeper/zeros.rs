@@ -7,10 +7,11 @@
 
 use super::super::axis_state::Order;
 use super::super::contacts::{OperatorRequest, RATE_HZ};
-use super::super::encoders::{EncoderCheck, Finding};
+use super::super::encoders::{EncoderCheck, EncoderSettings, Finding};
 use super::{Calibration, Housekeeper, Level};
 use crate::hal::{EncoderPlace, Hardware, JointSample};
 use crate::leg::StoredCalibration;
+use crate::motor::absolute::within_half_a_turn;
 use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{AbsoluteAngle, JointZero};
 use crate::safety::BoardFault;
@@ -46,14 +47,31 @@ fn reading<const N: usize>(
     AbsoluteAngle::of_frame(level.hardware.encoder_frame(axis, place))
 }
 
+/// Two readings of an absolute encoder that agree to two steps, of three attempts. One frame may be disturbed.
+fn steady_reading<const N: usize>(
+    axis: usize,
+    place: EncoderPlace,
+    level: &mut Level<'_, '_, N, impl Hardware<N>>,
+) -> Option<AbsoluteAngle> {
+    (0..3).find_map(|_| {
+        let (first, second) = (reading(axis, place, level)?, reading(axis, place, level)?);
+        let apart = i32::from(first.steps()) - i32::from(second.steps());
+        (within_half_a_turn(apart, AbsoluteAngle::STEPS).abs() <= 2).then_some(second)
+    })
+}
+
 /// Counts of a joint at the servo's last tick.
 fn counts<const N: usize, H>(axis: usize, level: &Level<'_, '_, N, H>) -> i32 {
     level.signals.statistics.counts.get(axis).map_or(0, |count| count.get().cast_signed())
 }
 
 impl<const N: usize> Housekeeper<N> {
-    /// Follows the counters of axes with an absolute encoder at the rotor.
+    /// Follows the counters of axes with an absolute encoder at the rotor. A flash write may let a counter
+    /// wrap unseen, so the checks begin anew after it.
     pub(super) fn follow_counters(&mut self, level: &Level<'_, '_, N, impl Hardware<N>>) {
+        if level.signals.inhibit.is_storing() {
+            self.checks = [EncoderCheck::default(); N];
+        }
         for (axis, (check, encoders)) in self.checks.iter_mut().zip(&self.settings.encoders).enumerate() {
             if encoders.absolute.rotor {
                 check.follow(encoders, level.hardware.encoder_count(axis));
@@ -96,18 +114,24 @@ impl<const N: usize> Housekeeper<N> {
     ) {
         match finding {
             Finding::Sound => {}
+            // Before that a calibration or a reference is refused.
+            Finding::Silent if !level.signals.has_begun() => {}
             Finding::Silent => level.signals.report(BoardFault::AbsoluteEncoder, axis),
             Finding::Contradiction => {
-                let Some(contradicted) = self.contradicted.get_mut(axis) else { return };
-                if core::mem::replace(contradicted, true) {
+                let is_calibrating = self.calibrating == Some(axis);
+                let order = if is_calibrating { Order::Off } else { Order::Lose };
+                // A full queue is tried again at the next check.
+                if self.is_contradicted(axis) || !level.order(axis, order) {
                     return;
                 }
+                if let Some(contradicted) = self.contradicted.get_mut(axis) {
+                    *contradicted = true;
+                }
+                self.must_turn(axis, true);
                 level.record(Record::AxisFault { tick: self.round, joint: axis as u8 + 1, name });
                 if let Some(zero) = self.joint_zeros.get_mut(axis) {
                     *zero = None;
                 }
-                let is_calibrating = self.calibrating == Some(axis);
-                level.order(axis, if is_calibrating { Order::Off } else { Order::Lose });
             }
         }
     }
@@ -159,11 +183,13 @@ impl<const N: usize> Housekeeper<N> {
             (true, _) if !all => return,
             // The encoders need no decision of the operator, so they wait for a leg at rest.
             (false, true) => return,
-            (true, true) => self.place_by_encoders(level),
-            (true, false) => {
-                (0..N).for_each(|axis| self.place_at_zero(axis, level));
-                true
+            (true, true) => {
+                let placed = self.place_by_encoders(level);
+                self.reference = None;
+                let Some(placed) = placed else { return };
+                placed
             }
+            (true, false) => self.place_at_zero(level),
             (false, false) => false,
         };
         self.reference = None;
@@ -174,45 +200,80 @@ impl<const N: usize> Housekeeper<N> {
         }
     }
 
-    /// Takes a joint's pose as its zero, and keeps the reading of the joint's encoder.
+    /// Reading of an axis' joint encoder: `Some(None)` without one, `None` where it does not answer.
+    fn joint_reading(
+        &self,
+        axis: usize,
+        level: &mut Level<'_, '_, N, impl Hardware<N>>,
+    ) -> Option<Option<AbsoluteAngle>> {
+        match self.settings.encoders.get(axis)?.absolute.joint {
+            Some(_) => steady_reading(axis, EncoderPlace::Joint, level).map(Some),
+            None => Some(None),
+        }
+    }
+
+    /// Takes the joints' pose as zero, and keeps the readings of their encoders. Returns whether all answer.
+    fn place_at_zero(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
+        let readings: [_; N] = core::array::from_fn(|axis| self.joint_reading(axis, level));
+        let all = readings.iter().all(Option::is_some);
+        for (axis, reading) in readings.into_iter().enumerate().filter(|_| all) {
+            self.keep_zero(axis, reading.flatten(), level);
+        }
+        all
+    }
+
+    /// Takes a joint's pose as zero, with this reading of its encoder.
     #[inline(never)]
-    fn place_at_zero(&mut self, axis: usize, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
-        let encoders = self.settings.encoders.get(axis);
-        let has_encoder = encoders.is_some_and(|encoders| encoders.absolute.joint.is_some());
-        let joint = if has_encoder { reading(axis, EncoderPlace::Joint, level) } else { None };
+    fn keep_zero(
+        &mut self,
+        axis: usize,
+        reading: Option<AbsoluteAngle>,
+        level: &mut Level<'_, '_, N, impl Hardware<N>>,
+    ) {
         let rotor = self.place(axis, 0, level);
-        let zero = joint.map(|joint| JointZero { rotor, joint });
+        let setting = self.settings.encoders.get(axis).map_or(0, EncoderSettings::joint_setting);
+        let zero = reading.map(|joint| JointZero { rotor, joint, setting });
         if let Some(place) = self.joint_zeros.get_mut(axis) {
             *place = zero;
         }
-        if has_encoder && let Some(passed) = self.passed.get(axis).copied().flatten() {
+        if zero.is_some()
+            && let Some(passed) = self.passed.get(axis).copied().flatten()
+        {
             self.passes(axis, Some(StoredCalibration { joint_zero: zero, ..passed }), level);
         }
     }
 
-    /// Present counts of a joint from its zero by its encoder; `None` where that and the rotor's position
+    /// Present counts of a joint from its zero by this reading; `None` where that and the rotor's position
     /// contradict each other.
     #[inline(never)]
-    fn counts_from_zero(&self, axis: usize, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> Option<i32> {
+    fn counts_from_zero(
+        &self,
+        axis: usize,
+        reading: Option<AbsoluteAngle>,
+        level: &Level<'_, '_, N, impl Hardware<N>>,
+    ) -> Option<i32> {
         let rotor = self.origins.get(axis)?.wrapping_add(counts(axis, level));
         let zero = self.joint_zeros.get(axis)?.as_ref()?;
-        let reading = reading(axis, EncoderPlace::Joint, level)?;
-        self.settings.encoders.get(axis)?.counts_from_zero(zero, rotor, reading)
+        self.settings.encoders.get(axis)?.counts_from_zero(zero, rotor, reading?)
     }
 
     /// Sets the zeros by the joints' encoders. Returns whether all agree with the rotors' positions;
-    /// otherwise the operator has to state the pose.
-    fn place_by_encoders(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
-        let places: [_; N] = core::array::from_fn(|axis| self.counts_from_zero(axis, level));
-        let agree = places.iter().all(Option::is_some);
-        if !agree {
+    /// otherwise the operator has to state the pose. `None` where an encoder does not answer now.
+    fn place_by_encoders(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> Option<bool> {
+        let readings: [_; N] = core::array::from_fn(|axis| self.joint_reading(axis, level));
+        if readings.contains(&None) {
+            return None;
+        }
+        let places: [_; N] =
+            core::array::from_fn(|axis| self.counts_from_zero(axis, readings[axis].flatten(), level));
+        if places.contains(&None) {
             self.joint_zeros = [None; N];
-            return false;
+            return Some(false);
         }
         for (axis, counts) in places.into_iter().enumerate() {
             self.place(axis, counts.unwrap_or_default(), level);
         }
-        true
+        Some(true)
     }
 
     /// Sets a joint's present count; returns the rotor's position in the joint's sense.

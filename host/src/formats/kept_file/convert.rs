@@ -66,10 +66,14 @@ impl AxisCalibration {
                 },
                 pole_pairs: encoder.pole_pairs,
                 counts_per_turn: encoder.counts_per_turn,
+                absolute: encoder.absolute,
             },
             winding_c: winding_c.map(f64::from),
-            joint_zero: joint_zero
-                .map(|zero| JointZeroPart { rotor_counts: zero.rotor, joint_steps: zero.joint.steps() }),
+            joint_zero: joint_zero.map(|zero| JointZeroPart {
+                rotor_counts: zero.rotor,
+                joint_steps: zero.joint.steps(),
+                setting: zero.setting,
+            }),
         }
     }
 
@@ -78,7 +82,7 @@ impl AxisCalibration {
         if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&units) {
             return Err(format!("`offset_rad` is {}; it must be from -pi to pi", self.offset_rad));
         }
-        let Encoder { counter, pole_pairs, counts_per_turn } = self.encoder;
+        let Encoder { counter, pole_pairs, counts_per_turn, absolute } = self.encoder;
         if pole_pairs == 0 || counts_per_turn == 0 {
             return Err("`encoder`: pole pairs and counts per turn must be above 0".into());
         }
@@ -105,11 +109,13 @@ impl AxisCalibration {
                 },
                 pole_pairs,
                 counts_per_turn,
+                absolute,
             },
             winding_c,
             joint_zero: self.joint_zero.map(|zero| JointZero {
                 rotor: zero.rotor_counts,
                 joint: AbsoluteAngle::from_steps(zero.joint_steps),
+                setting: zero.setting,
             }),
         }))
     }

@@ -75,13 +75,16 @@ fn calibration(out: &mut String, axis: &AxisCalibration) {
         Counter::Down => "down",
     };
     let (pairs, counts) = (axis.encoder.pole_pairs, axis.encoder.counts_per_turn);
-    let setting = format!("{{ counter = \"{counter}\", pole_pairs = {pairs}, counts_per_turn = {counts} }}");
+    let absolute = if axis.encoder.absolute { ", absolute = true" } else { "" };
+    let setting =
+        format!("{{ counter = \"{counter}\", pole_pairs = {pairs}, counts_per_turn = {counts}{absolute} }}");
     line(out, "encoder", setting);
     if let Some(celsius) = axis.winding_c {
         line(out, "winding_c", format!("{celsius:.1}"));
     }
-    if let Some(JointZeroPart { rotor_counts, joint_steps }) = axis.joint_zero {
-        let zero = format!("{{ rotor_counts = {rotor_counts}, joint_steps = {joint_steps} }}");
+    if let Some(JointZeroPart { rotor_counts, joint_steps, setting }) = axis.joint_zero {
+        let zero =
+            format!("{{ rotor_counts = {rotor_counts}, joint_steps = {joint_steps}, setting = {setting} }}");
         line(out, "joint_zero", zero);
     }
 }

@@ -28,6 +28,13 @@ const LEAST_TIME_CONSTANT_S: f64 = 80e-6;
 const SUPPLY_V: [f64; 2] = [22.0, 50.0];
 /// Reading of a simulated joint encoder at the joint's zero, degrees.
 const JOINT_READING_DEG: f64 = 77.0;
+/// Most pole pairs of a motor with an AS5047P.
+const AS5047P_PAIRS: u32 = 14;
+/// Largest ratio at which an encoder at the joint tells the motor turns apart: its errors are below a quarter
+/// of one.
+const MOST_RATIO: f64 = 80.0;
+/// Largest angle from the zero that an encoder at the joint measures, degrees, with a margin.
+const MOST_RANGE_DEG: f64 = 170.0;
 /// Counts per turn of an AS5047P.
 const AS5047P_COUNTS: [u32; 2] = [4000, 4096];
 /// Range of a 16-bit counter.
@@ -239,6 +246,25 @@ impl MotorFile {
                 joint.encoder.counts
             );
             return Err(place.fault("absolute_encoder", &complaint));
+        }
+        if self.absolute_encoder && self.pole_pairs > AS5047P_PAIRS {
+            let complaint = format!(
+                "is true, but `pole_pairs` is {}: the encoder's error of 0.8 degrees permits at most {AS5047P_PAIRS}",
+                self.pole_pairs
+            );
+            return Err(place.fault("absolute_encoder", &complaint));
+        }
+        if self.joint_encoder.is_some() && joint.encoder.ratio > MOST_RATIO {
+            let complaint = format!(
+                "cannot tell the motor turns apart at `encoder.ratio` {}: at most {MOST_RATIO}",
+                joint.encoder.ratio
+            );
+            return Err(place.fault("joint_encoder", &complaint));
+        }
+        if self.joint_encoder.is_some() && joint.range_deg.iter().any(|end| end.abs() > MOST_RANGE_DEG) {
+            let complaint =
+                format!("measures within a turn: `range_deg` must lie within {MOST_RANGE_DEG} degrees");
+            return Err(place.fault("joint_encoder", &complaint));
         }
         let flux = self.flux(joint);
         if !(1e-4..=1.0).contains(&flux) {

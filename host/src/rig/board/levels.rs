@@ -118,7 +118,7 @@ impl<const N: usize> Levels<N> {
         // A ready joint counts from its zero.
         let zero = |axis: AxisDescription| {
             let joint = AbsoluteAngle::from_steps(steps(axis.joint_encoder?.zero));
-            Some(JointZero { rotor: 0, joint })
+            Some(JointZero { rotor: 0, joint, setting: 0 })
         };
         levels.housekeeper = Housekeeper::ready(settings).with_joint_zeros(description.axes.map(zero));
         Ok(levels)

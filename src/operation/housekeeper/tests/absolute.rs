@@ -54,7 +54,7 @@ fn faults(machine: &Machine) -> Vec<(u8, &'static str)> {
 #[test]
 fn a_second_day_needs_neither_hand_nor_reference() {
     let (stored, zeros) = first_day();
-    assert!(stored.iter().flatten().all(|stored| stored.joint_zero.is_some() && stored.winding_c.is_some()));
+    assert!(stored.iter().flatten().all(|stored| stored.joint_zero.is_some()));
     // Far from the zero, by whole motor turns and parts of one; 300 rad are 344 degrees of the joint.
     for turned in [[40.0, -61.7], [-3.3, 120.0]] {
         let mut machine = restarted(turned, stored, zeros);
@@ -63,7 +63,8 @@ fn a_second_day_needs_neither_hand_nor_reference() {
         assert_eq!(machine.results(), [(1, "confirmed"), (2, "confirmed")]);
         machine.hold(true, false, 0.8);
         assert!(machine.signals.has_begun(), "no reference by the operator");
-        machine.hold(true, false, 0.05);
+        machine.hold(true, false, 0.3);
+        assert_ne!(machine.state(), DriveState::OperationEnabled, "this closing was for the calibration");
         for (axis, turned) in turned.into_iter().enumerate() {
             let counts = machine.signals.statistics.counts[axis].get().cast_signed();
             let expected = turned / core::f64::consts::TAU * 8192.0;
@@ -72,6 +73,60 @@ fn a_second_day_needs_neither_hand_nor_reference() {
         }
         assert_eq!(faults(&machine), []);
     }
+}
+
+#[test]
+fn zeros_of_another_setting_or_before_a_load_are_not_used() {
+    let (stored, zeros) = first_day();
+    let begins = |settings: HousekeepingSettings<2>, stored, forgets: bool| {
+        let mut motors = second_day().0;
+        (0..2).for_each(|axis| motors[axis].angle = zeros[axis]);
+        let mut machine = Machine::with(settings, motors, stored);
+        if forgets {
+            machine.signals.forget_stored();
+        }
+        machine.hold(false, false, 0.1);
+        machine.press();
+        machine.hold(true, false, if forgets { 46.0 } else { 3.7 });
+        (machine.results(), machine.signals.has_begun())
+    };
+    let confirmed = std::vec![(1, "confirmed"), (2, "confirmed")];
+    assert_eq!(begins(settings(), stored, false), (confirmed.clone(), true));
+    let mut other = settings();
+    other.encoders[1].absolute.joint = Some(Direction::Down);
+    assert_eq!(begins(other, stored, false), (confirmed.clone(), false));
+    let mut other = settings();
+    other.encoders[0].ratio = 49.0;
+    assert_eq!(begins(other, stored, false), (confirmed, false));
+    assert_eq!(begins(settings(), stored, true), (std::vec![(1, "done"), (2, "done")], false));
+}
+
+#[test]
+fn an_offset_at_an_index_is_not_used_with_an_absolute_encoder() {
+    let at_index = measured().stored().expect("an index");
+    let mut machine = restarted([0.0; 2], [Some(at_index); 2], [0.3; 2]);
+    machine.press();
+    machine.hold(true, false, 3.0);
+    // The motor turns.
+    assert_eq!(machine.results(), []);
+    assert!(machine.most_ampere > 10.0);
+}
+
+#[test]
+fn a_joint_encoder_that_does_not_answer_delays_the_zero_and_refuses_a_stated_one() {
+    let (stored, zeros) = first_day();
+    let mut machine = restarted([40.0; 2], stored, zeros);
+    machine.joint_steps[1] = None;
+    machine.press();
+    machine.hold(true, false, 3.7);
+    assert!(!machine.signals.has_begun());
+    machine.hold(false, false, 0.1);
+    machine.hold(false, true, 0.2);
+    machine.hold(false, false, 0.7);
+    assert!(!machine.signals.has_begun(), "its zero would be lost");
+    machine.joint_steps[1] = Some(0);
+    machine.hold(false, false, 0.7);
+    assert!(machine.signals.has_begun(), "it answers again");
 }
 
 #[test]
@@ -126,6 +181,7 @@ fn a_silent_encoder_is_reported_and_forbids_a_calibration() {
         let mut bench = Bench::new(Housekeeper::new(settings()));
         let valid = AbsoluteAngle::from_steps(77).to_frame();
         bench.hardware.encoder_frames = [[valid; 2]; 2];
+        bench.signals.begin_servo();
         bench.hold(false, false);
         (0..2).for_each(|axis| bench.signals.take_reported(axis).for_each(drop));
         bench.hardware.encoder_frames[1][place as usize] = 0xFFFF;
@@ -158,5 +214,6 @@ fn exchanged_lines_of_the_encoder_end_the_calibration_until_a_reset() {
     assert_eq!(machine.results(), [(1, "interrupted")]);
     machine.hold(false, false, 0.1);
     machine.press();
+    machine.hold(true, false, 0.1);
     assert_eq!(machine.results(), [(1, "interrupted"), (1, "absolute_encoder")]);
 }

@@ -160,6 +160,10 @@ impl Machine {
         self.records.iter().filter_map(result).collect()
     }
 
+    pub(super) fn state(&self) -> DriveState {
+        self.control.state()
+    }
+
     fn is_proven(&mut self) -> [bool; 2] {
         [0, 1].map(|axis| {
             let axis = self.loops.axis_state_mut(axis).and_then(AxisState::axis_mut);
