@@ -42,10 +42,17 @@ impl Chopper {
         sensible.then(|| Self { begin, per_volt: 1.0 / (full.0 - begin.0) })
     }
 
+    /// Whether the resistor conducts at a bus voltage.
+    #[inline(always)]
+    #[must_use]
+    pub fn conducts(&self, bus: Volt) -> bool {
+        bus.0 > self.begin.0
+    }
+
     /// Duty of the resistor at a bus voltage, 0..=0.95.
     #[must_use]
     pub fn duty(&self, bus: Volt) -> f32 {
-        if bus.0 > self.begin.0 { self.ramp(bus) } else { 0.0 }
+        if self.conducts(bus) { self.ramp(bus) } else { 0.0 }
     }
 
     /// Duty above `begin`.
@@ -81,13 +88,16 @@ impl BrakeBudget {
     /// The full budget.
     pub const FULL: Self = Self { left_s: Self::WHOLE_S, used_up: false };
 
+    /// Whether nothing was used.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.left_s == Self::WHOLE_S
+    }
+
     /// Returns the duty the resistor may have in a current tick, and subtracts it from the budget.
     #[must_use]
     pub fn spend(&mut self, wanted: f32) -> f32 {
-        // Usual case: a full budget and no demand.
-        if wanted == 0.0 && self.left_s == Self::WHOLE_S {
-            return 0.0;
-        }
         let duty = if self.used_up { 0.0 } else { wanted };
         self.left_s = clamp(self.left_s + (Self::GIVEN_BACK - duty) * Self::TICK_S, 0.0, Self::WHOLE_S);
         self.used_up = !(self.left_s > if self.used_up { 0.5 * Self::WHOLE_S } else { 0.0 });

@@ -230,15 +230,24 @@ impl<const N: usize> CurrentLoops<N> {
         }
     }
 
-    /// Sets the brake resistor at this bus voltage. A separate function, so that an image without a resistor
-    /// does not save its registers.
-    #[inline(never)]
+    /// Sets the brake resistor at this bus voltage.
+    #[inline(always)]
     fn resist<H: Hardware<N>>(&mut self, bus: Option<Volt>, signals: &Signals<N>, hardware: &mut H) {
-        let chopper = self.chopper.as_ref().zip(bus);
-        let wanted = chopper.map_or(0.0, |(chopper, bus)| max(chopper.duty(bus), signals.wanted_brake()));
-        let duty = self.budget.spend(wanted);
+        let by_voltage = self.chopper.as_ref().zip(bus).is_some_and(|(chopper, bus)| chopper.conducts(bus));
+        let is_wanted = by_voltage || signals.wants_brake();
+        // Usual case: no demand and a full budget.
+        let duty = if is_wanted || !self.budget.is_full() { self.brake_duty(bus, signals) } else { 0.0 };
         hardware.set_brake(duty);
         signals.set_given_brake(duty);
+    }
+
+    /// Duty of the brake resistor, by bus voltage, servo and budget.
+    #[cold]
+    #[inline(never)]
+    fn brake_duty(&mut self, bus: Option<Volt>, signals: &Signals<N>) -> f32 {
+        let chopper = self.chopper.as_ref().zip(bus);
+        let wanted = chopper.map_or(0.0, |(chopper, bus)| max(chopper.duty(bus), signals.wanted_brake()));
+        self.budget.spend(wanted)
     }
 
     /// Checks the other axes' ticks. A stopped axis cannot report itself, and its bridge repeats its last

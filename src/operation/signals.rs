@@ -416,6 +416,13 @@ impl<const N: usize> Signals<N> {
         f32::from_bits(self.brake[0].get())
     }
 
+    /// Whether the servo wants the brake resistor.
+    #[inline(always)]
+    #[must_use]
+    pub fn wants_brake(&self) -> bool {
+        self.brake[0].get() != 0
+    }
+
     /// Sets the least duty of the brake resistor, which its energy budget still limits.
     pub fn set_wanted_brake(&self, duty: f32) {
         self.brake[0].set(duty.to_bits());

@@ -47,7 +47,8 @@ fn reading<const N: usize>(
     AbsoluteAngle::of_frame(level.hardware.encoder_frame(axis, place))
 }
 
-/// Two readings of an absolute encoder that agree to two steps, of three attempts. One frame may be disturbed.
+/// Two readings of an absolute encoder that agree to two steps, of three attempts: one frame may be
+/// disturbed.
 fn steady_reading<const N: usize>(
     axis: usize,
     place: EncoderPlace,
