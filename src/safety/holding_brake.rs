@@ -4,8 +4,8 @@
 //! and after a crash too.
 //!
 //! ```text
-//! drive    off       | enabled, holds its pose   | follows commands      | damps, 300 ms | off
-//! brake    engaged   | released, one tick later  | open after release_ms |      engaged, | engage_ms before off
+//! drive    off     | enabled, holds its pose  | follows commands | damps, 300 ms               | off
+//! brake    engaged | released, one tick later | open             | released | engaged, closing  | closed
 //! ```
 //!
 //! The brake is released one servo tick after the drive was enabled, when all bridges switch. It engages in
