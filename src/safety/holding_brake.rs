@@ -12,8 +12,7 @@
 //! the tick in which the drive turns off, or `engage_ms` before the end of damping. Damping is not prolonged:
 //! a brake slower than damping engages as damping begins, and closes after the bridges are off.
 //!
-//! Known limits: no sensor shows whether the brake is open or closed. A brake that never opens ends as a
-//! following error or in derating; one that never closes is not detected.
+//! Known limit: no sensor shows whether the brake is open or closed.
 
 use super::state::DriveState;
 use crate::hal::SERVO_RATE_HZ;
