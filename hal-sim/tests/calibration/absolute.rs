@@ -54,8 +54,8 @@ fn placed(trial: &Trial, angle: f64, seed: u64) -> Stand {
     Stand::new(&trial.axis, &SupplyDescription::default(), trial.load, angle, seed)
 }
 
-/// With more pole pairs the encoder's error may turn a leg with little friction: 1.6 degrees are 22 electrical
-/// ones with 14. That leg is refused as moved, and its next calibration turns the motor.
+/// With more pole pairs the encoder's error may turn a leg with little friction: 1.6 degrees are 22
+/// electrical ones with 14. That leg is refused as moved, and its next calibration turns the motor.
 #[test]
 fn legs_are_calibrated_once_and_confirmed_anywhere_in_the_turn() {
     let (mut worst_error, mut worst_travel, mut moved) = (0.0_f64, 0.0_f64, 0);
