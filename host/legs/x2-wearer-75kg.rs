@@ -25,6 +25,7 @@ pub const LEG: LegDescription<2> = LegDescription {
             2.0,
         ),
     },
+    holding_brake: None,
     joints: [
         JointDescription {
             geometry: DenavitHartenberg {

@@ -29,6 +29,7 @@ target_only! {
     pub mod flash;
     pub mod gate_driver;
     pub mod hardware;
+    pub mod holding_brake;
     pub mod identity;
     pub mod interrupts;
     pub mod registers;

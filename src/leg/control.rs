@@ -42,6 +42,14 @@ pub enum ControlRequest<const N: usize> {
     TakeUpdate,
 }
 
+impl<const N: usize> ControlRequest<N> {
+    /// Returns whether the request commands a motion.
+    #[must_use]
+    pub const fn moves(&self) -> bool {
+        matches!(self, Self::Identify | Self::Track { .. })
+    }
+}
+
 /// A 500 Hz sample and its use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoggedSample<const N: usize> {

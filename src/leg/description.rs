@@ -17,7 +17,7 @@ use crate::model::{
 };
 use crate::motion::{ExcitationTable, MotionError, Periodic};
 use crate::motor::AbsoluteEncoders;
-use crate::safety::{SupplyLimits, WindingRating};
+use crate::safety::{BrakeDelays, SupplyLimits, WindingRating};
 use crate::servo::{JointConfiguration, JointScale, SERVO_RATE_HZ};
 use crate::units::{
     Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
@@ -116,6 +116,8 @@ pub struct LegDescription<const N: usize> {
     pub gravity: [f32; 3],
     /// Limits of the supply.
     pub supply: SupplyLimits,
+    /// Delays of the holding brake, if there is one.
+    pub holding_brake: Option<BrakeDelays>,
     /// Joints, proximal first.
     pub joints: [JointDescription; N],
     /// Prior knowledge of links and drives, if any.

@@ -170,11 +170,11 @@ impl<const N: usize> HostSide<N> {
         }
     }
 
-    /// Commands of a host for this tick, while it has the drive.
-    pub fn commands(&mut self) -> Option<Host<'_, N>> {
+    /// Commands of a host for this tick, while it has the drive; `waits` if they are not followed yet.
+    pub fn commands(&mut self, waits: bool) -> Option<Host<'_, N>> {
         let cancel = core::mem::take(&mut self.cancel);
         let (following, commands) = (&mut self.following, self.commands.as_ref()?);
-        Some(Host { following, commands, cancel })
+        Some(Host { following, commands, cancel, waits })
     }
 
     /// Reports the tick's results when a report is due.

@@ -5,8 +5,9 @@
 //! gate        no tick without calibration and zero of each joint: outputs off, requests dropped
 //! findings    of the identification
 //! faults      reported by the board's other levels; gains and limits (every 64 ms); supply; derating
-//! request     of the operator, else of a host; filtered by the inhibit word and the enabling switch
-//! leg         -> current targets, permission
+//! request     of the operator, else of a host; filtered by the inhibit word, the enabling switch and the
+//!             holding brake
+//! leg         -> current targets, permission, holding brake
 //! out         report to the bus; limits, requests, states, samples as events for identification and trace
 //! ```
 
@@ -22,7 +23,8 @@ use crate::leg::{
     Refusal, permitted,
 };
 use crate::safety::{
-    DeratingRamps, Fault, FaultCode, InhibitReason, JointShares, SupplyCurrent, SupplyLimits, SupplyWatch,
+    BrakeDelays, DeratingRamps, Fault, FaultCode, HoldingBrake, InhibitReason, JointShares, SupplyCurrent,
+    SupplyLimits, SupplyWatch,
 };
 use crate::servo::SERVO_RATE_HZ;
 use crate::trace::{Record, words};
@@ -46,6 +48,7 @@ pub struct ServoLevel<const N: usize> {
     checksum: Checksum,
     supply: SupplyWatch,
     supply_current: SupplyCurrent,
+    holding_brake: Option<HoldingBrake>,
     ramps: DeratingRamps,
     volt_per_code: Volt,
     /// Side of the bus, where there is one.
@@ -75,6 +78,7 @@ impl<const N: usize> ServoLevel<N> {
             checksum: control.checksum(),
             supply: SupplyWatch::default(),
             supply_current: SupplyCurrent::new(SupplyLimits::NONE),
+            holding_brake: None,
             ramps,
             volt_per_code,
             host: following.map(|following| HostSide::new(following, volt_per_code)),
@@ -87,6 +91,12 @@ impl<const N: usize> ServoLevel<N> {
     #[must_use]
     pub fn with_supply(self, limits: SupplyLimits) -> Self {
         Self { supply_current: SupplyCurrent::new(limits), ..self }
+    }
+
+    /// Adds a holding brake, if there is one.
+    #[must_use]
+    pub fn with_holding_brake(self, delays: Option<BrakeDelays>) -> Self {
+        Self { holding_brake: delays.map(HoldingBrake::new), ..self }
     }
 
     /// Runs one tick of the leg; `None` while the joints' samples are invalid. `gravity` in the base frame,
@@ -127,12 +137,16 @@ impl<const N: usize> ServoLevel<N> {
         }
         self.look_around(control, signals);
         let request = self.next_request(control, ends, signals, hardware);
-        let permitted = permitted(request, signals.inhibit.is_clear(), control.state());
+        // Until the brake is open the drive holds its pose.
+        let waits = self.holding_brake.is_some_and(|brake| !brake.is_open());
+        let permitted = permitted(request, signals.inhibit.is_clear(), control.state())
+            .filter(|request| !(waits && request.moves()));
         let sample = Sample { joints: self.sample };
-        let commands = self.host.as_mut().and_then(HostSide::commands);
+        let commands = self.host.as_mut().and_then(|host| host.commands(waits));
         let output = control.tick_with(&sample, permitted, gravity, commands);
         signals.set_targets(output.servo.drive());
         signals.set_permission(output.servo.decision.state.permission());
+        self.hold(output.servo.decision.state, signals, hardware);
         if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
             host.report(control, &sample, &output, ends, signals, hardware);
         }
@@ -158,12 +172,24 @@ impl<const N: usize> ServoLevel<N> {
     fn rest<H: Hardware<N>>(&mut self, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>, hardware: &mut H) {
         signals.disable();
         signals.set_permission(Permission::Off);
+        self.hold(DriveState::NotReadyToSwitchOn, signals, hardware);
         signals.set_wanted_brake(0.0);
         let _ = ends.requests.dequeue();
         if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
             host.rest(ends, signals, hardware);
         }
         self.report_noted(ends, signals);
+    }
+
+    /// Commands the holding brake. A stop may come between any two instructions, so the inhibit word is read
+    /// with interrupts masked.
+    fn hold<H: Hardware<N>>(&mut self, state: DriveState, signals: &Signals<N>, hardware: &mut H) {
+        if let Some(brake) = &mut self.holding_brake {
+            let released = brake.follow(state);
+            hardware.masked(|hardware| {
+                hardware.set_holding_brake(released && signals.inhibit.is_clear());
+            });
+        }
     }
 
     /// Next request: the operator's before the host's.

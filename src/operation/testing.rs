@@ -133,6 +133,8 @@ pub(super) struct TestHardware<const N: usize> {
     /// Outputs and duties of each bridge.
     pub bridges: [AxisCommand; N],
     pub brake: f32,
+    /// The holding brake is released.
+    pub holding_brake_released: bool,
     pub servo_pended: u32,
     pub bus_pended: u32,
     pub contacts: Contacts,
@@ -171,6 +173,7 @@ impl<const N: usize> TestHardware<N> {
         Self {
             bridges: [AxisCommand::OFF; N],
             brake: 0.0,
+            holding_brake_released: false,
             servo_pended: 0,
             bus_pended: 0,
             contacts: Contacts::default(),
@@ -225,6 +228,7 @@ impl<const N: usize> TestHardware<N> {
             && core::mem::take(&mut stop.pending)
         {
             self.bridges = [AxisCommand::OFF; N];
+            self.holding_brake_released = false;
             stop.signals.inhibit.raise(InhibitReason::EmergencyStop);
             stop.handled = true;
         }
@@ -242,6 +246,7 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     fn disable_all(&mut self) {
         self.access();
         self.bridges = [AxisCommand::OFF; N];
+        self.holding_brake_released = false;
     }
     fn disable(&mut self, axis: usize) {
         self.access();
@@ -261,6 +266,10 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     fn set_brake(&mut self, duty: f32) {
         self.access();
         self.brake = duty;
+    }
+    fn set_holding_brake(&mut self, released: bool) {
+        self.access();
+        self.holding_brake_released = released;
     }
     fn pend_servo(&mut self) {
         self.access();

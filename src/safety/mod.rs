@@ -16,6 +16,7 @@
 //! | [`SupplyWatch`] | detection of a failing supply |
 //! | [`SupplyCurrent`] | estimate and limits of the current from the supply and into it |
 //! | [`Monitor`] | all of the above, once per tick |
+//! | [`HoldingBrake`] | command of a spring-applied brake |
 //! | [`RefusalReason`] | reasons why enabling is refused |
 //! | [`InhibitReason`], [`TickWatch`], [`ServoWatch`] | inhibit reasons; checks of every current tick |
 //! | [`CheckIns`], [`TickGuard`] | check-ins that the watchdog requires; stopped current ticks |
@@ -36,6 +37,7 @@ pub mod barrier;
 pub mod check_in;
 pub mod derating;
 pub mod fault;
+pub mod holding_brake;
 pub mod interlock;
 pub mod limits;
 pub mod monitor;
@@ -50,6 +52,7 @@ pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
 pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
 pub use derating::{Derating, DeratingRamps, JointShares, LimitCode, LimitCodes, Ramp, SupplyWatch};
 pub use fault::{Fault, FaultCode, NO_ERROR, NoticeCode, Reaction};
+pub use holding_brake::{BrakeDelays, HoldingBrake};
 pub use interlock::{Bridges, InhibitReason, ServoWatch, TickState, TickWatch, stays_active};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, RANGE_TOLERANCE, Request};

@@ -13,7 +13,7 @@ use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
-use crate::board::odrive_v3_6::{brake, can, converter, watchdog};
+use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, watchdog};
 use crate::board::{stack, windings};
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::{LONGEST, NodeId, Storing};
@@ -104,7 +104,11 @@ fn hand_out(
         Some(control) => {
             let volt_per_code = analog::sense(divider).volt_per_code;
             let level = ServoLevel::new(&control, drives::derating(divider), volt_per_code, following)
-                .with_supply(leg::LEG.supply);
+                .with_supply(leg::LEG.supply)
+                .with_holding_brake(leg::LEG.holding_brake);
+            if leg::LEG.holding_brake.is_some() {
+                holding_brake::prepare();
+            }
             static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
             let clock = functions.clock;
             place(&servo::SERVO, SERVO.init(servo::ServoLoop { control, level, ends: servo_ends, clock }));

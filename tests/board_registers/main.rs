@@ -9,7 +9,7 @@ mod timer;
 
 use std::collections::BTreeMap;
 
-use scarab::board::odrive_v3_6::settings::pins::{GATES_OFF, PINS};
+use scarab::board::odrive_v3_6::settings::pins::{GATES_OFF, HOLDING_BRAKE, PINS};
 use scarab::board::odrive_v3_6::settings::{
     CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, Write, analog, can,
     chopper, converters, external, flash, gate_driver, prepare, timers,
@@ -309,6 +309,17 @@ fn every_pin_has_the_function_of_the_board_s_wiring() {
     // First levels written: enable low, selects high.
     let levels: Vec<u32> = GATES_OFF.iter().map(|pin| pin.writes()[0].value).collect();
     assert_eq!(levels, [1 << (12 + 16), 1 << 13, 1 << 14]);
+}
+
+#[test]
+fn only_a_leg_with_a_holding_brake_drives_its_pin_low_first() {
+    let mut registers = started();
+    let mode = |registers: &Registers| registers.bits(0x4002_0400, 4, 2);
+    assert_eq!(mode(&registers), 0, "PB2 is an input");
+    let writes = HOLDING_BRAKE.writes();
+    assert_eq!((writes[0].address, writes[0].value), (0x4002_0418, 1 << (2 + 16)), "engaged before driven");
+    registers.apply(&writes);
+    assert_eq!(mode(&registers), 1, "output");
 }
 
 #[test]

@@ -29,6 +29,7 @@
 //! | `asymmetric_coulomb` | `"auto"`, `"on"`, `"off"`: one Coulomb level per direction | off |
 //! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated static friction, speed of its decay | none |
 //! | `truth`, `prior` | see below | none |
+//! | `brake` | `{ release_ms, engage_ms }`: times of a holding brake on the board's output | none |
 //! | `[joint.motor]`, `supply` | complete drive ([`MotorFile`], [`SupplyFile`]) | none, 48 V |
 //!
 //! `torque_noise_percent` refers to each joint's mean absolute torque, per logged 500 Hz sample. The noise
@@ -48,7 +49,7 @@ mod motor;
 mod segments;
 mod switch;
 
-pub use motor::{JointEncoder, MotorFile, SupplyFile};
+pub use motor::{BrakeFile, JointEncoder, MotorFile, SupplyFile};
 pub use segments::{BodySide, SegmentsFile};
 pub use switch::Switch;
 
@@ -105,6 +106,9 @@ pub struct LegFile {
     /// Greatest current into the supply, A; `None` for a supply whose diode lets none in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub charge_current_a: Option<f64>,
+    /// Holding brake on the board's output.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub brake: Option<BrakeFile>,
     /// Joints, proximal first.
     #[serde(rename = "joint")]
     pub joints: Vec<JointFile>,
@@ -379,6 +383,7 @@ impl LegFile {
             supply: SupplyFile::default(),
             supply_current_a: None,
             charge_current_a: None,
+            brake: None,
             joints,
         }
     }

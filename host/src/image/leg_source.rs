@@ -63,6 +63,7 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, FileError> 
         name: Box::leak(leg.name.replace(char::is_whitespace, "_").into_boxed_str()),
         gravity: model.gravity.into(),
         supply: leg.supply_limits(),
+        holding_brake: leg.brake_delays(),
         joints,
         prior: configuration.prior.map(|prior| prior.map(|link| link_description(&link))),
         plan: configuration.plan,
@@ -116,6 +117,7 @@ fn table(motion: &Periodic<JOINTS>) -> ExcitationTable<JOINTS> {
 pub fn source(description: &LegDescription<JOINTS>) -> String {
     let has_direction = description.joints.iter().any(|joint| joint.motor.absolute.joint.is_some());
     let direction = if has_direction { "use crate::motor::Direction::*;\n" } else { "" };
+    let delays = if description.holding_brake.is_some() { "BrakeDelays, " } else { "" };
     // The debug form of plain data is valid source; `?` writes numbers that read back bit for bit.
     format!(
         "// The leg `{}`, written by `cargo fw --leg ... --source ...`. Change its leg file instead.\n\n\
@@ -127,7 +129,7 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
          use crate::motion::ExcitationTable;\n\
          use crate::motor::AbsoluteEncoders;\n\
          {direction}\
-         use crate::safety::{{SupplyLimits, WindingRating}};\n\
+         use crate::safety::{{{delays}SupplyLimits, WindingRating}};\n\
          use crate::units::*;\n\n\
          /// The leg.\n\
          pub const LEG: LegDescription<{JOINTS}> = {description:#?};\n\

@@ -143,6 +143,7 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
         supply: SupplyFile::default(),
         supply_current_a: None,
         charge_current_a: None,
+        brake: None,
         joints: vec![hip, knee],
     }
 }

@@ -2,9 +2,9 @@
 
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::motor::{AxisConfiguration, CalibrationSettings, Calibrator};
-use scarab::safety::SupplyLimits;
+use scarab::safety::{BrakeDelays, SupplyLimits};
 use scarab::units::{Ampere, Ohm};
-use scarab_host::formats::leg_file::{BodySide, DEFAULT_LEG, EncoderFile, LegFile, Side};
+use scarab_host::formats::leg_file::{BodySide, BrakeFile, DEFAULT_LEG, EncoderFile, LegFile, Side};
 use scarab_host::image::leg_source::{describe, source};
 use scarab_host::image::size::{ImageSize, MEMORY_GOAL, Section};
 use scarab_host::leg::posture::on_side;
@@ -222,6 +222,18 @@ fn a_leg_file_limits_the_supply_current_of_image_and_simulation() {
     // Only a stated limit makes the simulated supply a battery.
     let takes = |file: &LegFile| file.complete_description::<2>().expect("motors").supply.takes_charge;
     assert_eq!([takes(&file), takes(&leg(DEFAULT_LEG))], [true, false]);
+}
+
+#[test]
+fn a_leg_file_states_the_delays_of_a_holding_brake() {
+    let mut file = leg(DEFAULT_LEG);
+    let (description, _) = describe(&file, 1).expect("two joints");
+    assert!(description.holding_brake.is_none() && !source(&description).contains("BrakeDelays"));
+    file.brake = Some(BrakeFile { release_ms: 59.5, engage_ms: 40.0 });
+    let (description, _) = describe(&file, 1).expect("two joints");
+    let delays = BrakeDelays { release_ms: 60, engage_ms: 40 };
+    assert_eq!((description.holding_brake, file.brake_delays()), (Some(delays), Some(delays)));
+    assert!(source(&description).contains("use crate::safety::{BrakeDelays, SupplyLimits, WindingRating};"));
 }
 
 #[test]

@@ -153,6 +153,11 @@ fn every_error_names_file_line_and_reason() {
         ),
         (above("supply_current_a = 0.1"), Some(4), "`supply_current_a` is 0.1, outside 0.5..500"),
         (above("charge_current_a = 501.0"), Some(4), "`charge_current_a` is 501, outside 0.5..500"),
+        (
+            above("brake = { release_ms = 60.0, engage_ms = 501.0 }"),
+            Some(4),
+            "`brake.engage_ms` is 501, outside 0..500",
+        ),
         (joint("direction = 2"), Some(7), "joint `hip`: `direction` is 2; it must be 1 or -1"),
         (joint("\nrange_deg = [50.0, 2.0]"), Some(8), "`range_deg` is inverted or empty: 50 to 2"),
         (joint("range_deg = [-inf, 2.0]"), Some(7), "`range_deg` is -inf, outside -3600..3600"),

@@ -12,6 +12,7 @@ mod figures;
 mod files;
 mod floor;
 mod fuzz;
+mod holding_brake;
 mod image;
 mod image_source;
 mod kept;

@@ -1,8 +1,9 @@
 //! Both bridges: three compare values each, and the main output enable.
 //!
 //! Switching off is one store for each bridge, has no preconditions, and is allowed anywhere, also in a fault
-//! handler. Only the current loop switches on.
+//! handler. One more store engages the holding brake, after both bridges. Only the current loop switches on.
 
+use super::holding_brake;
 use super::registers::{load, store};
 use super::settings::timers::{BASES, BDTR, CCR1, MOE, TOP, bridge, compare};
 
@@ -12,11 +13,12 @@ const OFF: u32 = bridge(0)[0].value;
 /// All three duties one half.
 const NO_VOLTAGE: u32 = TOP as u32 / 2;
 
-/// Turns both bridges off at once.
+/// Turns both bridges off at once, then engages the holding brake.
 #[inline]
 pub fn disable_all() {
     store(BASES[0] + BDTR, OFF);
     store(BASES[1] + BDTR, OFF);
+    holding_brake::engage();
 }
 
 /// Whether both bridges are off.

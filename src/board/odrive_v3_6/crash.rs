@@ -1,4 +1,5 @@
-//! Crash handling of this board: both bridges off by two stores. A failure of the crystal counts as a crash.
+//! Crash handling of this board: both bridges off by two stores, then the holding brake engaged by one. A
+//! failure of the crystal counts as a crash.
 #![expect(unsafe_code, reason = "a name that the crash handler finds at link time, and a vector")]
 
 use cortex_m::peripheral::DWT;

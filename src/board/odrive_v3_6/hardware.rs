@@ -5,7 +5,7 @@ use spin::Mutex;
 
 use super::gate_driver::GateDrivers;
 use super::settings::analog::temperature_c;
-use super::{brake, bridge, can, contacts, converter, encoder, interrupts, watchdog};
+use super::{brake, bridge, can, contacts, converter, encoder, holding_brake, interrupts, watchdog};
 use crate::hal::{Contacts, Controller, EncoderPlace, Frame, Hardware};
 
 /// Gate drivers, available after the start; only the housekeeping uses them.
@@ -60,6 +60,10 @@ impl Hardware<2> for Odrive {
     #[inline(always)]
     fn set_brake(&mut self, duty: f32) {
         brake::set(duty);
+    }
+
+    fn set_holding_brake(&mut self, released: bool) {
+        holding_brake::set(released);
     }
 
     #[inline(always)]

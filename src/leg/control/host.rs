@@ -14,13 +14,15 @@ pub struct Host<'a, const N: usize> {
     /// Whether an identification or a tracked motion is cancelled: the joints slow down to rest along their
     /// profiles.
     pub cancel: bool,
+    /// Whether the drive holds its pose: commands are not followed yet.
+    pub waits: bool,
 }
 
 impl<const N: usize> Control<N> {
     /// Follows the host's commands if the drive is enabled and no other activity runs.
     pub(super) fn obey(&mut self, host: Option<&mut Host<'_, N>>) -> Option<Commanded<N>> {
-        let Host { following, commands, cancel } = host?;
-        if !self.servo.state().is_enabled() {
+        let Host { following, commands, cancel, waits } = host?;
+        if *waits || !self.servo.state().is_enabled() {
             return None;
         }
         if *cancel && !self.activity.follows_host() {

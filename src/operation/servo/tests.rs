@@ -16,6 +16,7 @@ use crate::safety::BoardFault;
 use crate::units::Ampere;
 
 mod faults;
+mod holding_brake;
 mod reports;
 
 const VOLT_PER_CODE: Volt = SenseScale::ODRIVE_3_6.volt_per_code;

@@ -175,7 +175,8 @@ fn follow_a_host(
         });
         let request = way.get(number as usize).copied().flatten().map(ControlRequest::Power);
         let (instructions, output) = count(|| {
-            let host = Host { following: &mut following, commands: black_box(&commands), cancel: false };
+            let commands = black_box(&commands);
+            let host = Host { following: &mut following, commands, cancel: false, waits: false };
             tick(black_box(&mut control), black_box(&sample), request, Some(host))
         });
         sample = follow(&output.motion, output.servo.drive().currents);

@@ -125,6 +125,8 @@ impl Hardware<2> for Machine {
         REGISTERS.requests[0].set(u32::from(low) | u32::from(high) << 16);
     }
 
+    fn set_holding_brake(&mut self, _: bool) {}
+
     #[inline(always)]
     fn pend_servo(&mut self) {
         REGISTERS.requests[0].set(1);

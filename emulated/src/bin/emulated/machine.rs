@@ -17,6 +17,7 @@ impl Hardware<JOINTS> for Machine {
     fn set_duty(&mut self, _: usize, _: &[f32; 3]) {}
     fn enable(&mut self, _: usize) {}
     fn set_brake(&mut self, _: f32) {}
+    fn set_holding_brake(&mut self, _: bool) {}
     fn pend_servo(&mut self) {
         vectors::pend_servo();
     }

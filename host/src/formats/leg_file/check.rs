@@ -13,6 +13,8 @@ use crate::formats::leg_file::{JointFile, LegFile, LinkParameters, Switch};
 
 /// Smallest range that the firmware's limits accept.
 const SMALLEST_RANGE_DEG: f64 = 2.0;
+/// Longest time of a holding brake, ms.
+const LONGEST_BRAKE_MS: f64 = 500.0;
 
 /// Position of a value; creates faults.
 pub(super) struct Place<'a> {
@@ -100,6 +102,11 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
         if let Some(limit) = limit {
             top.within(key, limit, 0.5, 500.0)?;
         }
+    }
+    if let Some(brake) = &leg.brake {
+        let place = Place { joint: None, table: Some("brake") };
+        place.within("release_ms", brake.release_ms, 0.0, LONGEST_BRAKE_MS)?;
+        place.within("engage_ms", brake.engage_ms, 0.0, LONGEST_BRAKE_MS)?;
     }
     if !(1..=3).contains(&leg.joints.len()) {
         return Err(top.fault("joint", &format!("occurs {} times; a leg has 1 to 3", leg.joints.len())));

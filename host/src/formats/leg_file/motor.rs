@@ -11,7 +11,7 @@ use hal_sim::drive::description::{
 };
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::leg::{AbsoluteEncoders, CounterDirection};
-use scarab::safety::{SupplyLimits, WindingRating};
+use scarab::safety::{BrakeDelays, SupplyLimits, WindingRating};
 use scarab::units::{Ampere, Ohm, Weber};
 use serde::{Deserialize, Serialize};
 
@@ -133,6 +133,16 @@ pub struct SupplyFile {
     pub capacitance_uf: f64,
     /// Brake resistor, ohm.
     pub brake_ohm: f64,
+}
+
+/// Times of a holding brake on the board's output, ms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BrakeFile {
+    /// From the command until it is open.
+    pub release_ms: f64,
+    /// From the command until it is closed.
+    pub engage_ms: f64,
 }
 
 impl Default for SupplyFile {
@@ -394,6 +404,14 @@ impl LegFile {
         let mut supply = self.supply.description();
         supply.takes_charge = self.charge_current_a.is_some();
         Ok(CompleteDescription::new(axes, supply))
+    }
+
+    /// Delays of the holding brake for the firmware, rounded up.
+    #[must_use]
+    pub fn brake_delays(&self) -> Option<BrakeDelays> {
+        let brake = self.brake?;
+        let (release_ms, engage_ms) = (brake.release_ms.ceil() as u16, brake.engage_ms.ceil() as u16);
+        Some(BrakeDelays { release_ms, engage_ms })
     }
 
     /// Limits of the supply for the firmware.

@@ -31,7 +31,7 @@ use scarab::operation::{
     AxisState, BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings,
     IdentificationLevel, Queues, RATE_HZ, ServoLevel, Signals, Slice, StoreJob, Tick, Watch,
 };
-use scarab::safety::{GUARD_RATE_HZ, SupplyLimits};
+use scarab::safety::{BrakeDelays, GUARD_RATE_HZ, SupplyLimits};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
@@ -95,6 +95,7 @@ pub struct Levels<const N: usize> {
     settings: HousekeepingSettings<N>,
     chopper: Chopper,
     supply: SupplyLimits,
+    holding_brake: Option<BrakeDelays>,
     following: Option<Following<N>>,
 }
 
@@ -110,7 +111,8 @@ impl<const N: usize> Levels<N> {
     ) -> Result<Self, ToolError> {
         let (axes, chopper) = ready(believed, description, world, seed)?;
         let settings = housekeeping_settings(believed)?;
-        let mut levels = Self::cold(settings, chopper, believed.supply_limits(), leg, None);
+        let mut levels =
+            Self::cold(settings, chopper, believed.supply_limits(), believed.brake_delays(), leg, None);
         levels.signals.begin_servo();
         levels.signals.statistics.see_bus(BUS_CODE);
         levels.registers.servo_due = true;
@@ -129,6 +131,7 @@ impl<const N: usize> Levels<N> {
         settings: HousekeepingSettings<N>,
         chopper: Chopper,
         supply: SupplyLimits,
+        holding_brake: Option<BrakeDelays>,
         leg: &DeviceLeg<N, B>,
         following: Option<Following<N>>,
     ) -> Self {
@@ -148,12 +151,14 @@ impl<const N: usize> Levels<N> {
                 volt_per_code,
                 following,
             )
-            .with_supply(supply),
+            .with_supply(supply)
+            .with_holding_brake(holding_brake),
             housekeeper: Housekeeper::new(settings),
             identification: IdentificationLevel::new(leg.identification().swarm_seed()),
             settings,
             chopper,
             supply,
+            holding_brake,
             following,
         }
     }
@@ -166,15 +171,18 @@ impl<const N: usize> Levels<N> {
         registers.thermistors = self.registers.thermistors;
         registers.encoders = self.registers.encoders;
         let following = self.following.take();
-        *self = Self { registers, ..Self::cold(self.settings, self.chopper, self.supply, leg, following) };
+        let (supply, holding_brake) = (self.supply, self.holding_brake);
+        let cold = Self::cold(self.settings, self.chopper, supply, holding_brake, leg, following);
+        *self = Self { registers, ..cold };
     }
 
     /// Connects the board to a bus, before its first tick.
     pub fn join_bus<const B: usize>(&mut self, leg: &DeviceLeg<N, B>, following: Following<N>) {
         let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
         let derating = drives::derating(SenseScale::DIVIDER);
-        self.servo =
-            ServoLevel::new(leg.control(), derating, volt_per_code, Some(following)).with_supply(self.supply);
+        self.servo = ServoLevel::new(leg.control(), derating, volt_per_code, Some(following))
+            .with_supply(self.supply)
+            .with_holding_brake(self.holding_brake);
         (self.bus, self.following) = (Some(Box::default()), Some(following));
     }
 

@@ -53,6 +53,8 @@ pub struct Registers<const N: usize> {
     pub commands: [AxisCommand; N],
     /// Duty cycle of the brake resistor.
     pub brake: f32,
+    /// Output of the holding brake: high releases it.
+    pub holding_brake: bool,
     /// Encoder counters.
     pub encoders: [u16; N],
     /// Frames of the absolute encoders at rotor and joint.
@@ -87,6 +89,7 @@ impl<const N: usize> Registers<N> {
             contacts: Contacts::default(),
             commands: [AxisCommand::OFF; N],
             brake: 0.0,
+            holding_brake: false,
             encoders: [0; N],
             encoder_frames: [[u16::MAX; 2]; N],
             gates: [true; N],
@@ -127,6 +130,7 @@ impl<const N: usize> Hardware<N> for Registers<N> {
 
     fn disable_all(&mut self) {
         self.commands = [AxisCommand::OFF; N];
+        self.holding_brake = false;
     }
 
     fn disable(&mut self, axis: usize) {
@@ -143,6 +147,10 @@ impl<const N: usize> Hardware<N> for Registers<N> {
 
     fn set_brake(&mut self, duty: f32) {
         self.brake = duty;
+    }
+
+    fn set_holding_brake(&mut self, released: bool) {
+        self.holding_brake = released;
     }
 
     fn pend_servo(&mut self) {

@@ -3,8 +3,8 @@
 //! Source: `Board/v3/Inc/main.h:77-156`, `board.cpp:35-254`; registers RM0090 8.4.
 //!
 //! Pins of the bus: [`super::can`]; of absolute encoders: [`super::absolute_encoders`]. Unused and left in
-//! their reset state: UART_A (PA0, PA1), USB (PA11, PA12), GPIO6 (PB2), and GPIO7 and GPIO8 (PA15, PB3)
-//! without such encoders.
+//! their reset state: UART_A (PA0, PA1), USB (PA11, PA12), GPIO6 (PB2) without a holding brake, and GPIO7
+//! and GPIO8 (PA15, PB3) without such encoders.
 
 use super::Write;
 
@@ -103,6 +103,9 @@ pub const PINS: [Pin; 32] = [
     pin(b'B', 10, CHOPPER),
     pin(b'B', 11, CHOPPER),
 ];
+
+/// Driver of the holding brake on GPIO6, initially low: engaged. Only written where there is a brake.
+pub const HOLDING_BRAKE: Pin = pin(b'B', 2, Mode::Output(false));
 
 /// Address of a port's first register.
 #[must_use]
