@@ -176,6 +176,24 @@ fn encoders_that_contradict_each_other_brake_once_and_end_the_zero() {
 }
 
 #[test]
+fn a_contradiction_of_an_axis_that_is_off_makes_its_motor_turn_next() {
+    let (stored, zeros) = first_day();
+    for lost in [0, 24] {
+        let mut machine = restarted([40.0; 2], stored, zeros);
+        machine.counted[0] = machine.counted[0].wrapping_add(lost);
+        machine.hold(false, false, 0.05);
+        assert_eq!(faults(&machine).len(), usize::from(lost > 0));
+        // Reset.
+        machine.hold(false, true, 2.3);
+        machine.hold(false, false, 0.3);
+        machine.press();
+        machine.hold(true, false, 3.0);
+        let is_confirmed = machine.results().contains(&(1, "confirmed"));
+        assert_eq!(is_confirmed, lost == 0, "{:?}", machine.results());
+    }
+}
+
+#[test]
 fn a_silent_encoder_is_reported_and_forbids_a_calibration() {
     for place in [EncoderPlace::Rotor, EncoderPlace::Joint] {
         let mut bench = Bench::new(Housekeeper::new(settings()));
