@@ -28,6 +28,9 @@ pub const BRIDGE_CLOCK_HZ: u32 = 168_000_000;
 /// docs/motor.md, section 1.
 pub const SHUNT_TRIGGER_CLOCKS: i16 = 20;
 
+/// Greatest duty of the brake resistor, as in ODrive's firmware.
+pub const GREATEST_BRAKE_DUTY: f32 = 0.95;
+
 /// Readings of one axis' converter and counter in one PWM period, at the middle of the zero
 /// vector in which all low sides conduct. A board samples the shunts later by the lag of
 /// their amplifiers ([`SHUNT_TRIGGER_CLOCKS`]).

@@ -17,12 +17,9 @@
 //! Cost: one comparison below the ramp.
 
 use super::SenseScale;
-use crate::hal::CURRENT_RATE_HZ;
+use crate::hal::{CURRENT_RATE_HZ, GREATEST_BRAKE_DUTY};
 use crate::real::{clamp, is_finite, min};
 use crate::units::Volt;
-
-/// Greatest duty of the resistor.
-pub const GREATEST_BRAKE_DUTY: f32 = 0.95;
 
 /// The chopper's ramp; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]

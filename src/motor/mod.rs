@@ -44,7 +44,7 @@ pub use calibration::{
     Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, IndexSearch, JointZero,
     Mismatch, MotorConstant, MotorFindings, Phase, Refusal, StoredCalibration,
 };
-pub use chopper::{BrakeBudget, Chopper, GREATEST_BRAKE_DUTY};
+pub use chopper::{BrakeBudget, Chopper};
 pub use configuration::{AxisConfiguration, AxisError, Direction};
 pub use current_loop::{CurrentGains, CurrentLoop, MotorConstants};
 pub use frames::{Phases, Quantity, Rotating, Stationary};

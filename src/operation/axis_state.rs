@@ -20,7 +20,7 @@ pub enum Order {
     /// Set the joint's position to these counts.
     Place(i32),
     /// Count the rotor position as lost: an absolute encoder contradicts it.
-    Lose,
+    LosePosition,
     /// Clear a fault.
     ClearFault,
 }
@@ -127,7 +127,7 @@ impl AxisState {
                     axis.set_counts(counts);
                 }
             }
-            Order::Lose => {
+            Order::LosePosition => {
                 if let Some(axis) = self.axis_mut() {
                     axis.lose_position();
                 }

@@ -22,9 +22,8 @@ use super::queues::CurrentEnds;
 use super::signals::Signals;
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Hardware};
 use crate::leg::axis_code;
-use crate::motor::{AxisRequest, BrakeBudget, Chopper, GREATEST_BRAKE_DUTY};
+use crate::motor::{AxisRequest, BrakeBudget, Chopper};
 use crate::real::max;
-use crate::safety::supply_current::MOST_BRAKE_DUTY;
 use crate::safety::{BoardFault, Bridges, InhibitReason, ServoWatch, TickState, TickWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
@@ -45,9 +44,6 @@ const UNCONVERTED: u8 = 2;
 /// Ticks after a stall in which the index is ignored. Its interrupt was late by the stall, and so is its
 /// captured count. The interrupt comes after the first of them.
 const LATE_TICKS: u8 = 2;
-
-// The servo may request what the resistor may have.
-const _: () = assert!(MOST_BRAKE_DUTY == GREATEST_BRAKE_DUTY);
 
 /// Board state at a tick of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -103,14 +103,14 @@ pub(super) enum Finding {
     Contradiction,
 }
 
-/// Occurrences in a row.
+/// Debounce counters of one encoder: checks in a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct InARow {
+struct DebounceCounters {
     invalid: u8,
     wrong: u8,
 }
 
-impl InARow {
+impl DebounceCounters {
     fn judge(&mut self, is_right: Option<bool>) -> Finding {
         let (invalid, wrong) = match is_right {
             None => (self.invalid.saturating_add(1), self.wrong),
@@ -132,8 +132,8 @@ pub(super) struct EncoderCheck {
     /// Rotor position in the counter's direction, counts from the absolute encoder's zero; `None` before the
     /// first reading.
     rotor: Option<i32>,
-    at_rotor: InARow,
-    at_joint: InARow,
+    at_rotor: DebounceCounters,
+    at_joint: DebounceCounters,
 }
 
 impl EncoderCheck {

@@ -471,7 +471,7 @@ impl<const N: usize> Housekeeper<N> {
             return level.signals.inhibit.raise(InhibitReason::Configuration);
         };
         *calibrated = true;
-        // The search begins anew with a running axis.
+        // A running axis has no index search.
         self.set_certain(axis, false);
         // Counting restarts without a zero.
         level.signals.end_servo();

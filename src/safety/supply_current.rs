@@ -33,7 +33,7 @@
 //! Cost: 36 instructions a tick, and some 120 more while a limit acts.
 
 use super::fault::FaultCode;
-use crate::hal::SERVO_RATE_HZ;
+use crate::hal::{GREATEST_BRAKE_DUTY, SERVO_RATE_HZ};
 use crate::real::{clamp, is_finite};
 use crate::units::{Ampere, Ohm, Volt};
 
@@ -49,8 +49,6 @@ const MOST_EXCESS: f32 = 4.0;
 const LEAST_SHARE: f32 = 1.0 / 64.0;
 /// Share of the charge limit above which the brake resistor takes the current.
 const BRAKE_SHARE: f32 = 0.75;
-/// Greatest duty of the brake resistor (`motor::GREATEST_BRAKE_DUTY`).
-pub const MOST_BRAKE_DUTY: f32 = 0.95;
 /// Multiple of a limit, and servo ticks (0.2 s), that are a fault.
 const FAULT_FACTOR: f32 = 1.25;
 const FAULT_TICKS: u16 = (SERVO_RATE_HZ / 5) as u16;
@@ -158,7 +156,7 @@ impl SupplyCurrent {
             [f32::INFINITY; 2]
         };
         let wanted = (-self.bridges_a - self.brake_from_a) * self.brake.0 * per_volt;
-        self.brake_duty = clamp(wanted, 0.0, MOST_BRAKE_DUTY);
+        self.brake_duty = clamp(wanted, 0.0, GREATEST_BRAKE_DUTY);
         let (drawn, charged) = (self.draw.advance(drawn_a), self.charge.advance(charged_a));
         self.limits = self.draw.share < 1.0 || self.charge.share < 1.0 || self.brake_duty > 0.0;
         if charged {

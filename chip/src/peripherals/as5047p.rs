@@ -5,6 +5,9 @@
 //! answer    bit 15 even parity, bit 14 error of a command before, bits 13..0 data
 //! ```
 //!
+//! The commands 0xFFFF (angle) and 0x4001 (errors), the error bits and SPI mode 1 are those of SimpleFOC's
+//! driver (`Arduino-FOC-drivers`, `AS5047.cpp`) too.
+//!
 //! A command takes effect when the chip is deselected. The error flag stays until the error register (0x0001)
 //! is read. Only reads of that and of the angle (0x3FFF) are modelled.
 

@@ -68,7 +68,7 @@ fn legs_are_calibrated_once_and_confirmed_anywhere_in_the_turn() {
         assert!(found.is_proven() && found.indexed(), "seed {seed}");
         let stored = found.stored().expect("positions count from the encoder's zero");
 
-        // The next day: the counter begins anew, and the leg rests elsewhere.
+        // The next day: the counter begins again, and the leg rests elsewhere.
         let mut random = TestRandom::new(seed + 3_000_000);
         let mut next = equipped(seed);
         next.axis.counter.start = random.one_of([0, 20_000, 65_500]);

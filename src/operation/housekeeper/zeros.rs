@@ -68,7 +68,7 @@ fn counts<const N: usize, H>(axis: usize, level: &Level<'_, '_, N, H>) -> i32 {
 
 impl<const N: usize> Housekeeper<N> {
     /// Follows the counters of axes with an absolute encoder at the rotor. A flash write may let a counter
-    /// wrap unseen, so the checks begin anew after it.
+    /// wrap unseen, so the checks restart after it.
     pub(super) fn follow_counters(&mut self, level: &Level<'_, '_, N, impl Hardware<N>>) {
         if level.signals.inhibit.is_storing() {
             self.checks = [EncoderCheck::default(); N];
@@ -120,7 +120,7 @@ impl<const N: usize> Housekeeper<N> {
             Finding::Silent => level.signals.report(BoardFault::AbsoluteEncoder, axis),
             Finding::Contradiction => {
                 let is_calibrating = self.calibrating == Some(axis);
-                let order = if is_calibrating { Order::Off } else { Order::Lose };
+                let order = if is_calibrating { Order::Off } else { Order::LosePosition };
                 // A full queue is tried again at the next check.
                 if self.is_contradicted(axis) || !level.order(axis, order) {
                     return;
@@ -265,8 +265,10 @@ impl<const N: usize> Housekeeper<N> {
         if readings.contains(&None) {
             return None;
         }
-        let places: [_; N] =
-            core::array::from_fn(|axis| self.counts_from_zero(axis, readings[axis].flatten(), level));
+        let mut readings = readings.into_iter();
+        let places: [_; N] = core::array::from_fn(|axis| {
+            self.counts_from_zero(axis, readings.next().flatten().flatten(), level)
+        });
         if places.contains(&None) {
             self.joint_zeros = [None; N];
             return Some(false);

@@ -3,7 +3,8 @@
 //! Detection is counted for choppers only. For voltages every run checks that the duty stays within its
 //! bounds.
 
-use scarab::motor::{Chopper, GREATEST_BRAKE_DUTY};
+use scarab::hal::GREATEST_BRAKE_DUTY;
+use scarab::motor::Chopper;
 use scarab::units::Volt;
 
 use crate::base::error::ToolError;
