@@ -24,16 +24,15 @@ const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
 /// Request of an operator, valid for one tick. `Identify` and `Track` are refused unless the drive is enabled
 /// and the commanded motion is at rest. To stop a moving leg, request a quick stop or wait for the end of the
 /// motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ControlRequest<const N: usize> {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ControlRequest {
     /// A step of the drive's power states.
     Power(PowerRequest),
     /// Start an identification: excite, solve, validate.
     Identify,
-    /// Track a motion, with the identified model as feedforward or with feedback only.
+    /// Track the motion of [`Control::set_tracked`], with the identified model as feedforward or with feedback
+    /// only. Refused if no motion is set.
     Track {
-        /// Motion proved against this leg's limits, see [`LegConfiguration::prove`].
-        motion: ProvedMotion<N>,
         /// Whether the model is used as feedforward, if there is one.
         with_model: bool,
     },
@@ -42,7 +41,7 @@ pub enum ControlRequest<const N: usize> {
     TakeUpdate,
 }
 
-impl<const N: usize> ControlRequest<N> {
+impl ControlRequest {
     /// Returns whether the request commands a motion.
     #[must_use]
     pub const fn moves(&self) -> bool {
@@ -225,7 +224,7 @@ impl<const N: usize> Control<N> {
     pub fn tick(
         &mut self,
         sample: &Sample<N>,
-        request: Option<ControlRequest<N>>,
+        request: Option<ControlRequest>,
         gravity: [f32; 3],
     ) -> ControlOutput<N> {
         self.tick_with(sample, request, gravity, None)
@@ -236,7 +235,7 @@ impl<const N: usize> Control<N> {
     pub fn tick_with(
         &mut self,
         sample: &Sample<N>,
-        request: Option<ControlRequest<N>>,
+        request: Option<ControlRequest>,
         gravity: [f32; 3],
         mut host: Option<Host<'_, N>>,
     ) -> ControlOutput<N> {
@@ -296,7 +295,7 @@ impl<const N: usize> Control<N> {
     }
 
     /// Whether the request is permitted. A new activity starts only from rest, because its approach does.
-    fn may_begin(&self, request: &ControlRequest<N>, host: Option<&Host<'_, N>>) -> bool {
+    fn may_begin(&self, request: &ControlRequest, host: Option<&Host<'_, N>>) -> bool {
         let still = match host {
             Some(host) if self.activity.follows_host() => host.following.is_still(),
             _ => self.motion.state_at(self.motion_tick).velocity_rad_per_s.iter().all(|&speed| speed == 0.0),
@@ -305,7 +304,8 @@ impl<const N: usize> Control<N> {
         match request {
             ControlRequest::Power(_) => true,
             ControlRequest::TakeUpdate => self.is_update_offered(),
-            ControlRequest::Identify | ControlRequest::Track { .. } => enabled && still,
+            ControlRequest::Identify => enabled && still,
+            ControlRequest::Track { .. } => enabled && still && self.tracked.is_some(),
         }
     }
 
@@ -315,7 +315,7 @@ impl<const N: usize> Control<N> {
         self.models.withdraw();
     }
 
-    fn accept(&mut self, request: Option<ControlRequest<N>>) -> Option<PowerRequest> {
+    fn accept(&mut self, request: Option<ControlRequest>) -> Option<PowerRequest> {
         match request? {
             ControlRequest::Power(power) => return Some(power),
             ControlRequest::Identify => {
@@ -324,11 +324,12 @@ impl<const N: usize> Control<N> {
                 self.forget_change();
                 self.approach(Activity::Identify(IdentifyPhase::Approach), self.excitation);
             }
-            ControlRequest::Track { motion, with_model } => {
-                self.forget_change();
-                self.tracked = Some(*motion.motion());
-                self.models.want(with_model);
-                self.approach(Activity::Track(Step::Approach), *motion.motion());
+            ControlRequest::Track { with_model } => {
+                if let Some(motion) = self.tracked {
+                    self.forget_change();
+                    self.models.want(with_model);
+                    self.approach(Activity::Track(Step::Approach), motion);
+                }
             }
             ControlRequest::TakeUpdate => {
                 self.models.take();
@@ -423,6 +424,17 @@ impl<const N: usize> Control<N> {
             }
         }
         false
+    }
+
+    /// Sets the motion of the next [`ControlRequest::Track`], proved against this leg's limits
+    /// ([`LegConfiguration::prove`]). Refused (`false`) while one is tracked. A restart forgets it.
+    #[must_use]
+    pub fn set_tracked(&mut self, motion: ProvedMotion<N>) -> bool {
+        let tracks = matches!(self.activity, Activity::Track(_));
+        if !tracks {
+            self.tracked = Some(*motion.motion());
+        }
+        !tracks
     }
 
     /// Replaces the model by a restored one, from the next tick on. Refused (`false`) during an activity or

@@ -102,7 +102,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     pub fn tick(
         &mut self,
         sample: &Sample<N>,
-        request: Option<ControlRequest<N>>,
+        request: Option<ControlRequest>,
         gravity: [f32; 3],
         evaluations: u32,
     ) -> ControlOutput<N> {
@@ -175,6 +175,12 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
             self.identification.forget_model();
         }
         adopted
+    }
+
+    /// Sets the motion that is tracked next, see [`Control::set_tracked`].
+    #[must_use]
+    pub fn set_tracked(&mut self, motion: ProvedMotion<N>) -> bool {
+        self.control.set_tracked(motion)
     }
 
     /// Reports a fault detected by the board, see [`Control::report`].

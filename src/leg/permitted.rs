@@ -8,11 +8,11 @@ use crate::safety::{DriveState, FaultCode, PowerRequest};
 ///
 /// With an inhibit reason, a drive that is not off is switched off even without a request.
 #[must_use]
-pub fn permitted<const N: usize>(
-    request: Option<ControlRequest<N>>,
+pub fn permitted(
+    request: Option<ControlRequest>,
     is_clear: bool,
     state: DriveState,
-) -> Option<ControlRequest<N>> {
+) -> Option<ControlRequest> {
     use PowerRequest::{DisableOperation, DisableVoltage, QuickStop, ResetFault};
     if is_clear {
         return request;
@@ -54,14 +54,14 @@ mod tests {
     #[test]
     fn an_inhibit_reason_prevents_enabling() {
         let enabling = [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation]
-            .map(ControlRequest::<2>::Power);
+            .map(ControlRequest::Power);
         let off = Some(ControlRequest::Power(PowerRequest::DisableVoltage));
         for request in enabling.into_iter().chain([ControlRequest::Identify]) {
             assert_eq!(permitted(Some(request), true, DriveState::SwitchedOn), Some(request));
             assert_eq!(permitted(Some(request), false, DriveState::SwitchOnDisabled), None);
             for state in [DriveState::ReadyToSwitchOn, DriveState::SwitchedOn, DriveState::OperationEnabled] {
                 assert_eq!(permitted(Some(request), false, state), off);
-                assert_eq!(permitted::<2>(None, false, state), off);
+                assert_eq!(permitted(None, false, state), off);
             }
         }
     }

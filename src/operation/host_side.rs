@@ -20,7 +20,7 @@ const TICKS: u32 = 2;
 const LAG_TICKS: f32 = 8.0;
 
 /// A request and, where it begins an identification, its plan and seed.
-pub type HostRequest<const N: usize> = (ControlRequest<N>, Option<(Plan, u64)>);
+pub type HostRequest = (ControlRequest, Option<(Plan, u64)>);
 
 /// State of the servo's side of the bus.
 #[derive(Clone, Debug, PartialEq)]
@@ -138,7 +138,7 @@ impl<const N: usize> HostSide<N> {
     }
 
     /// The request of this tick: the operator's, or else the host's, once.
-    pub fn request(&mut self, by_hand: Option<ControlRequest<N>>) -> Option<HostRequest<N>> {
+    pub fn request(&mut self, by_hand: Option<ControlRequest>) -> Option<HostRequest> {
         if let Some(request) = by_hand {
             return Some((request, None));
         }
@@ -154,11 +154,11 @@ impl<const N: usize> HostSide<N> {
     /// leg gets a quick stop.
     pub fn held(
         &self,
-        request: Option<ControlRequest<N>>,
+        request: Option<ControlRequest>,
         state: DriveState,
         signals: &Signals<N>,
         hardware: &impl Hardware<N>,
-    ) -> Option<ControlRequest<N>> {
+    ) -> Option<ControlRequest> {
         if is_held(signals, hardware) {
             return request;
         }

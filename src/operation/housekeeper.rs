@@ -79,7 +79,7 @@ impl<const N: usize, H> Level<'_, '_, N, H> {
 
     /// Sends a request to the servo and returns whether the queue took it. While a host has the drive,
     /// closing the enabling switch only permits and requests nothing.
-    fn request(&mut self, request: ControlRequest<N>) -> bool {
+    fn request(&mut self, request: ControlRequest) -> bool {
         let enables = matches!(request, ControlRequest::Power(power) if power.enables());
         !(enables && self.signals.is_hosted()) && self.ends.requests.enqueue(request).is_ok()
     }

@@ -63,7 +63,7 @@ pub struct Queues<const N: usize> {
     orders: [Queue<Order, 3>; N],
     outcomes: [Queue<Outcome, 4>; N],
     samples: [Queue<JointSample, 4>; N],
-    requests: Queue<ControlRequest<N>, 3>,
+    requests: Queue<ControlRequest, 3>,
     findings: Queue<Finding<N>, 3>,
     drive: Queue<DriveState, 8>,
     notes: Queue<Record<N>, 15>,
@@ -84,7 +84,7 @@ pub struct CurrentEnds<'a, const N: usize> {
 pub struct ServoEnds<'a, const N: usize> {
     /// Samples of each joint.
     pub samples: [Consumer<'a, JointSample>; N],
-    pub(super) requests: Consumer<'a, ControlRequest<N>>,
+    pub(super) requests: Consumer<'a, ControlRequest>,
     pub(super) findings: Consumer<'a, Finding<N>>,
     pub(super) drive: Producer<'a, DriveState>,
     pub(super) events: Producer<'a, LegEvent<N>>,
@@ -97,7 +97,7 @@ pub struct HousekeepingEnds<'a, const N: usize> {
     pub(super) orders: [Producer<'a, Order>; N],
     pub(super) outcomes: [Consumer<'a, Outcome>; N],
     /// Requests to the servo.
-    pub requests: Producer<'a, ControlRequest<N>>,
+    pub requests: Producer<'a, ControlRequest>,
     /// Drive states of the servo.
     pub drive: Consumer<'a, DriveState>,
     /// Records for the trace.
@@ -235,7 +235,7 @@ impl<const N: usize> Queues<N> {
     /// Requests that wait for the servo's tick.
     #[cfg(not(target_os = "none"))]
     #[must_use]
-    pub fn requests(&mut self) -> &mut Queue<ControlRequest<N>, 3> {
+    pub fn requests(&mut self) -> &mut Queue<ControlRequest, 3> {
         &mut self.requests
     }
 }

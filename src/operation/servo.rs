@@ -199,7 +199,7 @@ impl<const N: usize> ServoLevel<N> {
         ends: &mut ServoEnds<'_, N>,
         signals: &Signals<N>,
         hardware: &H,
-    ) -> Option<ControlRequest<N>> {
+    ) -> Option<ControlRequest> {
         let by_hand = ends.requests.dequeue();
         let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) else {
             return by_hand;
@@ -278,8 +278,8 @@ impl<const N: usize> ServoLevel<N> {
     fn report(
         &mut self,
         control: &Control<N>,
-        request: Option<&ControlRequest<N>>,
-        permitted: Option<&ControlRequest<N>>,
+        request: Option<&ControlRequest>,
+        permitted: Option<&ControlRequest>,
         output: &ControlOutput<N>,
         ends: &mut ServoEnds<'_, N>,
         signals: &Signals<N>,

@@ -12,7 +12,8 @@ const DAMPING: u64 = 1200;
 fn after_a_stop_the_model_returns_without_a_torque_step() {
     let mut pair = identified();
     let gait = context().configuration.prove(context().motions.validation[1]).expect("proved at the start");
-    tick(&mut pair, Some(ControlRequest::Track { motion: gait, with_model: true }));
+    assert!(pair.leg.set_tracked(gait));
+    tick(&mut pair, Some(ControlRequest::Track { with_model: true }));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
     for _ in 0..SECOND {
         tick(&mut pair, None);
@@ -87,7 +88,8 @@ fn a_refused_result_does_not_change_the_monitored_friction() {
     assert_ne!(pair.leg.identification().model().stribeck, accepted, "the refused result has another curve");
 
     let gait = context.configuration.prove(context.motions.validation[1]).expect("proved at the start");
-    tick(&mut pair, Some(ControlRequest::Track { motion: gait, with_model: true }));
+    assert!(pair.leg.set_tracked(gait));
+    tick(&mut pair, Some(ControlRequest::Track { with_model: true }));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
     for _ in 0..SECOND {
         tick(&mut pair, None);

@@ -205,7 +205,8 @@ fn commanded_speed_and_torque_never_jump_from_start_to_tracking() {
             before = output;
         }
         if !second_half {
-            request = Some(ControlRequest::Track { motion: gait, with_model: true });
+            assert!(pair.leg.set_tracked(gait));
+            request = Some(ControlRequest::Track { with_model: true });
         }
     }
 }

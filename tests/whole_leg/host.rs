@@ -57,7 +57,7 @@ impl Hosted {
         Self { pair, commands: [HOLD; JOINTS], status: [JointStatus::NONE; JOINTS] }
     }
 
-    fn tick(&mut self, request: Option<ControlRequest<JOINTS>>) -> scarab::leg::ControlOutput<JOINTS> {
+    fn tick(&mut self, request: Option<ControlRequest>) -> scarab::leg::ControlOutput<JOINTS> {
         self.pair.leg.command(&self.commands);
         let output = tick(&mut self.pair, request);
         self.status =

@@ -54,7 +54,7 @@ fn enabled(leg: &LegFile, seed: u64) -> Pair {
     pair
 }
 
-fn tick(pair: &mut Pair, request: Option<ControlRequest<JOINTS>>) -> scarab::leg::ControlOutput<JOINTS> {
+fn tick(pair: &mut Pair, request: Option<ControlRequest>) -> scarab::leg::ControlOutput<JOINTS> {
     pair.tick(request, context().gravity)
 }
 

@@ -13,14 +13,12 @@ use super::*;
 const MASS: f64 = 3.0;
 const PLACE: f64 = 0.2;
 
-/// Request to walk the 3 s gait for three minutes.
-fn walk(with_model: bool) -> ControlRequest<JOINTS> {
+/// Requests to walk the 3 s gait for three minutes.
+fn walk(pair: &mut Pair, with_model: bool) {
     let curve = *context().motions.validation[1].curve();
     let motion = Periodic::new(curve, Second(1.0), 60, SERVO_RATE_HZ).expect("a motion");
-    ControlRequest::Track {
-        motion: context().configuration.prove(motion).expect("within limits"),
-        with_model,
-    }
+    assert!(pair.leg.set_tracked(context().configuration.prove(motion).expect("within limits")));
+    tick(pair, Some(ControlRequest::Track { with_model }));
 }
 
 /// A pair ten seconds into the walk with the model.
@@ -28,7 +26,7 @@ fn walking() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {
         let mut pair = identified();
-        tick(&mut pair, Some(walk(true)));
+        walk(&mut pair, true);
         assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
         for _ in 0..10 * SECOND {
             tick(&mut pair, None);
@@ -91,7 +89,7 @@ fn an_update_is_applied_without_a_torque_step_and_then_monitored() {
     let old = *pair.leg.control().model().expect("accepted");
     let torque = |output: &ServoOutput<JOINTS>| output.wanted_torque.map(|torque| torque.0);
     let before = torque(&tick(&mut pair, None).servo);
-    let largest = |pair: &mut Pair, mut request: Option<ControlRequest<JOINTS>>| {
+    let largest = |pair: &mut Pair, mut request: Option<ControlRequest>| {
         let (mut largest, mut before) = (0.0_f32, before);
         for _ in 0..SECOND {
             let now = torque(&tick(pair, request.take()).servo);
@@ -130,7 +128,7 @@ fn no_update_is_available_before_a_change() {
 #[test]
 fn a_leg_that_was_never_identified_is_not_monitored() {
     let mut pair = enabled(&default_leg(), 1);
-    tick(&mut pair, Some(walk(false)));
+    walk(&mut pair, false);
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
     pair.world.attach(1, MASS, [PLACE, 0.0, 0.0]);
     for _ in 0..30 * SECOND {
@@ -151,7 +149,7 @@ fn a_stop_discards_the_collected_rows() {
     }
     // After enabling again the change is detected again.
     assert!(pair.enable(context().gravity));
-    tick(&mut pair, Some(walk(true)));
+    walk(&mut pair, true);
     assert_eq!(pair.leg.control().change(), None);
     assert!(run_until(&mut pair, |pair| pair.leg.control().change().is_some()));
 }

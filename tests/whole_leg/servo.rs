@@ -24,7 +24,8 @@ fn amplitude_ratio(joint: usize, frequency_hz: f32) -> f64 {
     let curve = Fourier::new(Second(1.0 / frequency_hz), centre, amplitudes, [[0.0; HARMONICS]; JOINTS]);
     let motion = Periodic::new(curve.expect("finite"), Second(1.0), CYCLES, SERVO_RATE_HZ).expect("sensible");
     let proved = context().configuration.prove(motion).expect("small");
-    tick(&mut pair, Some(ControlRequest::Track { motion: proved, with_model: false }));
+    assert!(pair.leg.set_tracked(proved));
+    tick(&mut pair, Some(ControlRequest::Track { with_model: false }));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
     for _ in 0..motion.blend_ticks() + (CYCLES - 8) * motion.period_ticks() {
         tick(&mut pair, None);
@@ -77,4 +78,20 @@ fn control_restarted_during_a_motion_is_off() {
         assert_eq!(control.activity(), Activity::Idle);
     }
     assert_eq!(control.state(), DriveState::SwitchOnDisabled);
+}
+
+#[test]
+fn a_motion_is_set_before_it_is_tracked_and_stays_while_it_runs() {
+    let leg = default_leg();
+    let mut pair = enabled(&leg, 1);
+    let track = ControlRequest::Track { with_model: false };
+    assert!(tick(&mut pair, Some(track)).refused, "no motion is set");
+    let motion = context().configuration.prove(context().motions.validation[1]).expect("proved before");
+    assert!(pair.leg.set_tracked(motion));
+    assert!(!tick(&mut pair, Some(track)).refused);
+    assert!(!pair.leg.set_tracked(motion), "an approach ends at its own motion");
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
+    assert!(!pair.leg.set_tracked(motion));
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Idle));
+    assert!(pair.leg.set_tracked(motion));
 }

@@ -95,7 +95,8 @@ fn a_model_is_not_exchanged_in_motion_or_while_in_use() {
 
     let mut pair = identified();
     let motion = context().configuration.prove(context().motions.validation[1]).expect("proved before");
-    tick(&mut pair, Some(ControlRequest::Track { motion, with_model: true }));
+    assert!(pair.leg.set_tracked(motion));
+    tick(&mut pair, Some(ControlRequest::Track { with_model: true }));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
     assert!(!pair.leg.adopt(restored), "tracking");
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Idle));

@@ -104,8 +104,10 @@ fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> 
             return Ok(Stretch { periods: rig.period - from, alarm: Some(alarm_text) });
         }
         if rig.leg.control().activity() == Activity::Idle && !rig.is_requested() {
-            if let Some(motion) = gaits.get(next % gaits.len()).copied().flatten() {
-                rig.ask(ControlRequest::Track { motion, with_model: true });
+            if let Some(motion) = gaits.get(next % gaits.len()).copied().flatten()
+                && rig.leg.set_tracked(motion)
+            {
+                rig.ask(ControlRequest::Track { with_model: true });
             }
             next += 1;
         }

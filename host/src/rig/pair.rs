@@ -211,7 +211,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
     }
 
     /// Runs one servo tick of leg and plant.
-    pub fn tick(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
+    pub fn tick(&mut self, request: Option<ControlRequest>, gravity: [f32; 3]) -> ControlOutput<N> {
         let output = if self.board.is_some() {
             self.tick_board(request, gravity)
         } else {
@@ -229,7 +229,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
     }
 
     /// Runs one servo tick of all levels of the board, and six periods of the plant.
-    fn tick_board(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
+    fn tick_board(&mut self, request: Option<ControlRequest>, gravity: [f32; 3]) -> ControlOutput<N> {
         let Some(board) = &mut self.board else { unreachable!("called with a board") };
         if let Some(request) = request {
             board.ask(request);

@@ -133,7 +133,10 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
             torque: pushes.torque_nm,
             duration: pushes.duration_s,
         }));
-        walk.tick(Some(ControlRequest::Track { motion, with_model: true }))?;
+        if !walk.pair.leg.set_tracked(motion) {
+            return Err(ToolError::input("the leg tracks another motion"));
+        }
+        walk.tick(Some(ControlRequest::Track { with_model: true }))?;
         while walk.activity() != Activity::Track(Step::Run) {
             walk.tick(None)?;
         }
@@ -145,7 +148,7 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
         self.pair.leg.control().activity()
     }
 
-    fn tick(&mut self, request: Option<ControlRequest<N>>) -> Result<(), ToolError> {
+    fn tick(&mut self, request: Option<ControlRequest>) -> Result<(), ToolError> {
         if let Some((disturbances, since)) = self.changing {
             let tick = self.pair.ticks - since;
             disturb(&mut self.pair, disturbances, tick);

@@ -70,7 +70,7 @@ impl Bench {
         self.side.receive(&mut self.host, report);
     }
 
-    fn held(&self, request: Option<ControlRequest<2>>, state: DriveState) -> Option<ControlRequest<2>> {
+    fn held(&self, request: Option<ControlRequest>, state: DriveState) -> Option<ControlRequest> {
         self.side.held(request, state, &self.signals, &self.hardware)
     }
 

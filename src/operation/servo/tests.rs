@@ -99,7 +99,7 @@ impl Bench {
     }
 
     /// The operator requests.
-    fn ask(&mut self, request: ControlRequest<2>) {
+    fn ask(&mut self, request: ControlRequest) {
         assert!(self.ends.housekeeping.requests.enqueue(request).is_ok(), "full");
     }
 

@@ -48,7 +48,7 @@ fn follow(motion: &MotionState<JOINTS>, currents: [Ampere; JOINTS]) -> Sample<JO
 fn tick(
     control: &mut Control<JOINTS>,
     sample: &Sample<JOINTS>,
-    request: Option<ControlRequest<JOINTS>>,
+    request: Option<ControlRequest>,
     host: Option<Host<'_, JOINTS>>,
 ) -> ControlOutput<JOINTS> {
     control.tick_with(sample, request, GRAVITY, host)
@@ -75,13 +75,8 @@ pub fn report(model: &Model, account: &mut Account) -> Option<()> {
     for power in way {
         let _ = tick(&mut control, &sample, power.map(ControlRequest::Power), None);
     }
-    let adopted = control.adopt(identified);
-    let mut output = tick(
-        &mut control,
-        &sample,
-        Some(ControlRequest::Track { motion: proved.ok()?, with_model: true }),
-        None,
-    );
+    let adopted = control.adopt(identified) && control.set_tracked(proved.ok()?);
+    let mut output = tick(&mut control, &sample, Some(ControlRequest::Track { with_model: true }), None);
     if !adopted || output.refused {
         hprintln!("the leg does not track: {:?}, {:?}", control.state(), control.activity());
         return None;

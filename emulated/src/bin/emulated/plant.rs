@@ -29,7 +29,7 @@ const LONGEST_TICKS: u32 = 300 * SERVO_RATE_HZ;
 /// Ticks after a fault, for its records.
 const LAST_TICKS: u32 = SERVO_RATE_HZ / 2;
 /// Operator's requests, one per servo tick; the first tick has none.
-const REQUESTS: [ControlRequest<JOINTS>; 4] = [
+const REQUESTS: [ControlRequest; 4] = [
     ControlRequest::Power(PowerRequest::Shutdown),
     ControlRequest::Power(PowerRequest::SwitchOn),
     ControlRequest::Power(PowerRequest::EnableOperation),
@@ -41,7 +41,7 @@ pub struct Plant {
     world: World<JOINTS>,
     axes: Axes,
     samples: [Producer<'static, JointSample>; JOINTS],
-    requests: Producer<'static, ControlRequest<JOINTS>>,
+    requests: Producer<'static, ControlRequest>,
     drive: Consumer<'static, DriveState>,
     /// Present sensor values.
     seen: Sample<JOINTS>,
@@ -64,7 +64,7 @@ impl Plant {
     /// The described leg in its start position; `None` if the axes cannot be calibrated.
     pub fn new(
         samples: [Producer<'static, JointSample>; JOINTS],
-        requests: Producer<'static, ControlRequest<JOINTS>>,
+        requests: Producer<'static, ControlRequest>,
         drive: Consumer<'static, DriveState>,
         start: Start,
     ) -> Option<Self> {
@@ -178,7 +178,7 @@ impl Plant {
 #[inline(never)]
 pub fn prepare(
     samples: [Producer<'static, JointSample>; JOINTS],
-    requests: Producer<'static, ControlRequest<JOINTS>>,
+    requests: Producer<'static, ControlRequest>,
     drive: Consumer<'static, DriveState>,
     start: Start,
 ) {

@@ -283,7 +283,7 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Requests an action from the servo that the operator's contacts cannot request.
-    pub fn ask(&mut self, request: ControlRequest<N>) {
+    pub fn ask(&mut self, request: ControlRequest) {
         let _ = self.queues().requests().enqueue(request);
     }
 

@@ -8,7 +8,7 @@ use crate::rig::faulty_board::{Edges, Rig};
 
 impl<const N: usize, const B: usize> Rig<N, B> {
     /// Requests something that the contacts do not offer, at the next servo tick.
-    pub fn ask(&mut self, request: ControlRequest<N>) {
+    pub fn ask(&mut self, request: ControlRequest) {
         self.board.ask(request);
     }
 
