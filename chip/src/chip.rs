@@ -66,7 +66,9 @@ const GATE_ENABLE: Pin = ('B', 12);
 const CAN_PINS: [Pin; 2] = [('B', 8), ('B', 9)];
 const CHOPPER_PIN: Pin = ('B', 11);
 /// Pins of the converters' channels.
-const ANALOG: [(u32, Pin); 8] = [
+const ANALOG: [(u32, Pin); 10] = [
+    (0, ('A', 0)),
+    (1, ('A', 1)),
     (10, ('C', 0)),
     (11, ('C', 1)),
     (12, ('C', 2)),

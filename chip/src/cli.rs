@@ -60,6 +60,9 @@ struct Common {
     /// The leg has an absolute encoder at each rotor and each joint.
     #[arg(long)]
     absolute_encoders: bool,
+    /// The leg has a thermistor in each motor.
+    #[arg(long)]
+    thermistors: bool,
     /// Image (ELF) of that leg; built unless given.
     #[arg(long)]
     image: Option<PathBuf>,
@@ -185,6 +188,7 @@ impl Common {
     fn session(&self) -> Result<Session, ToolError> {
         let leg = LegFile::load_for_image(&self.leg, false)?;
         let leg = if self.absolute_encoders { leg.with_absolute_encoders() } else { leg };
+        let leg = if self.thermistors { leg.with_thermistors() } else { leg };
         let options =
             build::Options { leg: leg.clone(), log: false, brake_resistor: true, board_volts: None };
         let path = match &self.image {

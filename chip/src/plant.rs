@@ -361,6 +361,8 @@ pub struct Plant {
     index_edges: Vec<(Ticks, usize, bool)>,
     /// Codes of the thermistors: bridge 0, bridge 1, chopper.
     pub thermistors: [u16; 3],
+    /// Codes of the thermistors in the motors, instead of those of the motors' temperatures.
+    pub motor_thermistors: [Option<u16>; JOINTS],
     /// Whether the enable line lets the gates follow.
     gates: bool,
     /// A half bridge had both switches requested.
@@ -397,6 +399,7 @@ impl Plant {
             mechanic: 0,
             index_edges: Vec::new(),
             thermistors: [WARM; 3],
+            motor_thermistors: [None; JOINTS],
             gates: false,
             shoot_through: 0,
             switchings: None,
@@ -663,6 +666,10 @@ impl Plant {
             15 => self.thermistors[0],
             4 => self.thermistors[1],
             5 => self.thermistors[2],
+            0 | 1 => {
+                let axis = channel as usize;
+                self.motor_thermistors[axis].or(self.axes[axis].motor.thermistor_code()).unwrap_or(0)
+            }
             _ => 0,
         }
     }

@@ -50,6 +50,8 @@ pub enum Step {
     Turn,
     /// Wait until absolute encoders at the joints have set the zeros.
     Zeros,
+    /// Heat the thermistor of the first motor, then break the wire of the second's.
+    Thermistors,
 }
 
 /// Image, board, leg and operator.
@@ -219,6 +221,7 @@ impl Session {
             Step::PowerCycle => self.power_cycle(),
             Step::Turn => self.turn(),
             Step::Zeros => self.zeros(),
+            Step::Thermistors => self.thermistors(),
         }
     }
 
@@ -319,6 +322,25 @@ impl Session {
             return Ok(());
         }
         self.wait("request", &words, 2.0).map(drop)
+    }
+
+    fn thermistors(&mut self) -> Result<(), ToolError> {
+        let cold = self.windings()?;
+        // 1.25 kOhm of 10 kOhm at 25 degrees, beta 3435 K, with 3.3 kOhm: 90.9 degrees.
+        self.machine.chip_mut().plant.motor_thermistors[0] = Some(1125);
+        self.run(0.3)?;
+        let hot = self.windings()?;
+        let [first, second] = hot[..] else {
+            return Err(ToolError::input(format!("{} windings", hot.len())));
+        };
+        if !((89.0..92.0).contains(&first) && second < 81.0 && cold.iter().all(|before| *before < 81.0)) {
+            let why = format!(
+                "the first thermistor is at 90.9 degrees, but windings went from {cold:?} to {hot:?}"
+            );
+            return Err(ToolError::Refused(why));
+        }
+        self.machine.chip_mut().plant.motor_thermistors[1] = Some(4095);
+        self.wait("fault", &["name=motor_thermistor", "joint=2"], 0.5).map(drop)
     }
 
     fn turn(&mut self) -> Result<(), ToolError> {

@@ -87,6 +87,7 @@ pub const LEG: LegDescription<2> = LegDescription {
                     ambient_c: 40.0,
                     limit_c: 100.0,
                 },
+                thermistor: None,
                 calibration_turns: 1.25,
                 absolute: AbsoluteEncoders {
                     rotor: false,
@@ -154,6 +155,7 @@ pub const LEG: LegDescription<2> = LegDescription {
                     ambient_c: 40.0,
                     limit_c: 100.0,
                 },
+                thermistor: None,
                 calibration_turns: 1.25,
                 absolute: AbsoluteEncoders {
                     rotor: false,

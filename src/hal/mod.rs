@@ -153,6 +153,10 @@ pub trait Hardware<const N: usize> {
     fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16;
     /// Temperature of a bridge, degrees Celsius; `None` if its thermistor is open or shorted.
     fn temperature(&self, axis: usize) -> Option<f32>;
+    /// Starts a conversion of the thermistor in an axis' motor.
+    fn convert_thermistor(&mut self, axis: usize);
+    /// Code of the conversion that was started last, of 12 bits; `None` if it has not ended.
+    fn thermistor_code(&mut self) -> Option<u16>;
     /// Whether a gate driver still holds its configuration.
     fn gate_holds(&mut self, axis: usize) -> bool;
     /// Status registers of a gate driver, the first in the upper half; all ones if it does not answer.

@@ -30,8 +30,8 @@ pub enum ControlRequest {
     Power(PowerRequest),
     /// Start an identification: excite, solve, validate.
     Identify,
-    /// Track the motion of [`Control::set_tracked`], with the identified model as feedforward or with feedback
-    /// only. Refused if no motion is set.
+    /// Track the motion of [`Control::set_tracked`], with the identified model as feedforward or with
+    /// feedback only. Refused if no motion is set.
     Track {
         /// Whether the model is used as feedforward, if there is one.
         with_model: bool,

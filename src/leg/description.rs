@@ -17,7 +17,7 @@ use crate::model::{
 };
 use crate::motion::{ExcitationTable, MotionError, Periodic};
 use crate::motor::AbsoluteEncoders;
-use crate::safety::{BrakeDelays, SupplyLimits, WindingRating};
+use crate::safety::{BrakeDelays, SupplyLimits, Thermistor, WindingRating};
 use crate::servo::{JointConfiguration, JointScale, SERVO_RATE_HZ};
 use crate::units::{
     Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
@@ -74,6 +74,8 @@ pub struct MotorDescription {
     pub ratio: f32,
     /// Thermal constants of the winding.
     pub winding: WindingRating,
+    /// Thermistor in the winding, if there is one.
+    pub thermistor: Option<Thermistor>,
     /// Permitted travel of a calibration, motor turns.
     pub calibration_turns: f32,
     /// Absolute encoders.

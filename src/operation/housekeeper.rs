@@ -37,12 +37,14 @@ use crate::leg::{
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, EncoderSetting, JointZero};
 use crate::real::max;
 use crate::safety::{
-    BoardFault, CheckClock, InhibitReason, Winding, WindingRating, of_gate_driver, of_temperature,
+    BoardFault, CheckClock, InhibitReason, Thermistor, Winding, WindingRating, of_gate_driver, of_temperature,
 };
 use crate::trace::{Record, words};
 
+mod thermistors;
 mod zeros;
 
+use thermistors::MotorThermistors;
 use zeros::Reference;
 
 /// Rounds of a reset with gate drivers off (2 ms), and until they can be configured (22 ms).
@@ -60,6 +62,8 @@ pub struct HousekeepingSettings<const N: usize> {
     pub hottest_c: f32,
     /// Thermal constants of each motor's winding.
     pub windings: [WindingRating; N],
+    /// Thermistors in the motors.
+    pub thermistors: [Option<Thermistor>; N],
     /// Encoders of each axis.
     pub encoders: [EncoderSettings; N],
 }
@@ -127,6 +131,7 @@ pub struct Housekeeper<const N: usize> {
     assumed: [bool; N],
     /// Integrals of the squared currents in the previous round.
     i2t: [u32; N],
+    motor_thermistors: MotorThermistors<N>,
     round: u32,
     recorded: u32,
 }
@@ -156,6 +161,7 @@ impl<const N: usize> Housekeeper<N> {
             windings: settings.windings.map(|rating| Winding::new(rating, None)),
             assumed: [true; N],
             i2t: [0; N],
+            motor_thermistors: MotorThermistors::NONE,
             round: 0,
             recorded: 0,
         }
@@ -284,6 +290,7 @@ impl<const N: usize> Housekeeper<N> {
                 }
             }
             level.signals.set_hottest_c(hottest_c);
+            self.check_thermistors(level);
             for (axis, _) in self.windings.iter().enumerate().filter(|(_, winding)| winding.is_too_hot()) {
                 level.signals.report(BoardFault::Winding, axis);
             }

@@ -142,6 +142,10 @@ pub(super) struct TestHardware<const N: usize> {
     /// Frames of the absolute encoders at rotor and joint.
     pub encoder_frames: [[u16; 2]; N],
     pub temperatures: [Option<f32>; N],
+    /// Codes of the thermistors in the motors; `None` while the converter is silent.
+    pub motor_codes: [Option<u16>; N],
+    /// Axis whose thermistor is converted.
+    pub converted: Option<usize>,
     pub gates_hold: [bool; N],
     pub gate_status: [u32; N],
     /// The gate drivers accept their configuration.
@@ -180,6 +184,8 @@ impl<const N: usize> TestHardware<N> {
             encoder_counts: [0; N],
             encoder_frames: [[u16::MAX; 2]; N],
             temperatures: [Some(30.0); N],
+            motor_codes: [None; N],
+            converted: None,
             gates_hold: [true; N],
             gate_status: [0; N],
             gates_configure: true,
@@ -290,6 +296,14 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     }
     fn temperature(&self, axis: usize) -> Option<f32> {
         self.temperatures[axis]
+    }
+
+    fn convert_thermistor(&mut self, axis: usize) {
+        self.converted = Some(axis);
+    }
+
+    fn thermistor_code(&mut self) -> Option<u16> {
+        self.converted.and_then(|axis| self.motor_codes[axis])
     }
     fn gate_holds(&mut self, axis: usize) -> bool {
         self.gates_hold[axis]

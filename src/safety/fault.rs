@@ -119,6 +119,8 @@ faults! {
     Thermistor = 0xFF04, "T1", "thermistor", Damp, "a thermistor is open or shorted";
     /// A winding reached its limit by its thermal model (2350: load level, thermal state).
     WindingTemperature = 0x2350, "T2", "winding", Damp, "its winding is too hot";
+    /// The thermistor of a motor is open or shorted.
+    MotorThermistor = 0xFF12, "T4", "motor_thermistor", Damp, "the thermistor of its motor is open or shorted";
     /// A measured or requested value is NaN or infinite.
     NotFinite = 0xFF01, "N1", "not_finite", Off, "a signal was not a number";
     /// The emergency stop's contact is open (9000: external error).
@@ -240,6 +242,7 @@ mod tests {
             (FaultCode::Temperature, 0x4210),
             (FaultCode::Thermistor, 0xFF04),
             (FaultCode::WindingTemperature, 0x2350),
+            (FaultCode::MotorThermistor, 0xFF12),
             (FaultCode::NotFinite, 0xFF01),
             (FaultCode::EmergencyStop, 0x9000),
             (FaultCode::CurrentTicks, 0xFF05),

@@ -13,6 +13,7 @@
 //! | [`Barrier`] | torque bounds that stop a joint before its range or speed limit |
 //! | [`DeratingRamps`], [`LimitCode`] | derating by temperature and bus voltage; codes of active limits |
 //! | [`Winding`] | temperature of a motor's winding, from its current |
+//! | [`Thermistor`] | temperature of a motor's winding, from a thermistor in it |
 //! | [`SupplyWatch`] | detection of a failing supply |
 //! | [`SupplyCurrent`] | estimate and limits of the current from the supply and into it |
 //! | [`Monitor`] | all of the above, once per tick |
@@ -46,6 +47,7 @@ pub mod refusal;
 pub mod state;
 pub mod step_gate;
 pub mod supply_current;
+pub mod thermistor;
 pub mod winding;
 
 pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
@@ -61,4 +63,5 @@ pub use refusal::{Refusal, RefusalReason};
 pub use state::{DriveState, Event, Permission, PowerRequest};
 pub use step_gate::{Reading, StepGate};
 pub use supply_current::{SupplyCurrent, SupplyLimits};
+pub use thermistor::Thermistor;
 pub use winding::{Winding, WindingRating};

@@ -10,6 +10,7 @@
 //! | absolute encoder contradicts the counter, twice | 8 ms | 16 ms | rotor position lost, Short |
 //! | thermistor open or shorted | 50 ms | 50 ms + servo tick | [`FaultCode::Thermistor`], Damp |
 //! | bridge at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::Temperature`], Damp |
+//! | motor's thermistor unreadable, three times | 50 ms a motor | 300 ms | [`FaultCode::MotorThermistor`] |
 //! | winding at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::WindingTemperature`], Damp |
 //!
 //! A register that changes and recovers between two checks is not detected, nor is a thermistor stuck within
@@ -32,12 +33,20 @@ pub enum BoardFault {
     Winding,
     /// An absolute encoder sends no valid frame.
     AbsoluteEncoder,
+    /// The thermistor of a motor is open or shorted.
+    MotorThermistor,
 }
 
 impl BoardFault {
     /// All faults, in the order of their bits.
-    pub const ALL: [Self; 5] =
-        [Self::CurrentTicks, Self::Temperature, Self::Thermistor, Self::Winding, Self::AbsoluteEncoder];
+    pub const ALL: [Self; 6] = [
+        Self::CurrentTicks,
+        Self::Temperature,
+        Self::Thermistor,
+        Self::Winding,
+        Self::AbsoluteEncoder,
+        Self::MotorThermistor,
+    ];
 
     /// Bit of the fault.
     #[must_use]
@@ -54,6 +63,7 @@ impl BoardFault {
             Self::Thermistor => FaultCode::Thermistor,
             Self::Winding => FaultCode::WindingTemperature,
             Self::AbsoluteEncoder => FaultCode::AbsoluteEncoder,
+            Self::MotorThermistor => FaultCode::MotorThermistor,
         }
     }
 }

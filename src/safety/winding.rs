@@ -9,8 +9,9 @@
 //! `rise` is the temperature rise per squared current of a winding at its limit, held for ever. `i` is the
 //! length of the current vector, along the flux included. Source of k: IEC 60034-1, copper.
 //!
-//! Why a model: the board has thermistors at its bridges, none in the motors. The hip of the default leg may
-//! be held in a pose with 33 A, which heats its winding from 40 to 100 degrees in seven minutes.
+//! Why a model: the board has thermistors at its bridges. A motor's own ([`super::Thermistor`]) is optional
+//! and lags behind its winding; the larger of both temperatures counts. The hip of the default leg may be
+//! held in a pose with 33 A, which heats its winding from 40 to 100 degrees in seven minutes.
 //!
 //! The share of the torque cap falls from 1 to 0 over the last [`RAMP_K`] below the limit. A stop at the end
 //! of the range keeps the whole cap, so a joint that is pushed against its end heats on. At the limit the leg
@@ -22,8 +23,8 @@
 //! stored calibration has one.
 //!
 //! Known limits: a winding hotter than that before the memory is lost gets up to [`RAMP_K`] of torque that it
-//! should not have. Ambient temperature, heat of iron and of the gear, and heat from one motor to another are
-//! not measured. Demagnetisation is not modelled.
+//! should not have. Without a thermistor, ambient temperature, heat of iron and of the gear, and heat from
+//! one motor to another are not measured. Demagnetisation is not modelled.
 
 use crate::real::{is_finite, max};
 use crate::units::Ohm;
@@ -104,6 +105,14 @@ impl Winding {
         let celsius = ratio * (COPPER_C + then_c) - COPPER_C + MEASURED_K;
         if is_finite(celsius) {
             (self.temperature_c, self.rest_c) = (max(celsius, self.rating.ambient_c), 0.0);
+        }
+    }
+
+    /// Raises the temperature to that of a thermistor, degrees Celsius; a colder one, or NaN, changes
+    /// nothing.
+    pub fn at_least(&mut self, celsius: f32) {
+        if celsius > self.temperature_c {
+            (self.temperature_c, self.rest_c) = (celsius, 0.0);
         }
     }
 

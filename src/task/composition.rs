@@ -119,7 +119,10 @@ fn hand_out(
     let calibration = drives::calibrations(&leg::LEG);
     let windings = leg::LEG.joints.map(|joint| joint.motor.winding);
     let encoders = leg::LEG.joints.map(|joint| EncoderSettings::of(&joint.motor));
-    let settings = HousekeepingSettings { axes, calibration, hottest_c: HOTTEST_C, windings, encoders };
+    let thermistors = leg::LEG.joints.map(|joint| joint.motor.thermistor);
+    converter::prepare_thermistors(thermistors.map(|thermistor| thermistor.is_some()));
+    let hottest_c = HOTTEST_C;
+    let settings = HousekeepingSettings { axes, calibration, hottest_c, windings, thermistors, encoders };
     let mut housekeeper = Housekeeper::new(settings).with_stored(stored);
     // Random memory after a power-up does not have the checksum.
     if let Some(celsius) = windings::stored() {

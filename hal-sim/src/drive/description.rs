@@ -35,6 +35,21 @@ pub struct MotorDescription {
     pub thermal_resistance: f64,
     /// Thermal time constant of the winding, s.
     pub thermal_time: f64,
+    /// Thermistor in the winding, if there is one.
+    pub thermistor: Option<ThermistorDescription>,
+}
+
+/// Thermistor in a motor, from the board's pin to ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThermistorDescription {
+    /// Resistor from the pin to the converter's supply, ohm.
+    pub pull_up: f64,
+    /// Resistance at 25 degrees Celsius, ohm.
+    pub at_25_c: f64,
+    /// Constant beta, K.
+    pub beta: f64,
+    /// Time constant with which its temperature follows the winding's, s.
+    pub lag: f64,
 }
 
 /// Three half bridges.

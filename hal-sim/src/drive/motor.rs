@@ -25,8 +25,8 @@
 //! Cost: two evaluations of the currents, some 60 operations.
 //! Known limits: sinusoidal flux, no saturation, no iron losses, magnets at constant temperature.
 
-use super::description::MotorDescription;
-use crate::maths::sin_cos;
+use super::description::{MotorDescription, ThermistorDescription};
+use crate::maths::{exp, sin_cos};
 
 /// Temperature coefficient of copper, 1/K.
 const RESISTANCE_PER_KELVIN: f64 = 0.003_93;
@@ -122,8 +122,9 @@ pub struct Motor {
     resistance: f64,
     on_resistance: f64,
     torque_factor: f64,
-    /// Temperature of the winding, degrees Celsius.
+    /// Temperatures of the winding and of its thermistor, degrees Celsius.
     temperature: f64,
+    sensed: f64,
     /// Flux linkage, V s.
     flux: Pair,
     /// Present electrical angle.
@@ -146,6 +147,7 @@ impl Motor {
             on_resistance,
             torque_factor: 1.5 * f64::from(description.pole_pairs),
             temperature: AMBIENT,
+            sensed: AMBIENT,
             flux: [description.flux * angle.cosine, description.flux * angle.sine],
             angle,
             currents: [0.0; 2],
@@ -166,6 +168,14 @@ impl Motor {
     #[must_use]
     pub fn temperature(&self) -> f64 {
         self.temperature
+    }
+
+    /// Code that a converter of 12 bits reads at the thermistor; `None` without one.
+    #[must_use]
+    pub fn thermistor_code(&self) -> Option<u16> {
+        let ThermistorDescription { pull_up, at_25_c, beta, .. } = self.description.thermistor?;
+        let resistance = at_25_c * exp(beta * (1.0 / (self.sensed + 273.15) - 1.0 / 298.15));
+        Some((4096.0 * resistance / (resistance + pull_up)).min(4095.0) as u16)
     }
 
     /// Resistance of a phase with its switch at the present temperature, ohm.
@@ -199,6 +209,9 @@ impl Motor {
         let (resistance, time) = (self.description.thermal_resistance, self.description.thermal_time);
         let copper = heat * (1.0 - self.on_resistance / self.resistance);
         self.temperature += (copper * resistance - (self.temperature - AMBIENT) * duration) / time;
+        if let Some(thermistor) = &self.description.thermistor {
+            self.sensed += (self.temperature - self.sensed) * duration / thermistor.lag;
+        }
         self.resistance = self.description.resistance
             * (1.0 + RESISTANCE_PER_KELVIN * (self.temperature - AMBIENT))
             + self.on_resistance;

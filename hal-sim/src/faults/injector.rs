@@ -43,6 +43,8 @@ pub enum Channel {
     GateRegisters,
     /// Code of a bridge's thermistor.
     Thermistor,
+    /// Code of the thermistor in a motor; with `Off` its conversion does not end.
+    MotorThermistor,
     /// A shunt's conversion does not end.
     Conversion,
     /// The conversions of bus voltage and thermistors do not end, and their codes stay.
@@ -167,6 +169,18 @@ impl Injector {
     /// Applies faults to a thermistor's code.
     pub fn thermistor(&mut self, joint: usize, tick: u64, value: u16) -> u16 {
         code(self.pass(Channel::Thermistor, joint, tick, f64::from(value), CODES))
+    }
+
+    /// Applies faults to the code of a motor's thermistor; `None` where its conversion does not end.
+    pub fn motor_thermistor(&mut self, joint: usize, tick: u64, value: u16) -> Option<u16> {
+        let passed = code(self.pass(Channel::MotorThermistor, joint, tick, f64::from(value), CODES));
+        let is_silent = self.slots.iter().flatten().any(|(injection, _)| {
+            injection.channel == Channel::MotorThermistor
+                && injection.joint == joint
+                && injection.form == Form::Off
+                && injection.timing.holds(tick)
+        });
+        (!is_silent).then_some(passed)
     }
 
     /// Applies faults to the brake resistor's duty.

@@ -74,6 +74,7 @@ impl Trial {
             cogging_periods: 6 * pole_pairs,
             thermal_resistance: 1.0,
             thermal_time: 600.0,
+            thermistor: None,
         };
         let shunts = ShuntDescription {
             offset_codes: [random.between(-80.0, 80.0), random.between(-80.0, 80.0)],

@@ -8,7 +8,7 @@ use hal_sim::drive::axis::{Axis, AxisFlow, PERIOD_S};
 use hal_sim::drive::complete::{CompleteDrives, Rotor};
 use hal_sim::drive::description::{
     AxisDescription, BridgeDescription, CompleteDescription, CounterDescription, MotorDescription,
-    SHIFT_QUARTERS, ShuntDescription, SupplyDescription, Wiring,
+    SHIFT_QUARTERS, ShuntDescription, SupplyDescription, ThermistorDescription, Wiring,
 };
 use hal_sim::drive::motor::{Direction, Motor, Terminal};
 use hal_sim::drive::stand::{Geared, Load, Stand};
@@ -29,6 +29,7 @@ const MOTOR: MotorDescription = MotorDescription {
     cogging_periods: 84,
     thermal_resistance: 1.0,
     thermal_time: 300.0,
+    thermistor: None,
 };
 
 const BUS: f64 = 48.0;
@@ -434,6 +435,28 @@ fn a_loaded_winding_warms_by_thermal_resistance_times_power() {
     assert!((axis.motor().temperature() - 20.0 - power).abs() < 0.01 * power, "{power}");
     let resistance = MOTOR.resistance * (1.0 + 0.00393 * power);
     assert!((axis.motor().resistance() / resistance - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn a_thermistor_follows_its_winding_with_a_lag() {
+    let mut description = axis();
+    description.motor.thermistor =
+        Some(ThermistorDescription { pull_up: 3300.0, at_25_c: 10_000.0, beta: 3435.0, lag: 10.0 });
+    let code = |seconds: f64| {
+        let mut motor = Motor::new(&description.motor, 0.0, Direction::of(0.0));
+        // 60 K above 20 degrees within a moment, by the time constant of 300 s; then 1 K/W holds them.
+        motor.warm(60.0 * 300.0, 0.0);
+        for _ in 0..(1e3 * seconds) as u32 {
+            motor.warm(0.06, 1e-3);
+        }
+        assert!((motor.temperature() - 80.0).abs() < 0.01, "{}", motor.temperature());
+        f64::from(motor.thermistor_code().expect("fitted"))
+    };
+    // 103AT-2 (Semitec) at 20 and 80 degrees: 12.09 and 1.668 kOhm.
+    let divided = |ohm: f64| 4096.0 * ohm / (ohm + 3300.0);
+    assert!((code(0.0) / divided(12_090.0) - 1.0).abs() < 0.01, "{}", code(0.0));
+    assert!((code(100.0) / divided(1668.0) - 1.0).abs() < 0.03, "{}", code(100.0));
+    assert!(code(10.0) < code(5.0) && code(10.0) > code(20.0));
 }
 
 #[test]

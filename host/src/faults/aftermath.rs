@@ -54,6 +54,7 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
         | Code::Temperature
         | Code::Thermistor
         | Code::WindingTemperature
+        | Code::MotorThermistor
         | Code::PositionLimit
         | Code::Overspeed
         | Code::FollowingError

@@ -17,10 +17,10 @@ pub enum Entry {
 }
 
 /// Order of the catalogue; other ids come last.
-const ORDER: [&str; 44] = [
+const ORDER: [&str; 46] = [
     "E1", "E2", "E3", "E4", "E5", "C1", "C2", "C3", "C4", "P1", "P2", "V1", "V2", "V3", "V4", "V5", "T1",
-    "T2", "N1", "B1", "B2", "B3", "B4", "B5", "X1", "X2", "X3", "K1", "K2", "K3", "K4", "M1", "M2", "F1",
-    "F2", "F3", "J1", "J2", "J3", "H1", "H2", "H4", "H3", "I1",
+    "T2", "T3", "T4", "N1", "B1", "B2", "B3", "B4", "B5", "X1", "X2", "X3", "K1", "K2", "K3", "K4", "M1",
+    "M2", "F1", "F2", "F3", "J1", "J2", "J3", "H1", "H2", "H4", "H3", "I1",
 ];
 
 impl Entry {

@@ -118,6 +118,8 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
     let has_direction = description.joints.iter().any(|joint| joint.motor.absolute.joint.is_some());
     let direction = if has_direction { "use crate::motor::Direction::*;\n" } else { "" };
     let delays = if description.holding_brake.is_some() { "BrakeDelays, " } else { "" };
+    let has_thermistor = description.joints.iter().any(|joint| joint.motor.thermistor.is_some());
+    let thermistor = if has_thermistor { "Thermistor, " } else { "" };
     // The debug form of plain data is valid source; `?` writes numbers that read back bit for bit.
     format!(
         "// The leg `{}`, written by `cargo fw --leg ... --source ...`. Change its leg file instead.\n\n\
@@ -129,7 +131,7 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
          use crate::motion::ExcitationTable;\n\
          use crate::motor::AbsoluteEncoders;\n\
          {direction}\
-         use crate::safety::{{{delays}SupplyLimits, WindingRating}};\n\
+         use crate::safety::{{{delays}SupplyLimits, {thermistor}WindingRating}};\n\
          use crate::units::*;\n\n\
          /// The leg.\n\
          pub const LEG: LegDescription<{JOINTS}> = {description:#?};\n\

@@ -168,14 +168,16 @@ fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSe
         let inertia = drives::CALIBRATION.inertia;
         let settings = CalibrationSettings { inertia, ..calibration_settings(&configuration, motor) };
         let encoders = EncoderSettings::of(&motor.for_firmware(joint));
-        parts.push((configuration, settings, motor.winding(), encoders));
+        let thermistor = motor.thermistor.map(|fitted| fitted.for_firmware());
+        parts.push((configuration, settings, motor.winding(), thermistor, encoders));
     }
     let parts: [_; N] = parts.try_into().map_err(|_| unfit())?;
     Ok(HousekeepingSettings {
         axes: parts.map(|(axis, ..)| axis),
         calibration: parts.map(|(_, calibration, ..)| calibration),
         hottest_c: HOTTEST_C,
-        windings: parts.map(|(.., winding, _)| winding),
+        windings: parts.map(|(.., winding, _, _)| winding),
+        thermistors: parts.map(|(.., thermistor, _)| thermistor),
         encoders: parts.map(|(.., encoders)| encoders),
     })
 }

@@ -159,8 +159,8 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             let registers = &mut self.board.registers;
             registers.gates[joint] = !injector.happens(Channel::GateRegisters, joint, now);
             registers.thermistors[joint] = injector.thermistor(joint, now, WARM_CODE);
-            registers.encoder_frames[joint] = encoder_frames(&self.world, injector, joint, now);
         }
+        self.board.registers.sense(&self.world, injector, now);
         self.board.housekeeping();
         if core::mem::take(&mut self.board.registers.configured) {
             self.axis_fault = None;
@@ -278,20 +278,6 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             axis.invalidate_modulation();
         }
     }
-}
-
-/// Frames of a joint's absolute encoders at rotor and joint; a board without one reads all ones.
-fn encoder_frames<const N: usize>(
-    world: &World<N>,
-    injector: &mut Injector,
-    joint: usize,
-    now: u64,
-) -> [u16; 2] {
-    let drives = world.complete_drives();
-    let rotor = drives.and_then(|drives| drives.axes().get(joint)).and_then(|axis| axis.rotor_steps());
-    let readings = [(Channel::RotorEncoder, rotor), (Channel::JointEncoder, world.joint_steps(joint))];
-    readings
-        .map(|(channel, steps)| steps.map_or(u16::MAX, |steps| injector.frame(channel, joint, now, steps)))
 }
 
 const fn mixed(hash: u64, word: u64) -> u64 {

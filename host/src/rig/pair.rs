@@ -3,6 +3,7 @@
 //! A pair can be cloned at any tick and continued. The copies stay equal bit for bit until they receive
 //! different requests.
 
+use hal_sim::faults::Injector;
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use hal_sim::world::{TICK_S, World};
 use scarab::hal::{LegDrives, Sample};
@@ -237,6 +238,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         let first = self.ticks * u64::from(PERIODS_PER_TICK);
         for period in first..first + u64::from(PERIODS_PER_TICK) {
             if Levels::<N>::is_round_due(period) {
+                board.registers.sense(&self.world, &mut Injector::new(0), period);
                 board.housekeeping();
             }
             if core::mem::take(&mut board.registers.servo_due) {

@@ -2,7 +2,7 @@
 
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::motor::{AxisConfiguration, CalibrationSettings, Calibrator};
-use scarab::safety::{BrakeDelays, SupplyLimits};
+use scarab::safety::{BrakeDelays, SupplyLimits, Thermistor};
 use scarab::units::{Ampere, Ohm};
 use scarab_host::formats::leg_file::{BodySide, BrakeFile, DEFAULT_LEG, EncoderFile, LegFile, Side};
 use scarab_host::image::leg_source::{describe, source};
@@ -234,6 +234,18 @@ fn a_leg_file_states_the_delays_of_a_holding_brake() {
     let delays = BrakeDelays { release_ms: 60, engage_ms: 40 };
     assert_eq!((description.holding_brake, file.brake_delays()), (Some(delays), Some(delays)));
     assert!(source(&description).contains("use crate::safety::{BrakeDelays, SupplyLimits, WindingRating};"));
+}
+
+#[test]
+fn a_leg_file_states_the_thermistors_of_its_motors() {
+    let mut file = leg(DEFAULT_LEG).with_thermistors();
+    file.joints[0].motor.as_mut().expect("a motor").thermistor = None;
+    let (description, _) = describe(&file, 1).expect("two joints");
+    let expected = Thermistor { pull_up: Ohm(3300.0), at_25_c: Ohm(10_000.0), beta_k: 3435.0 };
+    assert_eq!(description.joints.map(|joint| joint.motor.thermistor), [None, Some(expected)]);
+    let source = source(&description);
+    assert!(source.contains("use crate::safety::{SupplyLimits, Thermistor, WindingRating};"));
+    assert!(source.contains("thermistor: None,") && source.contains("beta_k: 3435.0,"), "{source}");
 }
 
 #[test]

@@ -139,6 +139,27 @@ fn every_error_names_file_line_and_reason() {
             "`motor.winding_limit_c` is 60, outside 70..250",
         ),
         (
+            joint(&format!(
+                "{MOTOR}thermistor = {{ pull_up_ohm = 3300.0, r25_ohm = 10000.0, beta_k = 343.5 }}"
+            )),
+            Some(12),
+            "`motor.thermistor` has `beta_k` 343.5, outside 1000..6000",
+        ),
+        (
+            joint(&format!(
+                "{MOTOR}thermistor = {{ pull_up_ohm = 1e5, r25_ohm = 10000.0, beta_k = 3435.0 }}"
+            )),
+            Some(12),
+            "`motor.thermistor` reads -87 to 99 degrees, needs -20 to 120: choose a smaller pull-up",
+        ),
+        (
+            joint(&format!(
+                "{MOTOR}thermistor = {{ pull_up_ohm = 200.0, r25_ohm = 10000.0, beta_k = 3435.0 }}"
+            )),
+            Some(12),
+            "choose a larger pull-up",
+        ),
+        (
             joint(&format!("encoder = {{ side = \"joint\", counts = 8192, ratio = 1.0 }}\n{MOTOR}")),
             Some(8),
             "joint `hip`: `motor` needs an encoder at the motor",

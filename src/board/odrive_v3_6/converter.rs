@@ -1,7 +1,10 @@
 //! Results of the converters, read in the interrupt at the end of conversion.
 
-use super::registers::{load, store};
-use super::settings::converters::{BASES, DR, ENDS, JDR1, JEOC, SR, cleared, finished_axes};
+use super::registers::{apply, load, store};
+use super::settings::converters::{
+    BASES, CR2, DR, ENDS, EOC, JDR1, JEOC, MOTORS, SQR3, SR, START, cleared, finished_axes,
+};
+use super::settings::pins::MOTOR_THERMISTORS;
 
 const ADC1: u32 = BASES[0];
 const ADC2: u32 = BASES[1];
@@ -58,4 +61,25 @@ pub fn bus() -> u16 {
 /// Codes of the thermistors of bridge 0, bridge 1 and chopper.
 pub fn thermistors() -> [u16; 3] {
     [JDR1 + 4, JDR1 + 8, JDR1 + 12].map(|result| load(ADC1 + result) as u16)
+}
+
+/// Makes the pins of these motors' thermistors analog inputs.
+pub fn prepare_thermistors(fitted: [bool; 2]) {
+    for (pin, _) in MOTOR_THERMISTORS.iter().zip(fitted).filter(|(_, fitted)| *fitted) {
+        apply(&pin.writes());
+    }
+}
+
+/// Starts a conversion of the thermistor in a motor. Injected conversions interrupt it; then it starts again.
+pub fn convert_thermistor(axis: usize) {
+    if let Some(channel) = MOTORS.get(axis) {
+        store(ADC1 + SQR3, *channel);
+        store(ADC1 + SR, cleared(EOC));
+        store(ADC1 + CR2, START);
+    }
+}
+
+/// Code of the last conversion of a motor's thermistor; `None` if it has not ended.
+pub fn thermistor_code() -> Option<u16> {
+    (load(ADC1 + SR) & EOC != 0).then(|| load(ADC1 + DR) as u16)
 }

@@ -91,6 +91,14 @@ impl Hardware<2> for Odrive {
         converter::thermistors().get(axis).copied().and_then(temperature_c)
     }
 
+    fn convert_thermistor(&mut self, axis: usize) {
+        converter::convert_thermistor(axis);
+    }
+
+    fn thermistor_code(&mut self) -> Option<u16> {
+        converter::thermistor_code()
+    }
+
     fn gate_holds(&mut self, axis: usize) -> bool {
         gates(|gates| gates.holds(axis)).unwrap_or(false)
     }

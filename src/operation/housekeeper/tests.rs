@@ -19,12 +19,14 @@ use crate::testing::TestRandom;
 mod absolute;
 mod reports;
 mod second_day;
+mod thermistors;
 
 const HOUSEKEEPING: HousekeepingSettings<2> = HousekeepingSettings {
     axes: [CONFIGURATION; 2],
     calibration: [SETTINGS; 2],
     hottest_c: 100.0,
     windings: [RATING; 2],
+    thermistors: [None; 2],
     encoders: [EncoderSettings { absolute: AbsoluteEncoders::NONE, counts_per_turn: 8192, ratio: 50.0 }; 2],
 };
 

@@ -1,4 +1,11 @@
-//! T2: a winding becomes too hot, because the wearer pushes a joint that a host moves.
+//! T2 to T4: a winding becomes too hot, because the wearer pushes a joint that a host moves, or its
+//! thermistor fails.
+//!
+//! | row | fault | reaction |
+//! | --- | --- | --- |
+//! | T2 | heat of the current | derating; Damp at the limit |
+//! | T3 | the same in motors that lose half of the believed heat, with thermistors | the same |
+//! | T4 | a thermistor is shorted or open, or its conversion does not end | Damp |
 //!
 //! The motors of these legs warm ten times faster than usual: a time constant of 30 s, and 11 A for ever
 //! reach the limit of 100 degrees. The firmware's ambient temperature is the plant's (20 degrees), so nothing
@@ -9,11 +16,18 @@
 //! pushed against the end of its range keeps the whole cap there, until the leg is damped at the limit. Runs
 //! whose windings stay below the ramp count as undetectable.
 //!
-//! Blind: the firmware's thermal resistance is a thousandth of the motor's.
+//! In T3 thermal resistance and time constant of the motors are twice the believed ones, so their heat
+//! capacity is as believed. In T4 interruptions that span at most two readings must have no effect; those
+//! that may span two or three count as undetectable.
+//!
+//! Blind: in T2 the firmware's thermal resistance is a thousandth of the motor's; in T3 and T4 its leg file
+//! has no thermistors.
 
+use hal_sim::faults::{Channel, Form, Injection, Timing};
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
 use scarab::safety::FaultCode;
+use scarab::safety::thermistor::{OPEN, SHORTED};
 use scarab::safety::winding::RAMP_K;
 
 use crate::base::error::ToolError;
@@ -26,7 +40,11 @@ use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
 use crate::rig::bus::host::{Host, NODES};
+use crate::rig::faulty_board::PERIOD_MS;
 
+/// Time between two readings of a motor's thermistor, with two of them.
+const READING_MS: f64 = 100.0;
+const TICK_MS: f64 = 1e3 / SERVO_RATE_HZ as f64;
 /// Servo ticks per second.
 const SECOND: u64 = SERVO_RATE_HZ as u64;
 /// Thermal resistance to ambient, K/W, and time constant, s.
@@ -41,7 +59,7 @@ const TOLERANCE_K: f64 = 15.0;
 /// Object of the following window, which no push may leave.
 const WINDOW: u16 = 0x6065;
 
-pub(super) const BENCH: Bench = Bench {
+pub(super) const CURRENT: Bench = Bench {
     head: Head {
         id: "T2",
         fault: "winding hot after long or large torque",
@@ -52,30 +70,121 @@ pub(super) const BENCH: Bench = Bench {
         codes: &[FaultCode::WindingTemperature],
         lacking: Some("heat that the current does not show: surroundings, iron, gear"),
     },
-    run,
+    run: current,
 };
 
-fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    let warmed = |kelvin_per_watt: f64| {
-        let mut leg = leg.clone();
-        for motor in leg.joints.iter_mut().filter_map(|joint| joint.motor.as_mut()) {
-            (motor.thermal_resistance_k_w, motor.thermal_time_s) = (kelvin_per_watt, TIME_S);
-            (motor.ambient_c, motor.winding_limit_c) = (AMBIENT_C, LIMIT_C);
-        }
-        leg
-    };
-    let believed = warmed(if blind { 1e-3 * KELVIN_PER_WATT } else { KELVIN_PER_WATT });
-    let motors = warmed(KELVIN_PER_WATT);
-    let mut base = Host::new(Board::new(&motors, context(&believed)?, 1, 1, Memory::new(None))?);
+pub(super) const SURROUNDINGS: Bench = Bench {
+    head: Head {
+        id: "T3",
+        fault: "winding hotter than its model",
+        detector: "thermistor of each motor, every 100 ms",
+        state: "Limit, Damp",
+        deadline_ms: f64::INFINITY,
+        unit: "degrees",
+        codes: &[FaultCode::WindingTemperature],
+        lacking: Some("a thermistor that has come off its winding"),
+    },
+    run: surroundings,
+};
+
+pub(super) const THERMISTOR: Bench = Bench {
+    head: Head {
+        id: "T4",
+        fault: "thermistor of a motor open, shorted or not converted",
+        detector: "range of its code, every 100 ms, three in a row",
+        state: "Damp",
+        deadline_ms: 3.0 * READING_MS + 2.0 * TICK_MS + PERIOD_MS,
+        unit: "ms",
+        codes: &[FaultCode::MotorThermistor],
+        lacking: Some("a thermistor that has come off its winding"),
+    },
+    run: thermistor,
+};
+
+/// The leg with other thermal constants of its motors.
+fn warmed(leg: &LegFile, kelvin_per_watt: f64, time_s: f64) -> LegFile {
+    let mut leg = leg.clone();
+    for motor in leg.joints.iter_mut().filter_map(|joint| joint.motor.as_mut()) {
+        (motor.thermal_resistance_k_w, motor.thermal_time_s) = (kelvin_per_watt, time_s);
+        (motor.ambient_c, motor.winding_limit_c) = (AMBIENT_C, LIMIT_C);
+    }
+    leg
+}
+
+/// A host that moves a leg for some seconds; `believed` is the firmware's leg file, `motors` the plant's.
+fn moving(leg: &LegFile, motors: &LegFile, believed: &LegFile, seconds: f64) -> Result<Host, ToolError> {
+    let mut base = Host::new(Board::new(motors, context(believed)?, 1, 1, Memory::new(None))?);
     base.begin()?;
     base.move_leg(leg)?;
     for node in NODES {
         base.write(node, WINDOW, 0, u32::MAX, 4)?;
     }
-    base.run(3 * TIME_S as u64 * SECOND);
-    // A strong push moves a joint beyond its range.
-    let scope = Scope { torque: true, range: false, rotor_position: true };
-    forked_within(head, leg, base, seeds, scope, one)
+    base.run(seconds as u64 * SECOND);
+    Ok(base)
+}
+
+/// A strong push moves a joint beyond its range.
+const PUSHED: Scope = Scope { torque: true, range: false, rotor_position: true };
+
+fn current(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    let believed = warmed(leg, if blind { 1e-3 * KELVIN_PER_WATT } else { KELVIN_PER_WATT }, TIME_S);
+    let base = moving(leg, &warmed(leg, KELVIN_PER_WATT, TIME_S), &believed, 3.0 * TIME_S)?;
+    forked_within(head, leg, base, seeds, PUSHED, heats)
+}
+
+fn surroundings(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    let motors = warmed(leg, 2.0 * KELVIN_PER_WATT, 2.0 * TIME_S).with_thermistors();
+    let believed = warmed(leg, KELVIN_PER_WATT, TIME_S);
+    let believed = if blind { believed } else { believed.with_thermistors() };
+    let base = moving(leg, &motors, &believed, 4.0 * TIME_S)?;
+    forked_within(head, leg, base, seeds, PUSHED, heats)
+}
+
+fn thermistor(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    let motors = leg.with_thermistors();
+    let base = moving(leg, &motors, if blind { leg } else { &motors }, 1.0)?;
+    let scope = Scope { torque: true, range: true, rotor_position: true };
+    forked_within(head, leg, base, seeds, scope, fails)
+}
+
+/// T4.
+fn fails(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
+    let joint = fork.random.below(JOINTS as u64) as usize;
+    let form = match fork.random.below(3) {
+        0 => Form::Off,
+        1 => Form::Rail(fork.random.below(u64::from(SHORTED) + 1) as f64),
+        _ => Form::Rail(f64::from(OPEN) + fork.random.below(4096 - u64::from(OPEN)) as f64),
+    };
+    let for_ever = fork.random.coin();
+    let ms = if for_ever { f64::INFINITY } else { fork.random.uniform(10.0, 5.0 * READING_MS) };
+    let rig = fork.host.rig();
+    let lasts = if for_ever { u64::MAX } else { (ms / PERIOD_MS) as u64 };
+    let timing = Timing::lasting(rig.period, lasts);
+    if !rig.injector.add(Injection { channel: Channel::MotorThermistor, joint, form, timing }) {
+        fork.broken("no space for an injection");
+    }
+    let (mut state, mut after_ms) = (None, None);
+    for tick in 0..SECOND {
+        fork.tick();
+        state = fork.safe_state();
+        if state.is_some() {
+            after_ms = Some((tick + 1) as f64 * TICK_MS);
+            break;
+        }
+    }
+    let in_time = after_ms.is_some_and(|after| after <= fork.head.deadline_ms + 1e-9);
+    let (is_noise, may_be) = (ms < 2.0 * READING_MS, ms < 3.0 * READING_MS + PERIOD_MS);
+    let alarm = fork.host.rig().alarm();
+    let is_right = state == Some("Damp") && alarm == Some(FaultCode::MotorThermistor);
+    let found = fork.ended(state, alarm.map(FaultCode::name));
+    Ok(Outcome {
+        detected: in_time && is_right && !is_noise,
+        undetectable: state.is_none() && may_be,
+        false_alarm: is_noise && state.is_some(),
+        after_ms,
+        magnitude: (!for_ever).then_some(ms),
+        ..found
+    })
 }
 
 /// Hottest winding of the plant, degrees Celsius.
@@ -86,7 +195,8 @@ fn hottest(fork: &mut Fork<'_>) -> f64 {
     })
 }
 
-fn one(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
+/// T2, T3.
+fn heats(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     let joint = fork.random.below(JOINTS as u64) as usize;
     let peak = fork.random.sign() * fork.random.uniform(20.0, 85.0);
     let seconds = fork.random.uniform(2.0, 10.0);

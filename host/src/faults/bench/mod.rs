@@ -43,13 +43,15 @@ pub struct Bench {
 }
 
 /// All benches.
-pub static BENCHES: [Bench; 25] = [
+pub static BENCHES: [Bench; 27] = [
     absolute::SILENT,
     absolute::CONTRADICTION,
     offsets::BENCH,
     calibration::BENCH,
     start::ZEROS,
-    hot::BENCH,
+    hot::CURRENT,
+    hot::SURROUNDINGS,
+    hot::THERMISTOR,
     supply::DRAW,
     supply::CHARGE,
     stopped::BENCH,

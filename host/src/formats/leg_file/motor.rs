@@ -7,11 +7,13 @@
 
 use hal_sim::drive::description::{
     AS5047P_ERROR, AxisDescription, BridgeDescription, CompleteDescription, CounterDescription,
-    JointEncoderDescription, MotorDescription, ShuntDescription, SupplyDescription, Wiring,
+    JointEncoderDescription, MotorDescription, ShuntDescription, SupplyDescription, ThermistorDescription,
+    Wiring,
 };
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::leg::{AbsoluteEncoders, CounterDirection};
-use scarab::safety::{BrakeDelays, SupplyLimits, WindingRating};
+use scarab::safety::thermistor::{OPEN, SHORTED};
+use scarab::safety::{BrakeDelays, SupplyLimits, Thermistor, WindingRating};
 use scarab::units::{Ampere, Ohm, Weber};
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +39,11 @@ const MOST_RATIO: f64 = 80.0;
 const MOST_RANGE_DEG: f64 = 170.0;
 /// Counts per turn of an AS5047P.
 const AS5047P_COUNTS: [u32; 2] = [4000, 4096];
+/// Time constant of a simulated thermistor, of its winding's.
+const THERMISTOR_LAG: f64 = 0.05;
+/// Least coldest temperature that a thermistor reads, and distance of the hottest from the winding's limit.
+const COLDEST_C: f64 = -20.0;
+const THERMISTOR_RESERVE_K: f64 = 20.0;
 /// Range of a 16-bit counter.
 const MOST_COUNTS: u32 = 1 << 16;
 
@@ -76,6 +83,9 @@ pub struct MotorFile {
     /// Temperature of the winding at which no torque is left, degrees Celsius.
     #[serde(default = "default_winding_limit")]
     pub winding_limit_c: f64,
+    /// Thermistor in the winding, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thermistor: Option<ThermistorFile>,
     /// Permitted travel of a calibration, motor turns; `None` for the usual one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_turns: Option<f64>,
@@ -85,6 +95,18 @@ pub struct MotorFile {
     /// AS5047P at the joint, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_encoder: Option<JointEncoder>,
+}
+
+/// Thermistor in a winding, from the board's pin to ground, and the resistor from the pin to 3.3 V.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThermistorFile {
+    /// Resistor from the pin to 3.3 V, ohm.
+    pub pull_up_ohm: f64,
+    /// Resistance of the thermistor at 25 degrees Celsius, ohm.
+    pub r25_ohm: f64,
+    /// Constant beta of its data sheet, K.
+    pub beta_k: f64,
 }
 
 /// Direction of an absolute encoder at a joint.
@@ -209,6 +231,7 @@ impl MotorFile {
         thermal_time_s: 300.0,
         ambient_c: 40.0,
         winding_limit_c: 100.0,
+        thermistor: None,
         calibration_turns: None,
         absolute_encoder: false,
         joint_encoder: None,
@@ -240,6 +263,9 @@ impl MotorFile {
         place.within("ambient_c", self.ambient_c, -40.0, 100.0)?;
         // The derating takes the last 20 degrees.
         place.within("winding_limit_c", self.winding_limit_c, self.ambient_c + 30.0, 250.0)?;
+        if let Some(thermistor) = &self.thermistor {
+            thermistor.check(&place, self.winding_limit_c)?;
+        }
         if let Some(turns) = self.calibration_turns {
             // Rounded for the message.
             let least = (1e3 * f64::from(drives::least_travel_turns(self.pole_pairs as u8))).round() / 1e3;
@@ -308,6 +334,7 @@ impl MotorFile {
             counts_per_turn: joint.encoder.counts,
             ratio: joint.encoder.ratio as f32,
             winding: self.winding(),
+            thermistor: self.thermistor.as_ref().map(ThermistorFile::for_firmware),
             calibration_turns: self.calibration_turns(),
             absolute: AbsoluteEncoders {
                 rotor: self.absolute_encoder,
@@ -346,6 +373,12 @@ impl MotorFile {
                 cogging_periods: self.cogging_periods,
                 thermal_resistance: self.thermal_resistance_k_w,
                 thermal_time: self.thermal_time_s,
+                thermistor: self.thermistor.map(|fitted| ThermistorDescription {
+                    pull_up: fitted.pull_up_ohm,
+                    at_25_c: fitted.r25_ohm,
+                    beta: fitted.beta_k,
+                    lag: THERMISTOR_LAG * self.thermal_time_s,
+                }),
             },
             bridge: BridgeDescription::default(),
             shunts: ShuntDescription::default(),
@@ -370,7 +403,55 @@ impl MotorFile {
     }
 }
 
+impl ThermistorFile {
+    fn check(&self, place: &Place<'_>, limit_c: f64) -> Result<(), Fault> {
+        let limits = [
+            ("pull_up_ohm", self.pull_up_ohm, 100.0, 1e6),
+            ("r25_ohm", self.r25_ohm, 100.0, 1e6),
+            ("beta_k", self.beta_k, 1000.0, 6000.0),
+        ];
+        for (key, value, low, high) in limits {
+            if !(low..=high).contains(&value) {
+                return Err(place.fault("thermistor", &format!("has `{key}` {value}, outside {low}..{high}")));
+            }
+        }
+        // A cold motor must not look like an open wire, nor a hot one like a short.
+        let celsius = |code: u16| self.for_firmware().celsius(code).map_or(f64::NAN, f64::from);
+        let (hottest, coldest) = (celsius(SHORTED + 1), celsius(OPEN - 1));
+        let needed = limit_c + THERMISTOR_RESERVE_K;
+        if !(hottest >= needed && coldest <= COLDEST_C) {
+            let complaint = format!(
+                "reads {coldest:.0} to {hottest:.0} degrees, needs {COLDEST_C} to {needed:.0}: choose a {} pull-up",
+                if hottest < needed { "smaller" } else { "larger" }
+            );
+            return Err(place.fault("thermistor", &complaint));
+        }
+        Ok(())
+    }
+
+    /// Constants for the firmware.
+    #[must_use]
+    pub fn for_firmware(&self) -> Thermistor {
+        Thermistor {
+            pull_up: Ohm(self.pull_up_ohm as f32),
+            at_25_c: Ohm(self.r25_ohm as f32),
+            beta_k: self.beta_k as f32,
+        }
+    }
+}
+
 impl LegFile {
+    /// The leg with a thermistor of 10 kOhm in each winding.
+    #[must_use]
+    pub fn with_thermistors(&self) -> Self {
+        let mut leg = self.clone();
+        for motor in leg.joints.iter_mut().filter_map(|joint| joint.motor.as_mut()) {
+            motor.thermistor =
+                Some(ThermistorFile { pull_up_ohm: 3300.0, r25_ohm: 10_000.0, beta_k: 3435.0 });
+        }
+        leg
+    }
+
     /// The leg with an AS5047P at each rotor and each joint, at the distal joints against their counters.
     #[must_use]
     pub fn with_absolute_encoders(&self) -> Self {

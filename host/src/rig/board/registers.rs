@@ -2,6 +2,8 @@
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
+use hal_sim::faults::{Channel, Injector};
+use hal_sim::world::World;
 use scarab::board::odrive_v3_6::settings::analog::temperature_c;
 use scarab::hal::{AxisCommand, Contacts, Controller, EncoderPlace, Frame, Hardware};
 
@@ -65,8 +67,12 @@ pub struct Registers<const N: usize> {
     pub gates_on: bool,
     /// Whether the gate drivers were configured since this was cleared: a reset has ended.
     pub configured: bool,
-    /// Codes of the thermistors.
+    /// Codes of the thermistors at the bridges.
     pub thermistors: [u16; N],
+    /// Codes of the thermistors in the motors; `None` while the converter is silent.
+    pub motor_thermistors: [Option<u16>; N],
+    /// Axis whose motor's thermistor is converted.
+    converted: Option<usize>,
     /// Whether the servo was requested.
     pub servo_due: bool,
     /// Whether a round of the bus was requested.
@@ -96,6 +102,8 @@ impl<const N: usize> Registers<N> {
             gates_on: true,
             configured: false,
             thermistors: [WARM_CODE; N],
+            motor_thermistors: [None; N],
+            converted: None,
             servo_due: false,
             bus_due: false,
             can: CanController {
@@ -120,6 +128,25 @@ impl<const N: usize> Registers<N> {
 impl<const N: usize> Default for Registers<N> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+impl<const N: usize> Registers<N> {
+    /// Reads the absolute encoders of the plant and the thermistors in its motors, with the faults of this
+    /// period. A board without an encoder reads all ones.
+    pub fn sense(&mut self, world: &World<N>, injector: &mut Injector, period: u64) {
+        for joint in 0..N {
+            let axis = world.complete_drives().and_then(|drives| drives.axes().get(joint));
+            let rotor = axis.and_then(|axis| axis.rotor_steps());
+            let readings =
+                [(Channel::RotorEncoder, rotor), (Channel::JointEncoder, world.joint_steps(joint))];
+            self.encoder_frames[joint] = readings.map(|(channel, steps)| {
+                steps.map_or(u16::MAX, |steps| injector.frame(channel, joint, period, steps))
+            });
+            let code = axis.and_then(|axis| axis.motor().thermistor_code());
+            self.motor_thermistors[joint] =
+                code.and_then(|code| injector.motor_thermistor(joint, period, code));
+        }
     }
 }
 
@@ -175,6 +202,14 @@ impl<const N: usize> Hardware<N> for Registers<N> {
 
     fn temperature(&self, axis: usize) -> Option<f32> {
         temperature_c(self.thermistors[axis])
+    }
+
+    fn convert_thermistor(&mut self, axis: usize) {
+        self.converted = Some(axis);
+    }
+
+    fn thermistor_code(&mut self) -> Option<u16> {
+        self.motor_thermistors[self.converted?]
     }
 
     fn gate_holds(&mut self, axis: usize) -> bool {

@@ -3,6 +3,7 @@
 //! ```text
 //! TIM1 trigger -> injected: ADC2 B, ADC3 C of axis 0; ADC1 bus voltage, thermistors
 //! TIM8 trigger -> regular:  ADC2 B, ADC3 C of axis 1
+//! software     -> regular:  ADC1 thermistor of one motor
 //! clock 84 MHz / 4 = 21 MHz; 3 + 12 cycles = 0.71 us
 //! ```
 //!
@@ -33,9 +34,15 @@ pub const JEOC: u32 = 1 << 2;
 
 /// Channels of the shunts of B and C, by axis.
 pub const SHUNTS: [[u32; 2]; 2] = [[10, 11], [13, 12]];
-/// Channels of bus voltage, bridge of axis 0, bridge of axis 1, chopper. All four injected ranks of ADC1 are
-/// used; its regular sequence is free.
+/// Channels of bus voltage, bridge of axis 0, bridge of axis 1, chopper: all four injected ranks of ADC1.
 pub const SLOW: [u32; 4] = [6, 15, 4, 5];
+
+/// Offset of the register with the channel of a regular conversion.
+pub const SQR3: u32 = 0x34;
+/// Offset of the register that starts a regular conversion.
+pub const CR2: u32 = 0x08;
+/// Channels of the thermistors in the motors, by axis: PA0, PA1.
+pub const MOTORS: [u32; 2] = [0, 1];
 
 /// Ends of either kind.
 pub const ENDS: u32 = JEOC | EOC;
@@ -47,8 +54,9 @@ const INTERRUPTS: u32 = 1 << 5 | 1 << 7;
 const INJECTED: u32 = 0b0001 << 16 | 0b01 << 20;
 /// Regular conversions by TIM8's trigger (number 14), rising edge.
 const REGULAR: u32 = 0b1110 << 24 | 0b01 << 28;
-/// Fifteen cycles of sampling for the thermistors' dividers, channels 4 and 5 (SMPR2), 15 (SMPR1).
-const SLOW_SAMPLING: [u32; 2] = [0b001 << 15, 0b001 << 12 | 0b001 << 15];
+/// Fifteen cycles of sampling for the thermistors' dividers, channels 4 and 5 (SMPR2), 15 (SMPR1). For those
+/// in the motors, channels 0 and 1, 480 cycles or 23 us: resistors of 10 kOhm and long wires.
+const SLOW_SAMPLING: [u32; 2] = [0b001 << 15, 0b111 | 0b111 << 3 | 0b001 << 12 | 0b001 << 15];
 
 macro_rules! adc {
     ($number:literal, $name:literal, $offset:expr, $value:expr) => {
@@ -87,6 +95,9 @@ pub const TRIGGERED: [Write; 3] = [
     adc!(2, "CR2", 0x08, ON | INJECTED | REGULAR),
     adc!(3, "CR2", 0x08, ON | INJECTED | REGULAR),
 ];
+
+/// Value of CR2 of ADC1 that starts a regular conversion; the triggers stay.
+pub const START: u32 = ON | INJECTED | 1 << 30;
 
 /// Axes with an end in ADC2 or ADC3; `Some(true)` where both have one.
 #[inline(always)]

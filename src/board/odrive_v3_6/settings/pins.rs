@@ -3,8 +3,8 @@
 //! Source: `Board/v3/Inc/main.h:77-156`, `board.cpp:35-254`; registers RM0090 8.4.
 //!
 //! Pins of the bus: [`super::can`]; of absolute encoders: [`super::absolute_encoders`]. Unused and left in
-//! their reset state: UART_A (PA0, PA1), USB (PA11, PA12), GPIO6 (PB2) without a holding brake, and GPIO7
-//! and GPIO8 (PA15, PB3) without such encoders.
+//! their reset state: GPIO1 and GPIO2 (PA0, PA1) without thermistors in the motors, USB (PA11, PA12), GPIO6
+//! (PB2) without a holding brake, and GPIO7 and GPIO8 (PA15, PB3) without absolute encoders.
 
 use super::Write;
 
@@ -106,6 +106,9 @@ pub const PINS: [Pin; 32] = [
 
 /// Driver of the holding brake on GPIO6, initially low: engaged. Only written where there is a brake.
 pub const HOLDING_BRAKE: Pin = pin(b'B', 2, Mode::Output(false));
+
+/// Thermistors in the motors, on GPIO1 and GPIO2. Only written where there is one.
+pub const MOTOR_THERMISTORS: [Pin; 2] = [pin(b'A', 0, Mode::Analog), pin(b'A', 1, Mode::Analog)];
 
 /// Address of a port's first register.
 #[must_use]
