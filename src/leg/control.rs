@@ -426,8 +426,9 @@ impl<const N: usize> Control<N> {
         false
     }
 
-    /// Sets the motion of the next [`ControlRequest::Track`], proved against this leg's limits
-    /// ([`LegConfiguration::prove`]). Refused (`false`) while one is tracked. A restart forgets it.
+    /// Sets the motion of [`ControlRequest::Track`]. It is proved against this leg's limits
+    /// ([`LegConfiguration::prove`]) and stays until it is replaced, or until a restart. Refused (`false`) while
+    /// one is tracked.
     #[must_use]
     pub fn set_tracked(&mut self, motion: ProvedMotion<N>) -> bool {
         let tracks = matches!(self.activity, Activity::Track(_));

@@ -144,8 +144,8 @@ pub(super) struct TestHardware<const N: usize> {
     pub temperatures: [Option<f32>; N],
     /// Codes of the thermistors in the motors; `None` while the converter is silent.
     pub motor_codes: [Option<u16>; N],
-    /// Axis whose thermistor is converted.
-    pub converted: Option<usize>,
+    /// Axis whose thermistor is converted, and its code at the start of that.
+    pub converted: Option<(usize, Option<u16>)>,
     pub gates_hold: [bool; N],
     pub gate_status: [u32; N],
     /// The gate drivers accept their configuration.
@@ -299,11 +299,11 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     }
 
     fn convert_thermistor(&mut self, axis: usize) {
-        self.converted = Some(axis);
+        self.converted = Some((axis, self.motor_codes[axis]));
     }
 
     fn thermistor_code(&mut self) -> Option<u16> {
-        self.converted.and_then(|axis| self.motor_codes[axis])
+        self.converted.and_then(|(_, code)| code)
     }
     fn gate_holds(&mut self, axis: usize) -> bool {
         self.gates_hold[axis]

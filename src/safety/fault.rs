@@ -119,8 +119,8 @@ faults! {
     Thermistor = 0xFF04, "T1", "thermistor", Damp, "a thermistor is open or shorted";
     /// A winding reached its limit by its thermal model (2350: load level, thermal state).
     WindingTemperature = 0x2350, "T2", "winding", Damp, "its winding is too hot";
-    /// The thermistor of a motor is open or shorted.
-    MotorThermistor = 0xFF12, "T4", "motor_thermistor", Damp, "the thermistor of its motor is open or shorted";
+    /// The thermistor of a motor is open, shorted or not converted.
+    MotorThermistor = 0xFF12, "T4", "motor_thermistor", Damp, "the thermistor of its motor cannot be read";
     /// A measured or requested value is NaN or infinite.
     NotFinite = 0xFF01, "N1", "not_finite", Off, "a signal was not a number";
     /// The emergency stop's contact is open (9000: external error).

@@ -10,7 +10,7 @@
 //! | absolute encoder contradicts the counter, twice | 8 ms | 16 ms | rotor position lost, Short |
 //! | thermistor open or shorted | 50 ms | 50 ms + servo tick | [`FaultCode::Thermistor`], Damp |
 //! | bridge at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::Temperature`], Damp |
-//! | motor's thermistor unreadable, three times | 50 ms a motor | 300 ms | [`FaultCode::MotorThermistor`] |
+//! | motor's thermistor unreadable, three times | 50 ms; 100 with two | 350 ms | [`FaultCode::MotorThermistor`], Damp |
 //! | winding at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::WindingTemperature`], Damp |
 //!
 //! A register that changes and recovers between two checks is not detected, nor is a thermistor stuck within
@@ -33,7 +33,7 @@ pub enum BoardFault {
     Winding,
     /// An absolute encoder sends no valid frame.
     AbsoluteEncoder,
-    /// The thermistor of a motor is open or shorted.
+    /// The thermistor of a motor cannot be read.
     MotorThermistor,
 }
 

@@ -9,7 +9,7 @@ mod timer;
 
 use std::collections::BTreeMap;
 
-use scarab::board::odrive_v3_6::settings::pins::{GATES_OFF, HOLDING_BRAKE, PINS};
+use scarab::board::odrive_v3_6::settings::pins::{GATES_OFF, HOLDING_BRAKE, MOTOR_THERMISTORS, Mode, PINS};
 use scarab::board::odrive_v3_6::settings::{
     CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, Write, analog, can,
     chopper, converters, external, flash, gate_driver, prepare, timers,
@@ -143,6 +143,19 @@ fn the_converters_sample_the_shunts_of_the_board() {
     assert_eq!(registers.bits(ADC[0] + 0x38, 20, 2), 3);
     assert_eq!([0, 5, 10, 15].map(|place| sequence >> place & 0x1F), [6, 15, 4, 5]);
     assert_eq!(registers.bits(ADC[0] + 0x04, 8, 1), 1, "scan");
+    // Thermistors of the motors on IN0 (PA0) and IN1 (PA1): one regular conversion by software, 480 cycles.
+    assert_eq!(converters::MOTORS, [0, 1]);
+    assert_eq!(
+        MOTOR_THERMISTORS.map(|pin| (pin.port, pin.number, pin.mode)),
+        [(b'A', 0, Mode::Analog), (b'A', 1, Mode::Analog)]
+    );
+    assert_eq!((registers.at(ADC[0] + 0x2C), registers.at(ADC[0] + 0x10) & 0o77), (0, 0o77));
+    let triggered = registers.at(ADC[0] + converters::CR2);
+    assert_eq!(converters::START, triggered | 1 << 30, "the injected trigger stays");
+    let down = 1 << 4;
+    let idle =
+        [(0, 1000), (down, 1000), (down, 168), (down, 169)].map(|(cr1, cnt)| converters::is_idle(cr1, cnt));
+    assert_eq!(idle, [false, true, false, true]);
     // ADC2 and ADC3 interrupt, at the end of either kind; all resolve 12 bits, right-aligned.
     let interrupts = ADC.map(|adc| registers.bits(adc + 0x04, 5, 3));
     assert_eq!(interrupts, [0, 0b101, 0b101]);

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! The input is read at the hold. Injected conversions of a scan follow one another; a regular conversion
-//! that is interrupted by injected ones starts again. Refused: sequences without scan mode, triggers before
-//! the converter has settled, a clock above 36 MHz. Known limits: no DMA, no dual mode, no analog watchdog;
+//! that is interrupted by injected ones starts again. Refused: sequences without scan mode or changed during
+//! a conversion, triggers before the converter has settled, a clock above 36 MHz. Known limits: no DMA, no dual mode, no analog watchdog;
 //! triggers are TRGO of TIM1 (injected) and TIM8 (regular), and software.
 
 use crate::findings::{Access, NO_REGISTER, NOT_MODELLED};
@@ -251,6 +251,9 @@ impl Adc {
     /// Writes a register of converter `number`.
     pub fn write(&mut self, number: usize, offset: u32, value: u32, clock: Ticks, access: &mut Access<'_>) {
         let name = |register: &str| Self::name(number, register);
+        if matches!(offset, 0x2C..=0x38) && self.running.is_some() {
+            access.refuse("sequence changed during a conversion", name("SQR, JSQR"));
+        }
         match offset {
             // Zeros clear, ones do nothing.
             0x00 => self.sr &= value | !0x3F,

@@ -17,7 +17,7 @@ use crate::faults::trial::KINDS;
 const MOST_FAILURES: usize = 100;
 /// Rows whose runs can show a false alarm: a harmless event or a mere push, or a host whose time is not over
 /// yet. All others test only the reaction to a fault.
-const JUDGED: [&str; 9] = ["E2", "E4", "E6", "E7", "J1", "J2", "H1", "B1", "B5"];
+const JUDGED: [&str; 10] = ["E2", "E4", "E6", "E7", "T4", "J1", "J2", "H1", "B1", "B5"];
 
 /// Results of one row of the catalogue. Field names are part of the JSON interface.
 #[derive(Clone, Debug, Serialize)]

@@ -143,7 +143,10 @@ fn tracking_error<const N: usize, const B: usize>(
 ) -> Option<[f64; N]> {
     let scales = context.configuration.joints.map(|joint| joint.scale);
     let motion = context.configuration.prove(motion).ok()?;
-    let mut request = pair.leg.set_tracked(motion).then_some(ControlRequest::Track { with_model });
+    if !pair.leg.set_tracked(motion) {
+        return None;
+    }
+    let mut request = Some(ControlRequest::Track { with_model });
     let (mut squared, mut count) = ([0.0; N], 0_u32);
     let end = pair.ticks + (60.0 / TICK_S) as u64;
     while pair.ticks < end {

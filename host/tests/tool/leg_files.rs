@@ -146,16 +146,12 @@ fn every_error_names_file_line_and_reason() {
             "`motor.thermistor` has `beta_k` 343.5, outside 1000..6000",
         ),
         (
-            joint(&format!(
-                "{MOTOR}thermistor = {{ pull_up_ohm = 1e5, r25_ohm = 10000.0, beta_k = 3435.0 }}"
-            )),
+            joint(&format!("{MOTOR}thermistor = {{ pull_up_ohm = 5e4, r25_ohm = 1e3, beta_k = 3435.0 }}")),
             Some(12),
-            "`motor.thermistor` reads -87 to 99 degrees, needs -20 to 120: choose a smaller pull-up",
+            "`motor.thermistor` reads -102 to 44 degrees, needs -20 to 120: choose a smaller pull-up",
         ),
         (
-            joint(&format!(
-                "{MOTOR}thermistor = {{ pull_up_ohm = 200.0, r25_ohm = 10000.0, beta_k = 3435.0 }}"
-            )),
+            joint(&format!("{MOTOR}thermistor = {{ pull_up_ohm = 1e3, r25_ohm = 5e4, beta_k = 3435.0 }}")),
             Some(12),
             "choose a larger pull-up",
         ),

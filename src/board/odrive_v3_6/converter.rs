@@ -2,13 +2,17 @@
 
 use super::registers::{apply, load, store};
 use super::settings::converters::{
-    BASES, CR2, DR, ENDS, EOC, JDR1, JEOC, MOTORS, SQR3, SR, START, cleared, finished_axes,
+    BASES, CR2, DR, ENDS, EOC, JDR1, JEOC, MOTORS, SQR3, SR, START, cleared, finished_axes, is_idle,
 };
 use super::settings::pins::MOTOR_THERMISTORS;
+use super::settings::timers;
 
 const ADC1: u32 = BASES[0];
 const ADC2: u32 = BASES[1];
 const ADC3: u32 = BASES[2];
+const TIM1: u32 = timers::BASES[0];
+/// Looks at the timer, of ten cycles or more each: a PWM period and more.
+const LOOKS: u32 = 800;
 
 /// Axes with conversions finished since the last call; `Some(true)` where both shunts are. Clears the flags
 /// it returns.
@@ -71,11 +75,24 @@ pub fn prepare_thermistors(fitted: [bool; 2]) {
 }
 
 /// Starts a conversion of the thermistor in a motor. Injected conversions interrupt it; then it starts again.
+///
+/// Another channel during the scan of the bus voltage would restart that scan (RM0090 13.3.5), so this waits
+/// for the half period without one, 22 us at most. Without running timers it starts nothing.
 pub fn convert_thermistor(axis: usize) {
-    if let Some(channel) = MOTORS.get(axis) {
-        store(ADC1 + SQR3, *channel);
-        store(ADC1 + SR, cleared(EOC));
-        store(ADC1 + CR2, START);
+    let Some(channel) = MOTORS.get(axis) else { return };
+    for _ in 0..LOOKS {
+        let started = cortex_m::interrupt::free(|_| {
+            let idle = is_idle(load(TIM1 + timers::CR1), load(TIM1 + timers::CNT));
+            if idle {
+                store(ADC1 + SQR3, *channel);
+                store(ADC1 + SR, cleared(EOC));
+                store(ADC1 + CR2, START);
+            }
+            idle
+        });
+        if started {
+            return;
+        }
     }
 }
 

@@ -1,32 +1,73 @@
-//! Thermistors of the motors: one conversion at a time, with each check of the temperatures.
+//! Thermistors of the motors: each check of the temperatures takes one conversion and starts the next.
 //!
-//! A motor's winding is at least as hot as its thermistor, so a reading raises the temperature of the thermal
-//! model and never lowers it. The lower of two readings counts: one disturbed conversion would heat the model
-//! for minutes. A thermistor that is unreadable [`UNREADABLE`] times in a row is a fault of its joint.
+//! A winding is at least as hot as its thermistor, so readings raise the temperature of the thermal model and
+//! never lower it. Each reading counts by an eighth, because noise would otherwise heat the model: it cools
+//! only with its own time constant. A hotter thermistor acts after a second.
 //!
-//! Not detected: a thermistor that has come off its winding and reads something colder.
+//! A reading is bad if the code has no temperature, if it is [`STEP_K`] from the last one, or [`BEYOND_K`]
+//! above the winding's limit: a wire with a partial short looks like heat. Bad readings count twice, good ones
+//! subtract one; [`WORN`] is a fault of the joint. So three bad ones in a row are a fault, two are not, and of
+//! a wire with every other reading bad the fourth.
+//!
+//! Not detected: a thermistor that has come off its winding, or whose wire adds resistance, reads something
+//! colder; a partial short between the limit and [`BEYOND_K`] above it is reported as heat.
 
 use super::{Housekeeper, Level};
 use crate::hal::Hardware;
-use crate::real::min;
+use crate::real::abs;
 use crate::safety::BoardFault;
 
-/// Unreadable conversions in a row that are a fault.
-const UNREADABLE: u8 = 3;
+/// Largest change between two readings, K; a winding warms by less than 1 K in that time.
+const STEP_K: f32 = 20.0;
+/// Largest excess over the winding's limit, K; the leg is off long before.
+const BEYOND_K: f32 = 20.0;
+/// Share of a new reading in the mean.
+const SHARE: f32 = 0.125;
+/// Count at which a thermistor is unreadable.
+const WORN: u8 = 5;
+
+/// Readings of one motor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Readings {
+    /// Last temperature, good or bad, degrees Celsius.
+    last_c: Option<f32>,
+    /// Mean of the good ones, degrees Celsius.
+    mean_c: Option<f32>,
+    /// Twice the bad readings, less the good ones since.
+    worn: u8,
+}
+
+impl Readings {
+    /// Takes a reading; `None` without a temperature.
+    fn take(&mut self, celsius: Option<f32>, limit_c: f32) {
+        let last = self.last_c;
+        self.last_c = celsius.or(last);
+        if last.is_none() && celsius.is_some() {
+            // Nothing to compare the first one with.
+            return;
+        }
+        let is_near = |celsius: f32| last.is_some_and(|last| abs(celsius - last) <= STEP_K);
+        match celsius.filter(|celsius| is_near(*celsius) && *celsius <= limit_c + BEYOND_K) {
+            Some(celsius) => {
+                self.mean_c = self.mean_c.map(|mean| mean + SHARE * (celsius - mean)).or(Some(celsius));
+                self.worn = self.worn.saturating_sub(1);
+            }
+            None => self.worn = self.worn.saturating_add(2),
+        }
+    }
+}
 
 /// State between two checks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MotorThermistors<const N: usize> {
     /// Axis of the conversion in progress.
     converting: Option<usize>,
-    /// Last reading of each axis, degrees Celsius.
-    last_c: [Option<f32>; N],
-    /// Unreadable conversions of each axis in a row.
-    unreadable: [u8; N],
+    readings: [Readings; N],
 }
 
 impl<const N: usize> MotorThermistors<N> {
-    pub(super) const NONE: Self = Self { converting: None, last_c: [None; N], unreadable: [0; N] };
+    pub(super) const NONE: Self =
+        Self { converting: None, readings: [Readings { last_c: None, mean_c: None, worn: 0 }; N] };
 }
 
 impl<const N: usize> Housekeeper<N> {
@@ -52,18 +93,20 @@ impl<const N: usize> Housekeeper<N> {
         code: Option<u16>,
         level: &mut Level<'_, '_, N, impl Hardware<N>>,
     ) {
-        let thermistor = self.settings.thermistors.get(axis).and_then(Option::as_ref);
-        let MotorThermistors { last_c, unreadable, .. } = &mut self.motor_thermistors;
-        let (Some(last), Some(unreadable)) = (last_c.get_mut(axis), unreadable.get_mut(axis)) else {
+        let settings = &self.settings;
+        let (Some(readings), Some(winding), Some(Some(thermistor)), Some(rating)) = (
+            self.motor_thermistors.readings.get_mut(axis),
+            self.windings.get_mut(axis),
+            settings.thermistors.get(axis),
+            settings.windings.get(axis),
+        ) else {
             return;
         };
-        let celsius = thermistor.zip(code).and_then(|(thermistor, code)| thermistor.celsius(code));
-        if let (Some(winding), Some(before), Some(now)) = (self.windings.get_mut(axis), *last, celsius) {
-            winding.at_least(min(before, now));
+        readings.take(code.and_then(|code| thermistor.celsius(code)), rating.limit_c);
+        if let Some(celsius) = readings.mean_c {
+            winding.at_least(celsius);
         }
-        *last = celsius;
-        *unreadable = if celsius.is_some() { 0 } else { unreadable.saturating_add(1) };
-        if *unreadable >= UNREADABLE {
+        if readings.worn >= WORN {
             level.signals.report(BoardFault::MotorThermistor, axis);
         }
     }

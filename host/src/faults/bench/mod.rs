@@ -50,7 +50,7 @@ pub static BENCHES: [Bench; 27] = [
     calibration::BENCH,
     start::ZEROS,
     hot::CURRENT,
-    hot::SURROUNDINGS,
+    hot::COOLING,
     hot::THERMISTOR,
     supply::DRAW,
     supply::CHARGE,

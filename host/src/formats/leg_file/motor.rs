@@ -39,9 +39,9 @@ const MOST_RATIO: f64 = 80.0;
 const MOST_RANGE_DEG: f64 = 170.0;
 /// Counts per turn of an AS5047P.
 const AS5047P_COUNTS: [u32; 2] = [4000, 4096];
-/// Time constant of a simulated thermistor, of its winding's.
+/// Time constant of a simulated thermistor as a share of its winding's.
 const THERMISTOR_LAG: f64 = 0.05;
-/// Least coldest temperature that a thermistor reads, and distance of the hottest from the winding's limit.
+/// Temperatures that a thermistor must read: down to this one, up to so much above the winding's limit.
 const COLDEST_C: f64 = -20.0;
 const THERMISTOR_RESERVE_K: f64 = 20.0;
 /// Range of a 16-bit counter.
@@ -406,8 +406,9 @@ impl MotorFile {
 impl ThermistorFile {
     fn check(&self, place: &Place<'_>, limit_c: f64) -> Result<(), Fault> {
         let limits = [
-            ("pull_up_ohm", self.pull_up_ohm, 100.0, 1e6),
-            ("r25_ohm", self.r25_ohm, 100.0, 1e6),
+            // Less heats the thermistor, more lets the pin's leakage current read as a temperature.
+            ("pull_up_ohm", self.pull_up_ohm, 1e3, 5e4),
+            ("r25_ohm", self.r25_ohm, 1e3, 5e4),
             ("beta_k", self.beta_k, 1000.0, 6000.0),
         ];
         for (key, value, low, high) in limits {
@@ -416,17 +417,18 @@ impl ThermistorFile {
             }
         }
         // A cold motor must not look like an open wire, nor a hot one like a short.
-        let celsius = |code: u16| self.for_firmware().celsius(code).map_or(f64::NAN, f64::from);
+        let celsius = |code: u16| self.for_firmware().celsius(code).map_or(f64::INFINITY, f64::from);
         let (hottest, coldest) = (celsius(SHORTED + 1), celsius(OPEN - 1));
         let needed = limit_c + THERMISTOR_RESERVE_K;
-        if !(hottest >= needed && coldest <= COLDEST_C) {
-            let complaint = format!(
-                "reads {coldest:.0} to {hottest:.0} degrees, needs {COLDEST_C} to {needed:.0}: choose a {} pull-up",
-                if hottest < needed { "smaller" } else { "larger" }
-            );
-            return Err(place.fault("thermistor", &complaint));
-        }
-        Ok(())
+        let advice = match (hottest >= needed, coldest <= COLDEST_C) {
+            (true, true) => return Ok(()),
+            (false, true) => "choose a smaller pull-up",
+            (true, false) => "choose a larger pull-up",
+            (false, false) => "no pull-up fits this thermistor",
+        };
+        let range =
+            format!("reads {coldest:.0} to {hottest:.0} degrees, needs {COLDEST_C} to {needed:.0}: {advice}");
+        Err(place.fault("thermistor", &range))
     }
 
     /// Constants for the firmware.

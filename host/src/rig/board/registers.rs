@@ -71,8 +71,8 @@ pub struct Registers<const N: usize> {
     pub thermistors: [u16; N],
     /// Codes of the thermistors in the motors; `None` while the converter is silent.
     pub motor_thermistors: [Option<u16>; N],
-    /// Axis whose motor's thermistor is converted.
-    converted: Option<usize>,
+    /// Code of the conversion of a motor's thermistor that was started last.
+    converted: Option<u16>,
     /// Whether the servo was requested.
     pub servo_due: bool,
     /// Whether a round of the bus was requested.
@@ -205,11 +205,11 @@ impl<const N: usize> Hardware<N> for Registers<N> {
     }
 
     fn convert_thermistor(&mut self, axis: usize) {
-        self.converted = Some(axis);
+        self.converted = self.motor_thermistors[axis];
     }
 
     fn thermistor_code(&mut self) -> Option<u16> {
-        self.motor_thermistors[self.converted?]
+        self.converted
     }
 
     fn gate_holds(&mut self, axis: usize) -> bool {

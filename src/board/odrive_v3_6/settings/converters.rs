@@ -12,7 +12,8 @@
 //! Source: `Board/v3/Src/adc.c:81-218`, `board.cpp:431-440`, `Inc/main.h:83-90` (on axis 1 PC3 is B and PC2
 //! is C); registers RM0090 13.13, triggers tables 68 and 69.
 
-use super::Write;
+use super::timers::DOWN;
+use super::{FAST_TIMER_HZ, Write};
 
 /// First registers of ADC1, ADC2, ADC3.
 pub const BASES: [u32; 3] = [0x4001_2000, 0x4001_2100, 0x4001_2200];
@@ -65,12 +66,13 @@ macro_rules! adc {
 }
 
 /// Turns all converters on and sets channels and sequences; nothing triggers them yet. Settling takes 3 us.
-pub const CONVERTERS: [Write; 20] = [
+pub const CONVERTERS: [Write; 21] = [
     Write::whole("ADC_CCR", COMMON, 0b01 << 16),
     // Scan mode: four injected conversions per trigger.
     adc!(1, "CR1", 0x04, 1 << 8),
     adc!(1, "SMPR1", 0x0C, SLOW_SAMPLING[0]),
     adc!(1, "SMPR2", 0x10, SLOW_SAMPLING[1]),
+    adc!(1, "SQR1", 0x2C, 0),
     adc!(1, "JSQR", 0x38, 3 << 20 | SLOW[0] | SLOW[1] << 5 | SLOW[2] << 10 | SLOW[3] << 15),
     adc!(1, "CR2", 0x08, ON),
     adc!(2, "CR1", 0x04, INTERRUPTS),
@@ -95,6 +97,13 @@ pub const TRIGGERED: [Write; 3] = [
     adc!(2, "CR2", 0x08, ON | INJECTED | REGULAR),
     adc!(3, "CR2", 0x08, ON | INJECTED | REGULAR),
 ];
+
+/// Whether ADC1 converts nothing for the next microsecond, by TIM1's control register and counter: the scan
+/// begins at the counter's zero and takes 4.6 us, less than the half period in which the counter rises.
+#[must_use]
+pub const fn is_idle(control: u32, counter: u32) -> bool {
+    control & DOWN != 0 && counter > FAST_TIMER_HZ / 1_000_000
+}
 
 /// Value of CR2 of ADC1 that starts a regular conversion; the triggers stay.
 pub const START: u32 = ON | INJECTED | 1 << 30;
