@@ -8,6 +8,7 @@ pub mod kept_file;
 pub mod leg_file;
 pub mod model_file;
 pub mod recording;
+pub mod robot;
 pub mod shard;
 pub mod temperature;
 pub mod trace;
