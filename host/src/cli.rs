@@ -58,7 +58,9 @@ Examples: cargo sim leg --urdf robot.urdf --joints hip_joint,knee_joint --out le
           cargo sim leg --check my-leg.toml")]
     Leg(leg::LegArguments),
     /// Design an exciting motion and predict its result before anything moves.
-    #[command(after_help = "Example: cargo sim excite --leg my-leg.toml --out motion.toml")]
+    #[command(after_help = "\
+Examples: cargo sim excite --leg my-leg.toml --out motion.toml
+          cargo sim excite --leg my-leg.toml --csv motion.csv --rate 1000 --trajectory motion.yaml")]
     Excite(excite::ExciteArguments),
     /// Identify a leg from recordings.
     #[command(

@@ -7,6 +7,7 @@ pub mod excitation_constant;
 pub mod kept_file;
 pub mod leg_file;
 pub mod model_file;
+pub mod motion_samples;
 pub mod recording;
 pub mod robot;
 pub mod shard;

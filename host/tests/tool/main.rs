@@ -7,6 +7,7 @@ mod command;
 mod crash;
 mod emulation;
 mod excite;
+mod excite_samples;
 mod faults;
 mod figures;
 mod files;
