@@ -6,7 +6,7 @@
 
 Each robot has one to three revolute joints in a chain, with links on fixed joints before, between and behind
 them, inertial frames turned at random, and in some robots a side branch whose moving joint is locked. The axes
-are random, parallel, opposite, intersecting or coaxial. Pinocchio builds the model, locks the joints that
+are random, parallel, opposite, intersecting or coaxial. The last robot is one of others. Pinocchio builds the model, locks the joints that
 are not chosen, and computes the torque of the rigid bodies (Featherstone's recursive Newton-Euler
 algorithm) at random states. The seed is fixed.
 
@@ -16,11 +16,14 @@ root's frame [m/s2], `states[]`: `q`, `qd`, `qdd`, `torque` [rad, s, N m].
 
 import argparse
 import json
+from pathlib import Path
 
 import numpy as np
 import pinocchio
 
 STATES = 6
+# Robot of others, from the package example-robot-data 6.0.0; its licence lies beside it.
+REAL = Path(__file__).parent.parent / "host/tests/data/double_pendulum/double_pendulum_simple.urdf"
 
 
 def numbers(values):
@@ -164,6 +167,10 @@ def main():
         robots.append(
             {"name": name, "urdf": text, "joints": joints, "lock": lock, "gravity": gravity, "states": states}
         )
+    text, joints, gravity = REAL.read_text(encoding="utf-8"), ["joint1", "joint2"], [0.0, 0.0, -9.81]
+    states = torques(text, joints, {}, gravity, random)
+    name = "double pendulum of example-robot-data"
+    robots.append({"name": name, "urdf": text, "joints": joints, "lock": {}, "gravity": gravity, "states": states})
     with open(out, "w", encoding="utf-8") as file:
         # One line for each robot and state, so that a change of one shows as such.
         lines = []

@@ -437,15 +437,17 @@ impl<'a, 'i> Reader<'a, 'i> {
         if parent == child {
             return Err(self.wrong(of, of.node, "parent and child are the same link"));
         }
+        // Many robots state an axis of length 0 where it has no meaning.
+        let has_axis = !matches!(kind, Kind::Fixed | Kind::Floating);
         let axis = match self.child(of, "axis")? {
-            Some(node) => {
+            Some(node) if has_axis => {
                 let text = node.attribute("xyz").unwrap_or("");
                 let axis = Vector3::from(self.numbers::<3>(of, node, "xyz", text)?);
                 // Shorter, its direction would be rounding.
                 Unit::try_new(axis, 1e-6)
                     .ok_or_else(|| self.wrong(of, node, "`axis` has no direction: its length is 0"))?
             }
-            None => Vector3::x_axis(),
+            _ => Vector3::x_axis(),
         };
         let limit = match self.child(of, "limit")? {
             Some(node) => {

@@ -103,7 +103,7 @@ fn error(leg: &LegFile, states: &[State]) -> f64 {
 #[test]
 fn the_leg_file_of_a_robot_gives_the_torque_of_pinocchio() {
     let robots = vectors();
-    assert_eq!(robots.len(), 15);
+    assert_eq!(robots.len(), 16);
     for robot in &robots {
         let found =
             converted(&robot.urdf, &options(robot)).unwrap_or_else(|error| panic!("{}: {error}", robot.name));
@@ -331,6 +331,10 @@ fn every_joint_that_is_no_leg_is_refused_by_name() {
         let refused = converted(&text, &options).expect_err(reason);
         assert!(refused.starts_with("robot.urdf:") && refused.contains(reason), "{reason}: {refused}");
     }
+    // Many robots state an axis of length 0 at joints that do not move.
+    let welded =
+        ankle("fixed").replace("<child link=\"foot\"/>", "<child link=\"foot\"/><axis xyz=\"0 0 0\"/>");
+    converted(&welded, &plain()).expect("the axis has no meaning");
     // A held joint, and bodies left out, are accepted.
     converted(SIMPLE, &RobotOptions { locked: vec![("knee".into(), 0.5)], ..joints(&["hip"]) })
         .expect("a pendulum");
