@@ -15,7 +15,7 @@
 //!
 //! Source: Craig, *Introduction to Robotics* (2005), 3.4.
 //! Known limit: the common normal of axes that are almost parallel lies far away; see
-//! [`DhChain::angle_to_parallel`].
+//! [`DhJoint::angle_to_parallel`].
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -65,7 +65,7 @@ pub fn leg(robot: &Robot, options: &RobotOptions) -> Result<FromRobot, FileError
         if let Some(before) = number.checked_sub(1) {
             let before = Framed { one: &chosen[before], dh: &dh.joints[before] };
             expressible(robot, before, Framed { one, dh: frame }, options.parallel_rad)?;
-            own.extend(almost_parallel(before.one.joint, one.joint, frame, options.parallel_rad));
+            own.extend(almost_parallel(before.one.joint, frame, options.parallel_rad));
         }
         joints.push(joint(robot, one, frame, options.with_prior, &mut own)?);
         remarks.extend(own.into_iter().map(|remark| format!("joint `{}`: {remark}", one.joint.name)));
@@ -143,7 +143,7 @@ impl Framed<'_> {
 }
 
 /// Remark on an axis that is nearly parallel to the one before.
-fn almost_parallel(before: &Joint, joint: &Joint, dh: &DhJoint, parallel_rad: f64) -> Option<String> {
+fn almost_parallel(before: &Joint, dh: &DhJoint, parallel_rad: f64) -> Option<String> {
     let angle = dh.angle_to_parallel;
     if angle <= ROUNDING_RAD || angle > SUSPICIOUS_RAD.max(parallel_rad) {
         return None;
@@ -152,11 +152,7 @@ fn almost_parallel(before: &Joint, joint: &Joint, dh: &DhJoint, parallel_rad: f6
     Some(if angle <= parallel_rad {
         format!("{words} and taken as parallel (--parallel)")
     } else {
-        format!(
-            "{words}: if `{}` is rounded, --parallel {:.0e} takes it as parallel",
-            joint.name,
-            2.0 * angle
-        )
+        format!("{words}: if its `rpy` is rounded, --parallel {:.0e} takes it as parallel", 2.0 * angle)
     })
 }
 

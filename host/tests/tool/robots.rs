@@ -70,7 +70,7 @@ fn converted(urdf: &str, options: &RobotOptions) -> Result<FromRobot, String> {
 }
 
 /// Anatomical torques of a leg's prior, rigid bodies only.
-fn torques<const N: usize>(leg: &LegFile, state: &State) -> [f64; N] {
+pub fn torques<const N: usize>(leg: &LegFile, state: &State) -> [f64; N] {
     let (chain, anatomy) = (chain::<N>(leg).expect("N joints"), anatomy::<N>(leg).expect("checked"));
     let bodies = prior_parameters(&links::<N>(leg, |joint| joint.prior.as_ref()).expect("every joint"));
     let state = JointState {
@@ -226,6 +226,15 @@ fn rounded_parallel_axes_are_refused_until_they_are_declared_parallel() {
         found.remarks[0].contains("3.7e-6 rad from parallel to that of `hip` and taken as parallel"),
         "{:?}",
         found.remarks
+    );
+    // Axes that meet within the format's lengths are converted as they are, with a remark.
+    let near = text.replace("xyz=\"0 0 -0.4\"", "xyz=\"0 0 0\"");
+    let kept = converted(&near, &plain()).expect("intersecting axes");
+    assert!(kept.leg.joints[1].dh.alpha.abs() > 3e-6, "{:?}", kept.leg.joints[1].dh);
+    assert!(
+        kept.remarks[0].contains("if its `rpy` is rounded, --parallel 7e-6 takes it as parallel"),
+        "{:?}",
+        kept.remarks
     );
     // The torque differs by about that angle.
     let exact = converted(SIMPLE, &plain()).expect("a leg").leg;

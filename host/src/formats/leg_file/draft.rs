@@ -16,7 +16,7 @@ pub struct Draft {
     pub name: String,
     /// Gravity's acceleration in the base frame, m/s^2.
     pub gravity: [f64; 3],
-    /// Comments at the begin of the file.
+    /// Comments at the beginning of the file.
     pub remarks: Vec<String>,
     /// Joints, proximal first.
     pub joints: Vec<DraftJoint>,
