@@ -11,6 +11,7 @@ mod faults;
 mod identify;
 mod image;
 mod kept;
+mod leg;
 mod leg_options;
 pub mod merge;
 mod model;
@@ -38,7 +39,7 @@ use crate::formats::shard::Argument;
 #[derive(Parser, Debug)]
 #[command(name = "scarab", version, max_term_width = HELP_WIDTH, after_help = "\
 Options without a command belong to `identify`. `scarab COMMAND --help` has an example of each.
-Your data: replay, predict, compare, export, regressor. Simulation: identify, excite, monitor, motor, serve.
+Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, excite, monitor, motor, serve.
 Board: fw, flash-leg, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
 struct Cli {
     #[command(subcommand)]
@@ -50,8 +51,16 @@ enum Command {
     /// Identify a simulated leg: drive it, log it, solve, validate, track.
     #[command(after_help = "Example: cargo sim identify --leg my-leg.toml --seed 3 --report run.html")]
     Identify(identify::IdentifyArguments),
+    /// Write a leg file, from a robot description (URDF) or from answers, or list what one lacks.
+    #[command(after_help = "\
+Examples: cargo sim leg --urdf robot.urdf --joints hip_joint,knee_joint --out leg.toml
+          cargo sim leg --new --out my-leg.toml
+          cargo sim leg --check my-leg.toml")]
+    Leg(leg::LegArguments),
     /// Design an exciting motion and predict its result before anything moves.
-    #[command(after_help = "Example: cargo sim excite --leg my-leg.toml --out motion.toml")]
+    #[command(after_help = "\
+Examples: cargo sim excite --leg my-leg.toml --out motion.toml
+          cargo sim excite --leg my-leg.toml --csv motion.csv --rate 1000 --trajectory motion.yaml")]
     Excite(excite::ExciteArguments),
     /// Identify a leg from recordings.
     #[command(
@@ -167,6 +176,7 @@ pub fn perform<C: CommandFactory + FromArgMatches>(
 /// Runs one command and returns its exit code.
 fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
     match command {
+        Command::Leg(arguments) => leg::run(arguments),
         Command::Excite(arguments) => excite::run(arguments),
         Command::Faults(arguments) => faults::run(arguments, stated),
         Command::Merge(arguments) => merge::run(arguments),

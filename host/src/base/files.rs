@@ -3,7 +3,7 @@
 
 pub mod write;
 
-pub use write::{NewFile, write};
+pub use write::{NewFile, check_new, write, write_new};
 
 use std::path::{Path, PathBuf};
 

@@ -10,6 +10,7 @@ use crate::cli::leg_options::LegOptions;
 use crate::cli::noise::NoiseOptions;
 use crate::formats::excitation::{Excitation, LONGEST_S};
 use crate::formats::excitation_constant as constant;
+use crate::formats::motion_samples::{MotionSamples, SampleRate};
 use crate::leg::setup::DEFAULT_SEED;
 use crate::run::excite::assumption::Assumption;
 use crate::run::excite::bench::ExciteOptions;
@@ -29,6 +30,15 @@ pub struct ExciteArguments {
     /// Write the motion here, as a Rust constant for an image.
     #[arg(long = "const")]
     constant: Option<Output>,
+    /// Write samples of the motion here, as CSV: t_s, and q1_rad, qd1_radps, qdd1_radps2 of each joint.
+    #[arg(long)]
+    csv: Option<Output>,
+    /// Write the motion here, as a ROS 2 trajectory (trajectory_msgs/JointTrajectory, YAML).
+    #[arg(long)]
+    trajectory: Option<Output>,
+    /// Samples per second of --csv and --trajectory, Hz; a divisor of 4000.
+    #[arg(long, value_name = "HZ", default_value = "500")]
+    rate: SampleRate,
     /// Duration of the motion with its blends, s.
     #[arg(long, default_value_t = 22.0, allow_negative_numbers = true)]
     duration: f64,
@@ -95,6 +105,15 @@ pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
     }
     if let Some(path) = &arguments.constant {
         files::write(path, constant::source(&excited.motion))?;
+    }
+    if arguments.csv.is_some() || arguments.trajectory.is_some() {
+        let samples = MotionSamples::of(leg, &excited.motion, arguments.rate)?;
+        if let Some(path) = &arguments.csv {
+            files::write(path, samples.to_csv())?;
+        }
+        if let Some(path) = &arguments.trajectory {
+            files::write(path, samples.to_trajectory())?;
+        }
     }
     if let Some(path) = &arguments.json {
         write_json(path, &excited.report)?;

@@ -41,14 +41,17 @@
 //! default to 0. `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of
 //! mass. All are in the joint's D-H frame with the D-H sign. Only a simulation needs `truth`.
 
-mod check;
+pub mod check;
 mod convert;
+pub mod draft;
 pub mod geometry;
 mod image;
+pub mod keys;
 mod motor;
 mod segments;
 mod switch;
 
+pub use image::{MissingForImage, MissingOfJoint};
 pub use motor::{BrakeFile, JointEncoder, MotorFile, SupplyFile};
 pub use segments::{BodySide, SegmentsFile};
 pub use switch::Switch;

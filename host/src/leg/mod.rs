@@ -1,12 +1,15 @@
 //! A leg file becomes the firmware's configuration, its prior and its plant.
 
+pub mod axes;
 pub mod background;
 pub mod board_words;
+pub mod from_robot;
 pub mod matching;
 pub mod model_choice;
 pub mod motions;
 pub mod placed_mass;
 pub mod posture;
+pub mod robot_chain;
 pub mod setup;
 pub mod size;
 pub mod states;

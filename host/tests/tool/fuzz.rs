@@ -13,11 +13,14 @@ use scarab_host::formats::excitation::Excitation;
 use scarab_host::formats::leg_file::{LegFile, SHIPPED_LEGS};
 use scarab_host::formats::model_file::ModelFile;
 use scarab_host::formats::recording::Recording;
+use scarab_host::formats::robot::Robot;
+use scarab_host::leg::from_robot;
 use scarab_host::run::trace::run::StreamReader;
 use scarab_host::run::trace::run_report;
 
 use crate::command::{Folder, MUJOCO};
 use crate::kept;
+use crate::robots;
 use crate::trace::session;
 
 const CASES: u32 = 200;
@@ -141,6 +144,30 @@ fn corrupted_leg_files_are_refused_by_name_or_valid() {
         LegFile::parse(&leg.to_toml(), NAME).map_err(|error| error.to_string())?;
         let _ = leg.description::<2>();
         let _ = leg.complete_description::<2>();
+        Ok(())
+    });
+}
+
+#[test]
+fn corrupted_robot_descriptions_are_refused_by_name_or_become_legs() {
+    let described = robots::vectors();
+    let mut texts: Vec<String> = described.iter().map(|robot| robot.urdf.clone()).collect();
+    let mut options: Vec<_> = described.iter().map(robots::options).collect();
+    texts.push(robots::SIMPLE.to_owned());
+    options.push(robots::plain());
+    fuzz(&texts, |bytes| {
+        let Some(text) = text(bytes) else { return Ok(()) };
+        let robot = Robot::parse(text, NAME).map_err(|error| error.to_string())?;
+        // Every choice of joints and locks, whichever text was corrupted.
+        for options in &options {
+            match from_robot::leg(&robot, options) {
+                Err(error) if !error.to_string().contains(NAME) => return Err(error.to_string()),
+                Err(_) => {}
+                Ok(found) => {
+                    LegFile::parse(&found.text, NAME).map_err(|error| error.reason)?;
+                }
+            }
+        }
         Ok(())
     });
 }

@@ -2,6 +2,7 @@
 #![expect(clippy::disallowed_methods, reason = "runs on the host only and may use std's mathematics")]
 
 use crate::command::{Folder, scarab};
+use crate::robots::{self, State};
 use hal_sim::description::{BodyDescription, DenavitHartenberg, LegDescription};
 use hal_sim::mechanism::Mechanism;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -9,7 +10,9 @@ use scarab::ident::prior_parameters;
 use scarab::model::{JointState, Parameter};
 use scarab_host::formats::leg_file::LegFile;
 use scarab_host::formats::model_file::ModelFile;
+use scarab_host::formats::robot::Robot;
 use scarab_host::formats::urdf::text;
+use scarab_host::leg::from_robot;
 use scarab_host::leg::setup::{links, row_model};
 use scarab_host::run::predict::Predictor;
 
@@ -144,6 +147,8 @@ fn checks<const N: usize, const B: usize>(name: &str) {
     }
     let mechanism = Mechanism::new(&description);
     let predictor = Predictor::<N>::new(&model).expect("joints");
+    let read = Robot::parse(&text, "leg.urdf").expect("a robot");
+    let again = from_robot::leg(&read, &robots::plain()).expect("the leg that was exported").leg;
     for step in 0..20 {
         let wave = |joint: usize, rate: f64| (0.7 * f64::from(step) * rate + joint as f64).sin();
         let state = JointState {
@@ -152,6 +157,16 @@ fn checks<const N: usize, const B: usize>(name: &str) {
             qdd: core::array::from_fn(|joint| 9.0 * wave(joint, 2.3)),
         };
         let torque = mechanism.inverse_dynamics(&state.q, &state.qd, &state.qdd);
+        // `leg --urdf` reads what `export` writes, in anatomical angles; the description holds no rotor.
+        let joints = || description.joints.iter();
+        let turned =
+            |values: [f64; N]| joints().zip(values).map(|(joint, value)| joint.direction * value).collect();
+        let q = joints().zip(state.q).map(|(joint, q)| joint.direction * (q - joint.zero_offset)).collect();
+        let anatomical = State { q, qd: turned(state.qd), qdd: turned(state.qdd), torque: Vec::new() };
+        let read = robots::torques::<N>(&again, &anatomical);
+        for ((joint, read), torque) in joints().zip(&read).zip(&torque) {
+            assert!((joint.direction * read - torque).abs() < 1e-9, "{name}: {read} against {torque}");
+        }
         for (joint, predicted) in predictor.torques(&state).iter().enumerate() {
             let rotor = model.joint_parameters(joint).expect("with a prior")[Parameter::IA.index()];
             let whole = torque[joint] + rotor * state.qdd[joint];

@@ -25,6 +25,42 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), ToolError> {
     file.finish()
 }
 
+/// Writes a whole file that does not exist yet; a device is written as by [`write()`].
+///
+/// # Errors
+/// The file exists, and is unchanged, or cannot be written.
+pub fn write_new(path: &Path, text: &str) -> Result<(), ToolError> {
+    if is_device(path) {
+        return write(path, text);
+    }
+    let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|error| {
+        if error.kind() == io::ErrorKind::AlreadyExists {
+            exists(path)
+        } else {
+            ToolError::cannot_write(path, &error)
+        }
+    })?;
+    file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(|error| {
+        let _ = std::fs::remove_file(path);
+        ToolError::cannot_write(path, &error)
+    })
+}
+
+/// Rejects a file that exists, before a command computes or asks anything.
+///
+/// # Errors
+/// The file exists.
+pub fn check_new(path: &Path) -> Result<(), ToolError> {
+    if !is_device(path) && path.symlink_metadata().is_ok() { Err(exists(path)) } else { Ok(()) }
+}
+
+fn exists(path: &Path) -> ToolError {
+    ToolError::input(format!(
+        "{}: exists and is not overwritten: name another file, or remove it first",
+        path.display()
+    ))
+}
+
 /// File that replaces its destination when finished; without that it leaves no file.
 #[derive(Debug)]
 pub struct NewFile {

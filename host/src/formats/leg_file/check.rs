@@ -11,8 +11,22 @@ use nalgebra::Matrix3;
 use crate::base::toml_file::{Fault, Step};
 use crate::formats::leg_file::{JointFile, LegFile, LinkParameters, Switch};
 
+/// Components of gravity, m/s^2.
+pub const GRAVITY: [f64; 2] = [-30.0, 30.0];
+/// D-H twist, rad.
+pub const TWIST: [f64; 2] = [-7.0, 7.0];
+/// D-H lengths, m.
+pub const LENGTH: [f64; 2] = [-5.0, 5.0];
+/// Zero offset, degrees.
+pub const ZERO_OFFSET: [f64; 2] = [-360.0, 360.0];
+/// Ends of a range, degrees.
+pub const RANGE_END: [f64; 2] = [-3600.0, 3600.0];
 /// Smallest range that the firmware's limits accept.
-const SMALLEST_RANGE_DEG: f64 = 2.0;
+pub const SMALLEST_RANGE_DEG: f64 = 2.0;
+/// Largest speed limit, degrees per second.
+pub const LARGEST_SPEED: f64 = 2800.0;
+/// Largest torque limit, N m.
+pub const LARGEST_TORQUE: f64 = 1000.0;
 /// Longest time of a holding brake, ms.
 const LONGEST_BRAKE_MS: f64 = 500.0;
 
@@ -43,6 +57,10 @@ impl Place<'_> {
         }
     }
 
+    fn inside(&self, key: &'static str, value: f64, [low, high]: [f64; 2]) -> Result<(), Fault> {
+        self.within(key, value, low, high)
+    }
+
     /// Accepts values above 0 and up to `high`.
     fn positive(&self, key: &'static str, value: f64, high: f64) -> Result<(), Fault> {
         if value > 0.0 && value <= high {
@@ -69,7 +87,7 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
     let top = Place { joint: None, table: None };
     top.named("name", &leg.name)?;
     for component in leg.gravity {
-        top.within("gravity", component, -30.0, 30.0)?;
+        top.inside("gravity", component, GRAVITY)?;
     }
     top.within("torque_noise_percent", leg.torque_noise_percent, 0.0, 100.0)?;
     // Above 25 Hz the rows at 50 Hz would be independent, and noise would alias into them.
@@ -127,16 +145,16 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
     let inside = |table| Place { joint: Some((number, joint.name.as_str())), table: Some(table) };
     place.named("name", &joint.name)?;
     let frame = inside("dh");
-    frame.within("alpha", joint.dh.alpha, -7.0, 7.0)?;
-    frame.within("a", joint.dh.a, -5.0, 5.0)?;
-    frame.within("d", joint.dh.d, -5.0, 5.0)?;
+    frame.inside("alpha", joint.dh.alpha, TWIST)?;
+    frame.inside("a", joint.dh.a, LENGTH)?;
+    frame.inside("d", joint.dh.d, LENGTH)?;
     if !matches!(joint.direction, 1 | -1) {
         return Err(place.fault("direction", &format!("is {}; it must be 1 or -1", joint.direction)));
     }
-    place.within("zero_offset_deg", joint.zero_offset_deg, -360.0, 360.0)?;
+    place.inside("zero_offset_deg", joint.zero_offset_deg, ZERO_OFFSET)?;
     let [lower, upper] = joint.range_deg;
-    place.within("range_deg", lower, -3600.0, 3600.0)?;
-    place.within("range_deg", upper, -3600.0, 3600.0)?;
+    place.inside("range_deg", lower, RANGE_END)?;
+    place.inside("range_deg", upper, RANGE_END)?;
     if lower >= upper {
         return Err(place.fault("range_deg", &format!("is inverted or empty: {lower} to {upper}")));
     }
@@ -144,9 +162,9 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         let words = format!("is {} degrees wide; at least {SMALLEST_RANGE_DEG} are needed", upper - lower);
         return Err(place.fault("range_deg", &words));
     }
-    place.positive("speed_limit_deg_s", joint.speed_limit_deg_s, 2800.0)?;
+    place.positive("speed_limit_deg_s", joint.speed_limit_deg_s, LARGEST_SPEED)?;
     place.positive("acceleration_limit_deg_s2", joint.acceleration_limit_deg_s2, 1e5)?;
-    place.positive("torque_limit_nm", joint.torque_limit_nm, 1000.0)?;
+    place.positive("torque_limit_nm", joint.torque_limit_nm, LARGEST_TORQUE)?;
     place.within("torque_per_ampere", joint.torque_per_ampere, 0.001, 100.0)?;
     if let Some(limit) = joint.current_limit_a {
         place.positive("current_limit_a", limit, 300.0)?;
