@@ -15,6 +15,7 @@ mod fuzz;
 mod holding_brake;
 mod image;
 mod image_source;
+mod imports;
 mod kept;
 mod kept_file;
 mod leg_files;
