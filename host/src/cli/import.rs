@@ -79,10 +79,13 @@ impl ImportArguments {
     }
 }
 
+/// Alias that runs this program.
+const BY_ALIAS: &str = if cfg!(feature = "readers") { "cargo sim-readers" } else { "cargo sim" };
+
 /// The command as typed, without `--columns` and `--units`.
 fn command(words: impl Iterator<Item = String>) -> String {
     let mut words = words.skip(1).peekable();
-    let program = if words.next_if(|word| word == BY_CARGO).is_some() { "cargo sim" } else { "scarab" };
+    let program = if words.next_if(|word| word == BY_CARGO).is_some() { BY_ALIAS } else { "scarab" };
     let mut command = program.to_owned();
     while let Some(word) = words.next() {
         if word == "--columns" || word == "--units" {
@@ -97,7 +100,7 @@ fn command(words: impl Iterator<Item = String>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{BY_CARGO, command};
+    use super::{BY_ALIAS, BY_CARGO, command};
 
     #[test]
     fn a_proposed_command_keeps_all_other_options() {
@@ -114,7 +117,7 @@ mod tests {
         ];
         assert_eq!(
             command(typed.into_iter().map(str::to_owned)),
-            "cargo sim replay 'my run.csv' --split 0.7"
+            format!("{BY_ALIAS} replay 'my run.csv' --split 0.7")
         );
         assert_eq!(command(["scarab", "replay"].into_iter().map(str::to_owned)), "scarab replay");
     }

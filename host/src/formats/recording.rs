@@ -21,7 +21,7 @@
 //! whole.
 
 use std::f64::consts::TAU;
-use std::io::{self, Write};
+use std::io::{self, BufRead as _, Write};
 use std::path::{Path, PathBuf};
 
 use crate::base::error::FileError;
@@ -31,6 +31,7 @@ pub mod columns;
 mod decode;
 pub mod dialect;
 mod fault;
+mod foreign;
 pub mod import;
 mod lines;
 pub mod signal;
@@ -40,6 +41,7 @@ mod suggest;
 use columns::{LineNumbers, of_text, refuse};
 pub use decode::Read;
 pub use fault::Fault;
+use foreign::Foreign;
 use import::Import;
 
 /// Least number of samples of a recording.
@@ -99,6 +101,10 @@ impl Recording {
     /// Names file, line and reason, and where column names are close the complete command.
     pub fn read(file: &Path, import: &Import) -> Result<Read, FileError> {
         let mut source = source::open(file)?;
+        let begin = source.text.fill_buf().map_err(|error| FileError::unreadable(file, &error))?;
+        if let Some(foreign) = Foreign::of(begin) {
+            return foreign.read(file, source.is_gzip, import);
+        }
         let packing = if source.is_gzip { ", gzip" } else { "" };
         decode::csv(file, &mut source.text, packing, import)
     }

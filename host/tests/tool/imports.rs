@@ -118,7 +118,7 @@ fn a_unit_in_a_name_that_contradicts_the_one_in_use_is_refused() {
     let message = refusal(&text, &import("q1=angle_deg", ""));
     assert_eq!(
         message,
-        "walk.csv:1: the name of column `angle_deg` states the unit deg, but q1 is read in rad. If these columns are meant, \
+        "walk.csv:1: column `angle_deg` is in deg by its name or type, but q1 is read in rad. If these columns are meant, \
          repeat the command with them:\n  cargo sim replay --columns t=t_s,q1=angle_deg,tau1=tau1_Nm --units s,deg,Nm"
     );
     // Stated on the command line, the user's word counts.
@@ -422,4 +422,79 @@ fn random_bytes_with_any_options_are_refused_by_name_or_read() {
     if let Err(failure) = result {
         panic!("{failure}");
     }
+}
+
+/// File of `readers/tests/data`.
+fn foreign(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../readers/tests/data").join(name)
+}
+
+#[test]
+fn files_of_other_kinds_are_refused_with_the_way_to_one_that_is_read() {
+    let folder = Folder::new();
+    for (begin, words) in [
+        (&b"SQLite format 3\0...."[..], "rosbags-convert --src BAG --dst NEW --dst-storage mcap"),
+        (b"#ROSBAG V2.0\n", "a bag of ROS 1: convert it to MCAP"),
+        (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
+        (b"PK\x03\x04", "a ZIP archive, as .xlsx and .npz are"),
+        (b"\x93NUMPY\x01", "numpy.savetxt"),
+        (b"\x28\xB5\x2F\xFD", "zstd -d"),
+    ] {
+        let path = folder.path("run");
+        std::fs::write(&path, begin).expect("a temporary file");
+        let message = Recording::read(&path, &import("", "")).expect_err("not a recording").to_string();
+        assert!(message.contains(words), "{message}");
+    }
+    let message = Recording::read(&foreign("level5.mat"), &import("", "")).expect_err("SciPy's").to_string();
+    assert!(
+        message.contains("level5.mat: a MAT file") && message.contains("writetable(table(t, q1, tau1)"),
+        "{message}"
+    );
+}
+
+#[cfg(not(feature = "readers"))]
+#[test]
+fn parquet_and_mcap_name_the_command_that_reads_them() {
+    for name in ["snappy.parquet", "plain.mcap"] {
+        let message =
+            Recording::read(&foreign(name), &import("", "")).expect_err("built without").to_string();
+        assert!(message.contains("with `cargo sim-readers` instead of `cargo sim`"), "{message}");
+    }
+}
+
+#[cfg(feature = "readers")]
+#[test]
+fn a_parquet_file_in_nanoseconds_is_read_once_its_columns_and_units_are_stated() {
+    let read = |columns: &str, units: &str, skip_bad: bool| {
+        let import = Import { skip_bad, ..import(columns, units) };
+        Recording::read(&foreign("snappy.parquet"), &import).map_err(|error| error.to_string())
+    };
+    let message = read("t=stamp", "", false).expect_err("in seconds by default");
+    assert!(message.contains("column `stamp` is in ns by its name or type, but t is read in s"), "{message}");
+    assert!(message.contains("--columns t=stamp,q1=q1_rad,tau1=tau1_Nm --units ns,rad,Nm"), "{message}");
+    let message = read("t=stamp", "ns", false).expect_err("a missing value");
+    assert!(message.contains("snappy.parquet:8: `NaN` in column `tau1_Nm` is not finite"), "{message}");
+    let Read { recording, report } = read("t=stamp", "ns", true).expect("119 samples");
+    assert_eq!((recording.time_s.len(), report.skipped, report.format.as_str()), (119, 1, "Parquet"));
+    // 100 is after the skipped sample 7.
+    let (time, torque) = (recording.time_s[100], recording.joints[0].torque_nm[100]);
+    assert_eq!((time, torque), (101.0 / 64.0, 4.0 - 101.0 / 8.0));
+}
+
+#[cfg(feature = "readers")]
+#[test]
+fn joints_of_a_bag_are_chosen_by_name_and_proposed_by_the_names_of_the_leg() {
+    let mut unnamed = Import::plain(2);
+    unnamed.drives[0].joint = "knee".to_owned();
+    unnamed.drives[1].joint = "hip".to_owned();
+    let message =
+        Recording::read(&foreign("zstd.mcap"), &unnamed).expect_err("no documented names").to_string();
+    let columns = "t=time,q1=position[knee_joint],q2=position[hip_joint],tau1=effort[knee_joint],tau2=effort[hip_joint]";
+    assert!(message.contains(&format!("--columns '{columns}' --units s,rad,Nm")), "{message}");
+    let choices: Vec<_> = columns.split(',').map(|choice| choice.parse().expect("a column")).collect();
+    let Read { recording, report } =
+        Recording::read(&foreign("zstd.mcap"), &unnamed.with(&choices, &[]).expect("valid")).expect("a bag");
+    assert_eq!(report.format, "MCAP, sensor_msgs/msg/JointState");
+    let torques: Vec<f64> = recording.joints.iter().map(|joint| joint.torque_nm[100]).collect();
+    assert_eq!(torques, [2.0 * (4.0 - 100.0 / 8.0), 4.0 - 100.0 / 8.0]);
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::formats::recording::columns::Column;
 use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
-use crate::formats::recording::signal::{Signal, Unit};
+use crate::formats::recording::signal::{Quantity, Signal, Unit};
 use crate::formats::recording::suggest::{advice, example, unit_in_name};
 use crate::formats::recording::{LARGEST_POSITION_RAD, LARGEST_TIME_S, LARGEST_TORQUE_NM};
 use crate::report::reading::ColumnReport;
@@ -14,8 +14,18 @@ use crate::report::reading::ColumnReport;
 /// Names of a file's columns.
 pub(crate) struct Names {
     pub(crate) names: Vec<String>,
+    /// Units that the file states beside the names; may be shorter.
+    pub(crate) units: Vec<Option<Unit>>,
     /// Whether the file states the names; otherwise they are its first row.
     pub(crate) are_stated: bool,
+}
+
+impl Names {
+    /// Unit of this quantity that the file or the column's name states.
+    pub(crate) fn unit(&self, index: usize, quantity: Quantity) -> Option<Unit> {
+        let of_file = self.units.get(index).copied().flatten().filter(|unit| unit.quantity == quantity);
+        of_file.or_else(|| unit_in_name(self.names.get(index)?, quantity))
+    }
 }
 
 /// Column of one signal.
@@ -153,7 +163,7 @@ impl Finder<'_> {
     fn chosen(&self, signal: Signal, found: &BTreeMap<Signal, Column>) -> Result<Chosen, Fault> {
         let column = found[&signal].clone();
         let (unit, is_stated) = self.import.unit(signal);
-        let named = unit_in_name(&column.name, signal.quantity());
+        let named = self.names.unit(column.index, signal.quantity());
         if let Some(named) = named.filter(|named| !is_stated && *named != unit) {
             return Err(Fault::OtherUnit {
                 column: column.name,
@@ -227,6 +237,6 @@ impl Finder<'_> {
 
     fn advice(&self, found: &BTreeMap<Signal, Column>) -> String {
         let certain: Vec<_> = found.iter().map(|(signal, column)| (*signal, column.index)).collect();
-        advice(&self.names.names, self.names.are_stated, self.import, &certain)
+        advice(self.names, self.import, &certain)
     }
 }

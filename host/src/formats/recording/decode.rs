@@ -50,6 +50,12 @@ impl<'a> Decoder<'a> {
         Ok(Self { file, import, columns, recording, numbers, skipped, values })
     }
 
+    /// Indices of the chosen columns, in the order in which [`Decoder::take`] asks for their numbers.
+    #[cfg(feature = "readers")]
+    pub(crate) fn indices(&self) -> Vec<usize> {
+        self.columns.iter().map(|chosen| chosen.column.index).collect()
+    }
+
     /// Takes one row, whose numbers `number` reads; `line` is where it stands.
     ///
     /// # Errors
@@ -173,6 +179,7 @@ pub(crate) fn csv(
     };
     let names = Names {
         names: first.iter().map(str::to_owned).collect(),
+        units: Vec::new(),
         are_stated: !is_data(&first, dialect.decimal, import),
     };
     let mut decoder =

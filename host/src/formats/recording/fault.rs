@@ -52,7 +52,7 @@ pub enum Fault {
         columns: usize,
     },
     /// The name of a column states another unit than the one in use.
-    #[error("the name of column `{column}` states the unit {named}, but {signal} is read in {used}{advice}")]
+    #[error("column `{column}` is in {named} by its name or type, but {signal} is read in {used}{advice}")]
     OtherUnit {
         /// Column name.
         column: String,

@@ -39,10 +39,7 @@ pub(crate) fn open(path: &Path) -> Result<Source, FileError> {
     let unreadable = |error: &io::Error| FileError::unreadable(path, error);
     let file = File::open(path).map_err(|error| unreadable(&error))?;
     let length = file.metadata().map_err(|error| unreadable(&error))?.len();
-    let progress = if length < SHOWN_FROM { ProgressBar::hidden() } else { ProgressBar::new(length) };
-    if let Ok(style) = ProgressStyle::with_template("reading {bar:40} {bytes} of {total_bytes}, {eta} left") {
-        progress.set_style(style);
-    }
+    let progress = progress(path, length, "{bytes} of {total_bytes}");
     let read = Rc::new(Cell::new(0));
     let counted = Counted { file: progress.wrap_read(file), read: Rc::clone(&read) };
     let mut packed = BufReader::with_capacity(BUFFER, counted);
@@ -54,6 +51,18 @@ pub(crate) fn open(path: &Path) -> Result<Source, FileError> {
         Box::new(packed)
     };
     Ok(Source { text, is_gzip, progress })
+}
+
+/// Progress of reading a file in so many steps, hidden for a short one. `position` is the bar's text.
+pub(crate) fn progress(path: &Path, steps: u64, position: &str) -> ProgressBar {
+    if path.metadata().map_or(0, |metadata| metadata.len()) < SHOWN_FROM {
+        return ProgressBar::hidden();
+    }
+    let progress = ProgressBar::new(steps);
+    if let Ok(style) = ProgressStyle::with_template(&format!("reading {{bar:40}} {position}, {{eta}} left")) {
+        progress.set_style(style);
+    }
+    progress
 }
 
 /// Counts the bytes of the file.

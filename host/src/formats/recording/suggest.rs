@@ -9,6 +9,7 @@
 use std::collections::BTreeSet;
 
 use crate::base::shell::quoted;
+use crate::formats::recording::chosen::Names;
 use crate::formats::recording::import::{ColumnChoice, ColumnName, Drive, Import};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
 
@@ -145,12 +146,8 @@ struct Proposal {
 
 /// Advice on these column names: the complete command, or what is missing. `certain` holds the columns that
 /// are stated or have documented names.
-pub(crate) fn advice(
-    names: &[String],
-    has_header: bool,
-    import: &Import,
-    certain: &[(Signal, usize)],
-) -> String {
+pub(crate) fn advice(stated: &Names, import: &Import, certain: &[(Signal, usize)]) -> String {
+    let names = &stated.names;
     let mut found: Vec<Proposal> = Vec::new();
     let mut missing = Vec::new();
     let candidates: Vec<(usize, Name, Signal)> = names
@@ -215,9 +212,9 @@ pub(crate) fn advice(
         });
         match proposed {
             Some((signal, index)) if !found.iter().any(|other| other.index == index) => {
-                let (stated, is_stated) = import.unit(signal);
-                let named = unit_in_name(&names[index], signal.quantity());
-                let unit = if is_stated { stated } else { named.unwrap_or(stated) };
+                let (in_use, is_stated) = import.unit(signal);
+                let named = stated.unit(index, signal.quantity());
+                let unit = if is_stated { in_use } else { named.unwrap_or(in_use) };
                 found.push(Proposal { signal, index, unit, is_assumed: !is_stated && named.is_none() });
             }
             _ => missing.push(choices[0].0),
@@ -236,7 +233,7 @@ pub(crate) fn advice(
     found.sort_by_key(|found| found.signal);
     let columns: Vec<String> = found
         .iter()
-        .map(|found| format!("{}={}", found.signal, word(names, found.index, has_header)))
+        .map(|found| format!("{}={}", found.signal, word(names, found.index, stated.are_stated)))
         .collect();
     let assumed: Vec<String> = found
         .iter()
