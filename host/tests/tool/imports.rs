@@ -159,6 +159,7 @@ fn well_known_names_give_the_complete_command_and_are_not_read() {
             "Time [ms],JointAngle1(deg),Torque1 [N m]",
             "'t=Time [ms],q1=JointAngle1(deg),tau1=Torque1 [N m]' --units ms,deg,Nm",
         ),
+        ("t_s,q1_deg_s,q1_deg,tau1_Nm", "t=t_s,q1=q1_deg,tau1=tau1_Nm --units s,deg,Nm"),
         ("T_s,q1_rda,tau1_nm", "t=T_s,q1=q1_rda,tau1=tau1_nm --units s,rad,Nm"),
         (
             "t,velocity_1,position_1,position_cmd_1,current_1_mA",
@@ -171,6 +172,12 @@ fn well_known_names_give_the_complete_command_and_are_not_read() {
         let command = format!("repeat the command with them:\n  cargo sim replay --columns {options}");
         assert!(message.contains(&command), "{message}\n{command}");
     }
+    // The unit in a name is proposed even where another one is stated.
+    let message = refusal(&text("t_s,q1_deg,tau1_Nm\n", plain), &import("", "ms,deg"));
+    assert!(
+        message.contains("no column `t_ms`") && message.contains("tau1=tau1_Nm --units s,deg,Nm"),
+        "{message}"
+    );
     let message = refusal(&text("a,b,c\n", plain), &import("", ""));
     assert!(message.contains("No name resembles t, q1, tau1. Name the columns by --columns"), "{message}");
 }

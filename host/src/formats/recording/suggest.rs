@@ -109,7 +109,9 @@ impl Name {
 
     /// Kind of signal, with a joint of 0.
     fn kind(&self) -> Option<Signal> {
-        if self.has(&OTHER) {
+        // Degrees per second are a speed.
+        let states = |quantity| self.unit.iter().any(|unit| unit.quantity == quantity);
+        if self.has(&OTHER) || states(Quantity::Angle) && states(Quantity::Time) {
             return None;
         }
         if self.has(&TORQUE) {
@@ -214,7 +216,7 @@ pub(crate) fn advice(stated: &Names, import: &Import, certain: &[(Signal, usize)
             Some((signal, index)) if !found.iter().any(|other| other.index == index) => {
                 let (in_use, is_stated) = import.unit(signal);
                 let named = stated.unit(index, signal.quantity());
-                let unit = if is_stated { in_use } else { named.unwrap_or(in_use) };
+                let unit = named.unwrap_or(in_use);
                 found.push(Proposal { signal, index, unit, is_assumed: !is_stated && named.is_none() });
             }
             _ => missing.push(choices[0].0),
