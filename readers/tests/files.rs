@@ -1,4 +1,4 @@
-//! Files of foreign software are read, spoilt ones are refused. `tests/data/make.py` wrote the files.
+//! Files of foreign software are read, damaged ones are refused. `tests/data/make.py` wrote the files.
 
 #![expect(clippy::disallowed_methods, reason = "a test on the host may use std's mathematics")]
 
@@ -252,7 +252,7 @@ fn a_record_beyond_the_limit_is_refused_before_it_is_unpacked() {
 /// One change of a file: kind, position and content.
 type Change = (u8, f64, u32);
 
-fn spoilt(good: &[u8], changes: &[Change]) -> Vec<u8> {
+fn damaged(good: &[u8], changes: &[Change]) -> Vec<u8> {
     let mut bytes = good.to_vec();
     for &(kind, place, what) in changes {
         if bytes.is_empty() {
@@ -299,7 +299,7 @@ fn peak_memory() -> Option<u64> {
     line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kilobytes| kilobytes << 10)
 }
 
-/// Spoils a file at random and reads it: no panic, and no memory beyond a few pieces.
+/// Damages a file at random and reads it: no panic, and no memory beyond a few pieces.
 fn fuzz(names: &[&str], open: fn(&Path) -> Result<Box<dyn Table>, Error>) {
     let good: Vec<Vec<u8>> = names.iter().map(|name| std::fs::read(data(name)).expect("shipped")).collect();
     let cases = std::env::var("SCARAB_FUZZ_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(1000);
@@ -311,9 +311,9 @@ fn fuzz(names: &[&str], open: fn(&Path) -> Result<Box<dyn Table>, Error>) {
     let result = runner.run(&strategy, |(file, changes, is_random)| {
         let bytes = if is_random && changes.len() == 1 {
             let begin = [&good[file][..8], &changes[0].2.to_le_bytes().repeat(50)].concat();
-            spoilt(&begin, &changes)
+            damaged(&begin, &changes)
         } else {
-            spoilt(&good[file], &changes)
+            damaged(&good[file], &changes)
         };
         let file = Temporary::new(&bytes);
         let rows = read_all(open(&file.0));
@@ -334,14 +334,14 @@ fn fuzz(names: &[&str], open: fn(&Path) -> Result<Box<dyn Table>, Error>) {
 }
 
 #[test]
-fn spoilt_parquet_files_end_in_rows_or_an_error() {
+fn damaged_parquet_files_end_in_rows_or_an_error() {
     fuzz(&["snappy.parquet", "zstd.parquet", "lz4.parquet", "gzip.parquet"], |path| {
         Parquet::open(path).map(|table| Box::new(table) as Box<dyn Table>)
     });
 }
 
 #[test]
-fn spoilt_mcap_files_end_in_rows_or_an_error() {
+fn damaged_mcap_files_end_in_rows_or_an_error() {
     fuzz(&["plain.mcap", "zstd.mcap"], |path| {
         Mcap::open(path).map(|table| Box::new(table) as Box<dyn Table>)
     });
