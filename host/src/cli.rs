@@ -10,6 +10,7 @@ mod export;
 mod faults;
 mod identify;
 mod image;
+mod import;
 mod kept;
 mod leg;
 mod leg_options;

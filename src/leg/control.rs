@@ -427,8 +427,8 @@ impl<const N: usize> Control<N> {
     }
 
     /// Sets the motion of [`ControlRequest::Track`]. It is proved against this leg's limits
-    /// ([`LegConfiguration::prove`]) and stays until it is replaced, or until a restart. Refused (`false`) while
-    /// one is tracked.
+    /// ([`LegConfiguration::prove`]) and stays until it is replaced, or until a restart. Refused (`false`)
+    /// while one is tracked.
     #[must_use]
     pub fn set_tracked(&mut self, motion: ProvedMotion<N>) -> bool {
         let tracks = matches!(self.activity, Activity::Track(_));

@@ -10,7 +10,7 @@
 //! | absolute encoder contradicts the counter, twice | 8 ms | 16 ms | rotor position lost, Short |
 //! | thermistor open or shorted | 50 ms | 50 ms + servo tick | [`FaultCode::Thermistor`], Damp |
 //! | bridge at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::Temperature`], Damp |
-//! | motor's thermistor unreadable, three times | 50 ms; 100 with two | 350 ms | [`FaultCode::MotorThermistor`], Damp |
+//! | motor's thermistor unreadable, thrice | 100 ms | 350 ms | [`FaultCode::MotorThermistor`], Damp |
 //! | winding at or above its limit | 50 ms | 50 ms + servo tick | [`FaultCode::WindingTemperature`], Damp |
 //!
 //! A register that changes and recovers between two checks is not detected, nor is a thermistor stuck within

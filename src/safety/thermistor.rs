@@ -5,8 +5,8 @@
 //! R = pull_up code / (4096 - code)        1 / T = 1 / 298.15 K + ln(R / R_25) / beta
 //! ```
 //!
-//! Source: beta equation of data sheets. For a 103AT-2 (Semitec) it agrees with the sheet's table within 1.1 K
-//! from 0 to 100 degrees Celsius. At 100 degrees a resistance 5 % off adds 2.0 K, a beta 3 % off 2.8 K.
+//! Source: beta equation of data sheets. For a 103AT-2 (Semitec) it agrees with the sheet's table within 1.1
+//! K from 0 to 100 degrees Celsius. At 100 degrees a resistance 5 % off adds 2.0 K, a beta 3 % off 2.8 K.
 
 use crate::real::ln;
 use crate::units::Ohm;

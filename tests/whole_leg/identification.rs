@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use scarab_host::formats::leg_file::LegFile;
+use scarab_host::formats::recording::import::Import;
 use scarab_host::report::RunReport;
 use scarab_host::rig::options::SimulationOptions;
 use scarab_host::run::identify::identify_one;
@@ -136,6 +137,7 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
     let (report, _) =
         identify_one::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(3), Some(&path)).expect("it runs");
     let options = ReplayOptions {
+        import: Import::plain(2),
         chooses_bandwidth: false,
         even_stamps: false,
         torque_delay_ms: Vec::new(),

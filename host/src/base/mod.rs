@@ -8,6 +8,7 @@ pub mod output;
 pub mod precision;
 pub mod random;
 pub mod shard;
+pub mod shell;
 pub mod stats;
 pub mod table;
 pub mod toml_file;

@@ -64,7 +64,8 @@ impl LegOptions {
         self.set(LegFile::load_for_image(self.name(), self.side.is_some())?)
     }
 
-    fn name(&self) -> &str {
+    /// Name of the shipped leg, or path of the leg file.
+    pub fn name(&self) -> &str {
         self.leg.as_deref().unwrap_or(DEFAULT_LEG)
     }
 

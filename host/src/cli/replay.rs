@@ -8,6 +8,7 @@ use clap::Args;
 use crate::base::error::ToolError;
 use crate::cli::arguments::{Input, Output};
 use crate::cli::common::{Common, draw, finish};
+use crate::cli::import::ImportArguments;
 use crate::cli::model::ModelArguments;
 use crate::leg::placed_mass::PlacedMass;
 use crate::leg::setup::DEFAULT_SEED;
@@ -18,9 +19,12 @@ use crate::with_leg_size;
 /// Recordings, and outputs.
 #[derive(Args, Debug)]
 pub struct ReplayArguments {
-    /// Recordings, CSV: t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several form one training set.
+    /// Recordings, CSV (also .csv.gz): t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several form one
+    /// training set.
     #[arg(required = true)]
     files: Vec<Input>,
+    #[command(flatten)]
+    import: ImportArguments,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
@@ -94,6 +98,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
     }
     let options = &ReplayOptions {
         files: paths(&arguments.files),
+        import: arguments.import.import(leg, arguments.common.leg.name())?,
         validate: paths(&arguments.validate),
         split: arguments.split,
         bandwidth_hz: match arguments.bandwidth {
@@ -115,7 +120,12 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
     let kept = arguments.model.kept(leg)?;
     let mut replayed = with_leg_size!(leg, replay(leg, options))?;
     arguments.model.compare(kept.as_ref(), &mut replayed.run);
-    let sources = format!("{}{}\n\n", tables::sources(&replayed.sources).to_text(), tables::SOURCES);
+    let mut sources = format!("{}{}\n\n", tables::sources(&replayed.sources).to_text(), tables::SOURCES);
+    let read = replayed.run.read.as_deref().unwrap_or_default();
+    if let Some(table) = tables::conversions(read) {
+        let notes = tables::reading_notes(read).join("\n");
+        sources.push_str(&format!("{}{notes}\n\n", table.to_text()));
+    }
     let code = finish(&replayed.run, &arguments.common, &sources)?;
     draw(leg, &arguments.common, &replayed.run, &replayed.series, &replayed.sources)?;
     arguments.model.save(leg, &replayed.run, replayed.bandwidth_hz)?;

@@ -417,6 +417,18 @@ impl LegFile {
         Ok(leg)
     }
 
+    /// Whether each joint of a shipped leg or of a file states this key. A default must not convert a
+    /// recording.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn joints_that_state(name_or_path: &str, key: &str) -> Result<Vec<bool>, FileError> {
+        let (text, _) = Self::text(name_or_path)?;
+        let table = text.parse::<toml::Table>().unwrap_or_default();
+        let joints = table.get("joint").and_then(toml::Value::as_array);
+        Ok(joints.into_iter().flatten().map(|joint| joint.get(key).is_some()).collect())
+    }
+
     /// Error about this leg.
     #[must_use]
     pub fn error(&self, reason: impl Into<String>) -> FileError {

@@ -1,10 +1,11 @@
-//! Recordings of a leg's motion: time, angle and torque of each joint, read from CSV and checked.
+//! Recordings of a leg's motion: time, angle and torque of each joint, read from files and checked.
 //!
 //! An identification is only as good as its input, and the recording machine is unknown. Nothing is repaired
-//! silently. Invalid data are refused with file, line and reason; plausible data pass unchanged
+//! or converted silently. Invalid data are refused with file, line and reason; plausible data pass unchanged
 //! ([`resample`](crate::run::resample) makes them uniform).
 //!
 //! Format: a header, then one row per sample. Columns are found by name, in any order; others are ignored.
+//! Other names, units, delimiters and files without a header are read as [`import::Import`] states them.
 //!
 //! | column | unit | range |
 //! | --- | --- | --- |
@@ -16,22 +17,32 @@
 //! whichever is longer.
 //!
 //! Limits: swapped columns, or a command recorded as a measurement, look like valid numbers here; only the
-//! fit can detect them. Cost: 16 bytes per joint and sample, and 16 per sample.
+//! fit can detect them. Cost: 16 bytes per joint and sample, and 8 per sample; the text is never held as a
+//! whole.
 
 use std::f64::consts::TAU;
-use std::io::{self, Write};
+use std::io::{self, BufRead as _, Write};
 use std::path::{Path, PathBuf};
 
-use csv::StringRecord;
-
 use crate::base::error::FileError;
-use crate::base::files;
 
+mod chosen;
 pub mod columns;
+mod decode;
+pub mod dialect;
 mod fault;
+mod foreign;
+pub mod import;
+mod lines;
+pub mod signal;
+pub(crate) mod source;
+mod suggest;
 
-use columns::{Column, for_each_row, line_at, refuse};
+use columns::{LineNumbers, of_text, refuse};
+pub use decode::Read;
 pub use fault::Fault;
+use foreign::Foreign;
+use import::Import;
 
 /// Least number of samples of a recording.
 pub const MINIMUM_SAMPLES: usize = 50;
@@ -56,6 +67,11 @@ pub const LARGEST_POSITION_RAD: f64 = 1.0e3;
 /// Largest plausible torque, N m; larger ones are in another unit.
 pub const LARGEST_TORQUE_NM: f64 = 1.0e5;
 
+/// Largest number of samples: eleven hours at 500 Hz, half a gigabyte for two joints.
+pub const MOST_SAMPLES: usize = 20_000_000;
+/// Largest share of rows that may be skipped, percent.
+pub const MOST_BAD_PERCENT: usize = 5;
+
 /// Recorded signals of one joint: one entry per sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointSeries {
@@ -79,38 +95,37 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads the first `joints` joints of a CSV file.
-    pub fn read(file: &Path, joints: usize) -> Result<Self, FileError> {
-        Self::parse(file, &files::read_text(file)?, joints)
+    /// Reads the joints of `import` from a file.
+    ///
+    /// # Errors
+    /// Names file, line and reason, and where column names are close the complete command.
+    pub fn read(file: &Path, import: &Import) -> Result<Read, FileError> {
+        let mut source = source::open(file)?;
+        let begin = source.text.fill_buf().map_err(|error| FileError::unreadable(file, &error))?;
+        if let Some(foreign) = Foreign::of(begin) {
+            return foreign.read(file, source.is_gzip, import);
+        }
+        let packing = if source.is_gzip { ", gzip" } else { "" };
+        decode::csv(file, &mut source.text, packing, import)
     }
 
     /// Reads the first `joints` joints of a CSV text; `file` is used only in error messages.
     pub fn parse(file: &Path, text: &str, joints: usize) -> Result<Self, FileError> {
-        let mut recording = Self {
-            file: file.to_owned(),
-            time_s: Vec::new(),
-            joints: vec![JointSeries::default(); joints],
-            joints_in_file: 0,
-        };
-        let mut joints_in_file = 0;
-        let offsets = for_each_row(
-            file,
-            text,
-            |header| {
-                let found = Columns::find(header, joints)?;
-                joints_in_file = found.joints_in_file;
-                Ok(found)
-            },
-            |columns, row| recording.push(columns, row),
-        )?;
-        recording.joints_in_file = joints_in_file;
-        recording.check_rate()?;
-        recording.check_gaps().and_then(|()| recording.check_turns()).map_err(|(sample, fault)| {
-            let line = offsets.get(sample).map(|&offset| line_at(text, offset));
-            refuse(file, line, fault)
-        })?;
-        recording.check_length()?;
-        Ok(recording)
+        Ok(Self::parse_as(file, text, &Import::plain(joints))?.recording)
+    }
+
+    /// Reads a CSV text as stated.
+    pub fn parse_as(file: &Path, text: &str, import: &Import) -> Result<Read, FileError> {
+        decode::csv(file, of_text(text), "", import)
+    }
+
+    /// Checks everything that concerns more than one row.
+    fn check(&self, numbers: &LineNumbers) -> Result<(), FileError> {
+        self.check_rate()?;
+        self.check_gaps()
+            .and_then(|()| self.check_turns())
+            .map_err(|(sample, fault)| refuse(&self.file, numbers.of(sample), fault))?;
+        self.check_length()
     }
 
     /// Time from the first sample to the last, s.
@@ -166,21 +181,6 @@ impl Recording {
         Ok(())
     }
 
-    fn push(&mut self, columns: &Columns, row: &StringRecord) -> Result<(), Fault> {
-        let time = columns.time.number(row, LARGEST_TIME_S)?;
-        if let Some(&previous) = self.time_s.last()
-            && time <= previous
-        {
-            return Err(Fault::TimeNotIncreasing { previous, time });
-        }
-        self.time_s.push(time);
-        for (joint, (position, torque)) in self.joints.iter_mut().zip(&columns.joints) {
-            joint.position_rad.push(position.number(row, LARGEST_POSITION_RAD)?);
-            joint.torque_nm.push(torque.number(row, LARGEST_TORQUE_NM)?);
-        }
-        Ok(())
-    }
-
     /// Rejects stamps in another unit before they are put on a grid of seconds, which would take gigabytes.
     fn check_rate(&self) -> Result<(), FileError> {
         let step_s = self.median_step_s();
@@ -226,31 +226,5 @@ impl Recording {
             return Err(refuse(&self.file, None, Fault::TooShort { samples, duration }));
         }
         Ok(())
-    }
-}
-
-/// Column positions of all signals.
-struct Columns {
-    time: Column,
-    /// Columns of angle and torque of each joint.
-    joints: Vec<(Column, Column)>,
-    joints_in_file: usize,
-}
-
-impl Columns {
-    fn find(header: &StringRecord, joints: usize) -> Result<Self, Fault> {
-        let names = |joint: usize| [format!("q{joint}_rad"), format!("tau{joint}_Nm")];
-        let needed: Vec<String> =
-            std::iter::once("t_s".to_owned()).chain((1..=joints).flat_map(names)).collect();
-        let pair = |joint: usize| -> Result<(Column, Column), Fault> {
-            let [position, torque] = names(joint);
-            let position = Column::find(header, position, &needed)?;
-            Ok((position, Column::find(header, torque, &needed)?))
-        };
-        Ok(Self {
-            time: Column::find(header, "t_s".to_owned(), &needed)?,
-            joints: (1..=joints).map(pair).collect::<Result<_, _>>()?,
-            joints_in_file: (1..=header.len()).take_while(|&joint| pair(joint).is_ok()).count(),
-        })
     }
 }

@@ -16,11 +16,11 @@ use csv::StringRecord;
 use scarab::model::{AnatomicalJoint, JointState};
 
 use crate::base::error::FileError;
-use crate::base::files;
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::Fault;
-use crate::formats::recording::columns::{Column, for_each_row, line_at, refuse};
+use crate::formats::recording::columns::{Column, LineNumbers, for_each_row, refuse};
+use crate::formats::recording::source;
 
 /// Convention of the angles in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,11 +47,10 @@ impl Angles {
 /// All states of a file.
 pub struct States<const N: usize> {
     file: PathBuf,
-    text: String,
     /// States in the order of the file.
     pub rows: Vec<State<N>>,
-    /// Byte offset of each row in the text.
-    offsets: Vec<usize>,
+    /// Line of each state.
+    lines: LineNumbers,
 }
 
 /// One row of the file.
@@ -71,9 +70,9 @@ impl<const N: usize> States<N> {
     /// # Errors
     /// Names file, line and reason.
     pub fn read(file: &Path, to_chain: &[AnatomicalJoint<f64>; N]) -> Result<Self, FileError> {
-        let text = files::read_text(file)?;
+        let mut source = source::open(file)?;
         let mut rows = Vec::new();
-        let offsets = for_each_row(file, &text, find_columns::<N>, |(columns, time), row| {
+        let lines = for_each_row(file, &mut source.text, find_columns::<N>, |(columns, time), row| {
             let mut numbers = [[0.0; N]; 3];
             for (group, columns) in numbers.iter_mut().zip(columns) {
                 for (number, column) in group.iter_mut().zip(columns) {
@@ -90,14 +89,13 @@ impl<const N: usize> States<N> {
             rows.push(State { time: time.map(|time| time.to_string()), motion });
             Ok(())
         })?;
-        Ok(Self { file: file.to_owned(), text, rows, offsets })
+        Ok(Self { file: file.to_owned(), rows, lines })
     }
 
     /// Error of a row whose torque exceeds the range of the number format.
     #[must_use]
     pub fn out_of_range(&self, row: usize) -> FileError {
-        let line = self.offsets.get(row).map(|&offset| line_at(&self.text, offset));
-        refuse(&self.file, line, Fault::OutOfRange)
+        refuse(&self.file, self.lines.of(row), Fault::OutOfRange)
     }
 }
 

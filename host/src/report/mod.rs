@@ -10,6 +10,7 @@ pub mod findings;
 pub mod model_choice;
 pub mod monitor;
 pub mod motor;
+pub mod reading;
 pub mod scale;
 pub mod series;
 pub mod spread;
@@ -27,6 +28,7 @@ use crate::report::disturbances::{OutliersReport, StribeckReport};
 use crate::report::doubt::{DoubtReport, SampleFinding};
 use crate::report::findings::FindingReport;
 use crate::report::model_choice::{DirectionsReport, ModelChoiceReport};
+use crate::report::reading::ReadReport;
 use crate::report::scale::ScaleReport;
 use crate::report::trace::TraceReport;
 
@@ -347,6 +349,9 @@ pub struct RunReport {
     /// Faults of the recordings' columns; absent for a simulated leg.
     #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
     pub samples: Option<Vec<SampleFinding>>,
+    /// How the files of a replay were read; absent for a simulated leg.
+    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
+    pub read: Option<Vec<ReadReport>>,
     /// Comparison with a stored model, if one was given.
     #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
     pub compared: Option<ComparisonReport>,

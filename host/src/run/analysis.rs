@@ -266,6 +266,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             stribeck: outcome.stribeck,
             doubt: None,
             samples: None,
+            read: None,
             compared: None,
             trace: outcome.trace,
         }

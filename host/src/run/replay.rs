@@ -21,9 +21,11 @@ use crate::base::error::ToolError;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::leg_file::{DEFAULT_RANGE_DEG, LegFile};
 use crate::formats::recording::Recording;
+use crate::formats::recording::import::Import;
 use crate::leg::background::Background;
 use crate::leg::setup::{PriorChoice, background};
 use crate::report::findings::FindingReport;
+use crate::report::reading::ReadReport;
 use crate::report::scale::{MassReport, ScaleReport};
 use crate::report::series::{Anatomy, Reader, Role, Series};
 use crate::report::{RunReport, Source};
@@ -56,6 +58,8 @@ const RANGE_MARGIN_DEG: f64 = 5.0;
 pub struct ReplayOptions {
     /// Recordings of the training set.
     pub files: Vec<PathBuf>,
+    /// Columns, units and format of all recordings.
+    pub import: Import,
     /// Recordings held out for validation.
     pub validate: Vec<PathBuf>,
     /// Share of each file that trains; the rest validates.
@@ -169,8 +173,9 @@ pub fn replay<const N: usize, const B: usize>(
     }
     let options = &options;
     let Some(payload) = &options.payload else { return identified(leg, background, options, None) };
-    let scale = known_mass::scale(leg, &background, options, payload)?;
+    let (scale, with_mass) = known_mass::scale(leg, &background, options, payload)?;
     let mut replayed = identified(leg, background, options, scale.trusted())?;
+    replayed.run.read.get_or_insert_default().extend(with_mass);
     let used = core::array::from_fn(|joint| leg.joints[joint].torque_per_ampere);
     replayed.run.scale = ScaleReport::of(&scale, &used);
     Ok(replayed)
@@ -188,7 +193,7 @@ fn identified<const N: usize, const B: usize>(
     let ratios = scale.map_or([1.0; N], |scale| scale.map(|found| f64::from(found.ratio)));
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
-    let (training, held_out, wholes, screening) = read_all(options, leg, &ratios)?;
+    let Parts { training, held_out, wholes, screening, read } = read_all(options, leg, &ratios)?;
     warn_of_geometry(leg);
     wholes.iter().for_each(|whole| warn_of_another_leg(&whole.recording, leg));
     screening.warn();
@@ -349,6 +354,7 @@ fn identified<const N: usize, const B: usize>(
     run.scale.load = options.load.as_ref().map(MassReport::from);
     run.wall_s = started.elapsed().as_secs_f64();
     run.samples = Some(screening.into_findings());
+    run.read = Some(read);
     let series = Series {
         excess: progress,
         floor_chi2: Some(optimum.above),
@@ -429,13 +435,29 @@ fn warn(file: &Path, warning: &dyn std::fmt::Display) {
     eprintln!("warning: {}: {warning}", file.display());
 }
 
-/// Training and held-out parts, the whole files, and the findings about their samples.
-type Parts = (Vec<Recording>, Vec<Recording>, Vec<Whole>, Screening);
+/// Recordings of a replay.
+struct Parts {
+    /// Training parts.
+    training: Vec<Recording>,
+    /// Held-out parts.
+    held_out: Vec<Recording>,
+    /// Whole files.
+    wholes: Vec<Whole>,
+    /// Findings about the samples.
+    screening: Screening,
+    /// How each file was read.
+    read: Vec<ReadReport>,
+}
 
 fn read_all(options: &ReplayOptions, leg: &LegFile, ratios: &[f64]) -> Result<Parts, ToolError> {
-    let read = |path: &PathBuf| corrected(Recording::read(path, leg.joints.len())?, options, ratios);
-    let mut training = options.files.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-    let mut held_out = options.validate.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let mut reports = Vec::new();
+    let mut read = |path: &PathBuf| {
+        let read = Recording::read(path, &options.import)?;
+        reports.push(read.report);
+        corrected(read.recording, options, ratios)
+    };
+    let mut training = options.files.iter().map(&mut read).collect::<Result<Vec<_>, _>>()?;
+    let mut held_out = options.validate.iter().map(&mut read).collect::<Result<Vec<_>, _>>()?;
     let share =
         |recording: &Recording| options.split.map_or(f64::INFINITY, |share| share * recording.duration_s());
     let whole = |recording: &Recording, training_s| Whole { recording: recording.clone(), training_s };
@@ -450,7 +472,7 @@ fn read_all(options: &ReplayOptions, leg: &LegFile, ratios: &[f64]) -> Result<Pa
         training = first;
         held_out.extend(rest);
     }
-    Ok((training, held_out, wholes, screening))
+    Ok(Parts { training, held_out, wholes, screening, read: reports })
 }
 
 /// Warns of signs that the recording is from another machine.

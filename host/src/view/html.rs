@@ -25,6 +25,7 @@ use crate::base::error::ToolError;
 use crate::base::names::BY_CARGO;
 use crate::base::number::Number;
 use crate::base::precision;
+use crate::base::shell::quoted;
 use crate::base::table::typeset;
 use crate::formats::leg_file::LegFile;
 use crate::report::{RunReport, Source};
@@ -61,22 +62,13 @@ impl Circumstances {
         let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
         let now =
             stated.and_then(|seconds| Timestamp::from_second(seconds).ok()).unwrap_or_else(Timestamp::now);
-        let words: Vec<String> = words.into_iter().map(quoted).collect();
+        let words: Vec<String> = words.into_iter().map(|word| quoted(&word)).collect();
         Self {
             time_utc: now.round(Unit::Second).unwrap_or(now).to_string(),
             command: format!("cargo sim {}", words.join(" ")).trim_end().to_owned(),
             leg: leg.clone(),
         }
     }
-}
-
-/// Quotes a word for a shell.
-fn quoted(word: String) -> String {
-    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./:=,+".contains(letter);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word;
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
 }
 
 /// Creates the page.
@@ -101,7 +93,7 @@ pub fn page(
                     (verdict::banner(run))
                     (head::facts(circumstances, run))
                     section { h2 { "At a glance" } (head::numbers(run, &circumstances.leg)) (group(Group::Summary)) }
-                    @if !sources.is_empty() { (results::sources(sources)) }
+                    @if !sources.is_empty() { (results::sources(run, sources)) }
                     section {
                         h2 { "Parameters" }
                         (parameters::base(run))
@@ -203,11 +195,5 @@ mod tests {
         assert_eq!(number(Number::UNKNOWN), "\u{2013}");
         assert_eq!(number((-0.79941).into()), "\u{2212}0.799");
         assert_eq!(number(f64::NAN.into()), "\u{2013}");
-    }
-
-    #[test]
-    fn a_command_can_be_given_again_as_it_is_printed() {
-        assert_eq!(quoted("--prior=wrong:40".into()), "--prior=wrong:40");
-        assert_eq!(quoted("my leg's.toml".into()), r"'my leg'\''s.toml'");
     }
 }

@@ -12,7 +12,7 @@ use crate::report::findings::untested_lengths;
 use crate::report::series::Role;
 use crate::report::{
     AddedMassReport, BaseReport, ComparisonReport, ConsistentSearchReport, FitReport, ParameterReport,
-    RunReport, Source,
+    RunReport, Source, reading::ReadReport,
 };
 use crate::view::html::parameters::{badge, bar};
 
@@ -160,6 +160,52 @@ pub fn sources(sources: &[Source]) -> Table {
         table.row(cells.into_iter().chain(counts));
     }
     table
+}
+
+/// Table of the columns and conversions of the files, if any differs from the documented format.
+#[must_use]
+pub fn conversions(read: &[ReadReport]) -> Option<Table> {
+    let mut table = Table::default().text(["file", "signal", "column", "unit", "times", "by"]);
+    let mut files: Vec<&ReadReport> = Vec::new();
+    for file in read.iter().filter(|file| file.is_notable()) {
+        if files.contains(&file) {
+            continue;
+        }
+        files.push(file);
+        for column in &file.columns {
+            table.row(cells![
+                file.file.clone(),
+                column.signal.clone(),
+                column.column.clone(),
+                column.unit.clone(),
+                format!("{}", column.factor),
+                column.by.unwrap_or("-"),
+            ]);
+        }
+    }
+    (!files.is_empty()).then_some(table)
+}
+
+/// Format and skipped rows of the same files, one line each.
+#[must_use]
+pub fn reading_notes(read: &[ReadReport]) -> Vec<String> {
+    let mut lines = Vec::new();
+    for file in read.iter().filter(|file| file.is_notable()) {
+        let header = if file.header { "" } else { ", no header" };
+        let rows = file.samples + file.skipped;
+        let mut line = format!("{}: {}{header}; {rows} rows", file.file, file.format);
+        if file.skipped > 0 {
+            let reasons = file.skipped_why.iter().map(|why| match why.rows {
+                1 => format!("line {}: {}", why.line, why.reason),
+                rows => format!("{rows} from line {}: {}", why.line, why.reason),
+            });
+            line += &format!(", {} skipped ({})", file.skipped, reasons.collect::<Vec<_>>().join("; "));
+        }
+        if !lines.contains(&line) {
+            lines.push(line);
+        }
+    }
+    lines
 }
 
 /// Meaning of the rows in the table of the files.

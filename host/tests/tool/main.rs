@@ -16,6 +16,7 @@ mod fuzz;
 mod holding_brake;
 mod image;
 mod image_source;
+mod imports;
 mod kept;
 mod kept_file;
 mod leg_command;

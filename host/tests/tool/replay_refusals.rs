@@ -33,7 +33,9 @@ fn bad_recordings_are_refused_with_file_line_and_reason() {
     assert_eq!(
         refusal("t_s,q1_rad,torque\n0,0,0\n"),
         "error: walk.csv:1: the header has no column `tau1_Nm`; its columns are: t_s, q1_rad, torque; needed \
-         are: t_s, q1_rad, tau1_Nm\n"
+         are: t_s, q1_rad, tau1_Nm. If these columns are meant, repeat the command with them:\n  scarab replay walk.csv --leg \
+         leg.toml --json report.json --columns t=t_s,q1=q1_rad,tau1=torque --units s,rad,Nm\n  (`torque` without a unit: SI \
+         is assumed, change --units if that is wrong)\n"
     );
     assert_eq!(refusal_with("0.2,NaN,1.0"), "error: walk.csv:102: `NaN` in column `q1_rad` is not finite\n");
     assert_eq!(
@@ -88,10 +90,11 @@ fn geometry_of_another_convention_gives_a_warning() {
 }
 
 #[test]
-fn columns_in_degrees_are_refused_with_the_conversion() {
+fn columns_in_degrees_are_refused_with_the_complete_command() {
     let message = refusal("t_s,q1_deg,tau1_Nm\n0,0,0\n");
     assert!(
-        message.contains("has no column `q1_rad`") && message.contains("multiply degrees by pi/180"),
+        message.contains("has no column `q1_rad`")
+            && message.contains("--columns t=t_s,q1=q1_deg,tau1=tau1_Nm --units s,deg,Nm"),
         "{message}"
     );
 }
@@ -149,10 +152,10 @@ fn time_in_another_unit_is_refused_by_the_rate_with_the_likely_unit() {
     };
     assert_eq!(
         refused(1e3),
-        "error: walk.csv: the median step of `t_s` is 2 s, which is 0.5 Hz; at least 10 Hz are needed. `t_s` is in \
-         seconds: are these milliseconds? In milliseconds it would be 500 Hz\n"
+        "error: walk.csv: the median step of the time is 2 s, which is 0.5 Hz; at least 10 Hz are needed: are these \
+         milliseconds? In milliseconds it would be 500 Hz (state it by --columns and --units)\n"
     );
-    assert!(refused(1e6).ends_with("are these microseconds? In microseconds it would be 500 Hz\n"));
+    assert!(refused(1e6).contains("are these microseconds? In microseconds it would be 500 Hz (state"));
     // Sample numbers instead of times.
     assert!(refused(500.0).contains("are these milliseconds or sample numbers?"));
 }

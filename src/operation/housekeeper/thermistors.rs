@@ -5,9 +5,9 @@
 //! only with its own time constant. A hotter thermistor acts after a second.
 //!
 //! A reading is bad if the code has no temperature, if it is [`STEP_K`] from the last one, or [`BEYOND_K`]
-//! above the winding's limit: a wire with a partial short looks like heat. Bad readings count twice, good ones
-//! subtract one; [`WORN`] is a fault of the joint. So three bad ones in a row are a fault, two are not, and of
-//! a wire with every other reading bad the fourth.
+//! above the winding's limit: a wire with a partial short looks like heat. Bad readings count twice, and good
+//! ones subtract one; [`WORN`] is a fault of the joint. Three bad ones in a row are a fault and two are not;
+//! if every other one is bad, the fourth is.
 //!
 //! Not detected: a thermistor that has come off its winding, or whose wire adds resistance, reads something
 //! colder; a partial short between the limit and [`BEYOND_K`] above it is reported as heat.

@@ -1,53 +1,113 @@
 //! CSV by column names: the header is parsed once, then every row is checked against it.
 
+use std::io::{BufRead, Cursor, Read};
 use std::path::Path;
 
 use csv::StringRecord;
 
 use crate::base::error::FileError;
+use crate::formats::recording::dialect::{Decimal, Delimiter};
 use crate::formats::recording::fault::Fault;
+use crate::formats::recording::lines::Lines;
 
-/// Passes the header to `find` and every row after it to `take`; returns the byte offset of each row.
+/// Rows of a CSV file, the header included.
+pub(crate) struct Rows<R> {
+    reader: csv::Reader<Lines<R>>,
+    row: StringRecord,
+}
+
+impl<R: BufRead> Rows<R> {
+    pub(crate) fn new(source: R, delimiter: Delimiter) -> Self {
+        let reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .delimiter(delimiter.byte())
+            .from_reader(Lines::new(source));
+        Self { reader, row: StringRecord::new() }
+    }
+
+    /// Next row, or `None` at the end.
+    pub(crate) fn next(&mut self) -> Result<Option<&StringRecord>, Fault> {
+        self.reader.get_mut().begin_record();
+        match self.reader.read_record(&mut self.row) {
+            Ok(true) => Ok(Some(&self.row)),
+            Ok(false) => Ok(None),
+            Err(error) => Err(match error.kind() {
+                csv::ErrorKind::Io(error) => Fault::Unreadable(error.to_string()),
+                csv::ErrorKind::Utf8 { .. } => Fault::Unreadable("not a text file".to_owned()),
+                _ => Fault::NotCsv(error),
+            }),
+        }
+    }
+
+    /// Line on which the last row began.
+    pub(crate) fn line(&self) -> usize {
+        self.reader.get_ref().record_line()
+    }
+}
+
+/// Passes the header to `find` and every row after it to `take`; returns the line of each row.
 pub(crate) fn for_each_row<C>(
     file: &Path,
-    text: &str,
+    source: impl BufRead,
     mut find: impl FnMut(&StringRecord) -> Result<C, Fault>,
     mut take: impl FnMut(&C, &StringRecord) -> Result<(), Fault>,
-) -> Result<Vec<usize>, FileError> {
-    if text.lines().all(|line| line.trim().is_empty() || line.starts_with('#')) {
-        return Err(refuse(file, None, Fault::Empty));
-    }
-    // Lines are located by byte offsets: the reader's own count skips blank lines and comments.
-    let refuse_at = |offset: usize, fault| refuse(file, Some(line_at(text, offset)), fault);
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(text.as_bytes());
-    let mut row = StringRecord::new();
-    let mut offsets = Vec::new();
+) -> Result<LineNumbers, FileError> {
+    let mut rows = Rows::new(source, Delimiter::Comma);
+    let mut numbers = LineNumbers::default();
     let mut columns: Option<(C, usize)> = None;
     loop {
-        let offset = reader.position().byte() as usize;
-        match reader.read_record(&mut row) {
-            Ok(true) => {}
-            Ok(false) => return Ok(offsets),
-            Err(error) => return Err(refuse_at(offset, Fault::NotCsv(error))),
+        let result = rows.next().and_then(|row| {
+            let Some(row) = row else { return Ok(None) };
+            match &columns {
+                None => columns = Some((find(row)?, row.len())),
+                Some((_, expected)) if row.len() != *expected => {
+                    return Err(Fault::FieldCount { found: row.len(), expected: *expected });
+                }
+                Some((columns, _)) => {
+                    take(columns, row)?;
+                    return Ok(Some(true));
+                }
+            }
+            Ok(Some(false))
+        });
+        match result {
+            Ok(Some(true)) => numbers.push(rows.line()),
+            Ok(Some(false)) => {}
+            Ok(None) if columns.is_none() => return Err(refuse(file, None, Fault::Empty)),
+            Ok(None) => return Ok(numbers),
+            Err(fault) => return Err(refuse(file, Some(rows.line()), fault)),
         }
-        match &columns {
-            None => {
-                let found = find(&row).map_err(|fault| refuse_at(offset, fault))?;
-                columns = Some((found, row.len()));
-            }
-            Some((_, expected)) if row.len() != *expected => {
-                return Err(refuse_at(offset, Fault::FieldCount { found: row.len(), expected: *expected }));
-            }
-            Some((columns, _)) => {
-                take(columns, &row).map_err(|fault| refuse_at(offset, fault))?;
-                offsets.push(offset);
-            }
+    }
+}
+
+/// Text as a source of rows.
+pub(crate) fn of_text(text: &str) -> impl BufRead + '_ {
+    Cursor::new(text.as_bytes())
+}
+
+/// Line of every sample. Only the samples that do not follow their predecessor's line are stored.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LineNumbers {
+    samples: usize,
+    /// Samples with their lines, at the breaks.
+    breaks: Vec<(usize, usize)>,
+}
+
+impl LineNumbers {
+    pub(crate) fn push(&mut self, line: usize) {
+        if self.of(self.samples) != Some(line) {
+            self.breaks.push((self.samples, line));
         }
+        self.samples += 1;
+    }
+
+    /// Line of a sample, or the line after the last one's.
+    pub(crate) fn of(&self, sample: usize) -> Option<usize> {
+        let after = self.breaks.partition_point(|(first, _)| *first <= sample);
+        let (first, line) = self.breaks.get(after.checked_sub(1)?)?;
+        (sample <= self.samples).then(|| line + sample - first)
     }
 }
 
@@ -55,17 +115,11 @@ pub(crate) fn refuse(file: &Path, line: Option<usize>, fault: Fault) -> FileErro
     FileError { file: file.display().to_string(), line, reason: fault.to_string() }
 }
 
-/// Line, from 1, of the first row at or after a byte of the text.
-pub(crate) fn line_at(text: &str, offset: usize) -> usize {
-    let skipped = |line: &&str| line.trim_end().is_empty() || line.starts_with('#');
-    let before = text[offset..].split_inclusive('\n').take_while(skipped).count();
-    1 + text[..offset].matches('\n').count() + before
-}
-
 /// Column of the file: its index and name.
+#[derive(Clone, Debug)]
 pub(crate) struct Column {
-    index: usize,
-    name: String,
+    pub(crate) index: usize,
+    pub(crate) name: String,
 }
 
 impl Column {
@@ -77,7 +131,12 @@ impl Column {
             (Some(_), Some(_)) => Err(Fault::RepeatedColumn(name)),
             (None, _) => {
                 let present = header.iter().collect::<Vec<_>>().join(", ");
-                Err(Fault::MissingColumn { column: name, present, needed: needed.join(", ") })
+                Err(Fault::MissingColumn {
+                    column: name,
+                    present,
+                    needed: needed.join(", "),
+                    advice: String::new(),
+                })
             }
         }
     }
@@ -85,12 +144,31 @@ impl Column {
     /// Finite number in this column, at most `limit` in magnitude.
     pub(crate) fn number(&self, row: &StringRecord, limit: f64) -> Result<f64, Fault> {
         let text = row.get(self.index).unwrap_or("");
-        let (column, text) = (self.name.clone(), text.to_owned());
-        match text.parse::<f64>() {
-            Err(_) => Err(Fault::NotANumber { column, text }),
-            Ok(value) if !value.is_finite() => Err(Fault::NotFinite { column, text }),
-            Ok(value) if value.abs() > limit => Err(Fault::Absurd { column, value, limit }),
-            Ok(value) => Ok(value),
+        self.check(self.parsed(text, Decimal::Point)?, limit)
+    }
+
+    /// Finite number, as the file holds it.
+    pub(crate) fn parsed(&self, text: &str, decimal: Decimal) -> Result<f64, Fault> {
+        match decimal.parse(text) {
+            None => Err(Fault::NotANumber { column: self.name.clone(), text: text.to_owned() }),
+            Some(value) if !value.is_finite() => {
+                Err(Fault::NotFinite { column: self.name.clone(), text: text.to_owned() })
+            }
+            Some(value) => Ok(value),
         }
     }
+
+    fn check(&self, value: f64, limit: f64) -> Result<f64, Fault> {
+        if value.abs() > limit {
+            return Err(Fault::Absurd { column: self.name.clone(), value, limit });
+        }
+        Ok(value)
+    }
+}
+
+/// First bytes of a source, and the source with them.
+pub(crate) fn peeked<R: BufRead>(mut source: R, most: usize) -> std::io::Result<(Vec<u8>, impl BufRead)> {
+    let mut begin = Vec::new();
+    source.by_ref().take(most as u64).read_to_end(&mut begin)?;
+    Ok((begin.clone(), Cursor::new(begin).chain(source)))
 }

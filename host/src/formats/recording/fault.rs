@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use crate::formats::recording::{MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MINIMUM_SAMPLES};
+use crate::formats::recording::signal::Signal;
+use crate::formats::recording::{
+    MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MINIMUM_SAMPLES, MOST_BAD_PERCENT, MOST_SAMPLES,
+};
 
 /// Fault of a recording, in plain words.
 #[derive(Debug, thiserror::Error)]
@@ -14,8 +17,7 @@ pub enum Fault {
     #[error("not a CSV file ({0})")]
     NotCsv(csv::Error),
     /// The header lacks a column that the leg needs.
-    #[error("the header has no column `{column}`; its columns are: {}{}; needed are: {needed}",
-        Excerpt(.present), Hint(.present))]
+    #[error("the header has no column `{column}`; its columns are: {}; needed are: {needed}{advice}", Excerpt(.present))]
     MissingColumn {
         /// Requested name.
         column: String,
@@ -23,7 +25,83 @@ pub enum Fault {
         present: String,
         /// All names that are needed.
         needed: String,
+        /// Complete command that would read the file, or how to find one.
+        advice: String,
     },
+    /// The first row has numbers only, and no columns are chosen by number.
+    #[error(
+        "the file has no header: its first row has {columns} numbers ({}). Name the columns by number, for example, if this \
+         is their order:\n  {command}", Excerpt(.first)
+    )]
+    NoHeader {
+        /// First row.
+        first: String,
+        /// Number of its fields.
+        columns: usize,
+        /// Example of a complete command.
+        command: String,
+    },
+    /// A column is chosen by a number beyond the last one.
+    #[error("--columns {signal}={number}: the file has {columns} columns")]
+    NoSuchColumn {
+        /// Signal of the column.
+        signal: Signal,
+        /// Number, from 1.
+        number: usize,
+        /// Columns of the file.
+        columns: usize,
+    },
+    /// The name of a column states another unit than the one in use.
+    #[error("column `{column}` is in {named} by its name or type, but {signal} is read in {used}{advice}")]
+    OtherUnit {
+        /// Column name.
+        column: String,
+        /// Unit in the name.
+        named: &'static str,
+        /// Signal of the column.
+        signal: Signal,
+        /// Unit in use.
+        used: &'static str,
+        /// Complete command with the unit of the name.
+        advice: String,
+    },
+    /// The leg file does not state the conversion from the motor to the joint.
+    #[error("column `{column}` is of the motor, but the leg file states no `{key}`{} for joint `{joint}`",
+        if *.key == "encoder" { " at the motor" } else { "" })]
+    NoDrive {
+        /// Column name.
+        column: String,
+        /// Missing key of the leg file.
+        key: &'static str,
+        /// Name of the joint.
+        joint: String,
+    },
+    /// The first rows allow two readings.
+    #[error("{what}: state which is right by {options}")]
+    Ambiguous {
+        /// Both readings.
+        what: String,
+        /// Options that settle it.
+        options: String,
+    },
+    /// The bytes cannot be read, or are not text.
+    #[error("{0}")]
+    Unreadable(String),
+    /// More rows are invalid than may be skipped.
+    #[error(
+        "{skipped} of {rows} rows are invalid, --skip-bad skips at most {MOST_BAD_PERCENT} %; the first: {first}"
+    )]
+    TooManyBad {
+        /// Invalid rows.
+        skipped: usize,
+        /// All rows.
+        rows: usize,
+        /// Line and fault of the first invalid one.
+        first: String,
+    },
+    /// The samples would not fit into memory.
+    #[error("more than {MOST_SAMPLES} samples: split the file")]
+    TooManySamples,
     /// Two columns have the same name, which is ambiguous.
     #[error("the header has the column `{0}` twice")]
     RepeatedColumn(String),
@@ -37,7 +115,7 @@ pub enum Fault {
         expected: usize,
     },
     /// The field is empty or not a number.
-    #[error("`{}` in column `{column}` is not a number", Excerpt(.text))]
+    #[error("`{}` in column `{column}` is not a number{}", Excerpt(.text), CommaHint(.text))]
     NotANumber {
         /// Column name.
         column: String,
@@ -93,7 +171,7 @@ pub enum Fault {
     },
     /// Most samples are too far apart.
     #[error(
-        "the median step of `t_s` is {} s, which is {} Hz; at least {MINIMUM_RATE_HZ} Hz are needed. `t_s` is in seconds{}",
+        "the median step of the time is {} s, which is {} Hz; at least {MINIMUM_RATE_HZ} Hz are needed{}",
         Short(*.step_s), rounded(1.0 / .step_s), OtherUnit(*.step_s, *.counts)
     )]
     TooSlow {
@@ -112,6 +190,21 @@ pub enum Fault {
         /// Time from first to last sample, s.
         duration: f64,
     },
+}
+
+impl Fault {
+    /// Whether the fault is one row's, so that the row can be skipped.
+    #[must_use]
+    pub fn is_of_row(&self) -> bool {
+        matches!(
+            self,
+            Self::FieldCount { .. }
+                | Self::NotANumber { .. }
+                | Self::NotFinite { .. }
+                | Self::Absurd { .. }
+                | Self::TimeNotIncreasing { .. }
+        )
+    }
 }
 
 /// Limit of characters of a file in a message: the file may be of any kind and size.
@@ -133,16 +226,13 @@ impl fmt::Display for Excerpt<'_> {
     }
 }
 
-/// Hint for a header of a single column with another separator in it, or with angles in degrees.
-struct Hint<'a>(&'a str);
+/// Hint for a number with a comma.
+struct CommaHint<'a>(&'a str);
 
-impl fmt::Display for Hint<'_> {
+impl fmt::Display for CommaHint<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.0.contains(',') && self.0.contains([';', '\t']) {
-            formatter.write_str(" (columns are separated by commas, numbers written with points)")
-        } else if self.0.contains("deg") {
-            formatter
-                .write_str(" (angles are in radians: multiply degrees by pi/180, and rename the columns)")
+        if self.0.contains(',') && self.0.replacen(',', ".", 1).parse::<f64>().is_ok() {
+            formatter.write_str(" (if the comma is a decimal comma: --decimal comma)")
         } else {
             Ok(())
         }
@@ -162,7 +252,11 @@ impl fmt::Display for OtherUnit {
             return Ok(());
         };
         let or_numbers = if self.1 { " or sample numbers" } else { "" };
-        write!(formatter, ": are these {unit}{or_numbers}? In {unit} it would be {} Hz", rounded(rate))
+        write!(
+            formatter,
+            ": are these {unit}{or_numbers}? In {unit} it would be {} Hz (state it by --columns and --units)",
+            rounded(rate)
+        )
     }
 }
 

@@ -11,12 +11,13 @@ use std::path::PathBuf;
 use scarab::ident::{Record, Solver, torque_constant_ratio};
 use scarab::model::Payload;
 
-use super::{ReplayOptions, Samples, feed, new_recorder, read_all};
+use super::{Parts, ReplayOptions, Samples, feed, new_recorder, read_all};
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::Recording;
 use crate::leg::background::Background;
+use crate::report::reading::ReadReport;
 use crate::run::replay::screening::refuse_copies;
 use crate::run::scale::{Scale, base_of};
 
@@ -35,31 +36,36 @@ pub(super) fn settled<const N: usize, const B: usize>(
     solver
 }
 
-/// Scale of the torques from the recordings with the mass and those without it.
+/// Scale of the torques from the recordings with the mass and those without it, and how the recordings with
+/// the mass were read.
 pub(super) fn scale<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
     options: &ReplayOptions,
     payload: &Payload<f64>,
-) -> Result<Scale<N, B>, ToolError> {
+) -> Result<(Scale<N, B>, Vec<ReadReport>), ToolError> {
     let with = ReplayOptions {
         files: options.with_payload.clone(),
         validate: Vec::new(),
         split: None,
         ..options.clone()
     };
-    let read = |paths: &[PathBuf]| -> Result<Vec<Recording>, ToolError> {
-        paths.iter().map(|path| Ok(Recording::read(path, leg.joints.len())?)).collect()
+    let read = |paths: &[PathBuf]| -> Result<(Vec<Recording>, Vec<ReadReport>), ToolError> {
+        let read = |path: &PathBuf| Recording::read(path, &options.import);
+        let read = paths.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        Ok(read.into_iter().map(|read| (read.recording, read.report)).unzip())
     };
-    refuse_copies(&read(&options.files)?, &read(&with.files)?, "--with-payload")?;
+    let (with_mass, reports) = read(&with.files)?;
+    refuse_copies(&read(&options.files)?.0, &with_mass, "--with-payload")?;
     let (without, with) = (record(leg, background, options)?, record(leg, background, &with)?);
     let base = base_of(background, payload);
-    Ok(Scale {
+    let scale = Scale {
         payload: Some(*payload),
         ratios: core::array::from_fn(|joint| torque_constant_ratio(&without, &with, joint, &base)),
         load: options.load,
         load_base: load_base(background, options),
-    })
+    };
+    Ok((scale, reports))
 }
 
 /// Base parameters of the load; zero without one.
@@ -77,7 +83,7 @@ fn record<const N: usize, const B: usize>(
     options: &ReplayOptions,
 ) -> Result<Record<f32, N, B>, ToolError> {
     let anatomy = anatomy::<N>(leg)?;
-    let (training, _, _, screening) = read_all(options, leg, &[1.0; N])?;
+    let Parts { training, screening, .. } = read_all(options, leg, &[1.0; N])?;
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
     let samples: Vec<Samples<N>> =

@@ -13,7 +13,7 @@ use crate::report::RunReport;
 use crate::view::html::number;
 
 /// Keys with their own sections on the page.
-const KNOWN: [&str; 38] = [
+const KNOWN: [&str; 39] = [
     "schema",
     "leg",
     "seed",
@@ -52,6 +52,7 @@ const KNOWN: [&str; 38] = [
     "directions",
     "misfit_over_noise",
     "at_prior_limit",
+    "read",
 ];
 /// Limit of nesting on the page.
 const DEEPEST: usize = 3;

@@ -10,12 +10,17 @@ use crate::view::html::{joint_name, number};
 use crate::view::tables;
 
 /// Section of a replay's files.
-pub fn sources(sources: &[Source]) -> Markup {
+pub fn sources(run: &RunReport, sources: &[Source]) -> Markup {
+    let read = run.read.as_deref().unwrap_or_default();
     html! {
         section {
             h2 { "Recordings" }
             (tables::sources(sources).to_html())
             p.note { (tables::SOURCES) }
+            @if let Some(table) = tables::conversions(read) {
+                (table.to_html())
+                @for line in tables::reading_notes(read) { p.note { (line) } }
+            }
         }
     }
 }

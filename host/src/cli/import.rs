@@ -1,0 +1,124 @@
+//! Options that state how recordings are read.
+
+use clap::{Args, ValueEnum};
+
+use crate::base::error::ToolError;
+use crate::base::names::BY_CARGO;
+use crate::base::shell::quoted;
+use crate::formats::leg_file::{BodySide, LegFile, Side};
+use crate::formats::recording::dialect::{Decimal, Delimiter};
+use crate::formats::recording::import::{ColumnChoice, Drive, Import, UnitChoice};
+
+/// Columns, units and format of all recordings of the command.
+#[derive(Args, Debug)]
+pub struct ImportArguments {
+    /// Columns by name or number from 1: SIGNAL=COLUMN,.. with the signals t, q1.. (joint angle) or motor1..
+    /// (motor angle), tau1.. (joint torque) or i1.. (motor current). Example: t=time,q1=position_0,tau1=4
+    #[arg(long, value_name = "SIGNAL=COLUMN,..", value_delimiter = ',', help_heading = "Recordings")]
+    columns: Vec<ColumnChoice>,
+    /// Units: UNIT,.. for all signals of a quantity, SIGNAL=UNIT for one; s, ms, us, ns, rad, mrad, deg,
+    /// turn, Nm, mNm, A, mA. Default: s, rad, Nm, A. Example: ms,deg,tau2=mNm
+    #[arg(long, value_name = "UNIT,..", value_delimiter = ',', help_heading = "Recordings")]
+    units: Vec<UnitChoice>,
+    /// Skip rows that are invalid, at most 5 % of a file; they are counted and reported.
+    #[arg(long, help_heading = "Recordings")]
+    skip_bad: bool,
+    /// Separator of fields, where the first lines allow two.
+    #[arg(long, value_enum, help_heading = "Recordings")]
+    delimiter: Option<DelimiterArgument>,
+    /// Decimal sign, where the first lines allow two.
+    #[arg(long, value_enum, help_heading = "Recordings")]
+    decimal: Option<DecimalArgument>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DelimiterArgument {
+    Comma,
+    Semicolon,
+    Tab,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DecimalArgument {
+    Point,
+    Comma,
+}
+
+impl ImportArguments {
+    /// How to read the recordings of this leg. `name` is the leg's name or file.
+    pub fn import(&self, leg: &LegFile, name: &str) -> Result<Import, ToolError> {
+        let states_constant = LegFile::joints_that_state(name, "torque_per_ampere")?;
+        let states_encoder = LegFile::joints_that_state(name, "encoder")?;
+        let mounting = if leg.side == BodySide::Left { -1.0 } else { 1.0 };
+        let states = |stated: &[bool], joint: usize| stated.get(joint).copied().unwrap_or(false);
+        let drives = leg.joints.iter().enumerate().map(|(number, joint)| {
+            let is_at_motor = joint.encoder.side == Side::Motor && states(&states_encoder, number);
+            Drive {
+                joint: joint.name.clone(),
+                torque_per_ampere: states(&states_constant, number)
+                    .then_some(mounting * joint.torque_per_ampere),
+                motor_ratio: is_at_motor.then_some(mounting * joint.encoder.ratio),
+            }
+        });
+        let import = Import {
+            drives: drives.collect(),
+            skip_bad: self.skip_bad,
+            delimiter: self.delimiter.map(|delimiter| match delimiter {
+                DelimiterArgument::Comma => Delimiter::Comma,
+                DelimiterArgument::Semicolon => Delimiter::Semicolon,
+                DelimiterArgument::Tab => Delimiter::Tab,
+            }),
+            decimal: self.decimal.map(|decimal| match decimal {
+                DecimalArgument::Point => Decimal::Point,
+                DecimalArgument::Comma => Decimal::Comma,
+            }),
+            command: command(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
+            ..Import::plain(0)
+        };
+        import.with(&self.columns, &self.units).map_err(ToolError::input)
+    }
+}
+
+/// Alias that runs this program.
+const BY_ALIAS: &str = if cfg!(feature = "readers") { "cargo sim-readers" } else { "cargo sim" };
+
+/// The command as typed, without `--columns` and `--units`.
+fn command(words: impl Iterator<Item = String>) -> String {
+    let mut words = words.skip(1).peekable();
+    let program = if words.next_if(|word| word == BY_CARGO).is_some() { BY_ALIAS } else { "scarab" };
+    let mut command = program.to_owned();
+    while let Some(word) = words.next() {
+        if word == "--columns" || word == "--units" {
+            words.next();
+        } else if !word.starts_with("--columns=") && !word.starts_with("--units=") {
+            command.push(' ');
+            command.push_str(&quoted(&word));
+        }
+    }
+    command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BY_ALIAS, BY_CARGO, command};
+
+    #[test]
+    fn a_proposed_command_keeps_all_other_options() {
+        let typed = [
+            "target/scarab",
+            BY_CARGO,
+            "replay",
+            "my run.csv",
+            "--columns",
+            "t=a",
+            "--units=ms",
+            "--split",
+            "0.7",
+        ];
+        assert_eq!(
+            command(typed.into_iter().map(str::to_owned)),
+            format!("{BY_ALIAS} replay 'my run.csv' --split 0.7")
+        );
+        assert_eq!(command(["scarab", "replay"].into_iter().map(str::to_owned)), "scarab replay");
+    }
+}
