@@ -9,9 +9,9 @@
 //! `rise` is the temperature rise per squared current of a winding at its limit, held for ever. `i` is the
 //! length of the current vector, along the flux included. Source of k: IEC 60034-1, copper.
 //!
-//! Why a model: a motor need not have a thermistor ([`super::Thermistor`]), and one lags behind its winding; the
-//! larger of both temperatures counts. The hip of the default leg may be
-//! held in a pose with 33 A, which heats its winding from 40 to 100 degrees in seven minutes.
+//! Why a model: a motor need not have a thermistor ([`super::Thermistor`]), and one lags behind its winding.
+//! The larger of both temperatures counts. The hip of the default leg may be held in a pose with 33 A, which
+//! heats its winding from 40 to 100 degrees in seven minutes.
 //!
 //! The share of the torque cap falls from 1 to 0 over the last [`RAMP_K`] below the limit. A stop at the end
 //! of the range keeps the whole cap, so a joint that is pushed against its end heats on. At the limit the leg

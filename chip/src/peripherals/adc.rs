@@ -6,8 +6,8 @@
 //!
 //! The input is read at the hold. Injected conversions of a scan follow one another; a regular conversion
 //! that is interrupted by injected ones starts again. Refused: sequences without scan mode or changed during
-//! a conversion, triggers before the converter has settled, a clock above 36 MHz. Known limits: no DMA, no dual mode, no analog watchdog;
-//! triggers are TRGO of TIM1 (injected) and TIM8 (regular), and software.
+//! a conversion, triggers before the converter has settled, a clock above 36 MHz. Known limits: no DMA, no
+//! dual mode, no analog watchdog; triggers are TRGO of TIM1 (injected) and TIM8 (regular), and software.
 
 use crate::findings::{Access, NO_REGISTER, NOT_MODELLED};
 use crate::time::{NEVER, TICK_HZ, Ticks};

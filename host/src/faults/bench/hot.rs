@@ -61,7 +61,7 @@ const LIMIT_C: f64 = 100.0;
 /// Largest excess over the limit. Before the leg is off, 50 ms and damping for 300 ms with the whole cap
 /// would heat by 23 degrees here; damping never takes all of it.
 const TOLERANCE_K: f64 = 15.0;
-/// The same with what a thermistor lags behind its winding, in T3.
+/// Largest excess in T3, whose thermistors lag behind their windings.
 const LAGGING_K: f64 = 20.0;
 /// Object of the following window, which no push may leave.
 const WINDOW: u16 = 0x6065;
