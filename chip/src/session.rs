@@ -326,10 +326,14 @@ impl Session {
 
     fn thermistors(&mut self) -> Result<(), ToolError> {
         let cold = self.windings()?;
-        // 1.25 kOhm of 10 kOhm at 25 degrees, beta 3435 K, with 3.3 kOhm: 90.7 degrees.
+        // From 20 to 90.7 degrees: 12.1 and 1.25 kOhm of 10 kOhm at 25 degrees, beta 3435 K, with 3.3 kOhm.
+        for code in (1125..=3215).rev().step_by(50) {
+            self.machine.chip_mut().plant.motor_thermistors[0] = Some(code);
+            self.run(0.1)?;
+        }
         self.machine.chip_mut().plant.motor_thermistors[0] = Some(1125);
         // A mean of eight readings.
-        self.run(4.0)?;
+        self.run(3.0)?;
         let hot = self.windings()?;
         let [first, second] = hot[..] else {
             return Err(ToolError::input(format!("{} windings", hot.len())));

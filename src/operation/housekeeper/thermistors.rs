@@ -4,10 +4,10 @@
 //! never lower it. Each reading counts by an eighth, because noise would otherwise heat the model: it cools
 //! only with its own time constant. A hotter thermistor acts after a second.
 //!
-//! A reading is bad if the code has no temperature, if it is [`STEP_K`] from the last one, or [`BEYOND_K`]
-//! above the winding's limit: a wire with a partial short looks like heat. Bad readings count twice, and good
-//! ones subtract one; [`WORN`] is a fault of the joint. Three bad ones in a row are a fault and two are not;
-//! if every other one is bad, the fourth is.
+//! A reading is bad if the code has no temperature, if it is [`STEP_K`] from the mean, or [`BEYOND_K`] above
+//! the winding's limit: a wire with a partial short looks like heat. Bad readings count twice, and good ones
+//! subtract one; [`WORN`] is a fault of the joint. Three bad ones in a row are a fault and two are not; if
+//! every other one is bad, the fourth is. The mean begins with two readings that agree.
 //!
 //! Not detected: a thermistor that has come off its winding, or whose wire adds resistance, reads something
 //! colder; a partial short between the limit and [`BEYOND_K`] above it is reported as heat.
@@ -17,7 +17,7 @@ use crate::hal::Hardware;
 use crate::real::abs;
 use crate::safety::BoardFault;
 
-/// Largest change between two readings, K; a winding warms by less than 1 K in that time.
+/// Largest distance of a reading from the mean, K; a winding warms by less than 1 K in a reading's time.
 const STEP_K: f32 = 20.0;
 /// Largest excess over the winding's limit, K; the leg is off long before.
 const BEYOND_K: f32 = 20.0;
@@ -29,8 +29,8 @@ const WORN: u8 = 5;
 /// Readings of one motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Readings {
-    /// Last temperature, good or bad, degrees Celsius.
-    last_c: Option<f32>,
+    /// Last reading before there is a mean, degrees Celsius.
+    first_c: Option<f32>,
     /// Mean of the good ones, degrees Celsius.
     mean_c: Option<f32>,
     /// Twice the bad readings, less the good ones since.
@@ -40,19 +40,19 @@ struct Readings {
 impl Readings {
     /// Takes a reading; `None` without a temperature.
     fn take(&mut self, celsius: Option<f32>, limit_c: f32) {
-        let last = self.last_c;
-        self.last_c = celsius.or(last);
-        if last.is_none() && celsius.is_some() {
+        let reference = self.mean_c.or(self.first_c);
+        let near = |celsius: f32| reference.is_some_and(|reference| abs(celsius - reference) <= STEP_K);
+        match celsius {
             // Nothing to compare the first one with.
-            return;
-        }
-        let is_near = |celsius: f32| last.is_some_and(|last| abs(celsius - last) <= STEP_K);
-        match celsius.filter(|celsius| is_near(*celsius) && *celsius <= limit_c + BEYOND_K) {
-            Some(celsius) => {
+            Some(celsius) if reference.is_none() => self.first_c = Some(celsius),
+            Some(celsius) if near(celsius) && celsius <= limit_c + BEYOND_K => {
                 self.mean_c = self.mean_c.map(|mean| mean + SHARE * (celsius - mean)).or(Some(celsius));
                 self.worn = self.worn.saturating_sub(1);
             }
-            None => self.worn = self.worn.saturating_add(2),
+            _ => {
+                self.first_c = celsius;
+                self.worn = self.worn.saturating_add(2);
+            }
         }
     }
 }
@@ -67,7 +67,7 @@ pub(super) struct MotorThermistors<const N: usize> {
 
 impl<const N: usize> MotorThermistors<N> {
     pub(super) const NONE: Self =
-        Self { converting: None, readings: [Readings { last_c: None, mean_c: None, worn: 0 }; N] };
+        Self { converting: None, readings: [Readings { first_c: None, mean_c: None, worn: 0 }; N] };
 }
 
 impl<const N: usize> Housekeeper<N> {
