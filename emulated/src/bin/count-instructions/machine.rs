@@ -154,6 +154,12 @@ impl Hardware<2> for Machine {
         Some(25.0)
     }
 
+    fn convert_thermistor(&mut self, _: usize) {}
+
+    fn thermistor_code(&mut self) -> Option<u16> {
+        None
+    }
+
     fn gate_holds(&mut self, _: usize) -> bool {
         true
     }
