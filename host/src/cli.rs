@@ -53,10 +53,9 @@ enum Command {
     #[command(after_help = "Example: cargo sim identify --leg my-leg.toml --seed 3 --report run.html")]
     Identify(identify::IdentifyArguments),
     /// Write a leg file, from a robot description (URDF) or from answers, or list what one lacks.
-    #[command(after_help = "\
-Examples: cargo sim leg --urdf robot.urdf --joints hip_joint,knee_joint --out leg.toml
-          cargo sim leg --new --out my-leg.toml
-          cargo sim leg --check my-leg.toml")]
+    #[command(
+        after_help = "Example: cargo sim leg --urdf robot.urdf --joints hip_joint,knee_joint --out leg.toml"
+    )]
     Leg(leg::LegArguments),
     /// Design an exciting motion and predict its result before anything moves.
     #[command(after_help = "\
