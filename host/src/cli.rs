@@ -58,9 +58,7 @@ enum Command {
     )]
     Leg(leg::LegArguments),
     /// Design an exciting motion and predict its result before anything moves.
-    #[command(after_help = "\
-Examples: cargo sim excite --leg my-leg.toml --out motion.toml
-          cargo sim excite --leg my-leg.toml --csv motion.csv --rate 1000 --trajectory motion.yaml")]
+    #[command(after_help = "Example: cargo sim excite --leg my-leg.toml --out motion.toml")]
     Excite(excite::ExciteArguments),
     /// Identify a leg from recordings.
     #[command(
