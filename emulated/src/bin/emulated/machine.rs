@@ -35,6 +35,12 @@ impl Hardware<JOINTS> for Machine {
     fn temperature(&self, _: usize) -> Option<f32> {
         None
     }
+    fn convert_thermistor(&mut self, _: usize) {}
+
+    fn thermistor_code(&mut self) -> Option<u16> {
+        None
+    }
+
     fn gate_holds(&mut self, _: usize) -> bool {
         true
     }
