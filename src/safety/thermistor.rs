@@ -73,8 +73,8 @@ pub(crate) mod tests {
     fn codes_without_a_temperature_are_unreadable() {
         let weak = Thermistor { beta_k: 1000.0, ..THERMISTOR };
         assert_eq!(weak.celsius(SHORTED + 1), None);
-        let spoilt = Thermistor { beta_k: f32::NAN, ..THERMISTOR };
-        assert_eq!(spoilt.celsius(2000), None);
+        let unknown = Thermistor { beta_k: f32::NAN, ..THERMISTOR };
+        assert_eq!(unknown.celsius(2000), None);
     }
 
     #[test]

@@ -8,6 +8,12 @@ use crate::base::error::FileError;
 /// Likeness (Jaro and Winkler, 0 to 1) from which a known word is proposed.
 const ALIKE: f64 = 0.8;
 
+/// Text as a TOML string, with quotation marks.
+#[must_use]
+pub fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
+}
+
 /// One step of a path into a file.
 #[derive(Clone, Copy, Debug)]
 pub enum Step {

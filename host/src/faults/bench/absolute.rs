@@ -14,14 +14,13 @@
 //!
 //! Blind: the firmware's leg file has no absolute encoders.
 
-use hal_sim::faults::{Channel, Form, Injection, Timing};
-use scarab::hal::SERVO_RATE_HZ;
+use hal_sim::faults::{Channel, Form, Timing};
 use scarab::model::planar::JOINTS;
 use scarab::safety::FaultCode;
 
 use crate::base::error::ToolError;
 use crate::faults::bench::Bench;
-use crate::faults::bench::hosted::{Fork, context, forked_within};
+use crate::faults::bench::hosted::{Fork, TICK_MS, context, forked_within};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
@@ -31,7 +30,6 @@ use crate::rig::bus::board::Board;
 use crate::rig::bus::host::Host;
 use crate::rig::faulty_board::PERIOD_MS;
 
-const TICK_MS: f64 = 1e3 / SERVO_RATE_HZ as f64;
 /// PWM periods and time between two checks.
 const CHECK: u64 = 192;
 const CHECK_MS: f64 = CHECK as f64 * PERIOD_MS;
@@ -99,13 +97,10 @@ fn contradict(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<
     forked_within(head, leg, base(leg, blind)?, seeds, scope, contradicts)
 }
 
-/// Adds a fault from now on; returns whether there was space for it.
+/// Adds a fault from now on.
 fn inject(fork: &mut Fork<'_>, channel: Channel, joint: usize, form: Form, duration: u64) {
-    let rig = fork.host.rig();
-    let timing = Timing::lasting(rig.period, duration);
-    if !rig.injector.add(Injection { channel, joint, form, timing }) {
-        fork.broken("no space for an injection");
-    }
+    let timing = Timing::lasting(fork.host.rig().period, duration);
+    fork.inject(channel, joint, form, timing);
 }
 
 /// Safe state of both bridges.
@@ -128,15 +123,7 @@ fn falls_silent(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
         _ => (Form::Rail(65_535.0), checks * CHECK),
     };
     inject(&mut fork, channel, joint, form, lasts);
-    let (mut state, mut after_ms) = (None, None);
-    for tick in 0..4 * PATIENCE / 12 {
-        fork.tick();
-        state = reached(&mut fork);
-        if state.is_some() {
-            after_ms = Some((tick + 1) as f64 * TICK_MS);
-            break;
-        }
-    }
+    let (state, after_ms) = fork.until(4 * PATIENCE / 12, reached).unzip();
     // Random frames are wrong now and then.
     let intermittent_ms = (form == Form::Garbage).then_some(GARBAGE_MS);
     let deadline_ms = intermittent_ms.unwrap_or(fork.head.deadline_ms);

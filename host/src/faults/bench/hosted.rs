@@ -2,8 +2,9 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use hal_sim::faults::{Channel, Form, Injection, Timing};
 use rayon::prelude::*;
-use scarab::hal::Contacts;
+use scarab::hal::{Contacts, SERVO_RATE_HZ};
 use scarab::leg::Permission;
 
 use crate::base::error::ToolError;
@@ -23,6 +24,8 @@ use crate::rig::pair::Context;
 use scarab::model::planar::BASE;
 use scarab::model::planar::JOINTS;
 
+/// Time of a servo tick, ms.
+pub(super) const TICK_MS: f64 = 1e3 / SERVO_RATE_HZ as f64;
 /// Servo ticks of the motion in which forks begin: two strokes back and forth.
 const MOTION: u64 = 11_400;
 /// Servo ticks for which the operator releases the switch.
@@ -91,6 +94,25 @@ impl Fork<'_> {
         for _ in 0..ticks {
             self.tick();
         }
+    }
+
+    /// Adds a fault of a joint's channel.
+    pub(super) fn inject(&mut self, channel: Channel, joint: usize, form: Form, timing: Timing) {
+        if !self.host.rig().injector.add(Injection { channel, joint, form, timing }) {
+            self.broken("no space for an injection");
+        }
+    }
+
+    /// Runs until a safe state is reached, by `state`, or for so many ticks. Returns it with its time, ms.
+    pub(super) fn until(
+        &mut self,
+        ticks: u64,
+        state: impl Fn(&mut Self) -> Option<&'static str>,
+    ) -> Option<(&'static str, f64)> {
+        (0..ticks).find_map(|tick| {
+            self.tick();
+            state(self).map(|state| (state, (tick + 1) as f64 * TICK_MS))
+        })
     }
 
     /// Name of the drive's safe state; `None` while the drive follows.

@@ -24,7 +24,7 @@
 //! Blind: in T2 the firmware's thermal resistance is a thousandth of the motor's; in T3 and T4 its leg file
 //! has no thermistors.
 
-use hal_sim::faults::{Channel, Form, Injection, Timing};
+use hal_sim::faults::{Channel, Form, Timing};
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
 use scarab::safety::FaultCode;
@@ -33,7 +33,7 @@ use scarab::safety::winding::RAMP_K;
 
 use crate::base::error::ToolError;
 use crate::faults::bench::Bench;
-use crate::faults::bench::hosted::{Fork, context, forked_within};
+use crate::faults::bench::hosted::{Fork, TICK_MS, context, forked_within};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
@@ -49,7 +49,6 @@ const READING_MS: f64 = 100.0;
 const CHECK_MS: f64 = 50.0;
 /// Codes of a partial short, hotter than 120 degrees.
 const PARTIAL: [u16; 2] = [SHORTED + 1, 640];
-const TICK_MS: f64 = 1e3 / SERVO_RATE_HZ as f64;
 /// Servo ticks per second.
 const SECOND: u64 = SERVO_RATE_HZ as u64;
 /// Thermal resistance to ambient, K/W, and time constant, s.
@@ -136,7 +135,7 @@ const PUSHED: Scope = Scope { torque: true, range: false, rotor_position: true }
 fn current(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let believed = warmed(leg, if blind { 1e-3 * KELVIN_PER_WATT } else { KELVIN_PER_WATT }, TIME_S);
     let base = moving(leg, &warmed(leg, KELVIN_PER_WATT, TIME_S), &believed, 3.0 * TIME_S)?;
-    forked_within(head, leg, base, seeds, PUSHED, heats)
+    forked_within(head, leg, base, seeds, PUSHED, |fork| heats(fork, TOLERANCE_K))
 }
 
 fn cooling(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
@@ -144,7 +143,7 @@ fn cooling(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec
     let believed = warmed(leg, KELVIN_PER_WATT, TIME_S);
     let believed = if blind { believed } else { believed.with_thermistors() };
     let base = moving(leg, &motors, &believed, 4.0 * TIME_S)?;
-    forked_within(head, leg, base, seeds, PUSHED, heats)
+    forked_within(head, leg, base, seeds, PUSHED, |fork| heats(fork, LAGGING_K))
 }
 
 fn thermistor(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
@@ -165,25 +164,14 @@ fn fails(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     let kind = fork.random.below(4);
     let (for_ever, alternates) = (kind < 2, kind == 2);
     let ms = if for_ever || alternates { f64::INFINITY } else { fork.random.uniform(10.0, 5.0 * READING_MS) };
-    let rig = fork.host.rig();
-    let mut timing =
-        Timing::lasting(rig.period, if ms.is_finite() { (ms / PERIOD_MS) as u64 } else { u64::MAX });
+    let begun = fork.host.rig().period;
+    let mut timing = Timing::lasting(begun, if ms.is_finite() { (ms / PERIOD_MS) as u64 } else { u64::MAX });
     if alternates {
         let reading = (READING_MS / PERIOD_MS) as u64;
         (timing.on, timing.off) = (reading, reading);
     }
-    if !rig.injector.add(Injection { channel: Channel::MotorThermistor, joint, form, timing }) {
-        fork.broken("no space for an injection");
-    }
-    let (mut state, mut after_ms) = (None, None);
-    for tick in 0..SECOND {
-        fork.tick();
-        state = fork.safe_state();
-        if state.is_some() {
-            after_ms = Some((tick + 1) as f64 * TICK_MS);
-            break;
-        }
-    }
+    fork.inject(Channel::MotorThermistor, joint, form, timing);
+    let (state, after_ms) = fork.until(SECOND, Fork::safe_state).unzip();
     // Every other reading is bad: the fourth of them is the seventh reading.
     let intermittent_ms = alternates.then_some(fork.head.deadline_ms + 4.0 * READING_MS);
     let deadline_ms = intermittent_ms.unwrap_or(fork.head.deadline_ms);
@@ -215,7 +203,7 @@ fn hottest(fork: &mut Fork<'_>) -> (usize, f64) {
 }
 
 /// T2, T3.
-fn heats(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
+fn heats(mut fork: Fork<'_>, tolerance_k: f64) -> Result<Outcome, ToolError> {
     let joint = fork.random.below(JOINTS as u64) as usize;
     let peak = fork.random.sign() * fork.random.uniform(20.0, 85.0);
     let seconds = fork.random.uniform(2.0, 10.0);
@@ -229,7 +217,6 @@ fn heats(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
             limited_at = Some(celsius);
         }
     }
-    let tolerance_k = if fork.head.id == COOLING.head.id { LAGGING_K } else { TOLERANCE_K };
     let undetectable = most < LIMIT_C - f64::from(RAMP_K);
     let in_time = limited_at.is_some_and(|celsius| celsius < LIMIT_C) && most <= LIMIT_C + tolerance_k;
     // A push beyond the range has an alarm of its own.

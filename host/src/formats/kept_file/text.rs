@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+use crate::base::toml_file::quoted;
 use crate::formats::kept_file::objects::{is_pattern, is_wide};
 use crate::formats::kept_file::{
     AxisCalibration, ConstantPart, Counter, JointZeroPart, KeptFile, ModelJoint, ModelPart, NodeObjects,
@@ -28,10 +29,6 @@ impl KeptFile {
 
 fn line(out: &mut String, key: &str, value: impl Display) {
     *out += &format!("{key} = {value}\n");
-}
-
-fn quoted(text: &str) -> String {
-    toml::Value::from(text).to_string()
 }
 
 /// Shortest digits that restore the f32 of this number.

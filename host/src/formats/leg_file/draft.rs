@@ -5,10 +5,9 @@
 
 use std::fmt::Write;
 
-use toml::Value;
-
 use super::keys::{IN_PRIOR, JOINT, KeyLine, SIDE, TRUTH};
 use super::{DhFile, LinkParameters};
+use crate::base::toml_file::quoted;
 
 /// What is known of a leg.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,10 +142,6 @@ pub fn parameters_text(link: &LinkParameters) -> String {
 fn list(numbers: &[f64]) -> String {
     let numbers: Vec<_> = numbers.iter().map(|number| format!("{number:?}")).collect();
     format!("[{}]", numbers.join(", "))
-}
-
-fn quoted(text: &str) -> String {
-    Value::String(text.to_owned()).to_string()
 }
 
 fn line(text: &mut String, key: &str, value: &str, meaning: &str) {

@@ -66,7 +66,7 @@ pub enum Fault {
         advice: String,
     },
     /// The leg file does not state the conversion from the motor to the joint.
-    #[error("column `{column}` is of the motor, but the leg file states no `{key}`{} for joint `{joint}`",
+    #[error("column `{column}` is of the motor, but the leg file states no `{key}`{} for joint `{joint}`: add it below that joint's `name` (docs/files.md)",
         if *.key == "encoder" { " at the motor" } else { "" })]
     NoDrive {
         /// Column name.

@@ -36,6 +36,10 @@ impl Drop for Source {
 
 /// Opens a file.
 pub(crate) fn open(path: &Path) -> Result<Source, FileError> {
+    if path.is_dir() {
+        let reason = "is a folder: name the recording in it, of a bag of ROS 2 its `.mcap` file";
+        return Err(FileError { file: path.display().to_string(), line: None, reason: reason.into() });
+    }
     let unreadable = |error: &io::Error| FileError::unreadable(path, error);
     let file = File::open(path).map_err(|error| unreadable(&error))?;
     let length = file.metadata().map_err(|error| unreadable(&error))?.len();
