@@ -151,6 +151,13 @@ fn options_that_contradict_each_other_are_refused() {
 }
 
 #[test]
+fn a_folder_is_answered_with_what_to_name() {
+    let run = scarab("replay --leg sp", &[Path::new("tests")]);
+    let refusal = run.refusal();
+    assert!(refusal.contains("is a folder: name the recording in it"), "{refusal}");
+}
+
+#[test]
 fn well_known_names_give_the_complete_command_and_are_not_read() {
     for (header, options) in [
         ("time,position_0,effort_0", "t=time,q1=position_0,tau1=effort_0 --units s,rad,Nm"),
