@@ -89,9 +89,15 @@ fn a_motion_is_set_before_it_is_tracked_and_stays_while_it_runs() {
     let motion = context().configuration.prove(context().motions.validation[1]).expect("proved before");
     assert!(pair.leg.set_tracked(motion));
     assert!(!tick(&mut pair, Some(track)).refused);
-    assert!(!pair.leg.set_tracked(motion), "an approach ends at its own motion");
+    let other = context().configuration.prove(context().motions.validation[0]).expect("proved before");
+    let ticks = [motion, other].map(|motion| u64::from(motion.motion().duration_ticks()));
+    assert!(ticks[0].abs_diff(ticks[1]) > 2 * SECOND, "{ticks:?}");
+    assert!(!pair.leg.set_tracked(other), "an approach ends at its own motion");
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
-    assert!(!pair.leg.set_tracked(motion));
+    assert!(!pair.leg.set_tracked(other));
+    let begun = pair.ticks;
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Idle));
-    assert!(pair.leg.set_tracked(motion));
+    let lasted = pair.ticks - begun;
+    assert!((ticks[0]..ticks[0] + SECOND).contains(&lasted), "{lasted} {ticks:?}");
+    assert!(pair.leg.set_tracked(other));
 }

@@ -38,8 +38,8 @@ fn read(bench: &mut Bench, axis: usize, codes: &[Option<u16>]) {
 
 /// Heats the thermistor of an axis to a code within the permitted steps.
 fn heat(bench: &mut Bench, axis: usize, to: u16) {
-    for step in 0..=50_u16 {
-        read(bench, axis, &[Some(COLD - (COLD - to) / 50 * step)]);
+    for code in (to..COLD).rev().step_by(5) {
+        read(bench, axis, &[Some(code)]);
     }
     read(bench, axis, &[Some(to); 60]);
 }
@@ -94,6 +94,20 @@ fn three_bad_readings_in_a_row_are_the_fault_of_their_joint_and_no_heat() {
         assert!(bench.signals.winding_c(axis) <= 40.0, "{code:?}");
         assert_eq!(BoardFault::MotorThermistor.code(), FaultCode::MotorThermistor);
     }
+}
+
+#[test]
+fn a_step_within_the_range_is_bad_and_so_is_a_temperature_far_above_the_limit() {
+    let mut bench = fitted([Some(THERMISTOR); 2]);
+    // 2.98 kOhm: 60 degrees.
+    read(&mut bench, 0, &[Some(1944); 4]);
+    assert!(bench.signals.take_reported(0).eq([BoardFault::MotorThermistor]));
+    assert!(bench.signals.winding_c(0) <= 40.0);
+    let mut bench = fitted([Some(THERMISTOR); 2]);
+    // 522 ohm: 128 degrees.
+    heat(&mut bench, 0, 560);
+    assert!(bench.signals.take_reported(0).any(|fault| fault == BoardFault::MotorThermistor));
+    assert!(bench.signals.winding_c(0) <= 120.0, "{}", bench.signals.winding_c(0));
 }
 
 #[test]
