@@ -67,8 +67,8 @@ const HOST: [(&str, &[&str]); 10] = [
 const OPEN: [&str; 5] = ["units", "real", "place", "checksum", "testing"];
 
 /// Source folders of all crates.
-const SOURCES: [&str; 7] =
-    ["src", "hal-sim/src", "host/src", "paper/src", "emulated/src", "chip/src", "readers/src"];
+const SOURCES: [&str; 8] =
+    ["src", "hal-sim/src", "host/src", "paper/src", "emulated/src", "chip/src", "readers/src", "python/src"];
 
 /// Firmware modules that the simulated hardware may use. The other crates may use all.
 const PLANT: [&str; 2] = ["hal", "units"];
@@ -267,7 +267,9 @@ const LARGEST_COMMENT_WIDTH: usize = 110;
 #[test]
 fn comments_begin_with_their_subject_and_are_at_most_110_columns_wide() {
     let mut offences = Vec::new();
-    for folder in ["src", "hal-sim", "host", "paper", "emulated", "chip", "readers", "tests", "examples"] {
+    for folder in
+        ["src", "hal-sim", "host", "paper", "emulated", "chip", "readers", "python", "tests", "examples"]
+    {
         for file in source_files(folder) {
             for (number, line) in file.text.lines().enumerate() {
                 if let Some(why) = comment_offence(line) {

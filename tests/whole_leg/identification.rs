@@ -3,15 +3,13 @@
 use std::path::Path;
 
 use scarab_host::formats::leg_file::LegFile;
+use scarab_host::formats::recording::Recording;
 use scarab_host::formats::recording::import::Import;
 use scarab_host::report::RunReport;
 use scarab_host::rig::options::SimulationOptions;
 use scarab_host::run::identify::identify_one;
-use scarab_host::run::replay::{ReplayOptions, replay};
+use scarab_host::run::replay::{Recordings, ReplayOptions, replay};
 use scarab_host::run::simulate::simulate;
-
-use scarab::ident::Plan;
-use scarab_host::leg::setup::PriorChoice;
 
 use super::*;
 
@@ -136,25 +134,10 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
     let leg = default_leg();
     let (report, _) =
         identify_one::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(3), Some(&path)).expect("it runs");
-    let options = ReplayOptions {
-        import: Import::plain(2),
-        chooses_bandwidth: false,
-        even_stamps: false,
-        torque_delay_ms: Vec::new(),
-        files: vec![path],
-        validate: Vec::new(),
-        split: None,
-        bandwidth_hz: leg.bandwidth_hz,
-        plan: Plan::OneTime,
-        prior: PriorChoice::Default,
-        swarm_seed: 3,
-        estimator: scarab::ident::Estimator::Robust,
-        csv: None,
-        load: None,
-        payload: None,
-        with_payload: Vec::new(),
-    };
-    let replayed = replay::<JOINTS, BASE>(&leg, &options).expect("the tool reads its own log");
+    let read = Recording::read(&path, &Import::plain(2)).expect("the tool reads its own log");
+    let recordings = Recordings { training: vec![read], ..Recordings::default() };
+    let options = ReplayOptions { swarm_seed: 3, ..ReplayOptions::of(&leg) };
+    let replayed = replay::<JOINTS, BASE>(&leg, &recordings, &options).expect("it is identified");
     for (online, offline) in report.base_parameters.iter().zip(&replayed.run.base_parameters) {
         assert_eq!(online.name, offline.name);
         let sigma = online.sigma.known().expect("determined");

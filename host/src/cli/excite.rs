@@ -8,12 +8,12 @@ use crate::cli::arguments::{Input, Output};
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
 use crate::cli::noise::NoiseOptions;
-use crate::formats::excitation::{Excitation, LONGEST_S};
+use crate::formats::excitation::Excitation;
 use crate::formats::excitation_constant as constant;
 use crate::formats::motion_samples::{MotionSamples, SampleRate};
 use crate::leg::setup::DEFAULT_SEED;
 use crate::run::excite::assumption::Assumption;
-use crate::run::excite::bench::ExciteOptions;
+use crate::run::excite::bench::{ExciteOptions, FEWEST_EVALUATIONS, MOST_EVALUATIONS};
 use crate::run::excite::design::DesignOptions;
 use crate::run::excite::run::excite;
 use crate::view::excite as text;
@@ -57,7 +57,7 @@ pub struct ExciteArguments {
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
     /// Largest number of curves that the swarm evaluates.
-    #[arg(long, default_value_t = EVALUATIONS, value_parser = clap::value_parser!(u32).range(600..=10_000_000))]
+    #[arg(long, default_value_t = EVALUATIONS, value_parser = clap::value_parser!(u32).range(i64::from(FEWEST_EVALUATIONS)..=i64::from(MOST_EVALUATIONS)))]
     evaluations: u32,
     /// Write the report as JSON here.
     #[arg(long)]
@@ -71,18 +71,6 @@ const EVALUATIONS: u32 = 48_000;
 pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
     let leg = &arguments.noise.on(arguments.leg.load()?)?;
     let torque_noise_percent = arguments.noise.percent()?;
-    let percentage = |option: &str, value: f64, most: f64| {
-        let fits = (0.0..=most).contains(&value);
-        if fits {
-            Ok(())
-        } else {
-            Err(ToolError::input(format!("{option}: must be a percentage from 0 to {most}")))
-        }
-    };
-    percentage("--torque-margin", arguments.torque_margin, 200.0)?;
-    if !(arguments.duration > 0.0 && arguments.duration <= LONGEST_S) {
-        return Err(ToolError::input(format!("--duration: must be above 0 and at most {LONGEST_S} s")));
-    }
     let given = match &arguments.excitation {
         Some(file) => Some((file.to_path_buf(), Excitation::load(file)?)),
         None => None,
@@ -99,6 +87,7 @@ pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
         margin_percent: arguments.torque_margin,
         assumption: if arguments.assume_truth { Assumption::Truth } else { Assumption::Best },
     };
+    options.check().map_err(ToolError::input)?;
     let excited = with_leg_size!(leg, excite(leg, options))?;
     if let Some(path) = &arguments.out {
         files::write(path, excited.motion.to_toml())?;

@@ -5,9 +5,9 @@ use clap::{Args, ValueEnum};
 use crate::base::error::ToolError;
 use crate::base::names::BY_CARGO;
 use crate::base::shell::quoted;
-use crate::formats::leg_file::{BodySide, LegFile, Side};
+use crate::formats::leg_file::LegFile;
 use crate::formats::recording::dialect::{Decimal, Delimiter};
-use crate::formats::recording::import::{ColumnChoice, Drive, Import, UnitChoice};
+use crate::formats::recording::import::{ColumnChoice, Import, UnitChoice};
 
 /// Columns, units and format of all recordings of the command.
 #[derive(Args, Debug)]
@@ -47,21 +47,8 @@ enum DecimalArgument {
 impl ImportArguments {
     /// How to read the recordings of this leg. `name` is the leg's name or file.
     pub fn import(&self, leg: &LegFile, name: &str) -> Result<Import, ToolError> {
-        let states_constant = LegFile::joints_that_state(name, "torque_per_ampere")?;
-        let states_encoder = LegFile::joints_that_state(name, "encoder")?;
-        let mounting = if leg.side == BodySide::Left { -1.0 } else { 1.0 };
-        let states = |stated: &[bool], joint: usize| stated.get(joint).copied().unwrap_or(false);
-        let drives = leg.joints.iter().enumerate().map(|(number, joint)| {
-            let is_at_motor = joint.encoder.side == Side::Motor && states(&states_encoder, number);
-            Drive {
-                joint: joint.name.clone(),
-                torque_per_ampere: states(&states_constant, number)
-                    .then_some(mounting * joint.torque_per_ampere),
-                motor_ratio: is_at_motor.then_some(mounting * joint.encoder.ratio),
-            }
-        });
+        let (text, _) = LegFile::text(name)?;
         let import = Import {
-            drives: drives.collect(),
             skip_bad: self.skip_bad,
             delimiter: self.delimiter.map(|delimiter| match delimiter {
                 DelimiterArgument::Comma => Delimiter::Comma,
@@ -73,7 +60,7 @@ impl ImportArguments {
                 DecimalArgument::Comma => Decimal::Comma,
             }),
             command: command(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
-            ..Import::plain(0)
+            ..Import::of(leg, &text)
         };
         import.with(&self.columns, &self.units).map_err(ToolError::input)
     }

@@ -11,12 +11,10 @@ use crate::base::{files, output};
 use crate::cli::arguments::{Input, LegName, Output};
 use crate::formats::leg_file::check::GRAVITY;
 use crate::formats::robot::Robot;
-use crate::leg::from_robot::{RobotOptions, leg};
+use crate::leg::from_robot::{LARGEST_PARALLEL_RAD, RobotOptions, leg};
 
 /// Largest position of a held joint, rad or m.
 const LARGEST_POSITION: f64 = 1000.0;
-/// Largest angle at which axes may count as parallel, rad.
-const LARGEST_PARALLEL_RAD: f64 = 0.01;
 
 /// Source of a leg file, or the file to check.
 #[derive(Args, Debug)]

@@ -4,6 +4,7 @@ use clap::Args;
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
+use crate::formats::leg_file::check::LARGEST_NOISE_PERCENT;
 
 /// Noise of the logged torque, instead of the leg file's.
 #[derive(Args, Debug)]
@@ -33,8 +34,10 @@ impl NoiseOptions {
     /// # Errors
     /// The value is not a valid percentage.
     pub fn percent(&self) -> Result<Option<f64>, ToolError> {
-        if self.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
-            return Err(ToolError::input("--torque-noise: must be a percentage from 0 to 1000"));
+        if self.torque_noise.is_some_and(|percent| !(0.0..=LARGEST_NOISE_PERCENT).contains(&percent)) {
+            return Err(ToolError::input(format!(
+                "--torque-noise: must be a percentage from 0 to {LARGEST_NOISE_PERCENT}"
+            )));
         }
         Ok(self.torque_noise)
     }

@@ -1,18 +1,20 @@
 //! `replay`: identifies a leg from recordings.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
 
 use clap::Args;
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 use crate::cli::arguments::{Input, Output};
 use crate::cli::common::{Common, draw, finish};
 use crate::cli::import::ImportArguments;
 use crate::cli::model::ModelArguments;
+use crate::formats::recording::import::Import;
+use crate::formats::recording::{Read, Recording};
 use crate::leg::placed_mass::PlacedMass;
 use crate::leg::setup::DEFAULT_SEED;
-use crate::run::replay::{ReplayOptions, replay};
+use crate::run::replay::{Recordings, ReplayOptions, replay};
 use crate::view::tables;
 use crate::with_leg_size;
 
@@ -85,8 +87,8 @@ impl FromStr for Bandwidth {
     }
 }
 
-fn paths(files: &[Input]) -> Vec<PathBuf> {
-    files.iter().map(|file| file.to_path_buf()).collect()
+fn read(files: &[Input], import: &Import) -> Result<Vec<Read>, FileError> {
+    files.iter().map(|file| Recording::read(file, import)).collect()
 }
 
 /// Identifies and reports; returns the exit code.
@@ -97,9 +99,6 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         return Err(ToolError::input("--split: must be above 0 and below 1"));
     }
     let options = &ReplayOptions {
-        files: paths(&arguments.files),
-        import: arguments.import.import(leg, arguments.common.leg.name())?,
-        validate: paths(&arguments.validate),
         split: arguments.split,
         bandwidth_hz: match arguments.bandwidth {
             Some(Bandwidth::Hertz(hz)) => hz,
@@ -115,10 +114,16 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         even_stamps: arguments.even_stamps,
         load: arguments.load.as_ref().map(|mass| mass.on(leg, "--load")).transpose()?,
         payload: arguments.payload.as_ref().map(|mass| mass.on(leg, "--payload")).transpose()?,
-        with_payload: paths(&arguments.with_payload),
     };
     let kept = arguments.model.kept(leg)?;
-    let mut replayed = with_leg_size!(leg, replay(leg, options))?;
+    let import = &arguments.import.import(leg, arguments.common.leg.name())?;
+    let recordings = &Recordings {
+        training: read(&arguments.files, import)?,
+        held_out: read(&arguments.validate, import)?,
+        with_payload: read(&arguments.with_payload, import)?,
+    };
+    let mut replayed = with_leg_size!(leg, replay(leg, recordings, options))?;
+    replayed.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     arguments.model.compare(kept.as_ref(), &mut replayed.run);
     let mut sources = format!("{}{}\n\n", tables::sources(&replayed.sources).to_text(), tables::SOURCES);
     let read = replayed.run.read.as_deref().unwrap_or_default();

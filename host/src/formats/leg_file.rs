@@ -398,7 +398,10 @@ impl LegFile {
     }
 
     /// Text of a shipped leg or of a file, and its name in error messages.
-    fn text(name_or_path: &str) -> Result<(String, String), FileError> {
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn text(name_or_path: &str) -> Result<(String, String), FileError> {
         if let Some((name, text)) = SHIPPED_LEGS.iter().find(|(name, _)| *name == name_or_path) {
             return Ok(((*text).to_owned(), format!("{name} (shipped)")));
         }
@@ -417,16 +420,12 @@ impl LegFile {
         Ok(leg)
     }
 
-    /// Whether each joint of a shipped leg or of a file states this key. A default must not convert a
-    /// recording.
-    ///
-    /// # Errors
-    /// The file cannot be read.
-    pub fn joints_that_state(name_or_path: &str, key: &str) -> Result<Vec<bool>, FileError> {
-        let (text, _) = Self::text(name_or_path)?;
+    /// Whether each joint of a checked leg's text states this key. A default must not convert a recording.
+    #[must_use]
+    pub fn joints_that_state(text: &str, key: &str) -> Vec<bool> {
         let table = text.parse::<toml::Table>().unwrap_or_default();
         let joints = table.get("joint").and_then(toml::Value::as_array);
-        Ok(joints.into_iter().flatten().map(|joint| joint.get(key).is_some()).collect())
+        joints.into_iter().flatten().map(|joint| joint.get(key).is_some()).collect()
     }
 
     /// Error about this leg.

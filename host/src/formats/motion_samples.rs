@@ -79,6 +79,16 @@ impl MotionSamples {
         Ok(Self { joints: leg.joints.iter().map(|joint| joint.name.clone()).collect(), samples })
     }
 
+    /// Time of each sample, s.
+    pub fn time_s(&self) -> impl Iterator<Item = f64> {
+        self.samples.iter().map(|sample| f64::from(sample.tick) / f64::from(SERVO_RATE_HZ))
+    }
+
+    /// Angles, speeds and accelerations of all joints at each sample; rad, rad/s, rad/s2.
+    pub fn states(&self) -> impl Iterator<Item = [&[f64]; 3]> {
+        self.samples.iter().map(|sample| [&sample.q[..], &sample.qd, &sample.qdd])
+    }
+
     /// CSV text.
     #[must_use]
     pub fn to_csv(&self) -> String {
@@ -88,9 +98,9 @@ impl MotionSamples {
             let _ = write!(text, ",q{joint}_rad,qd{joint}_radps,qdd{joint}_radps2");
         });
         text.push('\n');
-        for sample in &self.samples {
-            let _ = write!(text, "{}", f64::from(sample.tick) / f64::from(SERVO_RATE_HZ));
-            for ((q, qd), qdd) in sample.q.iter().zip(&sample.qd).zip(&sample.qdd) {
+        for (time_s, [q, qd, qdd]) in self.time_s().zip(self.states()) {
+            let _ = write!(text, "{time_s}");
+            for ((q, qd), qdd) in q.iter().zip(qd).zip(qdd) {
                 let _ = write!(text, ",{q},{qd},{qdd}");
             }
             text.push('\n');

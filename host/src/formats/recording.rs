@@ -109,6 +109,15 @@ impl Recording {
         decode::csv(file, &mut source.text, packing, import)
     }
 
+    /// Checks samples as those of a file are checked: `time_s`, and angles and torques of each joint, all of
+    /// one length. `name` stands for the file, and the index of a sample for the line.
+    ///
+    /// # Errors
+    /// Names the sample and the reason.
+    pub fn of_samples(name: &Path, time_s: &[f64], joints: &[JointSeries]) -> Result<Read, FileError> {
+        decode::samples(name, time_s, joints)
+    }
+
     /// Reads the first `joints` joints of a CSV text; `file` is used only in error messages.
     pub fn parse(file: &Path, text: &str, joints: usize) -> Result<Self, FileError> {
         Ok(Self::parse_as(file, text, &Import::plain(joints))?.recording)

@@ -20,6 +20,8 @@ use crate::formats::robot::{Joint, Kind, Robot};
 use crate::leg::axes::{Axis, DhChain, DhJoint, ROUNDING_RAD};
 use crate::leg::robot_chain::{ChainJoint, LumpedBody, chain};
 
+/// Largest angle at which axes may count as parallel, rad.
+pub const LARGEST_PARALLEL_RAD: f64 = 0.01;
 /// Axes nearer to parallel than this are probably meant parallel, rad.
 const SUSPICIOUS_RAD: f64 = 1e-3;
 

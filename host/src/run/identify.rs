@@ -54,14 +54,23 @@ pub fn identify_many<const N: usize, const B: usize>(
     runs
 }
 
-/// Writes the training motion in the format of `replay`: anatomical angles and torques.
+/// Writes samples of a log in the format of `replay`.
 pub fn write_log<const N: usize>(
     path: &Path,
     leg: &LegFile,
     log: &[LoggedSample<N>],
 ) -> Result<(), ToolError> {
+    let mut out = NewFile::create(path)?;
+    let recording = recorded(path, leg, log);
+    recording.write(&mut out).map_err(|error| ToolError::cannot_write(path, &error))?;
+    out.finish()
+}
+
+/// Recording of samples of a log: anatomical angles and torques. `name` stands for the file.
+#[must_use]
+pub fn recorded<const N: usize>(name: &Path, leg: &LegFile, log: &[LoggedSample<N>]) -> Recording {
     let mut recording = Recording {
-        file: path.to_owned(),
+        file: name.to_owned(),
         time_s: Vec::with_capacity(log.len()),
         joints: vec![JointSeries::default(); N],
         joints_in_file: N,
@@ -80,7 +89,5 @@ pub fn write_log<const N: usize>(
             series.torque_nm.push(direction * f64::from(logged.sample.torque_nm[joint]));
         }
     }
-    let mut out = NewFile::create(path)?;
-    recording.write(&mut out).map_err(|error| ToolError::cannot_write(path, &error))?;
-    out.finish()
+    recording
 }

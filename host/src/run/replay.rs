@@ -6,9 +6,10 @@ mod logging_errors;
 mod predictions;
 mod recordings;
 mod screening;
+mod warnings;
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use scarab::ident::{
@@ -18,12 +19,11 @@ use scarab::ident::{
 use scarab::model::{AnatomicalJoint, Payload};
 
 use crate::base::error::ToolError;
+use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
-use crate::formats::leg_file::{DEFAULT_RANGE_DEG, LegFile};
-use crate::formats::recording::Recording;
-use crate::formats::recording::import::Import;
+use crate::formats::recording::{Read, Recording};
 use crate::leg::background::Background;
-use crate::leg::setup::{PriorChoice, background};
+use crate::leg::setup::{DEFAULT_SEED, PriorChoice, background};
 use crate::report::findings::FindingReport;
 use crate::report::reading::ReadReport;
 use crate::report::scale::{MassReport, ScaleReport};
@@ -31,7 +31,7 @@ use crate::report::series::{Anatomy, Reader, Role, Series};
 use crate::report::{RunReport, Source};
 use crate::run::analysis::{Circumstances, Motion};
 use crate::run::logging_errors::encoder::Encoders;
-use crate::run::resample::Resampled;
+use crate::run::resample::{BandwidthWarning, Resampled};
 use cleaning::cleaned;
 use known_mass::{load_base, settled};
 use logging_errors::{
@@ -50,19 +50,22 @@ const GRID_S: f64 = 1.0 / SAMPLE_RATE_HZ;
 const SLICE: u32 = 20;
 /// Lowest bandwidth, tenths of a Hz.
 const LOWEST_TENTHS: u32 = 10;
-/// Excess over the leg's range from which a warning is printed.
-const RANGE_MARGIN_DEG: f64 = 5.0;
+
+/// Recordings of a replay, each with how it was read.
+#[derive(Clone, Debug, Default)]
+pub struct Recordings {
+    /// Training set.
+    pub training: Vec<Read>,
+    /// Held out for validation.
+    pub held_out: Vec<Read>,
+    /// Recorded with the leg's `payload`; they determine the scale of the torques.
+    pub with_payload: Vec<Read>,
+}
 
 /// Options of a replay.
 #[derive(Clone, Debug)]
 pub struct ReplayOptions {
-    /// Recordings of the training set.
-    pub files: Vec<PathBuf>,
-    /// Columns, units and format of all recordings.
-    pub import: Import,
-    /// Recordings held out for validation.
-    pub validate: Vec<PathBuf>,
-    /// Share of each file that trains; the rest validates.
+    /// Share of each training recording that trains; the rest validates.
     pub split: Option<f64>,
     /// Frequency at which the low-pass is 3 dB down, Hz.
     pub bandwidth_hz: f64,
@@ -84,10 +87,29 @@ pub struct ReplayOptions {
     pub even_stamps: bool,
     /// Known load in all recordings, to be subtracted.
     pub load: Option<Payload<f64>>,
-    /// Known mass in the recordings `with_payload`.
+    /// Known mass in [`Recordings::with_payload`].
     pub payload: Option<Payload<f64>>,
-    /// Recordings of the leg with `payload`; they determine the scale of the torques.
-    pub with_payload: Vec<PathBuf>,
+}
+
+impl ReplayOptions {
+    /// Defaults for a leg: its bandwidth and prior, one-time, robust, nothing held out.
+    #[must_use]
+    pub fn of(leg: &LegFile) -> Self {
+        Self {
+            split: None,
+            bandwidth_hz: leg.bandwidth_hz,
+            chooses_bandwidth: false,
+            plan: Plan::OneTime,
+            prior: PriorChoice::Default,
+            estimator: Estimator::Robust,
+            swarm_seed: DEFAULT_SEED,
+            csv: None,
+            torque_delay_ms: Vec::new(),
+            even_stamps: false,
+            load: None,
+            payload: None,
+        }
+    }
 }
 
 type HostRecorder<const N: usize, const B: usize> = Recorder<f32, N, B, TAPS, PENDING>;
@@ -103,6 +125,8 @@ pub struct Replayed {
     pub sources: Vec<Source>,
     /// Curves of every file.
     pub series: Series,
+    /// Doubts about recordings and leg that do not change the result, in words.
+    pub warnings: Vec<String>,
 }
 
 /// One file on the firmware's grid, as D-H angles and torques.
@@ -110,6 +134,8 @@ struct Samples<const N: usize> {
     file: PathBuf,
     /// Outliers replaced before resampling, converted to samples of the grid.
     replaced: [u32; N],
+    /// Doubt about the bandwidth at this rate.
+    warning: Option<BandwidthWarning>,
     rate_hz: f64,
     start_s: f64,
     /// Points without a valid sample, in order.
@@ -134,15 +160,13 @@ impl<const N: usize> Samples<N> {
         // Unit: samples of the grid, as in the recorder.
         let share = grid.len() as f64 / recording.time_s.len() as f64;
         let replaced = replaced.map(|count| (f64::from(count) * share).round() as u32);
-        if let Some(warning) = grid.bandwidth_warning(options.bandwidth_hz) {
-            warn(&recording.file, &warning);
-        }
         let points = 0..grid.len();
         let position = points.clone().filter_map(|point| grid.position_rad::<N>(point));
         let torque = points.filter_map(|point| grid.torque_nm::<N>(point));
         Self {
             file: recording.file.clone(),
             replaced,
+            warning: grid.bandwidth_warning(options.bandwidth_hz),
             rate_hz: grid.native_rate_hz,
             start_s: grid.start_s,
             excluded: screening.excluded(recording, grid.start_s),
@@ -163,18 +187,21 @@ impl<const N: usize> Samples<N> {
 /// Identifies from recordings and validates on the held-out ones.
 pub fn replay<const N: usize, const B: usize>(
     leg: &LegFile,
+    recordings: &Recordings,
     options: &ReplayOptions,
 ) -> Result<Replayed, ToolError> {
     let mut background = background::<N, B>(leg, options.prior, options.swarm_seed)?;
     background.use_estimator(options.estimator);
     let mut options = options.clone();
     if options.chooses_bandwidth {
-        options.bandwidth_hz = chosen_bandwidth(leg, &background, &options)?;
+        options.bandwidth_hz = chosen_bandwidth(leg, &background, recordings, &options)?;
     }
     let options = &options;
-    let Some(payload) = &options.payload else { return identified(leg, background, options, None) };
-    let (scale, with_mass) = known_mass::scale(leg, &background, options, payload)?;
-    let mut replayed = identified(leg, background, options, scale.trusted())?;
+    let Some(payload) = &options.payload else {
+        return identified(leg, background, recordings, options, None);
+    };
+    let (scale, with_mass) = known_mass::scale(leg, &background, recordings, options, payload)?;
+    let mut replayed = identified(leg, background, recordings, options, scale.trusted())?;
     replayed.run.read.get_or_insert_default().extend(with_mass);
     let used = core::array::from_fn(|joint| leg.joints[joint].torque_per_ampere);
     replayed.run.scale = ScaleReport::of(&scale, &used);
@@ -185,6 +212,7 @@ pub fn replay<const N: usize, const B: usize>(
 fn identified<const N: usize, const B: usize>(
     leg: &LegFile,
     mut background: Background<N, B>,
+    recordings: &Recordings,
     options: &ReplayOptions,
     scale: Option<[ConstantRatio<f32>; N]>,
 ) -> Result<Replayed, ToolError> {
@@ -193,10 +221,10 @@ fn identified<const N: usize, const B: usize>(
     let ratios = scale.map_or([1.0; N], |scale| scale.map(|found| f64::from(found.ratio)));
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
-    let Parts { training, held_out, wholes, screening, read } = read_all(options, leg, &ratios)?;
-    warn_of_geometry(leg);
-    wholes.iter().for_each(|whole| warn_of_another_leg(&whole.recording, leg));
-    screening.warn();
+    let Parts { training, held_out, wholes, screening, read } = parts(recordings, options, leg, &ratios)?;
+    let mut warnings: Vec<String> = warnings::of_geometry(leg).collect();
+    warnings.extend(wholes.iter().flat_map(|whole| warnings::of_another_leg(&whole.recording, leg)));
+    warnings.extend(screening.warnings());
     let encoders: Encoders<N> = encoders(&wholes, leg);
     encoders.describe(leg, options.bandwidth_hz, &mut background.model);
     encoders.describe(leg, options.bandwidth_hz, &mut background.device);
@@ -205,6 +233,9 @@ fn identified<const N: usize, const B: usize>(
         recordings.iter().map(|recording| Samples::of(recording, &anatomy, options, &screening)).collect()
     };
     let (training, held_out) = (on_grid(&training), on_grid(&held_out));
+    warnings.extend(training.iter().chain(&held_out).filter_map(|samples| {
+        samples.warning.as_ref().map(|warning| format!("{}: {warning}", samples.file.display()))
+    }));
 
     let mut sources = feed(&mut recorder, &background, &training, "training", |_, _, _| {});
     // The bias of the parameters is judged instead (`logging_errors::encoder`).
@@ -327,7 +358,7 @@ fn identified<const N: usize, const B: usize>(
     // A misfit above the noise may be vibration; a larger bandwidth passes more of it. Beyond the bandwidths
     // of the Stribeck search it would bias friction.
     let proposed_hz = if noise_is_known && !options.chooses_bandwidth {
-        let larger = chosen_bandwidth(leg, &background, options)?;
+        let larger = chosen_bandwidth(leg, &background, recordings, options)?;
         largest(larger).filter(|hz| *hz > options.bandwidth_hz)
     } else {
         None
@@ -360,7 +391,7 @@ fn identified<const N: usize, const B: usize>(
         floor_chi2: Some(optimum.above),
         ..series(&background, &anatomy, &solver, values, options.bandwidth_hz, &training, &held_out)?
     };
-    Ok(Replayed { bandwidth_hz: options.bandwidth_hz, run, sources, series })
+    Ok(Replayed { bandwidth_hz: options.bandwidth_hz, run, sources, series, warnings })
 }
 
 /// Takes the durations of disturbances from the rows themselves, because blocks of a long motion are long.
@@ -431,11 +462,7 @@ fn bandwidth_error(bandwidth_hz: f64, error: KernelError) -> ToolError {
     })
 }
 
-fn warn(file: &Path, warning: &dyn std::fmt::Display) {
-    eprintln!("warning: {}: {warning}", file.display());
-}
-
-/// Recordings of a replay.
+/// Recordings as they are used.
 struct Parts {
     /// Training parts.
     training: Vec<Recording>,
@@ -445,19 +472,22 @@ struct Parts {
     wholes: Vec<Whole>,
     /// Findings about the samples.
     screening: Screening,
-    /// How each file was read.
+    /// How each recording was read.
     read: Vec<ReadReport>,
 }
 
-fn read_all(options: &ReplayOptions, leg: &LegFile, ratios: &[f64]) -> Result<Parts, ToolError> {
-    let mut reports = Vec::new();
-    let mut read = |path: &PathBuf| {
-        let read = Recording::read(path, &options.import)?;
-        reports.push(read.report);
-        corrected(read.recording, options, ratios)
+/// Corrects all recordings, examines them, and splits them as requested.
+fn parts(
+    recordings: &Recordings,
+    options: &ReplayOptions,
+    leg: &LegFile,
+    ratios: &[f64],
+) -> Result<Parts, ToolError> {
+    let of = |reads: &[Read]| -> Result<Vec<Recording>, ToolError> {
+        reads.iter().map(|read| corrected(read.recording.clone(), options, ratios)).collect()
     };
-    let mut training = options.files.iter().map(&mut read).collect::<Result<Vec<_>, _>>()?;
-    let mut held_out = options.validate.iter().map(&mut read).collect::<Result<Vec<_>, _>>()?;
+    let (mut training, mut held_out) = (of(&recordings.training)?, of(&recordings.held_out)?);
+    let read = recordings.training.iter().chain(&recordings.held_out).map(|read| read.report.clone());
     let share =
         |recording: &Recording| options.split.map_or(f64::INFINITY, |share| share * recording.duration_s());
     let whole = |recording: &Recording, training_s| Whole { recording: recording.clone(), training_s };
@@ -472,59 +502,7 @@ fn read_all(options: &ReplayOptions, leg: &LegFile, ratios: &[f64]) -> Result<Pa
         training = first;
         held_out.extend(rest);
     }
-    Ok(Parts { training, held_out, wholes, screening, read: reports })
-}
-
-/// Warns of signs that the recording is from another machine.
-fn warn_of_another_leg(recording: &Recording, leg: &LegFile) {
-    let (in_file, in_leg) = (recording.joints_in_file, leg.joints.len());
-    if in_file > in_leg {
-        let warning = format!(
-            "holds {in_file} joints, the leg `{}` has {in_leg}: the other columns are ignored, as if those joints were at rest",
-            leg.name
-        );
-        warn(&recording.file, &warning);
-    }
-    for (number, (series, joint)) in recording.joints.iter().zip(&leg.joints).enumerate() {
-        let angles = series.position_rad.iter().map(|angle| angle.to_degrees());
-        let (low, high) =
-            angles.fold((f64::MAX, f64::MIN), |(low, high), angle| (low.min(angle), high.max(angle)));
-        let [lower, upper] = joint.range_deg;
-        let is_stated = joint.range_deg != DEFAULT_RANGE_DEG;
-        if is_stated && (low < lower - RANGE_MARGIN_DEG || high > upper + RANGE_MARGIN_DEG) {
-            let warning = format!(
-                "q{}_rad goes from {low:.0} to {high:.0} deg, the range of `{}` is {lower:.0} to {upper:.0} deg: are \
-                 column, unit, direction and zero right?",
-                number + 1,
-                joint.name
-            );
-            warn(&recording.file, &warning);
-        }
-    }
-}
-
-/// Warns of Denavit-Hartenberg numbers and gravity that suggest another convention.
-fn warn_of_geometry(leg: &LegFile) {
-    let Some(first) = leg.joints.first() else { return };
-    if first.dh.a != 0.0 {
-        eprintln!(
-            "warning: {}: `dh.a` of joint `{}` is {} m and has no effect: it is the distance from the joint before. Is it the \
-             length of this joint's link? Then it belongs to the next joint (docs/model.md)",
-            leg.name, first.name, first.dh.a
-        );
-    }
-    let [x, y, z] = leg.gravity;
-    let (sine, cosine) = first.dh.alpha.sin_cos();
-    let along = z * cosine - y * sine;
-    let across = (x * x + y * y + z * z - along * along).max(0.0).sqrt();
-    let is_parallel = leg.joints.iter().skip(1).all(|joint| joint.dh.alpha == 0.0);
-    if is_parallel && across < 1e-3 * along.abs() {
-        eprintln!(
-            "warning: {}: gravity is along the joints' axes, so no torque holds weight. In a vertical plane gravity lies in x \
-             and y of the base frame, because z is the first joint's axis",
-            leg.name
-        );
-    }
+    Ok(Parts { training, held_out, wholes, screening, read: read.collect() })
 }
 
 /// Every file is a separate motion: windows never span two files.

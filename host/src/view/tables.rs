@@ -217,7 +217,9 @@ pub fn print_run(run: &RunReport) -> Result<(), ToolError> {
     print(&run_text(run))
 }
 
-fn run_text(run: &RunReport) -> String {
+/// Tables and verdict of one run.
+#[must_use]
+pub fn run_text(run: &RunReport) -> String {
     let combinations = run.base_parameters.len();
     let determined = if run.rank == combinations {
         "all of them determined".to_owned()

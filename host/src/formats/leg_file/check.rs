@@ -27,6 +27,8 @@ pub const SMALLEST_RANGE_DEG: f64 = 2.0;
 pub const LARGEST_SPEED: f64 = 2800.0;
 /// Largest torque limit, N m.
 pub const LARGEST_TORQUE: f64 = 1000.0;
+/// Largest simulated noise of the torque, percent; leg files state at most 100.
+pub const LARGEST_NOISE_PERCENT: f64 = 1000.0;
 /// Longest time of a holding brake, ms.
 const LONGEST_BRAKE_MS: f64 = 500.0;
 

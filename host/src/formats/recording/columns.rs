@@ -158,6 +158,14 @@ impl Column {
         }
     }
 
+    /// This number, if it is finite.
+    pub(crate) fn finite(&self, value: f64) -> Result<f64, Fault> {
+        if !value.is_finite() {
+            return Err(Fault::NotFinite { column: self.name.clone(), text: value.to_string() });
+        }
+        Ok(value)
+    }
+
     fn check(&self, value: f64, limit: f64) -> Result<f64, Fault> {
         if value.abs() > limit {
             return Err(Fault::Absurd { column: self.name.clone(), value, limit });

@@ -12,6 +12,7 @@ use crate::formats::recording::columns::{LineNumbers, Rows, peeked, refuse};
 use crate::formats::recording::dialect::{Decimal, Dialect, LOOKED_AT};
 use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
+use crate::formats::recording::signal::Signal;
 use crate::formats::recording::{JointSeries, MOST_BAD_PERCENT, MOST_SAMPLES, Recording};
 use crate::report::reading::{ReadReport, SkippedReport};
 
@@ -153,6 +154,25 @@ impl Skipped {
             }
         }
     }
+}
+
+/// Checks samples that a program holds.
+pub(crate) fn samples(name: &Path, time_s: &[f64], joints: &[JointSeries]) -> Result<Read, FileError> {
+    let import = Import::plain(joints.len());
+    let signals = (1..=joints.len()).flat_map(|joint| [Signal::Angle(joint), Signal::Torque(joint)]);
+    let documented = std::iter::once(Signal::Time)
+        .chain(signals)
+        .map(|signal| signal.column(signal.quantity().si()))
+        .collect();
+    let names = Names { names: documented, units: Vec::new(), are_stated: true };
+    let mut decoder = Decoder::new(name, &names, &import).map_err(|fault| refuse(name, None, fault))?;
+    let series: Vec<&[f64]> = std::iter::once(time_s)
+        .chain(joints.iter().flat_map(|joint| [&joint.position_rad[..], &joint.torque_nm[..]]))
+        .collect();
+    for sample in 0..time_s.len() {
+        decoder.take(sample, |chosen| chosen.column.finite(series[chosen.column.index][sample]))?;
+    }
+    decoder.finish("arrays".to_owned(), true)
 }
 
 /// Reads a CSV text.

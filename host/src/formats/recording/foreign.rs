@@ -123,13 +123,8 @@ mod readers {
                 progress.set_position((row.done * STEPS as f64) as u64);
                 let mut values = row.values.iter();
                 let number = usize::try_from(row.number).unwrap_or(usize::MAX);
-                let taken = decoder.take(number, |column| match values.next() {
-                    Some(value) if value.is_finite() => Ok(*value),
-                    value => Err(Fault::NotFinite {
-                        column: column.column.name.clone(),
-                        text: value.unwrap_or(&f64::NAN).to_string(),
-                    }),
-                });
+                let taken = decoder
+                    .take(number, |column| column.column.finite(values.next().copied().unwrap_or(f64::NAN)));
                 match taken {
                     Ok(()) => ControlFlow::Continue(()),
                     Err(error) => {

@@ -11,6 +11,7 @@
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
+use crate::formats::leg_file::{BodySide, LegFile, Side};
 use crate::formats::recording::dialect::{Decimal, Delimiter};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
 
@@ -121,6 +122,25 @@ impl Import {
             drives: (1..=joints).map(drive).collect(),
             command: "cargo sim replay".to_owned(),
         }
+    }
+
+    /// Documented format for a leg whose file holds this text.
+    #[must_use]
+    pub fn of(leg: &LegFile, text: &str) -> Self {
+        let states_constant = LegFile::joints_that_state(text, "torque_per_ampere");
+        let states_encoder = LegFile::joints_that_state(text, "encoder");
+        let mounting = if leg.side == BodySide::Left { -1.0 } else { 1.0 };
+        let states = |stated: &[bool], joint: usize| stated.get(joint).copied().unwrap_or(false);
+        let drives = leg.joints.iter().enumerate().map(|(number, joint)| {
+            let is_at_motor = joint.encoder.side == Side::Motor && states(&states_encoder, number);
+            Drive {
+                joint: joint.name.clone(),
+                torque_per_ampere: states(&states_constant, number)
+                    .then_some(mounting * joint.torque_per_ampere),
+                motor_ratio: is_at_motor.then_some(mounting * joint.encoder.ratio),
+            }
+        });
+        Self { drives: drives.collect(), ..Self::plain(0) }
     }
 
     /// With these columns and units.

@@ -10,7 +10,7 @@ use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::Second;
 
 use crate::base::error::ToolError;
-use crate::formats::excitation::Excitation;
+use crate::formats::excitation::{Excitation, LONGEST_S};
 use crate::formats::leg_file::LegFile;
 use crate::leg::motions::random_excitation;
 use crate::leg::words::leg_error;
@@ -37,6 +37,33 @@ pub struct ExciteOptions {
     pub margin_percent: f64,
     /// Description of the leg to be assumed.
     pub assumption: Assumption,
+}
+
+/// Largest assumed error of the base parameters, percent.
+const LARGEST_MARGIN_PERCENT: f64 = 200.0;
+/// Fewest evaluations of a design.
+pub const FEWEST_EVALUATIONS: u32 = 600;
+/// Most evaluations of a design.
+pub const MOST_EVALUATIONS: u32 = 10_000_000;
+
+impl ExciteOptions {
+    /// Checks duration, margin and effort.
+    ///
+    /// # Errors
+    /// Names the option and its limits.
+    pub fn check(&self) -> Result<(), String> {
+        let DesignOptions { duration_s, evaluations, .. } = self.design;
+        if !(0.0..=LARGEST_MARGIN_PERCENT).contains(&self.margin_percent) {
+            return Err(format!("--torque-margin: must be a percentage from 0 to {LARGEST_MARGIN_PERCENT}"));
+        }
+        if !(duration_s > 0.0 && duration_s <= LONGEST_S) {
+            return Err(format!("--duration: must be above 0 and at most {LONGEST_S} s"));
+        }
+        if !(FEWEST_EVALUATIONS..=MOST_EVALUATIONS).contains(&evaluations) {
+            return Err(format!("--evaluations: must be from {FEWEST_EVALUATIONS} to {MOST_EVALUATIONS}"));
+        }
+        Ok(())
+    }
 }
 
 /// Reference of the torque noise.

@@ -6,16 +6,14 @@
 //! the parameters. A mass in a second set of recordings determines recorded over true torque
 //! ([`scarab::ident::torque_constant_ratio`]). All torques are divided by that ratio first.
 
-use std::path::PathBuf;
-
 use scarab::ident::{Record, Solver, torque_constant_ratio};
 use scarab::model::Payload;
 
-use super::{Parts, ReplayOptions, Samples, feed, new_recorder, read_all};
+use super::{Parts, Recordings, ReplayOptions, Samples, feed, new_recorder, parts};
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
-use crate::formats::recording::Recording;
+use crate::formats::recording::Read;
 use crate::leg::background::Background;
 use crate::report::reading::ReadReport;
 use crate::run::replay::screening::refuse_copies;
@@ -41,23 +39,16 @@ pub(super) fn settled<const N: usize, const B: usize>(
 pub(super) fn scale<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
+    recordings: &Recordings,
     options: &ReplayOptions,
     payload: &Payload<f64>,
 ) -> Result<(Scale<N, B>, Vec<ReadReport>), ToolError> {
-    let with = ReplayOptions {
-        files: options.with_payload.clone(),
-        validate: Vec::new(),
-        split: None,
-        ..options.clone()
-    };
-    let read = |paths: &[PathBuf]| -> Result<(Vec<Recording>, Vec<ReadReport>), ToolError> {
-        let read = |path: &PathBuf| Recording::read(path, &options.import);
-        let read = paths.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        Ok(read.into_iter().map(|read| (read.recording, read.report)).unzip())
-    };
-    let (with_mass, reports) = read(&with.files)?;
-    refuse_copies(&read(&options.files)?.0, &with_mass, "--with-payload")?;
-    let (without, with) = (record(leg, background, options)?, record(leg, background, &with)?);
+    let recording = |reads: &[Read]| reads.iter().map(|read| read.recording.clone()).collect::<Vec<_>>();
+    let (without, with) = (&recordings.training, &recordings.with_payload);
+    refuse_copies(&recording(without), &recording(with), "--with-payload")?;
+    let reports = with.iter().map(|read| read.report.clone()).collect();
+    let without = record(leg, background, without, options)?;
+    let with = record(leg, background, with, &ReplayOptions { split: None, ..options.clone() })?;
     let base = base_of(background, payload);
     let scale = Scale {
         payload: Some(*payload),
@@ -76,14 +67,16 @@ pub(super) fn load_base<const N: usize, const B: usize>(
     options.load.as_ref().map_or([0.0; B], |load| base_of(background, load))
 }
 
-/// Record of the unchanged training recordings.
+/// Record of unchanged recordings.
 fn record<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
+    training: &[Read],
     options: &ReplayOptions,
 ) -> Result<Record<f32, N, B>, ToolError> {
     let anatomy = anatomy::<N>(leg)?;
-    let Parts { training, screening, .. } = read_all(options, leg, &[1.0; N])?;
+    let recordings = Recordings { training: training.to_vec(), ..Recordings::default() };
+    let Parts { training, screening, .. } = parts(&recordings, options, leg, &[1.0; N])?;
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
     let samples: Vec<Samples<N>> =

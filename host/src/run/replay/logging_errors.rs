@@ -23,7 +23,7 @@ use crate::run::logging_errors::{LoggingErrors, Question, cause, noise as scatte
 use crate::run::replay::cleaning::cleaned;
 use crate::run::replay::recordings::leave_one_out;
 use crate::run::replay::screening::Screening;
-use crate::run::replay::{Parts, ReplayOptions, bandwidth_error, read_all};
+use crate::run::replay::{Parts, Recordings, ReplayOptions, bandwidth_error, parts};
 use crate::run::resample::{Resampled, TRUSTED_BANDWIDTH};
 
 /// Misfit over noise up to which noise explains the misfit, so that limits follow from the noise.
@@ -188,9 +188,10 @@ pub(super) fn encoders<const N: usize>(wholes: &[Whole], leg: &LegFile) -> Encod
 pub(super) fn chosen_bandwidth<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
+    recordings: &Recordings,
     options: &ReplayOptions,
 ) -> Result<f64, ToolError> {
-    let Parts { wholes, screening, .. } = read_all(options, leg, &[1.0; N])?;
+    let Parts { wholes, screening, .. } = parts(recordings, options, leg, &[1.0; N])?;
     let robust = options.estimator == scarab::ident::Estimator::Robust;
     let (motions, _) = motions(&wholes, &anatomy::<N>(leg)?, robust, &screening);
     let encoders: Encoders<N> = encoders(&wholes, leg);

@@ -1,7 +1,7 @@
 //! Examines the recordings before anything is identified: copies, and samples that no sensor measured.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
@@ -34,10 +34,10 @@ impl Screening {
         Self { findings, spans }
     }
 
-    /// Prints the findings that do not refuse.
-    pub(super) fn warn(&self) {
+    /// The findings that do not refuse, in words.
+    pub(super) fn warnings(&self) -> impl Iterator<Item = String> {
         let findings = self.findings.iter().filter(|finding| !finding.refuses && finding.name != QUANTISED);
-        findings.for_each(|finding| crate::run::replay::warn(Path::new(&finding.file), &finding.text));
+        findings.map(|finding| format!("{}: {}", finding.file, finding.text))
     }
 
     /// Grid points of a recording, from `start_s` at 500 Hz, that touch an excluded stretch.

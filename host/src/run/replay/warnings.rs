@@ -1,0 +1,61 @@
+//! Doubts about a recording or its leg that do not change the result.
+
+use crate::formats::leg_file::{DEFAULT_RANGE_DEG, LegFile};
+use crate::formats::recording::Recording;
+
+/// Excess over the leg's range from which a warning is given.
+const RANGE_MARGIN_DEG: f64 = 5.0;
+
+/// Signs that the recording is from another machine.
+pub(super) fn of_another_leg(recording: &Recording, leg: &LegFile) -> impl Iterator<Item = String> {
+    let file = recording.file.display();
+    let (in_file, in_leg) = (recording.joints_in_file, leg.joints.len());
+    let more_joints = (in_file > in_leg).then(|| {
+        format!(
+            "{file}: holds {in_file} joints, the leg `{}` has {in_leg}: the other columns are ignored, as if those joints were at rest",
+            leg.name
+        )
+    });
+    let outside = recording.joints.iter().zip(&leg.joints).enumerate().filter_map(move |(number, (series, joint))| {
+        let angles = series.position_rad.iter().map(|angle| angle.to_degrees());
+        let (low, high) =
+            angles.fold((f64::MAX, f64::MIN), |(low, high), angle| (low.min(angle), high.max(angle)));
+        let [lower, upper] = joint.range_deg;
+        let is_stated = joint.range_deg != DEFAULT_RANGE_DEG;
+        let is_outside = low < lower - RANGE_MARGIN_DEG || high > upper + RANGE_MARGIN_DEG;
+        (is_stated && is_outside).then(|| {
+            format!(
+                "{file}: q{}_rad goes from {low:.0} to {high:.0} deg, the range of `{}` is {lower:.0} to {upper:.0} deg: are \
+                 column, unit, direction and zero right?",
+                number + 1,
+                joint.name
+            )
+        })
+    });
+    more_joints.into_iter().chain(outside)
+}
+
+/// Denavit-Hartenberg numbers and gravity that suggest another convention.
+pub(super) fn of_geometry(leg: &LegFile) -> impl Iterator<Item = String> {
+    let first = leg.joints.first();
+    let ineffective = first.filter(|first| first.dh.a != 0.0).map(|first| {
+        format!(
+            "{}: `dh.a` of joint `{}` is {} m and has no effect: it is the distance from the joint before. Is it the \
+             length of this joint's link? Then it belongs to the next joint (docs/model.md)",
+            leg.name, first.name, first.dh.a
+        )
+    });
+    let [x, y, z] = leg.gravity;
+    let (sine, cosine) = first.map_or((0.0, 1.0), |first| first.dh.alpha.sin_cos());
+    let along = z * cosine - y * sine;
+    let across = (x * x + y * y + z * z - along * along).max(0.0).sqrt();
+    let is_parallel = leg.joints.iter().skip(1).all(|joint| joint.dh.alpha == 0.0);
+    let weightless = (is_parallel && across < 1e-3 * along.abs()).then(|| {
+        format!(
+            "{}: gravity is along the joints' axes, so no torque holds weight. In a vertical plane gravity lies in x \
+             and y of the base frame, because z is the first joint's axis",
+            leg.name
+        )
+    });
+    ineffective.into_iter().chain(weightless)
+}

@@ -1,0 +1,290 @@
+"""Shapes: a row for each sample, a column for each joint; `(joints,)` for a single sample. Units: rad, rad/s,
+rad/s2, N m, s. Every function raises `InputError` for an argument or file that cannot be used."""
+
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from typing import Any, Literal, final
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from ._records import Curves, Minimum, Parameter, Prediction, Recording, Samples, Simulation
+
+__all__ = [
+    "Identification",
+    "InputError",
+    "Leg",
+    "Motion",
+    "RefusedError",
+    "beetle_swarm",
+    "read_recording",
+]
+
+_Path = str | PathLike[str]
+_Array = NDArray[np.float64]
+_Triple = tuple[ArrayLike, ArrayLike, ArrayLike]
+
+class InputError(ValueError):
+    """An argument or a file cannot be used; the message says what is wrong, where, and what to do."""
+
+class RefusedError(RuntimeError):
+    """A model that was refused cannot be used; the message holds the reasons of the verdict."""
+
+@final
+class Leg:
+    """Leg of 1 to 3 joints: geometry (modified Denavit-Hartenberg), gravity, limits, and prior where known."""
+
+    @staticmethod
+    def from_toml(path: _Path) -> Leg:
+        """Reads a leg file (docs/files.md), or a shipped leg by name, such as 'mujoco-leg'."""
+
+    @staticmethod
+    def from_urdf(
+        path: _Path,
+        joints: Sequence[str] | None = None,
+        *,
+        locked: Mapping[str, float] | None = None,
+        gravity: Sequence[float] = ...,
+        parallel_rad: float = 0.0,
+        prior: bool = True,
+    ) -> Leg:
+        """Converts a robot description.
+
+        `joints`: the leg's joints, proximal first; default all that turn. `locked`: position of each joint that
+        is held, rad or m. `gravity`: m/s2 in the frame of the root, default (0, 0, -9.81). `parallel_rad`: axes within this angle count
+        as parallel, 0 to 0.01. `prior=False` leaves out the bodies. Remarks stand in `remarks`.
+        """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def joints(self) -> list[str]:
+        """Names of the joints, proximal first."""
+
+    @property
+    def toml(self) -> str:
+        """Text of the leg file."""
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a robot description states and the leg file does not hold."""
+
+    @property
+    def parameter_names(self) -> list[str]:
+        """Names of the 14 parameters of each joint, such as 'XX1': the columns of `regressor`.
+
+        XX..ZZ: inertia tensor about the frame's origin, kg m2; HX..HZ: first moment, kg m; M: mass, kg; IA: rotor
+        inertia, kg m2; FC: Coulomb friction, N m; FV: viscous friction, N m s/rad; OFF: offset, N m.
+        """
+
+    def save(self, path: _Path) -> None:
+        """Writes the leg file; a file that exists is refused."""
+
+    def parameters(self, of: Literal["truth", "prior"] | None = None) -> _Array:
+        """Parameters that the leg file states, shape (14 joints,); default: truth, else prior."""
+
+    def regressor(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, inertial_only: bool = False, dh: bool = False
+    ) -> _Array:
+        """Regressor Y of each state: `Y @ parameters` is the torque.
+
+        Shape (samples, joints, 14 joints); with `inertial_only` the ten inertial parameters of each link,
+        (samples, joints, 10 joints). `dh`: angles and torques of the D-H frames instead of anatomical ones.
+        Source: Khalil and Dombre, Modeling, Identification and Control of Robots (2002), ch. 9.
+        """
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        *,
+        parameters: ArrayLike | None = None,
+        of: Literal["truth", "prior"] | None = None,
+        dh: bool = False,
+    ) -> _Array:
+        """Torque of each state by Newton-Euler, friction and rotors included, shape (samples, joints).
+
+        `parameters`: 14 for each joint; default those of the leg file, as in `parameters(of)`.
+        """
+
+    def identify(
+        self,
+        t: ArrayLike,
+        q: ArrayLike,
+        tau: ArrayLike,
+        *,
+        also: _Triple | Sequence[_Triple] | None = None,
+        validate: _Triple | Sequence[_Triple] | None = None,
+        split: float | None = None,
+        bandwidth_hz: float | Literal["auto"] | None = None,
+        plan: Literal["one-time", "sequential"] = "one-time",
+        prior: str | None = None,
+        estimator: Literal["robust", "plain"] = "robust",
+        seed: int = 1,
+        torque_delay_ms: Sequence[float] = ...,
+        even_stamps: bool = False,
+        load: str | None = None,
+        payload: str | None = None,
+        with_payload: _Triple | Sequence[_Triple] | None = None,
+        temperature_c: float | None = None,
+    ) -> Identification:
+        """Identifies the leg from recordings, with the firmware's filters, estimate, swarm and verdict.
+
+        `t`: (samples,), strictly increasing, 10 Hz or faster; `q` and `tau`: (samples, joints). A message that
+        names `recording:17` means sample 17. `also`: more training recordings (t, q, tau). `validate`: held-out
+        recordings; `split`: share of each recording that trains. Without either, the result is not validated.
+        `bandwidth_hz`: -3 dB frequency of the low-pass, default that of the leg file (8 Hz). `prior`: 'none',
+        'file' or 'wrong:PERCENT'. `torque_delay_ms`: delay to be removed, one value or one for each joint.
+        `load`, `payload`: known mass as 'KG@JOINT:X_M', see `cargo sim replay --help`.
+        A recording that cannot be identified from still gives a result, whose verdict refuses it with reasons.
+        """
+
+    def excite(
+        self,
+        *,
+        duration_s: float = 22.0,
+        seed: int = 1,
+        evaluations: int = 48_000,
+        torque_noise_percent: float | None = None,
+        torque_margin_percent: float = 20.0,
+        assume_truth: bool = False,
+    ) -> Motion:
+        """Designs a motion that makes all parameters visible within the limits of the leg.
+
+        Needs `prior` or `truth` of every joint and a noise of the torque.
+        """
+
+    def simulate(
+        self,
+        *,
+        motion: Motion | None = None,
+        seed: int = 1,
+        torque_noise_percent: float | None = None,
+        drive: Literal["ideal", "full"] = "ideal",
+    ) -> Simulation:
+        """Drives and identifies a simulated leg (needs `truth`) with the firmware."""
+
+@final
+class Identification:
+    """Result of an identification. `print(result)` shows the tables of `cargo sim replay`."""
+
+    @property
+    def accepted(self) -> bool: ...
+    @property
+    def validated(self) -> bool:
+        """Whether unused motions were predicted."""
+
+    @property
+    def verdict(self) -> str:
+        """Verdict in one line."""
+
+    @property
+    def reasons(self) -> list[str]:
+        """Reasons of a refusal (docs/method.md, verdict)."""
+
+    @property
+    def warnings(self) -> list[str]: ...
+    @property
+    def bandwidth_hz(self) -> float: ...
+    @property
+    def names(self) -> list[str]:
+        """Names of the k base parameters: the combinations that torque determines."""
+
+    @property
+    def units(self) -> list[str]: ...
+    @property
+    def values(self) -> _Array:
+        """Base parameters, shape (k,)."""
+
+    @property
+    def sigma(self) -> _Array:
+        """Their standard deviations, shape (k,)."""
+
+    @property
+    def covariance(self) -> _Array:
+        """Their covariance, shape (k, k)."""
+
+    @property
+    def sums(self) -> _Array:
+        """Factors of the combinations, shape (k, 14 joints): `sums @ leg.parameters()` are the base parameters
+        of a leg with these parameters."""
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """The 14 parameters of each joint, with their status."""
+
+    @property
+    def motions(self) -> list[Curves]:
+        """Measured and predicted torque of each motion."""
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Everything, as `cargo sim replay --json` writes it (docs/files.md)."""
+
+    def predict(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, dh: bool = False) -> Prediction:
+        """Torque of each state with its standard deviation. Raises `RefusedError` unless accepted."""
+
+    def save(self, path: _Path) -> None:
+        """Writes the model file that `cargo sim predict` reads. Raises `RefusedError` unless accepted."""
+
+    def write_report(self, path: _Path) -> None:
+        """Writes the HTML page of figures, tables and verdict."""
+
+    def plot(self, joint: str | None = None) -> Figure:
+        """Draws measured and predicted torque with matplotlib, for all joints or one."""
+
+@final
+class Motion:
+    """Exciting motion of a leg, from rest to rest."""
+
+    @staticmethod
+    def load(path: _Path, leg: Leg) -> Motion:
+        """Reads a motion file of this leg."""
+
+    @property
+    def duration_s(self) -> float: ...
+    @property
+    def report(self) -> dict[str, Any] | None:
+        """Expected standard deviations and limits of a design; None for a motion from a file."""
+
+    def samples(self, rate_hz: int = 500) -> Samples:
+        """States at a divisor of 4000 Hz."""
+
+    def to_trajectory(self, rate_hz: int = 500) -> str:
+        """YAML of a ROS 2 trajectory_msgs/JointTrajectory."""
+
+    def save(self, path: _Path) -> None:
+        """Writes the motion file that `cargo sim identify --excitation` reads."""
+
+def read_recording(
+    path: _Path,
+    leg: Leg,
+    *,
+    columns: str = "",
+    units: str = "",
+    skip_bad: bool = False,
+    delimiter: Literal["comma", "semicolon", "tab"] | None = None,
+    decimal: Literal["point", "comma"] | None = None,
+) -> Recording:
+    """Reads a CSV recording (also .csv.gz), as `cargo sim replay` does.
+
+    `columns`: 't=time,q1=position_0,tau1=4'; `units`: 'ms,deg,tau2=mNm'. Nothing is converted unless stated.
+    """
+
+def beetle_swarm(
+    objective: Callable[[NDArray[np.float64]], float],
+    bounds: Sequence[tuple[float, float]],
+    *,
+    evaluations: int = 20_000,
+    goal: float | None = None,
+    seed: int = 1,
+    rules: Literal["adaptive", "paper"] = "adaptive",
+) -> Minimum:
+    """Minimises a function over a box of at most 64 coordinates with the firmware's swarm of 20 beetles.
+
+    `objective` gets an array of shape (coordinates,); a value that is not finite drops the candidate. The search
+    ends after `evaluations`, or at `goal`. An exception of the objective ends it. The same seed gives the same
+    result. Method: docs/bso.md; `rules='paper'` are the printed equations with (29) corrected.
+    """

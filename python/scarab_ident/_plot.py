@@ -1,0 +1,57 @@
+"""Figure of an identification; needs matplotlib."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def plot(identification, joints, joint=None):
+    """Draws measured and predicted torque and their difference, a column for each joint."""
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError("plot() needs matplotlib: pip install 'scarab-ident[plot]'") from error
+    if joint is not None and joint not in joints:
+        raise ValueError(f"joint is '{joint}'; the leg has {', '.join(joints)}")
+    shown = joints if joint is None else [joint]
+    figure, axes = pyplot.subplots(
+        2,
+        len(shown),
+        sharex="col",
+        squeeze=False,
+        figsize=(6.4 * len(shown), 4.8),
+        gridspec_kw={"height_ratios": [2, 1]},
+    )
+    # Colours of Okabe and Ito (2008), distinct for colour-blind readers.
+    measured, predicted, unused = "#000000", "#d55e00", "#0072b2"
+    for column, name in enumerate(shown):
+        index = joints.index(name)
+        torque, residual = axes[0][column], axes[1][column]
+        start, labelled = 0.0, set()
+        for motion in identification.motions:
+            if motion.time_s.size == 0:
+                continue
+            # Motions follow each other with a gap of a second.
+            time = start + motion.time_s - motion.time_s[0]
+            start = time[-1] + 1.0
+            is_unused = motion.role != "identified from"
+            colour = unused if is_unused else predicted
+            label = "predicted, unused motion" if is_unused else "predicted"
+
+            def once(text):
+                text = None if text in labelled else text
+                labelled.add(text)
+                return text
+
+            torque.plot(time, motion.measured_nm[:, index], color=measured, lw=0.8, label=once("measured"))
+            torque.plot(time, motion.predicted_nm[:, index], color=colour, lw=0.8, label=once(label))
+            difference = motion.measured_nm[:, index] - motion.predicted_nm[:, index]
+            residual.plot(time, np.where(motion.at_rest[:, index], np.nan, difference), color=colour, lw=0.8)
+        torque.set_title(f"{name}: {identification.verdict.removeprefix('verdict: ')}", fontsize="medium")
+        torque.set_ylabel("torque [N m]")
+        torque.legend(loc="upper right", fontsize="small")
+        residual.set_ylabel("difference [N m]")
+        residual.set_xlabel("time of the motions, one after the other [s]")
+        residual.axhline(0.0, color="#999999", lw=0.6)
+    figure.tight_layout()
+    return figure

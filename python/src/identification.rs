@@ -1,0 +1,244 @@
+//! Class `Identification`: parameters with their uncertainty, and the verdict.
+
+use std::path::PathBuf;
+
+use numpy::{PyArray1, PyArrayDyn};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use scarab_host::base::error::ToolError;
+use scarab_host::base::files;
+use scarab_host::formats::leg_file::LegFile;
+use scarab_host::formats::model_file::{BaseSet, ModelFile};
+use scarab_host::leg::states::Angles;
+use scarab_host::report::series::{JointCurves, MotionSeries, Series};
+use scarab_host::report::{RunReport, Source};
+use scarab_host::run::predict::Predictor;
+use scarab_host::run::replay::Replayed;
+use scarab_host::view::{figures, html, tables};
+
+use crate::arrays::{Numbers, object, shaped, vector};
+use crate::dynamics::{Dynamics, States};
+use crate::error::{RefusedError, raised};
+use crate::leg::{states, with_joints};
+use crate::recording::record;
+
+/// Result of an identification.
+#[pyclass(frozen, module = "scarab_ident")]
+pub struct Identification {
+    leg: LegFile,
+    run: RunReport,
+    series: Series,
+    sources: Vec<Source>,
+    bandwidth_hz: f64,
+    warnings: Vec<String>,
+    base: BaseSet,
+}
+
+impl Identification {
+    /// Result of recordings; their warnings become warnings of Python.
+    pub fn of_replay(py: Python<'_>, leg: LegFile, replayed: Replayed) -> PyResult<Self> {
+        let Replayed { bandwidth_hz, run, sources, series, warnings } = replayed;
+        let warn = py.import("warnings")?.getattr("warn")?;
+        for warning in &warnings {
+            warn.call1((warning,))?;
+        }
+        let base = BaseSet::of(&run);
+        Ok(Self { leg, run, series, sources, bandwidth_hz, warnings, base })
+    }
+
+    /// Result of a simulated leg.
+    pub fn of_simulation(py: Python<'_>, leg: LegFile, run: RunReport, series: Series) -> PyResult<Py<Self>> {
+        let (bandwidth_hz, base) = (leg.bandwidth_hz, BaseSet::of(&run));
+        Py::new(py, Self { leg, run, series, sources: Vec::new(), bandwidth_hz, warnings: Vec::new(), base })
+    }
+
+    fn model(&self) -> PyResult<ModelFile> {
+        ModelFile::of(&self.leg, &self.run, self.bandwidth_hz).ok_or_else(|| {
+            let failed = self.run.findings.iter().filter(|finding| !finding.passed);
+            let words: Vec<_> =
+                failed.map(|finding| format!("{}: {}", finding.reason, finding.words)).collect();
+            RefusedError::new_err(format!("{}: {}", tables::verdict_line(&self.run), words.join("; ")))
+        })
+    }
+}
+
+#[pymethods]
+impl Identification {
+    #[getter]
+    fn accepted(&self) -> bool {
+        self.run.accepted()
+    }
+
+    #[getter]
+    fn validated(&self) -> bool {
+        self.run.validated
+    }
+
+    #[getter]
+    fn verdict(&self) -> String {
+        tables::verdict_line(&self.run)
+    }
+
+    #[getter]
+    fn reasons(&self) -> Vec<String> {
+        self.run.reasons.iter().map(|reason| (*reason).to_owned()).collect()
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    #[getter]
+    fn bandwidth_hz(&self) -> f64 {
+        self.bandwidth_hz
+    }
+
+    #[getter]
+    fn names(&self) -> Vec<&str> {
+        self.base.parameters.iter().map(|base| base.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn units(&self) -> Vec<&str> {
+        self.base.parameters.iter().map(|base| base.unit.as_str()).collect()
+    }
+
+    #[getter]
+    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, self.base.parameters.iter().map(|base| base.value).collect())
+    }
+
+    #[getter]
+    fn sigma<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, self.base.parameters.iter().map(|base| base.sigma).collect())
+    }
+
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let size = self.base.parameters.len();
+        shaped(py, self.base.covariance.iter().flatten().copied().collect(), &[size, size], false)
+    }
+
+    /// Factors of the sums: row i times the leg's parameters is value i.
+    #[getter]
+    fn sums<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let all: Vec<&str> = self.run.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+        let rows = self.base.parameters.iter().flat_map(|base| {
+            all.iter().map(|name| base.terms.get(*name).copied().unwrap_or(0.0)).collect::<Vec<_>>()
+        });
+        shaped(py, rows.collect(), &[self.base.parameters.len(), all.len()], false)
+    }
+
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (all, class) = (PyDict::new(py), record(py, "Parameter")?);
+        for one in &self.run.parameters {
+            let fields = (one.value.known(), one.sigma.known(), one.unit, one.status);
+            all.set_item(&one.name, class.call1(fields)?)?;
+        }
+        Ok(all)
+    }
+
+    #[getter]
+    fn motions<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let class = record(py, "Curves")?;
+        let of = |motion: &MotionSeries, curve: fn(&JointCurves) -> &[f64]| {
+            let (rows, joints) = (motion.time_s.len(), motion.joints.len());
+            let numbers = (0..rows).flat_map(|row| motion.joints.iter().map(move |joint| curve(joint)[row]));
+            shaped(py, numbers.collect(), &[rows, joints], false)
+        };
+        let one = |motion: &MotionSeries| {
+            let is_at_rest: Vec<Vec<bool>> = (0..motion.time_s.len())
+                .map(|row| motion.joints.iter().map(|joint| joint.still[row]).collect())
+                .collect();
+            class.call1((
+                &motion.name,
+                motion.role.name(),
+                vector(py, motion.time_s.clone()),
+                of(motion, |joint| &joint.measured_deg)?,
+                of(motion, |joint| &joint.measured_nm)?,
+                of(motion, |joint| &joint.predicted_nm)?,
+                py.import("numpy")?.call_method1("array", (is_at_rest, "bool"))?,
+            ))
+        };
+        self.series.motions.iter().map(one).collect()
+    }
+
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        object(
+            py,
+            &serde_json::to_string(&self.run).map_err(|error| raised(ToolError::input(error.to_string())))?,
+        )
+    }
+
+    #[pyo3(signature = (q, qd, qdd, *, dh = false))]
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        q: Numbers<'py>,
+        qd: Numbers<'py>,
+        qdd: Numbers<'py>,
+        dh: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let model = self.model()?;
+        let joints = self.leg.joints.len();
+        let (states, count, is_single) = states(&q, &qd, &qdd, joints)?;
+        let angles = if dh { Angles::DenavitHartenberg } else { Angles::Anatomical };
+        let (torque, sigma) = py
+            .detach(|| with_joints!(self.leg, predicted(&self.leg, &model, angles, &states)))
+            .map_err(raised)?;
+        let of = |numbers| shaped(py, numbers, &[count, joints], is_single);
+        record(py, "Prediction")?.call1((of(torque)?, of(sigma)?))
+    }
+
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        self.model()?.write(&path).map_err(raised)
+    }
+
+    fn write_report(&self, path: PathBuf) -> PyResult<()> {
+        let names: Vec<_> = self.leg.joints.iter().map(|joint| joint.name.as_str()).collect();
+        let written = || -> Result<(), ToolError> {
+            let drawn = figures::all(&names, &self.run, &self.series)?;
+            let mut circumstances = html::Circumstances::of_command(&self.leg, []);
+            circumstances.command = "scarab_ident (Python)".into();
+            files::write(&path, html::page(&circumstances, &self.run, &self.sources, &drawn)?)
+        };
+        written().map_err(raised)
+    }
+
+    #[pyo3(signature = (joint = None))]
+    fn plot<'py>(slf: &Bound<'py, Self>, joint: Option<&str>) -> PyResult<Bound<'py, PyAny>> {
+        let joints: Vec<&str> = slf.get().leg.joints.iter().map(|joint| joint.name.as_str()).collect();
+        slf.py().import("scarab_ident._plot")?.call_method1("plot", (slf, joints, joint))
+    }
+
+    fn __str__(&self) -> String {
+        tables::run_text(&self.run)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Identification of '{}': {}>", self.run.leg, tables::verdict_line(&self.run))
+    }
+}
+
+/// Torques and their standard deviations.
+fn predicted<const N: usize>(
+    leg: &LegFile,
+    model: &ModelFile,
+    angles: Angles,
+    states: &States,
+) -> Result<(Vec<f64>, Vec<f64>), ToolError> {
+    let (predictor, dynamics) = (Predictor::<N>::new(model)?, Dynamics::<N>::of(leg, angles)?);
+    let samples = 0..states.q.len() / N;
+    let all = samples.flat_map(|sample| {
+        let torques = predictor.torques(&dynamics.state(states, sample));
+        torques
+            .into_iter()
+            .enumerate()
+            .map(|(joint, torque)| (dynamics.outside(joint, torque.total()), torque.sigma))
+            .collect::<Vec<_>>()
+    });
+    Ok(all.unzip())
+}

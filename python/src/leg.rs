@@ -1,0 +1,447 @@
+//! Class `Leg`.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use numpy::{PyArray1, PyArrayDyn};
+use pyo3::prelude::*;
+use scarab::ident::{Estimator, Plan, prior_parameters};
+use scarab::leg::{LoggedSample, Segment};
+use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
+use scarab_host::base::error::ToolError;
+use scarab_host::base::files;
+use scarab_host::formats::leg_file::LegFile;
+use scarab_host::formats::leg_file::check::LARGEST_NOISE_PERCENT;
+use scarab_host::formats::recording::Recording;
+use scarab_host::formats::robot::Robot;
+use scarab_host::leg::from_robot::{self, RobotOptions};
+use scarab_host::leg::placed_mass::PlacedMass;
+use scarab_host::leg::setup::{PriorChoice, links};
+use scarab_host::leg::states::Angles;
+use scarab_host::rig::options::{DriveModel, SimulationOptions};
+use scarab_host::run::excite::assumption::Assumption;
+use scarab_host::run::excite::bench::ExciteOptions;
+use scarab_host::run::excite::design::DesignOptions;
+use scarab_host::run::excite::run::{check, excite};
+use scarab_host::run::identify::recorded;
+use scarab_host::run::replay::{Recordings, ReplayOptions, replay};
+use scarab_host::run::simulate::{SimulatedRun, simulate};
+use scarab_host::with_leg_size;
+
+use crate::arrays::{Numbers, Rows, column, shaped, vector};
+use crate::dynamics::{Dynamics, States};
+use crate::error::{argument, raised};
+use crate::identification::Identification;
+use crate::motion::Motion;
+use crate::recording::{Several, named, read, record, recording};
+
+/// Inertial parameters of a link.
+const INERTIAL: usize = 10;
+
+/// Leg of 1 to 3 joints.
+#[pyclass(frozen, module = "scarab_ident")]
+pub struct Leg {
+    pub file: LegFile,
+    /// Text of the leg file.
+    pub text: String,
+    remarks: Vec<String>,
+}
+
+/// Calls a function with the constant `N`, the number of the leg's joints.
+macro_rules! with_joints {
+    ($leg:expr, $body:ident ( $($argument:expr),* )) => {
+        match $leg.joints.len() {
+            1 => $body::<1>($($argument),*),
+            2 => $body::<2>($($argument),*),
+            _ => $body::<3>($($argument),*),
+        }
+    };
+}
+pub(crate) use with_joints;
+
+#[pymethods]
+impl Leg {
+    #[staticmethod]
+    fn from_toml(path: PathBuf) -> PyResult<Self> {
+        let (text, file) = LegFile::text(&path.to_string_lossy()).map_err(raised)?;
+        Ok(Self { file: LegFile::parse(&text, &file).map_err(raised)?, text, remarks: Vec::new() })
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (path, joints = None, *, locked = None, gravity = [0.0, 0.0, -9.81], parallel_rad = 0.0, prior = true))]
+    fn from_urdf(
+        path: PathBuf,
+        joints: Option<Vec<String>>,
+        locked: Option<HashMap<String, f64>>,
+        gravity: [f64; 3],
+        parallel_rad: f64,
+        prior: bool,
+    ) -> PyResult<Self> {
+        let most = from_robot::LARGEST_PARALLEL_RAD;
+        if !(0.0..=most).contains(&parallel_rad) {
+            return Err(argument(format!("parallel_rad is {parallel_rad}; it must be from 0 to {most}")));
+        }
+        let robot = files::read_text(&path)
+            .and_then(|text| Robot::parse(&text, &path.display().to_string()))
+            .map_err(raised)?;
+        let options = RobotOptions {
+            joints: joints.unwrap_or_default(),
+            locked: locked.unwrap_or_default().into_iter().collect(),
+            gravity: Vector3::from(gravity),
+            parallel_rad,
+            with_prior: prior,
+        };
+        let found = from_robot::leg(&robot, &options).map_err(raised)?;
+        Ok(Self { file: found.leg, text: found.text, remarks: found.remarks })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.file.name
+    }
+
+    #[getter]
+    fn joints(&self) -> Vec<&str> {
+        self.file.joints.iter().map(|joint| joint.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn toml(&self) -> &str {
+        &self.text
+    }
+
+    #[getter]
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.clone()
+    }
+
+    #[getter]
+    fn parameter_names(&self) -> Vec<String> {
+        let of_joint = |joint: usize| {
+            Parameter::ALL.into_iter().map(move |parameter| format!("{}{joint}", parameter.symbol()))
+        };
+        (1..=self.file.joints.len()).flat_map(of_joint).collect()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Leg('{}', joints={:?})", self.file.name, self.joints())
+    }
+
+    /// Writes the leg file; a file that exists is refused.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        files::check_new(&path).and_then(|()| files::write_new(&path, &self.text)).map_err(raised)
+    }
+
+    #[pyo3(signature = (of = None))]
+    fn parameters<'py>(&self, py: Python<'py>, of: Option<&str>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let numbers = with_joints!(self.file, flat_parameters(&self.file, of))?;
+        Ok(vector(py, numbers))
+    }
+
+    #[pyo3(signature = (q, qd, qdd, *, inertial_only = false, dh = false))]
+    fn regressor<'py>(
+        &self,
+        py: Python<'py>,
+        q: Numbers<'py>,
+        qd: Numbers<'py>,
+        qdd: Numbers<'py>,
+        inertial_only: bool,
+        dh: bool,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let joints = self.file.joints.len();
+        let (states, count, is_single) = states(&q, &qd, &qdd, joints)?;
+        let columns = if inertial_only { INERTIAL } else { PARAMETERS_PER_JOINT };
+        let numbers =
+            py.detach(|| with_joints!(self.file, regressors(&self.file, angles(dh), &states, columns)))?;
+        shaped(py, numbers, &[count, joints, joints * columns], is_single)
+    }
+
+    #[pyo3(signature = (q, qd, qdd, *, parameters = None, of = None, dh = false))]
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: Numbers<'py>,
+        qd: Numbers<'py>,
+        qdd: Numbers<'py>,
+        parameters: Option<Numbers<'py>>,
+        of: Option<&str>,
+        dh: bool,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let joints = self.file.joints.len();
+        let (states, count, is_single) = states(&q, &qd, &qdd, joints)?;
+        let parameters = match (parameters, of) {
+            (Some(_), Some(_)) => return Err(argument("parameters and of are both given: give one")),
+            (Some(parameters), None) => {
+                let numbers = column("parameters", &parameters)?;
+                let needed = joints * PARAMETERS_PER_JOINT;
+                if numbers.len() != needed {
+                    let found = numbers.len();
+                    return Err(argument(format!(
+                        "parameters has {found} numbers; needed are {needed}, in the order of parameter_names"
+                    )));
+                }
+                numbers
+            }
+            (None, of) => with_joints!(self.file, flat_parameters(&self.file, of))?,
+        };
+        let numbers =
+            py.detach(|| with_joints!(self.file, torques(&self.file, angles(dh), &states, &parameters)))?;
+        shaped(py, numbers, &[count, joints], is_single)
+    }
+
+    #[pyo3(signature = (
+        t, q, tau, *, also = None, validate = None, split = None, bandwidth_hz = None, plan = "one-time",
+        prior = None, estimator = "robust", seed = 1, torque_delay_ms = Vec::new(), even_stamps = false,
+        load = None, payload = None, with_payload = None, temperature_c = None
+    ))]
+    fn identify<'py>(
+        &self,
+        py: Python<'py>,
+        t: Numbers<'py>,
+        q: Numbers<'py>,
+        tau: Numbers<'py>,
+        also: Option<Several<'py>>,
+        validate: Option<Several<'py>>,
+        split: Option<f64>,
+        bandwidth_hz: Option<Bandwidth>,
+        plan: &str,
+        prior: Option<&str>,
+        estimator: &str,
+        seed: u64,
+        torque_delay_ms: Vec<f64>,
+        even_stamps: bool,
+        load: Option<&str>,
+        payload: Option<&str>,
+        with_payload: Option<Several<'py>>,
+        temperature_c: Option<f64>,
+    ) -> PyResult<Identification> {
+        if split.is_some_and(|share| !(share > 0.0 && share < 1.0)) {
+            return Err(argument("split must be above 0 and below 1"));
+        }
+        if split.is_some() && validate.is_some() {
+            return Err(argument("split and validate are both given: give one"));
+        }
+        if payload.is_some() != with_payload.is_some() {
+            return Err(argument("payload and with_payload belong together: give both or none"));
+        }
+        let joints = self.file.joints.len();
+        let all = |recordings: Option<Several<'py>>, name: &str| {
+            recordings.map_or_else(|| Ok(Vec::new()), |recordings| recordings.read(name, joints))
+        };
+        let mut recordings = Recordings {
+            training: vec![read("recording", &(t, q, tau), joints)?],
+            held_out: all(validate, "validate")?,
+            with_payload: all(with_payload, "with_payload")?,
+        };
+        recordings.training.extend(all(also, "also")?);
+        let leg = LegFile { temperature_c: temperature_c.or(self.file.temperature_c), ..self.file.clone() };
+        let placed = |mass: Option<&str>, name: &str| -> PyResult<_> {
+            let mass = mass.map(str::parse::<PlacedMass>).transpose();
+            let mass = mass.map_err(|reason| argument(format!("{name}: {reason}")))?;
+            mass.map(|mass| mass.on(&leg, name)).transpose().map_err(raised)
+        };
+        let options = ReplayOptions {
+            split,
+            bandwidth_hz: match bandwidth_hz {
+                Some(Bandwidth::Hertz(hz)) => hz,
+                _ => leg.bandwidth_hz,
+            },
+            chooses_bandwidth: match &bandwidth_hz {
+                Some(Bandwidth::Word(word)) if word == "auto" => true,
+                Some(Bandwidth::Word(word)) => {
+                    return Err(argument(format!(
+                        "bandwidth_hz is '{word}'; needed is a number of Hz, or 'auto'"
+                    )));
+                }
+                _ => false,
+            },
+            plan: named(
+                "plan",
+                Some(plan),
+                &[("one-time", Plan::OneTime), ("sequential", Plan::Sequential)],
+            )?
+            .unwrap_or_default(),
+            prior: match prior {
+                Some(prior) => prior.parse().map_err(|reason| argument(format!("prior: {reason}")))?,
+                None => PriorChoice::Default,
+            },
+            estimator: named(
+                "estimator",
+                Some(estimator),
+                &[("robust", Estimator::Robust), ("plain", Estimator::Plain)],
+            )?
+            .unwrap_or_default(),
+            swarm_seed: seed,
+            csv: None,
+            torque_delay_ms,
+            even_stamps,
+            load: placed(load, "load")?,
+            payload: placed(payload, "payload")?,
+        };
+        let (recordings, options) = (&recordings, &options);
+        let replayed = py
+            .detach(|| {
+                let leg = &leg;
+                with_leg_size!(leg, replay(leg, recordings, options))
+            })
+            .map_err(raised)?;
+        Identification::of_replay(py, leg, replayed)
+    }
+
+    #[pyo3(signature = (
+        *, duration_s = 22.0, seed = 1, evaluations = 48_000, torque_noise_percent = None,
+        torque_margin_percent = 20.0, assume_truth = false
+    ))]
+    fn excite(
+        &self,
+        py: Python<'_>,
+        duration_s: f64,
+        seed: u64,
+        evaluations: u32,
+        torque_noise_percent: Option<f64>,
+        torque_margin_percent: f64,
+        assume_truth: bool,
+    ) -> PyResult<Motion> {
+        check_noise(torque_noise_percent)?;
+        let options = &ExciteOptions {
+            design: DesignOptions { duration_s, seed, evaluations },
+            given: None,
+            carried: Vec::new(),
+            torque_noise_percent,
+            margin_percent: torque_margin_percent,
+            assumption: if assume_truth { Assumption::Truth } else { Assumption::Best },
+        };
+        options.check().map_err(argument)?;
+        let leg = &self.file;
+        let excited = py.detach(|| with_leg_size!(leg, excite(leg, options))).map_err(raised)?;
+        Motion::of_design(leg.clone(), excited)
+    }
+
+    #[pyo3(signature = (*, motion = None, seed = 1, torque_noise_percent = None, drive = "ideal"))]
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        motion: Option<&Motion>,
+        seed: u64,
+        torque_noise_percent: Option<f64>,
+        drive: &str,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        check_noise(torque_noise_percent)?;
+        let drives = [("ideal", DriveModel::Ideal), ("full", DriveModel::Full)];
+        let excitation = motion.map(|motion| motion.excitation.clone());
+        let options = &SimulationOptions {
+            torque_noise_percent,
+            drive: named("drive", Some(drive), &drives)?.unwrap_or_default(),
+            excitation,
+            with_series: true,
+            ..SimulationOptions::of_seed(seed)
+        };
+        let leg = &self.file;
+        let (identification, recordings) =
+            py.detach(|| with_leg_size!(leg, simulated(leg, options))).map_err(raised)?;
+        let identification =
+            Identification::of_simulation(py, leg.clone(), identification.0, identification.1)?;
+        let mut recordings = recordings.iter();
+        let training = recordings.next().map(|first| recording(py, first)).transpose()?;
+        let validation = recordings.map(|other| recording(py, other)).collect::<PyResult<Vec<_>>>()?;
+        record(py, "Simulation")?.call1((training, validation, identification))
+    }
+}
+
+/// Bandwidth as given: a frequency, or `auto`.
+#[derive(FromPyObject)]
+pub enum Bandwidth {
+    Hertz(f64),
+    Word(String),
+}
+
+fn check_noise(percent: Option<f64>) -> PyResult<()> {
+    match percent {
+        Some(percent) if !(0.0..=LARGEST_NOISE_PERCENT).contains(&percent) => Err(argument(format!(
+            "torque_noise_percent is {percent}; it must be from 0 to {LARGEST_NOISE_PERCENT}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+fn angles(dh: bool) -> Angles {
+    if dh { Angles::DenavitHartenberg } else { Angles::Anatomical }
+}
+
+/// States of three arrays, their number, and whether a single state was given.
+pub fn states(
+    q: &Numbers<'_>,
+    qd: &Numbers<'_>,
+    qdd: &Numbers<'_>,
+    joints: usize,
+) -> PyResult<(States, usize, bool)> {
+    let [q, qd, qdd] =
+        [("q", q), ("qd", qd), ("qdd", qdd)].map(|(name, array)| Rows::of(name, array, joints));
+    let (q, qd, qdd) = (q?, qd?, qdd?);
+    for (name, other) in [("qd", &qd), ("qdd", &qdd)] {
+        if (other.count(), other.is_single) != (q.count(), q.is_single) {
+            return Err(argument(format!("{name} has {} samples, q has {}", other.count(), q.count())));
+        }
+    }
+    let (count, is_single) = (q.count(), q.is_single);
+    Ok((States { q: q.numbers, qd: qd.numbers, qdd: qdd.numbers }, count, is_single))
+}
+
+fn regressors<const N: usize>(
+    leg: &LegFile,
+    angles: Angles,
+    states: &States,
+    columns: usize,
+) -> PyResult<Vec<f64>> {
+    Ok(Dynamics::<N>::of(leg, angles).map_err(raised)?.regressors(states, columns))
+}
+
+fn torques<const N: usize>(
+    leg: &LegFile,
+    angles: Angles,
+    states: &States,
+    parameters: &[f64],
+) -> PyResult<Vec<f64>> {
+    let parameters: LegParameters<f64, N> = core::array::from_fn(|joint| {
+        core::array::from_fn(|parameter| parameters[joint * PARAMETERS_PER_JOINT + parameter])
+    });
+    Ok(Dynamics::<N>::of(leg, angles).map_err(raised)?.torques(states, &parameters))
+}
+
+/// Parameters of the leg file in the order of the names: `truth`, `prior`, or the first that exists.
+fn flat_parameters<const N: usize>(leg: &LegFile, of: Option<&str>) -> PyResult<Vec<f64>> {
+    let truth = || links::<N>(leg, |joint| joint.truth.as_ref());
+    let prior = || links::<N>(leg, |joint| joint.prior.as_ref());
+    let (found, needed) = match of {
+        None => (truth().or_else(prior), "`truth` or `prior`"),
+        Some("truth") => (truth(), "`truth`"),
+        Some("prior") => (prior(), "`prior`"),
+        Some(other) => return Err(argument(format!("of is '{other}'; possible are 'truth', 'prior'"))),
+    };
+    let found = found.ok_or_else(|| {
+        argument(format!("the leg `{}` has no {needed} for every joint: give parameters", leg.name))
+    })?;
+    Ok(prior_parameters(&found).into_iter().flatten().collect())
+}
+
+/// Report and curves of a simulation, and its recordings, the training motion first.
+type Simulated = ((scarab_host::report::RunReport, scarab_host::report::series::Series), Vec<Recording>);
+
+fn simulated<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &SimulationOptions,
+) -> Result<Simulated, ToolError> {
+    if let Some(motion) = &options.excitation {
+        check::<N, B>(leg, Path::new("motion"), motion, &[])?;
+    }
+    let SimulatedRun { report, log, series }: SimulatedRun<N> = simulate::<N, B>(leg, options)?;
+    let of = |segment: Segment| -> Vec<LoggedSample<N>> {
+        log.iter().filter(|logged| logged.segment == Some(segment)).copied().collect()
+    };
+    let segments = std::iter::once(Segment::Training).chain((0..=u8::MAX).map(Segment::Validation));
+    let recordings = segments
+        .map(|segment| recorded(Path::new("simulation"), leg, &of(segment)))
+        .take_while(|recording| !recording.time_s.is_empty());
+    Ok(((report, series), recordings.collect()))
+}

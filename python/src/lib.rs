@@ -1,0 +1,41 @@
+//! `scarab_ident._native`: Scarab's model and identification for Python.
+//!
+//! The module converts arrays, calls the functions of `scarab-host` and converts the results; it decides
+//! nothing. Shapes, units and errors of every function stand in `scarab_ident/_native.pyi`.
+//!
+//! | Python | Rust |
+//! | --- | --- |
+//! | `Leg` | [`scarab_host::formats::leg_file::LegFile`] |
+//! | `Leg.identify` | [`scarab_host::run::replay`], as `cargo sim replay` |
+//! | `Leg.simulate` | [`scarab_host::run::simulate`], as `cargo sim identify` |
+//! | `Leg.excite` | [`scarab_host::run::excite`], as `cargo sim excite` |
+//! | `beetle_swarm` | [`scarab::swarm::Bso`] |
+
+#![expect(clippy::too_many_arguments, reason = "functions have the keyword arguments of Python")]
+
+mod arrays;
+mod dynamics;
+mod error;
+mod identification;
+mod leg;
+mod motion;
+mod recording;
+mod swarm;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::error::{InputError, RefusedError};
+    #[pymodule_export]
+    use super::identification::Identification;
+    #[pymodule_export]
+    use super::leg::Leg;
+    #[pymodule_export]
+    use super::motion::Motion;
+    #[pymodule_export]
+    use super::recording::read_recording;
+    #[pymodule_export]
+    use super::swarm::beetle_swarm;
+}

@@ -1,0 +1,84 @@
+//! Class `Motion`: an exciting motion.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use scarab_host::base::files;
+use scarab_host::formats::excitation::Excitation;
+use scarab_host::formats::leg_file::LegFile;
+use scarab_host::formats::motion_samples::{MotionSamples, SampleRate};
+use scarab_host::run::excite::run::Excited;
+
+use crate::arrays::{object, shaped, vector};
+use crate::error::{argument, raised};
+use crate::leg::Leg;
+use crate::recording::record;
+
+/// Exciting motion of a leg.
+#[pyclass(frozen, module = "scarab_ident")]
+pub struct Motion {
+    leg: LegFile,
+    pub excitation: Excitation,
+    /// Report of the design, JSON.
+    report: Option<String>,
+}
+
+impl Motion {
+    pub fn of_design(leg: LegFile, excited: Excited) -> PyResult<Self> {
+        let report = serde_json::to_string(&excited.report).map_err(|error| argument(error.to_string()))?;
+        Ok(Self { leg, excitation: excited.motion, report: Some(report) })
+    }
+
+    fn samples_at(&self, rate_hz: u32) -> PyResult<MotionSamples> {
+        let rate: SampleRate =
+            rate_hz.to_string().parse().map_err(|reason| argument(format!("rate_hz: {rate_hz} {reason}")))?;
+        MotionSamples::of(&self.leg, &self.excitation, rate).map_err(raised)
+    }
+}
+
+#[pymethods]
+impl Motion {
+    #[staticmethod]
+    fn load(path: PathBuf, leg: &Leg) -> PyResult<Self> {
+        let excitation = Excitation::load(&path).map_err(raised)?;
+        let motion = Self { leg: leg.file.clone(), excitation, report: None };
+        motion.samples_at(1)?;
+        Ok(motion)
+    }
+
+    #[getter]
+    fn duration_s(&self) -> f64 {
+        self.excitation.duration_s()
+    }
+
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.report.as_deref().map(|json| object(py, json)).transpose()
+    }
+
+    #[pyo3(signature = (rate_hz = 500))]
+    fn samples<'py>(&self, py: Python<'py>, rate_hz: u32) -> PyResult<Bound<'py, PyAny>> {
+        let samples = self.samples_at(rate_hz)?;
+        let time_s: Vec<f64> = samples.time_s().collect();
+        let shape = [time_s.len(), self.leg.joints.len()];
+        let of = |kind: usize| {
+            let numbers = samples.states().flat_map(|state| state[kind].iter().copied());
+            shaped(py, numbers.collect(), &shape, false)
+        };
+        let (q, qd, qdd) = (of(0)?, of(1)?, of(2)?);
+        record(py, "Samples")?.call1((vector(py, time_s), q, qd, qdd))
+    }
+
+    #[pyo3(signature = (rate_hz = 500))]
+    fn to_trajectory(&self, rate_hz: u32) -> PyResult<String> {
+        Ok(self.samples_at(rate_hz)?.to_trajectory())
+    }
+
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        files::write(&path, self.excitation.to_toml()).map_err(raised)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Motion of '{}', {} s>", self.leg.name, self.excitation.duration_s())
+    }
+}
