@@ -3,7 +3,7 @@
 
   scripts/venv DIR numpy pin==4.1.0
   DIR/bin/pip install ./python
-  DIR/bin/python python/benchmark.py
+  DIR/bin/python scripts/python_benchmark.py
 
 Regressor: 100,000 random states of a leg of two joints, ten inertial parameters a link. Pinocchio's
 `computeJointTorqueRegressor` takes one state a call, so Python loops over it. Both results are compared.
