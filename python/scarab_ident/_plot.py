@@ -43,15 +43,18 @@ def plot(identification, joints, joint=None):
                 labelled.add(text)
                 return text
 
+            # Friction at rest is undetermined, so such rows are excluded.
+            moving = np.where(motion.at_rest[:, index], np.nan, motion.predicted_nm[:, index])
             torque.plot(time, motion.measured_nm[:, index], color=measured, lw=0.8, label=once("measured"))
-            torque.plot(time, motion.predicted_nm[:, index], color=colour, lw=0.8, label=once(label))
-            difference = motion.measured_nm[:, index] - motion.predicted_nm[:, index]
-            residual.plot(time, np.where(motion.at_rest[:, index], np.nan, difference), color=colour, lw=0.8)
-        torque.set_title(f"{name}: {identification.verdict.removeprefix('verdict: ')}", fontsize="medium")
+            torque.plot(time, moving, color=colour, lw=0.8, label=once(label))
+            residual.plot(time, motion.measured_nm[:, index] - moving, color=colour, lw=0.8)
+        torque.set_title(name)
         torque.set_ylabel("torque [N m]")
-        torque.legend(loc="upper right", fontsize="small")
         residual.set_ylabel("difference [N m]")
-        residual.set_xlabel("time of the motions, one after the other [s]")
+        residual.set_xlabel("time of the motions, one after the other [s]; gaps: joint at rest")
         residual.axhline(0.0, color="#999999", lw=0.6)
-    figure.tight_layout()
+    figure.suptitle(identification.verdict)
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncols=3, frameon=False)
+    figure.tight_layout(rect=(0.0, 0.06, 1.0, 1.0))
     return figure
