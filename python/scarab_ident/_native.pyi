@@ -1,12 +1,12 @@
 """Shapes: a row for each sample, a column for each joint; `(joints,)` for a single sample. Units: rad, rad/s,
-rad/s2, N m, s. Every function raises `InputError` for an argument or file that cannot be used."""
+rad/s2, N m, s. Functions raise `InputError` for a value or a file that cannot be used, and `TypeError` for a value
+of another type. Docstrings of the module are taken from here (build.rs)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, final
+from typing import Any, Literal, SupportsFloat, final
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from ._records import Curves, Minimum, Parameter, Prediction, Recording, Samples, Simulation
@@ -45,7 +45,7 @@ class Leg:
         joints: Sequence[str] | None = None,
         *,
         locked: Mapping[str, float] | None = None,
-        gravity: Sequence[float] = ...,
+        gravity: Sequence[float] | None = None,
         parallel_rad: float = 0.0,
         prior: bool = True,
     ) -> Leg:
@@ -53,11 +53,17 @@ class Leg:
 
         `joints`: the leg's joints, proximal first; default all that turn. `locked`: position of each joint that
         is held, rad or m. `gravity`: m/s2 in the frame of the root, default (0, 0, -9.81). `parallel_rad`: axes within this angle count
-        as parallel, 0 to 0.01. `prior=False` leaves out the bodies. Remarks stand in `remarks`.
+        as parallel, 0 to 0.01. `prior=False` leaves out the bodies. See also `remarks`.
         """
 
+    @staticmethod
+    def from_text(toml: str) -> Leg:
+        """Reads the text of a leg file."""
+
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name in the leg file."""
+
     @property
     def joints(self) -> list[str]:
         """Names of the joints, proximal first."""
@@ -75,7 +81,8 @@ class Leg:
         """Names of the 14 parameters of each joint, such as 'XX1': the columns of `regressor`.
 
         XX..ZZ: inertia tensor about the frame's origin, kg m2; HX..HZ: first moment, kg m; M: mass, kg; IA: rotor
-        inertia, kg m2; FC: Coulomb friction, N m; FV: viscous friction, N m s/rad; OFF: offset, N m.
+        inertia, kg m2; FC: Coulomb friction, N m; FV: viscous friction, N m s/rad; OFF: offset, N m. Where the leg
+        file estimates another Coulomb friction for each direction, results name the last one FCA.
         """
 
     def save(self, path: _Path) -> None:
@@ -104,7 +111,8 @@ class Leg:
         of: Literal["truth", "prior"] | None = None,
         dh: bool = False,
     ) -> _Array:
-        """Torque of each state by Newton-Euler, friction and rotors included, shape (samples, joints).
+        """Torque of each state, shape (samples, joints): bodies by Newton-Euler, rotors, Coulomb and viscous
+        friction, offset. Stribeck friction and a difference between the directions are not included.
 
         `parameters`: 14 for each joint; default those of the leg file, as in `parameters(of)`.
         """
@@ -123,7 +131,7 @@ class Leg:
         prior: str | None = None,
         estimator: Literal["robust", "plain"] = "robust",
         seed: int = 1,
-        torque_delay_ms: Sequence[float] = ...,
+        torque_delay_ms: float | Sequence[float] | None = None,
         even_stamps: bool = False,
         load: str | None = None,
         payload: str | None = None,
@@ -132,8 +140,8 @@ class Leg:
     ) -> Identification:
         """Identifies the leg from recordings, with the firmware's filters, estimate, swarm and verdict.
 
-        `t`: (samples,), strictly increasing, 10 Hz or faster; `q` and `tau`: (samples, joints). A message that
-        names `recording:17` means sample 17. `also`: more training recordings (t, q, tau). `validate`: held-out
+        `t`: (samples,), strictly increasing, 10 Hz or faster; `q` and `tau`: (samples, joints). A message about
+        `recording:17` concerns sample 17. `also`: more training recordings (t, q, tau). `validate`: held-out
         recordings; `split`: share of each recording that trains. Without either, the result is not validated.
         `bandwidth_hz`: -3 dB frequency of the low-pass, default that of the leg file (8 Hz). `prior`: 'none',
         'file' or 'wrong:PERCENT'. `torque_delay_ms`: delay to be removed, one value or one for each joint.
@@ -153,7 +161,8 @@ class Leg:
     ) -> Motion:
         """Designs a motion that makes all parameters visible within the limits of the leg.
 
-        Needs `prior` or `truth` of every joint and a noise of the torque.
+        Needs `prior` or `truth` of every joint and a noise of the torque, percent of the mean absolute torque.
+        Ctrl-C acts at the end of the design.
         """
 
     def simulate(
@@ -171,7 +180,9 @@ class Identification:
     """Result of an identification. `print(result)` shows the tables of `cargo sim replay`."""
 
     @property
-    def accepted(self) -> bool: ...
+    def accepted(self) -> bool:
+        """Whether the verdict accepts the result."""
+
     @property
     def validated(self) -> bool:
         """Whether unused motions were predicted."""
@@ -185,15 +196,21 @@ class Identification:
         """Reasons of a refusal (docs/method.md, verdict)."""
 
     @property
-    def warnings(self) -> list[str]: ...
+    def warnings(self) -> list[str]:
+        """Doubts that do not change the result."""
+
     @property
-    def bandwidth_hz(self) -> float: ...
+    def bandwidth_hz(self) -> float:
+        """Frequency at which the filter's low-pass is 3 dB down, Hz."""
+
     @property
     def names(self) -> list[str]:
         """Names of the k base parameters: the combinations that torque determines."""
 
     @property
-    def units(self) -> list[str]: ...
+    def units(self) -> list[str]:
+        """Their units."""
+
     @property
     def values(self) -> _Array:
         """Base parameters, shape (k,)."""
@@ -208,8 +225,8 @@ class Identification:
 
     @property
     def sums(self) -> _Array:
-        """Factors of the combinations, shape (k, 14 joints): `sums @ leg.parameters()` are the base parameters
-        of a leg with these parameters."""
+        """Factors of the combinations, shape (k, 14 joints), columns in the order of `parameters`:
+        `sums @ leg.parameters()` are the base parameters of a leg with these parameters."""
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -227,13 +244,19 @@ class Identification:
         """Torque of each state with its standard deviation. Raises `RefusedError` unless accepted."""
 
     def save(self, path: _Path) -> None:
-        """Writes the model file that `cargo sim predict` reads. Raises `RefusedError` unless accepted."""
+        """Writes the model file that `cargo sim predict` reads. Raises `RefusedError` unless accepted.
+
+        An older model file is replaced; a file of another kind is not.
+        """
 
     def write_report(self, path: _Path) -> None:
-        """Writes the HTML page of figures, tables and verdict."""
+        """Writes the HTML page of figures, tables and verdict. An older page is replaced; another file is not."""
 
-    def plot(self, joint: str | None = None) -> Figure:
-        """Draws measured and predicted torque with matplotlib, for all joints or one."""
+    def plot(self, joint: str | None = None) -> NDArray[np.object_]:
+        """Draws measured and predicted torque and their difference with matplotlib, for all joints or one.
+
+        Returns the axes, shape (2, joints); `axes[0, 0].figure` is the figure.
+        """
 
 @final
 class Motion:
@@ -241,10 +264,12 @@ class Motion:
 
     @staticmethod
     def load(path: _Path, leg: Leg) -> Motion:
-        """Reads a motion file of this leg."""
+        """Reads a motion file; a motion of another leg or beyond this leg's limits is refused."""
 
     @property
-    def duration_s(self) -> float: ...
+    def duration_s(self) -> float:
+        """Duration with its blends, s."""
+
     @property
     def report(self) -> dict[str, Any] | None:
         """Expected standard deviations and limits of a design; None for a motion from a file."""
@@ -256,7 +281,10 @@ class Motion:
         """YAML of a ROS 2 trajectory_msgs/JointTrajectory."""
 
     def save(self, path: _Path) -> None:
-        """Writes the motion file that `cargo sim identify --excitation` reads."""
+        """Writes the motion file that `cargo sim identify --excitation` reads.
+
+        An older motion file is replaced; a file of another kind is not.
+        """
 
 def read_recording(
     path: _Path,
@@ -271,11 +299,12 @@ def read_recording(
     """Reads a CSV recording (also .csv.gz), as `cargo sim replay` does.
 
     `columns`: 't=time,q1=position_0,tau1=4'; `units`: 'ms,deg,tau2=mNm'. Nothing is converted unless stated.
+    `skip_bad` skips invalid rows, at most 5 %, with a warning. Other formats: `pandas`, then arrays.
     """
 
 def beetle_swarm(
-    objective: Callable[[NDArray[np.float64]], float],
-    bounds: Sequence[tuple[float, float]],
+    objective: Callable[[NDArray[np.float64]], SupportsFloat],
+    bounds: ArrayLike,
     *,
     evaluations: int = 20_000,
     goal: float | None = None,
@@ -284,7 +313,8 @@ def beetle_swarm(
 ) -> Minimum:
     """Minimises a function over a box of at most 64 coordinates with the firmware's swarm of 20 beetles.
 
-    `objective` gets an array of shape (coordinates,); a value that is not finite drops the candidate. The search
-    ends after `evaluations`, or at `goal`. An exception of the objective ends it. The same seed gives the same
-    result. Method: docs/bso.md; `rules='paper'` are the printed equations with (29) corrected.
+    `bounds`: lowest and highest value of each coordinate, shape (coordinates, 2). `objective` gets an array of
+    shape (coordinates,); a value that is not finite drops the candidate. The search ends after `evaluations`, or
+    at `goal`. An exception of the objective ends it. The same seed gives the same result. Method: docs/bso.md;
+    `rules='paper'` are the printed equations with (29) corrected.
     """

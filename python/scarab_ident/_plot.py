@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._native import InputError
+
 
 def plot(identification, joints, joint=None):
-    """Draws measured and predicted torque and their difference, a column for each joint."""
+    """Draws measured and predicted torque above their difference, a column for each joint; returns the axes."""
     try:
         from matplotlib import pyplot
     except ImportError as error:
         raise ImportError("plot() needs matplotlib: pip install 'scarab-ident[plot]'") from error
     if joint is not None and joint not in joints:
-        raise ValueError(f"joint is '{joint}'; the leg has {', '.join(joints)}")
+        raise InputError(f"joint is '{joint}'; the leg has {', '.join(joints)}")
     shown = joints if joint is None else [joint]
     figure, axes = pyplot.subplots(
         2,
@@ -57,4 +59,4 @@ def plot(identification, joints, joint=None):
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncols=3, frameon=False)
     figure.tight_layout(rect=(0.0, 0.06, 1.0, 1.0))
-    return figure
+    return axes

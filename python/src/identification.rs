@@ -1,12 +1,12 @@
 //! Class `Identification`: parameters with their uncertainty, and the verdict.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use scarab_host::base::error::ToolError;
-use scarab_host::base::files;
+use scarab_host::base::files::{self, is_device};
 use scarab_host::formats::leg_file::LegFile;
 use scarab_host::formats::model_file::{BaseSet, ModelFile};
 use scarab_host::leg::states::Angles;
@@ -16,13 +16,17 @@ use scarab_host::run::predict::Predictor;
 use scarab_host::run::replay::Replayed;
 use scarab_host::view::{figures, html, tables};
 
-use crate::arrays::{Numbers, object, shaped, vector};
+use crate::arrays::{Numbers, finite, object, shaped, vector};
 use crate::dynamics::{Dynamics, States};
-use crate::error::{RefusedError, raised};
+use crate::error::{RefusedError, argument, raised};
 use crate::leg::{states, with_joints};
-use crate::recording::record;
+use crate::pool::compute;
+use crate::recording::{record, warn};
 
-/// Result of an identification.
+/// First characters of a report page.
+const PAGE: &str = "<!DOCTYPE html>";
+
+#[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification"))]
 #[pyclass(frozen, module = "scarab_ident")]
 pub struct Identification {
     leg: LegFile,
@@ -32,28 +36,31 @@ pub struct Identification {
     bandwidth_hz: f64,
     warnings: Vec<String>,
     base: BaseSet,
+    /// Stored form; none for a refused result.
+    model: Option<ModelFile>,
 }
 
 impl Identification {
     /// Result of recordings; their warnings become warnings of Python.
     pub fn of_replay(py: Python<'_>, leg: LegFile, replayed: Replayed) -> PyResult<Self> {
+        warn(py, replayed.warnings.iter().cloned())?;
         let Replayed { bandwidth_hz, run, sources, series, warnings } = replayed;
-        let warn = py.import("warnings")?.getattr("warn")?;
-        for warning in &warnings {
-            warn.call1((warning,))?;
-        }
-        let base = BaseSet::of(&run);
-        Ok(Self { leg, run, series, sources, bandwidth_hz, warnings, base })
+        Ok(Self { sources, bandwidth_hz, warnings, ..Self::of(leg, run, series, bandwidth_hz) })
     }
 
     /// Result of a simulated leg.
     pub fn of_simulation(py: Python<'_>, leg: LegFile, run: RunReport, series: Series) -> PyResult<Py<Self>> {
-        let (bandwidth_hz, base) = (leg.bandwidth_hz, BaseSet::of(&run));
-        Py::new(py, Self { leg, run, series, sources: Vec::new(), bandwidth_hz, warnings: Vec::new(), base })
+        let bandwidth_hz = leg.bandwidth_hz;
+        Py::new(py, Self::of(leg, run, series, bandwidth_hz))
     }
 
-    fn model(&self) -> PyResult<ModelFile> {
-        ModelFile::of(&self.leg, &self.run, self.bandwidth_hz).ok_or_else(|| {
+    fn of(leg: LegFile, run: RunReport, series: Series, bandwidth_hz: f64) -> Self {
+        let (base, model) = (BaseSet::of(&run), ModelFile::of(&leg, &run, bandwidth_hz));
+        Self { leg, run, series, sources: Vec::new(), bandwidth_hz, warnings: Vec::new(), base, model }
+    }
+
+    fn model(&self) -> PyResult<&ModelFile> {
+        self.model.as_ref().ok_or_else(|| {
             let failed = self.run.findings.iter().filter(|finding| !finding.passed);
             let words: Vec<_> =
                 failed.map(|finding| format!("{}: {}", finding.reason, finding.words)).collect();
@@ -64,63 +71,74 @@ impl Identification {
 
 #[pymethods]
 impl Identification {
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.accepted"))]
     #[getter]
     fn accepted(&self) -> bool {
         self.run.accepted()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.validated"))]
     #[getter]
     fn validated(&self) -> bool {
         self.run.validated
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.verdict"))]
     #[getter]
     fn verdict(&self) -> String {
         tables::verdict_line(&self.run)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.reasons"))]
     #[getter]
     fn reasons(&self) -> Vec<String> {
         self.run.reasons.iter().map(|reason| (*reason).to_owned()).collect()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.warnings"))]
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.bandwidth_hz"))]
     #[getter]
     fn bandwidth_hz(&self) -> f64 {
         self.bandwidth_hz
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.names"))]
     #[getter]
     fn names(&self) -> Vec<&str> {
         self.base.parameters.iter().map(|base| base.name.as_str()).collect()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.units"))]
     #[getter]
     fn units(&self) -> Vec<&str> {
         self.base.parameters.iter().map(|base| base.unit.as_str()).collect()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.values"))]
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         vector(py, self.base.parameters.iter().map(|base| base.value).collect())
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.sigma"))]
     #[getter]
     fn sigma<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         vector(py, self.base.parameters.iter().map(|base| base.sigma).collect())
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.covariance"))]
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let size = self.base.parameters.len();
         shaped(py, self.base.covariance.iter().flatten().copied().collect(), &[size, size], false)
     }
 
-    /// Factors of the sums: row i times the leg's parameters is value i.
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.sums"))]
     #[getter]
     fn sums<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let all: Vec<&str> = self.run.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
@@ -130,6 +148,7 @@ impl Identification {
         shaped(py, rows.collect(), &[self.base.parameters.len(), all.len()], false)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.parameters"))]
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (all, class) = (PyDict::new(py), record(py, "Parameter")?);
@@ -140,6 +159,7 @@ impl Identification {
         Ok(all)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.motions"))]
     #[getter]
     fn motions<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let class = record(py, "Curves")?;
@@ -165,6 +185,7 @@ impl Identification {
         self.series.motions.iter().map(one).collect()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.report"))]
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         object(
@@ -173,6 +194,7 @@ impl Identification {
         )
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.predict"))]
     #[pyo3(signature = (q, qd, qdd, *, dh = false))]
     fn predict<'py>(
         &self,
@@ -186,18 +208,26 @@ impl Identification {
         let joints = self.leg.joints.len();
         let (states, count, is_single) = states(&q, &qd, &qdd, joints)?;
         let angles = if dh { Angles::DenavitHartenberg } else { Angles::Anatomical };
-        let (torque, sigma) = py
-            .detach(|| with_joints!(self.leg, predicted(&self.leg, &model, angles, &states)))
-            .map_err(raised)?;
+        let leg = &self.leg;
+        let (torque, sigma) =
+            compute(py, || with_joints!(leg, predicted(leg, model, angles, &states)))?.map_err(raised)?;
+        finite("torque", &torque, joints)?;
+        finite("torque", &sigma, joints)?;
         let of = |numbers| shaped(py, numbers, &[count, joints], is_single);
         record(py, "Prediction")?.call1((of(torque)?, of(sigma)?))
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.save"))]
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        self.model()?.write(&path).map_err(raised)
+        let model = self.model()?;
+        refuse_other_kind(&path, "a model file", |path| ModelFile::load(path).is_ok())?;
+        model.write(&path).map_err(raised)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.write_report"))]
     fn write_report(&self, path: PathBuf) -> PyResult<()> {
+        let is_page = |path: &Path| files::read_text(path).is_ok_and(|text| text.starts_with(PAGE));
+        refuse_other_kind(&path, "a report page", is_page)?;
         let names: Vec<_> = self.leg.joints.iter().map(|joint| joint.name.as_str()).collect();
         let written = || -> Result<(), ToolError> {
             let drawn = figures::all(&names, &self.run, &self.series)?;
@@ -208,6 +238,7 @@ impl Identification {
         written().map_err(raised)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Identification.plot"))]
     #[pyo3(signature = (joint = None))]
     fn plot<'py>(slf: &Bound<'py, Self>, joint: Option<&str>) -> PyResult<Bound<'py, PyAny>> {
         let joints: Vec<&str> = slf.get().leg.joints.iter().map(|joint| joint.name.as_str()).collect();
@@ -221,6 +252,14 @@ impl Identification {
     fn __repr__(&self) -> String {
         format!("<Identification of '{}': {}>", self.run.leg, tables::verdict_line(&self.run))
     }
+}
+
+/// Refuses to replace a file of another kind, such as the recording or the leg file.
+pub fn refuse_other_kind(path: &Path, kind: &str, is_kind: impl Fn(&Path) -> bool) -> PyResult<()> {
+    if path.exists() && !is_device(path) && !is_kind(path) {
+        return Err(argument(format!("{}: exists and is not {kind}: choose another name", path.display())));
+    }
+    Ok(())
 }
 
 /// Torques and their standard deviations.

@@ -8,13 +8,15 @@ use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use scarab::ident::{Estimator, Plan, prior_parameters};
 use scarab::leg::{LoggedSample, Segment};
-use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
+use scarab::model::{INERTIAL_PARAMETERS, LegParameters, PARAMETERS_PER_JOINT, Parameter, Payload};
 use scarab_host::base::error::ToolError;
 use scarab_host::base::files;
+use scarab_host::base::names::parameter_name;
 use scarab_host::formats::leg_file::LegFile;
 use scarab_host::formats::leg_file::check::LARGEST_NOISE_PERCENT;
 use scarab_host::formats::recording::Recording;
 use scarab_host::formats::robot::Robot;
+use scarab_host::formats::temperature;
 use scarab_host::leg::from_robot::{self, RobotOptions};
 use scarab_host::leg::placed_mass::PlacedMass;
 use scarab_host::leg::setup::{PriorChoice, links};
@@ -29,17 +31,15 @@ use scarab_host::run::replay::{Recordings, ReplayOptions, replay};
 use scarab_host::run::simulate::{SimulatedRun, simulate};
 use scarab_host::with_leg_size;
 
-use crate::arrays::{Numbers, Rows, column, shaped, vector};
+use crate::arrays::{Numbers, Rows, column, finite, shaped, vector};
 use crate::dynamics::{Dynamics, States};
 use crate::error::{argument, raised};
 use crate::identification::Identification;
 use crate::motion::Motion;
-use crate::recording::{Several, named, read, record, recording};
+use crate::pool::compute;
+use crate::recording::{named, read, record, recording, several};
 
-/// Inertial parameters of a link.
-const INERTIAL: usize = 10;
-
-/// Leg of 1 to 3 joints.
+#[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg"))]
 #[pyclass(frozen, module = "scarab_ident")]
 pub struct Leg {
     pub file: LegFile,
@@ -62,25 +62,37 @@ pub(crate) use with_joints;
 
 #[pymethods]
 impl Leg {
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.from_toml"))]
     #[staticmethod]
     fn from_toml(path: PathBuf) -> PyResult<Self> {
         let (text, file) = LegFile::text(&path.to_string_lossy()).map_err(raised)?;
-        Ok(Self { file: LegFile::parse(&text, &file).map_err(raised)?, text, remarks: Vec::new() })
+        Self::of_text(text, &file)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.from_text"))]
     #[staticmethod]
-    #[pyo3(signature = (path, joints = None, *, locked = None, gravity = [0.0, 0.0, -9.81], parallel_rad = 0.0, prior = true))]
+    fn from_text(toml: String) -> PyResult<Self> {
+        Self::of_text(toml, "text")
+    }
+
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.from_urdf"))]
+    #[staticmethod]
+    #[pyo3(signature = (path, joints = None, *, locked = None, gravity = None, parallel_rad = 0.0, prior = true))]
     fn from_urdf(
         path: PathBuf,
         joints: Option<Vec<String>>,
         locked: Option<HashMap<String, f64>>,
-        gravity: [f64; 3],
+        gravity: Option<[f64; 3]>,
         parallel_rad: f64,
         prior: bool,
     ) -> PyResult<Self> {
         let most = from_robot::LARGEST_PARALLEL_RAD;
         if !(0.0..=most).contains(&parallel_rad) {
             return Err(argument(format!("parallel_rad is {parallel_rad}; it must be from 0 to {most}")));
+        }
+        let gravity = gravity.unwrap_or([0.0, 0.0, -9.81]);
+        if let Some(wrong) = gravity.iter().find(|part| !part.is_finite()) {
+            return Err(argument(format!("gravity contains {wrong}; all numbers must be finite")));
         }
         let robot = files::read_text(&path)
             .and_then(|text| Robot::parse(&text, &path.display().to_string()))
@@ -96,49 +108,59 @@ impl Leg {
         Ok(Self { file: found.leg, text: found.text, remarks: found.remarks })
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.name"))]
     #[getter]
     fn name(&self) -> &str {
         &self.file.name
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.joints"))]
     #[getter]
     fn joints(&self) -> Vec<&str> {
         self.file.joints.iter().map(|joint| joint.name.as_str()).collect()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.toml"))]
     #[getter]
     fn toml(&self) -> &str {
         &self.text
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.remarks"))]
     #[getter]
     fn remarks(&self) -> Vec<String> {
         self.remarks.clone()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.parameter_names"))]
     #[getter]
     fn parameter_names(&self) -> Vec<String> {
-        let of_joint = |joint: usize| {
-            Parameter::ALL.into_iter().map(move |parameter| format!("{}{joint}", parameter.symbol()))
-        };
-        (1..=self.file.joints.len()).flat_map(of_joint).collect()
+        let of_joint =
+            |joint: usize| Parameter::ALL.into_iter().map(move |parameter| parameter_name(joint, parameter));
+        (0..self.file.joints.len()).flat_map(of_joint).collect()
     }
 
     fn __repr__(&self) -> String {
-        format!("Leg('{}', joints={:?})", self.file.name, self.joints())
+        format!("<Leg '{}' of joints {}>", self.file.name, self.joints().join(", "))
     }
 
-    /// Writes the leg file; a file that exists is refused.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&str,))> {
+        Ok((py.get_type::<Self>().getattr("from_text")?, (&self.text,)))
+    }
+
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.save"))]
     fn save(&self, path: PathBuf) -> PyResult<()> {
         files::check_new(&path).and_then(|()| files::write_new(&path, &self.text)).map_err(raised)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.parameters"))]
     #[pyo3(signature = (of = None))]
     fn parameters<'py>(&self, py: Python<'py>, of: Option<&str>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let numbers = with_joints!(self.file, flat_parameters(&self.file, of))?;
         Ok(vector(py, numbers))
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.regressor"))]
     #[pyo3(signature = (q, qd, qdd, *, inertial_only = false, dh = false))]
     fn regressor<'py>(
         &self,
@@ -151,12 +173,14 @@ impl Leg {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let joints = self.file.joints.len();
         let (states, count, is_single) = states(&q, &qd, &qdd, joints)?;
-        let columns = if inertial_only { INERTIAL } else { PARAMETERS_PER_JOINT };
-        let numbers =
-            py.detach(|| with_joints!(self.file, regressors(&self.file, angles(dh), &states, columns)))?;
+        let columns = if inertial_only { INERTIAL_PARAMETERS } else { PARAMETERS_PER_JOINT };
+        let leg = &self.file;
+        let numbers = compute(py, || with_joints!(leg, regressors(leg, angles(dh), &states, columns)))??;
+        finite("regressor", &numbers, joints * joints * columns)?;
         shaped(py, numbers, &[count, joints, joints * columns], is_single)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.inverse_dynamics"))]
     #[pyo3(signature = (q, qd, qdd, *, parameters = None, of = None, dh = false))]
     fn inverse_dynamics<'py>(
         &self,
@@ -171,28 +195,34 @@ impl Leg {
         let joints = self.file.joints.len();
         let (states, count, is_single) = states(&q, &qd, &qdd, joints)?;
         let parameters = match (parameters, of) {
-            (Some(_), Some(_)) => return Err(argument("parameters and of are both given: give one")),
+            (Some(_), Some(_)) => return Err(argument("parameters and of exclude each other")),
             (Some(parameters), None) => {
-                let numbers = column("parameters", &parameters)?;
                 let needed = joints * PARAMETERS_PER_JOINT;
+                let numbers = column("parameters", &parameters, &needed.to_string())?;
                 if numbers.len() != needed {
                     let found = numbers.len();
                     return Err(argument(format!(
-                        "parameters has {found} numbers; needed are {needed}, in the order of parameter_names"
+                        "parameters has {found} numbers; expected {needed}, in the order of parameter_names"
                     )));
+                }
+                if let Some(at) = numbers.iter().position(|number| !number.is_finite()) {
+                    let value = numbers[at];
+                    return Err(argument(format!("parameters[{at}] is {value}; all numbers must be finite")));
                 }
                 numbers
             }
             (None, of) => with_joints!(self.file, flat_parameters(&self.file, of))?,
         };
-        let numbers =
-            py.detach(|| with_joints!(self.file, torques(&self.file, angles(dh), &states, &parameters)))?;
+        let leg = &self.file;
+        let numbers = compute(py, || with_joints!(leg, torques(leg, angles(dh), &states, &parameters)))??;
+        finite("torque", &numbers, joints)?;
         shaped(py, numbers, &[count, joints], is_single)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.identify"))]
     #[pyo3(signature = (
         t, q, tau, *, also = None, validate = None, split = None, bandwidth_hz = None, plan = "one-time",
-        prior = None, estimator = "robust", seed = 1, torque_delay_ms = Vec::new(), even_stamps = false,
+        prior = None, estimator = "robust", seed = 1, torque_delay_ms = None, even_stamps = false,
         load = None, payload = None, with_payload = None, temperature_c = None
     ))]
     fn identify<'py>(
@@ -201,94 +231,55 @@ impl Leg {
         t: Numbers<'py>,
         q: Numbers<'py>,
         tau: Numbers<'py>,
-        also: Option<Several<'py>>,
-        validate: Option<Several<'py>>,
+        also: Option<Bound<'py, PyAny>>,
+        validate: Option<Bound<'py, PyAny>>,
         split: Option<f64>,
         bandwidth_hz: Option<Bandwidth>,
         plan: &str,
         prior: Option<&str>,
         estimator: &str,
         seed: u64,
-        torque_delay_ms: Vec<f64>,
+        torque_delay_ms: Option<Delay>,
         even_stamps: bool,
         load: Option<&str>,
         payload: Option<&str>,
-        with_payload: Option<Several<'py>>,
+        with_payload: Option<Bound<'py, PyAny>>,
         temperature_c: Option<f64>,
     ) -> PyResult<Identification> {
-        if split.is_some_and(|share| !(share > 0.0 && share < 1.0)) {
-            return Err(argument("split must be above 0 and below 1"));
-        }
-        if split.is_some() && validate.is_some() {
-            return Err(argument("split and validate are both given: give one"));
-        }
-        if payload.is_some() != with_payload.is_some() {
-            return Err(argument("payload and with_payload belong together: give both or none"));
-        }
         let joints = self.file.joints.len();
-        let all = |recordings: Option<Several<'py>>, name: &str| {
-            recordings.map_or_else(|| Ok(Vec::new()), |recordings| recordings.read(name, joints))
-        };
         let mut recordings = Recordings {
-            training: vec![read("recording", &(t, q, tau), joints)?],
-            held_out: all(validate, "validate")?,
-            with_payload: all(with_payload, "with_payload")?,
+            training: vec![read("recording", [&t, &q, &tau], joints)?],
+            held_out: several("validate", validate.as_ref(), joints)?,
+            with_payload: several("with_payload", with_payload.as_ref(), joints)?,
         };
-        recordings.training.extend(all(also, "also")?);
-        let leg = LegFile { temperature_c: temperature_c.or(self.file.temperature_c), ..self.file.clone() };
-        let placed = |mass: Option<&str>, name: &str| -> PyResult<_> {
-            let mass = mass.map(str::parse::<PlacedMass>).transpose();
-            let mass = mass.map_err(|reason| argument(format!("{name}: {reason}")))?;
-            mass.map(|mass| mass.on(&leg, name)).transpose().map_err(raised)
-        };
+        recordings.training.extend(several("also", also.as_ref(), joints)?);
+        let leg = self.at(temperature_c)?;
+        let plans = [("one-time", Plan::OneTime), ("sequential", Plan::Sequential)];
+        let estimators = [("robust", Estimator::Robust), ("plain", Estimator::Plain)];
+        let hertz = bandwidth_hz.map(Bandwidth::hertz).transpose()?;
         let options = ReplayOptions {
             split,
-            bandwidth_hz: match bandwidth_hz {
-                Some(Bandwidth::Hertz(hz)) => hz,
-                _ => leg.bandwidth_hz,
-            },
-            chooses_bandwidth: match &bandwidth_hz {
-                Some(Bandwidth::Word(word)) if word == "auto" => true,
-                Some(Bandwidth::Word(word)) => {
-                    return Err(argument(format!(
-                        "bandwidth_hz is '{word}'; needed is a number of Hz, or 'auto'"
-                    )));
-                }
-                _ => false,
-            },
-            plan: named(
-                "plan",
-                Some(plan),
-                &[("one-time", Plan::OneTime), ("sequential", Plan::Sequential)],
-            )?
-            .unwrap_or_default(),
-            prior: match prior {
-                Some(prior) => prior.parse().map_err(|reason| argument(format!("prior: {reason}")))?,
-                None => PriorChoice::Default,
-            },
-            estimator: named(
-                "estimator",
-                Some(estimator),
-                &[("robust", Estimator::Robust), ("plain", Estimator::Plain)],
-            )?
-            .unwrap_or_default(),
+            bandwidth_hz: hertz.flatten().unwrap_or(leg.bandwidth_hz),
+            chooses_bandwidth: hertz == Some(None),
+            plan: named("plan", plan, &plans)?,
+            prior: prior
+                .map_or(Ok(PriorChoice::Default), str::parse)
+                .map_err(|reason| argument(format!("prior: {reason}")))?,
+            estimator: named("estimator", estimator, &estimators)?,
             swarm_seed: seed,
             csv: None,
-            torque_delay_ms,
+            torque_delay_ms: torque_delay_ms.map_or_else(Vec::new, Delay::values),
             even_stamps,
-            load: placed(load, "load")?,
-            payload: placed(payload, "payload")?,
+            load: placed(&leg, load, "load")?,
+            payload: placed(&leg, payload, "payload")?,
         };
-        let (recordings, options) = (&recordings, &options);
-        let replayed = py
-            .detach(|| {
-                let leg = &leg;
-                with_leg_size!(leg, replay(leg, recordings, options))
-            })
-            .map_err(raised)?;
-        Identification::of_replay(py, leg, replayed)
+        let (leg, recordings, options) = (&leg, &recordings, &options);
+        let replayed =
+            compute(py, || with_leg_size!(leg, replay(leg, recordings, options)))?.map_err(raised)?;
+        Identification::of_replay(py, leg.clone(), replayed)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.excite"))]
     #[pyo3(signature = (
         *, duration_s = 22.0, seed = 1, evaluations = 48_000, torque_noise_percent = None,
         torque_margin_percent = 20.0, assume_truth = false
@@ -312,12 +303,13 @@ impl Leg {
             margin_percent: torque_margin_percent,
             assumption: if assume_truth { Assumption::Truth } else { Assumption::Best },
         };
-        options.check().map_err(argument)?;
+        options.check().map_err(|reason| raised(ToolError::Input(reason)))?;
         let leg = &self.file;
-        let excited = py.detach(|| with_leg_size!(leg, excite(leg, options))).map_err(raised)?;
+        let excited = compute(py, || with_leg_size!(leg, excite(leg, options)))?.map_err(raised)?;
         Motion::of_design(leg.clone(), excited)
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.simulate"))]
     #[pyo3(signature = (*, motion = None, seed = 1, torque_noise_percent = None, drive = "ideal"))]
     fn simulate<'py>(
         &self,
@@ -332,14 +324,14 @@ impl Leg {
         let excitation = motion.map(|motion| motion.excitation.clone());
         let options = &SimulationOptions {
             torque_noise_percent,
-            drive: named("drive", Some(drive), &drives)?.unwrap_or_default(),
+            drive: named("drive", drive, &drives)?,
             excitation,
             with_series: true,
             ..SimulationOptions::of_seed(seed)
         };
         let leg = &self.file;
         let (identification, recordings) =
-            py.detach(|| with_leg_size!(leg, simulated(leg, options))).map_err(raised)?;
+            compute(py, || with_leg_size!(leg, simulated(leg, options)))?.map_err(raised)?;
         let identification =
             Identification::of_simulation(py, leg.clone(), identification.0, identification.1)?;
         let mut recordings = recordings.iter();
@@ -349,11 +341,63 @@ impl Leg {
     }
 }
 
+impl Leg {
+    fn of_text(text: String, file: &str) -> PyResult<Self> {
+        Ok(Self { file: LegFile::parse(&text, file).map_err(raised)?, text, remarks: Vec::new() })
+    }
+
+    /// Leg at a temperature of its drives.
+    fn at(&self, temperature_c: Option<f64>) -> PyResult<LegFile> {
+        let stated = temperature_c
+            .map(|celsius| {
+                temperature::checked(celsius).map_err(|reason| argument(format!("temperature_c: {reason}")))
+            })
+            .transpose()?;
+        Ok(LegFile { temperature_c: stated.or(self.file.temperature_c), ..self.file.clone() })
+    }
+}
+
 /// Bandwidth as given: a frequency, or `auto`.
 #[derive(FromPyObject)]
 pub enum Bandwidth {
     Hertz(f64),
     Word(String),
+}
+
+impl Bandwidth {
+    /// Frequency; `None` for `auto`.
+    fn hertz(self) -> PyResult<Option<f64>> {
+        match self {
+            Self::Hertz(hertz) => Ok(Some(hertz)),
+            Self::Word(word) if word == "auto" => Ok(None),
+            Self::Word(word) => {
+                Err(argument(format!("bandwidth_hz is '{word}'; it must be a number of Hz, or 'auto'")))
+            }
+        }
+    }
+}
+
+/// Delay of all torques, or of each.
+#[derive(FromPyObject)]
+pub enum Delay {
+    All(f64),
+    Each(Vec<f64>),
+}
+
+impl Delay {
+    fn values(self) -> Vec<f64> {
+        match self {
+            Self::All(one) => vec![one],
+            Self::Each(values) => values,
+        }
+    }
+}
+
+/// Mass on a leg, as stated.
+fn placed(leg: &LegFile, mass: Option<&str>, name: &str) -> PyResult<Option<Payload<f64>>> {
+    let mass = mass.map(str::parse::<PlacedMass>).transpose();
+    let mass = mass.map_err(|reason| argument(format!("{name}: {reason}")))?;
+    mass.map(|mass| mass.on(leg, name)).transpose().map_err(raised)
 }
 
 fn check_noise(percent: Option<f64>) -> PyResult<()> {
@@ -381,7 +425,8 @@ pub fn states(
     let (q, qd, qdd) = (q?, qd?, qdd?);
     for (name, other) in [("qd", &qd), ("qdd", &qdd)] {
         if (other.count(), other.is_single) != (q.count(), q.is_single) {
-            return Err(argument(format!("{name} has {} samples, q has {}", other.count(), q.count())));
+            let [theirs, own] = [other, &q].map(Rows::shape_text);
+            return Err(argument(format!("{name} has the shape {theirs}, q has {own}; both must be equal")));
         }
     }
     let (count, is_single) = (q.count(), q.is_single);
@@ -417,7 +462,7 @@ fn flat_parameters<const N: usize>(leg: &LegFile, of: Option<&str>) -> PyResult<
         None => (truth().or_else(prior), "`truth` or `prior`"),
         Some("truth") => (truth(), "`truth`"),
         Some("prior") => (prior(), "`prior`"),
-        Some(other) => return Err(argument(format!("of is '{other}'; possible are 'truth', 'prior'"))),
+        Some(other) => return Err(argument(format!("of is '{other}'; it must be one of 'truth', 'prior'"))),
     };
     let found = found.ok_or_else(|| {
         argument(format!("the leg `{}` has no {needed} for every joint: give parameters", leg.name))

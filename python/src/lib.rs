@@ -1,7 +1,7 @@
 //! `scarab_ident._native`: Scarab's model and identification for Python.
 //!
-//! The module converts arrays, calls the functions of `scarab-host` and converts the results; it decides
-//! nothing. Shapes, units and errors of every function stand in `scarab_ident/_native.pyi`.
+//! The module converts arrays, calls the functions of `scarab-host` and converts the results. Shapes, units and
+//! errors of every function are in `scarab_ident/_native.pyi`, from which `build.rs` takes the docstrings.
 //!
 //! | Python | Rust |
 //! | --- | --- |
@@ -19,6 +19,7 @@ mod error;
 mod identification;
 mod leg;
 mod motion;
+mod pool;
 mod recording;
 mod swarm;
 

@@ -1,20 +1,24 @@
 //! Class `Motion`: an exciting motion.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
+use scarab_host::base::error::{FileError, ToolError};
 use scarab_host::base::files;
 use scarab_host::formats::excitation::Excitation;
 use scarab_host::formats::leg_file::LegFile;
 use scarab_host::formats::motion_samples::{MotionSamples, SampleRate};
-use scarab_host::run::excite::run::Excited;
+use scarab_host::run::excite::assumption::{Assumption, assumed};
+use scarab_host::run::excite::run::{Excited, check};
+use scarab_host::with_leg_size;
 
 use crate::arrays::{object, shaped, vector};
 use crate::error::{argument, raised};
+use crate::identification::refuse_other_kind;
 use crate::leg::Leg;
 use crate::recording::record;
 
-/// Exciting motion of a leg.
+#[doc = include_str!(concat!(env!("OUT_DIR"), "/Motion"))]
 #[pyclass(frozen, module = "scarab_ident")]
 pub struct Motion {
     leg: LegFile,
@@ -38,24 +42,27 @@ impl Motion {
 
 #[pymethods]
 impl Motion {
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Motion.load"))]
     #[staticmethod]
     fn load(path: PathBuf, leg: &Leg) -> PyResult<Self> {
-        let excitation = Excitation::load(&path).map_err(raised)?;
-        let motion = Self { leg: leg.file.clone(), excitation, report: None };
-        motion.samples_at(1)?;
-        Ok(motion)
+        let (leg, excitation) = (&leg.file, Excitation::load(&path).map_err(raised)?);
+        with_leg_size!(leg, checked(leg, &path, &excitation)).map_err(raised)?;
+        Ok(Self { leg: leg.clone(), excitation, report: None })
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Motion.duration_s"))]
     #[getter]
     fn duration_s(&self) -> f64 {
         self.excitation.duration_s()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Motion.report"))]
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.report.as_deref().map(|json| object(py, json)).transpose()
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Motion.samples"))]
     #[pyo3(signature = (rate_hz = 500))]
     fn samples<'py>(&self, py: Python<'py>, rate_hz: u32) -> PyResult<Bound<'py, PyAny>> {
         let samples = self.samples_at(rate_hz)?;
@@ -69,16 +76,32 @@ impl Motion {
         record(py, "Samples")?.call1((vector(py, time_s), q, qd, qdd))
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Motion.to_trajectory"))]
     #[pyo3(signature = (rate_hz = 500))]
     fn to_trajectory(&self, rate_hz: u32) -> PyResult<String> {
         Ok(self.samples_at(rate_hz)?.to_trajectory())
     }
 
+    #[doc = include_str!(concat!(env!("OUT_DIR"), "/Motion.save"))]
     fn save(&self, path: PathBuf) -> PyResult<()> {
+        refuse_other_kind(&path, "a motion file", |path| Excitation::load(path).is_ok())?;
         files::write(&path, self.excitation.to_toml()).map_err(raised)
     }
 
     fn __repr__(&self) -> String {
         format!("<Motion of '{}', {} s>", self.leg.name, self.excitation.duration_s())
+    }
+}
+
+/// Refuses a motion of another leg, and one beyond the leg's limits. Those of torque need its bodies.
+fn checked<const N: usize, const B: usize>(
+    leg: &LegFile,
+    path: &Path,
+    motion: &Excitation,
+) -> Result<(), ToolError> {
+    motion.table::<N>(leg).map_err(|reason| FileError::new(path.display(), reason))?;
+    match assumed(leg, Assumption::Best) {
+        Ok(_) => check::<N, B>(leg, path, motion, &[]),
+        Err(_) => Ok(()),
     }
 }

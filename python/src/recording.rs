@@ -3,41 +3,37 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
 use scarab_host::formats::recording::dialect::{Decimal, Delimiter};
 use scarab_host::formats::recording::import::{ColumnChoice, Import, UnitChoice};
 use scarab_host::formats::recording::{JointSeries, Read, Recording};
+use scarab_host::run::replay::warnings::of_more_joints;
+use scarab_host::view::tables::reading_notes;
 
-use crate::arrays::{Numbers, column, shaped, vector};
+use crate::arrays::{Array, Numbers, column, shaped, vector};
 use crate::error::{argument, raised};
 use crate::leg::Leg;
 
-/// Time, angles and torques of one recording.
-pub type Triple<'py> = (Numbers<'py>, Numbers<'py>, Numbers<'py>);
-
-/// One recording, or a list of them.
-#[derive(FromPyObject)]
-pub enum Several<'py> {
-    One(Triple<'py>),
-    Many(Vec<Triple<'py>>),
-}
-
-impl Several<'_> {
-    /// Checks all recordings; `name` stands for a file in messages.
-    pub fn read(&self, name: &str, joints: usize) -> PyResult<Vec<Read>> {
-        match self {
-            Self::One(one) => Ok(vec![read(name, one, joints)?]),
-            Self::Many(many) => many
-                .iter()
-                .enumerate()
-                .map(|(number, one)| read(&format!("{name}[{number}]"), one, joints))
-                .collect(),
+/// Checks one recording `(t, q, tau)`, or a list of them, as files are checked.
+pub fn several(name: &str, given: Option<&Bound<'_, PyAny>>, joints: usize) -> PyResult<Vec<Read>> {
+    let Some(given) = given else { return Ok(Vec::new()) };
+    let one = |name: &str, given: &Bound<'_, PyAny>| match given.cast::<PyTuple>() {
+        Ok(triple) if triple.len() == 3 => {
+            read(name, [&triple.get_item(0)?, &triple.get_item(1)?, &triple.get_item(2)?], joints)
         }
+        _ => Err(argument(format!("{name} must be a recording (t, q, tau), or a list of recordings"))),
+    };
+    match given.cast::<PyList>() {
+        Ok(list) => {
+            list.iter().enumerate().map(|(number, given)| one(&format!("{name}[{number}]"), &given)).collect()
+        }
+        Err(_) => Ok(vec![one(name, given)?]),
     }
 }
 
-/// Checks one recording, as a file is checked.
-pub fn read(name: &str, (t, q, tau): &Triple<'_>, joints: usize) -> PyResult<Read> {
-    let time_s = column(&format!("{name}: t"), t)?;
+/// Checks one recording, as a file is checked; `name` stands for the file in messages.
+pub fn read(name: &str, [t, q, tau]: [&Numbers<'_>; 3], joints: usize) -> PyResult<Read> {
+    let time_s = column(&format!("{name}: t"), t, "samples")?;
     let q = by_joint(&format!("{name}: q"), q, time_s.len(), joints)?;
     let tau = by_joint(&format!("{name}: tau"), tau, time_s.len(), joints)?;
     let series: Vec<JointSeries> = q
@@ -49,21 +45,21 @@ pub fn read(name: &str, (t, q, tau): &Triple<'_>, joints: usize) -> PyResult<Rea
 }
 
 /// Numbers of each joint, from an array of shape `(samples, joints)`, or `(samples,)` for one joint.
-fn by_joint(name: &str, array: &Numbers<'_>, samples: usize, joints: usize) -> PyResult<Vec<Vec<f64>>> {
-    let array = array.as_array();
-    let fits = match array.shape() {
-        [rows] => joints == 1 && *rows == samples,
-        [rows, columns] => *rows == samples && *columns == joints,
+fn by_joint(name: &str, given: &Numbers<'_>, samples: usize, joints: usize) -> PyResult<Vec<Vec<f64>>> {
+    let array = Array::of(name, given)?;
+    let fits = match array.shape[..] {
+        [rows] => joints == 1 && rows == samples,
+        [rows, columns] => rows == samples && columns == joints,
         _ => false,
     };
     if !fits {
         return Err(argument(format!(
-            "{name} has shape {:?}; needed is ({samples}, {joints}): a row for each time, a column for each joint",
-            array.shape()
+            "{name} has the shape {}; expected ({samples}, {joints}): a row for each time, a column for each joint",
+            array.shape_text()
         )));
     }
-    let numbers: Vec<f64> = array.iter().copied().collect();
-    Ok((0..joints).map(|joint| numbers[joint..].iter().step_by(joints).copied().collect()).collect())
+    let of_joint = |joint: usize| array.numbers.iter().skip(joint).step_by(joints).copied().collect();
+    Ok((0..joints).map(of_joint).collect())
 }
 
 /// Record `Recording` of Python.
@@ -83,7 +79,13 @@ pub fn record<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("scarab_ident._records")?.getattr(name)
 }
 
-/// Reads a recording of a leg from a file.
+/// Gives warnings of Python.
+pub fn warn(py: Python<'_>, warnings: impl IntoIterator<Item = String>) -> PyResult<()> {
+    let warn = py.import("warnings")?.getattr("warn")?;
+    warnings.into_iter().try_for_each(|warning| warn.call1((warning,)).map(drop))
+}
+
+#[doc = include_str!(concat!(env!("OUT_DIR"), "/read_recording"))]
 #[pyfunction]
 #[pyo3(signature = (path, leg, *, columns = "", units = "", skip_bad = false, delimiter = None, decimal = None))]
 pub fn read_recording<'py>(
@@ -98,20 +100,21 @@ pub fn read_recording<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let columns: Vec<ColumnChoice> = parts("columns", columns)?;
     let units: Vec<UnitChoice> = parts("units", units)?;
+    let delimiters =
+        [("comma", Delimiter::Comma), ("semicolon", Delimiter::Semicolon), ("tab", Delimiter::Tab)];
+    let decimals = [("point", Decimal::Point), ("comma", Decimal::Comma)];
     let import = Import {
         skip_bad,
-        delimiter: named(
-            "delimiter",
-            delimiter,
-            &[("comma", Delimiter::Comma), ("semicolon", Delimiter::Semicolon), ("tab", Delimiter::Tab)],
-        )?,
-        decimal: named("decimal", decimal, &[("point", Decimal::Point), ("comma", Decimal::Comma)])?,
+        delimiter: delimiter.map(|name| named("delimiter", name, &delimiters)).transpose()?,
+        decimal: decimal.map(|name| named("decimal", name, &decimals)).transpose()?,
         command: format!("scarab replay {}", path.display()),
         ..Import::of(&leg.file, &leg.text)
     };
     let import = import.with(&columns, &units).map_err(argument)?;
-    let read = py.detach(|| Recording::read(&path, &import)).map_err(raised)?;
-    recording(py, &read.recording)
+    let Read { recording: read, report } = py.detach(|| Recording::read(&path, &import)).map_err(raised)?;
+    let skipped = (report.skipped > 0).then(|| reading_notes(std::slice::from_ref(&report)));
+    warn(py, skipped.into_iter().flatten().chain(of_more_joints(&read, &leg.file)))?;
+    recording(py, &read)
 }
 
 /// Parts of an argument that are separated by commas.
@@ -121,11 +124,10 @@ fn parts<T: std::str::FromStr<Err = String>>(name: &str, text: &str) -> PyResult
 }
 
 /// Value of this name.
-pub fn named<T: Copy>(argument_name: &str, name: Option<&str>, values: &[(&str, T)]) -> PyResult<Option<T>> {
-    let Some(name) = name else { return Ok(None) };
+pub fn named<T: Copy>(argument_name: &str, name: &str, values: &[(&str, T)]) -> PyResult<T> {
     let found = values.iter().find(|(known, _)| *known == name);
-    found.map(|(_, value)| Some(*value)).ok_or_else(|| {
+    found.map(|(_, value)| *value).ok_or_else(|| {
         let known: Vec<_> = values.iter().map(|(known, _)| format!("'{known}'")).collect();
-        argument(format!("{argument_name} is '{name}'; possible are {}", known.join(", ")))
+        argument(format!("{argument_name} is '{name}'; it must be one of {}", known.join(", ")))
     })
 }

@@ -36,12 +36,20 @@ def test_every_position_is_inside_the_box_and_an_impossible_one_is_dropped():
     assert np.allclose(found.x, [0.5, -1.0], atol=1e-3)
 
 
+def test_nested_searches_end_with_an_error_not_a_crash():
+    def search(x):
+        return si.beetle_swarm(search, np.array([[0.0, 1.0]]), evaluations=20).value
+
+    with pytest.raises(si.InputError, match="nested"):
+        search(None)
+
+
 @pytest.mark.parametrize(
     ("bounds", "words"),
     [
         ([], "empty"),
         ([(0.0, 1.0)] * 65, "at most 64"),
-        ([(0.0, 1.0), (2.0, 1.0)], r"bounds\[1\] is \(2, 1\)"),
+        ([(0.0, 1.0), (2.0, 1.0)], r"bounds\[1\] is \(2.0, 1.0\)"),
         ([(0.0, float("inf"))], "finite"),
     ],
 )
@@ -58,5 +66,7 @@ def test_an_exception_of_the_objective_ends_the_search():
         si.beetle_swarm(objective, [(0.0, 1.0)])
     with pytest.raises(TypeError):
         si.beetle_swarm(lambda x: "text", [(0.0, 1.0)])
+    with pytest.raises(si.InputError, match="at least 1"):
+        si.beetle_swarm(lambda x: 0.0, [(0.0, 1.0)], evaluations=0)
     with pytest.raises(si.InputError, match="not finite at any"):
         si.beetle_swarm(lambda x: float("nan"), [(0.0, 1.0)], evaluations=100)

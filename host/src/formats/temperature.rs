@@ -22,11 +22,21 @@ pub const MAGNET_SHARE_PER_KELVIN: f64 = -0.0011;
 /// # Errors
 /// The text is not a number, or outside the range of a drive.
 pub fn parse(text: &str) -> Result<f64, String> {
+    text.parse().map_or(Err(()), |celsius| checked(celsius).map_err(drop)).map_err(|()| refusal(text))
+}
+
+/// This temperature, if a drive can have it.
+///
+/// # Errors
+/// The temperature is outside the range of a drive.
+pub fn checked(celsius: f64) -> Result<f64, String> {
     let (low, high) = RANGE_C;
-    match text.parse::<f64>() {
-        Ok(celsius) if (low..=high).contains(&celsius) => Ok(celsius),
-        _ => Err(format!("`{text}` is not a temperature from {low} to {high} degrees Celsius")),
-    }
+    if (low..=high).contains(&celsius) { Ok(celsius) } else { Err(refusal(&celsius.to_string())) }
+}
+
+fn refusal(text: &str) -> String {
+    let (low, high) = RANGE_C;
+    format!("`{text}` is not a temperature from {low} to {high} degrees Celsius")
 }
 
 /// Warning about a model identified at `model` degrees Celsius on a leg at `leg`; `None` if one is

@@ -54,7 +54,7 @@ impl ReadReport {
         let is_plain = |column: &ColumnReport| column.factor == 1.0 && column.by.is_none();
         self.skipped > 0
             || !self.header
-            || self.format != PLAIN_FORMAT
+            || ![PLAIN_FORMAT, ARRAYS].contains(&self.format.as_str())
             || !self.columns.iter().all(is_plain)
             || self.columns.iter().any(|column| column.column != format!("{}_{}", column.signal, column.unit))
     }
@@ -62,3 +62,5 @@ impl ReadReport {
 
 /// Format that needs no mention.
 pub const PLAIN_FORMAT: &str = "CSV with commas";
+/// Format of samples that a program holds.
+pub const ARRAYS: &str = "arrays";

@@ -6,8 +6,9 @@ mod logging_errors;
 mod predictions;
 mod recordings;
 mod screening;
-mod warnings;
+pub mod warnings;
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -110,6 +111,23 @@ impl ReplayOptions {
             payload: None,
         }
     }
+
+    /// Checks what concerns several options.
+    fn check(&self, recordings: &Recordings) -> Result<(), ToolError> {
+        let Recordings { held_out, with_payload, .. } = recordings;
+        let refused = |reason: &str| Err(ToolError::input(reason));
+        if self.split.is_some_and(|share| !(share > 0.0 && share < 1.0)) {
+            return refused("--split: must be above 0 and below 1");
+        }
+        if self.split.is_some() && !held_out.is_empty() {
+            return refused("--split and --validate exclude each other");
+        }
+        match (self.payload.is_some(), with_payload.is_empty()) {
+            (true, true) => refused("--payload needs --with-payload: recordings of the leg with that mass"),
+            (false, false) => refused("--with-payload needs --payload: the mass in those recordings"),
+            _ => Ok(()),
+        }
+    }
 }
 
 type HostRecorder<const N: usize, const B: usize> = Recorder<f32, N, B, TAPS, PENDING>;
@@ -179,6 +197,11 @@ impl<const N: usize> Samples<N> {
         }
     }
 
+    /// Doubt about the bandwidth, with the file's name.
+    fn warning(&self) -> Option<String> {
+        self.warning.as_ref().map(|warning| format!("{}: {warning}", self.file.display()))
+    }
+
     fn duration_s(&self) -> f64 {
         self.position.len() as f64 / SAMPLE_RATE_HZ
     }
@@ -190,6 +213,7 @@ pub fn replay<const N: usize, const B: usize>(
     recordings: &Recordings,
     options: &ReplayOptions,
 ) -> Result<Replayed, ToolError> {
+    options.check(recordings)?;
     let mut background = background::<N, B>(leg, options.prior, options.swarm_seed)?;
     background.use_estimator(options.estimator);
     let mut options = options.clone();
@@ -200,9 +224,11 @@ pub fn replay<const N: usize, const B: usize>(
     let Some(payload) = &options.payload else {
         return identified(leg, background, recordings, options, None);
     };
-    let (scale, with_mass) = known_mass::scale(leg, &background, recordings, options, payload)?;
+    let known_mass::Found { scale, read, warnings } =
+        known_mass::scale(leg, &background, recordings, options, payload)?;
     let mut replayed = identified(leg, background, recordings, options, scale.trusted())?;
-    replayed.run.read.get_or_insert_default().extend(with_mass);
+    replayed.run.read.get_or_insert_default().extend(read);
+    replayed.warnings.extend(warnings);
     let used = core::array::from_fn(|joint| leg.joints[joint].torque_per_ampere);
     replayed.run.scale = ScaleReport::of(&scale, &used);
     Ok(replayed)
@@ -233,9 +259,10 @@ fn identified<const N: usize, const B: usize>(
         recordings.iter().map(|recording| Samples::of(recording, &anatomy, options, &screening)).collect()
     };
     let (training, held_out) = (on_grid(&training), on_grid(&held_out));
-    warnings.extend(training.iter().chain(&held_out).filter_map(|samples| {
-        samples.warning.as_ref().map(|warning| format!("{}: {warning}", samples.file.display()))
-    }));
+    warnings.extend(training.iter().chain(&held_out).filter_map(Samples::warning));
+    // Both parts of a file that is split give the same warning.
+    let mut seen = BTreeSet::new();
+    warnings.retain(|warning| seen.insert(warning.clone()));
 
     let mut sources = feed(&mut recorder, &background, &training, "training", |_, _, _| {});
     // The bias of the parameters is judged instead (`logging_errors::encoder`).

@@ -14,7 +14,7 @@ use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
 use crate::formats::recording::signal::Signal;
 use crate::formats::recording::{JointSeries, MOST_BAD_PERCENT, MOST_SAMPLES, Recording};
-use crate::report::reading::{ReadReport, SkippedReport};
+use crate::report::reading::{ARRAYS, ReadReport, SkippedReport};
 
 /// Recording with its provenance.
 #[derive(Clone, Debug)]
@@ -172,7 +172,7 @@ pub(crate) fn samples(name: &Path, time_s: &[f64], joints: &[JointSeries]) -> Re
     for sample in 0..time_s.len() {
         decoder.take(sample, |chosen| chosen.column.finite(series[chosen.column.index][sample]))?;
     }
-    decoder.finish("arrays".to_owned(), true)
+    decoder.finish(ARRAYS.to_owned(), true)
 }
 
 /// Reads a CSV text.

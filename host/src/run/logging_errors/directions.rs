@@ -28,6 +28,7 @@
 use std::borrow::Cow;
 
 use nalgebra::{Rotation3, Unit, Vector3};
+use rayon::prelude::*;
 use scarab::ident::{RowModel, Smoothed};
 
 use crate::run::logging_errors::fit::{Fit, Score, score};
@@ -196,7 +197,7 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
         let plain = self.equations.fit(&self.equations.columns, &self.equations.torque, false);
         let training = self.equations.fit(&self.equations.columns, &self.equations.torque, true);
         let mut found: Vec<Found<B>> =
-            Kind::all(N).into_iter().map(|kind| self.one(kind, &plain, &training)).collect();
+            Kind::all(N).into_par_iter().map(|kind| self.one(kind, &plain, &training)).collect();
         for one in 0..found.len() {
             let names: Vec<String> = (0..found.len())
                 .filter(|&other| other != one && found[one].seen && found[other].seen)

@@ -34,21 +34,28 @@ pub(super) fn settled<const N: usize, const B: usize>(
     solver
 }
 
-/// Scale of the torques from the recordings with the mass and those without it, and how the recordings with
-/// the mass were read.
+/// Scale of the torques, and the recordings with the mass.
+pub(super) struct Found<const N: usize, const B: usize> {
+    pub scale: Scale<N, B>,
+    /// How the recordings with the mass were read.
+    pub read: Vec<ReadReport>,
+    pub warnings: Vec<String>,
+}
+
+/// Scale of the torques from the recordings with the mass and those without it.
 pub(super) fn scale<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
     recordings: &Recordings,
     options: &ReplayOptions,
     payload: &Payload<f64>,
-) -> Result<(Scale<N, B>, Vec<ReadReport>), ToolError> {
+) -> Result<Found<N, B>, ToolError> {
     let recording = |reads: &[Read]| reads.iter().map(|read| read.recording.clone()).collect::<Vec<_>>();
-    let (without, with) = (&recordings.training, &recordings.with_payload);
-    refuse_copies(&recording(without), &recording(with), "--with-payload")?;
-    let reports = with.iter().map(|read| read.report.clone()).collect();
-    let without = record(leg, background, without, options)?;
-    let with = record(leg, background, with, &ReplayOptions { split: None, ..options.clone() })?;
+    let with = Recordings { training: recordings.with_payload.clone(), ..Recordings::default() };
+    refuse_copies(&recording(&recordings.training), &recording(&with.training), "--with-payload")?;
+    let read = with.training.iter().map(|read| read.report.clone()).collect();
+    let (without, _) = record(leg, background, recordings, options)?;
+    let (with, warnings) = record(leg, background, &with, &ReplayOptions { split: None, ..options.clone() })?;
     let base = base_of(background, payload);
     let scale = Scale {
         payload: Some(*payload),
@@ -56,7 +63,7 @@ pub(super) fn scale<const N: usize, const B: usize>(
         load: options.load,
         load_base: load_base(background, options),
     };
-    Ok((scale, reports))
+    Ok(Found { scale, read, warnings })
 }
 
 /// Base parameters of the load; zero without one.
@@ -67,20 +74,20 @@ pub(super) fn load_base<const N: usize, const B: usize>(
     options.load.as_ref().map_or([0.0; B], |load| base_of(background, load))
 }
 
-/// Record of unchanged recordings.
+/// Record of the unchanged training recordings, and their warnings.
 fn record<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
-    training: &[Read],
+    recordings: &Recordings,
     options: &ReplayOptions,
-) -> Result<Record<f32, N, B>, ToolError> {
+) -> Result<(Record<f32, N, B>, Vec<String>), ToolError> {
     let anatomy = anatomy::<N>(leg)?;
-    let recordings = Recordings { training: training.to_vec(), ..Recordings::default() };
-    let Parts { training, screening, .. } = parts(&recordings, options, leg, &[1.0; N])?;
+    let Parts { training, screening, .. } = parts(recordings, options, leg, &[1.0; N])?;
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
     let samples: Vec<Samples<N>> =
         training.iter().map(|recording| Samples::of(recording, &anatomy, options, &screening)).collect();
     feed(&mut recorder, background, &samples, "training", |_, _, _| {});
-    Ok(settled(background, recorder.finish(), options).record().clone())
+    let warnings = samples.iter().filter_map(Samples::warning).collect();
+    Ok((settled(background, recorder.finish(), options).record().clone(), warnings))
 }

@@ -6,16 +6,23 @@ use crate::formats::recording::Recording;
 /// Excess over the leg's range from which a warning is given.
 const RANGE_MARGIN_DEG: f64 = 5.0;
 
+/// Joints of the file that the leg does not have.
+#[must_use]
+pub fn of_more_joints(recording: &Recording, leg: &LegFile) -> Option<String> {
+    let (in_file, in_leg) = (recording.joints_in_file, leg.joints.len());
+    (in_file > in_leg).then(|| {
+        format!(
+            "{}: holds {in_file} joints, the leg `{}` has {in_leg}: the other columns are ignored, as if those joints were at rest",
+            recording.file.display(),
+            leg.name
+        )
+    })
+}
+
 /// Signs that the recording is from another machine.
 pub(super) fn of_another_leg(recording: &Recording, leg: &LegFile) -> impl Iterator<Item = String> {
     let file = recording.file.display();
-    let (in_file, in_leg) = (recording.joints_in_file, leg.joints.len());
-    let more_joints = (in_file > in_leg).then(|| {
-        format!(
-            "{file}: holds {in_file} joints, the leg `{}` has {in_leg}: the other columns are ignored, as if those joints were at rest",
-            leg.name
-        )
-    });
+    let more_joints = of_more_joints(recording, leg);
     let outside = recording.joints.iter().zip(&leg.joints).enumerate().filter_map(move |(number, (series, joint))| {
         let angles = series.position_rad.iter().map(|angle| angle.to_degrees());
         let (low, high) =
