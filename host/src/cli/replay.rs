@@ -93,7 +93,7 @@ fn read(files: &[Input], import: &Import) -> Result<Vec<Read>, FileError> {
 
 /// Identifies and reports; returns the exit code.
 pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
-    arguments.common.leg.require("cargo sim replay run.csv --leg my-leg.toml")?;
+    arguments.common.leg.require("replay run.csv --leg my-leg.toml")?;
     let leg = &arguments.common.leg()?;
     if arguments.split.is_some_and(|fraction| !(fraction > 0.0 && fraction < 1.0)) {
         return Err(ToolError::input("--split: must be above 0 and below 1"));
