@@ -278,6 +278,7 @@ impl Leg {
             even_stamps,
             load: placed(load, "load")?,
             payload: placed(payload, "payload")?,
+            import: None,
         };
         let (recordings, options) = (&recordings, &options);
         let replayed = py

@@ -98,6 +98,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
     if arguments.split.is_some_and(|fraction| !(fraction > 0.0 && fraction < 1.0)) {
         return Err(ToolError::input("--split: must be above 0 and below 1"));
     }
+    let import = &arguments.import.import(leg, arguments.common.leg.name())?;
     let options = &ReplayOptions {
         split: arguments.split,
         bandwidth_hz: match arguments.bandwidth {
@@ -114,9 +115,9 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         even_stamps: arguments.even_stamps,
         load: arguments.load.as_ref().map(|mass| mass.on(leg, "--load")).transpose()?,
         payload: arguments.payload.as_ref().map(|mass| mass.on(leg, "--payload")).transpose()?,
+        import: Some(import.clone()),
     };
     let kept = arguments.model.kept(leg)?;
-    let import = &arguments.import.import(leg, arguments.common.leg.name())?;
     let recordings = &Recordings {
         training: read(&arguments.files, import)?,
         held_out: read(&arguments.validate, import)?,

@@ -424,7 +424,9 @@ impl LegFile {
     pub fn parse(text: &str, file: &str) -> Result<Self, FileError> {
         let mut leg: Self = toml_file::parse(text, file)?;
         // An unknown drive delivers the stated torque.
-        for (joint, is_stated) in leg.joints.iter_mut().zip(Self::joints_that_state(text, "torque_per_ampere")) {
+        for (joint, is_stated) in
+            leg.joints.iter_mut().zip(Self::joints_that_state(text, "torque_per_ampere"))
+        {
             if !is_stated {
                 joint.torque_per_ampere =
                     DEFAULT_TORQUE_PER_AMPERE.max(joint.torque_limit_nm / check::LARGEST_CURRENT_A);

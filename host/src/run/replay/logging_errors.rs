@@ -227,7 +227,7 @@ pub(super) struct Subject<'a, const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> Subject<'_, N, B> {
     /// Adds directions, sigma, tests and the likely cause of a refusal to the report.
-    pub(super) fn examine(&self, run: &mut RunReport) -> Result<(), ToolError> {
+    pub(super) fn examine(&self, run: &mut RunReport) -> Result<Option<String>, ToolError> {
         let samples = self.screening.findings();
         let (question, file_of) = self.question();
         let mut errors = LoggingErrors::of(&question)
@@ -238,7 +238,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             self.widen(run, errors);
             run.findings.extend(errors.findings());
             run.findings.extend(cause::in_degrees(&question, errors).map(|found| {
-                let remedy = units::remedy(&self.options.import, found.name, found.joint);
+                let remedy = units::remedy(self.options.import.as_ref(), found.name, found.joint);
                 FindingReport {
                     reason: Reason::Input.name(),
                     test: found.name,
@@ -271,25 +271,25 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         run.verdict = if run.accepted() { "accepted" } else { "refused" };
         let current = errors
             .as_ref()
-            .and_then(|errors| units::current(&question, &errors.equations, &self.options.import));
+            .and_then(|errors| units::current(&question, &errors.equations, self.options.import.as_ref()));
         let mut suspected = current.as_ref();
         if !run.accepted() {
             let mut cause = cause::likely(&question, errors.as_ref(), samples, &run.findings);
             if let Some(current) = suspected.take_if(|_| cause.name == "unknown") {
                 cause = current.clone();
             } else {
-                let remedy = units::remedy(&self.options.import, cause.name, cause.joint);
+                let remedy = units::remedy(self.options.import.as_ref(), cause.name, cause.joint);
                 cause.words += &remedy.unwrap_or_default();
             }
             correct_words(run, cause.name);
             report.likely_cause = Some(cause);
         }
         // Torques of another scale make another leg, which may be accepted.
-        if let (Some(current), Some(whole)) = (suspected, self.wholes.first()) {
-            crate::run::replay::warn(&whole.recording.file, &current.words);
-        }
+        let warning = suspected
+            .zip(self.wholes.first())
+            .map(|(current, whole)| format!("{}: {}", whole.recording.file.display(), current.words));
         run.doubt = Some(report);
-        Ok(())
+        Ok(warning)
     }
 
     /// Adds the scatter between recordings to sigma.

@@ -26,7 +26,8 @@ const CURRENT_RATIO: f64 = 0.2;
 const ALIKE: f64 = 0.8;
 
 /// Options that read the columns as the cause states, where it is a unit.
-pub(super) fn remedy(import: &Import, name: &str, joint: Option<usize>) -> Option<String> {
+pub(super) fn remedy(import: Option<&Import>, name: &str, joint: Option<usize>) -> Option<String> {
+    let import = import?;
     let mut changed = readings(import);
     let is_meant = |signal: Signal| joint.is_none_or(|joint| signal.joint() == Some(joint));
     let unit = Unit::named(match name {
@@ -45,8 +46,9 @@ pub(super) fn remedy(import: &Import, name: &str, joint: Option<usize>) -> Optio
 pub(super) fn current<const N: usize, const B: usize>(
     question: &Question<N, B>,
     equations: &Equations<N, B>,
-    import: &Import,
+    import: Option<&Import>,
 ) -> Option<CauseReport> {
+    let import = import?;
     let is_torque = |joint: usize| !import.columns.contains_key(&Signal::Current(joint + 1));
     let scales = scales(equations, &question.prior?);
     let is_alike = scales.iter().all(|scale| scale.ratio > 0.0 && scale.likeness >= ALIKE);
