@@ -34,6 +34,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use crate::base::error::{EXIT_REFUSED, ToolError};
 use crate::base::names::BY_CARGO;
 use crate::base::output;
+use crate::base::shell::program;
 use crate::formats::shard::Argument;
 
 /// Identifies legs, simulated or recorded. Exit codes: 0 accepted, 3 refused, 2 bad input.
@@ -157,7 +158,7 @@ pub fn perform<C: CommandFactory + FromArgMatches>(
     words: Vec<OsString>,
     run: impl FnOnce(&C, Vec<Argument>) -> Result<u8, ToolError>,
 ) -> ExitCode {
-    let description = C::command();
+    let description = called(C::command(), &program());
     let matches = description.clone().get_matches_from(words);
     let command = C::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let checked = arguments::check(&description, &matches);
@@ -169,6 +170,17 @@ pub fn perform<C: CommandFactory + FromArgMatches>(
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Command whose examples call `program` instead of the alias.
+fn called(command: clap::Command, program: &str) -> clap::Command {
+    let names: Vec<String> = command.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    names.iter().fold(command, |command, name| {
+        command.mut_subcommand(name, |command| match command.get_after_help().map(ToString::to_string) {
+            Some(text) => command.after_help(text.replace("cargo sim ", &format!("{program} "))),
+            None => command,
+        })
+    })
 }
 
 /// Runs one command and returns its exit code.
@@ -200,7 +212,7 @@ fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
 mod tests {
     use clap::{CommandFactory, Parser};
 
-    use super::{BY_CARGO, Cli, arguments};
+    use super::{BY_CARGO, Cli, arguments, called};
 
     fn help(mut command: clap::Command) -> String {
         command.render_long_help().to_string()
@@ -227,6 +239,15 @@ mod tests {
         }
         let wide = help(cli).lines().find(|line| line.chars().count() > super::HELP_WIDTH).map(str::to_owned);
         assert_eq!(wide, None);
+    }
+
+    #[test]
+    fn examples_call_the_program_by_its_name() {
+        let cli = called(Cli::command(), "scarab");
+        let replay = cli.find_subcommand("replay").expect("a command").clone();
+        assert!(help(replay).contains("Example: scarab replay run.csv"));
+        let flash = cli.find_subcommand("flash-leg").expect("a command").clone();
+        assert!(help(flash).contains("Example: cargo flash-leg --leg"));
     }
 
     #[test]

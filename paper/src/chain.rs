@@ -200,7 +200,7 @@ pub fn run(plant: &LegFile, believed: &LegFile, options: &ChainOptions) -> Resul
     let excitation = repeated(&context.motions.excitation, options.cycles).map_err(unfit)?;
     (context.motions.excitation, context.configuration.excitation) = (excitation, excitation);
     verify_on(&mut context, verification::motion(believed)?);
-    let Driven { pair, watch, stopped } = drive(believed, plant, &context, &simulation)?;
+    let Driven { pair, watch, stopped, .. } = drive(believed, plant, &context, &simulation)?;
     let identification = pair.leg.identification();
     let found = identification.solver().zip(identification.validation().first().cloned().flatten());
     let Some((solver, measured)) = found.filter(|_| stopped.is_none()) else {

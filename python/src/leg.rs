@@ -267,11 +267,11 @@ impl Leg {
                 .map_err(|reason| argument(format!("prior: {reason}")))?,
             estimator: named("estimator", estimator, &estimators)?,
             swarm_seed: seed,
-            csv: None,
             torque_delay_ms: torque_delay_ms.map_or_else(Vec::new, Delay::values),
             even_stamps,
             load: placed(&leg, load, "load")?,
             payload: placed(&leg, payload, "payload")?,
+            ..ReplayOptions::of(&leg)
         };
         let (leg, recordings, options) = (&leg, &recordings, &options);
         let replayed =

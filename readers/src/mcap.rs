@@ -66,23 +66,25 @@ enum Content {
     Effort(String),
 }
 
-/// Opened MCAP file.
+/// Opened MCAP file, or all files of a bag.
 pub struct Mcap {
-    path: PathBuf,
+    /// Files in the order of the recording.
+    parts: Vec<PathBuf>,
     columns: Vec<Column>,
     /// Topic and content of each column.
     contents: Vec<(String, Content)>,
 }
 
 impl Mcap {
-    /// Opens a file and finds its joints.
+    /// Opens a file, or a folder with the files into which a bag is split, and finds its joints.
     ///
     /// # Errors
-    /// The file is damaged, or holds no message with states of joints.
+    /// A file is damaged, or none holds a message with states of joints.
     pub fn open(path: &Path) -> Result<Self, Error> {
+        let parts = if path.is_dir() { parts(path)? } else { vec![path.to_owned()] };
         let mut topics: BTreeMap<String, Vec<String>> = BTreeMap::new();
         let mut others = Vec::new();
-        each_message(path, &mut others, &mut |topic, message, _| {
+        each_message(&parts, &mut others, &mut |topic, message, _| {
             let joints = topics.entry(topic.to_owned()).or_default();
             if joints.len() < MOST_JOINTS {
                 // Most messages name the joints of the one before.
@@ -101,7 +103,7 @@ impl Mcap {
                 "no message of the type {SCHEMA}; message types in the file: {found}"
             )));
         }
-        let mut table = Self { path: path.to_owned(), columns: Vec::new(), contents: Vec::new() };
+        let mut table = Self { parts, columns: Vec::new(), contents: Vec::new() };
         for (topic, joints) in &topics {
             let prefix = if topics.len() > 1 { format!("{topic}:") } else { String::new() };
             let mut add = |name: String, unit, content| {
@@ -138,7 +140,7 @@ impl Table for Mcap {
         }
         let mut number = 0;
         let mut values = vec![0.0; chosen.len()];
-        each_message(&self.path, &mut Vec::new(), &mut |of, message, done| {
+        each_message(&self.parts, &mut Vec::new(), &mut |of, message, done| {
             if of != topic {
                 return Ok(ControlFlow::Continue(()));
             }
@@ -211,8 +213,48 @@ fn check_name(name: &str) -> Result<(), Error> {
 type TakeMessage<'a> = &'a mut dyn FnMut(&str, Message<'_>, f64) -> Result<ControlFlow<()>, Error>;
 
 /// Passes every message with states of joints to `take`, and collects the names of all other message types.
-fn each_message(path: &Path, others: &mut Vec<String>, take: TakeMessage<'_>) -> Result<(), Error> {
-    guarded(|| read_messages(path, others, take))
+fn each_message(parts: &[PathBuf], others: &mut Vec<String>, take: TakeMessage<'_>) -> Result<(), Error> {
+    let mut is_ended = false;
+    for (number, part) in parts.iter().enumerate() {
+        let mut take_part = |topic: &str, message: Message<'_>, done: f64| {
+            let flow = take(topic, message, (number as f64 + done) / parts.len() as f64)?;
+            is_ended |= flow.is_break();
+            Ok(flow)
+        };
+        let read = guarded(|| read_messages(part, others, &mut take_part));
+        read.map_err(|error| match part.file_name() {
+            Some(name) if parts.len() > 1 => Error::new(format!("{}: {error}", name.to_string_lossy())),
+            _ => error,
+        })?;
+        if is_ended {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// MCAP files of a folder, in the order of the number at the end of their names, then by name.
+///
+/// # Errors
+/// The folder cannot be read, or holds no such file.
+fn parts(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut parts = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|extension| extension == "mcap") {
+            parts.push(path);
+        }
+    }
+    if parts.is_empty() {
+        return Err(Error::new("the folder holds no `.mcap` file"));
+    }
+    // `bag_10` follows `bag_9`.
+    let number = |path: &Path| {
+        let stem = path.file_stem()?.to_str()?;
+        stem[stem.trim_end_matches(|c: char| c.is_ascii_digit()).len()..].parse::<u64>().ok()
+    };
+    parts.sort_by(|one, other| number(one).cmp(&number(other)).then_with(|| one.cmp(other)));
+    Ok(parts)
 }
 
 fn read_messages(path: &Path, others: &mut Vec<String>, take: TakeMessage<'_>) -> Result<(), Error> {

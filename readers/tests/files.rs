@@ -218,6 +218,38 @@ fn topics_are_named_where_there_are_several_and_never_mixed() {
 }
 
 #[test]
+fn the_files_of_a_split_bag_are_read_in_the_order_of_their_numbers() {
+    let states = |joint: &str| {
+        let bytes = state(joint);
+        std::fs::read(&mcap_of(&[("/states", "sensor_msgs/msg/JointState", "cdr", &bytes)]).0)
+            .expect("written")
+    };
+    let folder = Temporary::new(b"");
+    std::fs::remove_file(&folder.0).expect("its name is free");
+    std::fs::create_dir(&folder.0).expect("a temporary folder");
+    let part = |name: &str, bytes: &[u8]| std::fs::write(folder.0.join(name), bytes).expect("a file");
+    assert!(refusal(Mcap::open(&folder.0)).contains("no `.mcap` file"));
+    part("metadata.yaml", b"");
+    for (name, joint) in [("bag_0.mcap", "a"), ("bag_10.mcap", "c"), ("bag_9.mcap", "b")] {
+        part(name, &states(joint));
+    }
+    let table = Mcap::open(&folder.0).expect("a bag of three files");
+    let names = ["position[a]", "position[b]", "position[c]"];
+    let found = rows(&table, &names).expect("three messages");
+    let order: Vec<_> = found
+        .iter()
+        .map(|(number, values)| (*number, values.iter().position(|value| !value.is_nan())))
+        .collect();
+    assert_eq!(order, [(1, Some(0)), (2, Some(1)), (3, Some(2))]);
+    // A damaged part is named.
+    part("bag_9.mcap", &states("b")[..60]);
+    part("bag_11.mcap", b"\x89MCAP0\r\nno record");
+    let message = refusal(Mcap::open(&folder.0).and_then(|table| rows(&table, &names)));
+    assert!(message.contains("bag_"), "{message}");
+    std::fs::remove_dir_all(&folder.0).expect("the folder exists");
+}
+
+#[test]
 fn other_messages_and_encodings_are_refused_with_a_sentence() {
     let hip = state("hip");
     let opened = |channels: &[(&str, &str, &str, &[u8])]| refusal(Mcap::open(&mcap_of(channels).0));

@@ -7,6 +7,7 @@ pub mod number;
 pub mod output;
 pub mod precision;
 pub mod random;
+pub mod rounding;
 pub mod shard;
 pub mod shell;
 pub mod stats;

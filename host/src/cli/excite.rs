@@ -15,7 +15,7 @@ use crate::leg::setup::DEFAULT_SEED;
 use crate::run::excite::assumption::Assumption;
 use crate::run::excite::bench::{ExciteOptions, FEWEST_EVALUATIONS, MOST_EVALUATIONS};
 use crate::run::excite::design::DesignOptions;
-use crate::run::excite::run::excite;
+use crate::run::excite::run::{USUAL_DURATION_S, USUAL_MARGIN_PERCENT, excite};
 use crate::view::excite as text;
 use crate::with_leg_size;
 
@@ -40,12 +40,12 @@ pub struct ExciteArguments {
     #[arg(long, value_name = "HZ", default_value = "500")]
     rate: SampleRate,
     /// Duration of the motion with its blends, s.
-    #[arg(long, default_value_t = 22.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = USUAL_DURATION_S, allow_negative_numbers = true)]
     duration: f64,
     #[command(flatten)]
     noise: NoiseOptions,
     /// Assumed error of each base parameter in the bound on torque, percent.
-    #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = USUAL_MARGIN_PERCENT, allow_negative_numbers = true)]
     torque_margin: f64,
     /// Assume the truth of the leg file instead of its prior.
     #[arg(long)]

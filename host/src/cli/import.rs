@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use crate::base::error::ToolError;
 use crate::base::names::BY_CARGO;
-use crate::base::shell::quoted;
+use crate::base::shell::{program_of, quoted};
 use crate::formats::leg_file::LegFile;
 use crate::formats::recording::dialect::{Decimal, Delimiter};
 use crate::formats::recording::import::{ColumnChoice, Import, UnitChoice};
@@ -66,14 +66,11 @@ impl ImportArguments {
     }
 }
 
-/// Alias that runs this program.
-const BY_ALIAS: &str = if cfg!(feature = "readers") { "cargo sim-readers" } else { "cargo sim" };
-
 /// The command as typed, without `--columns` and `--units`.
 fn command(words: impl Iterator<Item = String>) -> String {
-    let mut words = words.skip(1).peekable();
-    let program = if words.next_if(|word| word == BY_CARGO).is_some() { BY_ALIAS } else { "scarab" };
-    let mut command = program.to_owned();
+    let words: Vec<String> = words.collect();
+    let mut command = program_of(words.iter().cloned());
+    let mut words = words.into_iter().skip(1).filter(|word| word != BY_CARGO);
     while let Some(word) = words.next() {
         if word == "--columns" || word == "--units" {
             words.next();
@@ -87,7 +84,8 @@ fn command(words: impl Iterator<Item = String>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{BY_ALIAS, BY_CARGO, command};
+    use super::{BY_CARGO, command};
+    use crate::base::shell::ALIAS;
 
     #[test]
     fn a_proposed_command_keeps_all_other_options() {
@@ -104,7 +102,7 @@ mod tests {
         ];
         assert_eq!(
             command(typed.into_iter().map(str::to_owned)),
-            format!("{BY_ALIAS} replay 'my run.csv' --split 0.7")
+            format!("{ALIAS} replay 'my run.csv' --split 0.7")
         );
         assert_eq!(command(["scarab", "replay"].into_iter().map(str::to_owned)), "scarab replay");
     }

@@ -7,6 +7,7 @@ use clap::{ArgGroup, Args};
 use nalgebra::Vector3;
 
 use crate::base::error::{EXIT_ACCEPTED, ToolError};
+use crate::base::shell::{program, quoted};
 use crate::base::{files, output};
 use crate::cli::arguments::{Input, LegName, Output};
 use crate::formats::leg_file::check::GRAVITY;
@@ -84,8 +85,8 @@ pub fn run(arguments: &LegArguments) -> Result<u8, ToolError> {
     for remark in &remarks {
         output::print(&format!("{remark}\n"))?;
     }
-    let path = out.display();
-    output::print(&format!("leg file: {path}\nnext: cargo sim leg --check {path}\n"))?;
+    let path = out.display().to_string();
+    output::print(&format!("leg file: {path}\nnext: {} leg --check {}\n", program(), quoted(&path)))?;
     Ok(EXIT_ACCEPTED)
 }
 

@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use crate::base::error::ToolError;
+use crate::base::shell::program;
 use crate::cli::arguments::LegName;
 use crate::formats::leg_file::{BodySide, DEFAULT_LEG, LegFile, SHIPPED_LEGS};
 use crate::leg::posture::{on_side, pitched};
@@ -49,8 +50,9 @@ impl LegOptions {
         }
         let names = SHIPPED_LEGS.map(|(name, _)| name).join(", ");
         Err(ToolError::input(format!(
-            "--leg is missing: of which leg? For example `{example}`, where my-leg.toml is a leg file (docs/files.md); \
-             shipped legs go by their names: {names}"
+            "--leg is missing: of which leg? For example `{} {example}`, where my-leg.toml is a leg file (docs/files.md); \
+             shipped legs go by their names: {names}",
+            program()
         )))
     }
 

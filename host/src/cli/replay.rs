@@ -93,8 +93,9 @@ fn read(files: &[Input], import: &Import) -> Result<Vec<Read>, FileError> {
 
 /// Identifies and reports; returns the exit code.
 pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
-    arguments.common.leg.require("cargo sim replay run.csv --leg my-leg.toml")?;
+    arguments.common.leg.require("replay run.csv --leg my-leg.toml")?;
     let leg = &arguments.common.leg()?;
+    let import = &arguments.import.import(leg, arguments.common.leg.name())?;
     let options = &ReplayOptions {
         split: arguments.split,
         bandwidth_hz: match arguments.bandwidth {
@@ -111,9 +112,9 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         even_stamps: arguments.even_stamps,
         load: arguments.load.as_ref().map(|mass| mass.on(leg, "--load")).transpose()?,
         payload: arguments.payload.as_ref().map(|mass| mass.on(leg, "--payload")).transpose()?,
+        import: Some(import.clone()),
     };
     let kept = arguments.model.kept(leg)?;
-    let import = &arguments.import.import(leg, arguments.common.leg.name())?;
     let recordings = &Recordings {
         training: read(&arguments.files, import)?,
         held_out: read(&arguments.validate, import)?,

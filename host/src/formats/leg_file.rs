@@ -313,8 +313,15 @@ fn default_range() -> [f64; 2] {
     DEFAULT_RANGE_DEG
 }
 
+/// Speed limit of a joint without `speed_limit_deg_s`, degrees per second.
+pub const DEFAULT_SPEED_LIMIT: f64 = 180.0;
+/// Torque limit of a joint without `torque_limit_nm`, N m.
+pub const DEFAULT_TORQUE_LIMIT: f64 = 100.0;
+/// Torque constant of a joint without `torque_per_ampere`, N m/A, unless its torque needs too much current.
+const DEFAULT_TORQUE_PER_AMPERE: f64 = 1.5;
+
 fn default_speed_limit() -> f64 {
-    180.0
+    DEFAULT_SPEED_LIMIT
 }
 
 fn default_acceleration_limit() -> f64 {
@@ -322,11 +329,11 @@ fn default_acceleration_limit() -> f64 {
 }
 
 fn default_torque_limit() -> f64 {
-    100.0
+    DEFAULT_TORQUE_LIMIT
 }
 
 fn default_torque_per_ampere() -> f64 {
-    1.5
+    DEFAULT_TORQUE_PER_AMPERE
 }
 
 fn default_lag() -> f64 {
@@ -415,7 +422,16 @@ impl LegFile {
 
     /// Parses TOML text; `file` is its name in error messages.
     pub fn parse(text: &str, file: &str) -> Result<Self, FileError> {
-        let leg: Self = toml_file::parse(text, file)?;
+        let mut leg: Self = toml_file::parse(text, file)?;
+        // An unknown drive delivers the stated torque.
+        for (joint, is_stated) in
+            leg.joints.iter_mut().zip(Self::joints_that_state(text, "torque_per_ampere"))
+        {
+            if !is_stated {
+                joint.torque_per_ampere =
+                    DEFAULT_TORQUE_PER_AMPERE.max(joint.torque_limit_nm / check::LARGEST_CURRENT_A);
+            }
+        }
         check::leg(&leg).map_err(|fault| fault.in_file(file, text))?;
         Ok(leg)
     }

@@ -36,7 +36,7 @@ pub mod import;
 mod lines;
 pub mod signal;
 pub(crate) mod source;
-mod suggest;
+pub(crate) mod suggest;
 
 use columns::{LineNumbers, of_text, refuse};
 pub use decode::Read;
@@ -100,6 +100,9 @@ impl Recording {
     /// # Errors
     /// Names file, line and reason, and where column names are close the complete command.
     pub fn read(file: &Path, import: &Import) -> Result<Read, FileError> {
+        if let Some(foreign) = Foreign::of_folder(file) {
+            return foreign.read(file, false, import);
+        }
         let mut source = source::open(file)?;
         let begin = source.text.fill_buf().map_err(|error| FileError::unreadable(file, &error))?;
         if let Some(foreign) = Foreign::of(begin) {
@@ -128,13 +131,14 @@ impl Recording {
         decode::csv(file, of_text(text), "", import)
     }
 
-    /// Checks everything that concerns more than one row.
-    fn check(&self, numbers: &LineNumbers) -> Result<(), FileError> {
-        self.check_rate()?;
+    /// Checks everything that concerns more than one row. `advice` names the unit in which the time would be
+    /// valid.
+    fn check(&self, numbers: &LineNumbers, advice: &str) -> Result<(), FileError> {
+        self.check_rate(advice)?;
         self.check_gaps()
             .and_then(|()| self.check_turns())
             .map_err(|(sample, fault)| refuse(&self.file, numbers.of(sample), fault))?;
-        self.check_length()
+        self.check_length(advice)
     }
 
     /// Time from the first sample to the last, s.
@@ -170,8 +174,8 @@ impl Recording {
             joints_in_file: self.joints_in_file,
         };
         let (first, second) = (part(0..at), part(at..self.time_s.len()));
-        first.check_length()?;
-        second.check_length()?;
+        first.check_length("")?;
+        second.check_length("")?;
         Ok((first, second))
     }
 
@@ -191,13 +195,12 @@ impl Recording {
     }
 
     /// Rejects stamps in another unit before they are put on a grid of seconds, which would take gigabytes.
-    fn check_rate(&self) -> Result<(), FileError> {
+    fn check_rate(&self, advice: &str) -> Result<(), FileError> {
         let step_s = self.median_step_s();
         if step_s * MINIMUM_RATE_HZ <= RATE_TOLERANCE {
             return Ok(());
         }
-        let counts = self.time_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
-        Err(refuse(&self.file, None, Fault::TooSlow { step_s, counts }))
+        Err(refuse(&self.file, None, Fault::TooSlow { step_s, advice: advice.to_owned() }))
     }
 
     /// First gap, with the number of the sample after it.
@@ -229,10 +232,11 @@ impl Recording {
         Ok(())
     }
 
-    fn check_length(&self) -> Result<(), FileError> {
+    fn check_length(&self, advice: &str) -> Result<(), FileError> {
         let (samples, duration) = (self.time_s.len(), self.duration_s());
         if samples < MINIMUM_SAMPLES || duration < MINIMUM_DURATION_S {
-            return Err(refuse(&self.file, None, Fault::TooShort { samples, duration }));
+            let fault = Fault::TooShort { samples, duration, advice: advice.to_owned() };
+            return Err(refuse(&self.file, None, fault));
         }
         Ok(())
     }

@@ -2,6 +2,7 @@
 //!
 //! The conversion keeps torque, not frames: the anatomical angle is the joint's angle in the description, its
 //! torque the joint's torque. What a description does not know is left out of the file, as a comment.
+//! Rounding of the conversion is removed where a short number lies within it ([`crate::base::rounding`]).
 //!
 //! | leg file | robot description |
 //! | --- | --- |
@@ -13,9 +14,12 @@
 use nalgebra::Vector3;
 
 use crate::base::error::FileError;
-use crate::formats::leg_file::check::{LARGEST_SPEED, LARGEST_TORQUE, LENGTH, RANGE_END, SMALLEST_RANGE_DEG};
+use crate::base::rounding::{without_noise, without_noise_rad};
+use crate::formats::leg_file::check::{LARGEST_SPEED, LARGEST_TORQUE, LENGTH, SMALLEST_RANGE_DEG};
 use crate::formats::leg_file::draft::{Draft, DraftJoint, DraftPrior};
-use crate::formats::leg_file::{DhFile, LegFile};
+use crate::formats::leg_file::{
+    DEFAULT_RANGE_DEG, DEFAULT_SPEED_LIMIT, DEFAULT_TORQUE_LIMIT, DhFile, LegFile,
+};
 use crate::formats::robot::{Joint, Kind, Robot};
 use crate::leg::axes::{Axis, DhChain, DhJoint, ROUNDING_RAD};
 use crate::leg::robot_chain::{ChainJoint, LumpedBody, chain};
@@ -24,6 +28,12 @@ use crate::leg::robot_chain::{ChainJoint, LumpedBody, chain};
 pub const LARGEST_PARALLEL_RAD: f64 = 0.01;
 /// Axes nearer to parallel than this are probably meant parallel, rad.
 const SUSPICIOUS_RAD: f64 = 1e-3;
+
+/// Ends of a range that the firmware takes, anatomical and as D-H angle, degrees.
+const TURN_DEG: f64 = 360.0;
+
+/// Narrowing of a range that needs no remark, degrees.
+const ROUNDED_DEG: f64 = 1e-4;
 
 /// Choices that a robot description leaves open.
 #[derive(Clone, Debug)]
@@ -75,11 +85,11 @@ pub fn leg(robot: &Robot, options: &RobotOptions) -> Result<FromRobot, FileError
     let [x, y, z]: [f64; 3] = options.gravity.into();
     let draft = Draft {
         name: robot.name.clone(),
-        gravity: dh.gravity.into(),
+        gravity: dh.gravity.map(|part| without_noise(part, dh.gravity.norm())).into(),
         remarks: vec![
             format!("Leg of the robot `{}`; gravity is ({x}, {y}, {z}) m/s2 in the frame of its root.", robot.name),
             "Anatomical angles and torques are those of the robot description. Words in capitals are unknown:".into(),
-            "replace them and remove the `#`. `cargo sim leg --check FILE` says which use needs which.".into(),
+            "replace them and remove the `#`. `leg --check FILE` says which use needs which.".into(),
         ],
         joints,
     };
@@ -168,48 +178,78 @@ fn joint(
     let joint = one.joint;
     let limit = joint.limit.unwrap_or_default();
     // Bounds of a leg file, in the units of the description.
-    let within = |key: &str, value: Option<f64>, most: f64, remarks: &mut Vec<String>| {
+    let within = |key: &str, value: Option<f64>, most: f64, usual: &str, remarks: &mut Vec<String>| {
         let value = value?;
         let fits = value > 0.0 && value <= most;
         if !fits {
-            remarks
-                .push(format!("`limit` has {key} = {value}, a leg file takes above 0, to {most}: left out"));
+            remarks.push(format!(
+                "`limit` has {key} = {value}, a leg file takes above 0, to {most}: left out; simulation and `excite` use \
+                 {usual}"
+            ));
         }
         fits.then_some(value)
     };
-    let speed = within("velocity", limit.velocity, LARGEST_SPEED.to_radians(), remarks);
-    let torque = within("effort", limit.effort, LARGEST_TORQUE, remarks);
+    let usual_speed = format!("{DEFAULT_SPEED_LIMIT} degrees per second");
+    let usual_torque = format!("{DEFAULT_TORQUE_LIMIT} N m");
+    let speed = within("velocity", limit.velocity, LARGEST_SPEED.to_radians(), &usual_speed, remarks);
+    let torque = within("effort", limit.effort, LARGEST_TORQUE, &usual_torque, remarks);
+    // Lengths carry the rounding of the positions from which they follow.
+    let size = dh.origin.norm().max(one.point.norm());
+    let zero_offset_deg = without_noise(dh.zero.to_degrees(), TURN_DEG);
     Ok(DraftJoint {
         name: joint.name.clone(),
-        dh: DhFile { alpha: dh.alpha, a: dh.a, d: dh.d },
+        dh: DhFile {
+            alpha: without_noise_rad(dh.alpha),
+            a: without_noise(dh.a, size),
+            d: without_noise(dh.d, size),
+        },
         direction: dh.direction,
-        zero_offset_deg: dh.zero.to_degrees(),
-        range_deg: range(joint, remarks),
-        speed_limit_deg_s: speed.map(f64::to_degrees),
+        zero_offset_deg,
+        range_deg: range(joint, dh.direction as f64, zero_offset_deg, remarks),
+        speed_limit_deg_s: speed.map(|speed| without_noise(speed.to_degrees(), 0.0)),
         torque_limit_nm: torque,
         prior: if with_prior { Some(prior(robot, joint, &one.body, dh)?) } else { None },
         remarks: remarks.clone(),
     })
 }
 
-/// Range in degrees, if the description states one that a leg file takes.
-fn range(joint: &Joint, remarks: &mut Vec<String>) -> Option<[f64; 2]> {
+/// Range in degrees, if the description states one; narrowed to what the firmware takes.
+fn range(joint: &Joint, direction: f64, zero_deg: f64, remarks: &mut Vec<String>) -> Option<[f64; 2]> {
+    let [usual_low, usual_high] = DEFAULT_RANGE_DEG;
+    let usual = format!(
+        "simulation and `excite` use {usual_low} to {usual_high} degrees until `range_deg` is stated"
+    );
     if joint.kind == Kind::Continuous {
-        remarks.push("is continuous: it has no range".to_owned());
+        remarks.push(format!("is continuous: it has no range; {usual}"));
         return None;
     }
-    let range = joint.limit?.range.map(f64::to_degrees);
-    let [low, high] = range;
-    let is_inside = |end: f64| (RANGE_END[0]..=RANGE_END[1]).contains(&end);
-    let fits = is_inside(low) && is_inside(high) && high - low >= SMALLEST_RANGE_DEG;
-    if !fits {
-        let [least, most] = RANGE_END;
+    let [low, high] = joint.limit?.range.map(|end| without_noise(end.to_degrees(), 0.0));
+    if !(high - low >= SMALLEST_RANGE_DEG) {
         remarks.push(format!(
-            "`limit` is {low} to {high} degrees, a leg file takes {SMALLEST_RANGE_DEG} degrees and more within \
-             {least}..{most}: left out"
+            "`limit` is {low} to {high} degrees, a leg file takes {SMALLEST_RANGE_DEG} degrees and more: left out; {usual}"
         ));
+        return None;
     }
-    fits.then_some(range)
+    // The firmware's angle is direction * angle + zero, and each of both lies within a turn.
+    let ends = [-TURN_DEG, TURN_DEG].map(|end| without_noise((end - zero_deg) * direction, TURN_DEG));
+    let narrowed =
+        [low.max(-TURN_DEG).max(ends[0].min(ends[1])), high.min(TURN_DEG).min(ends[0].max(ends[1]))];
+    // A turn of a few digits is a turn.
+    if (narrowed[0] - low).max(high - narrowed[1]) < ROUNDED_DEG {
+        return Some(narrowed);
+    }
+    let [least, most] = narrowed;
+    if !(most - least >= SMALLEST_RANGE_DEG) {
+        remarks.push(format!(
+            "`limit` is {low} to {high} degrees, of which D-H angles within {TURN_DEG} degrees leave none: left out; {usual}"
+        ));
+        return None;
+    }
+    remarks.push(format!(
+        "`limit` is {low:.1} to {high:.1} degrees, narrowed to {least:.1} to {most:.1}: simulation and `excite` take angles, and D-H \
+         angles (zero offset {zero_deg:.1} degrees), within {TURN_DEG} degrees"
+    ));
+    Some(narrowed)
 }
 
 /// Body in the joint's D-H frame.
@@ -221,7 +261,10 @@ fn prior(robot: &Robot, joint: &Joint, body: &LumpedBody, dh: &DhJoint) -> Resul
     }
     let turn = dh.frame.transpose();
     let com = turn * (body.centre - dh.origin);
+    let size = body.centre.norm().max(dh.origin.norm());
+    let com = com.map(|part| without_noise(part, size));
     let tensor = turn * body.tensor * dh.frame;
+    let tensor = tensor.map(|element| without_noise(element, tensor.amax()));
     let positive = |key: &str, value: Option<f64>| match value {
         Some(value) if value < 0.0 => {
             let reason = format!("`{key}` of `dynamics` is {value}; it must not be negative");
@@ -230,7 +273,7 @@ fn prior(robot: &Robot, joint: &Joint, body: &LumpedBody, dh: &DhJoint) -> Resul
         value => Ok(value),
     };
     Ok(DraftPrior {
-        mass: body.mass,
+        mass: without_noise(body.mass, 0.0),
         com: com.into(),
         inertia_com: [
             tensor[(0, 0)],

@@ -29,6 +29,8 @@ const CANDIDATES: u64 = 300;
 const INSTANTS: u32 = 100;
 /// Share of the range left free at both ends.
 const RANGE_MARGIN: f32 = 0.06;
+/// Shares of the range into which a gait is mapped, the first one that fits.
+const GAIT_SHARES: [f32; 3] = [1.0, 0.3, 0.1];
 /// First seed of the candidates for excitation, and of the predicted motion.
 const EXCITATION_SEED: u64 = 1_000;
 const UNUSED_SEED: u64 = 900_000;
@@ -179,6 +181,15 @@ fn walk<const N: usize>(
         .iter()
         .zip(limits)
         .all(|(motion, limit)| motion.low >= limit.low && motion.high <= limit.high);
-    let curve = if fits { curve } else { gait::mapped_into(curve, inner_ranges(limits)).ok()? };
-    slowed_into(curve, limits, cycles)
+    if fits {
+        return slowed_into(curve, limits, cycles);
+    }
+    // A wide range of a slow joint has no gait in all of it.
+    GAIT_SHARES.into_iter().find_map(|share| {
+        let ranges = inner_ranges(limits).map(|(low, high)| {
+            let (middle, half) = ((low + high) * 0.5, (high - low) * (0.5 * share));
+            (middle - half, middle + half)
+        });
+        slowed_into(gait::mapped_into(curve, ranges).ok()?, limits, cycles)
+    })
 }

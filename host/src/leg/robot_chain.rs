@@ -12,17 +12,18 @@
 //!
 //! Source: parallel-axis theorem, Featherstone, *Rigid Body Dynamics Algorithms* (2008), 2.13.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::base::error::FileError;
+use crate::base::shell::quoted;
 use crate::formats::robot::{Inertial, Joint, Kind, Robot};
 
 /// Most joints of a leg.
 const MOST_JOINTS: usize = 3;
-/// Names in a message.
-const MOST_NAMES: usize = 20;
+/// Joints in a message.
+const MOST_NAMES: usize = 200;
 
 /// Body in the root's frame while every chosen joint is at 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,8 +54,8 @@ enum Owner {
     Base,
     /// Body of a chosen joint.
     Chosen(usize),
-    /// Moved by a joint before the chain that is neither chosen nor locked.
-    Loose(usize),
+    /// Moved by a joint that is no part of the leg.
+    Aside,
 }
 
 /// Chain of the joints with these names, proximal first; without names, of all joints that turn. `locked`
@@ -71,6 +72,7 @@ pub fn chain<'a>(
     let positions = locked_positions(robot, locked)?;
     let chosen = chosen(robot, names, &positions)?;
     in_one_chain(robot, &chosen)?;
+    nothing_loose(robot, &chosen, &positions)?;
     let place_in_chain: HashMap<usize, usize> =
         chosen.iter().enumerate().map(|(place, joint)| (*joint, place)).collect();
 
@@ -78,22 +80,12 @@ pub fn chain<'a>(
     let mut owner = vec![Owner::Base; robot.links.len()];
     let mut found: Vec<ChainJoint<'a>> = Vec::new();
     let mut parts: Vec<Vec<LumpedBody>> = vec![Vec::new(); chosen.len()];
-    let mut movers = Vec::new();
     for (number, joint) in robot.joints.iter().enumerate() {
         let (before, frame) = (owner[joint.parent], pose[joint.parent] * joint.place);
         let at = positions.get(&number).copied();
         pose[joint.child] = frame * at.map_or_else(Isometry3::identity, |at| moved(joint, at));
-        owner[joint.child] = match (place_in_chain.get(&number), before) {
-            (Some(_), Owner::Loose(mover)) => {
-                let mover = &robot.joints[mover];
-                let reason = format!(
-                    "moves the chain of `{}`, but is neither chosen nor held: choose it too (--joints), or hold it \
-                     (--lock \"{}=0\")",
-                    joint.name, mover.name
-                );
-                return Err(robot.joint_error(mover, &reason));
-            }
-            (Some(place), _) => {
+        owner[joint.child] = match place_in_chain.get(&number) {
+            Some(place) => {
                 found.push(ChainJoint {
                     joint,
                     axis: Unit::new_normalize(frame * joint.axis.into_inner()),
@@ -102,12 +94,8 @@ pub fn chain<'a>(
                 });
                 Owner::Chosen(*place)
             }
-            (None, before) if joint.kind == Kind::Fixed || at.is_some() => before,
-            (None, Owner::Chosen(_)) => {
-                movers.push(joint);
-                before
-            }
-            (None, _) => Owner::Loose(number),
+            None if joint.kind == Kind::Fixed || at.is_some() => before,
+            None => Owner::Aside,
         };
         if let (Owner::Chosen(place), Some(inertial)) =
             (owner[joint.child], &robot.links[joint.child].inertial)
@@ -115,19 +103,73 @@ pub fn chain<'a>(
             parts[place].push(in_root(&pose[joint.child], inertial));
         }
     }
-    if let Some(first) = movers.first() {
-        let locks: Vec<_> =
-            movers.iter().take(MOST_NAMES).map(|joint| format!("--lock \"{}=0\"", joint.name)).collect();
-        let reason = format!(
-            "hangs on the chosen joints and moves: choose it (--joints), or hold it at a position in rad or m ({})",
-            locks.join(" ")
-        );
-        return Err(robot.joint_error(first, &reason));
-    }
     for (joint, parts) in found.iter_mut().zip(&parts) {
         joint.body = lumped(parts);
     }
     Ok(found)
+}
+
+/// Checks that every joint which moves the leg's bodies or its base is chosen or held.
+fn nothing_loose(robot: &Robot, chosen: &[usize], locked: &HashMap<usize, f64>) -> Result<(), FileError> {
+    let (Some(first), Some(last)) = (chosen.first(), chosen.last()) else { return Ok(()) };
+    let before_leg: HashSet<usize> = before(robot, &movers(robot), *last).collect();
+    // Every joint stands after those before it in the tree.
+    let mut is_beyond = vec![false; robot.links.len()];
+    let mut loose: Vec<&Joint> = Vec::new();
+    for (number, joint) in robot.joints.iter().enumerate() {
+        is_beyond[joint.child] = is_beyond[joint.parent] || number == *first;
+        let moves_leg = is_beyond[joint.child] || before_leg.contains(&number);
+        let is_free = joint.kind != Kind::Fixed && !chosen.contains(&number) && !locked.contains_key(&number);
+        if moves_leg && is_free {
+            loose.push(joint);
+        }
+    }
+    let Some(one) = loose.first() else { return Ok(()) };
+    if let Some(free) = loose.iter().find(|joint| !(joint.kind.turns() || joint.kind == Kind::Prismatic)) {
+        let reason = format!(
+            "is {} and moves the leg, and cannot be held (--lock): choose joints beyond or before it, or make it `fixed`",
+            free.kind.word()
+        );
+        return Err(robot.joint_error(free, &reason));
+    }
+    let locks: Vec<_> = loose.iter().take(MOST_NAMES).map(|joint| lock_words(joint)).collect();
+    let more = loose.len() - locks.len();
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let subject = if loose.len() == 1 {
+        "moves the leg and is neither chosen nor held: choose it".to_owned()
+    } else {
+        let names: Vec<_> =
+            loose[1..].iter().take(MOST_NAMES).map(|joint| format!("`{}`", joint.name)).collect();
+        format!("moves the leg and is neither chosen nor held, and so are {}: choose them", names.join(", "))
+    };
+    let reason = format!(
+        "{subject} (--joints), or hold at a position in rad or m, for example\n  {}{more}",
+        locks.join(" ")
+    );
+    Err(robot.joint_error(one, &reason))
+}
+
+/// Option that holds a joint at 0, or in the middle of a range without 0.
+fn lock_words(joint: &Joint) -> String {
+    let range = joint.limit.map(|limit| limit.range).filter(|[low, high]| low < high);
+    let middle = range.filter(|[low, high]| joint.kind != Kind::Continuous && !(*low..=*high).contains(&0.0));
+    let at = middle.map_or(0.0, |[low, high]| (500.0 * (low + high)).round() / 1000.0);
+    format!("--lock {}", quoted(&format!("{}={at}", joint.name)))
+}
+
+/// Joint that moves each link.
+fn movers(robot: &Robot) -> HashMap<usize, usize> {
+    robot.joints.iter().enumerate().map(|(number, joint)| (joint.child, number)).collect()
+}
+
+/// Joints on which a joint hangs, the nearest first.
+fn before<'a>(
+    robot: &'a Robot,
+    movers: &'a HashMap<usize, usize>,
+    joint: usize,
+) -> impl Iterator<Item = usize> + 'a {
+    let mover = |number: usize| movers.get(&robot.joints[number].parent).copied();
+    std::iter::successors(mover(joint), move |number| mover(*number))
 }
 
 /// Position of each locked joint, by its number.
@@ -165,19 +207,23 @@ fn chosen(robot: &Robot, names: &[String], locked: &HashMap<usize, f64>) -> Resu
     if !(1..=MOST_JOINTS).contains(&chosen.len()) {
         let reason = if names.is_empty() {
             format!(
-                "{} joints turn, a leg has 1 to {MOST_JOINTS}: choose some by --joints, proximal first ({})",
+                "{} joints turn, a leg has 1 to {MOST_JOINTS}: choose some by --joints, proximal first.{}",
                 chosen.len(),
-                names_of(robot, |joint| joint.kind.turns())
+                listed(robot)
             )
         } else {
-            format!("--joints names {} joints; a leg has 1 to {MOST_JOINTS}", chosen.len())
+            format!("--joints names {} joints; a leg has 1 to {MOST_JOINTS}.{}", chosen.len(), listed(robot))
         };
         return Err(robot.error(reason));
     }
     for (place, number) in chosen.iter().enumerate() {
         let joint = &robot.joints[*number];
         if !joint.kind.turns() {
-            let reason = format!("is {}; a leg's joints are revolute or continuous", joint.kind.word());
+            let reason = format!(
+                "is {}; a leg's joints are revolute or continuous.{}",
+                joint.kind.word(),
+                listed(robot)
+            );
             return Err(robot.joint_error(joint, &reason));
         }
         if joint.is_mimic {
@@ -196,37 +242,40 @@ fn chosen(robot: &Robot, names: &[String], locked: &HashMap<usize, f64>) -> Resu
 }
 
 fn number_of(robot: &Robot, name: &str, option: &str) -> Result<usize, FileError> {
-    robot.joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
-        let known = names_of(robot, |joint| joint.kind != Kind::Fixed);
-        robot.error(format!("{option}: no joint is called `{name}`; joints that move: {known}"))
-    })
+    robot
+        .joints
+        .iter()
+        .position(|joint| joint.name == name)
+        .ok_or_else(|| robot.error(format!("{option}: no joint is called `{name}`.{}", listed(robot))))
 }
 
-fn names_of(robot: &Robot, of: impl Fn(&Joint) -> bool) -> String {
-    let names: Vec<_> =
-        robot.joints.iter().filter(|joint| of(joint)).map(|joint| joint.name.as_str()).collect();
-    let shown = names.iter().take(MOST_NAMES).copied().collect::<Vec<_>>().join(", ");
-    match names.len() {
-        0 => "none".to_owned(),
-        count if count > MOST_NAMES => format!("{shown}, and {} more", count - MOST_NAMES),
-        _ => shown,
+/// Joints that move, each with its kind and the one before it that moves.
+fn listed(robot: &Robot) -> String {
+    let movers = movers(robot);
+    let moving: Vec<usize> =
+        (0..robot.joints.len()).filter(|number| robot.joints[*number].kind != Kind::Fixed).collect();
+    let line = |number: &usize| {
+        let joint = &robot.joints[*number];
+        let mimic = if joint.is_mimic { ", follows another joint" } else { "" };
+        let on = before(robot, &movers, *number).find(|other| robot.joints[*other].kind != Kind::Fixed);
+        let on = on.map_or(String::new(), |on| format!(", on {}", robot.joints[on].name));
+        format!("\n  {} ({}{on}{mimic})", joint.name, joint.kind.word())
+    };
+    match moving.len() {
+        0 => " No joint of the file moves".to_owned(),
+        count => {
+            let lines: String = moving.iter().take(MOST_NAMES).map(line).collect();
+            let more = count.saturating_sub(MOST_NAMES);
+            let more = if more > 0 { format!("\n  and {more} more") } else { String::new() };
+            format!(" Joints that move, from the root on:{lines}{more}")
+        }
     }
 }
 
 /// Checks that each chosen joint hangs on the one before.
 fn in_one_chain(robot: &Robot, chosen: &[usize]) -> Result<(), FileError> {
-    let mover: HashMap<usize, usize> =
-        robot.joints.iter().enumerate().map(|(number, joint)| (joint.child, number)).collect();
-    let hangs_on = |distal: usize, proximal: usize| {
-        let mut link = robot.joints[distal].parent;
-        while let Some(joint) = mover.get(&link) {
-            if *joint == proximal {
-                return true;
-            }
-            link = robot.joints[*joint].parent;
-        }
-        false
-    };
+    let movers = movers(robot);
+    let hangs_on = |distal: usize, proximal: usize| before(robot, &movers, distal).any(|one| one == proximal);
     for pair in chosen.windows(2) {
         let [first, second] = [pair[0], pair[1]].map(|number| &robot.joints[number]);
         if hangs_on(pair[0], pair[1]) {
@@ -234,7 +283,11 @@ fn in_one_chain(robot: &Robot, chosen: &[usize]) -> Result<(), FileError> {
             return Err(robot.joint_error(first, &reason));
         }
         if !hangs_on(pair[1], pair[0]) {
-            let reason = format!("does not hang on `{}`: the joints of a leg are one chain", first.name);
+            let reason = format!(
+                "does not hang on `{}`: the joints of a leg are one chain, chosen by --joints.{}",
+                first.name,
+                listed(robot)
+            );
             return Err(robot.joint_error(second, &reason));
         }
     }

@@ -242,6 +242,12 @@ impl CauseReport {
         let name = format!("{}: ", self.name.replace('_', " "));
         format!("likely cause: {name}{}", self.words.strip_prefix(&name).unwrap_or(&self.words))
     }
+
+    /// Whether the line contains what a finding says, so that it suffices.
+    #[must_use]
+    pub fn says(&self, finding: &FindingReport) -> bool {
+        !finding.words.is_empty() && self.words.starts_with(&finding.words)
+    }
 }
 
 impl DoubtReport {

@@ -18,6 +18,7 @@ pub mod replay;
 pub mod resample;
 pub mod save_model;
 pub mod scale;
+pub mod shaking;
 pub mod simulate;
 pub mod trace;
 pub mod watch;

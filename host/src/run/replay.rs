@@ -22,6 +22,7 @@ use scarab::model::{AnatomicalJoint, Payload};
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
+use crate::formats::recording::import::Import;
 use crate::formats::recording::{Read, Recording};
 use crate::leg::background::Background;
 use crate::leg::setup::{DEFAULT_SEED, PriorChoice, background};
@@ -90,6 +91,8 @@ pub struct ReplayOptions {
     pub load: Option<Payload<f64>>,
     /// Known mass in [`Recordings::with_payload`].
     pub payload: Option<Payload<f64>>,
+    /// How the recordings were read from files, for options that read them otherwise.
+    pub import: Option<Import>,
 }
 
 impl ReplayOptions {
@@ -109,6 +112,7 @@ impl ReplayOptions {
             even_stamps: false,
             load: None,
             payload: None,
+            import: None,
         }
     }
 
@@ -408,7 +412,7 @@ fn identified<const N: usize, const B: usize>(
         proposed_hz,
         stribeck_hz,
     };
-    subject.examine(&mut run)?;
+    warnings.extend(subject.examine(&mut run)?);
     run.scale.load = options.load.as_ref().map(MassReport::from);
     run.wall_s = started.elapsed().as_secs_f64();
     run.samples = Some(screening.into_findings());

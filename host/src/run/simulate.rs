@@ -15,6 +15,7 @@ use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
 use crate::rig::perturb;
 use crate::run::scale::Scale;
+use crate::run::shaking::Shaking;
 use crate::run::watch::Watch;
 
 /// Limit of a run, s.
@@ -41,13 +42,16 @@ pub fn simulate<const N: usize, const B: usize>(
     let simulated = perturb::simulated(leg, wrong)?;
     let mut context = Context::<N, B>::new(&perturb::believed(leg, wrong)?, options)?;
     perturb::configure(&mut context, wrong)?;
-    let Driven { pair, mut watch, stopped } = drive(leg, &simulated, &context, options)?;
-    if stopped.is_some() {
-        return watch.report(&pair, options, Vec::new(), stopped, started);
-    }
-    let tracking = track(&context, &pair);
-    watch.scale = Some(Scale::find(&context, &pair, options.payload.as_ref(), options.load.as_ref())?);
-    watch.report(&pair, options, tracking, None, started)
+    let Driven { pair, mut watch, stopped, shaking } = drive(leg, &simulated, &context, options)?;
+    let mut run = if stopped.is_some() {
+        watch.report(&pair, options, Vec::new(), stopped, started)?
+    } else {
+        let tracking = track(&context, &pair);
+        watch.scale = Some(Scale::find(&context, &pair, options.payload.as_ref(), options.load.as_ref())?);
+        watch.report(&pair, options, tracking, None, started)?
+    };
+    shaking.explain(&simulated, &mut run.report);
+    Ok(run)
 }
 
 /// Leg after one identification, with its observation.
@@ -58,6 +62,8 @@ pub struct Driven<'a, const N: usize, const B: usize> {
     pub watch: Watch<'a, N, B>,
     /// Reason for a missing verdict.
     pub stopped: Option<String>,
+    /// Speed of the plant beside its command.
+    pub shaking: Shaking<N>,
 }
 
 /// Runs from drive off to the verdict: the firmware of `context` against the plant `simulated`;
@@ -74,10 +80,15 @@ pub fn drive<'a, const N: usize, const B: usize>(
         pair.world.attach(load.joint, load.mass, load.place.into());
     }
     perturb::at_start(leg, &mut pair, wrong)?;
+    let anatomy = context.configuration.joints.map(|joint| joint.scale.anatomy);
+    let mut shaking = Shaking::new(
+        anatomy.map(|anatomy| f64::from(anatomy.direction())),
+        anatomy.map(|anatomy| f64::from(anatomy.zero_offset())),
+    );
     let mut watch = Watch::new(context);
     if !pair.enable(context.gravity) {
         let words = "the drive refused to be enabled at the start: the leg is outside its range";
-        return Ok(Driven { pair, watch, stopped: Some(words.into()) });
+        return Ok(Driven { pair, watch, stopped: Some(words.into()), shaking });
     }
     let mut request = Some(ControlRequest::Identify);
     let largest = (LONGEST_RUN_S / TICK_S) as u64;
@@ -87,6 +98,7 @@ pub fn drive<'a, const N: usize, const B: usize>(
         let (torque, sticking) = (pair.world.motor_torque(), pair.world.sticking());
         let output = pair.tick(request.take(), context.gravity);
         watch.see(&pair, &torque, &sticking, output.logged.as_ref());
+        shaking.take(&pair.world, &output.motion);
         let activity = pair.leg.control().activity();
         if activity != before {
             match activity {
@@ -105,10 +117,12 @@ pub fn drive<'a, const N: usize, const B: usize>(
         }
         match activity {
             Activity::Identify(_) => {}
-            _ if pair.leg.control().verdict().is_some() => return Ok(Driven { pair, watch, stopped: None }),
+            _ if pair.leg.control().verdict().is_some() => {
+                return Ok(Driven { pair, watch, stopped: None, shaking });
+            }
             _ => {
                 let stopped = Some(pair.stop_words(leg));
-                return Ok(Driven { pair, watch, stopped });
+                return Ok(Driven { pair, watch, stopped, shaking });
             }
         }
         if pair.ticks > largest {

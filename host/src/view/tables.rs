@@ -254,9 +254,12 @@ pub fn run_text(run: &RunReport) -> String {
     lines.extend(run.doubt.iter().flat_map(crate::report::doubt::DoubtReport::lines));
     lines.push(String::new());
     lines.push(verdict_line(run));
-    let failed = run.findings.iter().filter(|finding| !finding.passed);
-    lines.extend(failed.map(|finding| format!("  {}: {}", finding.reason, finding.words)));
     let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
+    let failed = run
+        .findings
+        .iter()
+        .filter(|finding| !finding.passed && !cause.is_some_and(|cause| cause.says(finding)));
+    lines.extend(failed.map(|finding| format!("  {}: {}", finding.reason, finding.words)));
     lines.extend(cause.map(|cause| format!("  {}", cause.line())));
     if !run.validated && run.seed.is_none() {
         lines.push("  not validated: no motion was held out (--validate, --split)".into());

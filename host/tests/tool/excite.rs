@@ -297,7 +297,78 @@ fn a_motion_above_the_torque_limit_is_refused_and_never_designed() {
     feeble.joints[0].torque_limit_nm = 5.0;
     let feeble = folder.write("feeble.toml", &feeble.to_toml());
     let message = scarab(&format!("excite {EFFORT} --leg"), &[&feeble]).refusal();
-    assert!(message.contains("no exciting motion fits the limits"), "{message}");
+    for word in
+        ["no exciting motion fits the limits: joint `hip`: ", "limit 5.000 N m (`torque_limit_nm`): raise it"]
+    {
+        assert!(message.contains(word), "{word}: {message}");
+    }
+    let checked = scarab("leg --check", &[&feeble]).ends_with(0).printed;
+    assert!(checked.contains("\nexcite: not possible: ") && checked.contains("joint `hip`"), "{checked}");
+}
+
+/// Two links that turn about y, as robot descriptions state them: mass, centre below the joint, moments; the
+/// length of the first link; and the limits of each joint.
+fn description(links: [(f64, f64, f64); 2], length: f64, limits: [&str; 2]) -> String {
+    let body = |name: &str, (mass, centre, moment): (f64, f64, f64)| {
+        format!(
+            "<link name=\"{name}\"><inertial><origin xyz=\"0 0 -{centre}\"/><mass value=\"{mass}\"/>\
+             <inertia ixx=\"{moment}\" ixy=\"0\" ixz=\"0\" iyy=\"{moment}\" iyz=\"0\" izz=\"{}\"/></inertial></link>",
+            0.1 * moment
+        )
+    };
+    let joint = |name: &str, parent: &str, child: &str, at: f64, limit: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <origin xyz=\"0 0 {at}\"/><axis xyz=\"0 1 0\"/><limit {limit}/><dynamics damping=\"0\" friction=\"0\"/></joint>"
+        )
+    };
+    format!(
+        "<robot name=\"arm\"><link name=\"base\"/>{}{}{}{}</robot>",
+        body("upper", links[0]),
+        body("lower", links[1]),
+        joint("shoulder", "base", "upper", 0.0, limits[0]),
+        joint("elbow", "upper", "lower", -length, limits[1])
+    )
+}
+
+#[test]
+fn converted_robots_without_friction_and_with_wide_limits_get_a_motion() {
+    let turn = |range: &str, effort: f64, velocity: f64| {
+        let (low, high) = range.split_once("..").expect("two ends");
+        format!("lower=\"{low}\" upper=\"{high}\" effort=\"{effort}\" velocity=\"{velocity}\"")
+    };
+    // Numbers of UR5 (shoulder lift, elbow), Solo12 (hip, knee) and an exoskeleton's knee with ankle.
+    let ur5 = [
+        turn("-6.28318530718..6.28318530718", 150.0, 3.15),
+        turn("-3.14159265359..3.14159265359", 150.0, 3.15),
+    ];
+    let solo = [turn("-10..10", 1000.0, 1000.0), turn("-10..10", 1000.0, 1000.0)];
+    let exoskeleton = [turn("0..2.0", 40.0, 6.0), turn("-0.6..0.4", 30.0, 6.0)];
+    for (name, links, length, limits, remark) in [
+        ("ur5", [(8.393, 0.28, 0.227), (5.9, 0.4, 0.25)], 0.425, &ur5, ""),
+        (
+            "solo12",
+            [(0.1485, 0.079, 4.1e-4), (0.0376, 0.09, 1.5e-4)],
+            0.16,
+            &solo,
+            "`limit` is -573.0 to 573.0 degrees, narrowed to -360.0 to 360.0",
+        ),
+        ("exoskeleton", [(3.5, 0.18, 0.06), (1.1, 0.07, 0.008)], 0.42, &exoskeleton, ""),
+    ] {
+        let folder = Folder::new();
+        let urdf = folder.write("robot.urdf", &description(links, length, [&limits[0], &limits[1]]));
+        let out = folder.path("leg.toml");
+        let converted = scarab("leg --urdf", &[&urdf, Path::new("--out"), &out]).ends_with(0).printed;
+        assert!(converted.contains(remark), "{name}: {converted}");
+        let checked = scarab("leg --check", &[&out]).ends_with(0).printed;
+        assert!(checked.contains("\nexcite: ready\n  the option --torque-noise-nm NM"), "{name}: {checked}");
+        let json = folder.path("report.json");
+        let arguments = "excite --torque-noise-nm 0.1 --evaluations 1800 --leg";
+        scarab(arguments, &[&out, Path::new("--json"), &json]).ends_with(0);
+        for joint in list(&folder.json("report.json"), "joints") {
+            assert_eq!(joint["simulated"]["limited_ticks"], 0, "{name}: {joint}");
+        }
+    }
 }
 
 #[test]
@@ -313,7 +384,10 @@ fn implausible_options_are_refused_with_a_reason() {
         ("excite --torque-noise-nm -1", "-1 N m is outside 0..1000"),
         ("identify --torque-noise-nm nan", "NaN N m is outside 0..1000"),
         ("identify --torque-noise-nm 1 --torque-noise 7", "cannot be used with"),
-        ("excite --leg paper-chain --evaluations 600", "no motion can be designed for this leg"),
+        (
+            "excite --leg paper-chain --evaluations 600",
+            "no exciting motion fits the limits: joint `hip rotation`: ",
+        ),
         ("excite --evaluations 1", "evaluations"),
         ("excite --leg none-such", "none-such"),
     ] {

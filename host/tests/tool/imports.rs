@@ -407,7 +407,7 @@ fn close_names_end_a_replay_with_exit_code_two_and_a_command_that_works() {
     let message = replayed(&folder, "Time,position_0_deg,effort_0", row, "", "").refusal();
     let command = message.lines().nth(1).expect("a command").trim();
     let words: Vec<&str> = command.split(' ').collect();
-    assert_eq!(words[..2], ["scarab", "replay"], "{message}");
+    assert_eq!(words[..2], [crate::PROGRAM, "replay"], "{message}");
     let paths: Vec<&Path> = words[2..].iter().map(Path::new).collect();
     let run = scarab("replay", &paths).ends_with(0);
     assert!(run.printed.contains("position_0_deg"), "{}", run.printed);
@@ -472,7 +472,7 @@ fn parquet_and_mcap_name_the_command_that_reads_them() {
     for name in ["snappy.parquet", "plain.mcap"] {
         let message =
             Recording::read(&foreign(name), &import("", "")).expect_err("built without").to_string();
-        assert!(message.contains("with `cargo sim-readers` instead of `cargo sim`"), "{message}");
+        assert!(message.contains("give the same command with `cargo sim-readers` instead of `"), "{message}");
     }
 }
 
@@ -511,4 +511,34 @@ fn joints_of_a_bag_are_chosen_by_name_and_proposed_by_the_names_of_the_leg() {
     assert_eq!(report.format, "MCAP, sensor_msgs/msg/JointState");
     let torques: Vec<f64> = recording.joints.iter().map(|joint| joint.torque_nm[100]).collect();
     assert_eq!(torques, [2.0 * (4.0 - 100.0 / 8.0), 4.0 - 100.0 / 8.0]);
+}
+
+#[test]
+fn the_folder_of_a_bag_is_read_as_a_whole() {
+    let folder = Folder::new();
+    let bag = folder.path("bag");
+    std::fs::create_dir(&bag).expect("a temporary folder");
+    std::fs::write(bag.join("metadata.yaml"), "").expect("a file");
+    std::fs::copy(foreign("plain.mcap"), bag.join("bag_0.mcap")).expect("a file");
+    let columns = "t=time,q1=position[hip_joint],tau1=effort[hip_joint]";
+    let read = |path: &Path| {
+        let choices: Vec<_> = columns.split(',').map(|choice| choice.parse().expect("a column")).collect();
+        let import = Import::plain(1).with(&choices, &[]).expect("valid");
+        Recording::read(path, &import).map_err(|error| error.to_string())
+    };
+    if cfg!(feature = "readers") {
+        let whole = read(&bag).expect("a bag").recording;
+        let file = read(&foreign("plain.mcap")).expect("its only file").recording;
+        assert_eq!((whole.time_s, whole.joints), (file.time_s, file.joints));
+        // Messages that come twice do not continue the recording.
+        std::fs::copy(foreign("plain.mcap"), bag.join("bag_1.mcap")).expect("a file");
+        assert!(read(&bag).expect_err("time goes back").contains("does not exceed the previous"));
+    } else {
+        assert!(read(&bag).expect_err("built without").contains("`cargo sim-readers`"));
+    }
+    // A bag of the older storage is refused with the way to convert it.
+    let old = folder.path("old");
+    std::fs::create_dir(&old).expect("a temporary folder");
+    std::fs::write(old.join("old_0.db3"), "").expect("a file");
+    assert!(read(&old).expect_err("SQLite").contains("rosbags-convert"));
 }

@@ -9,7 +9,7 @@ use crate::robots::SIMPLE;
 use scarab_host::formats::leg_file::LegFile;
 
 /// Gravity, two joints and their numbers; empty lines take the value in brackets.
-const ANSWERS: &str = "my-arm\n2\n\n\n\nhip\n\n\n\n\n\nknee\n\n0.45\n\n-1\n10\n";
+const ANSWERS: &str = "my-arm\n2\n\nhip\n\n\n\n\n\nknee\n\n0.45\n\n-1\n10\n";
 
 /// Runs the tool with answers on its standard input.
 fn answered(answers: &str, out: &Path) -> Run {
@@ -36,7 +36,9 @@ fn piped_answers_become_a_leg_file_that_the_check_accepts() {
     let folder = Folder::new();
     let out = folder.path("arm.toml");
     let run = answered(ANSWERS, &out).ends_with(0);
-    assert!(run.printed.contains("gravity x [m/s2] (9.81): "), "{}", run.printed);
+    assert!(run.printed.contains("or its three numbers (x): "), "{}", run.printed);
+    let next = format!("\nnext: {} leg --check {}\n", crate::PROGRAM, out.display());
+    assert!(run.printed.ends_with(&next), "{}", run.printed);
     let leg = LegFile::load(&out.display().to_string()).expect("a leg file");
     assert_eq!((leg.name.as_str(), leg.gravity), ("my-arm", [9.81, 0.0, 0.0]));
     let knee = &leg.joints[1];
@@ -51,9 +53,9 @@ fn piped_answers_become_a_leg_file_that_the_check_accepts() {
 fn an_ended_input_or_an_existing_file_writes_nothing() {
     let folder = Folder::new();
     let out = folder.path("arm.toml");
-    let run = answered("my-arm\n2\n9.81\n", &out).ends_with(2);
+    let run = answered("my-arm\n2\nx\n", &out).ends_with(2);
     assert!(
-        run.errors.contains("the input ended before answer 4 (gravity y [m/s2]); nothing was written"),
+        run.errors.contains("the input ended before answer 4 (name of joint 1); nothing was written"),
         "{}",
         run.errors
     );
@@ -136,6 +138,46 @@ fn pasted_lines_make_a_new_leg_ready_for_simulation_and_image() {
 }
 
 #[test]
+fn the_check_says_what_excite_needs() {
+    let folder = Folder::new();
+    let out = folder.path("arm.toml");
+    answered(ANSWERS, &out).ends_with(0);
+    let report = scarab("leg --check", &[&out]).ends_with(0).printed;
+    assert!(report.contains("\nexcite: keys are missing\n  before the first [[joint]]\n    # no key: the option --torque-noise-nm NM"), "{report}");
+    let text = pasted(&std::fs::read_to_string(&out).expect("written"), &report, "excite");
+    let file = folder.write("pasted.toml", &text);
+    let report = scarab("leg --check", &[&file]).ends_with(0).printed;
+    assert!(report.contains("\nexcite: ready\n"), "{report}");
+    scarab("excite --torque-noise-nm 0.5 --evaluations 1800 --leg", &[&file]).ends_with(0);
+}
+
+#[test]
+fn a_simulated_leg_without_rotor_and_friction_that_shakes_is_named() {
+    let folder = Folder::new();
+    // The upper arm of a robot as its description states it: a light link behind a heavy one.
+    let body = "mass = 2.6, com = [0.05, 0.0, 0.0], inertia_com = [0.003, 0.0, 0.0, 0.005, 0.0, 0.005]";
+    let tip = "mass = 1.9, com = [0.16, 0.0, 0.0], inertia_com = [0.002, 0.0, 0.0, 0.004, 0.0, 0.004]";
+    let leg = |drive: &str| {
+        format!(
+            "name = \"arm\"\ngravity = [9.81, 0.0, 0.0]\n[[joint]]\nname = \"shoulder\"\n\
+             dh = {{ alpha = 0.0, a = 0.0, d = 0.0 }}\ntruth = {{ {body}{drive} }}\n[[joint]]\nname = \"elbow\"\n\
+             dh = {{ alpha = 0.0, a = 0.35, d = 0.0 }}\ntruth = {{ {tip}{drive} }}\n"
+        )
+    };
+    let bare = folder.write("bare.toml", &leg(""));
+    let run = scarab("identify --leg", &[&bare]).ends_with(3);
+    for word in [
+        "input: the simulated leg shakes: for a second the speed of joint",
+        "`rotor_inertia`, `coulomb` and `viscous` are 0",
+    ] {
+        assert!(run.printed.contains(word), "{word}: {}", run.printed);
+    }
+    assert!(!run.printed.contains("something held the leg"), "{}", run.printed);
+    let driven = folder.write("driven.toml", &leg(", rotor_inertia = 0.1, coulomb = 0.5, viscous = 0.5"));
+    scarab("identify --leg", &[&driven]).ends_with(0);
+}
+
+#[test]
 fn a_forgotten_word_in_capitals_is_refused_with_its_line() {
     let folder = Folder::new();
     let out = folder.path("arm.toml");
@@ -155,7 +197,7 @@ fn the_check_of_a_robot_offers_its_prior_as_truth() {
     scarab("leg --urdf", &[&urdf, "--out".as_ref(), &out]).ends_with(0);
     let report = scarab("leg --check", &[&out]).ends_with(0).printed;
     assert!(report.contains("\nreplay: ready\n\nsimulation: keys are missing\n"), "{report}");
-    assert!(report.contains("    truth = { mass = 5.0, com = [0.1999"), "{report}");
+    assert!(report.contains("    truth = { mass = 5.0, com = [0.2, 0.0, 0.0]"), "{report}");
     assert!(report.contains("    # within `prior = { .. }`: rotor_inertia = KG_M2\n"), "{report}");
     let text = pasted(&std::fs::read_to_string(&out).expect("written"), &report, "simulation");
     let file = folder.write("simulated.toml", &text);

@@ -31,11 +31,17 @@ fn refusal(text: &str) -> String {
     }
 }
 
-/// Message for a recording with line 102 (sample 100, 1 s) replaced.
+/// Message for a recording with line 102 (sample 100, 1 s) replaced, without the option that skips it.
 fn refusal_with(line: &str) -> String {
     let mut rows = rows();
     line.clone_into(&mut rows[100]);
-    refusal(&text(HEADER, &rows))
+    damaged(&text(HEADER, &rows))
+}
+
+/// Message for a damaged row, without the option that skips it.
+fn damaged(text: &str) -> String {
+    let message = refusal(text);
+    message.strip_suffix(" (--skip-bad skips such rows, up to 5 %)").expect("an option to skip it").to_owned()
 }
 
 #[test]
@@ -148,7 +154,7 @@ fn a_field_that_is_not_finite_is_refused_with_its_line() {
 fn a_truncated_file_is_refused_with_its_last_line() {
     let whole = text(HEADER, &rows());
     let cut = &whole[..whole.len() - "0,-4.000\n".len() - ",3.00".len()];
-    assert_eq!(refusal(cut), "walk.csv:201: 3 fields, but the header has 5: is the line truncated?");
+    assert_eq!(damaged(cut), "walk.csv:201: 3 fields, but the header has 5: is the line truncated?");
     assert_eq!(
         refusal_with("1.0,0,1,-0,2,3,-4"),
         "walk.csv:102: 7 fields, but the header has 5: are these decimal commas?"
@@ -165,7 +171,7 @@ fn blank_lines_are_skipped_but_counted() {
     );
     rows[50] = "0.5,0.1,x,3,-4".to_owned();
     rows[49] += "\n\n";
-    assert_eq!(refusal(&text(HEADER, &rows)), "walk.csv:54: `x` in column `q2_rad` is not a number");
+    assert_eq!(damaged(&text(HEADER, &rows)), "walk.csv:54: `x` in column `q2_rad` is not a number");
 }
 
 #[test]

@@ -281,6 +281,69 @@ fn a_torque_of_the_wrong_sign_or_unit_is_named_and_is_not_called_computed() {
     }
 }
 
+/// Options that read the documented columns, with the torques as these signals.
+fn reading(torques: &str, units: &str) -> String {
+    format!("--columns t=t_s,q1=q1_rad,q2=q2_rad,{torques} --units {units}")
+}
+
+#[test]
+fn a_wrong_unit_is_named_once_with_the_options_that_read_it() {
+    let mut torques = samples();
+    torques.iter_mut().flat_map(|row| &mut row[3..]).for_each(|torque| *torque *= 1000.0);
+    let mut angles = samples();
+    angles.iter_mut().flat_map(|row| &mut row[1..3]).for_each(|angle| *angle = angle.to_degrees());
+    let right = "tau1=tau1_Nm,tau2=tau2_Nm";
+    for (samples, options, words) in [
+        (torques, reading(right, "s,rad,mNm"), "is it in mN m?"),
+        (angles, reading(right, "s,deg,Nm"), "read as degrees"),
+    ] {
+        let (report, run) = replay(&samples, "", 3);
+        let cause = report["likely_cause"]["words"].as_str().expect("words");
+        assert!(cause.ends_with(&format!("; read it so by {options}")), "{cause}");
+        assert_eq!(run.printed.matches(words).count(), 1, "{}", run.printed);
+        replay(&samples, &options, 0);
+    }
+}
+
+#[test]
+fn currents_that_were_read_as_torques_are_suspected_by_the_scale_of_the_prior() {
+    const CONSTANT: f64 = 40.0;
+    let folder = Folder::new();
+    let leg = include_str!("../../legs/mujoco-leg.toml");
+    let stated = leg.replace("torque_per_ampere = 1.5", &format!("torque_per_ampere = {CONSTANT:?}"));
+    let unknown = leg.replace("torque_per_ampere = 1.5\n", "");
+    assert!(stated != leg && unknown != leg);
+    let mut currents = samples();
+    currents.iter_mut().flat_map(|row| &mut row[3..]).for_each(|torque| *torque /= CONSTANT);
+    let file = folder.write("walk.csv", &csv(&currents));
+    let run = |leg: &str, arguments: &str| {
+        let leg = folder.write("leg.toml", leg);
+        let arguments = format!("replay --split 0.666666 {arguments} --leg");
+        scarab(&arguments, &[&leg, &file])
+    };
+    let options = reading("i1=tau1_Nm,i2=tau2_Nm", "s,rad,A");
+    for (leg, words) in [
+        (&stated, "and `torque_per_ampere` of the leg file explains it: is it a current?"),
+        (
+            &unknown,
+            "in its shape: is it a current? Then state each joint's `torque_per_ampere` (by the prior about 3",
+        ),
+    ] {
+        let suspected = run(leg, "");
+        let all = format!("{}{}", suspected.printed, suspected.errors);
+        for word in [words, &options] {
+            assert_eq!(all.matches(word).count(), 1, "{word}: {all}");
+        }
+    }
+    let read = run(&stated, &options).ends_with(0);
+    assert!(!read.errors.contains("is it a current?"), "{}", read.errors);
+    // Torques are not suspected, whatever constant the leg file states.
+    let torques = folder.write("torque.csv", &csv(&samples()));
+    let stated = folder.write("leg.toml", &stated);
+    let run = scarab("replay --split 0.666666 --leg", &[&stated, &torques]).ends_with(0);
+    assert!(!run.errors.contains("is it a current?"), "{}", run.errors);
+}
+
 #[test]
 fn a_sign_that_flips_midway_is_named() {
     for share in [0.25, 0.5, 0.75] {

@@ -7,12 +7,19 @@ use std::path::Path;
 
 /// Message for a recording, without its folder. No report may remain.
 fn refusal(text: &str) -> String {
+    refusal_of("", text)
+}
+
+/// Message for a recording that is read with options.
+fn refusal_of(options: &str, text: &str) -> String {
     let folder = Folder::new();
     let (file, leg) = (folder.write("walk.csv", text), folder.write("leg.toml", &leg("")));
     let json = folder.path("report.json");
-    let message = scarab("replay", &[&file, Path::new("--leg"), &leg, Path::new("--json"), &json]).refusal();
+    let arguments = format!("replay {options}");
+    let message =
+        scarab(&arguments, &[&file, Path::new("--leg"), &leg, Path::new("--json"), &json]).refusal();
     assert!(!json.exists(), "a report of bad input");
-    message.replace(&folder.path("").display().to_string(), "")
+    message.replace(&folder.path("").display().to_string(), "").replace(crate::PROGRAM, "scarab")
 }
 
 /// Message for a valid recording with line 102 replaced.
@@ -37,20 +44,23 @@ fn bad_recordings_are_refused_with_file_line_and_reason() {
          leg.toml --json report.json --columns t=t_s,q1=q1_rad,tau1=torque --units s,rad,Nm\n  (`torque` without a unit: SI \
          is assumed, change --units if that is wrong)\n"
     );
-    assert_eq!(refusal_with("0.2,NaN,1.0"), "error: walk.csv:102: `NaN` in column `q1_rad` is not finite\n");
+    assert_eq!(
+        refusal_with("0.2,NaN,1.0"),
+        "error: walk.csv:102: `NaN` in column `q1_rad` is not finite (--skip-bad skips such rows, up to 5 %)\n"
+    );
     assert_eq!(
         refusal_with("0.1,0.2,1.0"),
-        "error: walk.csv:102: time 0.1 s does not exceed the previous 0.198 s\n"
+        "error: walk.csv:102: time 0.1 s does not exceed the previous 0.198 s (--skip-bad skips such rows, up to 5 %)\n"
     );
     assert_eq!(
         refusal_with("0.198,0.2,1.0"),
-        "error: walk.csv:102: time 0.198 s does not exceed the previous 0.198 s\n"
+        "error: walk.csv:102: time 0.198 s does not exceed the previous 0.198 s (--skip-bad skips such rows, up to 5 %)\n"
     );
     let whole = Motion::default().csv();
     let truncated = &whole[..whole.len() - 12];
     assert_eq!(
         refusal(truncated),
-        "error: walk.csv:5001: 2 fields, but the header has 3: is the line truncated?\n"
+        "error: walk.csv:5001: 2 fields, but the header has 3: is the line truncated? (--skip-bad skips such rows, up to 5 %)\n"
     );
 }
 
@@ -139,7 +149,9 @@ fn implausible_options_are_refused_with_their_limits() {
 fn a_replay_without_a_leg_is_refused_with_an_example() {
     let message = scarab("replay", &[Path::new(MUJOCO)]).refusal();
     assert!(message.contains("--leg is missing"), "{message}");
-    assert!(message.contains("cargo sim replay run.csv --leg my-leg.toml"), "{message}");
+    // The program's name is the one by which it was called.
+    let example = format!("{} replay run.csv --leg my-leg.toml", crate::PROGRAM);
+    assert!(message.contains(&example), "{message}");
     assert!(message.contains("x2-wearer-75kg, x2-rough, mujoco-leg"), "{message}");
 }
 
@@ -152,12 +164,18 @@ fn time_in_another_unit_is_refused_by_the_rate_with_the_likely_unit() {
     };
     assert_eq!(
         refused(1e3),
-        "error: walk.csv: the median step of the time is 2 s, which is 0.5 Hz; at least 10 Hz are needed: are these \
-         milliseconds? In milliseconds it would be 500 Hz (state it by --columns and --units)\n"
+        "error: walk.csv: the median step of the time is 2 s, which is 0.5 Hz; at least 10 Hz are needed: is the time in \
+         ms? Then it would be 500 Hz over 9.998 s. If so, repeat the command with it:\n  scarab replay walk.csv \
+         --leg leg.toml --json report.json --columns t=t_s,q1=q1_rad,tau1=tau1_Nm --units ms,rad,Nm\n"
     );
-    assert!(refused(1e6).contains("are these microseconds? In microseconds it would be 500 Hz (state"));
+    assert!(refused(1e6).contains("is the time in us? Then it would be 500 Hz"));
     // Sample numbers instead of times.
-    assert!(refused(500.0).contains("are these milliseconds or sample numbers?"));
+    assert!(refused(500.0).contains("is the time in ms or sample numbers?"));
+    // Seconds that are read as milliseconds.
+    let seconds = crate::pendulum::csv(&motion).replacen("t_s", "t_ms", 1);
+    let refused = refusal_of("--units ms", &seconds);
+    assert!(refused.contains("is the time in s? Then it would be 500 Hz"), "{refused}");
+    assert!(refused.contains("--columns t=t_ms,q1=q1_rad,tau1=tau1_Nm --units s,rad,Nm"), "{refused}");
 }
 
 #[test]
@@ -220,7 +238,8 @@ fn a_motionless_joint_is_refused_as_unexcited() {
         .collect();
     let still = folder.write("still.csv", &crate::pendulum::csv(&still));
     let run = scarab("replay", &[&still, Path::new("--leg"), &leg, Path::new("--json"), &json]).ends_with(3);
-    assert!(run.printed.contains("unexcited: joint 1 hardly moved"), "{}", run.printed);
+    // Said once, as the cause.
+    assert_eq!(run.printed.matches("joint 1 hardly moved").count(), 1, "{}", run.printed);
     assert!(run.printed.contains("likely cause: motion: joint 1 hardly moved"), "{}", run.printed);
     assert!(reasons(&folder.json("report.json")).contains(&"unexcited"));
 

@@ -185,6 +185,34 @@ fn limits_friction_and_gravity_are_those_of_the_description() {
 }
 
 #[test]
+fn a_leg_file_holds_short_numbers_where_the_description_does() {
+    // Turned frames and a tilted axis leave rounding in every number of the conversion.
+    let text = with("xyz=\"0 0 -0.4\" rpy=\"0 0 0\"", "xyz=\"0.3 0 -0.4\" rpy=\"0 0.7 0\"");
+    let found = converted(&text, &plain()).expect("a leg");
+    let [hip, knee] = &found.leg.joints[..] else { panic!("two joints") };
+    assert_eq!((knee.dh.a, knee.dh.d, knee.dh.alpha), (0.5, 0.0, 0.0), "{}", found.text);
+    assert_eq!(hip.prior.expect("a body").com, [0.16, -0.12, 0.0], "{}", found.text);
+    for noise in ["00000000", "99999999"] {
+        assert!(!found.text.contains(noise), "{noise}: {}", found.text);
+    }
+}
+
+#[test]
+fn a_range_beyond_a_turn_is_narrowed_to_what_the_firmware_takes() {
+    let text = with("lower=\"-0.5\" upper=\"1.5\"", "lower=\"-10\" upper=\"10\"")
+        .replace("lower=\"0\" upper=\"2\"", "lower=\"-6.28318530718\" upper=\"6.28318530718\"");
+    let found = converted(&text, &plain()).expect("a leg");
+    assert_eq!(found.leg.joints[0].range_deg, [-360.0, 360.0]);
+    assert_eq!(found.leg.joints[1].range_deg, [-360.0, 360.0]);
+    // A turn written with twelve digits needs no remark.
+    let [remark] = &found.remarks[..] else { panic!("one remark: {:?}", found.remarks) };
+    assert!(
+        remark.starts_with("joint `hip`: `limit` is -573.0 to 573.0 degrees, narrowed to -360.0"),
+        "{remark}"
+    );
+}
+
+#[test]
 fn values_that_a_leg_file_cannot_hold_are_left_out_with_a_remark() {
     let text = with("effort=\"80\" velocity=\"4\"", "effort=\"0\" velocity=\"1000\"")
         .replace("lower=\"0\" upper=\"2\"", "lower=\"0\" upper=\"0\"");
@@ -265,9 +293,14 @@ fn every_joint_that_is_no_leg_is_refused_by_name() {
         (
             ankle("revolute"),
             joints(&["hip", "knee"]),
-            "joint `ankle`: hangs on the chosen joints and moves: choose it (--joints)",
+            "joint `ankle`: moves the leg and is neither chosen nor held: choose it (--joints), or hold at a position \
+             in rad or m, for example\n  --lock ankle=0",
         ),
-        (ankle("floating"), joints(&["hip", "knee"]), "joint `ankle`: hangs on the chosen joints and moves"),
+        (
+            ankle("floating"),
+            joints(&["hip", "knee"]),
+            "joint `ankle`: is floating and moves the leg, and cannot be held",
+        ),
         (
             ankle("floating"),
             lock("ankle", 0.0),
@@ -277,7 +310,8 @@ fn every_joint_that_is_no_leg_is_refused_by_name() {
         (
             ankle("prismatic"),
             joints(&["hip", "knee", "ankle"]),
-            "joint `ankle`: is prismatic; a leg's joints are revolute or continuous",
+            "joint `ankle`: is prismatic; a leg's joints are revolute or continuous. Joints that move, from the root on:\n  \
+             hip (revolute)\n  knee (revolute, on hip)\n  ankle (prismatic, on knee)",
         ),
         (ankle("screw"), plain(), "joint `ankle`: `type` is `screw`, not one of revolute"),
         (ankle("revolute"), plain(), "joint `ankle`: the links that it moves have no mass"),
@@ -290,14 +324,10 @@ fn every_joint_that_is_no_leg_is_refused_by_name() {
         (
             SIMPLE.into(),
             joints(&["hip", "kne"]),
-            "--joints: no joint is called `kne`; joints that move: hip, knee",
+            "--joints: no joint is called `kne`. Joints that move, from the root on:\n  hip (revolute)\n  knee (revolute, on hip)",
         ),
-        (
-            SIMPLE.into(),
-            joints(&["knee"]),
-            "joint `hip`: moves the chain of `knee`, but is neither chosen nor held",
-        ),
-        (SIMPLE.into(), joints(&["hip"]), "joint `knee`: hangs on the chosen joints and moves"),
+        (SIMPLE.into(), joints(&["knee"]), "joint `hip`: moves the leg and is neither chosen nor held"),
+        (SIMPLE.into(), joints(&["hip"]), "joint `knee`: moves the leg and is neither chosen nor held"),
         (SIMPLE.into(), lock("knee", 0.5), "joint `knee`: is both chosen (--joints) and held (--lock)"),
         (
             SIMPLE.into(),
@@ -340,6 +370,25 @@ fn every_joint_that_is_no_leg_is_refused_by_name() {
         let refused = converted(&text, &options).expect_err(reason);
         assert!(refused.starts_with("robot.urdf:") && refused.contains(reason), "{reason}: {refused}");
     }
+    // All joints to be held are named at once, each at a position within its range.
+    let crowd = SIMPLE.replace(
+        "</robot>",
+        "<link name=\"foot\"/><joint name=\"ankle roll\" type=\"revolute\"><parent link=\"shank\"/><child link=\"foot\"/>\
+         <limit lower=\"0.2\" upper=\"0.5\"/></joint>\
+         <link name=\"toe\"/><joint name=\"toes\" type=\"continuous\"><parent link=\"foot\"/><child link=\"toe\"/></joint>\
+         <link name=\"hand\"/><joint name=\"aside\" type=\"revolute\"><parent link=\"base\"/><child link=\"hand\"/></joint></robot>",
+    );
+    let refused = converted(&crowd, &joints(&["knee"])).expect_err("three joints are loose");
+    assert!(
+        refused.contains(
+            "joint `hip`: moves the leg and is neither chosen nor held, and so are `ankle roll`, `toes`: choose them \
+             (--joints), or hold at a position in rad or m, for example\n  --lock hip=0 --lock 'ankle roll=0.35' --lock toes=0"
+        ),
+        "{refused}"
+    );
+    let held = [("hip", 0.0), ("ankle roll", 0.35), ("toes", 0.0)].map(|(name, at)| (name.to_owned(), at));
+    let held = RobotOptions { locked: held.into(), ..joints(&["knee"]) };
+    assert_eq!(converted(&crowd, &held).expect("as proposed").leg.joints[0].name, "knee");
     // Many robots state an axis of length 0 at joints that do not move.
     let welded =
         ankle("fixed").replace("<child link=\"foot\"/>", "<child link=\"foot\"/><axis xyz=\"0 0 0\"/>");

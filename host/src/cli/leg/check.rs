@@ -1,15 +1,16 @@
-//! What replay, simulation and image need from a leg file and do not find, as lines to paste.
+//! What replay, simulation, `excite` and image need from a leg file and do not find, as lines to paste.
 
 use std::fmt::Write;
 
 use scarab::ident::Plan;
 
 use crate::base::error::{FileError, ToolError};
-use crate::formats::leg_file::draft::parameters_text;
+use crate::formats::leg_file::draft::truth_text;
 use crate::formats::leg_file::keys::{KeyLine, PRIOR, TRUTH};
-use crate::formats::leg_file::{LegFile, MissingForImage};
+use crate::formats::leg_file::{JointFile, LegFile, MissingForImage};
 use crate::image::leg_source::describe;
 use crate::leg::setup::{DEFAULT_SEED, PriorChoice, background, configuration};
+use crate::run::excite::run::designable;
 use crate::with_leg_size;
 use scarab::model::planar::JOINTS;
 
@@ -24,6 +25,7 @@ pub fn text(name_or_path: &str) -> Result<String, ToolError> {
     let known = with_leg_size!(&leg, replayable(&leg));
     replay(&mut text, &leg, &known);
     simulation(&mut text, &leg, &known);
+    excite(&mut text, &leg, &known);
     image(&mut text, &leg, &missing);
     if text.contains("\n  [[joint]]") || text.contains("\n  before") {
         text.push_str(
@@ -84,10 +86,42 @@ fn simulation(text: &mut String, leg: &LegFile, known: &Result<(), FileError>) {
     section(text, "simulation", "keys are missing");
     for joint in without {
         let lines = match &leg.joints[joint].prior {
-            Some(prior) => format!("truth = {}  # the prior's values: change them", parameters_text(prior)),
+            Some(prior) => format!("truth = {}  # the prior's values: change them", truth_text(prior)),
             None => line(&TRUTH),
         };
         of_joint(text, leg, joint, &[lines]);
+    }
+}
+
+/// Whether a motion can be designed, by a short search.
+fn excite(text: &mut String, leg: &LegFile, known: &Result<(), FileError>) {
+    if let Err(fault) = known {
+        return impossible(text, "excite", fault);
+    }
+    let has = |of: &dyn Fn(&JointFile) -> bool| leg.joints.iter().all(of);
+    let noise = has(&|joint| joint.current_noise_a > 0.0) || leg.torque_noise_percent > 0.0;
+    let advice = "--torque-noise-nm NM states the torque's noise at rest (standard deviation)\n";
+    if !has(&|joint| joint.prior.is_some()) && !has(&|joint| joint.truth.is_some()) {
+        section(text, "excite", "keys are missing");
+        if !noise {
+            text.push_str("  before the first [[joint]]\n    # no key: the option ");
+            text.push_str(advice);
+        }
+        let without = (0..leg.joints.len()).filter(|joint| leg.joints[*joint].prior.is_none());
+        return without.for_each(|joint| of_joint(text, leg, joint, &[line(&PRIOR)]));
+    }
+    match with_leg_size!(leg, designable(leg)) {
+        Ok(assumed) => {
+            section(text, "excite", "ready");
+            if !noise {
+                text.push_str("  the option ");
+                text.push_str(advice);
+            }
+            assumed.iter().for_each(|line| {
+                let _ = writeln!(text, "  {line}");
+            });
+        }
+        Err(error) => section(text, "excite", &format!("not possible: {error}")),
     }
 }
 

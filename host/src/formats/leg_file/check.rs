@@ -29,6 +29,8 @@ pub const LARGEST_SPEED: f64 = 2800.0;
 pub const LARGEST_TORQUE: f64 = 1000.0;
 /// Largest simulated noise of the torque, percent; leg files state at most 100.
 pub const LARGEST_NOISE_PERCENT: f64 = 1000.0;
+/// Largest current limit, A.
+pub const LARGEST_CURRENT_A: f64 = 300.0;
 /// Longest time of a holding brake, ms.
 const LONGEST_BRAKE_MS: f64 = 500.0;
 
@@ -169,7 +171,7 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
     place.positive("torque_limit_nm", joint.torque_limit_nm, LARGEST_TORQUE)?;
     place.within("torque_per_ampere", joint.torque_per_ampere, 0.001, 100.0)?;
     if let Some(limit) = joint.current_limit_a {
-        place.positive("current_limit_a", limit, 300.0)?;
+        place.positive("current_limit_a", limit, LARGEST_CURRENT_A)?;
     }
     place.within("drive_lag_s", joint.drive_lag_s, 0.0, 0.1)?;
     let encoder = inside("encoder");

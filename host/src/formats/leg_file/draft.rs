@@ -127,15 +127,21 @@ impl DraftPrior {
     }
 }
 
-/// `truth` or `prior` as an inline table.
+/// A prior as `truth`, an inline table. What a drive always has and the prior does not state is a word in
+/// capitals.
 #[must_use]
-pub fn parameters_text(link: &LinkParameters) -> String {
+pub fn truth_text(link: &LinkParameters) -> String {
     let LinkParameters { mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset, asymmetry } = link;
+    let or_word =
+        |value: &f64, word: &str| if *value == 0.0 { word.to_owned() } else { format!("{value:?}") };
     format!(
-        "{{ mass = {mass:?}, com = {}, inertia_com = {}, rotor_inertia = {rotor_inertia:?}, coulomb = {coulomb:?}, \
-         viscous = {viscous:?}, offset = {offset:?}, asymmetry = {asymmetry:?} }}",
+        "{{ mass = {mass:?}, com = {}, inertia_com = {}, rotor_inertia = {}, coulomb = {}, viscous = {}, \
+         offset = {offset:?}, asymmetry = {asymmetry:?} }}",
         list(com),
-        list(inertia_com)
+        list(inertia_com),
+        or_word(rotor_inertia, "KG_M2"),
+        or_word(coulomb, "NM"),
+        or_word(viscous, "NM_S_RAD")
     )
 }
 

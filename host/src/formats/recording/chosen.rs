@@ -7,7 +7,7 @@ use crate::formats::recording::columns::Column;
 use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
-use crate::formats::recording::suggest::{advice, example, unit_in_name};
+use crate::formats::recording::suggest::{Reading, advice, example, unit_in_name};
 use crate::formats::recording::{LARGEST_POSITION_RAD, LARGEST_TIME_S, LARGEST_TORQUE_NM};
 use crate::report::reading::ColumnReport;
 
@@ -57,6 +57,13 @@ impl Chosen {
 
     fn factor(&self) -> f64 {
         self.unit.factor() * self.drive
+    }
+
+    /// How the column is read, for a proposal.
+    pub(crate) fn reading(&self) -> Reading {
+        let Column { index, name } = &self.column;
+        let column = if name.contains(',') { (index + 1).to_string() } else { name.clone() };
+        Reading { signal: self.signal, column, unit: self.unit }
     }
 
     pub(crate) fn report(&self) -> ColumnReport {

@@ -10,11 +10,17 @@ use crate::base::error::FileError;
 use crate::formats::recording::chosen::{Chosen, Names, choose};
 use crate::formats::recording::columns::{LineNumbers, Rows, peeked, refuse};
 use crate::formats::recording::dialect::{Decimal, Dialect, LOOKED_AT};
-use crate::formats::recording::fault::Fault;
+use crate::formats::recording::fault::{Fault, rounded};
 use crate::formats::recording::import::{ColumnName, Import};
-use crate::formats::recording::signal::Signal;
-use crate::formats::recording::{JointSeries, MOST_BAD_PERCENT, MOST_SAMPLES, Recording};
+use crate::formats::recording::signal::{Quantity, Signal, Unit};
+use crate::formats::recording::suggest::{Reading, command};
+use crate::formats::recording::{
+    JointSeries, MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MOST_BAD_PERCENT, MOST_SAMPLES, Recording,
+};
 use crate::report::reading::{ARRAYS, ReadReport, SkippedReport};
+
+/// Rate above which the unit of the time is in doubt, Hz.
+const LARGEST_RATE_HZ: f64 = 5e4;
 
 /// Recording with its provenance.
 #[derive(Clone, Debug)]
@@ -81,6 +87,9 @@ impl<'a> Decoder<'a> {
     /// The fault, where rows are not skipped.
     pub(crate) fn skip(&mut self, line: usize, fault: Fault) -> Result<(), FileError> {
         if !self.import.skip_bad || !fault.is_of_row() {
+            // A fault of the first row is rather one of all rows.
+            let is_damage = fault.is_of_row() && !self.recording.time_s.is_empty();
+            let fault = if is_damage { Fault::Skippable(Box::new(fault)) } else { fault };
             return Err(refuse(self.file, Some(line), fault));
         }
         self.skipped.add(line, &fault);
@@ -112,7 +121,7 @@ impl<'a> Decoder<'a> {
 
     /// Checks the whole recording.
     pub(crate) fn finish(self, format: String, header: bool) -> Result<Read, FileError> {
-        let Self { file, columns, recording, numbers, skipped, .. } = self;
+        let Self { file, import, columns, recording, numbers, skipped, .. } = self;
         let rows = recording.time_s.len() + skipped.rows;
         if skipped.rows * 100 > rows * MOST_BAD_PERCENT {
             let first = skipped
@@ -121,7 +130,8 @@ impl<'a> Decoder<'a> {
                 .map_or(String::new(), |(_, first)| format!("line {}: {}", first.line, first.reason));
             return Err(refuse(file, None, Fault::TooManyBad { skipped: skipped.rows, rows, first }));
         }
-        recording.check(&numbers)?;
+        let readings: Vec<Reading> = columns.iter().map(Chosen::reading).collect();
+        recording.check(&numbers, &other_time_unit(&recording, import, readings))?;
         let report = ReadReport {
             file: file.display().to_string(),
             format,
@@ -133,6 +143,35 @@ impl<'a> Decoder<'a> {
         };
         Ok(Read { recording, report })
     }
+}
+
+/// Advice where the time is a recording in another unit only, else nothing.
+fn other_time_unit(recording: &Recording, import: &Import, mut readings: Vec<Reading>) -> String {
+    let Some(time) = readings.iter_mut().find(|reading| reading.signal == Signal::Time) else {
+        return String::new();
+    };
+    let is_valid = |unit: &Unit| {
+        let factor = unit.factor() / time.unit.factor();
+        let rate = 1.0 / (factor * recording.median_step_s());
+        (MINIMUM_RATE_HZ..=LARGEST_RATE_HZ).contains(&rate)
+            && factor * recording.duration_s() >= MINIMUM_DURATION_S
+    };
+    if is_valid(&time.unit) {
+        return String::new();
+    }
+    let Some(unit) = Unit::of(Quantity::Time).find(is_valid) else { return String::new() };
+    let factor = unit.factor() / time.unit.factor();
+    let (rate, duration) = (1.0 / (factor * recording.median_step_s()), factor * recording.duration_s());
+    let counts = recording.time_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
+    let or_numbers = if counts { " or sample numbers" } else { "" };
+    time.unit = unit;
+    format!(
+        ": is the time in {}{or_numbers}? Then it would be {} Hz over {} s. If so, repeat the command with it:\n  {}",
+        unit.name,
+        rounded(rate),
+        rounded(duration),
+        command(import, &readings)
+    )
 }
 
 /// Skipped rows by kind of fault, with the first of each.

@@ -87,6 +87,9 @@ pub enum Fault {
     /// The bytes cannot be read, or are not text.
     #[error("{0}")]
     Unreadable(String),
+    /// A damaged row, which may be skipped.
+    #[error("{0} (--skip-bad skips such rows, up to {MOST_BAD_PERCENT} %)")]
+    Skippable(Box<Fault>),
     /// More rows are invalid than may be skipped.
     #[error(
         "{skipped} of {rows} rows are invalid, --skip-bad skips at most {MOST_BAD_PERCENT} %; the first: {first}"
@@ -171,24 +174,27 @@ pub enum Fault {
     },
     /// Most samples are too far apart.
     #[error(
-        "the median step of the time is {} s, which is {} Hz; at least {MINIMUM_RATE_HZ} Hz are needed{}",
-        Short(*.step_s), rounded(1.0 / .step_s), OtherUnit(*.step_s, *.counts)
+        "the median step of the time is {} s, which is {} Hz; at least {MINIMUM_RATE_HZ} Hz are needed{advice}",
+        Short(*.step_s), rounded(1.0 / .step_s)
     )]
     TooSlow {
         /// Median time between two samples, s.
         step_s: f64,
-        /// Whether each stamp is one more than the previous one.
-        counts: bool,
+        /// Unit in which the time would be valid, with the complete command.
+        advice: String,
     },
     /// The recording is too short for an identification.
     #[error(
-        "too short: {samples} samples over {duration:.3} s, but at least {MINIMUM_SAMPLES} over {MINIMUM_DURATION_S} s are needed"
+        "too short: {samples} samples over {duration:.3} s, but at least {MINIMUM_SAMPLES} over {MINIMUM_DURATION_S} s are \
+         needed{advice}"
     )]
     TooShort {
         /// Number of samples.
         samples: usize,
         /// Time from first to last sample, s.
         duration: f64,
+        /// Unit in which the time would be valid, with the complete command.
+        advice: String,
     },
 }
 
@@ -239,29 +245,8 @@ impl fmt::Display for CommaHint<'_> {
     }
 }
 
-/// Units of time that recorders use, in seconds.
-const UNITS: [(&str, f64); 3] = [("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)];
-
-/// Unit in which these stamps would be a valid recording, if any.
-struct OtherUnit(f64, bool);
-
-impl fmt::Display for OtherUnit {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rates = UNITS.map(|(unit, second)| (unit, 1.0 / (self.0 * second)));
-        let Some((unit, rate)) = rates.into_iter().find(|(_, rate)| *rate >= MINIMUM_RATE_HZ) else {
-            return Ok(());
-        };
-        let or_numbers = if self.1 { " or sample numbers" } else { "" };
-        write!(
-            formatter,
-            ": are these {unit}{or_numbers}? In {unit} it would be {} Hz (state it by --columns and --units)",
-            rounded(rate)
-        )
-    }
-}
-
 /// Rounds to four digits.
-fn rounded(rate: f64) -> f64 {
+pub(crate) fn rounded(rate: f64) -> f64 {
     format!("{rate:.3e}").parse().unwrap_or(rate)
 }
 

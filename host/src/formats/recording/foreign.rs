@@ -21,6 +21,9 @@ pub(crate) enum Foreign {
 const MATLAB: &str = "a MAT file, which is not read: save the columns as CSV, in MATLAB \
     writetable(table(t, q1, tau1), 'run.csv'), in Python scipy.io.loadmat and numpy.savetxt";
 
+/// First bytes of an SQLite file.
+const SQLITE: &[u8] = b"SQLite format 3\0";
+
 /// First bytes of each kind.
 const KINDS: [(&[u8], Foreign); 11] = [
     (b"PAR1", Foreign::Parquet),
@@ -34,7 +37,7 @@ const KINDS: [(&[u8], Foreign); 11] = [
         ),
     ),
     (
-        b"SQLite format 3\0",
+        SQLITE,
         Foreign::Refused(
             "an SQLite file, as older bags of ROS 2 are: convert the bag's folder to MCAP by \
              `rosbags-convert --src BAG --dst NEW --dst-storage mcap`",
@@ -58,6 +61,18 @@ impl Foreign {
         KINDS.into_iter().find(|(bytes, _)| begin.starts_with(bytes)).map(|(_, kind)| kind)
     }
 
+    /// Kind of a folder that holds a bag of ROS 2.
+    pub(crate) fn of_folder(folder: &Path) -> Option<Self> {
+        let names = std::fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
+        let extensions: Vec<_> = names.filter_map(|path| path.extension().map(ToOwned::to_owned)).collect();
+        let has = |wanted: &str| extensions.iter().any(|extension| extension == wanted);
+        match (has("mcap"), has("db3")) {
+            (true, _) => Some(Self::Mcap),
+            (false, true) => Self::of(SQLITE),
+            _ => None,
+        }
+    }
+
     /// Reads or refuses the file.
     pub(crate) fn read(self, file: &Path, is_packed: bool, import: &Import) -> Result<Read, FileError> {
         let refused = |reason: &str| Err(refuse(file, None, Fault::Unreadable(reason.to_owned())));
@@ -71,8 +86,9 @@ impl Foreign {
                 let _ = import;
                 let kind = if self == Self::Parquet { "a Parquet file" } else { "an MCAP file" };
                 refused(&format!(
-                    "{kind}, which this program is built without: give the same command with `cargo sim-readers` instead of \
-                     `cargo sim`"
+                    "{kind}, which this program is built without: in the clone give the same command with `cargo sim-readers` \
+                     instead of `{}`; an installed program needs `cargo install --path host --features readers`",
+                    crate::base::shell::program()
                 ))
             }
         }

@@ -107,6 +107,11 @@ impl Unit {
         self.times / self.over
     }
 
+    /// Units of a quantity, the SI unit first.
+    pub fn of(quantity: Quantity) -> impl Iterator<Item = Self> {
+        UNITS.into_iter().filter(move |unit| unit.quantity == quantity)
+    }
+
     /// Unit of this name on the command line.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {

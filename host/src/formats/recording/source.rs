@@ -37,7 +37,7 @@ impl Drop for Source {
 /// Opens a file.
 pub(crate) fn open(path: &Path) -> Result<Source, FileError> {
     if path.is_dir() {
-        let reason = "is a folder: name the recording in it, of a bag of ROS 2 its `.mcap` file";
+        let reason = "is a folder: name the recording in it; only the folder of a ROS 2 bag (`.mcap`) is read as a whole";
         return Err(FileError { file: path.display().to_string(), line: None, reason: reason.into() });
     }
     let unreadable = |error: &io::Error| FileError::unreadable(path, error);

@@ -150,12 +150,85 @@ struct Proposal {
 /// are stated or have documented names.
 pub(crate) fn advice(stated: &Names, import: &Import, certain: &[(Signal, usize)]) -> String {
     let names = &stated.names;
+    let topics = topics(names);
+    let mut all: Vec<(Vec<Proposal>, Vec<Signal>)> =
+        topics.iter().map(|topic| proposals(stated, import, certain, topic)).collect();
+    let best = all.iter().position(|(_, missing)| missing.is_empty()).unwrap_or(0);
+    let complete = topics.iter().zip(&all).filter(|(_, (_, missing))| missing.is_empty());
+    let others: Vec<_> =
+        complete.map(|(topic, _)| topic.as_str()).filter(|topic| *topic != topics[best]).collect();
+    let (mut found, missing) = all.swap_remove(best);
+    let joints = import.drives.len();
+    if !missing.is_empty() {
+        let missing: Vec<String> = missing.iter().map(ToString::to_string).collect();
+        return format!(
+            ". No name resembles {}. Name the columns by --columns SIGNAL=COLUMN,.. (a name, or a number from 1) and their \
+             units by --units, for example\n  {} --columns {} --units s,rad,Nm",
+            missing.join(", "),
+            import.command,
+            example(joints),
+        );
+    }
+    found.sort_by_key(|found| found.signal);
+    let columns: Vec<String> = found
+        .iter()
+        .map(|found| format!("{}={}", found.signal, word(names, found.index, stated.are_stated)))
+        .collect();
+    let assumed: Vec<String> = found
+        .iter()
+        .filter(|found| found.is_assumed)
+        .map(|found| format!("`{}`", names[found.index]))
+        .collect();
+    let assumed = match assumed.len() {
+        0 => String::new(),
+        _ => format!(
+            "\n  ({} without a unit: SI is assumed, change --units if that is wrong)",
+            assumed.join(", ")
+        ),
+    };
+    let others = match others.len() {
+        0 => String::new(),
+        _ => format!("\n  (topics with such columns too: {})", others.join(", ")),
+    };
+    format!(
+        ". If these columns are meant, repeat the command with them:\n  {} --columns {} --units {}{assumed}{others}",
+        import.command,
+        quoted(&columns.join(",")),
+        units(&found.iter().map(|found| (found.signal, found.unit)).collect::<Vec<_>>()),
+    )
+}
+
+/// Topics of which the names of all columns begin with one and a colon; one empty topic otherwise.
+fn topics(names: &[String]) -> Vec<String> {
+    let mut topics: Vec<String> = Vec::new();
+    for name in names {
+        let Some((topic, _)) = name.split_once(':').filter(|_| name.starts_with('/')) else {
+            return vec![String::new()];
+        };
+        if !topics.iter().any(|other| other == topic) {
+            topics.push(topic.to_owned());
+        }
+    }
+    if topics.is_empty() { vec![String::new()] } else { topics }
+}
+
+/// Columns of one topic for each signal, and the signals without one.
+fn proposals(
+    stated: &Names,
+    import: &Import,
+    certain: &[(Signal, usize)],
+    topic: &str,
+) -> (Vec<Proposal>, Vec<Signal>) {
+    let names = &stated.names;
+    let own = |name: &&String| topic.is_empty() || name.split_once(':').is_some_and(|(of, _)| of == topic);
     let mut found: Vec<Proposal> = Vec::new();
     let mut missing = Vec::new();
     let candidates: Vec<(usize, Name, Signal)> = names
         .iter()
         .enumerate()
+        .filter(|(_, name)| own(name))
         .filter_map(|(index, text)| {
+            let text = if topic.is_empty() { text.as_str() } else { text.get(topic.len() + 1..)? };
             let name = Name::of(text);
             let kind = name.kind()?;
             Some((index, name, kind))
@@ -188,7 +261,7 @@ pub(crate) fn advice(stated: &Names, import: &Import, certain: &[(Signal, usize)
             |name: &String| strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &documented);
         let digits = |text: &str| text.chars().filter(char::is_ascii_digit).collect::<String>();
         let close = names.iter().enumerate().filter(|(_, name)| {
-            (TYPING_ERROR..1.0).contains(&likeness(name)) && digits(name) == digits(&documented)
+            own(name) && (TYPING_ERROR..1.0).contains(&likeness(name)) && digits(name) == digits(&documented)
         });
         close.max_by(|(_, a), (_, b)| likeness(a).total_cmp(&likeness(b))).map(|(index, _)| index)
     };
@@ -222,39 +295,54 @@ pub(crate) fn advice(stated: &Names, import: &Import, certain: &[(Signal, usize)
             _ => missing.push(choices[0].0),
         }
     }
-    if !missing.is_empty() {
-        let missing: Vec<String> = missing.iter().map(ToString::to_string).collect();
-        return format!(
-            ". No name resembles {}. Name the columns by --columns SIGNAL=COLUMN,.. (a name, or a number from 1) and their \
-             units by --units, for example\n  {} --columns {} --units s,rad,Nm",
-            missing.join(", "),
-            import.command,
-            example(joints),
-        );
-    }
-    found.sort_by_key(|found| found.signal);
-    let columns: Vec<String> = found
-        .iter()
-        .map(|found| format!("{}={}", found.signal, word(names, found.index, stated.are_stated)))
-        .collect();
-    let assumed: Vec<String> = found
-        .iter()
-        .filter(|found| found.is_assumed)
-        .map(|found| format!("`{}`", names[found.index]))
-        .collect();
-    let assumed = match assumed.len() {
-        0 => String::new(),
-        _ => format!(
-            "\n  ({} without a unit: SI is assumed, change --units if that is wrong)",
-            assumed.join(", ")
-        ),
+    (found, missing)
+}
+
+/// Signal that is read from a column in a unit.
+#[derive(Clone, Debug)]
+pub(crate) struct Reading {
+    pub(crate) signal: Signal,
+    /// Column as `--columns` takes it.
+    pub(crate) column: String,
+    pub(crate) unit: Unit,
+}
+
+/// Readings of a command: the stated columns and units, else the documented names.
+pub(crate) fn readings(import: &Import) -> Vec<Reading> {
+    let reading = |choices: &[Signal]| {
+        let signal =
+            *choices.iter().find(|signal| import.columns.contains_key(signal)).unwrap_or(&choices[0]);
+        let unit = import.unit(signal).0;
+        let column = match import.columns.get(&signal) {
+            Some(ColumnName::Name(name)) => name.clone(),
+            Some(ColumnName::Number(number)) => number.to_string(),
+            None => signal.column(unit),
+        };
+        Reading { signal, column, unit }
     };
-    format!(
-        ". If these columns are meant, repeat the command with them:\n  {} --columns {} --units {}{assumed}",
-        import.command,
-        quoted(&columns.join(",")),
-        units(&found),
-    )
+    let joints = 1..=import.drives.len();
+    let of_joints = joints.flat_map(|joint| {
+        [
+            reading(&[Signal::Angle(joint), Signal::MotorAngle(joint)]),
+            reading(&[Signal::Torque(joint), Signal::Current(joint)]),
+        ]
+    });
+    std::iter::once(reading(&[Signal::Time])).chain(of_joints).collect()
+}
+
+/// Complete command with these readings.
+pub(crate) fn command(import: &Import, readings: &[Reading]) -> String {
+    format!("{} {}", import.command, options(readings))
+}
+
+/// Options of these readings.
+pub(crate) fn options(readings: &[Reading]) -> String {
+    let mut readings = readings.to_vec();
+    readings.sort_by_key(|reading| reading.signal);
+    let columns: Vec<String> =
+        readings.iter().map(|reading| format!("{}={}", reading.signal, reading.column)).collect();
+    let all: Vec<_> = readings.iter().map(|reading| (reading.signal, reading.unit)).collect();
+    format!("--columns {} --units {}", quoted(&columns.join(",")), units(&all))
 }
 
 /// Columns of a file without a header, by number.
@@ -265,14 +353,14 @@ pub(crate) fn example(joints: usize) -> String {
 }
 
 /// One unit for each quantity, and the exceptions.
-fn units(found: &[Proposal]) -> String {
+fn units(found: &[(Signal, Unit)]) -> String {
     let mut words = Vec::new();
     for quantity in Quantity::ALL {
-        let mut of_quantity = found.iter().filter(|found| found.unit.quantity == quantity);
-        let Some(first) = of_quantity.next() else { continue };
-        words.push(first.unit.name.to_owned());
-        let others = of_quantity.filter(|other| other.unit != first.unit);
-        words.extend(others.map(|other| format!("{}={}", other.signal, other.unit.name)));
+        let mut of_quantity = found.iter().filter(|(_, unit)| unit.quantity == quantity);
+        let Some((_, first)) = of_quantity.next() else { continue };
+        words.push(first.name.to_owned());
+        let others = of_quantity.filter(|(_, unit)| unit != first);
+        words.extend(others.map(|(signal, unit)| format!("{signal}={}", unit.name)));
     }
     words.join(",")
 }
@@ -287,5 +375,38 @@ fn word(names: &[String], index: usize, has_header: bool) -> String {
         name.clone()
     } else {
         (index + 1).to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Proposal for columns of these names.
+    fn proposed(names: &[&str]) -> String {
+        let names = names.iter().map(|name| (*name).to_owned()).collect();
+        advice(&Names { names, units: Vec::new(), are_stated: true }, &Import::plain(1), &[])
+    }
+
+    #[test]
+    fn columns_are_proposed_from_one_topic_that_has_all() {
+        let names = [
+            "/clock:time",
+            "/clock:log_time",
+            "/joint_states:time",
+            "/joint_states:log_time",
+            "/joint_states:position[1]",
+            "/joint_states:effort[1]",
+            "/other:time",
+            "/other:position[1]",
+            "/other:effort[1]",
+        ];
+        let all = proposed(&names);
+        let columns = "t=/joint_states:time,q1=/joint_states:position[1],tau1=/joint_states:effort[1]";
+        assert!(all.contains(&format!("--columns '{columns}' --units s,rad,Nm")), "{all}");
+        assert!(all.ends_with("(topics with such columns too: /other)"), "{all}");
+        let one = proposed(&names[2..6]);
+        assert!(one.contains(columns) && !one.contains("such columns too"), "{one}");
+        assert!(proposed(&names[..2]).contains("No name resembles"));
     }
 }

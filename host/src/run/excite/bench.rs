@@ -20,6 +20,7 @@ use crate::run::excite::assumption::{Assumption, assumed};
 use crate::run::excite::demand::demand;
 use crate::run::excite::design::{BLEND_S, Candidate, DesignOptions, Frame};
 use crate::run::excite::expectation::{Rehearsal, rehearse};
+use crate::run::excite::obstacle::torque_limit;
 use crate::run::excite::score::Scorer;
 
 /// Options of `excite`.
@@ -135,10 +136,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         .ok_or_else(|| {
             ToolError::input(format!("{}: bandwidth_hz does not fit the device's filter", leg.name))
         })?;
-        let torque_limit = core::array::from_fn(|joint| {
-            let joint = &leg.joints[joint];
-            joint.torque_limit_nm.min(joint.current_limit() * joint.torque_per_ampere)
-        });
+        let torque_limit = core::array::from_fn(|joint| torque_limit(&leg.joints[joint]));
         Ok(Self { leg, assumed: word, context, scorer, torque_limit, noise: origin })
     }
 
@@ -194,11 +192,11 @@ impl<const N: usize, const B: usize> Bench<N, B> {
                     self.leg.joints[joint].name, self.assumed, self.torque_limit[joint]
                 )));
             }
-            if demand.cut_nm > 0.0 {
-                return Err(ToolError::input(format!(
-                    "joint {}: too fast near an end of its range to stop there; the monitor would reduce its torque by {:.1} N m",
-                    self.leg.joints[joint].name, demand.cut_nm
-                )));
+            if demand.cut.by_nm > 0.0
+                && let Some(obstacle) = demand.obstacle(joint, f64::INFINITY)
+            {
+                let inertia = f64::from(self.context.configuration.joints[joint].inertia.0);
+                return Err(ToolError::input(obstacle.words(&self.leg, inertia, self.scorer.margin)));
             }
         }
         Ok(Candidate { table, motion, demand })

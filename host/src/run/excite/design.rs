@@ -27,6 +27,7 @@ use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::run::excite::candidate::{self, PER_JOINT};
 use crate::run::excite::demand::{Demand, demand};
+use crate::run::excite::obstacle::Obstacle;
 use crate::run::excite::score::Scorer;
 
 /// Duration of a blend between rest and full speed, s.
@@ -52,7 +53,7 @@ const SLICE: u32 = 100;
 /// Rounding of the coefficients, rad: the file contains exactly the proved values.
 const GRID_RAD: f64 = 1e-6;
 /// Factor per reduction of a motion with too much torque, and limit of the steps.
-const SHRINK: f32 = 0.98;
+pub const SHRINK: f32 = 0.98;
 const SHRINKINGS: u32 = 60;
 
 /// Options of a design.
@@ -109,15 +110,34 @@ pub fn candidates<const N: usize, const B: usize>(
     }
     let share = (options.evaluations / paces.len() as u32).max(SLICE);
     progress.set_length(u64::from(share) * paces.len() as u64);
-    let found: Vec<_> = paces
+    let searched: Vec<_> = paces
         .into_par_iter()
-        .filter_map(|(period_s, cycles)| search(frame, period_s, cycles, options.seed, share, progress))
+        .map(|(period_s, cycles)| search(frame, period_s, cycles, options.seed, share, progress))
         .collect();
+    let mut found = Vec::with_capacity(searched.len());
+    let mut obstacles = Vec::new();
+    for searched in searched {
+        match searched {
+            Ok(candidate) => found.push(candidate),
+            Err(obstacle) => obstacles.extend(obstacle),
+        }
+    }
     if found.is_empty() {
-        let reason = "no exciting motion fits the limits of angle, speed, acceleration and torque";
-        return Err(frame.leg.error(reason).into());
+        return Err(frame.refusal(obstacles));
     }
     Ok(found)
+}
+
+impl<const N: usize, const B: usize> Frame<'_, N, B> {
+    /// Refusal of a design that names the obstacle which comes nearest to its limit.
+    pub fn refusal(&self, obstacles: Vec<Obstacle>) -> ToolError {
+        let nearest = obstacles.into_iter().min_by(|one, other| one.excess().total_cmp(&other.excess()));
+        let words = nearest.map_or(String::new(), |obstacle| {
+            let inertia = self.configuration.joints.get(obstacle.joint).map_or(0.0, |joint| joint.inertia.0);
+            format!(": {}", obstacle.words(self.leg, f64::from(inertia), self.scorer.margin))
+        });
+        self.leg.error(format!("no exciting motion fits the limits{words}")).into()
+    }
 }
 
 /// Periods and numbers of cycles that fill a duration, slow ones first.
@@ -183,25 +203,29 @@ fn search<const N: usize, const B: usize>(
     seed: u64,
     evaluations: u32,
     progress: &ProgressBar,
-) -> Option<Candidate<N>> {
+) -> Result<Candidate<N>, Option<Obstacle>> {
     let period = Second(period_s as f32);
     let cost = Cost { frame, envelope: frame.configuration.envelope(), period, cycles };
-    let mut swarm = Bso::<f64, BEETLES, CAPACITY>::new(&cost, BsoSettings::default(), seed).ok()?;
+    let mut swarm =
+        Bso::<f64, BEETLES, CAPACITY>::new(&cost, BsoSettings::default(), seed).map_err(|_| None)?;
     while swarm.evaluations() < evaluations {
         swarm.advance(&cost, SLICE.min(evaluations - swarm.evaluations()));
         progress.inc(u64::from(SLICE));
     }
-    let curve = cost.curve(swarm.best()?.position)?;
+    let curve = swarm.best().and_then(|best| cost.curve(best.position)).ok_or(None)?;
     within_limits(frame, &curve, cycles, 1.0)
 }
 
-/// Shrinks a motion slightly.
-#[must_use]
+/// Motion shrunk by a factor about its centre.
+///
+/// # Errors
+/// The limit that the smallest motion exceeds.
 pub fn smaller<const N: usize, const B: usize>(
     frame: &Frame<'_, N, B>,
     candidate: &Candidate<N>,
-) -> Option<Candidate<N>> {
-    within_limits(frame, candidate.motion.curve(), candidate.table.cycles, SHRINK)
+    factor: f32,
+) -> Result<Candidate<N>, Option<Obstacle>> {
+    within_limits(frame, candidate.motion.curve(), candidate.table.cycles, factor)
 }
 
 /// Rounds the curve as in the file and shrinks it about its centre until everything is proved.
@@ -210,21 +234,25 @@ fn within_limits<const N: usize, const B: usize>(
     curve: &Fourier<N>,
     cycles: u32,
     first_scale: f32,
-) -> Option<Candidate<N>> {
-    let mut scale = first_scale;
+) -> Result<Candidate<N>, Option<Obstacle>> {
+    let (mut scale, mut obstacle) = (first_scale, None);
     for _ in 0..SHRINKINGS {
         let table = rounded(curve, scale, cycles);
         scale *= SHRINK;
         let Ok(motion) = table.motion(SERVO_RATE_HZ) else { continue };
-        if Motion::Periodic(motion).prove(&frame.configuration.envelope()).is_err() {
+        if let Err(violation) = Motion::Periodic(motion).prove(&frame.configuration.envelope()) {
+            obstacle = Some(Obstacle::of_motion(&violation));
             continue;
         }
         let demand = demand(frame.scorer, frame.configuration, &motion);
-        if (0..N).all(|joint| demand[joint].is_within(frame.torque_limit[joint])) {
-            return Some(Candidate { table, motion, demand });
+        let exceeded = |joint: usize| demand[joint].obstacle(joint, frame.torque_limit[joint]);
+        let worst = (0..N).filter_map(exceeded).max_by(|one, other| one.excess().total_cmp(&other.excess()));
+        if worst.is_none() {
+            return Ok(Candidate { table, motion, demand });
         }
+        obstacle = worst;
     }
-    None
+    Err(obstacle)
 }
 
 fn rounded<const N: usize>(curve: &Fourier<N>, scale: f32, cycles: u32) -> ExcitationTable<N> {

@@ -20,16 +20,18 @@
 //! on the motion; it is not a standard deviation, and averaging over runs does not remove it.
 
 use hal_sim::world::TICK_S;
+use scarab::hal::LegDrives;
 use scarab::ident::{DECIMATION, Estimate, Estimator, Plan, Problem, Record, RowModel, Selection};
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase};
 use scarab::motion::ExcitationTable;
-use scarab::servo::TICKS_PER_LOG;
+use scarab::servo::{ServoOutput, TICKS_PER_LOG};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::report::excite::Seen;
 use crate::rig::options::SimulationOptions;
-use crate::rig::pair::{Context, Pair};
+use crate::rig::pair::{Context, Pair, start_position};
+use crate::run::excite::obstacle::{Limit, Obstacle, Place, torque_limit};
 
 /// Limit of an excitation, s.
 const LONGEST_S: f64 = 200.0;
@@ -46,6 +48,8 @@ pub struct Rehearsal<const N: usize, const B: usize> {
     pub lost_share: [f64; N],
     /// Extremes of the plant's motion.
     pub seen: [Seen; N],
+    /// Largest reduction of each joint's torque by the monitor.
+    pub reduced: [Option<Obstacle>; N],
 }
 
 /// Expected result of one motion at one noise.
@@ -80,19 +84,22 @@ pub fn rehearse<const N: usize, const B: usize>(
     let motion = context.motions.excitation;
     let silent = Context { noise: [0.0; N], ..context.clone() };
     let mut pair = Pair::new(assumed, &silent, options.seed)?;
+    stand(assumed, &context, &mut pair);
     if !pair.enable(context.gravity) {
         return Err(assumed.error("the drive refused to be enabled at the start").into());
     }
-    let mut seen = [Seen::default(); N];
+    let (mut seen, mut reduced) = ([Seen::default(); N], [None; N]);
     let mut before = pair.world.anatomical_position();
     let mut request = Some(ControlRequest::Identify);
     while pair.leg.identification().solver().is_none() {
-        let limited = pair.tick(request.take(), context.gravity).servo.decision.limited;
+        let servo = pair.tick(request.take(), context.gravity).servo;
+        let limited = servo.decision.limited;
         let position = pair.world.anatomical_position();
         let torque = pair.world.motor_torque();
         for joint in 0..N {
             let velocity = (position[joint] - before[joint]) / TICK_S;
             seen[joint].add(position[joint], velocity, torque[joint], limited[joint].any());
+            note(&mut reduced[joint], joint, &servo);
         }
         before = position;
         let exciting = matches!(
@@ -100,7 +107,12 @@ pub fn rehearse<const N: usize, const B: usize>(
             Activity::Identify(IdentifyPhase::Approach | IdentifyPhase::Excite | IdentifyPhase::Settle)
         );
         if !exciting || pair.ticks as f64 * TICK_S > LONGEST_S {
-            return Err(assumed.error(pair.stop_words(assumed)).into());
+            let reason = format!(
+                "on the designed motion the simulated leg fails: {}; state `rotor_inertia`, `coulomb` and `viscous` of its drives \
+                 in `prior`",
+                pair.stop_words(assumed)
+            );
+            return Err(assumed.error(reason).into());
         }
     }
     let Some(solver) = pair.leg.identification().solver() else {
@@ -113,7 +125,48 @@ pub fn rehearse<const N: usize, const B: usize>(
     let samples = motion.duration_ticks() as usize / TICKS_PER_LOG as usize;
     let rows = samples.saturating_sub(2 * context.smoothing.reach()).div_ceil(DECIMATION).max(1) as f64;
     let lost_share = record.rows.map(|kept| (1.0 - f64::from(kept) / rows).clamp(0.0, 1.0));
-    Ok(Rehearsal { record, model, assumed, noise_nm: context.noise, lost_share, seen })
+    Ok(Rehearsal { record, model, assumed, noise_nm: context.noise, lost_share, seen, reduced })
+}
+
+/// Places a leg at the begin of its motion if it cannot hold its weight where it usually begins.
+fn stand<const N: usize, const B: usize>(leg: &LegFile, context: &Context<N, B>, pair: &mut Pair<N, B>) {
+    let needed = pair.world.inverse_dynamics(&start_position(leg), &[0.0; N], &[0.0; N]);
+    if needed.iter().zip(&leg.joints).all(|(needed, joint)| needed.abs() <= torque_limit(joint)) {
+        return;
+    }
+    let start = context.motions.excitation.state_at(0).position_rad;
+    let start = core::array::from_fn(|joint| {
+        let anatomy = &context.configuration.joints[joint].scale.anatomy;
+        f64::from(anatomy.direction()) * f64::from(start[joint] - anatomy.zero_offset())
+    });
+    pair.world.place(&start);
+    pair.sample = pair.world.sample();
+}
+
+/// Keeps the largest reduction of a joint's torque by the monitor.
+fn note<const N: usize>(largest: &mut Option<Obstacle>, joint: usize, servo: &ServoOutput<N>) {
+    let limited = servo.decision.limited[joint];
+    if !limited.any() {
+        return;
+    }
+    let place = Place {
+        position_rad: f64::from(servo.position[joint].0),
+        velocity_rad_s: f64::from(servo.velocity[joint].0),
+    };
+    let limit = if limited.range {
+        Limit::Stop(place)
+    } else if limited.speed {
+        Limit::Speed(place)
+    } else {
+        Limit::Loop(place)
+    };
+    let [value, allowed] =
+        [servo.wanted_torque[joint], servo.decision.torque[joint]].map(|torque| f64::from(torque.0));
+    let by = |one: &Obstacle| (one.value - one.allowed).abs();
+    let found = Obstacle { joint, limit, value, allowed };
+    if largest.as_ref().is_none_or(|before| by(&found) > by(before)) {
+        *largest = Some(found);
+    }
 }
 
 impl<const N: usize, const B: usize> Rehearsal<N, B> {

@@ -9,6 +9,7 @@
 //! | [`demand`] | torque of every tick, blends and approach included |
 //! | [`design`] | the swarm over the curves |
 //! | [`expectation`] | sigma and status of every parameter, through the firmware's own chain |
+//! | [`obstacle`] | limit that a motion exceeds, in words |
 //! | [`run`] | a designed or given motion with its report |
 //! | [`warnings`] | read before the motion is run |
 
@@ -18,6 +19,7 @@ pub mod candidate;
 pub mod demand;
 pub mod design;
 pub mod expectation;
+pub mod obstacle;
 pub mod run;
 pub mod score;
 pub mod warnings;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
 use scarab::ident::status;
 use scarab::model::{PARAMETERS_PER_JOINT, Parameter, Payload};
 use scarab::motion::Motion;
@@ -13,13 +14,20 @@ use crate::formats::excitation::{Excitation, Expected, Proved, geometry};
 use crate::formats::leg_file::LegFile;
 use crate::leg::background::Background;
 use crate::leg::motions::EXCITATION_CYCLES;
+use crate::leg::setup::DEFAULT_SEED;
 use crate::report::excite::{
     ComparedBase, ExciteReport, ExpectedBase, ExpectedParameter, JointReport, RandomMotion, SCHEMA,
 };
-use crate::run::excite::assumption::Assumption;
+use crate::run::excite::assumption::{Assumption, with_rotors};
 use crate::run::excite::bench::{Bench, ExciteOptions};
-use crate::run::excite::design::{Candidate, DesignOptions, candidates, smaller};
+use crate::run::excite::design::{Candidate, DesignOptions, SHRINK, candidates, smaller};
 use crate::run::excite::expectation::{Expectation, Rehearsal};
+
+/// Duration of a design, s, and error of each base parameter that its torque covers, percent, by default.
+pub const USUAL_DURATION_S: f64 = 22.0;
+pub const USUAL_MARGIN_PERCENT: f64 = 20.0;
+/// Curves that show whether a leg has a motion at all.
+const SHORT_SEARCH: u32 = 1800;
 
 /// Motion with its report.
 #[derive(Clone, Debug)]
@@ -57,11 +65,28 @@ pub fn check<const N: usize, const B: usize>(
     Ok(())
 }
 
-/// Designs a motion, or checks a given one.
+/// Designs a motion, or checks a given one; if none fits, with rotor inertias where none are stated.
 ///
 /// # Errors
 /// The leg file cannot be used, or no motion fits.
 pub fn excite<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &ExciteOptions,
+) -> Result<Excited, ToolError> {
+    match excited::<N, B>(leg, options) {
+        Err(error) => match with_rotors::<N, B>(leg) {
+            Some((with_rotors, lines)) => {
+                let mut excited = excited::<N, B>(&with_rotors, options)?;
+                excited.report.warnings.extend(lines);
+                Ok(excited)
+            }
+            None => Err(error),
+        },
+        excited => excited,
+    }
+}
+
+fn excited<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ExciteOptions,
 ) -> Result<Excited, ToolError> {
@@ -79,11 +104,14 @@ pub fn excite<const N: usize, const B: usize>(
     };
     let mut best: Option<(f64, Candidate<N>, Rehearsal<N, B>)> = None;
     let mut fault = None;
-    for candidate in found {
-        let rehearsed = match &options.given {
+    let rehearsed: Vec<_> = found
+        .into_par_iter()
+        .map(|candidate| match &options.given {
             Some(_) => bench.rehearse(&candidate.table).map(|rehearsal| (candidate, rehearsal)),
             None => untouched(&bench, candidate),
-        };
+        })
+        .collect();
+    for rehearsed in rehearsed {
         match rehearsed {
             Ok((candidate, rehearsal)) => {
                 let information = rehearsal.at_noise(&bench.scorer.noise_nm).log_determinant;
@@ -97,10 +125,38 @@ pub fn excite<const N: usize, const B: usize>(
     match (best, fault) {
         (Some((_, candidate, rehearsal)), _) => Ok(bench.excited(options, &candidate, &rehearsal)),
         (None, Some(error)) => Err(error),
-        (None, None) => Err(ToolError::input(
-            "no motion was found within the limits of the leg: choose another --duration or --seed",
-        )),
+        (None, None) => Err(bench.frame().refusal(Vec::new())),
     }
+}
+
+/// Whether a motion can be designed for this leg, by a short search: what a design must assume.
+///
+/// # Errors
+/// The leg file cannot be used, or names the limit that no motion keeps.
+pub fn designable<const N: usize, const B: usize>(leg: &LegFile) -> Result<Vec<String>, ToolError> {
+    match designed_shortly::<N, B>(leg) {
+        Ok(()) => Ok(Vec::new()),
+        Err(error) => match with_rotors::<N, B>(leg) {
+            Some((with_rotors, lines)) => designed_shortly::<N, B>(&with_rotors).map(|()| lines),
+            None => Err(error),
+        },
+    }
+}
+
+fn designed_shortly<const N: usize, const B: usize>(leg: &LegFile) -> Result<(), ToolError> {
+    let options = ExciteOptions {
+        design: DesignOptions { duration_s: USUAL_DURATION_S, seed: DEFAULT_SEED, evaluations: SHORT_SEARCH },
+        given: None,
+        carried: Vec::new(),
+        torque_noise_percent: None,
+        margin_percent: USUAL_MARGIN_PERCENT,
+        assumption: Assumption::Best,
+    };
+    let bench = Bench::<N, B>::new(leg, &options)?;
+    let found = candidates(&bench.frame(), &options.design, &ProgressBar::hidden())?;
+    let rehearsed: Vec<_> =
+        found.into_par_iter().map(|candidate| untouched(&bench, candidate).map(drop)).collect();
+    rehearsed.into_iter().reduce(Result::or).unwrap_or(Ok(()))
 }
 
 /// Shrinks a motion until the monitor never reduces the simulated plant's torque. Friction at a
@@ -109,23 +165,38 @@ fn untouched<const N: usize, const B: usize>(
     bench: &Bench<N, B>,
     mut candidate: Candidate<N>,
 ) -> Result<(Candidate<N>, Rehearsal<N, B>), ToolError> {
-    for _ in 0..SMALLER {
-        let rehearsal = bench.rehearse(&candidate.table)?;
-        if rehearsal.seen.iter().all(|joint| joint.limited_ticks == 0) {
-            return Ok((candidate, rehearsal));
+    let (mut obstacles, mut failure) = (Vec::new(), None);
+    for step in 0..STEPS {
+        match bench.rehearse(&candidate.table) {
+            Ok(rehearsal) if rehearsal.seen.iter().all(|joint| joint.limited_ticks == 0) => {
+                return Ok((candidate, rehearsal));
+            }
+            Ok(rehearsal) => {
+                (obstacles, failure) = (rehearsal.reduced.into_iter().flatten().collect(), None);
+            }
+            Err(error) => failure = Some(error),
         }
-        let Some(next) = smaller(&bench.frame(), &candidate) else { break };
-        candidate = next;
+        let factor = if step < FINE_STEPS { SHRINK } else { COARSE_SHRINK };
+        match smaller(&bench.frame(), &candidate, factor) {
+            Ok(next) => candidate = next,
+            Err(obstacle) => {
+                obstacles.extend(obstacle);
+                break;
+            }
+        }
     }
-    Err(ToolError::input(format!(
-        "{}: no motion can be designed for this leg: even for the smallest motion the monitor reduces its torque near an end of its range, \
-         for a joint that is slow to follow could not stop there; `identify` has the default motion",
-        bench.leg.name
-    )))
+    if let Some(failure) = failure {
+        return Err(failure);
+    }
+    let worst = obstacles.into_iter().max_by(|one, other| one.excess().total_cmp(&other.excess()));
+    Err(bench.frame().refusal(worst.into_iter().collect()))
 }
 
-/// Limit of the shrinking steps.
-const SMALLER: u32 = 12;
+/// Shrinking steps, and how many of them are fine; the smallest motion has a tenth of the first one's size.
+const STEPS: u32 = 18;
+const FINE_STEPS: u32 = 12;
+/// Factor of the other steps.
+const COARSE_SHRINK: f32 = 0.7;
 
 fn design<const N: usize, const B: usize>(
     bench: &Bench<N, B>,
@@ -200,6 +271,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             warnings: crate::run::excite::warnings::warnings(
                 &self.leg,
                 self.noise,
+                &candidate.demand,
                 &joints,
                 &base,
                 &parameters,

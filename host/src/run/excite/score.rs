@@ -22,7 +22,6 @@
 //! Trans. Robotics and Automation 13 (1997), section III.
 //! Known limits: blends are not counted. At each reversal friction holds a real joint a little longer than
 //! its command; [`crate::run::excite::expectation`] includes both.
-//! reversal than its command; [`crate::run::excite::expectation`] includes both.
 
 use nalgebra::SMatrix;
 use scarab::ident::{DECIMATION, LARGEST_STILL_SHARE, LowPass, RowModel, SAMPLE_RATE_HZ, Smoothed};
@@ -31,6 +30,7 @@ use scarab::safety::Barrier;
 use scarab::units::{NewtonMetre, Radian, RadianPerSecond};
 
 use crate::rig::pair::TAPS;
+use crate::run::excite::obstacle::Place;
 
 /// Rate of the stillness rule, Hz, and instants per row.
 const SPEED_RATE_HZ: f64 = 100.0;
@@ -55,6 +55,18 @@ pub struct Scorer<const N: usize, const B: usize> {
     pub barriers: [Barrier; N],
     /// Share of the low-pass's magnitude in each 10 ms, from its centre outwards.
     weights: Vec<f64>,
+}
+
+/// Reduction of a joint's torque by the monitor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cut {
+    /// Reduction, N m; zero for none.
+    pub by_nm: f64,
+    /// Torque that the motion needs, N m.
+    pub wanted_nm: f64,
+    /// Torque that the monitor grants, N m.
+    pub granted_nm: f64,
+    pub place: Place,
 }
 
 /// Score of one curve.
@@ -105,17 +117,27 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
         (sum, self.margin * absolute)
     }
 
-    /// Reduction of a joint's torque by the monitor at one instant, N m; the monitor must still be
-    /// able to stop the joint.
+    /// Reduction of a joint's torque by the monitor at one instant; the monitor must still be able to stop
+    /// the joint.
     #[must_use]
-    pub fn cut(&self, joint: usize, position: f32, velocity: f32, torque: f64, uncertainty: f64) -> f64 {
-        [torque + uncertainty, torque - uncertainty].into_iter().fold(0.0, |cut: f64, wanted| {
-            let (position, velocity) = (Radian(position), RadianPerSecond(velocity));
-            let (allowed, _) =
-                self.barriers[joint].bound(position, velocity, NewtonMetre(wanted as f32), false);
+    pub fn cut(&self, joint: usize, position: f32, velocity: f32, torque: f64, uncertainty: f64) -> Cut {
+        let mut worst = Cut::default();
+        for wanted_nm in [torque + uncertainty, torque - uncertainty] {
+            let (allowed, _) = self.barriers[joint].bound(
+                Radian(position),
+                RadianPerSecond(velocity),
+                NewtonMetre(wanted_nm as f32),
+                false,
+            );
+            let granted_nm = f64::from(allowed.0);
             // Differences within single precision do not count as a reduction.
-            cut.max((wanted - f64::from(allowed.0)).abs() - 1e-5 * wanted.abs())
-        })
+            let by_nm = (wanted_nm - granted_nm).abs() - 1e-5 * wanted_nm.abs();
+            if by_nm > worst.by_nm {
+                let place = Place { position_rad: f64::from(position), velocity_rad_s: f64::from(velocity) };
+                worst = Cut { by_nm, wanted_nm, granted_nm, place };
+            }
+        }
+        worst
     }
 
     /// Scores `cycles` cycles of a curve.
@@ -141,7 +163,7 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
                 let (value, uncertainty) = self.torque(row);
                 torque[joint] = torque[joint].max(value.abs() + uncertainty);
                 let (position, velocity) = (state.position_rad[joint], state.velocity_rad_per_s[joint]);
-                cut[joint] = cut[joint].max(self.cut(joint, position, velocity, value, uncertainty));
+                cut[joint] = cut[joint].max(self.cut(joint, position, velocity, value, uncertainty).by_nm);
                 if still[joint][index] <= LARGEST_STILL_SHARE {
                     add_square(&mut information[joint], row);
                 }

@@ -3,12 +3,15 @@
 use scarab::servo::SERVO_RATE_HZ;
 
 use crate::base::number::number;
-use crate::formats::leg_file::LegFile;
+use crate::formats::leg_file::{DEFAULT_RANGE_DEG, LegFile};
 use crate::report::excite::{ComparedBase, ExpectedParameter, JointReport};
 use crate::run::excite::bench::NoiseOrigin;
+use crate::run::excite::demand::Demand;
 
 /// Systematic error above which a warning is printed, sigma.
 const SYSTEMATIC_SIGMAS: f64 = 1.0;
+/// Angle through which a joint moves, above which a warning is printed, degrees.
+const WIDE_DEG: f64 = 200.0;
 /// Share of lost rows above which a warning is printed.
 const LOST_SHARE: f64 = 0.4;
 
@@ -17,6 +20,7 @@ const LOST_SHARE: f64 = 0.4;
 pub fn warnings(
     leg: &LegFile,
     noise: NoiseOrigin,
+    demand: &[Demand],
     joints: &[JointReport],
     base: &[ComparedBase],
     parameters: &[ExpectedParameter],
@@ -58,6 +62,27 @@ pub fn warnings(
             warnings.push(format!(
                 "{}: the monitor reduces its torque for {seconds:.3} s: the motion differs from the design",
                 joint.name
+            ));
+        }
+    }
+    for (joint, demand) in joints.iter().zip(demand).filter(|(_, demand)| demand.unheld_nm > 0.0) {
+        warnings.push(format!(
+            "{}: holding its weight somewhere in `range_deg` needs {:.1} N m with the margin, limit {:.1} N m: do not begin there",
+            joint.name, demand.unheld_nm, joint.torque_limit_nm
+        ));
+    }
+    for (file, joint) in leg.joints.iter().zip(joints) {
+        let [low, high] = joint.angle_deg;
+        if file.range_deg == DEFAULT_RANGE_DEG {
+            warnings.push(format!(
+                "{}: `range_deg` is the default {} to {}: state the range in which it may move",
+                joint.name, DEFAULT_RANGE_DEG[0], DEFAULT_RANGE_DEG[1]
+            ));
+        } else if high - low > WIDE_DEG {
+            warnings.push(format!(
+                "{}: moves through {:.0} degrees: narrow `range_deg` if cables or other links are in the way",
+                joint.name,
+                high - low
             ));
         }
     }

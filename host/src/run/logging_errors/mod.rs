@@ -335,7 +335,7 @@ pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
         joint: finding.joint,
         value: finding.value.into(),
         sigma: finding.sigma.into(),
-        words: finding.text.clone(),
+        words: format!("{}: {}", finding.file, finding.text),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Checks the recordings of a replay for errors of the logging chain, and adds the results to its report.
 
+mod units;
+
 use std::ops::Range;
 
 use nalgebra::Vector3;
@@ -225,7 +227,7 @@ pub(super) struct Subject<'a, const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> Subject<'_, N, B> {
     /// Adds directions, sigma, tests and the likely cause of a refusal to the report.
-    pub(super) fn examine(&self, run: &mut RunReport) -> Result<(), ToolError> {
+    pub(super) fn examine(&self, run: &mut RunReport) -> Result<Option<String>, ToolError> {
         let samples = self.screening.findings();
         let (question, file_of) = self.question();
         let mut errors = LoggingErrors::of(&question)
@@ -235,15 +237,18 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             report.recordings = self.between_recordings(errors, &file_of);
             self.widen(run, errors);
             run.findings.extend(errors.findings());
-            run.findings.extend(cause::in_degrees(&question, errors).map(|found| FindingReport {
-                reason: Reason::Input.name(),
-                test: found.name,
-                joint: found.joint,
-                motion: None,
-                value: found.value,
-                limit: found.value,
-                passed: false,
-                words: found.words,
+            run.findings.extend(cause::in_degrees(&question, errors).map(|found| {
+                let remedy = units::remedy(self.options.import.as_ref(), found.name, found.joint);
+                FindingReport {
+                    reason: Reason::Input.name(),
+                    test: found.name,
+                    joint: found.joint,
+                    motion: None,
+                    value: found.value,
+                    limit: found.value,
+                    passed: false,
+                    words: found.words + &remedy.unwrap_or_default(),
+                }
             }));
         }
         run.findings.extend(samples.iter().filter(|found| found.refuses).map(sample_finding));
@@ -264,13 +269,27 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             stribeck_hz: self.stribeck_hz,
         });
         run.verdict = if run.accepted() { "accepted" } else { "refused" };
+        let current = errors
+            .as_ref()
+            .and_then(|errors| units::current(&question, &errors.equations, self.options.import.as_ref()));
+        let mut suspected = current.as_ref();
         if !run.accepted() {
-            let cause = cause::likely(&question, errors.as_ref(), samples, &run.findings);
+            let mut cause = cause::likely(&question, errors.as_ref(), samples, &run.findings);
+            if let Some(current) = suspected.take_if(|_| cause.name == "unknown") {
+                cause = current.clone();
+            } else {
+                let remedy = units::remedy(self.options.import.as_ref(), cause.name, cause.joint);
+                cause.words += &remedy.unwrap_or_default();
+            }
             correct_words(run, cause.name);
             report.likely_cause = Some(cause);
         }
+        // Torques of another scale make another leg, which may be accepted.
+        let warning = suspected
+            .zip(self.wholes.first())
+            .map(|(current, whole)| format!("{}: {}", whole.recording.file.display(), current.words));
         run.doubt = Some(report);
-        Ok(())
+        Ok(warning)
     }
 
     /// Adds the scatter between recordings to sigma.

@@ -65,7 +65,10 @@ fn passed(run: &RunReport) -> String {
 
 /// Failures for a reason: their sentences, or the general explanation.
 fn sentences(reason: &str, run: &RunReport) -> Markup {
-    let failed = run.findings.iter().filter(|finding| finding.reason == reason && !finding.passed);
+    let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
+    let failed = run.findings.iter().filter(|finding| {
+        finding.reason == reason && !finding.passed && !cause.is_some_and(|cause| cause.says(finding))
+    });
     let words: Vec<&str> =
         failed.map(|finding| finding.words.as_str()).filter(|words| !words.is_empty()).collect();
     let name = html! { strong { (reason.replace('_', " ")) } ": " };
@@ -85,6 +88,8 @@ fn meaning(test: &str) -> (bool, &str) {
         "not_finite" => (false, "samples and rows that are not finite"),
         "torque" => (true, "rms torque, N m"),
         "search" => (false, "chi-square by which the search ended above least squares"),
+        "weight" => (false, "torque that holds the leg's weight, N m"),
+        "shaking" => (false, "rms speed beside the command, rad/s"),
         "drive" => (true, "the drive stayed enabled"),
         "speed" => (true, "rms speed, rad/s"),
         "determined" => (true, "base parameters that are determined"),
