@@ -14,6 +14,7 @@ mod import;
 mod kept;
 mod leg;
 mod leg_options;
+mod live;
 pub mod merge;
 mod model;
 mod monitor;
@@ -41,7 +42,7 @@ use crate::formats::shard::Argument;
 #[derive(Parser, Debug)]
 #[command(name = "scarab", version, max_term_width = HELP_WIDTH, after_help = "\
 Options without a command belong to `identify`. `scarab COMMAND --help` has an example of each.
-Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, excite, monitor, motor, serve.
+Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, live, excite, monitor, motor, serve.
 Board: fw, flash-leg, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
 struct Cli {
     #[command(subcommand)]
@@ -53,6 +54,9 @@ enum Command {
     /// Identify a simulated leg: drive it, log it, solve, validate, track.
     #[command(after_help = "Example: cargo sim identify --leg my-leg.toml --seed 3 --report run.html")]
     Identify(identify::IdentifyArguments),
+    /// Show a leg that identifies itself in a browser, while it moves.
+    #[command(after_help = "Example: cargo sim live --speed 4")]
+    Live(live::LiveArguments),
     /// Write a leg file, from a robot description (URDF) or from answers, or list what one lacks.
     #[command(
         after_help = "Example: cargo sim leg --urdf robot.urdf --joints hip_joint,knee_joint --out leg.toml"
@@ -121,7 +125,7 @@ const MAIN_JOB: [&str; 5] = ["identify", "--figures", "target/sim", "--report", 
 /// Commands to try after the main job.
 const NEXT: &str = "
 next:
-  cargo sim identify --wearer 90,1.88        the leg on another person
+  cargo sim live                             the same run in a browser, while the leg moves
   cargo sim identify --perturb length=1.1    a leg file with a wrong length is refused
   cargo sim replay --help                    a leg of your own, from a recording
 ";
@@ -186,6 +190,7 @@ fn called(command: clap::Command, program: &str) -> clap::Command {
 /// Runs one command and returns its exit code.
 fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
     match command {
+        Command::Live(arguments) => live::run(arguments),
         Command::Leg(arguments) => leg::run(arguments),
         Command::Excite(arguments) => excite::run(arguments),
         Command::Faults(arguments) => faults::run(arguments, stated),

@@ -12,7 +12,7 @@
 //! | [`run`] | one experiment each: identify, replay, monitor, design of a motion, motor stand, prediction |
 //! | [`image`] | the flash image, and the whole firmware in the emulator |
 //! | [`faults`] | the fault catalogue, injected into the whole firmware |
-//! | [`view`] | tables, figures and pages; runs nothing |
+//! | [`view`] | tables, figures and pages, with the live page's server; runs no experiment |
 //! | [`cli`] | the command line |
 
 #![expect(missing_docs, reason = "a program: names and units are stated where they are not obvious")]

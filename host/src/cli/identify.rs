@@ -64,7 +64,7 @@ pub struct IdentifyArguments {
 
 /// Kind of simulated drives.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum DriveArgument {
+pub(super) enum DriveArgument {
     /// A current that follows its target with a lag.
     Ideal,
     /// Motor, inverter, current and angle sensors, supply; needs `[joint.motor]` in the leg file.

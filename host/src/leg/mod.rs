@@ -1,5 +1,6 @@
 //! A leg file becomes the firmware's configuration, its prior and its plant.
 
+pub mod activity_words;
 pub mod axes;
 pub mod background;
 pub mod board_words;
@@ -13,5 +14,6 @@ pub mod robot_chain;
 pub mod setup;
 pub mod size;
 pub mod states;
+pub mod stick;
 pub mod words;
 pub mod x2;

@@ -7,6 +7,7 @@ pub mod doubt;
 pub mod excite;
 pub mod fault_curves;
 pub mod findings;
+pub mod live;
 pub mod model_choice;
 pub mod monitor;
 pub mod motor;

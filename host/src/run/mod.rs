@@ -8,6 +8,7 @@ pub mod disturbances;
 pub mod excite;
 pub mod identify;
 pub mod information;
+pub mod live;
 pub mod logging_errors;
 pub mod model_choice;
 pub mod monitor;

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use hal_sim::world::TICK_S;
-use scarab::leg::{Activity, ControlRequest, IdentifyPhase, LoggedSample, Step};
+use scarab::leg::{Activity, ControlOutput, ControlRequest, IdentifyPhase, LoggedSample, Step};
 use scarab::motion::Periodic;
 use scarab::real::sqrt;
 
@@ -32,17 +32,42 @@ pub struct SimulatedRun<const N: usize> {
     pub series: Series,
 }
 
+/// Sees a run while it is simulated.
+pub trait Observer<const N: usize, const B: usize> {
+    /// Begins a run.
+    fn begin(&mut self, context: &Context<N, B>);
+    /// Sees the tick just run.
+    fn tick(&mut self, pair: &Pair<N, B>, output: &ControlOutput<N>);
+}
+
+/// Sees nothing.
+impl<const N: usize, const B: usize> Observer<N, B> for () {
+    fn begin(&mut self, _: &Context<N, B>) {}
+    fn tick(&mut self, _: &Pair<N, B>, _: &ControlOutput<N>) {}
+}
+
 /// Drives, identifies, validates and tracks one simulated leg.
 pub fn simulate<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &SimulationOptions,
+) -> Result<SimulatedRun<N>, ToolError> {
+    simulate_observed::<N, B>(leg, options, &mut ())
+}
+
+/// [`simulate`] with an observer, which sees all but the tracking after the verdict.
+pub fn simulate_observed<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &SimulationOptions,
+    observer: &mut impl Observer<N, B>,
 ) -> Result<SimulatedRun<N>, ToolError> {
     let started = Instant::now();
     let wrong = options.perturbations.as_slice();
     let simulated = perturb::simulated(leg, wrong)?;
     let mut context = Context::<N, B>::new(&perturb::believed(leg, wrong)?, options)?;
     perturb::configure(&mut context, wrong)?;
-    let Driven { pair, mut watch, stopped, shaking } = drive(leg, &simulated, &context, options)?;
+    observer.begin(&context);
+    let Driven { pair, mut watch, stopped, shaking } =
+        drive_observed(leg, &simulated, &context, options, observer)?;
     let mut run = if stopped.is_some() {
         watch.report(&pair, options, Vec::new(), stopped, started)?
     } else {
@@ -74,6 +99,16 @@ pub fn drive<'a, const N: usize, const B: usize>(
     context: &'a Context<N, B>,
     options: &SimulationOptions,
 ) -> Result<Driven<'a, N, B>, ToolError> {
+    drive_observed(leg, simulated, context, options, &mut ())
+}
+
+fn drive_observed<'a, const N: usize, const B: usize>(
+    leg: &LegFile,
+    simulated: &LegFile,
+    context: &'a Context<N, B>,
+    options: &SimulationOptions,
+    observer: &mut impl Observer<N, B>,
+) -> Result<Driven<'a, N, B>, ToolError> {
     let wrong = options.perturbations.as_slice();
     let mut pair = Pair::new(simulated, context, options.seed)?;
     if let Some(load) = &options.load {
@@ -99,6 +134,7 @@ pub fn drive<'a, const N: usize, const B: usize>(
         let output = pair.tick(request.take(), context.gravity);
         watch.see(&pair, &torque, &sticking, output.logged.as_ref());
         shaking.take(&pair.world, &output.motion);
+        observer.tick(&pair, &output);
         let activity = pair.leg.control().activity();
         if activity != before {
             match activity {

@@ -4,6 +4,7 @@ pub mod document;
 pub mod excite;
 pub mod figures;
 pub mod html;
+pub mod live;
 pub mod monitor;
 pub mod motor;
 pub mod runs;

@@ -22,6 +22,7 @@ mod kept_file;
 mod leg_command;
 mod leg_files;
 mod leg_options;
+mod live;
 mod model_choice;
 mod model_file;
 mod model_predict;

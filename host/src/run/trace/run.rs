@@ -17,14 +17,7 @@ const LONGEST_LINE: usize = 64 * 1024;
 
 /// Reads a file, or `-` for standard input; writes the records as lines to `text`.
 pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<Trace, ToolError> {
-    let decoder = match image {
-        Some(path) => {
-            let bytes = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
-            let named = |error: ToolError| FileError::new(path.display(), error);
-            Some(Decoder::new(&bytes).map_err(named)?)
-        }
-        None => None,
-    };
+    let decoder = decoder(image)?;
     let mut input: Box<dyn Read> = if source == Path::new("-") {
         Box::new(std::io::stdin().lock())
     } else {
@@ -46,6 +39,17 @@ pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<
     reader.finish(source)
 }
 
+/// Decoder of an image's frames; none for text.
+///
+/// # Errors
+/// The image cannot be read or has no texts of records.
+pub fn decoder(image: Option<&Path>) -> Result<Option<Decoder>, ToolError> {
+    let Some(path) = image else { return Ok(None) };
+    let bytes = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
+    let named = |error: ToolError| FileError::new(path.display(), error);
+    Ok(Some(Decoder::new(&bytes).map_err(named)?))
+}
+
 /// Reads bytes of text or `defmt` frames into a trace.
 pub struct StreamReader {
     decoder: Option<Decoder>,
@@ -60,6 +64,11 @@ impl StreamReader {
     #[must_use]
     pub fn new(decoder: Option<Decoder>) -> Self {
         Self { decoder, trace: Trace::default(), line: Vec::new(), zeros: 0, text: None }
+    }
+
+    /// Trace so far.
+    pub fn trace_mut(&mut self) -> &mut Trace {
+        &mut self.trace
     }
 
     /// Takes the next bytes.

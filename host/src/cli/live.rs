@@ -1,0 +1,208 @@
+//! `live`: a leg that identifies itself, a recording or a board's trace, shown in a browser.
+
+use std::fs::File;
+use std::io::Read;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::base::error::{EXIT_ACCEPTED, EXIT_INPUT, EXIT_REFUSED, FileError, ToolError};
+use crate::base::output::say;
+use crate::cli::arguments::Input;
+use crate::cli::identify::DriveArgument;
+use crate::cli::import::ImportArguments;
+use crate::cli::leg_options::LegOptions;
+use crate::formats::leg_file::LegFile;
+use crate::formats::recording::Recording;
+use crate::leg::setup::DEFAULT_SEED;
+use crate::report::live::LiveUpdate;
+use crate::rig::options::SimulationOptions;
+use crate::rig::perturb::Perturbation;
+use crate::run::live::playback::play;
+use crate::run::live::simulated::{LiveOptions, identify};
+use crate::run::live::traced::{TraceInput, follow};
+use crate::run::replay::{Recordings, ReplayOptions};
+use crate::run::trace::run::{StreamReader, decoder};
+use crate::view::live::hub::Hub;
+use crate::view::live::server::Server;
+use crate::view::tables;
+use crate::with_leg_size;
+
+/// Largest speed, simulated seconds per second.
+const LARGEST_SPEED: f64 = 1000.0;
+/// Pause between two looks at the signals.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Leg, speed and address.
+#[derive(Args, Debug)]
+pub struct LiveArguments {
+    #[command(flatten)]
+    leg: LegOptions,
+    /// Simulated seconds per second.
+    #[arg(long, value_name = "K", default_value_t = 1.0)]
+    speed: f64,
+    /// Seed of noise and swarm.
+    #[arg(long, default_value_t = DEFAULT_SEED)]
+    seed: u64,
+    /// Identifications, one after the other, with growing seeds.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Simulation")]
+    runs: u32,
+    /// Ideal currents, or motors, bridges and sensors under the board's current loops.
+    #[arg(long, value_enum, default_value = "ideal", help_heading = "Simulation")]
+    drive: DriveArgument,
+    /// Inject a deliberate error: NAME or NAME=VALUE, repeatable.
+    #[arg(long, value_name = "NAME[=VALUE]", help_heading = "Simulation")]
+    perturb: Vec<Perturbation>,
+    /// Play this recording instead of simulating; --leg is required.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["runs", "drive", "perturb"], help_heading = "Recordings")]
+    recording: Option<Input>,
+    /// Share of the recording to identify from, above 0 and below 1; the rest is predicted.
+    #[arg(long, requires = "recording", allow_negative_numbers = true, help_heading = "Recordings")]
+    split: Option<f64>,
+    #[command(flatten)]
+    import: ImportArguments,
+    /// Show this trace of a board instead, - for standard input; --leg is required.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["runs", "drive", "perturb", "recording"], help_heading = "Board")]
+    trace: Option<Input>,
+    /// Image (ELF) that sent the trace as a defmt stream; without it the trace is text.
+    #[arg(long, value_name = "ELF", requires = "trace", help_heading = "Board")]
+    image: Option<Input>,
+    /// Address and port of the page; port 0 selects a free one. Outside this machine it needs --token.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
+    listen: SocketAddr,
+    /// Word that the page's address must contain: 16 or more letters and digits.
+    #[arg(long)]
+    token: Option<String>,
+    /// End after the last identification; else the page stays until Ctrl-C.
+    #[arg(long)]
+    once: bool,
+}
+
+/// Source of the picture.
+enum Source {
+    Simulated(Box<SimulationOptions>, LiveOptions),
+    Recording(Box<(Recordings, ReplayOptions)>, f64),
+    Trace(Box<TraceInput>),
+}
+
+impl LiveArguments {
+    fn source(&self, leg: &LegFile) -> Result<Source, ToolError> {
+        if let Some(file) = &self.trace {
+            let reader = StreamReader::new(decoder(self.image.as_deref())?);
+            let (name, is_now) = (file.display().to_string(), &**file == Path::new("-"));
+            let input: Box<dyn Read + Send> = if is_now {
+                Box::new(std::io::stdin())
+            } else {
+                Box::new(File::open(&**file).map_err(|error| FileError::unreadable(file, &error))?)
+            };
+            let speed = (!is_now).then_some(self.speed);
+            return Ok(Source::Trace(Box::new(TraceInput { input, reader, name, speed })));
+        }
+        let Some(file) = &self.recording else {
+            let options = SimulationOptions {
+                drive: self.drive.into(),
+                perturbations: self.perturb.clone(),
+                ..SimulationOptions::of_seed(self.seed)
+            };
+            return Ok(Source::Simulated(
+                Box::new(options),
+                LiveOptions { speed: self.speed, runs: self.runs },
+            ));
+        };
+        let import = self.import.import(leg, self.leg.name())?;
+        let read = Recording::read(file, &import)?;
+        let recordings = Recordings { training: vec![read], ..Recordings::default() };
+        let options = ReplayOptions {
+            split: self.split,
+            swarm_seed: self.seed,
+            import: Some(import),
+            ..ReplayOptions::of(leg)
+        };
+        Ok(Source::Recording(Box::new((recordings, options)), self.speed))
+    }
+}
+
+/// Serves the page until Ctrl-C; returns the exit code of the last identification.
+pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
+    for (file, example) in [
+        (&arguments.recording, "live --recording run.csv --leg my-leg.toml"),
+        (&arguments.trace, "live --trace trace.txt --leg my-leg.toml"),
+    ] {
+        if file.is_some() {
+            arguments.leg.require(example)?;
+        }
+    }
+    let leg = arguments.leg.load()?;
+    let speed = arguments.speed;
+    if !(speed > 0.0 && speed <= LARGEST_SPEED) {
+        return Err(ToolError::input(format!(
+            "--speed: {speed} must be above 0 and at most {LARGEST_SPEED}"
+        )));
+    }
+    let source = arguments.source(&leg)?;
+    let server = Server::new(arguments.listen, arguments.token.clone())?;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        let registered = signal_hook::flag::register(signal, Arc::clone(&stop));
+        registered.map_err(|error| ToolError::input(format!("signals cannot be caught: {error}")))?;
+    }
+    say!("live: {}", server.url());
+    if !arguments.listen.ip().is_loopback() {
+        eprintln!(
+            "warning: {} can be reached from other machines; the page is not encrypted",
+            arguments.listen
+        );
+    }
+    let hub = Arc::new(Hub::default());
+    let shown = Arc::clone(&hub);
+    // Ends with the process.
+    let page = thread::spawn(move || server.serve(shown));
+    let shown = Arc::clone(&hub);
+    let mut source = Some(thread::spawn(move || report(&leg, source, &shown)));
+    let mut outcome = None;
+    while !stop.load(Ordering::Relaxed) {
+        if page.is_finished() {
+            return page.join().map_or_else(
+                |_| Err(ToolError::input("the page's thread failed")),
+                |served| served.map(|()| EXIT_REFUSED),
+            );
+        }
+        if let Some(ended) = source.take_if(|source| source.is_finished()) {
+            let result = ended.join().map_err(|_| ToolError::input("the simulation failed"))?;
+            match result {
+                Ok((code, words)) => {
+                    say!("{words}");
+                    outcome = Some(Ok(code));
+                }
+                Err(error) => outcome = Some(Err(error)),
+            }
+            if arguments.once || matches!(outcome, Some(Err(_))) {
+                break;
+            }
+            say!("the page stays open until Ctrl-C");
+        }
+        thread::sleep(PAUSE);
+    }
+    outcome.unwrap_or(Ok(EXIT_ACCEPTED))
+}
+
+/// Runs the source; returns the exit code and the verdict's line.
+fn report(leg: &LegFile, source: Source, hub: &Hub) -> Result<(u8, String), ToolError> {
+    let out = &mut |update: LiveUpdate| hub.push(update);
+    let report = match source {
+        Source::Simulated(options, live) => Some(with_leg_size!(leg, identify(leg, &options, &live, out))?),
+        Source::Recording(recorded, speed) => {
+            let (recordings, options) = &*recorded;
+            Some(with_leg_size!(leg, play(leg, recordings, options, speed, out))?)
+        }
+        Source::Trace(input) => with_leg_size!(leg, follow(leg, *input, out))?,
+    };
+    let Some(report) = report else { return Ok((EXIT_INPUT, "the trace has no complete result".into())) };
+    let code = if report.accepted() { EXIT_ACCEPTED } else { EXIT_REFUSED };
+    Ok((code, tables::verdict_line(&report)))
+}

@@ -1,0 +1,368 @@
+//! `live` without a browser: its requests, its messages against `identify`, slow and superfluous pages.
+//! `scripts/render-live` tests the page itself.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use scarab::real::sqrt;
+use scarab_host::view::live::hub::MOST_IN_MESSAGE;
+use scarab_host::view::live::server::MOST_PAGES;
+use serde_json::Value;
+use socket2::{Domain, SockAddr, Socket, Type};
+
+use crate::PROGRAM;
+use crate::command::{Folder, MUJOCO, scarab};
+use crate::trace::session;
+
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A running `live` and its address.
+struct Live {
+    child: Child,
+    output: BufReader<std::process::ChildStdout>,
+    host: String,
+}
+
+impl Live {
+    fn new(arguments: &str) -> Self {
+        let mut child = Command::new(PROGRAM)
+            .arg("live")
+            .args(arguments.split_whitespace())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the tool runs");
+        let mut output = BufReader::new(child.stdout.take().expect("piped"));
+        let mut line = String::new();
+        output.read_line(&mut line).expect("a line");
+        let url = line.trim().strip_prefix("live: http://").expect("an address");
+        let host = url.split('/').next().expect("a host").to_owned();
+        Self { child, output, host }
+    }
+
+    /// Sends a request and returns the connection.
+    fn ask(&self, request: &str) -> BufReader<TcpStream> {
+        let mut stream = TcpStream::connect(&self.host).expect("it listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
+        stream.write_all(request.replace("{host}", &self.host).as_bytes()).expect("a connection");
+        BufReader::new(stream)
+    }
+
+    /// Whole answer to a request that ends.
+    fn answer(&self, request: &str) -> String {
+        let mut text = String::new();
+        self.ask(request).read_to_string(&mut text).expect("text");
+        text
+    }
+
+    fn events(&self) -> Events {
+        Events(self.ask("GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n"))
+    }
+
+    /// Waits for a line of the output.
+    fn prints(&mut self, words: &str) {
+        let mut line = String::new();
+        while !line.contains(words) {
+            line.clear();
+            assert!(self.output.read_line(&mut line).expect("text") > 0, "{words:?} is not printed");
+        }
+    }
+
+    /// Largest memory so far, KB; 0 where the system does not report it.
+    fn memory_kb(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
+        let line = status.lines().find(|line| line.starts_with("VmHWM:"));
+        line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Messages of a stream.
+struct Events(BufReader<TcpStream>);
+
+impl Iterator for Events {
+    type Item = Value;
+
+    fn next(&mut self) -> Option<Value> {
+        let mut line = String::new();
+        loop {
+            line.clear();
+            if self.0.read_line(&mut line).ok()? == 0 {
+                return None;
+            }
+            if let Some(data) = line.strip_prefix("data: ") {
+                return Some(serde_json::from_str(data).expect("JSON"));
+            }
+        }
+    }
+}
+
+impl Events {
+    /// Messages up to the end of the source, and its last point.
+    fn until_the_end(self) -> Vec<Value> {
+        let begin = Instant::now();
+        let (mut messages, mut ended) = (Vec::new(), false);
+        for message in self {
+            assert!(begin.elapsed() < PATIENCE, "the source does not end");
+            ended |= all(&message, "notes").any(|note| note["words"] == "the source has ended");
+            let is_full = points(&message) == MOST_IN_MESSAGE;
+            messages.push(message);
+            if ended && !is_full {
+                break;
+            }
+        }
+        messages
+    }
+}
+
+/// Points in a message.
+fn points(message: &Value) -> usize {
+    ["samples", "rows", "estimates"].iter().map(|key| all(message, key).count()).sum()
+}
+
+/// Elements of a list in a message.
+fn all<'a>(message: &'a Value, key: &str) -> impl Iterator<Item = &'a Value> {
+    message[key].as_array().into_iter().flatten()
+}
+
+#[test]
+fn the_page_is_served_with_its_policy_and_nothing_can_be_sent() {
+    let live = Live::new("--speed 1");
+    let page = live.answer("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n");
+    assert!(page.starts_with("HTTP/1.1 200 OK\r\n"), "{page}");
+    for header in [
+        "content-security-policy: default-src 'none'; script-src 'self';",
+        "x-content-type-options: nosniff",
+        "referrer-policy: no-referrer",
+        "cache-control: no-store",
+    ] {
+        assert!(page.contains(header), "{header}:\n{page}");
+    }
+    for path in ["live.js", "model.js", "charts.js", "live.css", "uPlot.iife.min.js", "uPlot.min.css"] {
+        assert!(page.contains(&format!("\"/{path}\"")), "{path} is not used");
+        let part = live.answer(&format!("GET /{path} HTTP/1.1\r\nHost: {{host}}\r\n\r\n"));
+        assert!(part.starts_with("HTTP/1.1 200 OK\r\n"), "{path}");
+    }
+    for (request, status) in [
+        ("POST / HTTP/1.1\r\nHost: {host}\r\nContent-Length: 0\r\n\r\n", "405"),
+        ("PUT /events HTTP/1.1\r\nHost: {host}\r\nContent-Length: 2\r\n\r\n{}", "405"),
+        ("GET /events HTTP/1.1\r\nHost: evil.example\r\n\r\n", "421"),
+        ("GET /events HTTP/1.1\r\n\r\n", "421"),
+        ("GET /events?next=x HTTP/1.1\r\nHost: {host}\r\n\r\n", "400"),
+        ("GET /secret HTTP/1.1\r\nHost: {host}\r\n\r\n", "404"),
+        ("garbage\r\n\r\n", "400"),
+    ] {
+        let answer = live.answer(request);
+        assert!(answer.starts_with(&format!("HTTP/1.1 {status} ")), "{request:?}: {answer}");
+    }
+}
+
+#[test]
+fn messages_end_with_the_result_of_identify() {
+    let folder = Folder::new();
+    scarab("identify --seed 3 --json", &[&folder.path("run.json")]).ends_with(0);
+    let expected = folder.json("run.json");
+    let live = Live::new("--seed 3 --speed 1000");
+    let messages = live.events().until_the_end();
+    let estimates: Vec<_> = messages.iter().flat_map(|message| all(message, "estimates")).collect();
+    let result = estimates.last().expect("estimates");
+    assert_eq!(result["origin"], "result");
+    let base = expected["base_parameters"].as_array().expect("a list");
+    let values = result["values"].as_array().expect("a list");
+    assert_eq!(values.len(), base.len());
+    for (value, base) in values.iter().zip(base) {
+        for key in ["name", "unit", "value", "sigma", "truth"] {
+            assert_eq!(value[key], base[key], "{}", base["name"]);
+        }
+    }
+    let outcome = messages.iter().flat_map(|message| all(message, "outcomes")).last().expect("an outcome");
+    assert_eq!((&outcome["verdict"], &outcome["findings"]), (&expected["verdict"], &expected["findings"]));
+    // While the leg moves, sigma shrinks, and the motion determines all parameters long before its end.
+    let moving: Vec<_> = estimates.iter().filter(|estimate| estimate["origin"] == "motion").collect();
+    assert!(moving.len() > 10, "{} estimates", moving.len());
+    let sigma = |estimate: &Value, base: usize| estimate["values"][base]["sigma"].as_f64();
+    let (early, late) = (moving[moving.len() / 2], moving[moving.len() - 1]);
+    for base in 0..values.len().min(12) {
+        let (early, late) = (sigma(early, base).expect("determined"), sigma(late, base).expect("determined"));
+        assert!(late < early, "{}: sigma {early} and later {late}", values[base]["name"]);
+    }
+    // Predictions of unused motions: the mean error is that of the report.
+    let rows = messages.iter().flat_map(|message| all(message, "rows"));
+    let begin = messages.iter().flat_map(|message| all(message, "notes"));
+    let begin = begin.filter(|note| note["words"] == "the leg runs unused motion 3 of 3 (fourier)");
+    let begin = begin.last().expect("a motion")["time_s"].as_f64().expect("a time");
+    let errors: Vec<f64> = rows
+        .filter(|row| row["time_s"].as_f64().is_some_and(|time| time > begin + 0.5))
+        .filter_map(|row| Some(row["predicted_nm"][0].as_f64()? - row["measured_nm"][0].as_f64()?))
+        .collect();
+    let rms = sqrt(errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64);
+    let fit = expected["validation"].as_array().expect("a list");
+    let fit = fit.iter().find(|fit| fit["motion"] == "fourier" && fit["joint"] == 1).expect("a fit");
+    let reported = fit["rms_nm"].as_f64().expect("a number");
+    assert!(errors.len() > 300 && (rms / reported - 1.0).abs() < 0.15, "{rms} N m, reported {reported}");
+}
+
+#[test]
+fn a_recording_is_played_back_and_judged_as_by_replay() {
+    let folder = Folder::new();
+    let arguments = format!("--leg mujoco-leg --split 0.67 --seed 1 --speed 1000 --recording {MUJOCO}");
+    let replay = format!("replay {MUJOCO} --leg mujoco-leg --split 0.67 --json");
+    scarab(&replay, &[&folder.path("run.json")]).ends_with(0);
+    let expected = folder.json("run.json");
+    let live = Live::new(&arguments);
+    let messages = live.events().until_the_end();
+    let estimates: Vec<_> = messages.iter().flat_map(|message| all(message, "estimates")).collect();
+    let result = estimates.last().expect("estimates");
+    assert_eq!(result["origin"], "result");
+    for (value, base) in all(result, "values").zip(all(&expected, "base_parameters")) {
+        assert_eq!((&value["name"], &value["value"]), (&base["name"], &base["value"]));
+    }
+    let outcome = messages.iter().flat_map(|message| all(message, "outcomes")).last().expect("an outcome");
+    assert_eq!((&outcome["verdict"], &outcome["findings"]), (&expected["verdict"], &expected["findings"]));
+    // 30 s at 50 Hz, from the recording's first sample on; what was commanded is unknown.
+    let samples: Vec<_> = messages.iter().flat_map(|message| all(message, "samples")).collect();
+    assert!((1490..=1501).contains(&samples.len()), "{} samples", samples.len());
+    assert!(samples[0]["time_s"].as_f64().is_some_and(|time| (0.0..0.02).contains(&time)));
+    assert!(samples[9]["commanded_rad"][0].is_null());
+    // The held-out part is predicted by the result.
+    let rows = messages.iter().flat_map(|message| all(message, "rows"));
+    let held_out = rows.filter(|row| row["time_s"].as_f64().is_some_and(|time| time > 21.0));
+    let errors: Vec<f64> = held_out
+        .filter_map(|row| Some(row["predicted_nm"][1].as_f64()? - row["measured_nm"][1].as_f64()?))
+        .collect();
+    let rms = sqrt(errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64);
+    let fit = all(&expected, "validation").find(|fit| fit["joint"] == 2).expect("a fit");
+    let reported = fit["rms_nm"].as_f64().expect("a number");
+    assert!(errors.len() > 200 && (rms / reported - 1.0).abs() < 0.3, "{rms} N m, reported {reported}");
+}
+
+#[test]
+fn a_board_s_trace_is_shown_as_it_arrives_and_from_a_file() {
+    let text = session::text(session::accepted());
+    let folder = Folder::new();
+    let path = folder.write("trace.txt", &text);
+    let arguments = format!("--leg x2-wearer-75kg --speed 1000 --trace {}", path.display());
+    let from_file = Live::new(&arguments).events().until_the_end();
+    let mut live = Live::new("--leg x2-wearer-75kg --trace -");
+    live.child.stdin.take().expect("piped").write_all(text.as_bytes()).expect("a pipe");
+    let arrived = live.events().until_the_end();
+    scarab("identify --seed 1 --json", &[&folder.path("run.json")]).ends_with(0);
+    let expected = folder.json("run.json");
+    for messages in [from_file, arrived] {
+        let result = messages.iter().flat_map(|message| all(message, "estimates")).last().expect("estimates");
+        assert_eq!(result["origin"], "result");
+        let values = |of: &Value| of.as_f64().map(|value| value as f32);
+        for (value, base) in all(result, "values").zip(all(&expected, "base_parameters")) {
+            assert_eq!((&value["name"], values(&value["value"])), (&base["name"], values(&base["value"])));
+        }
+        let outcome =
+            messages.iter().flat_map(|message| all(message, "outcomes")).last().expect("an outcome");
+        assert_eq!(outcome["verdict"], "accepted");
+        // The log has the exciting motion and the three unused ones.
+        let samples: Vec<_> = messages.iter().flat_map(|message| all(message, "samples")).collect();
+        assert!(samples.len() > 2000, "{} samples", samples.len());
+        let drives: Vec<_> = messages.iter().flat_map(|message| all(message, "status")).collect();
+        let last = drives.last().expect("states");
+        assert_eq!(
+            (&last["drive"], &last["doing"]),
+            (&"operation enabled".into(), &"drive operation enabled; idle".into())
+        );
+        let notes: Vec<_> = messages.iter().flat_map(|message| all(message, "notes")).collect();
+        assert!(
+            notes.iter().any(|note| note["words"] == "the operator asks: identify, accepted"),
+            "{notes:?}"
+        );
+    }
+}
+
+#[test]
+fn a_trace_without_records_is_refused() {
+    let folder = Folder::new();
+    let path = folder.write("trace.txt", "no record\n");
+    let run = scarab("live --once --leg x2-wearer-75kg --trace", &[&path]).ends_with(2);
+    assert!(run.errors.contains("contains no trace record"), "{}", run.errors);
+    let path = folder.write("short.txt", &session::text(&session::accepted()[..3]));
+    let run = scarab("live --once --leg x2-wearer-75kg --trace", &[&path]).ends_with(2);
+    assert!(run.printed.contains("the trace has no complete result"), "{}{}", run.printed, run.errors);
+}
+
+#[test]
+fn a_recording_that_cannot_be_read_is_refused_with_its_line() {
+    let folder = Folder::new();
+    let path = folder.write("bad.csv", "t_s,q1_rad,q2_rad,tau1_Nm,tau2_Nm\n0,0,0,0,zero\n");
+    let errors = scarab("live --leg mujoco-leg --recording", &[&path]).ends_with(2).errors;
+    assert!(errors.contains("bad.csv:2: "), "{errors}");
+    let errors = scarab("live --recording", &[&path]).refusal();
+    assert!(errors.contains("--leg is missing"), "{errors}");
+}
+
+#[test]
+fn a_page_that_does_not_read_is_overtaken_and_slows_nothing() {
+    let mut live = Live::new("--speed 1000 --runs 4");
+    // A small buffer, so that the page is behind at once.
+    let socket = Socket::new(Domain::IPV4, Type::STREAM, None).expect("a socket");
+    socket.set_recv_buffer_size(4096).expect("a socket");
+    let address: std::net::SocketAddr = live.host.parse().expect("an address");
+    socket.connect(&SockAddr::from(address)).expect("it listens");
+    let mut stalled = TcpStream::from(socket);
+    write!(stalled, "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n", live.host).expect("a connection");
+    // 220 s of motion: more points than ring and buffers hold.
+    live.prints("verdict: ");
+    assert!(live.memory_kb() < 300_000, "{} KB", live.memory_kb());
+    stalled.set_read_timeout(Some(PATIENCE)).expect("a socket");
+    let messages = Events(BufReader::new(stalled)).until_the_end();
+    let dropped: u64 = messages.iter().filter_map(|message| message["dropped"].as_u64()).sum();
+    let received: usize = messages.iter().map(points).sum();
+    let last = messages.last().expect("messages")["next"].as_u64().expect("a count");
+    assert!(dropped > 1000, "{received} of {last} points received, {dropped} lost");
+    // What was not received was counted, up to the position of the first message.
+    let before = messages[0]["next"].as_u64().expect("a count") - points(&messages[0]) as u64;
+    assert_eq!(before + received as u64 + dropped, last);
+    let outcome = messages.iter().flat_map(|message| all(message, "outcomes")).last().expect("an outcome");
+    assert_eq!(outcome["verdict"], "accepted");
+}
+
+#[test]
+fn one_page_too_many_is_refused_and_served_when_a_place_is_free() {
+    let live = Live::new("--speed 1");
+    let mut pages: Vec<Events> = (0..MOST_PAGES).map(|_| live.events()).collect();
+    for page in &mut pages {
+        assert!(page.next().is_some_and(|message| message["scene"].is_object()));
+    }
+    let refused = live.answer("GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n");
+    assert!(refused.starts_with("HTTP/1.1 503 ") && refused.contains("close another page"), "{refused}");
+    pages.pop();
+    let begin = Instant::now();
+    // The server notices the end of a connection at its next write.
+    while live.events().next().is_none_or(|message| !message["scene"].is_object()) {
+        assert!(begin.elapsed() < PATIENCE, "the place stays taken");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn an_address_outside_this_machine_needs_a_token() {
+    for (arguments, words) in [
+        ("--listen 0.0.0.0:0", "add --token"),
+        ("--listen 0.0.0.0:0 --token short", "5 characters, at least 16"),
+        ("--speed 0", "--speed: 0 must be above 0"),
+    ] {
+        let errors = scarab(&format!("live {arguments}"), &[]).refusal();
+        assert!(errors.contains(words), "{arguments}: {errors}");
+    }
+    let live = Live::new("--token 0123456789abcdef");
+    let refused = live.answer("GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n");
+    assert!(refused.starts_with("HTTP/1.1 401 "), "{refused}");
+    let allowed = "GET /events?token=0123456789abcdef HTTP/1.1\r\nHost: {host}\r\n\r\n";
+    let mut events = Events(live.ask(allowed));
+    assert!(events.next().is_some_and(|message| message["scene"].is_object()));
+}
