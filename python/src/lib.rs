@@ -1,7 +1,7 @@
 //! `scarab_ident._native`: Scarab's model and identification for Python.
 //!
 //! The module converts arrays, calls the functions of `scarab-host` and converts the results. Shapes, units
-//! and errors of every function are in `scarab_ident/_native.pyi`; `build.rs` takes the docstrings from there.
+//! and errors of every function are in `scarab_ident/_native.pyi`; `build.rs` takes docstrings from there.
 //!
 //! | Python | Rust |
 //! | --- | --- |
