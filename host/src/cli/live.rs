@@ -33,8 +33,8 @@ use crate::view::live::server::Server;
 use crate::view::tables;
 use crate::with_leg_size;
 
-/// Largest speed, simulated seconds per second.
-const LARGEST_SPEED: f64 = 1000.0;
+/// Smallest and largest speed, simulated seconds per second.
+const SPEED: (f64, f64) = (1e-3, 1e3);
 /// Pause between two looks at the signals.
 const PAUSE: Duration = Duration::from_millis(50);
 
@@ -139,10 +139,9 @@ pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
     }
     let leg = arguments.leg.load()?;
     let speed = arguments.speed;
-    if !(speed > 0.0 && speed <= LARGEST_SPEED) {
-        return Err(ToolError::input(format!(
-            "--speed: {speed} must be above 0 and at most {LARGEST_SPEED}"
-        )));
+    let (slowest, fastest) = SPEED;
+    if !(slowest..=fastest).contains(&speed) {
+        return Err(ToolError::input(format!("--speed: {speed:?} must be from {slowest} to {fastest}")));
     }
     let source = arguments.source(&leg)?;
     let server = Server::new(arguments.listen, arguments.token.clone())?;

@@ -24,6 +24,8 @@ use crate::formats::robot::{Joint, Kind, Robot};
 use crate::leg::axes::{Axis, DhChain, DhJoint, ROUNDING_RAD};
 use crate::leg::robot_chain::{ChainJoint, LumpedBody, chain};
 
+/// Range above which a limit may be in degrees, rad.
+const LARGEST_PLAUSIBLE_RAD: f64 = 30.0;
 /// Largest angle at which axes may count as parallel, rad.
 pub const LARGEST_PARALLEL_RAD: f64 = 0.01;
 /// Axes nearer to parallel than this are probably meant parallel, rad.
@@ -245,9 +247,12 @@ fn range(joint: &Joint, direction: f64, zero_deg: f64, remarks: &mut Vec<String>
         ));
         return None;
     }
+    // A URDF states rad; a person's joint in degrees is a number of 20 to 180.
+    let is_doubtful = (high - low).to_radians() > LARGEST_PLAUSIBLE_RAD;
+    let doubt = if is_doubtful { ". Are its numbers degrees? A URDF states rad" } else { "" };
     remarks.push(format!(
         "`limit` is {low:.1} to {high:.1} degrees, narrowed to {least:.1} to {most:.1}: simulation and `excite` take angles, and D-H \
-         angles (zero offset {zero_deg:.1} degrees), within {TURN_DEG} degrees"
+         angles (zero offset {zero_deg:.1} degrees), within {TURN_DEG} degrees{doubt}"
     ));
     Some(narrowed)
 }

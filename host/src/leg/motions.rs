@@ -13,7 +13,7 @@ use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::{Radian, Second};
 
 use crate::base::error::FileError;
-use crate::formats::leg_file::LegFile;
+use crate::formats::leg_file::{JointFile, LegFile};
 
 /// Names of the predicted motions, in the order of the leg's validation.
 pub const VALIDATION_NAMES: [&str; VALIDATION_MOTIONS] = ["gait-6.5", "gait-3", "fourier"];
@@ -50,7 +50,22 @@ pub fn motions<const N: usize, const B: usize>(
     model: &RowModel<f64, N, B>,
     limits: &[JointEnvelope; N],
 ) -> Result<Motions<N>, FileError> {
-    let refuse = |motion: &str| leg.error(format!("no {motion} motion fits the limits"));
+    let joint = |joint: &JointFile| {
+        let [low, high] = joint.range_deg;
+        let (speed, acceleration) = (joint.speed_limit_deg_s, joint.acceleration_limit_deg_s2);
+        format!(
+            "`{}` {speed:.1} degrees/s, {acceleration:.1} degrees/s2, {low:.1} to {high:.1} degrees",
+            joint.name
+        )
+    };
+    let limits_of_all: Vec<_> = leg.joints.iter().map(joint).collect();
+    let refuse = |motion: &str| {
+        leg.error(format!(
+            "no {motion} motion fits the limits ({}): raise `speed_limit_deg_s` or `acceleration_limit_deg_s2`, or widen \
+             `range_deg`. A run moves along a Fourier series and, to validate, a gait of 3 s",
+            limits_of_all.join("; ")
+        ))
+    };
     let excitation = random_excitation(model, limits, EXCITATION_PERIOD, EXCITATION_CYCLES)
         .ok_or_else(|| refuse("exciting"))?;
     let unused = most_informative(model, limits, UNUSED_PERIOD, 1, UNUSED_SEED, 20)

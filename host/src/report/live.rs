@@ -70,8 +70,8 @@ pub struct LiveSample {
     pub commanded_rad: Vec<Option<f32>>,
     /// Torques by the measured currents, N m.
     pub torque_nm: Vec<f32>,
-    /// Measured currents with the torques' signs, A.
-    pub current_a: Vec<f32>,
+    /// Measured currents with the torques' signs, A; unknown in a recording.
+    pub current_a: Vec<Option<f32>>,
     /// Joints and tip in the picture's plane, m: to the right, downwards.
     pub points_m: Vec<[f32; 2]>,
 }

@@ -354,7 +354,8 @@ fn an_address_outside_this_machine_needs_a_token() {
     for (arguments, words) in [
         ("--listen 0.0.0.0:0", "add --token"),
         ("--listen 0.0.0.0:0 --token short", "5 characters, at least 16"),
-        ("--speed 0", "--speed: 0 must be above 0"),
+        ("--speed 0", "--speed: 0.0 must be from 0.001 to 1000"),
+        ("--speed 1e-300", "--speed: 1e-300 must be from 0.001 to 1000"),
     ] {
         let errors = scarab(&format!("live {arguments}"), &[]).refusal();
         assert!(errors.contains(words), "{arguments}: {errors}");

@@ -4,6 +4,9 @@ use scarab::motion::{LimitViolation, Quantity};
 
 use crate::formats::leg_file::{JointFile, LegFile};
 
+/// Torque over its limit above which the position loop has lost the command, and its value says nothing.
+const DIVERGED: f64 = 3.0;
+
 /// Limit that a motion exceeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limit {
@@ -113,6 +116,13 @@ impl Obstacle {
                 place.velocity_rad_s.abs().to_degrees(),
                 joint.speed_limit_deg_s,
                 joint.acceleration_limit_deg_s2
+            ),
+            Limit::Loop(place) if value.abs() > DIVERGED * allowed.abs() => format!(
+                "the simulated leg does not follow its command at {:.0} degrees/s with {:.3} N m ({key}): raise it, lower \
+                 `speed_limit_deg_s` (now {:.0}), or correct friction and `rotor_inertia` in `prior`",
+                place.velocity_rad_s.abs().to_degrees(),
+                allowed.abs(),
+                joint.speed_limit_deg_s
             ),
             Limit::Loop(place) => format!(
                 "with the position loop it needs {value:.3} N m at {:.0} degrees/s, limit {allowed:.3} N m ({key}): raise it, \

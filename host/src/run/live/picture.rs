@@ -52,6 +52,8 @@ pub struct Picture<'a, const N: usize> {
     stick: Stick,
     anatomy: [AnatomicalJoint<f64>; N],
     sums: Sums<N>,
+    /// Whether torques come from currents by the leg's torque constants.
+    has_currents: bool,
     /// Time of the reports, s: that of the last servo tick.
     pub time_s: f64,
 }
@@ -63,7 +65,14 @@ impl<'a, const N: usize> Picture<'a, N> {
         anatomy: [AnatomicalJoint<f64>; N],
         out: &'a mut dyn FnMut(LiveUpdate),
     ) -> Self {
-        Self { leg, out, stick: Stick::of(leg), anatomy, sums: Sums::EMPTY, time_s: 0.0 }
+        let stick = Stick::of(leg);
+        Self { leg, out, stick, anatomy, sums: Sums::EMPTY, has_currents: true, time_s: 0.0 }
+    }
+
+    /// Reports currents as unknown.
+    #[must_use]
+    pub fn without_currents(self) -> Self {
+        Self { has_currents: false, ..self }
     }
 
     /// Leg of the picture.
@@ -135,7 +144,9 @@ impl<'a, const N: usize> Picture<'a, N> {
         let commanded = |joint: usize| {
             (sums.ticks > 0).then(|| anatomical(joint, sums.commanded[joint] / f64::from(sums.ticks)))
         };
-        let current = |joint: usize| (torque[joint] / self.leg.joints[joint].torque_per_ampere) as f32;
+        let current = |joint: usize| {
+            self.has_currents.then(|| (torque[joint] / self.leg.joints[joint].torque_per_ampere) as f32)
+        };
         let sample = LiveSample {
             leg: 0,
             time_s: rounded(self.time_s - HALF_PERIOD_S),

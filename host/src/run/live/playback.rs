@@ -49,7 +49,7 @@ pub fn play<const N: usize, const B: usize>(
     let source = format!("recording {name}, {:.1} s", recording.duration_s());
     out(LiveUpdate::Scene(scene(leg, source, speed)));
     let anatomy = anatomy::<N>(leg)?;
-    let picture = Picture::new(leg, anatomy, out);
+    let picture = Picture::new(leg, anatomy, out).without_currents();
     let mut player =
         Player { picture, clock: Clock::new(speed), progress, background, report: &report, anatomy };
     let first_s = recording.time_s.first().copied().unwrap_or(0.0);
