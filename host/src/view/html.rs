@@ -32,7 +32,7 @@ use crate::report::{RunReport, Source};
 use crate::view::figures::{Figure, Group};
 
 /// Colours, print rules, narrow screens.
-const STYLE: &str = include_str!("html/style.css");
+const STYLE: &str = concat!(include_str!("palette.css"), include_str!("html/style.css"));
 /// Content policy: nothing is fetched or executed, independent of a file's text.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 

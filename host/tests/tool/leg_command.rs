@@ -202,7 +202,10 @@ fn the_check_of_a_robot_offers_its_prior_as_truth() {
     let text = pasted(&std::fs::read_to_string(&out).expect("written"), &report, "simulation");
     let file = folder.write("simulated.toml", &text);
     let report = scarab("leg --check", &[&file]).ends_with(0).printed;
-    assert!(report.contains("\nsimulation: ready\n"), "{report}\n{text}");
+    assert!(
+        report.contains("\nsimulation: ready\n  its torque has no noise: add --torque-noise 1"),
+        "{report}\n{text}"
+    );
     for (leg, words) in
         [("none.toml", "cannot be read"), ("sp", "image: not possible: an image supports two joints")]
     {

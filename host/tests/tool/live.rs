@@ -12,9 +12,9 @@ use scarab_host::view::live::server::MOST_PAGES;
 use serde_json::Value;
 use socket2::{Domain, SockAddr, Socket, Type};
 
-use crate::PROGRAM;
 use crate::command::{Folder, MUJOCO, scarab};
 use crate::trace::session;
+use crate::{PROGRAM, largest_memory_kb};
 
 const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -71,11 +71,8 @@ impl Live {
         }
     }
 
-    /// Largest memory so far, KB; 0 where the system does not report it.
     fn memory_kb(&self) -> u64 {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
-        let line = status.lines().find(|line| line.starts_with("VmHWM:"));
-        line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
+        largest_memory_kb(self.child.id())
     }
 }
 
@@ -147,7 +144,9 @@ fn the_page_is_served_with_its_policy_and_nothing_can_be_sent() {
     ] {
         assert!(page.contains(header), "{header}:\n{page}");
     }
-    for path in ["live.js", "model.js", "charts.js", "live.css", "uPlot.iife.min.js", "uPlot.min.css"] {
+    for path in
+        ["live.js", "model.js", "charts.js", "palette.css", "live.css", "uPlot.iife.min.js", "uPlot.min.css"]
+    {
         assert!(page.contains(&format!("\"/{path}\"")), "{path} is not used");
         let part = live.answer(&format!("GET /{path} HTTP/1.1\r\nHost: {{host}}\r\n\r\n"));
         assert!(part.starts_with("HTTP/1.1 200 OK\r\n"), "{path}");

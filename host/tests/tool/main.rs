@@ -52,3 +52,10 @@ mod verdict;
 
 /// Program under test.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_scarab");
+
+/// Largest memory of a process so far, KB; 0 where the system does not report it.
+fn largest_memory_kb(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"));
+    line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
+}

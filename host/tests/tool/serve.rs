@@ -8,6 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::command::Folder;
+use crate::largest_memory_kb;
 use scarab_host::base::random::Random;
 
 const MS: Duration = Duration::from_millis(1);
@@ -66,11 +67,8 @@ impl Serve {
         assert!(Command::new("kill").args([name, &id]).status().expect("kill").success());
     }
 
-    /// The largest share of memory so far, KB; 0 where the system does not report it.
     fn memory_kb(&self) -> u64 {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
-        let line = status.lines().find(|line| line.starts_with("VmHWM:"));
-        line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
+        largest_memory_kb(self.child.id())
     }
 }
 

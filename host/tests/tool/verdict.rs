@@ -29,3 +29,32 @@ fn compensating_errors_of_length_and_zero_are_detected_together() {
     let json = folder.json("run.json");
     assert_eq!(json["reasons"], serde_json::json!(["residual"]));
 }
+
+/// Hip and knee with Coulomb friction alone.
+const WITHOUT_VISCOUS: &str = r#"name = "exo"
+gravity = [9.81, 0.0, 0.0]
+[[joint]]
+name = "hip"
+dh = { alpha = 0.0, a = 0.0, d = 0.0 }
+range_deg = [-20.0, 120.0]
+speed_limit_deg_s = 229.0
+torque_limit_nm = 80.0
+truth = { mass = 8.5, com = [0.2, 0.0, -0.01], inertia_com = [0.02, 0.0, 0.0, 0.16, 0.0, 0.165], rotor_inertia = 0.12, coulomb = 1.0 }
+[[joint]]
+name = "knee"
+dh = { alpha = 0.0, a = 0.42, d = 0.0 }
+direction = -1
+range_deg = [0.0, 120.0]
+speed_limit_deg_s = 286.0
+torque_limit_nm = 60.0
+truth = { mass = 4.8, com = [0.18, 0.0, 0.0], inertia_com = [0.01, 0.0, 0.0, 0.095, 0.0, 0.098], rotor_inertia = 0.08, coulomb = 1.0 }
+"#;
+
+#[test]
+fn without_noise_the_search_is_refused_with_the_noise_that_helps() {
+    let folder = Folder::new();
+    let leg = folder.write("exo.toml", WITHOUT_VISCOUS);
+    let refused = scarab("identify --leg", &[&leg]).ends_with(3).printed;
+    assert!(refused.contains("has not converged") && refused.contains("--torque-noise 1"), "{refused}");
+    scarab("identify --torque-noise 1 --leg", &[&leg]).ends_with(0);
+}

@@ -79,7 +79,15 @@ fn simulation(text: &mut String, leg: &LegFile, known: &Result<(), FileError>) {
         (0..leg.joints.len()).filter(|joint| leg.joints[*joint].truth.is_none()).collect();
     if without.is_empty() {
         return match with_leg_size!(leg, simulated(leg)) {
-            Ok(()) => section(text, "simulation", "ready"),
+            Ok(()) => {
+                section(text, "simulation", "ready");
+                let is_noiseless = leg.joints.iter().all(|joint| joint.current_noise_a == 0.0);
+                if leg.torque_noise_percent == 0.0 && is_noiseless {
+                    text.push_str(
+                        "  its torque has no noise: add --torque-noise 1, or `torque_noise_percent`\n",
+                    );
+                }
+            }
             Err(fault) => impossible(text, "simulation", &fault),
         };
     }

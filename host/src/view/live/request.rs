@@ -19,8 +19,9 @@ pub const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self
 pub const LEAST_TOKEN: usize = 16;
 
 /// Parts of the page: path, type, content.
-pub const FILES: [(&str, &str, &str); 8] = [
+pub const FILES: [(&str, &str, &str); 9] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
+    ("/palette.css", "text/css; charset=utf-8", include_str!("../palette.css")),
     ("/live.css", "text/css; charset=utf-8", include_str!("page/live.css")),
     ("/model.js", JAVASCRIPT, include_str!("page/model.js")),
     ("/live.js", JAVASCRIPT, include_str!("page/live.js")),
