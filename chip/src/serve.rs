@@ -50,7 +50,10 @@ pub fn serve(session: &mut Session, address: SocketAddr, duration: Option<f64>) 
                 _ => {}
             }
         }
-        frames.into_iter().for_each(|frame| session.machine.chip_mut().send_frame(frame));
+        for frame in frames {
+            server.show(&frame);
+            session.machine.chip_mut().send_frame(frame);
+        }
         session.run(SLICE_S)?;
         // The hand releases the leg once the drive holds it.
         let plant = &mut session.machine.chip_mut().plant;
@@ -58,6 +61,7 @@ pub fn serve(session: &mut Session, address: SocketAddr, duration: Option<f64>) 
             plant.let_go();
         }
         for (_, frame) in session.machine.chip_mut().can.sent.drain(..) {
+            server.show(&frame);
             server.send(&frame);
         }
         server.flush().iter().for_each(|event| eprintln!("{event}"));

@@ -1,6 +1,7 @@
 //! Texts that are read, and files that are written: a temporary file in the same folder, then renamed. No
 //! other module writes files.
 
+pub mod serial;
 pub mod write;
 
 pub use write::{NewFile, check_new, write, write_new};

@@ -1,4 +1,4 @@
-//! `live`: a leg that identifies itself, a recording or a board's trace, shown in a browser.
+//! `live`: a leg that identifies itself, a recording, a board's trace or legs on a bus, shown in a browser.
 
 use std::fs::File;
 use std::io::Read;
@@ -17,12 +17,17 @@ use crate::cli::arguments::Input;
 use crate::cli::identify::DriveArgument;
 use crate::cli::import::ImportArguments;
 use crate::cli::leg_options::LegOptions;
+use crate::cli::serve::bit_rates;
 use crate::formats::leg_file::LegFile;
+use crate::formats::model_file::ModelFile;
 use crate::formats::recording::Recording;
+use crate::leg::matching::refuse_another_leg;
 use crate::leg::setup::DEFAULT_SEED;
 use crate::report::live::LiveUpdate;
 use crate::rig::options::SimulationOptions;
 use crate::rig::perturb::Perturbation;
+use crate::run::live::bus::adapter::listen;
+use crate::run::live::bus::{BusInput, Lines, watch};
 use crate::run::live::playback::play;
 use crate::run::live::simulated::{LiveOptions, identify};
 use crate::run::live::traced::{TraceInput, follow};
@@ -35,6 +40,8 @@ use crate::with_leg_size;
 
 /// Smallest and largest speed, simulated seconds per second.
 const SPEED: (f64, f64) = (1e-3, 1e3);
+/// Legs on one page.
+const MOST_LEGS: usize = 4;
 /// Pause between two looks at the signals.
 const PAUSE: Duration = Duration::from_millis(50);
 
@@ -72,6 +79,23 @@ pub struct LiveArguments {
     /// Image (ELF) that sent the trace as a defmt stream; without it the trace is text.
     #[arg(long, value_name = "ELF", requires = "trace", help_heading = "Board")]
     image: Option<Input>,
+    /// Show the legs on this CANopen bus, heard by an slcan adapter: HOST:PORT or a serial device; --leg is
+    /// required.
+    #[arg(long, value_name = "ADAPTER", conflicts_with_all = ["runs", "drive", "perturb", "recording", "trace"], help_heading = "Bus")]
+    slcan: Option<String>,
+    /// Show the legs in these lines of `candump -L`, - for standard input; --leg is required.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["runs", "drive", "perturb", "recording", "trace", "slcan"], help_heading = "Bus")]
+    candump: Option<Input>,
+    /// Node-IDs, leg by leg, proximal joint first. Default: one leg with nodes from 1 on.
+    #[arg(long, value_name = "ID,ID,..", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=127), help_heading = "Bus")]
+    nodes: Vec<u8>,
+    /// Bit rate of the bus, kbit/s.
+    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates(), help_heading = "Bus")]
+    bit_rate: u64,
+    /// Model (--save-model) that predicts the torque; without one it is predicted once a host has read the
+    /// parameters.
+    #[arg(long, value_name = "FILE", help_heading = "Bus")]
+    model: Option<Input>,
     /// Address and port of the page; port 0 selects a free one. Outside this machine it needs --token.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
     listen: SocketAddr,
@@ -88,20 +112,19 @@ enum Source {
     Simulated(Box<SimulationOptions>, LiveOptions),
     Recording(Box<(Recordings, ReplayOptions)>, f64),
     Trace(Box<TraceInput>),
+    Bus(Box<BusInput>),
 }
 
 impl LiveArguments {
     fn source(&self, leg: &LegFile) -> Result<Source, ToolError> {
         if let Some(file) = &self.trace {
             let reader = StreamReader::new(decoder(self.image.as_deref())?);
-            let (name, is_now) = (file.display().to_string(), &**file == Path::new("-"));
-            let input: Box<dyn Read + Send> = if is_now {
-                Box::new(std::io::stdin())
-            } else {
-                Box::new(File::open(&**file).map_err(|error| FileError::unreadable(file, &error))?)
-            };
-            let speed = (!is_now).then_some(self.speed);
+            let (input, speed) = self.open(file)?;
+            let name = file.display().to_string();
             return Ok(Source::Trace(Box::new(TraceInput { input, reader, name, speed })));
+        }
+        if let Some(source) = self.bus(leg)? {
+            return Ok(source);
         }
         let Some(file) = &self.recording else {
             let options = SimulationOptions {
@@ -127,15 +150,63 @@ impl LiveArguments {
     }
 }
 
+impl LiveArguments {
+    /// Opens a file, played at the requested speed, or standard input.
+    fn open(&self, file: &Input) -> Result<(Box<dyn Read + Send>, Option<f64>), ToolError> {
+        if &**file == Path::new("-") {
+            return Ok((Box::new(std::io::stdin()), None));
+        }
+        let opened = File::open(&**file).map_err(|error| FileError::unreadable(file, &error))?;
+        Ok((Box::new(opened), Some(self.speed)))
+    }
+
+    /// Bus to be shown, if one is named.
+    fn bus(&self, leg: &LegFile) -> Result<Option<Source>, ToolError> {
+        let bits_per_s = 1000 * self.bit_rate;
+        let (lines, name, (input, speed)) = match (&self.slcan, &self.candump) {
+            (Some(adapter), _) => (Lines::Slcan, adapter.clone(), (listen(adapter, self.bit_rate)?, None)),
+            (None, Some(file)) => (Lines::Candump, file.display().to_string(), self.open(file)?),
+            (None, None) => return Ok(None),
+        };
+        let joints = leg.joints.len();
+        let nodes: Vec<u8> =
+            if self.nodes.is_empty() { (1..=joints as u8).collect() } else { self.nodes.clone() };
+        let repeated = nodes.iter().enumerate().find(|(place, id)| nodes[..*place].contains(id));
+        if let Some((_, id)) = repeated {
+            return Err(ToolError::input(format!("--nodes: {id} occurs twice")));
+        }
+        if !nodes.len().is_multiple_of(joints) || nodes.len() > MOST_LEGS * joints {
+            return Err(ToolError::input(format!(
+                "--nodes: {} node-IDs; {} has {joints} joints, so that 1 to {MOST_LEGS} legs have {joints} to {}",
+                nodes.len(),
+                leg.name,
+                MOST_LEGS * joints
+            )));
+        }
+        let model = self.model.as_ref().map(|path| -> Result<ModelFile, ToolError> {
+            let model = ModelFile::load(path)?;
+            refuse_another_leg(&model, &path.display().to_string(), leg)?;
+            Ok(model)
+        });
+        let model = model.transpose()?;
+        let input = BusInput { input, lines, name, nodes, bits_per_s, model, speed };
+        Ok(Some(Source::Bus(Box::new(input))))
+    }
+}
+
 /// Serves the page until Ctrl-C; returns the exit code of the last identification.
 pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
     for (file, example) in [
         (&arguments.recording, "live --recording run.csv --leg my-leg.toml"),
         (&arguments.trace, "live --trace trace.txt --leg my-leg.toml"),
+        (&arguments.candump, "live --candump - --leg my-leg.toml"),
     ] {
         if file.is_some() {
             arguments.leg.require(example)?;
         }
+    }
+    if arguments.slcan.is_some() {
+        arguments.leg.require("live --slcan /dev/ttyACM0 --leg my-leg.toml")?;
     }
     let leg = arguments.leg.load()?;
     let speed = arguments.speed;
@@ -153,7 +224,8 @@ pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
     say!("live: {}", server.url());
     if !arguments.listen.ip().is_loopback() {
         eprintln!(
-            "warning: {} can be reached from other machines; the page is not encrypted",
+            "warning: {} can be reached from other machines; the page is not encrypted. There the address begins with \
+             this machine's IP address instead of `localhost`",
             arguments.listen
         );
     }
@@ -162,6 +234,7 @@ pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
     // Ends with the process.
     let page = thread::spawn(move || server.serve(shown));
     let shown = Arc::clone(&hub);
+    let judges = !matches!(source, Source::Bus(_));
     let mut source = Some(thread::spawn(move || report(&leg, source, &shown)));
     let mut outcome = None;
     while !stop.load(Ordering::Relaxed) {
@@ -187,12 +260,17 @@ pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
         }
         thread::sleep(PAUSE);
     }
-    outcome.unwrap_or(Ok(EXIT_ACCEPTED))
+    outcome.unwrap_or_else(|| {
+        if judges {
+            eprintln!("stopped before a verdict");
+        }
+        Ok(if judges { EXIT_REFUSED } else { EXIT_ACCEPTED })
+    })
 }
 
-/// Runs the source; returns the exit code and the verdict's line.
+/// Runs the source; returns the exit code and the verdict with its reasons.
 fn report(leg: &LegFile, source: Source, hub: &Hub) -> Result<(u8, String), ToolError> {
-    let out = &mut |update: LiveUpdate| hub.push(update);
+    let out = &|update: LiveUpdate| hub.push(update);
     let report = match source {
         Source::Simulated(options, live) => Some(with_leg_size!(leg, identify(leg, &options, &live, out))?),
         Source::Recording(recorded, speed) => {
@@ -200,8 +278,15 @@ fn report(leg: &LegFile, source: Source, hub: &Hub) -> Result<(u8, String), Tool
             Some(with_leg_size!(leg, play(leg, recordings, options, speed, out))?)
         }
         Source::Trace(input) => with_leg_size!(leg, follow(leg, *input, out))?,
+        Source::Bus(input) => {
+            with_leg_size!(leg, watch(leg, *input, out))?;
+            return Ok((EXIT_ACCEPTED, "the bus is silent: its source has ended".into()));
+        }
     };
     let Some(report) = report else { return Ok((EXIT_INPUT, "the trace has no complete result".into())) };
     let code = if report.accepted() { EXIT_ACCEPTED } else { EXIT_REFUSED };
-    Ok((code, tables::verdict_line(&report)))
+    let explained =
+        report.reasons.iter().map(|reason| format!("  {reason}: {}", tables::explanation(reason)));
+    let lines: Vec<String> = core::iter::once(tables::verdict_line(&report)).chain(explained).collect();
+    Ok((code, lines.join("\n")))
 }

@@ -46,7 +46,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 /// Bit rates of the board's controller, kbit/s (object 2002).
-fn bit_rates() -> impl TypedValueParser<Value = u64> {
+pub fn bit_rates() -> impl TypedValueParser<Value = u64> {
     PossibleValuesParser::new(["125", "250", "500", "1000"]).try_map(|rate| rate.parse::<u64>())
 }
 

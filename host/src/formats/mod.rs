@@ -1,6 +1,7 @@
 //! Files and streams: read and checked, written.
 
 pub mod anthropometry;
+pub mod candump;
 pub mod eds;
 pub mod excitation;
 pub mod excitation_constant;

@@ -66,10 +66,10 @@ pub struct LiveSample {
     pub time_s: f64,
     /// Measured angles, rad.
     pub angle_rad: Vec<f32>,
-    /// Commanded angles, rad; unknown in a recording.
+    /// Commanded angles, rad; unknown in a recording, and without a target on a bus.
     pub commanded_rad: Vec<Option<f32>>,
-    /// Torques by the measured currents, N m.
-    pub torque_nm: Vec<f32>,
+    /// Torques by the measured currents, N m; unknown on a bus that does not carry them.
+    pub torque_nm: Vec<Option<f32>>,
     /// Measured currents with the torques' signs, A; unknown in a recording.
     pub current_a: Vec<Option<f32>>,
     /// Joints and tip in the picture's plane, m: to the right, downwards.
@@ -160,6 +160,8 @@ pub struct LiveStatus {
     pub speed: Number,
     /// Load of the board's processor in words; empty if unknown.
     pub processor: String,
+    /// Load of the bus in words; empty without one.
+    pub bus: String,
 }
 
 /// Verdict and its tests.

@@ -4,6 +4,9 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use scarab::real::sqrt;
@@ -13,6 +16,7 @@ use serde_json::Value;
 use socket2::{Domain, SockAddr, Socket, Type};
 
 use crate::command::{Folder, MUJOCO, scarab};
+use crate::serve::{Client, ENABLED, Serve};
 use crate::trace::session;
 use crate::{PROGRAM, largest_memory_kb};
 
@@ -227,11 +231,11 @@ fn a_recording_is_played_back_and_judged_as_by_replay() {
     }
     let outcome = messages.iter().flat_map(|message| all(message, "outcomes")).last().expect("an outcome");
     assert_eq!((&outcome["verdict"], &outcome["findings"]), (&expected["verdict"], &expected["findings"]));
-    // 30 s at 50 Hz, from the recording's first sample on; what was commanded is unknown.
+    // 30 s at 50 Hz, from the recording's first sample on; command and current are unknown.
     let samples: Vec<_> = messages.iter().flat_map(|message| all(message, "samples")).collect();
     assert!((1490..=1501).contains(&samples.len()), "{} samples", samples.len());
     assert!(samples[0]["time_s"].as_f64().is_some_and(|time| (0.0..0.02).contains(&time)));
-    assert!(samples[9]["commanded_rad"][0].is_null());
+    assert!(samples[9]["commanded_rad"][0].is_null() && samples[9]["current_a"][0].is_null());
     // The held-out part is predicted by the result.
     let rows = messages.iter().flat_map(|message| all(message, "rows"));
     let held_out = rows.filter(|row| row["time_s"].as_f64().is_some_and(|time| time > 21.0));
@@ -275,11 +279,176 @@ fn a_board_s_trace_is_shown_as_it_arrives_and_from_a_file() {
             (&last["drive"], &last["doing"]),
             (&"operation enabled".into(), &"drive operation enabled; idle".into())
         );
+        assert!(last["processor"].as_str().is_some_and(|words| !words.is_empty()), "{last}");
         let notes: Vec<_> = messages.iter().flat_map(|message| all(message, "notes")).collect();
         assert!(
             notes.iter().any(|note| note["words"] == "the operator asks: identify, accepted"),
             "{notes:?}"
         );
+    }
+}
+
+/// Lines of `candump -L`: two nodes in the compact mapping, 100 Hz, hip at `hip` and knee at `knee` (rad).
+fn compact(seconds: u32, hip: impl Fn(f64) -> f64, knee: impl Fn(f64) -> f64) -> String {
+    let mut lines = String::new();
+    let mut line = |time_s: f64, id: u16, data: &[u8]| {
+        let bytes: String = data.iter().map(|byte| format!("{byte:02X}")).collect();
+        lines += &format!("({:.6}) can0 {id:03X}#{bytes}\n", 1.7e9 + time_s);
+    };
+    for node in [1_u8, 2] {
+        for (index, sub, value) in
+            [(0x1A00_u16, 0, 0_u32), (0x1A00, 2, 0x6064_0020), (0x1A00, 3, 0x2010_0010), (0x1A00, 0, 3)]
+        {
+            let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+            line(0.0, 0x600 + u16::from(node), &[0x23, low, high, sub, a, b, c, d]);
+            line(0.0, 0x580 + u16::from(node), &[0x60, low, high, sub, 0, 0, 0, 0]);
+        }
+    }
+    for cycle in 0..100 * seconds {
+        let time_s = f64::from(cycle) * 0.01;
+        line(time_s, 0x80, &[]);
+        for (node, angle) in [(1, hip(time_s)), (2, knee(time_s))] {
+            let [a, b, c, d] = ((angle * 1e6).round() as i32).to_le_bytes();
+            line(time_s + 1e-4 * f64::from(node), 0x180 + node, &[0x37, 0x1A, a, b, c, d, 0, 0]);
+        }
+    }
+    lines
+}
+
+#[test]
+fn frames_of_a_bus_give_angles_states_and_load() {
+    let folder = Folder::new();
+    let (hip, knee) = (|time: f64| 0.2 + 0.1 * time, |time: f64| 0.9 - 0.2 * time);
+    let path = folder.write("compact.log", &compact(3, hip, knee));
+    let arguments = format!("--leg x2-wearer-75kg --speed 1000 --candump {}", path.display());
+    let messages = Live::new(&arguments).events().until_the_end();
+    let samples: Vec<_> = messages.iter().flat_map(|message| all(message, "samples")).collect();
+    assert!((145..=150).contains(&samples.len()), "{} samples", samples.len());
+    for sample in &samples {
+        let time = sample["time_s"].as_f64().expect("a time");
+        for (joint, expected) in [hip(time), knee(time)].into_iter().enumerate() {
+            let angle = sample["angle_rad"][joint].as_f64().expect("an angle");
+            // Each frame is a little late, and time stamps begin with the first frame.
+            assert!((angle - expected).abs() < 1e-4, "{angle} instead of {expected} at {time} s");
+            assert!(sample["torque_nm"][joint].is_null() && sample["commanded_rad"][joint].is_null());
+        }
+    }
+    let last = messages.iter().flat_map(|message| all(message, "status")).last().expect("a status");
+    assert_eq!((&last["drive"], &last["fault"]), (&"operation enabled".into(), &"".into()));
+    assert_eq!(
+        last["limits"],
+        serde_json::json!(["hip: internal limit active", "knee: internal limit active"])
+    );
+    // SYNC has 47 bits, the others 111, and some stuffed bits.
+    assert!(
+        last["bus"].as_str().is_some_and(|words| words.starts_with("3 % of 1000 kbit/s, 300 frames/s")),
+        "{last}"
+    );
+}
+
+#[test]
+fn lines_that_are_no_frames_are_named_and_a_file_without_any_is_refused() {
+    let folder = Folder::new();
+    let text = compact(1, |_| 0.0, |_| 0.5).replacen("can0 080#", "can0 0", 1);
+    let path = folder.write("bad.log", &text);
+    let arguments = format!("--leg x2-wearer-75kg --speed 1000 --candump {}", path.display());
+    let messages = Live::new(&arguments).events().until_the_end();
+    let notes: Vec<_> = messages.iter().flat_map(|message| all(message, "notes")).collect();
+    let words = "line 17: no length in square brackets";
+    assert!(
+        notes.iter().any(|note| note["words"].as_str().is_some_and(|line| line.ends_with(words))),
+        "{notes:?}"
+    );
+    let path = folder.write("none.log", "t_s,q1_rad\n0,0\n");
+    let run = scarab("live --once --leg x2-wearer-75kg --candump", &[&path]).ends_with(2);
+    assert!(run.errors.contains("no CAN frame; 2 lines are none"), "{}", run.errors);
+    for (arguments, words) in [
+        ("--slcan 127.0.0.1:1", "it must be HOST:PORT or a serial device"),
+        ("--slcan nowhere", "it must be HOST:PORT or a serial device"),
+        ("--candump - --nodes 1,2,3", "--nodes: 3 node-IDs; x2-wearer-75kg has 2 joints"),
+        ("--candump - --nodes 1,1", "--nodes: 1 occurs twice"),
+    ] {
+        let run = scarab(&format!("live --once --leg x2-wearer-75kg {arguments}"), &[]).ends_with(2);
+        assert!(run.errors.contains(words), "{}", run.errors);
+    }
+}
+
+#[test]
+fn two_served_legs_are_shown_while_a_host_moves_one() {
+    let serve = Serve::at("127.0.0.1:0", "--legs 2");
+    let mut host = Client::new(&serve);
+    let live = Live::new(&format!("--leg x2-wearer-75kg --nodes 1,2,3,4 --slcan {}", serve.address));
+    serve.waits_for("listens");
+    for node in 1..=4 {
+        host.frame(0, &[1, node]);
+    }
+    host.enable(ENABLED);
+    for node in [1, 2] {
+        // A target far from the joint would be a following error (8611).
+        let position = host.read(node, 0x6064, 0);
+        host.write(node, 0x607A, 0, position, 4);
+        host.write(node, 0x6060, 0, 8, 1);
+        // This host may be slow.
+        host.write(node, 0x2013, 0, 0, 1);
+    }
+    // Follows its host to 0.1 and 0.2 rad, 100 cycles a second, until this test ends.
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopped = Arc::clone(&stop);
+    let host = thread::spawn(move || {
+        while !stopped.load(Ordering::Relaxed) {
+            for node in [1_u16, 2] {
+                host.frame(0x300 + node, &(100_000 * i32::from(node)).to_le_bytes());
+            }
+            host.frame(0x80, &[]);
+            thread::sleep(Duration::from_millis(10));
+        }
+    });
+    let begin = Instant::now();
+    let is_there = |sample: &Value| {
+        let angles = [0, 1].map(|joint| sample["angle_rad"][joint].as_f64().unwrap_or(f64::NAN));
+        sample["leg"] == 0 && (angles[0] - 0.1).abs() < 0.006 && (angles[1] - 0.2).abs() < 0.006
+    };
+    let (mut messages, mut arrived) = (Vec::new(), false);
+    for message in live.events() {
+        arrived |= all(&message, "samples").any(is_there);
+        let is_followed = all(&message, "status")
+            .any(|status| status["leg"] == 0 && status["drive"] == "operation enabled");
+        messages.push(message);
+        if arrived && is_followed {
+            break;
+        }
+        assert!(begin.elapsed() < PATIENCE, "the page does not show the motion");
+    }
+    let scene = messages.iter().find_map(|message| message["scene"]["legs"].as_array()).expect("a scene");
+    let names: Vec<_> = scene.iter().map(|leg| leg["name"].as_str().unwrap_or("")).collect();
+    assert_eq!(names, ["x2-wearer-75kg, nodes 1 and 2", "x2-wearer-75kg, nodes 3 and 4"]);
+    let sample = messages
+        .iter()
+        .flat_map(|message| all(message, "samples"))
+        .filter(|sample| sample["leg"] == 0)
+        .last();
+    let sample = sample.expect("samples");
+    assert_eq!(sample["commanded_rad"], serde_json::json!([0.1_f32, 0.2_f32]), "{sample}");
+    assert!(sample["torque_nm"][0].is_number() && sample["current_a"][1].is_number(), "{sample}");
+    let states: Vec<_> = messages.iter().flat_map(|message| all(message, "status")).collect();
+    let last = |leg: u64| states.iter().rev().find(|status| status["leg"] == leg).expect("a status");
+    assert_eq!(last(0)["doing"], "follows its host: cyclic position");
+    assert_eq!(
+        (&last(1)["drive"], &last(1)["waits_for"]),
+        (&"switch on disabled".into(), &"controlword 6 of its host".into())
+    );
+    // A host that is lost: the plug is pulled, and the boards say so once it is back.
+    stop.store(true, Ordering::Relaxed);
+    host.join().expect("the host ends");
+    serve.waits_for("plug is pulled");
+    let _host = Client::new(&serve);
+    for message in live.events() {
+        if all(&message, "notes").any(|note| {
+            note["words"].as_str().is_some_and(|words| words.starts_with("leg 1: emergency 8120"))
+        }) {
+            return;
+        }
+        assert!(begin.elapsed() < PATIENCE, "the page does not tell the emergency");
     }
 }
 
@@ -344,7 +513,7 @@ fn one_page_too_many_is_refused_and_served_when_a_place_is_free() {
     // The server notices the end of a connection at its next write.
     while live.events().next().is_none_or(|message| !message["scene"].is_object()) {
         assert!(begin.elapsed() < PATIENCE, "the place stays taken");
-        std::thread::sleep(Duration::from_millis(20));
+        thread::sleep(Duration::from_millis(20));
     }
 }
 

@@ -60,3 +60,15 @@ fn one_recording_reports_that_sigma_lacks_scatter_between_recordings() {
     assert!(printed.contains("sigma does not contain the scatter between recordings: only one"), "{printed}");
     assert_eq!(report["recordings"], serde_json::json!({ "count": 1, "sigma": [] }));
 }
+
+#[test]
+fn a_warning_about_both_parts_of_a_file_is_printed_once() {
+    let folder = Folder::new();
+    let table = Table::read(MUJOCO);
+    let sparse = table.rows.iter().step_by(table.rows.len() / 750);
+    let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let lines: Vec<String> = std::iter::once(table.header.join(",")).chain(sparse.map(line)).collect();
+    let file = folder.write("sparse.csv", &(lines.join("\n") + "\n"));
+    let errors = scarab("replay --leg mujoco-leg --split 0.67", &[&file]).errors;
+    assert_eq!(errors.matches("is too large for a recording").count(), 1, "{errors}");
+}

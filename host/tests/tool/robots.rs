@@ -213,6 +213,16 @@ fn a_range_beyond_a_turn_is_narrowed_to_what_the_firmware_takes() {
 }
 
 #[test]
+fn a_range_that_looks_like_degrees_is_doubted() {
+    let text = with("lower=\"-0.5\" upper=\"1.5\"", "lower=\"-20\" upper=\"120\"");
+    let found = converted(&text, &plain()).expect("a leg");
+    let [remark] = &found.remarks[..] else { panic!("one remark: {:?}", found.remarks) };
+    assert!(remark.ends_with("Are its numbers degrees? A URDF states rad"), "{remark}");
+    let text = with("lower=\"-0.5\" upper=\"1.5\"", "lower=\"-10\" upper=\"10\"");
+    assert!(!converted(&text, &plain()).expect("a leg").remarks.concat().contains("degrees?"));
+}
+
+#[test]
 fn values_that_a_leg_file_cannot_hold_are_left_out_with_a_remark() {
     let text = with("effort=\"80\" velocity=\"4\"", "effort=\"0\" velocity=\"1000\"")
         .replace("lower=\"0\" upper=\"2\"", "lower=\"0\" upper=\"0\"");

@@ -15,17 +15,17 @@ const MS: Duration = Duration::from_millis(1);
 const PATIENCE: Duration = Duration::from_secs(20);
 const OFF: u32 = 0x40;
 const SWITCHED_ON: u32 = 0x23;
-const ENABLED: u32 = 0x27;
+pub const ENABLED: u32 = 0x27;
 
 /// A running `serve` with its output.
-struct Serve {
+pub struct Serve {
     child: Child,
-    address: String,
+    pub address: String,
     errors: Arc<Mutex<String>>,
 }
 
 impl Serve {
-    fn at(address: &str, arguments: &str) -> Self {
+    pub fn at(address: &str, arguments: &str) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_scarab"))
             .args(["serve", "--slcan", address])
             .args(arguments.split_whitespace())
@@ -54,7 +54,7 @@ impl Serve {
         self.errors.lock().expect("no thread panics").clone()
     }
 
-    fn waits_for(&self, words: &str) {
+    pub fn waits_for(&self, words: &str) {
         let begin = Instant::now();
         while !self.errors().contains(words) {
             assert!(begin.elapsed() < PATIENCE, "{words:?} not found in:\n{}", self.errors());
@@ -79,7 +79,7 @@ impl Drop for Serve {
     }
 }
 
-struct Client {
+pub struct Client {
     stream: TcpStream,
     received: Vec<u8>,
 }
@@ -91,7 +91,7 @@ impl Client {
         Self { stream, received: Vec::new() }
     }
 
-    fn new(serve: &Serve) -> Self {
+    pub fn new(serve: &Serve) -> Self {
         let mut client = Self::silent(serve);
         client.say("C\rS8\rO\r");
         for _ in 0..3 {
@@ -119,7 +119,7 @@ impl Client {
         }
     }
 
-    fn frame(&mut self, id: u16, data: &[u8]) {
+    pub fn frame(&mut self, id: u16, data: &[u8]) {
         let bytes: String = data.iter().map(|byte| format!("{byte:02X}")).collect();
         self.say(&format!("t{id:03X}{}{bytes}\r", data.len()));
     }
@@ -137,14 +137,14 @@ impl Client {
         }
     }
 
-    fn read(&mut self, node: u16, index: u16, sub: u8) -> u32 {
+    pub fn read(&mut self, node: u16, index: u16, sub: u8) -> u32 {
         let [low, high] = index.to_le_bytes();
         let [kind, _, _, _, a, b, c, d] = self.request(node, [0x40, low, high, sub, 0, 0, 0, 0]);
         assert_eq!(kind >> 5, 2, "{index:x}:{sub}");
         u32::from_le_bytes([a, b, c, d])
     }
 
-    fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {
+    pub fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
         let answer = self.request(node, [0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]);
         assert_eq!(answer[0], 0x60, "{index:x}:{sub}");
@@ -168,7 +168,7 @@ impl Client {
     }
 
     /// Takes the leg up to "switched on", or further to "operation enabled".
-    fn enable(&mut self, to: u32) {
+    pub fn enable(&mut self, to: u32) {
         for (word, state) in [(6, 0x21), (7, SWITCHED_ON), (15, ENABLED)] {
             [1, 2].into_iter().for_each(|node| self.write(node, 0x6040, 0, word, 2));
             self.until(state);
@@ -262,6 +262,29 @@ fn a_second_client_is_refused_a_silent_connection_blocks_no_client() {
     drop(client);
     serve.waits_for("the boards' plug is pulled");
     Client::new(&serve).until(OFF);
+}
+
+#[test]
+fn a_listener_hears_host_and_boards_and_disturbs_neither() {
+    let serve = Serve::new();
+    let mut client = Client::new(&serve);
+    let mut listener = Client::silent(&serve);
+    listener.say("C\rS8\rL\r");
+    for _ in 0..3 {
+        assert_eq!(listener.line().as_deref(), Some(""));
+    }
+    serve.waits_for("listens");
+    // Its own frames are refused.
+    listener.frame(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+    assert_eq!(client.state(1), OFF);
+    let lines = core::iter::from_fn(|| listener.line()).filter(|line| !line.starts_with("t7"));
+    let heard: Vec<String> = lines.take(3).collect();
+    assert_eq!(heard[..2], ["\u{7}", "t60184041600000000000"], "{heard:?}");
+    assert!(heard[2].starts_with("t58184B416000"), "{heard:?}");
+    drop(listener);
+    serve.waits_for("disconnected (end of the connection)");
+    assert_eq!(client.state(1), OFF);
+    assert!(!serve.errors().contains("plug is pulled"), "{}", serve.errors());
 }
 
 #[test]

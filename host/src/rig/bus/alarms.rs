@@ -13,7 +13,8 @@ pub struct Alarms {
 }
 
 /// Reason of a refused step, by its bit of 60FD.
-fn reason(bit: u8) -> &'static str {
+#[must_use]
+pub fn reason(bit: u8) -> &'static str {
     use RefusalReason as Reason;
     match bit {
         bit if bit == Reason::SwitchOpen as u8 => "the enabling switch is open",
@@ -57,6 +58,16 @@ impl Alarms {
         let new = fault.filter(|_| fault != self.fault);
         self.fault = fault;
         new.map(|code| format!("{} ({:#06x}): {}", code.name(), code.number(), code.words()))
+    }
+
+    /// Words of the active fault; `None` without one.
+    #[must_use]
+    pub fn active_fault(&self) -> Option<&'static str> {
+        let faults = || FaultCode::ALL.into_iter();
+        let words = |(_, code, _): &(u16, u16, [u8; 5])| {
+            faults().find(|fault| fault.number() == *code).map(FaultCode::words)
+        };
+        self.fault.map(FaultCode::words).or_else(|| self.active.iter().find_map(words))
     }
 
     /// Takes an emergency message. Returns its line, unless the fault or another node's message already gave

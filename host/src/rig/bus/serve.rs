@@ -100,6 +100,7 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
         let mut sent_by_boards = Vec::new();
         for _ in 0..due {
             adapter.tick(&mut network, Instant::now(), |sent| {
+                server.show(&sent.frame);
                 if sent.sender > 0 {
                     server.send(&sent.frame);
                     sent_by_boards.push(*sent);

@@ -1,8 +1,8 @@
-//! slcan over TCP for one client at a time.
+//! slcan over TCP for one client at a time, and for listeners.
 //!
 //! A connection becomes the client when it opens the channel, so a silent connection does not block others.
-//! While a client has the channel, another connection is refused with a line that gives the reason, and a
-//! bell.
+//! While a client has the channel, another connection that opens it is refused with a line that gives the
+//! reason, and a bell. Connections that open it to listen only receive every frame of the bus.
 
 use core::fmt::{Display, Formatter, Result as Formatted};
 use std::collections::VecDeque;
@@ -19,7 +19,8 @@ use crate::rig::bus::slcan::{BELL, DONE, Line, Received, TAKEN, encode};
 const MOST_UNREAD: usize = 1 << 22;
 /// Bytes read from a connection at once: several times what the bus carries until the next read.
 const MOST_AT_ONCE: usize = 4096;
-/// Limit of connections without a channel, and of refused ones. A further connection displaces the oldest.
+/// Limit of connections without a channel, of listeners, and of refused ones. A further connection displaces
+/// the oldest.
 const MOST_CONNECTIONS: usize = 8;
 /// Time for a refused connection to read the reason.
 const REFUSED_FOR: Duration = Duration::from_secs(1);
@@ -37,6 +38,10 @@ pub enum What {
     Opened,
     /// The client closed the channel; it may open the channel again.
     Closed,
+    /// Listens only from now on.
+    Listens,
+    /// Listened, and closed the channel.
+    Listened,
     /// Ended for this reason; `true` for the client's connection.
     Gone(&'static str, bool),
     /// Refused, because this client has the channel.
@@ -67,6 +72,8 @@ impl Display for Event {
             What::Connected => f.write_str("connected"),
             What::Opened => f.write_str("opened the channel"),
             What::Closed => f.write_str("closed the channel: the boards' plug is pulled"),
+            What::Listens => f.write_str("listens"),
+            What::Listened => f.write_str("listens no longer"),
             What::Gone(why, true) => write!(f, "disconnected ({why}): the boards' plug is pulled"),
             What::Gone(why, false) => write!(f, "disconnected ({why})"),
             What::Refused(client) => write!(f, "refused, {client} has the channel"),
@@ -88,6 +95,7 @@ pub struct Server {
     listener: TcpListener,
     client: Option<Connection>,
     waiting: VecDeque<Connection>,
+    listeners: VecDeque<Connection>,
     refused: VecDeque<(TcpStream, Instant)>,
     /// All bytes sent before this instant have been processed.
     drained: Instant,
@@ -135,6 +143,10 @@ impl Connection {
                     self.out.extend_from_slice(DONE);
                     return Err(What::Opened);
                 }
+                Some(Received::Listen) => {
+                    self.out.extend_from_slice(DONE);
+                    return Err(What::Listens);
+                }
                 Some(Received::Close) => {
                     self.out.extend_from_slice(DONE);
                     return Err(What::Closed);
@@ -175,6 +187,13 @@ fn set_up(stream: &TcpStream) -> std::io::Result<()> {
     Ok(())
 }
 
+/// Adds a connection; a full list loses its oldest one for this reason.
+fn push(list: &mut VecDeque<Connection>, connection: Connection, why: &'static str) -> Option<Event> {
+    let displaced = if list.len() >= MOST_CONNECTIONS { list.pop_front() } else { None };
+    list.push_back(connection);
+    displaced.map(|oldest| Event { peer: oldest.peer, what: What::Gone(why, false) })
+}
+
 impl Server {
     /// Listens at `address`; port 0 selects a free one.
     pub fn new(address: SocketAddr) -> std::io::Result<Self> {
@@ -184,6 +203,7 @@ impl Server {
             listener,
             client: None,
             waiting: VecDeque::new(),
+            listeners: VecDeque::new(),
             refused: VecDeque::new(),
             drained: Instant::now(),
         })
@@ -221,21 +241,11 @@ impl Server {
             if set_up(&stream).is_err() {
                 continue;
             }
-            if let Some(client) = &self.client {
-                let client = client.peer;
-                self.refuse(stream, client, now);
-                events.push(Event { peer, what: What::Refused(client) });
-                continue;
-            }
-            if self.waiting.len() >= MOST_CONNECTIONS
-                && let Some(oldest) = self.waiting.pop_front()
-            {
-                let what = What::Gone("too many connections without a channel", false);
-                events.push(Event { peer: oldest.peer, what });
-            }
             events.push(Event { peer, what: What::Connected });
             let (received, out) = (VecDeque::new(), Vec::new());
-            self.waiting.push_back(Connection { stream, peer, line: Line::default(), received, out });
+            let connection = Connection { stream, peer, line: Line::default(), received, out };
+            let displaced = push(&mut self.waiting, connection, "too many connections without a channel");
+            events.extend(displaced);
         }
         for _ in 0..self.waiting.len() {
             let Some(mut connection) = self.waiting.pop_front() else { break };
@@ -247,12 +257,28 @@ impl Server {
                     is_drained = false;
                     events.push(Event { peer, what: What::Opened });
                 }
+                Err(What::Listens) => {
+                    events.push(Event { peer, what: What::Listens });
+                    events.extend(push(&mut self.listeners, connection, "too many listeners"));
+                }
                 Err(what) => {
                     if let What::Refused(client) = what {
                         self.refuse(connection.stream, client, now);
                     }
                     events.push(Event { peer, what });
                 }
+            }
+        }
+        for _ in 0..self.listeners.len() {
+            let Some(mut listener) = self.listeners.pop_front() else { break };
+            let peer = listener.peer;
+            match listener.receive(None, |_| false) {
+                Ok(_) => self.listeners.push_back(listener),
+                Err(What::Closed) => {
+                    events.push(Event { peer, what: What::Listened });
+                    self.waiting.push_back(listener);
+                }
+                Err(what) => events.push(Event { peer, what }),
             }
         }
         if is_drained {
@@ -289,6 +315,13 @@ impl Server {
         }
     }
 
+    /// Shows a frame of the bus to the listeners.
+    pub fn show(&mut self, frame: &Frame) {
+        for listener in &mut self.listeners {
+            encode(frame, &mut listener.out);
+        }
+    }
+
     /// Sends pending bytes of all connections, as many as they accept.
     pub fn flush(&mut self) -> Vec<Event> {
         let mut events = Vec::new();
@@ -298,11 +331,13 @@ impl Server {
             events.push(Event { peer: client.peer, what: What::Gone(why, true) });
             self.client = None;
         }
-        self.waiting.retain_mut(|connection| {
-            let Err(why) = connection.flush() else { return true };
-            events.push(Event { peer: connection.peer, what: What::Gone(why, false) });
-            false
-        });
+        for connections in [&mut self.waiting, &mut self.listeners] {
+            connections.retain_mut(|connection| {
+                let Err(why) = connection.flush() else { return true };
+                events.push(Event { peer: connection.peer, what: What::Gone(why, false) });
+                false
+            });
+        }
         events
     }
 }

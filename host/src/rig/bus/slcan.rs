@@ -1,7 +1,8 @@
-//! Serial line protocol of CAN adapters (Lawicel, "slcan"), adapter side.
+//! Serial line protocol of CAN adapters (Lawicel, "slcan"): the adapter's side, and lines that it sends.
 //!
 //! ```text
-//! S0 .. S8, s...   bit rate        reply CR      O, L   open    CR      C   close   CR
+//! S0 .. S8, s...   bit rate        reply CR      O   open      CR      C   close   CR
+//!                                                L   listen    CR; a frame to be sent gets a bell
 //! tIIILDD..        frame           reply z CR; bell if the queue is full
 //! TIIIIIIIILDD..   29-bit frame    reply z CR; dropped
 //! rIIIL            remote frame    reply z CR; dropped
@@ -20,6 +21,8 @@ pub enum Received {
     Frame(Frame),
     /// Request to open the channel: [`DONE`], or a refusal.
     Open,
+    /// The channel was opened to listen only: [`DONE`].
+    Listen,
     /// The open channel was closed: [`DONE`].
     Close,
 }
@@ -40,6 +43,7 @@ pub struct Line {
     /// The line is too long; it is discarded up to the next CR.
     overlong: bool,
     is_open: bool,
+    listens_only: bool,
 }
 
 impl Line {
@@ -73,12 +77,12 @@ impl Line {
     fn execute(&mut self, line: &[u8]) -> Result<Received, &'static [u8]> {
         match line {
             [b'S' | b's', ..] if self.is_open => Err(BELL),
-            [b'O' | b'L'] if !self.is_open => {
-                self.is_open = true;
-                Ok(Received::Open)
+            [command @ (b'O' | b'L')] if !self.is_open => {
+                (self.is_open, self.listens_only) = (true, *command == b'L');
+                Ok(if self.listens_only { Received::Listen } else { Received::Open })
             }
             [b'C'] if self.is_open => {
-                self.is_open = false;
+                (self.is_open, self.listens_only) = (false, false);
                 Ok(Received::Close)
             }
             // Clients begin with a few empty lines.
@@ -87,6 +91,7 @@ impl Line {
             [b'v'] => Err(b"v1013\r"),
             [b'N'] => Err(b"N5CA2\r"),
             [b'F'] => Err(b"F00\r"),
+            [b't' | b'T' | b'r' | b'R', ..] if self.listens_only => Err(BELL),
             [b't', rest @ ..] if self.is_open => frame(rest).map(Received::Frame).ok_or(BELL),
             [b'T' | b'r' | b'R', ..] if self.is_open => Err(TAKEN),
             _ => Err(BELL),
@@ -96,6 +101,22 @@ impl Line {
 
 fn digit(byte: u8) -> Option<u16> {
     char::from(byte).to_digit(16).map(|digit| digit as u16)
+}
+
+/// Decodes a line of an adapter. `None` for an answer to a command, and for frames that this bus does not
+/// carry. A time stamp of four digits at the end is ignored.
+///
+/// # Errors
+/// What is wrong with the line.
+pub fn decode(line: &str) -> Result<Option<Frame>, String> {
+    let line = line.trim_matches(|letter: char| letter.is_ascii_control() || letter == ' ');
+    let Some(digits) = line.strip_prefix('t') else {
+        let is_answer = line.is_empty() || line.starts_with(['z', 'Z', 'V', 'v', 'N', 'F', 'T', 'r', 'R']);
+        return if is_answer { Ok(None) } else { Err(format!("the adapter says `{line}`")) };
+    };
+    let stamped = digits.len().checked_sub(4).and_then(|length| digits.get(..length));
+    let found = frame(digits.as_bytes()).or_else(|| frame(stamped?.as_bytes()));
+    found.map(Some).ok_or_else(|| format!("`{line}` is not a frame of slcan"))
 }
 
 /// Decodes `IIILDD..`.
@@ -137,7 +158,7 @@ mod tests {
                     frames.push(frame);
                     out.extend_from_slice(TAKEN);
                 }
-                Some(Received::Open | Received::Close) => out.extend_from_slice(DONE),
+                Some(Received::Open | Received::Listen | Received::Close) => out.extend_from_slice(DONE),
                 None => {}
             }
         }
@@ -156,6 +177,27 @@ mod tests {
         assert_eq!(text, b"t60184041600000000000\r");
         assert_eq!(exchange(&mut line, "C\r").1, "\r");
         assert!(!line.is_open());
+    }
+
+    #[test]
+    fn a_listener_sends_nothing_until_it_opens_the_channel_again() {
+        let mut line = Line::default();
+        assert_eq!(exchange(&mut line, "C\rS8\rL\rt0000\rr0012\r"), (Vec::new(), "\r\r\r\x07\x07".into()));
+        assert_eq!(exchange(&mut line, "C\rO\rt0000\r"), (vec![Frame::new(0, &[])], "\r\rz\r".into()));
+    }
+
+    #[test]
+    fn lines_of_an_adapter_are_frames_answers_or_refusals() {
+        let frame = Frame::new(0x181, &[0x37, 0x06]);
+        for line in ["t18123706", "t18123706\r", "\x07t18123706", "t18123706A1F0"] {
+            assert_eq!(decode(line), Ok(Some(frame)), "{line:?}");
+        }
+        for line in ["", "\r", "z\r", "V1013", "T000000010", "r1010"] {
+            assert_eq!(decode(line), Ok(None), "{line:?}");
+        }
+        for line in ["t18", "t1812370", "t8000", "#refused: 127.0.0.1:9 has the channel", "tä1"] {
+            assert!(decode(line).is_err(), "{line:?}");
+        }
     }
 
     #[test]
@@ -179,6 +221,12 @@ mod tests {
         for _ in 0..200_000 {
             let _ = line.receive(letters[random.below(letters.len() as u64) as usize], &mut out);
             out.clear();
+        }
+        for _ in 0..50_000 {
+            let length = random.below(30);
+            let line: Vec<u8> =
+                (0..length).map(|_| letters[random.below(letters.len() as u64) as usize]).collect();
+            let _ = decode(&String::from_utf8_lossy(&line));
         }
     }
 }

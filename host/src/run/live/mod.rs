@@ -5,8 +5,10 @@
 //! | [`clock`], [`picture`], [`progress`] | pace; samples, rows and estimates from logged samples |
 //! | [`simulated`] | a simulated leg that identifies itself |
 //! | [`playback`] | a recording, played back |
+//! | [`bus`] | legs on a CANopen bus, from the frames of a silent listener |
 //! | [`traced`] | the trace of a board, as it arrives or from a file |
 
+pub mod bus;
 pub mod clock;
 pub mod picture;
 pub mod playback;

@@ -48,31 +48,41 @@ impl<const N: usize> Sums<N> {
 /// Reports about one leg.
 pub struct Picture<'a, const N: usize> {
     leg: &'a LegFile,
-    out: &'a mut dyn FnMut(LiveUpdate),
+    out: &'a dyn Fn(LiveUpdate),
     stick: Stick,
     anatomy: [AnatomicalJoint<f64>; N],
     sums: Sums<N>,
     /// Whether torques come from currents by the leg's torque constants.
     has_currents: bool,
+    /// Place of the leg in the scene.
+    place: usize,
     /// Time of the reports, s: that of the last servo tick.
     pub time_s: f64,
 }
 
 impl<'a, const N: usize> Picture<'a, N> {
     /// Creates the reports of a leg, at time zero.
-    pub fn new(
-        leg: &'a LegFile,
-        anatomy: [AnatomicalJoint<f64>; N],
-        out: &'a mut dyn FnMut(LiveUpdate),
-    ) -> Self {
+    pub fn new(leg: &'a LegFile, anatomy: [AnatomicalJoint<f64>; N], out: &'a dyn Fn(LiveUpdate)) -> Self {
         let stick = Stick::of(leg);
-        Self { leg, out, stick, anatomy, sums: Sums::EMPTY, has_currents: true, time_s: 0.0 }
+        Self { leg, out, stick, anatomy, sums: Sums::EMPTY, has_currents: true, place: 0, time_s: 0.0 }
     }
 
     /// Reports currents as unknown.
     #[must_use]
     pub fn without_currents(self) -> Self {
         Self { has_currents: false, ..self }
+    }
+
+    /// Reports as the leg at this place of the scene.
+    #[must_use]
+    pub fn at(self, place: usize) -> Self {
+        Self { place, ..self }
+    }
+
+    /// Place of the leg in the scene.
+    #[must_use]
+    pub fn place(&self) -> usize {
+        self.place
     }
 
     /// Leg of the picture.
@@ -87,12 +97,12 @@ impl<'a, const N: usize> Picture<'a, N> {
     }
 
     /// Hands on a report.
-    pub fn send(&mut self, update: LiveUpdate) {
+    pub fn send(&self, update: LiveUpdate) {
         (self.out)(update);
     }
 
     /// Adds a line to the timeline.
-    pub fn note(&mut self, weight: Severity, words: impl Into<String>) {
+    pub fn note(&self, weight: Severity, words: impl Into<String>) {
         let time_s = rounded(self.time_s);
         self.send(LiveUpdate::Note(LiveNote { time_s, weight, words: words.into() }));
     }
@@ -106,7 +116,8 @@ impl<'a, const N: usize> Picture<'a, N> {
     }
 
     /// Adds a logged sample to the means and to the progress of the identification. In the motion to identify
-    /// from, least squares over the motion so far are reported each second.
+    /// from, least squares over the motion so far are reported each second. A torque that is not a number is
+    /// unknown.
     pub fn learn<const B: usize>(
         &mut self,
         logged: &LoggedSample<N>,
@@ -115,6 +126,9 @@ impl<'a, const N: usize> Picture<'a, N> {
         plan: Plan,
     ) {
         self.log(logged);
+        if !logged.sample.torque_nm.iter().all(|torque| torque.is_finite()) {
+            return;
+        }
         let Some(row) = progress.push(logged) else { return };
         self.row(&row);
         if progress.is_due() {
@@ -138,21 +152,23 @@ impl<'a, const N: usize> Picture<'a, N> {
         let sums = core::mem::replace(&mut self.sums, Sums::EMPTY);
         let angles = sums.angle.map(|sum| sum / f64::from(SAMPLES));
         let anatomical = |joint: usize, angle: f64| self.anatomy[joint].angle_from_chain(angle) as f32;
-        let torque: [f64; N] = core::array::from_fn(|joint| {
-            self.anatomy[joint].from_chain(sums.torque[joint] / f64::from(SAMPLES))
+        let torque: [Option<f64>; N] = core::array::from_fn(|joint| {
+            let torque = self.anatomy[joint].from_chain(sums.torque[joint] / f64::from(SAMPLES));
+            Some(torque).filter(|torque| torque.is_finite())
         });
         let commanded = |joint: usize| {
             (sums.ticks > 0).then(|| anatomical(joint, sums.commanded[joint] / f64::from(sums.ticks)))
         };
         let current = |joint: usize| {
-            self.has_currents.then(|| (torque[joint] / self.leg.joints[joint].torque_per_ampere) as f32)
+            let torque = torque[joint].filter(|_| self.has_currents)?;
+            Some((torque / self.leg.joints[joint].torque_per_ampere) as f32)
         };
         let sample = LiveSample {
-            leg: 0,
+            leg: self.place,
             time_s: rounded(self.time_s - HALF_PERIOD_S),
             angle_rad: (0..N).map(|joint| anatomical(joint, angles[joint])).collect(),
             commanded_rad: (0..N).map(commanded).collect(),
-            torque_nm: torque.iter().map(|torque| *torque as f32).collect(),
+            torque_nm: torque.iter().map(|torque| torque.map(|torque| torque as f32)).collect(),
             current_a: (0..N).map(current).collect(),
             points_m: self.stick.points(&angles),
         };
@@ -166,7 +182,7 @@ impl<'a, const N: usize> Picture<'a, N> {
         };
         let measured = row.measured.map(Some);
         let row = LiveRow {
-            leg: 0,
+            leg: self.place,
             time_s: rounded(self.time_s - HALF_SAMPLE_S - row.age_s),
             measured_nm: measured.iter().enumerate().filter_map(signed).collect(),
             predicted_nm: row.predicted.iter().enumerate().map(signed).collect(),
@@ -184,14 +200,14 @@ impl<'a, const N: usize> Picture<'a, N> {
             truth: base.truth,
         });
         let (time_s, values) = (rounded(self.time_s), values.collect());
-        self.send(LiveUpdate::Estimate(LiveEstimate { leg: 0, time_s, origin, iterations, values }));
+        self.send(LiveUpdate::Estimate(LiveEstimate { leg: self.place, time_s, origin, iterations, values }));
     }
 
     /// Reports the end of a run.
     pub fn conclude(&mut self, report: &RunReport) {
         self.estimate(EstimateOrigin::Result, report.bso.iterations, &report.base_parameters);
         self.send(LiveUpdate::Outcome(LiveOutcome {
-            leg: 0,
+            leg: self.place,
             verdict: report.verdict.into(),
             validated: report.validated,
             reasons: report.reasons.iter().map(|reason| (*reason).into()).collect(),

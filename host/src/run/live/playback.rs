@@ -5,8 +5,8 @@
 //! samples played so far; those of the held-out part use the result.
 
 use scarab::ident::{Plan, SAMPLE_RATE_HZ};
-use scarab::leg::{LoggedSample, Segment, Stribeck};
-use scarab::model::{AnatomicalJoint, Parameter};
+use scarab::leg::{LoggedSample, Segment};
+use scarab::model::AnatomicalJoint;
 use scarab::servo::{LogSample, SERVO_RATE_HZ, TICKS_PER_LOG};
 
 use crate::base::error::ToolError;
@@ -35,7 +35,7 @@ pub fn play<const N: usize, const B: usize>(
     recordings: &Recordings,
     options: &ReplayOptions,
     speed: f64,
-    out: &mut dyn FnMut(LiveUpdate),
+    out: &dyn Fn(LiveUpdate),
 ) -> Result<RunReport, ToolError> {
     let none = || ToolError::input("no recording to be played");
     let recording = recordings.training.first().ok_or_else(none)?.recording.clone();
@@ -112,24 +112,18 @@ impl<const N: usize, const B: usize> Player<'_, N, B> {
 
     /// Predicts with the result of the replay from now on.
     fn use_result(&mut self) {
-        let mut model = self.background.device.clone();
-        let values: [f32; B] = core::array::from_fn(|base| {
-            let name = self.background.base_name(base);
-            let found = self.report.base_parameters.iter().find(|found| found.name == name);
-            found.and_then(|found| found.value.known()).unwrap_or(0.0) as f32
+        let report = self.report;
+        let value = |name: &str| {
+            report
+                .base_parameters
+                .iter()
+                .find(|found| found.name == name)
+                .and_then(|found| found.value.known())
+        };
+        let curves = report.stribeck.iter().filter_map(|found| {
+            Some((found.joint - 1, found.surplus_nm.known()?, found.speed_rad_s.known()?))
         });
-        for found in &self.report.stribeck {
-            let joint = found.joint - 1;
-            let coulomb = model.drive(joint, Parameter::FC).map_or(0.0, |base| f64::from(values[base]));
-            let curve = (found.surplus_nm.known(), found.speed_rad_s.known());
-            if let (Some(surplus), Some(speed)) = curve
-                && coulomb > 0.0
-                && let Some(slot) = model.stribeck.get_mut(joint)
-            {
-                *slot = Stribeck { excess: (surplus / coulomb).max(0.0) as f32, velocity: speed as f32 };
-            }
-        }
-        self.progress.use_result(&model, &values);
+        self.progress.use_named(&self.background, value, curves);
         self.picture.estimate(
             EstimateOrigin::Candidate,
             self.report.bso.iterations,
@@ -155,6 +149,7 @@ impl<const N: usize, const B: usize> Player<'_, N, B> {
             limits: None,
             speed: self.clock.measured,
             processor: String::new(),
+            bus: String::new(),
         };
         self.picture.send(LiveUpdate::Status(status));
     }

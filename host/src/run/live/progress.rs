@@ -8,9 +8,11 @@ use scarab::ident::{
     Ends, Estimate, Estimator, FilteredRows, Filters, LARGEST_STILL_SHARE, MotionWindow, Plan, Problem,
     Recorder, RowModel, SAMPLE_RATE_HZ, no_stribeck,
 };
-use scarab::leg::{LoggedSample, Segment};
+use scarab::leg::{LoggedSample, Segment, Stribeck};
+use scarab::model::Parameter;
 
 use crate::base::error::ToolError;
+use crate::leg::background::Background;
 use crate::report::live::RATE_HZ;
 
 /// Reserved filter taps: bandwidths from 1 Hz.
@@ -121,5 +123,27 @@ impl<const N: usize, const B: usize> Progress<N, B> {
     pub fn use_result(&mut self, model: &RowModel<f32, N, B>, values: &[f32; B]) {
         self.model = model.clone();
         self.values = Some(*values);
+    }
+
+    /// Predicts with base values by name from now on, unknown ones zero, and with Stribeck curves: joint from
+    /// 0, surplus in N m, speed in rad/s.
+    pub fn use_named(
+        &mut self,
+        background: &Background<N, B>,
+        value: impl Fn(&str) -> Option<f64>,
+        curves: impl Iterator<Item = (usize, f64, f64)>,
+    ) {
+        let mut model = background.device.clone();
+        let values: [f32; B] =
+            core::array::from_fn(|base| value(&background.base_name(base)).unwrap_or(0.0) as f32);
+        for (joint, surplus, speed) in curves {
+            let coulomb = model.drive(joint, Parameter::FC).map_or(0.0, |base| f64::from(values[base]));
+            if coulomb > 0.0
+                && let Some(slot) = model.stribeck.get_mut(joint)
+            {
+                *slot = Stribeck { excess: (surplus / coulomb).max(0.0) as f32, velocity: speed as f32 };
+            }
+        }
+        self.use_result(&model, &values);
     }
 }

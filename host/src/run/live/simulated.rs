@@ -45,7 +45,7 @@ pub fn identify<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &SimulationOptions,
     live: &LiveOptions,
-    out: &mut dyn FnMut(LiveUpdate),
+    out: &dyn Fn(LiveUpdate),
 ) -> Result<RunReport, ToolError> {
     let source = format!("simulated leg, {} drives, seed {}", options.drive.name(), options.seed);
     out(LiveUpdate::Scene(scene(leg, source, live.speed)));
@@ -212,6 +212,7 @@ impl<'a, const N: usize, const B: usize> Watched<'a, N, B> {
             limits: Some(named.collect()),
             speed: self.clock.measured,
             processor: String::new(),
+            bus: String::new(),
         };
         self.picture.send(LiveUpdate::Status(status));
     }

@@ -48,7 +48,7 @@ pub struct TraceInput {
 pub fn follow<const N: usize, const B: usize>(
     leg: &LegFile,
     source: TraceInput,
-    out: &mut dyn FnMut(LiveUpdate),
+    out: &dyn Fn(LiveUpdate),
 ) -> Result<Option<RunReport>, ToolError> {
     let TraceInput { mut input, mut reader, name, speed } = source;
     let background = background::<N, B>(leg, PriorChoice::Default, 0)?;
@@ -63,6 +63,7 @@ pub fn follow<const N: usize, const B: usize>(
         events: 0,
         results: 0,
         state: None,
+        processor: String::new(),
         last_logged: None,
         report: None,
     };
@@ -117,6 +118,8 @@ struct Follower<'a, const N: usize, const B: usize> {
     events: usize,
     results: usize,
     state: Option<State>,
+    /// Load of the board's processor, as last reported.
+    processor: String,
     last_logged: Option<u32>,
     report: Option<RunReport>,
 }
@@ -131,10 +134,15 @@ impl<const N: usize, const B: usize> Follower<'_, N, B> {
             self.event(event);
         }
         self.events = trace.events.len();
-        if trace.state != self.state
+        let processor = trace.statistics.lines().into_iter().next().unwrap_or_default();
+        let is_new = trace.state != self.state;
+        if (is_new || processor != self.processor)
             && let Some(state) = trace.state.clone()
         {
-            self.at(state.tick);
+            if is_new {
+                self.at(state.tick);
+            }
+            self.processor = processor;
             self.status(&state, trace);
             self.state = Some(state);
         }
@@ -210,7 +218,8 @@ impl<const N: usize, const B: usize> Follower<'_, N, B> {
             fault: Some(fault.unwrap_or_default()),
             limits: None,
             speed: self.clock.as_ref().map_or(Number::UNKNOWN, |clock| clock.measured),
-            processor: trace.statistics.lines().into_iter().next().unwrap_or_default(),
+            processor: self.processor.clone(),
+            bus: String::new(),
         };
         self.picture.send(LiveUpdate::Status(status));
     }

@@ -187,3 +187,11 @@ pub fn read(lines: &[String]) -> Trace {
     trace.finish();
     trace
 }
+
+/// Not a test: `scripts/render-live` draws the page of this trace.
+#[test]
+#[ignore = "writes the file SCARAB_TRACE_FILE"]
+fn trace_for_the_picture() {
+    let path = std::env::var("SCARAB_TRACE_FILE").expect("the name of a file");
+    std::fs::write(path, text(accepted())).expect("a file");
+}

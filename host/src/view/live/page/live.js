@@ -230,6 +230,8 @@ function showStatus(leg) {
     const speed = status.speed === null ? "" : `, ${status.speed.toFixed(status.speed < 10 ? 1 : 0)} of ${model.scene.speed} times real time`;
     setText("time", `${status.time_s.toFixed(1)} s${speed}, run ${status.run}`);
     setText("processor", status.processor || UNKNOWN);
+    at("wire").hidden = status.bus === "";
+    setText("bus", status.bus);
 }
 
 function showJoints(leg) {

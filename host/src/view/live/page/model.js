@@ -178,7 +178,7 @@ class Model {
             }
         }
         for (const status of parts.status) {
-            texts(status, ["drive", "doing", "waits_for", "not_enabled", "processor"], "a status");
+            texts(status, ["drive", "doing", "waits_for", "not_enabled", "processor", "bus"], "a status");
             need(status.fault === null || isText(status.fault), "fault is not a text");
             need(status.limits === null || (Array.isArray(status.limits) && status.limits.every(isText)), "limits are not texts");
             need([status.left_s, status.speed, status.run].every(isKnown), "a status has no numbers");
