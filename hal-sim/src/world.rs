@@ -1,4 +1,4 @@
-//! World: a leg with drives, sensors and wearer as one seeded value.
+//! World: a leg with drives, sensors and disturbances as one seeded value.
 //!
 //! Why one value: a test runs the firmware against a world, clones both at any time, lets the copies continue
 //! differently, and compares copies bit for bit. A world contains no clock, no file and no shared state. The
@@ -18,8 +18,8 @@ use crate::end_stop;
 use crate::floor::Floor;
 use crate::grip::Grip;
 use crate::leg::{Leg, LegState};
+use crate::pushes::Pushes;
 use crate::sensors::{CurrentSensor, Encoder};
-use crate::wearer::Wearer;
 use periods::{Electric, PERIODS_PER_TICK};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -65,7 +65,7 @@ pub struct World<const N: usize> {
     current_sensors: [CurrentSensor; N],
     /// Direction of motors and encoders relative to the anatomical one, 1 or -1.
     mounting: f64,
-    wearer: Wearer,
+    pushes: Pushes,
     blocked: [bool; N],
     floor: Option<Floor>,
     grip: Option<Grip>,
@@ -81,9 +81,9 @@ impl<const N: usize> World<N> {
     pub fn new(description: &LegDescription<N>, seed: u64) -> Self {
         let joints = &description.joints;
         let sensor_noise = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut pushes = sensor_noise.clone();
-        pushes.jump();
-        let mut sensor_faults = pushes.clone();
+        let mut push_instants = sensor_noise.clone();
+        push_instants.jump();
+        let mut sensor_faults = push_instants.clone();
         sensor_faults.jump();
         let mut world = Self {
             description: *description,
@@ -95,7 +95,7 @@ impl<const N: usize> World<N> {
             encoders: joints.map(|joint| Encoder::new(&joint.encoder)),
             current_sensors: joints.map(|joint| CurrentSensor::new(&joint.current_sensor)),
             mounting: if description.mirrored { -1.0 } else { 1.0 },
-            wearer: Wearer::new(description.pushes, N, pushes),
+            pushes: Pushes::new(description.pushes, N, push_instants),
             blocked: [false; N],
             floor: None,
             grip: None,
@@ -164,12 +164,12 @@ impl<const N: usize> World<N> {
     /// Changes the wearer's pushes from now on; `None` stops them.
     pub fn set_pushes(&mut self, pushes: Option<PushDescription>) {
         self.description.pushes = pushes;
-        self.wearer.change_habits(pushes, self.tick as f64 * TICK_S, N);
+        self.pushes.change_habits(pushes, self.tick as f64 * TICK_S, N);
     }
 
     /// Lets the wearer push or kick once from now on: half a sine on one joint, peak in N m, anatomical.
     pub fn push(&mut self, joint: usize, peak: f64, duration: f64) {
-        self.wearer.push(joint, peak, self.tick as f64 * TICK_S, duration);
+        self.pushes.push(joint, peak, self.tick as f64 * TICK_S, duration);
     }
 
     /// Lets a hand hold a joint at its present angle ([`Grip`]) for `duration` s, with at most `strength` N
@@ -207,8 +207,8 @@ impl<const N: usize> World<N> {
             return self.read_sensors();
         }
         let gripped = self.gripped(self.tick as f64 * TICK_S);
-        let pushes: [f64; N] = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
-        let pushed: [f64; N] = core::array::from_fn(|joint| pushes[joint] + gripped[joint]);
+        let pulse: [f64; N] = self.pushes.torque((self.tick as f64 + 0.5) * TICK_S);
+        let pushed: [f64; N] = core::array::from_fn(|joint| pulse[joint] + gripped[joint]);
         let stood: [f64; N] = match &mut self.floor {
             Some(floor) => floor.torque(self.leg.mechanism(), &self.state, self.tick as f64 * TICK_S),
             None => [0.0; N],

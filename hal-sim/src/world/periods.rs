@@ -95,7 +95,7 @@ impl<const N: usize> World<N> {
         let (gripped, stopped) = (self.gripped(now), self.stopped());
         let Some(electric) = &mut self.electric else { return [AxisSample::default(); N] };
         if electric.period == 0 {
-            electric.pushed = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
+            electric.pushed = self.pushes.torque((self.tick as f64 + 0.5) * TICK_S);
         }
         let (anatomy, state, mounting) = (&self.anatomy, &mut self.state, self.mounting);
         let stood = match &mut self.floor {

@@ -5,9 +5,9 @@
 //! ```
 //!
 //! Pauses between pushes are exponential with the mean 1 / rate, and peaks uniform in -torque..=torque.
-//! Durations are uniform in half to one and a half of the mean, joints equally likely. The generator is the
-//! wearer's own, so sensor noise does not change with the pushes.
-//! Known limits: no stiffness, no intention, one joint at a time.
+//! Durations are uniform in half to one and a half of the mean, joints equally likely. The generator is their
+//! own, so sensor noise does not change with the pushes.
+//! Known limits: no body, no stiffness, one joint at a time.
 
 use crate::description::PushDescription;
 use crate::maths::{ln, sin_cos};
@@ -23,21 +23,21 @@ struct Push {
     joint: usize,
 }
 
-/// A wearer with occasional pushes, or without.
+/// Pushes of a wearer, past and planned.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wearer {
+pub struct Pushes {
     habits: Option<PushDescription>,
     next: Option<Push>,
     generator: Xoshiro256PlusPlus,
 }
 
-impl Wearer {
-    /// A wearer at time 0, with a random generator of its own.
+impl Pushes {
+    /// Pushes from time 0 on, with a random generator of their own; none without habits.
     #[must_use]
     pub fn new(habits: Option<PushDescription>, joints: usize, generator: Xoshiro256PlusPlus) -> Self {
-        let mut wearer = Self { habits, next: None, generator };
-        wearer.plan(0.0, joints);
-        wearer
+        let mut pushes = Self { habits, next: None, generator };
+        pushes.plan(0.0, joints);
+        pushes
     }
 
     /// Changes rate and strength of the pushes from this time (s) on; a push in progress ends.
