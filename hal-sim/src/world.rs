@@ -10,6 +10,7 @@
 //! All public angles and torques are anatomical.
 
 pub mod periods;
+mod worn;
 
 use crate::conventions::{Anatomy, links_at_reference};
 use crate::description::{LegDescription, PushDescription};
@@ -20,6 +21,7 @@ use crate::grip::Grip;
 use crate::leg::{Leg, LegState};
 use crate::pushes::Pushes;
 use crate::sensors::{CurrentSensor, Encoder};
+use crate::wearer::Wearer;
 use periods::{Electric, PERIODS_PER_TICK};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -43,7 +45,8 @@ pub struct Truth<const N: usize> {
     pub position: [f64; N],
     /// Joint rates, rad/s; exactly 0 while a joint sticks.
     pub velocity: [f64; N],
-    /// Joint accelerations, rad/s^2, under the present motor torque; without pushes and floor.
+    /// Joint accelerations, rad/s^2, under the present torque of motors and of a wearer's cuffs; without
+    /// pushes and floor.
     pub acceleration: [f64; N],
     /// Torque of the motors at the joints, N m.
     pub motor_torque: [f64; N],
@@ -66,6 +69,8 @@ pub struct World<const N: usize> {
     /// Direction of motors and encoders relative to the anatomical one, 1 or -1.
     mounting: f64,
     pushes: Pushes,
+    /// Wearer with a body of their own, if any.
+    wearer: Option<Wearer>,
     blocked: [bool; N],
     floor: Option<Floor>,
     grip: Option<Grip>,
@@ -96,6 +101,7 @@ impl<const N: usize> World<N> {
             current_sensors: joints.map(|joint| CurrentSensor::new(&joint.current_sensor)),
             mounting: if description.mirrored { -1.0 } else { 1.0 },
             pushes: Pushes::new(description.pushes, N, push_instants),
+            wearer: None,
             blocked: [false; N],
             floor: None,
             grip: None,
@@ -108,13 +114,18 @@ impl<const N: usize> World<N> {
         world
     }
 
-    /// Sets the leg at rest at anatomical angles, rad; the encoders' reference does not change.
+    /// Sets the leg, and its wearer if any, at rest at anatomical angles, rad. The encoders' reference does
+    /// not change.
     pub fn place(&mut self, position: &[f64; N]) {
         let anatomy = &self.anatomy;
         self.state = LegState {
             angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(position[joint])),
             rates: [0.0; N],
         };
+        let now = self.time();
+        if let Some(wearer) = &mut self.wearer {
+            wearer.place(&self.state, now);
+        }
         if let Some(electric) = &mut self.electric {
             electric.place(&position.map(|angle| self.mounting * angle));
         }
@@ -206,6 +217,7 @@ impl<const N: usize> World<N> {
             }
             return self.read_sensors();
         }
+        self.decide_muscles();
         let gripped = self.gripped(self.tick as f64 * TICK_S);
         let pulse: [f64; N] = self.pushes.torque((self.tick as f64 + 0.5) * TICK_S);
         let pushed: [f64; N] = core::array::from_fn(|joint| pulse[joint] + gripped[joint]);
@@ -222,7 +234,7 @@ impl<const N: usize> World<N> {
             drive.advance();
         }
         let to = with_floor(self.joint_torque(&pushed));
-        self.leg.advance(&mut self.state, &from, &to, TICK_S);
+        worn::advance(&self.leg, &mut self.wearer, &mut self.state, [&from, &to], TICK_S);
         self.tick += 1;
         self.read_sensors();
     }
@@ -268,7 +280,12 @@ impl<const N: usize> World<N> {
     #[must_use]
     pub fn truth(&self) -> Truth<N> {
         let (anatomy, state) = (&self.anatomy, &self.state);
-        let acceleration = self.leg.forward_dynamics(state, &self.joint_torque(&[0.0; N]));
+        let mut torque = self.joint_torque(&[0.0; N]);
+        if let Some(wearer) = &self.wearer {
+            let interaction: [f64; N] = wearer.interaction(state);
+            torque = core::array::from_fn(|joint| torque[joint] + interaction[joint]);
+        }
+        let acceleration = self.leg.forward_dynamics(state, &torque);
         Truth {
             time_s: self.tick as f64 * TICK_S,
             position: core::array::from_fn(|joint| anatomy[joint].to_anatomical_angle(state.angles[joint])),
