@@ -25,8 +25,10 @@
 //! terms). Cuffs act at the positions of the interval's middle, so the elastic step is symmetric in time and
 //! the energy does not drift. Dampers act at the mean of old and new rates, found by a second pass. A step
 //! turns the fastest motion of the cuffs by at most [`LARGEST_PHASE`]. A step in which a joint of the
-//! exoskeleton starts, stops or reverses is repeated in [`FINE_STEPS`] parts. Cost without dampers: one
-//! evaluation of both bodies a step, with dampers two.
+//! exoskeleton starts, stops or reverses is repeated in [`FINE_STEPS`] parts.
+//!
+//! Cost: one evaluation of both bodies a step, two with dampers. A servo tick with a wearer takes about five
+//! times as long as one without (1.2 us instead of 0.23 us on a server's core).
 //!
 //! Known limits: one vertical plane; the trunk is fixed and no foot touches the ground, so motions are those
 //! of a leg in the air: swinging, seated or hanging. The wearer's joints have no end stops. Floor, pushes and
@@ -50,7 +52,7 @@ use cuff::{Cuff, CuffLoad};
 use description::{WearerDescription, WearerError};
 use motion::Intended;
 use muscles::{Intention, Muscles};
-use plane::{ExoskeletonPlane, LimbSegment, Pair, dot, other_angles, other_torques};
+use plane::{ExoskeletonPlane, LimbSegment, Pair, convert_angles, convert_torques, dot};
 
 /// Largest phase of the cuffs' fastest motion in a step, rad. The energy of that motion errs by at most an
 /// eighth of its square.
@@ -68,7 +70,7 @@ pub struct WearerTruth {
     pub velocity: [f64; 2],
     /// Their accelerations, rad/s^2.
     pub acceleration: [f64; 2],
-    /// IntendedMotion that the wearer intended in the last servo tick; `None` while limp.
+    /// Motion that the wearer intended in the last servo tick; `None` while limp.
     pub intended: Option<Intended>,
     /// Torque of the muscles in the last servo tick, N m.
     pub muscle_torque: [f64; 2],
@@ -168,17 +170,19 @@ impl Wearer {
         Ok(worn)
     }
 
-    /// Upper bound of the rates with which the cuffs make the bodies vibrate or settle, rad/s, over all knee
-    /// angles: the trace of stiffness (or damping) times mobility bounds the largest eigenvalue.
+    /// Upper bound of the rates with which the cuffs make the bodies vibrate or settle, rad/s, at nine knee
+    /// angles from 0 to half a turn: the trace of stiffness (or damping) times mobility bounds the largest
+    /// eigenvalue. NaN for a massless exoskeleton.
     fn fastest_motion<const N: usize>(&self, leg: &Leg<N>) -> f64 {
-        let columns = [[1.0, 0.0], [0.0, 1.0]].map(|unit| self.plane.flipped(other_angles(unit)));
+        let columns = [[1.0, 0.0], [0.0, 1.0]].map(|unit| self.plane.flipped(convert_angles(unit)));
         (0..=8)
             .map(|eighth| {
-                let angles = other_angles([0.0, f64::from(eighth) * PI / 8.0]);
+                let angles = convert_angles([0.0, f64::from(eighth) * PI / 8.0]);
                 let joints = self.joint_angles(angles);
-                let matrix = leg.mechanism().dynamics(&each(joints), &[0.0; N]).inertia;
-                let of_exoskeleton =
-                    columns.map(|row| columns.map(|column| dot(row, two(&times(&matrix, &each(column))))));
+                let matrix = leg.mechanism().dynamics(&as_first_two(joints), &[0.0; N]).inertia;
+                let of_exoskeleton = columns.map(|row| {
+                    columns.map(|column| dot(row, first_two(&times(&matrix, &as_first_two(column)))))
+                });
                 let of_wearer = self.body.inertia(angles);
                 let bodies = [(&self.plane.chain, &of_exoskeleton), (&self.body.chain, &of_wearer)];
                 let (mut squared, mut settling) = (0.0, 0.0);
@@ -190,7 +194,7 @@ impl Wearer {
                 }
                 sqrt(squared) + settling
             })
-            .fold(0.0, |largest, rate| if rate <= largest { largest } else { rate })
+            .fold(0.0, |largest, rate| if rate > largest || rate.is_nan() { rate } else { largest })
     }
 
     /// Begins an intention at the present posture and time (s).
@@ -201,33 +205,33 @@ impl Wearer {
         if let Intention::Follow(motion) = &intention {
             motion.check()?;
         }
-        self.muscles.intend(intention, other_angles(self.limb.angles), now);
+        self.muscles.intend(intention, convert_angles(self.limb.angles), now);
         Ok(())
     }
 
     /// Sets the wearer at rest at the exoskeleton's posture, where the present intention begins again.
     pub(crate) fn place<const N: usize>(&mut self, state: &LegState<N>, now: f64) {
         self.limb = LimbState { angles: self.exoskeleton(state).angles, rates: [0.0; 2] };
-        self.muscles.restart(other_angles(self.limb.angles), now);
+        self.muscles.restart(convert_angles(self.limb.angles), now);
     }
 
     /// Decides the muscles' torque of the servo tick that begins now (s).
     pub(crate) fn decide(&mut self, tick: u64, now: f64) {
-        let (position, velocity) = (other_angles(self.limb.angles), other_angles(self.limb.rates));
+        let (position, velocity) = (convert_angles(self.limb.angles), convert_angles(self.limb.rates));
         self.muscles.decide(&self.body, tick, now, position, velocity);
     }
 
     /// Joint (D-H) angles of the exoskeleton at directions of its segments.
     fn joint_angles(&self, angles: Pair) -> Pair {
-        let position = other_angles(angles);
+        let position = convert_angles(angles);
         [0, 1].map(|joint| self.plane.anatomy[joint].to_joint_angle(position[joint]))
     }
 
     /// Directions of the exoskeleton's segments.
     fn exoskeleton<const N: usize>(&self, state: &LegState<N>) -> LimbState {
         LimbState {
-            angles: other_angles(self.plane.position(two(&state.angles))),
-            rates: other_angles(self.plane.flipped(two(&state.rates))),
+            angles: convert_angles(self.plane.position(first_two(&state.angles))),
+            rates: convert_angles(self.plane.flipped(first_two(&state.rates))),
         }
     }
 
@@ -238,7 +242,7 @@ impl Wearer {
     /// Interaction torque at a state of the exoskeleton, N m, joint (D-H) sign.
     pub(crate) fn interaction<const N: usize>(&self, state: &LegState<N>) -> [f64; N] {
         let loads = self.loads(&self.exoskeleton(state), &self.limb);
-        each(self.plane.flipped(other_torques(sum(loads.map(|load| load.on_exoskeleton)))))
+        as_first_two(self.plane.flipped(convert_torques(sum(loads.map(|load| load.on_exoskeleton)))))
     }
 
     /// Advances both bodies by `duration` s under a torque of motors and surroundings (N m, joint sign) that
@@ -285,23 +289,23 @@ impl Wearer {
         let half = 0.5 * duration;
         let before = [self.exoskeleton(state), self.limb];
         let mut middle =
-            before.map(|body| LimbState { angles: along(body.angles, half, body.rates), ..body });
+            before.map(|body| LimbState { angles: extrapolated(body.angles, half, body.rates), ..body });
         let passes = if self.is_damped { 2 } else { 1 };
         let mut step = CoupledStep { exoskeleton: *state, limb: self.limb, ledger: self.ledger };
         let mut loads = [CuffLoad::default(); 2];
         let muscle = self.muscles.torque();
         for _ in 0..passes {
             loads = self.loads(&middle[0], &middle[1]);
-            let on_exoskeleton = other_torques(sum(loads.map(|load| load.on_exoskeleton)));
-            let cuffs: [f64; N] = each(self.plane.flipped(on_exoskeleton));
+            let on_exoskeleton = convert_torques(sum(loads.map(|load| load.on_exoskeleton)));
+            let cuffs: [f64; N] = as_first_two(self.plane.flipped(on_exoskeleton));
             let acting = core::array::from_fn(|joint| torque[joint] + cuffs[joint]);
             step.exoskeleton = leg.step(state, &acting, duration);
-            let elastic = self.body.elastic(other_angles(middle[1].angles));
-            let damping = self.body.damping(other_angles(middle[1].rates));
-            let own = other_torques([0, 1].map(|joint| muscle[joint] + elastic[joint] + damping[joint]));
+            let elastic = self.body.elastic(convert_angles(middle[1].angles));
+            let damping = self.body.damping(convert_angles(middle[1].rates));
+            let own = convert_torques([0, 1].map(|joint| muscle[joint] + elastic[joint] + damping[joint]));
             let forces = sum([own, sum(loads.map(|load| load.on_wearer))]);
             let rates = self.body.rates_after(middle[1].angles, before[1].rates, forces, duration);
-            step.limb = LimbState { angles: along(middle[1].angles, half, rates), rates };
+            step.limb = LimbState { angles: extrapolated(middle[1].angles, half, rates), rates };
             let after = self.exoskeleton(&step.exoskeleton);
             middle[0].rates = sum([before[0].rates, after.rates]).map(|rate| 0.5 * rate);
             middle[1].rates = sum([before[1].rates, rates]).map(|rate| 0.5 * rate);
@@ -313,7 +317,7 @@ impl Wearer {
             ledger.received[number] += duration * dot(load.on_wearer, middle[1].rates);
             ledger.dissipated[number] += duration * load.dissipated;
         }
-        let velocity = other_angles(middle[1].rates);
+        let velocity = convert_angles(middle[1].rates);
         ledger.muscle_work += duration * dot(muscle, velocity);
         ledger.passive_loss -= duration * dot(self.body.damping(velocity), velocity);
         step
@@ -323,20 +327,20 @@ impl Wearer {
     pub(crate) fn truth<const N: usize>(&self, state: &LegState<N>) -> WearerTruth {
         let limb = &self.limb;
         let loads = self.loads(&self.exoskeleton(state), limb);
-        let (position, velocity) = (other_angles(limb.angles), other_angles(limb.rates));
+        let (position, velocity) = (convert_angles(limb.angles), convert_angles(limb.rates));
         let (elastic, damping) = (self.body.elastic(position), self.body.damping(velocity));
         let (muscle, passive) = (self.muscles.torque(), sum([elastic, damping]));
         let on_wearer = sum(loads.map(|load| load.on_wearer));
-        let forces = sum([on_wearer, other_torques(sum([muscle, passive]))]);
+        let forces = sum([on_wearer, convert_torques(sum([muscle, passive]))]);
         WearerTruth {
             position,
             velocity,
-            acceleration: other_angles(self.body.accelerations(limb, forces)),
+            acceleration: convert_angles(self.body.accelerations(limb, forces)),
             intended: self.muscles.intended(),
             muscle_torque: muscle,
             passive_torque: passive,
-            interaction_torque: other_torques(sum(loads.map(|load| load.on_exoskeleton))),
-            reaction_torque: other_torques(on_wearer),
+            interaction_torque: convert_torques(sum(loads.map(|load| load.on_exoskeleton))),
+            reaction_torque: convert_torques(on_wearer),
             cuffs: [0, 1].map(|number| {
                 let load = &loads[number];
                 CuffTruth {
@@ -357,12 +361,12 @@ impl Wearer {
 }
 
 /// First two of `N` values; 0 for a missing one.
-fn two<const N: usize>(values: &[f64; N]) -> Pair {
+fn first_two<const N: usize>(values: &[f64; N]) -> Pair {
     [0, 1].map(|number: usize| values.get(number).copied().unwrap_or(0.0))
 }
 
 /// The two values as the first of `N`.
-fn each<const N: usize>(values: Pair) -> [f64; N] {
+fn as_first_two<const N: usize>(values: Pair) -> [f64; N] {
     core::array::from_fn(|number| values.get(number).copied().unwrap_or(0.0))
 }
 
@@ -371,6 +375,6 @@ fn sum([one, other]: [Pair; 2]) -> Pair {
 }
 
 /// Angles after some seconds at constant rates.
-fn along(angles: Pair, seconds: f64, rates: Pair) -> Pair {
+fn extrapolated(angles: Pair, seconds: f64, rates: Pair) -> Pair {
     [angles[0] + seconds * rates[0], angles[1] + seconds * rates[1]]
 }

@@ -8,13 +8,13 @@
 //! passive torque at a joint = -K (a - rest) - D a'
 //! ```
 //!
-//! LimbSegment i has mass m_i, inertia I_i about its centre of mass c_i = [x_i, y_i], and direction p_i; L is the
+//! Segment i has mass m_i, inertia I_i about its centre of mass c_i = [x_i, y_i], and direction p_i; L is the
 //! length of the thigh. With directions instead of joint angles there is no Coriolis term, only two
 //! centrifugal ones. [`super::plane`] has the conversions. SI units.
 //! Source: any text on analytical mechanics, double pendulum.
 
 use super::description::{PassiveDescription, SegmentDescription, WearerDescription};
-use super::plane::{LimbSegment, Pair, TwoLinkChain, dot, other_angles, other_torques};
+use super::plane::{LimbSegment, Pair, TwoLinkChain, convert_angles, convert_torques, dot};
 use crate::maths::sin_cos;
 use crate::mechanism::times;
 
@@ -93,7 +93,7 @@ impl Body {
 
     /// Torque of the muscles at hip and knee for a motion of the free limb: rad, rad/s, rad/s^2 to N m.
     pub(super) fn inverse_dynamics(&self, position: Pair, velocity: Pair, acceleration: Pair) -> Pair {
-        let [angles, rates, accelerations] = [position, velocity, acceleration].map(other_angles);
+        let [angles, rates, accelerations] = [position, velocity, acceleration].map(convert_angles);
         let slope = self.coupling(angles)[1];
         let inertial = times(&self.inertia(angles), &accelerations);
         let gravity = self.gravity_torques(angles);
@@ -102,7 +102,7 @@ impl Body {
             inertial[1] + slope * rates[0] * rates[0] + gravity[1],
         ];
         let (torque, elastic, damping) =
-            (other_torques(forces), self.elastic(position), self.damping(velocity));
+            (convert_torques(forces), self.elastic(position), self.damping(velocity));
         [0, 1].map(|joint| torque[joint] - elastic[joint] - damping[joint])
     }
 
@@ -146,7 +146,7 @@ impl Body {
                 -body.mass * dot(self.gravity, self.chain.point(segment, body.com, angles).position)
             })
             .sum();
-        let position = other_angles(angles);
+        let position = convert_angles(angles);
         let stretched: f64 = (0..2)
             .map(|joint| {
                 let turned = position[joint] - self.passive[joint].rest;

@@ -137,7 +137,7 @@ impl CuffDescription {
 pub struct CuffSpring {
     /// Stiffness, N/m.
     pub stiffness: f64,
-    /// Damping, N s/m. With play a pad pushes and never pulls, so damping acts on compression only.
+    /// Damping, N s/m. With play a pad pushes and never pulls, whatever its damping.
     pub damping: f64,
     /// Free travel from the centre in either direction, m.
     pub play: f64,

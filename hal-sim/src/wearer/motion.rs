@@ -12,11 +12,11 @@
 //! Velocity and acceleration are the analytic derivatives, and all are continuous. Angles are anatomical, hip
 //! and knee, rad. Time counts from the start of the motion, s.
 //!
-//! Sources: Flash and Hogan (1985) for minimum jerk. Gait: hip and knee of a young woman at her natural
-//! cadence, 0.987 s per stride, in Winter, Biomechanics and Motor Control of Human Movement (2009), appendix
-//! A; here the first four harmonics of the Fourier series that M. F. Dogan fitted (2022), rounded to 0.1
-//! degrees and 0.01 rad. They differ from his seven harmonics by at most 0.9 degrees at the extremes. Toe-off
-//! is at p = 0.
+//! Sources: Flash and Hogan (1985) for minimum jerk. Gait: hip and knee at a natural cadence, 0.987 s per
+//! stride, as tabulated in Winter, Biomechanics and Motor Control of Human Movement (2009), appendix A. The
+//! numbers are the first four harmonics of a published Fourier fit with seven (M. F. Dogan,
+//! Microprocessor-Controlled-Prosthetic-Knee, 2022), rounded to 0.1 degrees and 0.01 rad. The extremes differ
+//! by at most 0.9 degrees. Toe-off is at p = 0.
 //! Known limits: one pattern for all cadences, although swing shortens and angles grow with speed; no stance.
 
 use super::description::{WearerError, check_ranges};
@@ -29,7 +29,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// Duration in which a motion fades in, s.
 pub const START_S: f64 = 1.0;
 
-/// IntendedMotion that a wearer intends.
+/// Motion that a wearer intends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum IntendedMotion {
     /// Stay at a posture: hip and knee, rad.
@@ -38,7 +38,7 @@ pub enum IntendedMotion {
     Gait(Gait),
     /// Move between two postures again and again.
     Strokes(Strokes),
-    /// ReachingMovement random postures.
+    /// Reach random postures.
     Reaching(Reaching),
 }
 
@@ -325,7 +325,7 @@ impl IntendedMotion {
     }
 }
 
-/// IntendedMotion on its way from a posture.
+/// Motion on its way from a posture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct IntendedCourse {
     motion: IntendedMotion,
@@ -335,7 +335,7 @@ pub(super) struct IntendedCourse {
 }
 
 impl IntendedCourse {
-    /// IntendedMotion that begins at a time (s), at a posture (rad).
+    /// Motion that begins at a time (s), at a posture (rad).
     pub(super) fn begin(motion: IntendedMotion, from: Pair, begun: f64) -> Self {
         let reach = match &motion {
             IntendedMotion::Reaching(reaching) => Some(ReachingMovement::begin(reaching, from)),

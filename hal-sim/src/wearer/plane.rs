@@ -22,13 +22,13 @@ pub(super) type Pair = [f64; 2];
 /// Largest angle between the two axes, and between plane and gravity, rad: rounding of a leg file's numbers.
 const LARGEST_TILT: f64 = 1e-6;
 
-/// Joint angles or rates to those of the segments, and back.
-pub(super) fn other_angles([hip, second]: Pair) -> Pair {
+/// Joint angles or rates converted to those of the segments, or back: the map is its own inverse.
+pub(super) fn convert_angles([hip, second]: Pair) -> Pair {
     [hip, hip - second]
 }
 
-/// Joint torques to generalised forces on the segments' angles, and back.
-pub(super) fn other_torques([first, second]: Pair) -> Pair {
+/// Joint torques converted to generalised forces on the segments' angles, or back.
+pub(super) fn convert_torques([first, second]: Pair) -> Pair {
     [first + second, -second]
 }
 
@@ -47,7 +47,7 @@ pub(super) fn combined([first, second]: [Pair; 2], [along, forward]: Pair) -> Pa
     [along * first[0] + forward * second[0], along * first[1] + forward * second[1]]
 }
 
-/// LimbSegment of a leg.
+/// Segment of a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LimbSegment {
     Thigh,
@@ -63,7 +63,7 @@ pub(super) struct TwoLinkChain {
     pub thigh: f64,
 }
 
-/// ChainPoint of a chain with its derivatives by the segments' angles, m and m/rad.
+/// Point of a chain with its derivatives by the segments' angles, m and m/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChainPoint {
     pub position: Pair,
@@ -71,7 +71,7 @@ pub(super) struct ChainPoint {
 }
 
 impl TwoLinkChain {
-    /// ChainPoint fixed to a segment: `at` along the segment from its upper joint, and forward, m.
+    /// Point fixed to a segment: `at` along the segment from its upper joint, and forward, m.
     pub(super) fn point(&self, segment: LimbSegment, at: Pair, angles: Pair) -> ChainPoint {
         let thigh = directions(angles[0]);
         let from_hip = |vector: Pair| [self.hip[0] + vector[0], self.hip[1] + vector[1]];

@@ -153,6 +153,54 @@ fn energy_of_both_bodies_and_elastic_cuffs_is_conserved() {
     }
 }
 
+#[test]
+fn no_permitted_cuff_makes_a_step_unstable() {
+    let description = bare_exoskeleton();
+    for (stiffness, damping) in [(1e3, 2e4), (1e7, 10.0), (5e7, 0.0), (0.0, 2e4)] {
+        let mut wearer_description = elastic_person(stiffness, 0.0);
+        for cuff in &mut wearer_description.cuffs {
+            (cuff.along.damping, cuff.across.damping) = (damping, damping);
+        }
+        let mut world = worn(&description, &wearer_description, [1.2, 0.3]);
+        let initial = energy(&description, &world);
+        for _ in 0..4000 {
+            world.advance();
+            let gained = energy(&description, &world) - initial;
+            // The bound of the elastic energy's error above.
+            assert!(gained < 2.5e-4, "{stiffness} N/m, {damping} N s/m: {gained} J");
+        }
+    }
+}
+
+#[test]
+fn accelerations_are_those_of_the_motion() {
+    let mut world = worn(&bare_exoskeleton(), &person(), [0.9, 0.4]);
+    let path: Vec<_> = (0..4000)
+        .map(|_| {
+            world.advance();
+            (world.truth(), wearer(&world))
+        })
+        .collect();
+    let mut fastest = [0.0_f64; 2];
+    for three in path.windows(3) {
+        let [before, (carrier, limb), after] = three else { panic!("three instants") };
+        let second = |[old, now, new]: [[f64; 2]; 3], joint: usize| {
+            (new[joint] - 2.0 * now[joint] + old[joint]) / (TICK_S * TICK_S)
+        };
+        for joint in 0..2 {
+            let found = [
+                second([before.0.position, carrier.position, after.0.position], joint),
+                second([before.1.position, limb.position, after.1.position], joint),
+            ];
+            // Cuffs vibrate at some 100 rad/s: (100/s * 250 us)^2 / 12 of 100 rad/s^2 are 5e-3 rad/s^2.
+            assert!((found[0] - carrier.acceleration[joint]).abs() < 0.02, "{found:?} {carrier:?}");
+            assert!((found[1] - limb.acceleration[joint]).abs() < 0.02, "{found:?} {limb:?}");
+            fastest[joint] = fastest[joint].max(found[0].abs());
+        }
+    }
+    assert!(fastest.iter().all(|rate| *rate > 2.0), "{fastest:?}");
+}
+
 /// Sine torques of the motors, N m, anatomical.
 fn driven(tick: u32) -> DriveCommand<2> {
     let time = f64::from(tick) * TICK_S;
@@ -246,7 +294,9 @@ fn merged(description: &LegDescription<2>, wearer: &WearerDescription) -> LegDes
 
 #[test]
 fn with_stiff_cuffs_both_bodies_move_as_one_rigid_leg() {
-    let description = bare_exoskeleton();
+    // The thigh is not vertical at the anatomical zero.
+    let mut description = bare_exoskeleton();
+    description.gravity = [8.0, 5.7, 0.0];
     let deviation = |stiffness: f64| {
         let wearer = elastic_person(stiffness, 0.0);
         let mut two = worn(&description, &wearer, [0.6, 0.8]);
@@ -264,13 +314,14 @@ fn with_stiff_cuffs_both_bodies_move_as_one_rigid_leg() {
         assert!(one.truth().position.iter().any(|angle| angle.abs() > 0.1));
         largest
     };
-    let found = [1e5, 1e6, 1e7].map(deviation);
+    let found = [3e4, 3e5, 3e6].map(deviation);
     println!("largest deviation in 2 s: {found:?} rad");
-    // Deflections are forces over stiffness; the double pendulum amplifies them alike.
+    // Deflections are forces over stiffness, and the double pendulum amplifies them alike. The steps of the
+    // rigid leg, longer than those of stiff cuffs, add some 5e-5 rad.
     for pair in found.windows(2) {
         assert!((7.0..14.0).contains(&(pair[0] / pair[1])), "{found:?}");
     }
-    assert!(found[2] < 3e-4, "{found:?}");
+    assert!(found[2] < 6e-4, "{found:?}");
 }
 
 /// The person's limb as a leg of its own, for the inverse dynamics of the exoskeleton's code path.
@@ -314,8 +365,8 @@ fn interaction_torque_is_what_the_wearers_own_accelerations_demand() {
     }
     println!("up to {largest:.2} N m, errors {error:?} N m, action against reaction {unequal:.1e} N m");
     assert!(largest > 10.0, "{largest}");
-    // Second differences over a tick of 250 us while cuffs vibrate at some 60 rad/s: (60/s * 250 us)^2 / 12 of
-    // 40 N m are 7e-4 N m; a joint of the exoskeleton that starts or stops adds its step of the force.
+    // Second differences over a tick of 250 us while cuffs vibrate at some 60 rad/s: (60/s * 250 us)^2 / 12
+    // of 40 N m are 7e-4 N m. A joint of the exoskeleton that starts or stops adds its step of the force.
     assert!(error.iter().all(|error| *error < 0.03), "{error:?}");
     assert!(unequal < 1e-12, "{unequal:e}");
 }
@@ -374,6 +425,25 @@ fn a_wearer_alone_walks_as_intended_by_feedforward() {
     println!("largest error alone: {largest:.1e} rad");
     // Torques are constant during a tick: 40 N m change by 1 % in a tick, over an impedance near 10 N m/rad.
     assert!(largest < 5e-3, "{largest:e}");
+}
+
+#[test]
+fn an_exoskeleton_with_loose_cuffs_moves_as_without_wearer() {
+    let mut loose = worn(&exoskeleton(), &uncoupled(), [0.3, 0.4]);
+    let mut empty = World::new(&exoskeleton(), 1);
+    empty.place(&[0.3, 0.4]);
+    let mut starts = 0;
+    for tick in 0..12_000 {
+        let before = empty.sticking();
+        loose.tick(&driven(tick));
+        empty.tick(&driven(tick));
+        starts += u32::from(before != empty.sticking());
+        for joint in 0..2 {
+            // Rounding of the mean torque; joints start and stop in the same parts of a tick.
+            assert!((loose.truth().position[joint] - empty.truth().position[joint]).abs() < 1e-12);
+        }
+    }
+    assert!(starts > 4, "{starts}");
 }
 
 #[test]
@@ -501,6 +571,22 @@ fn a_resisting_wearer_holds_the_exoskeleton_where_a_limp_one_yields() {
 }
 
 #[test]
+fn muscles_are_limited_to_their_largest_torque() {
+    let mut weak = person();
+    weak.muscles.iter_mut().for_each(|muscle| muscle.torque_limit = 6.0);
+    let mut world = worn(&exoskeleton(), &weak, [0.4, 0.5]);
+    world.intend(walking(1.0)).expect("a valid motion");
+    let mut largest = [0.0_f64; 2];
+    for _ in 0..12_000 {
+        world.advance();
+        for (largest, torque) in largest.iter_mut().zip(wearer(&world).muscle_torque) {
+            *largest = largest.max(torque.abs());
+        }
+    }
+    assert_eq!(largest, [6.0; 2]);
+}
+
+#[test]
 fn offset_axes_load_the_cuffs_of_a_bent_leg() {
     let forces = |hip_offset: [f64; 2], thigh_length: f64| {
         let wearer_description = WearerDescription { hip_offset, thigh_length, ..person() };
@@ -561,9 +647,9 @@ fn a_wearer_walks_alike_with_ideal_and_with_complete_drives_off() {
     });
     println!("{:?} {:?}", ideal.0.position, complete.0.position);
     for joint in 0..2 {
-        // Other steps: friction reverses up to a servo tick apart.
-        assert!((ideal.0.position[joint] - complete.0.position[joint]).abs() < 1e-3);
-        assert!((ideal.1.position[joint] - complete.1.position[joint]).abs() < 1e-3);
+        // Other steps: friction starts and reverses up to an eighth of a servo tick apart.
+        assert!((ideal.0.position[joint] - complete.0.position[joint]).abs() < 1e-5);
+        assert!((ideal.1.position[joint] - complete.1.position[joint]).abs() < 1e-5);
     }
     assert!((ideal.0.muscle_work - complete.0.muscle_work).abs() < 0.01 * ideal.0.muscle_work);
 }
@@ -622,6 +708,12 @@ fn legs_and_wearers_that_do_not_fit_are_refused() {
     assert_eq!(lying, WearerError::PlaneNotVertical { sideways: 9.81 });
     let no_thigh = refused(|leg, _| leg.joints[1].frame.a = 0.0);
     assert_eq!(no_thigh, WearerError::NoThigh { length: 0.0 });
+    let massless = refused(|leg, _| {
+        leg.joints.iter_mut().for_each(|joint| {
+            (joint.body, joint.rotor_inertia) = (Default::default(), 0.0);
+        });
+    });
+    assert!(matches!(massless, WearerError::TooFast { .. }), "{massless}");
     let too_fast = refused(|_, wearer| wearer.cuffs[1].across.damping = 1e5);
     assert!(matches!(too_fast, WearerError::TooFast { .. }), "{too_fast}");
     for (part, quantity, error) in [
