@@ -126,8 +126,9 @@ impl<const N: usize> Leg<N> {
         }
     }
 
+    /// State after one step of `duration` s under a mean torque (N m).
     #[inline(always)]
-    fn step(&self, state: &LegState<N>, torque: &[f64; N], duration: f64) -> LegState<N> {
+    pub(crate) fn step(&self, state: &LegState<N>, torque: &[f64; N], duration: f64) -> LegState<N> {
         let half = 0.5 * duration;
         let rates = &state.rates;
         let middle: [f64; N] = core::array::from_fn(|joint| state.angles[joint] + half * rates[joint]);

@@ -16,7 +16,8 @@
 //! | [`drive`] | ideal: a current with lag; complete: motor, bridge, shunts, counter, supply |
 //! | [`faults`] | faults injected into a board's ports at given ticks |
 //! | [`flash`] | flash memory with a power cut at any byte |
-//! | [`gear`], [`sensors`], [`wearer`] | ratio; encoder and current sensor; pushes |
+//! | [`gear`], [`sensors`], [`pushes`] | ratio; encoder and current sensor; pushes of the wearer |
+//! | [`wearer`] | a wearer with a body of their own: limb, cuffs, muscles, intended motions |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!
 //! The plant needs neither `std` nor a heap.
@@ -38,6 +39,7 @@ pub mod grip;
 pub mod leg;
 mod maths;
 pub mod mechanism;
+pub mod pushes;
 pub mod sensors;
 pub mod wearer;
 pub mod world;

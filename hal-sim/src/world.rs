@@ -1,4 +1,4 @@
-//! World: a leg with drives, sensors and wearer as one seeded value.
+//! World: a leg with drives, sensors and disturbances as one seeded value.
 //!
 //! Why one value: a test runs the firmware against a world, clones both at any time, lets the copies continue
 //! differently, and compares copies bit for bit. A world contains no clock, no file and no shared state. The
@@ -10,6 +10,7 @@
 //! All public angles and torques are anatomical.
 
 pub mod periods;
+mod worn;
 
 use crate::conventions::{Anatomy, links_at_reference};
 use crate::description::{LegDescription, PushDescription};
@@ -18,6 +19,7 @@ use crate::end_stop;
 use crate::floor::Floor;
 use crate::grip::Grip;
 use crate::leg::{Leg, LegState};
+use crate::pushes::Pushes;
 use crate::sensors::{CurrentSensor, Encoder};
 use crate::wearer::Wearer;
 use periods::{Electric, PERIODS_PER_TICK};
@@ -43,7 +45,8 @@ pub struct Truth<const N: usize> {
     pub position: [f64; N],
     /// Joint rates, rad/s; exactly 0 while a joint sticks.
     pub velocity: [f64; N],
-    /// Joint accelerations, rad/s^2, under the present motor torque; without pushes and floor.
+    /// Joint accelerations, rad/s^2, under the present torque of motors and of a wearer's cuffs; without
+    /// pushes and floor.
     pub acceleration: [f64; N],
     /// Torque of the motors at the joints, N m.
     pub motor_torque: [f64; N],
@@ -65,7 +68,9 @@ pub struct World<const N: usize> {
     current_sensors: [CurrentSensor; N],
     /// Direction of motors and encoders relative to the anatomical one, 1 or -1.
     mounting: f64,
-    wearer: Wearer,
+    pushes: Pushes,
+    /// Wearer with a body of their own, if any.
+    wearer: Option<Wearer>,
     blocked: [bool; N],
     floor: Option<Floor>,
     grip: Option<Grip>,
@@ -81,9 +86,9 @@ impl<const N: usize> World<N> {
     pub fn new(description: &LegDescription<N>, seed: u64) -> Self {
         let joints = &description.joints;
         let sensor_noise = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut pushes = sensor_noise.clone();
-        pushes.jump();
-        let mut sensor_faults = pushes.clone();
+        let mut push_instants = sensor_noise.clone();
+        push_instants.jump();
+        let mut sensor_faults = push_instants.clone();
         sensor_faults.jump();
         let mut world = Self {
             description: *description,
@@ -95,7 +100,8 @@ impl<const N: usize> World<N> {
             encoders: joints.map(|joint| Encoder::new(&joint.encoder)),
             current_sensors: joints.map(|joint| CurrentSensor::new(&joint.current_sensor)),
             mounting: if description.mirrored { -1.0 } else { 1.0 },
-            wearer: Wearer::new(description.pushes, N, pushes),
+            pushes: Pushes::new(description.pushes, N, push_instants),
+            wearer: None,
             blocked: [false; N],
             floor: None,
             grip: None,
@@ -108,13 +114,18 @@ impl<const N: usize> World<N> {
         world
     }
 
-    /// Sets the leg at rest at anatomical angles, rad; the encoders' reference does not change.
+    /// Sets the leg, and its wearer if any, at rest at anatomical angles, rad. The encoders' reference does
+    /// not change.
     pub fn place(&mut self, position: &[f64; N]) {
         let anatomy = &self.anatomy;
         self.state = LegState {
             angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(position[joint])),
             rates: [0.0; N],
         };
+        let now = self.time();
+        if let Some(wearer) = &mut self.wearer {
+            wearer.place(&self.state, now);
+        }
         if let Some(electric) = &mut self.electric {
             electric.place(&position.map(|angle| self.mounting * angle));
         }
@@ -164,12 +175,12 @@ impl<const N: usize> World<N> {
     /// Changes the wearer's pushes from now on; `None` stops them.
     pub fn set_pushes(&mut self, pushes: Option<PushDescription>) {
         self.description.pushes = pushes;
-        self.wearer.change_habits(pushes, self.tick as f64 * TICK_S, N);
+        self.pushes.change_habits(pushes, self.tick as f64 * TICK_S, N);
     }
 
     /// Lets the wearer push or kick once from now on: half a sine on one joint, peak in N m, anatomical.
     pub fn push(&mut self, joint: usize, peak: f64, duration: f64) {
-        self.wearer.push(joint, peak, self.tick as f64 * TICK_S, duration);
+        self.pushes.push(joint, peak, self.tick as f64 * TICK_S, duration);
     }
 
     /// Lets a hand hold a joint at its present angle ([`Grip`]) for `duration` s, with at most `strength` N
@@ -206,9 +217,10 @@ impl<const N: usize> World<N> {
             }
             return self.read_sensors();
         }
+        self.decide_muscles();
         let gripped = self.gripped(self.tick as f64 * TICK_S);
-        let pushes: [f64; N] = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
-        let pushed: [f64; N] = core::array::from_fn(|joint| pushes[joint] + gripped[joint]);
+        let pulse: [f64; N] = self.pushes.torque((self.tick as f64 + 0.5) * TICK_S);
+        let pushed: [f64; N] = core::array::from_fn(|joint| pulse[joint] + gripped[joint]);
         let stood: [f64; N] = match &mut self.floor {
             Some(floor) => floor.torque(self.leg.mechanism(), &self.state, self.tick as f64 * TICK_S),
             None => [0.0; N],
@@ -222,7 +234,7 @@ impl<const N: usize> World<N> {
             drive.advance();
         }
         let to = with_floor(self.joint_torque(&pushed));
-        self.leg.advance(&mut self.state, &from, &to, TICK_S);
+        worn::advance(&self.leg, &mut self.wearer, &mut self.state, [&from, &to], TICK_S);
         self.tick += 1;
         self.read_sensors();
     }
@@ -268,7 +280,12 @@ impl<const N: usize> World<N> {
     #[must_use]
     pub fn truth(&self) -> Truth<N> {
         let (anatomy, state) = (&self.anatomy, &self.state);
-        let acceleration = self.leg.forward_dynamics(state, &self.joint_torque(&[0.0; N]));
+        let mut torque = self.joint_torque(&[0.0; N]);
+        if let Some(wearer) = &self.wearer {
+            let interaction: [f64; N] = wearer.interaction(state);
+            torque = core::array::from_fn(|joint| torque[joint] + interaction[joint]);
+        }
+        let acceleration = self.leg.forward_dynamics(state, &torque);
         Truth {
             time_s: self.tick as f64 * TICK_S,
             position: core::array::from_fn(|joint| anatomy[joint].to_anatomical_angle(state.angles[joint])),

@@ -15,7 +15,7 @@
 //! 48) comes in addition. In the codes, 7 % per logged sample would be about 9 A each, which no current loop
 //! would follow and no board would show.
 
-use super::{TICK_S, World};
+use super::{TICK_S, World, worn};
 use crate::description::LegDescription;
 use crate::drive::axis::PERIOD_S;
 use crate::drive::complete::{CompleteDrives, Rotor};
@@ -92,10 +92,13 @@ impl<const N: usize> World<N> {
             return [AxisSample::default(); N];
         };
         let now = self.tick as f64 * TICK_S + f64::from(period) * PERIOD_S;
+        if period == 0 {
+            self.decide_muscles();
+        }
         let (gripped, stopped) = (self.gripped(now), self.stopped());
         let Some(electric) = &mut self.electric else { return [AxisSample::default(); N] };
         if electric.period == 0 {
-            electric.pushed = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
+            electric.pushed = self.pushes.torque((self.tick as f64 + 0.5) * TICK_S);
         }
         let (anatomy, state, mounting) = (&self.anatomy, &mut self.state, self.mounting);
         let stood = match &mut self.floor {
@@ -116,7 +119,7 @@ impl<const N: usize> World<N> {
             let pushed = electric.pushed[joint] + gripped[joint];
             anatomy[joint].flip(mounting * motor + pushed) + stood[joint] + stopped[joint]
         });
-        self.leg.advance(state, &acting, &acting, PERIOD_S);
+        worn::advance(&self.leg, &mut self.wearer, state, [&acting, &acting], PERIOD_S);
         electric.period += 1;
         if electric.period == PERIODS_PER_TICK {
             (electric.period, electric.torque, electric.sum) = (0, electric.sum, [0.0; N]);

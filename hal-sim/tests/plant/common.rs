@@ -62,3 +62,21 @@ pub fn spatial_chain() -> LegDescription<3> {
     chain.joints[1].rotor_inertia = 0.2;
     chain
 }
+
+/// A solid of revolution in the sagittal plane: mass, centre of mass along and forward, sagittal inertia,
+/// radius; and whether its long axis points forward.
+type Solid = (f64, [f64; 2], f64, f64, bool);
+
+/// Joins solids to one rigid body in a frame with x along the segment, y forward, z along the joint's axis.
+pub fn joined(solids: &[Solid]) -> BodyDescription {
+    let mut whole = BodyDescription::default();
+    for &(mass, [x, y], sagittal, radius, is_forward) in solids {
+        whole = whole.with_point_mass(mass, [x, y, 0.0]);
+        let axial = 0.5 * mass * radius * radius;
+        let [xx, yy] = if is_forward { [sagittal, axial] } else { [axial, sagittal] };
+        for (element, own) in [(0, xx), (3, yy), (5, sagittal)] {
+            whole.inertia_com[element] += own;
+        }
+    }
+    whole
+}

@@ -297,7 +297,7 @@ fn steps_at_edges_alone_are_fine_enough() {
     assert!((moved / impulse - 1.0).abs() < 1e-4, "{:e}", moved / impulse - 1.0);
 }
 
-fn board() -> CompleteDescription<2> {
+pub fn board() -> CompleteDescription<2> {
     CompleteDescription::new([axis(); 2], SupplyDescription::default())
 }
 

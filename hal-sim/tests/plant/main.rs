@@ -6,4 +6,5 @@ mod end_stop;
 mod friction;
 mod integration;
 mod mechanism;
+mod wearer;
 mod world;
