@@ -16,6 +16,7 @@ pub mod node;
 pub mod words;
 
 use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -153,7 +154,12 @@ pub fn watch<const N: usize, const B: usize>(
 ) -> Result<(), ToolError> {
     let BusInput { input, lines, name, nodes, bits_per_s, model, speed } = source;
     let ids: Vec<[u8; N]> = nodes.chunks_exact(N).filter_map(|ids| ids.try_into().ok()).collect();
-    let mut described = scene(leg, format!("CANopen bus, {name}"), speed.unwrap_or(1.0));
+    let heard = if lines == Lines::Candump {
+        Path::new(&name).file_name().unwrap_or_default()
+    } else {
+        name.as_ref()
+    };
+    let mut described = scene(leg, format!("CANopen bus, {}", heard.display()), speed.unwrap_or(1.0));
     let joints = described.legs.first().map(|leg| leg.joints.clone()).unwrap_or_default();
     described.legs =
         ids.iter().map(|ids| LegScene { name: leg_name(leg, ids), joints: joints.clone() }).collect();

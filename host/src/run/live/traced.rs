@@ -4,6 +4,7 @@
 //! curves. Shown samples are dropped; events and results stay, as in `trace`.
 
 use std::io::Read;
+use std::path::Path;
 
 use scarab::ident::{Estimator, Plan};
 use scarab::leg::{LoggedSample, Segment};
@@ -53,7 +54,8 @@ pub fn follow<const N: usize, const B: usize>(
     let TraceInput { mut input, mut reader, name, speed } = source;
     let background = background::<N, B>(leg, PriorChoice::Default, 0)?;
     let progress = Progress::new(&background.device, leg.bandwidth_hz as f32, Estimator::Robust)?;
-    out(LiveUpdate::Scene(scene(leg, format!("trace {name}"), speed.unwrap_or(1.0))));
+    let shown = Path::new(&name).file_name().unwrap_or_default().display();
+    out(LiveUpdate::Scene(scene(leg, format!("trace {shown}"), speed.unwrap_or(1.0))));
     let mut follower = Follower::<N, B> {
         picture: Picture::new(leg, anatomy::<N>(leg)?, out),
         clock: speed.map(Clock::new),
@@ -79,7 +81,7 @@ pub fn follow<const N: usize, const B: usize>(
             Err(error) => return Err(ToolError::input(format!("{name}: cannot be read ({error})"))),
         }
     }
-    let mut trace = reader.finish(std::path::Path::new(&name))?;
+    let mut trace = reader.finish(Path::new(&name))?;
     follower.take(&mut trace, leg)?;
     follower.picture.note(Severity::Note, "the source has ended");
     Ok(follower.report)
@@ -209,7 +211,7 @@ impl<const N: usize, const B: usize> Follower<'_, N, B> {
         let status = LiveStatus {
             leg: 0,
             time_s: self.picture.time_s,
-            run: self.results as u32 + 1,
+            run: (self.results as u32 + u32::from(state.activity == "identify")).max(1),
             drive: state.drive.replace('_', " "),
             doing: doing(state),
             waits_for: "the next record of the board".into(),
