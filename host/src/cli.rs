@@ -54,7 +54,7 @@ enum Command {
     /// Identify a simulated leg: drive it, log it, solve, validate, track.
     #[command(after_help = "Example: cargo sim identify --leg my-leg.toml --seed 3 --report run.html")]
     Identify(identify::IdentifyArguments),
-    /// Show a leg that identifies itself in a browser, while it moves.
+    /// Show a leg in a browser while it moves: simulated, recorded, by its trace or on its bus.
     #[command(after_help = "Example: cargo sim live --speed 4")]
     Live(live::LiveArguments),
     /// Write a leg file, from a robot description (URDF) or from answers, or list what one lacks.

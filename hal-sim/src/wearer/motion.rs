@@ -12,8 +12,8 @@
 //! Velocity and acceleration are the analytic derivatives, and all are continuous. Angles are anatomical, hip
 //! and knee, rad. Time counts from the start of the motion, s.
 //!
-//! Sources: Flash and Hogan (1985) for minimum jerk. Gait: first four of seven harmonics of a published fit to
-//! hip and knee at a natural cadence, 0.987 s per stride (M. F. Dogan,
+//! Sources: Flash and Hogan (1985) for minimum jerk. Gait: first four of seven harmonics of a published fit
+//! to hip and knee at a natural cadence, 0.987 s per stride (M. F. Dogan,
 //! Microprocessor-Controlled-Prosthetic-Knee, 2022), rounded to 0.1 degrees and 0.01 rad; its extremes differ
 //! by at most 0.9 degrees. The fitted angles seem to be those of Winter (2009), appendix A; this was not
 //! compared with the book. Toe-off is at p = 0.

@@ -81,20 +81,20 @@ pub struct LiveArguments {
     image: Option<Input>,
     /// Show the legs on this CANopen bus, heard by an slcan adapter: HOST:PORT or a serial device; --leg is
     /// required.
-    #[arg(long, value_name = "ADAPTER", conflicts_with_all = ["runs", "drive", "perturb", "recording", "trace"], help_heading = "Bus")]
+    #[arg(long, value_name = "ADAPTER", group = "bus", conflicts_with_all = ["runs", "drive", "perturb", "recording", "trace", "seed", "speed"], help_heading = "Bus")]
     slcan: Option<String>,
     /// Show the legs in these lines of `candump -L`, - for standard input; --leg is required.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["runs", "drive", "perturb", "recording", "trace", "slcan"], help_heading = "Bus")]
+    #[arg(long, value_name = "FILE", group = "bus", conflicts_with_all = ["runs", "drive", "perturb", "recording", "trace", "seed"], help_heading = "Bus")]
     candump: Option<Input>,
     /// Node-IDs, leg by leg, proximal joint first. Default: one leg with nodes from 1 on.
-    #[arg(long, value_name = "ID,ID,..", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=127), help_heading = "Bus")]
+    #[arg(long, value_name = "ID,ID,..", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=127), requires = "bus", help_heading = "Bus")]
     nodes: Vec<u8>,
     /// Bit rate of the bus, kbit/s.
-    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates(), help_heading = "Bus")]
+    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates(), requires = "bus", help_heading = "Bus")]
     bit_rate: u64,
-    /// Model (--save-model) that predicts the torque; without one it is predicted once a host has read the
-    /// parameters.
-    #[arg(long, value_name = "FILE", help_heading = "Bus")]
+    /// Model (--save-model) that predicts the torque of every leg. Without one it is predicted once a host
+    /// has read the parameters.
+    #[arg(long, value_name = "FILE", requires = "bus", help_heading = "Bus")]
     model: Option<Input>,
     /// Address and port of the page; port 0 selects a free one. Outside this machine it needs --token.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
@@ -162,12 +162,9 @@ impl LiveArguments {
 
     /// Bus to be shown, if one is named.
     fn bus(&self, leg: &LegFile) -> Result<Option<Source>, ToolError> {
-        let bits_per_s = 1000 * self.bit_rate;
-        let (lines, name, (input, speed)) = match (&self.slcan, &self.candump) {
-            (Some(adapter), _) => (Lines::Slcan, adapter.clone(), (listen(adapter, self.bit_rate)?, None)),
-            (None, Some(file)) => (Lines::Candump, file.display().to_string(), self.open(file)?),
-            (None, None) => return Ok(None),
-        };
+        if self.slcan.is_none() && self.candump.is_none() {
+            return Ok(None);
+        }
         let joints = leg.joints.len();
         let nodes: Vec<u8> =
             if self.nodes.is_empty() { (1..=joints as u8).collect() } else { self.nodes.clone() };
@@ -189,6 +186,12 @@ impl LiveArguments {
             Ok(model)
         });
         let model = model.transpose()?;
+        let bits_per_s = 1000 * self.bit_rate;
+        let (lines, name, (input, speed)) = match (&self.slcan, &self.candump) {
+            (Some(adapter), _) => (Lines::Slcan, adapter.clone(), (listen(adapter, self.bit_rate)?, None)),
+            (None, Some(file)) => (Lines::Candump, file.display().to_string(), self.open(file)?),
+            (None, None) => return Ok(None),
+        };
         let input = BusInput { input, lines, name, nodes, bits_per_s, model, speed };
         Ok(Some(Source::Bus(Box::new(input))))
     }
@@ -279,8 +282,8 @@ fn report(leg: &LegFile, source: Source, hub: &Hub) -> Result<(u8, String), Tool
         }
         Source::Trace(input) => with_leg_size!(leg, follow(leg, *input, out))?,
         Source::Bus(input) => {
-            with_leg_size!(leg, watch(leg, *input, out))?;
-            return Ok((EXIT_ACCEPTED, "the bus is silent: its source has ended".into()));
+            let code = if input.lines == Lines::Slcan { EXIT_INPUT } else { EXIT_ACCEPTED };
+            return Ok((code, with_leg_size!(leg, watch(leg, *input, out))?));
         }
     };
     let Some(report) = report else { return Ok((EXIT_INPUT, "the trace has no complete result".into())) };

@@ -320,7 +320,7 @@ fn frames_of_a_bus_give_angles_states_and_load() {
     let folder = Folder::new();
     let (hip, knee) = (|time: f64| 0.2 + 0.1 * time, |time: f64| 0.9 - 0.2 * time);
     let path = folder.write("compact.log", &compact(3, hip, knee));
-    let arguments = format!("--leg x2-wearer-75kg --speed 1000 --candump {}", path.display());
+    let arguments = format!("--leg x2-wearer-75kg --speed 1 --candump {}", path.display());
     let messages = Live::new(&arguments).events().until_the_end();
     let samples: Vec<_> = messages.iter().flat_map(|message| all(message, "samples")).collect();
     assert!((145..=150).contains(&samples.len()), "{} samples", samples.len());
@@ -333,7 +333,13 @@ fn frames_of_a_bus_give_angles_states_and_load() {
             assert!(sample["torque_nm"][joint].is_null() && sample["commanded_rad"][joint].is_null());
         }
     }
-    let last = messages.iter().flat_map(|message| all(message, "status")).last().expect("a status");
+    let states: Vec<_> = messages.iter().flat_map(|message| all(message, "status")).collect();
+    let end = states.last().expect("states");
+    assert_eq!(
+        (&end["drive"], &end["doing"]),
+        (&"unknown".into(), &"is unknown: the source has ended".into())
+    );
+    let last = states.iter().rev().find(|status| status["drive"] != "unknown").expect("a state");
     assert_eq!((&last["drive"], &last["fault"]), (&"operation enabled".into(), &"".into()));
     assert_eq!(
         last["limits"],
@@ -361,10 +367,13 @@ fn lines_that_are_no_frames_are_named_and_a_file_without_any_is_refused() {
     );
     let path = folder.write("none.log", "t_s,q1_rad\n0,0\n");
     let run = scarab("live --once --leg x2-wearer-75kg --candump", &[&path]).ends_with(2);
-    assert!(run.errors.contains("no CAN frame; 2 lines are none"), "{}", run.errors);
+    assert!(run.errors.contains("no CAN frame: the frames have ended; 2 lines are none, the first: line 1: no time stamp in brackets"), "{}", run.errors);
+    let run = scarab("live --once --leg x2-wearer-75kg --nodes 1,2", &[]).ends_with(2);
+    assert!(run.errors.contains("required arguments"), "{}", run.errors);
     for (arguments, words) in [
         ("--slcan 127.0.0.1:1", "it must be HOST:PORT or a serial device"),
         ("--slcan nowhere", "it must be HOST:PORT or a serial device"),
+        ("--slcan /dev/absent", "/dev/absent: No such file"),
         ("--candump - --nodes 1,2,3", "--nodes: 3 node-IDs; x2-wearer-75kg has 2 joints"),
         ("--candump - --nodes 1,1", "--nodes: 1 occurs twice"),
     ] {

@@ -13,8 +13,13 @@ const BAUD: u32 = 115_200;
 /// Those of the device.
 #[cfg(unix)]
 pub fn open(device: &Path) -> std::io::Result<File> {
+    use std::os::unix::fs::OpenOptionsExt;
+
+    use rustix::fs::OFlags;
     use rustix::termios::{ControlModes, OptionalActions, tcgetattr, tcsetattr};
-    let port = File::options().read(true).write(true).open(device)?;
+
+    let no_terminal = OFlags::NOCTTY.bits().cast_signed();
+    let port = File::options().read(true).write(true).custom_flags(no_terminal).open(device)?;
     let mut settings = tcgetattr(&port)?;
     settings.make_raw();
     settings.control_modes |= ControlModes::CLOCAL | ControlModes::CREAD;

@@ -4,6 +4,9 @@
 use scarab::bus::Frame;
 use scarab::leg::{FaultCode, NO_ERROR, NoticeCode, RefusalReason};
 
+/// Messages that are remembered; a node that forgets to end its errors loses the oldest.
+const MOST_ACTIVE: usize = 32;
+
 /// Active messages of one leg.
 #[derive(Clone, Debug, Default)]
 pub struct Alarms {
@@ -60,14 +63,19 @@ impl Alarms {
         new.map(|code| format!("{} ({:#06x}): {}", code.name(), code.number(), code.words()))
     }
 
-    /// Words of the active fault; `None` without one.
+    /// Words of the newest active fault; `None` without one.
     #[must_use]
     pub fn active_fault(&self) -> Option<&'static str> {
         let faults = || FaultCode::ALL.into_iter();
         let words = |(_, code, _): &(u16, u16, [u8; 5])| {
             faults().find(|fault| fault.number() == *code).map(FaultCode::words)
         };
-        self.fault.map(FaultCode::words).or_else(|| self.active.iter().find_map(words))
+        self.fault.map(FaultCode::words).or_else(|| self.active.iter().rev().find_map(words))
+    }
+
+    /// Forgets the messages of this COB-ID: the node has started again.
+    pub fn restarted(&mut self, emergency: u16) {
+        self.active.retain(|(id, ..)| *id != emergency);
     }
 
     /// Takes an emergency message. Returns its line, unless the fault or another node's message already gave
@@ -81,6 +89,10 @@ impl Alarms {
         }
         let is_known = self.fault.is_some_and(|fault| fault.number() == code)
             || self.active.iter().any(|(_, other, with)| (*other, *with) == (code, information));
+        self.active.retain(|message| *message != (node, code, information));
+        if self.active.len() >= MOST_ACTIVE {
+            self.active.remove(0);
+        }
         self.active.push((node, code, information));
         (!is_known).then(|| format!("emergency {code:04X}: {}", words(code, information)))
     }

@@ -20,7 +20,7 @@ const MOST_UNREAD: usize = 1 << 22;
 /// Bytes read from a connection at once: several times what the bus carries until the next read.
 const MOST_AT_ONCE: usize = 4096;
 /// Limit of connections without a channel, of listeners, and of refused ones. A further connection displaces
-/// the oldest.
+/// the oldest; a further listener is refused.
 const MOST_CONNECTIONS: usize = 8;
 /// Time for a refused connection to read the reason.
 const REFUSED_FOR: Duration = Duration::from_secs(1);
@@ -46,6 +46,8 @@ pub enum What {
     Gone(&'static str, bool),
     /// Refused, because this client has the channel.
     Refused(SocketAddr),
+    /// Refused, because as many listen as can.
+    Full,
 }
 
 /// An event and its connection.
@@ -77,6 +79,7 @@ impl Display for Event {
             What::Gone(why, true) => write!(f, "disconnected ({why}): the boards' plug is pulled"),
             What::Gone(why, false) => write!(f, "disconnected ({why})"),
             What::Refused(client) => write!(f, "refused, {client} has the channel"),
+            What::Full => write!(f, "refused, {MOST_CONNECTIONS} listen already"),
         }
     }
 }
@@ -187,13 +190,6 @@ fn set_up(stream: &TcpStream) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Adds a connection; a full list loses its oldest one for this reason.
-fn push(list: &mut VecDeque<Connection>, connection: Connection, why: &'static str) -> Option<Event> {
-    let displaced = if list.len() >= MOST_CONNECTIONS { list.pop_front() } else { None };
-    list.push_back(connection);
-    displaced.map(|oldest| Event { peer: oldest.peer, what: What::Gone(why, false) })
-}
-
 impl Server {
     /// Listens at `address`; port 0 selects a free one.
     pub fn new(address: SocketAddr) -> std::io::Result<Self> {
@@ -244,8 +240,13 @@ impl Server {
             events.push(Event { peer, what: What::Connected });
             let (received, out) = (VecDeque::new(), Vec::new());
             let connection = Connection { stream, peer, line: Line::default(), received, out };
-            let displaced = push(&mut self.waiting, connection, "too many connections without a channel");
-            events.extend(displaced);
+            if self.waiting.len() >= MOST_CONNECTIONS
+                && let Some(oldest) = self.waiting.pop_front()
+            {
+                let what = What::Gone("too many connections without a channel", false);
+                events.push(Event { peer: oldest.peer, what });
+            }
+            self.waiting.push_back(connection);
         }
         for _ in 0..self.waiting.len() {
             let Some(mut connection) = self.waiting.pop_front() else { break };
@@ -257,13 +258,17 @@ impl Server {
                     is_drained = false;
                     events.push(Event { peer, what: What::Opened });
                 }
-                Err(What::Listens) => {
+                Err(What::Listens) if self.listeners.len() < MOST_CONNECTIONS => {
                     events.push(Event { peer, what: What::Listens });
-                    events.extend(push(&mut self.listeners, connection, "too many listeners"));
+                    self.listeners.push_back(connection);
+                }
+                Err(What::Listens) => {
+                    self.refuse(connection.stream, &format!("{MOST_CONNECTIONS} listen already"), now);
+                    events.push(Event { peer, what: What::Full });
                 }
                 Err(what) => {
                     if let What::Refused(client) = what {
-                        self.refuse(connection.stream, client, now);
+                        self.refuse(connection.stream, &format!("{client} has the channel"), now);
                     }
                     events.push(Event { peer, what });
                 }
@@ -288,8 +293,8 @@ impl Server {
     }
 
     /// Sends the reason, and holds the connection open for a while: closing it at once would reset it.
-    fn refuse(&mut self, mut stream: TcpStream, client: SocketAddr, now: Instant) {
-        let _ = stream.write_all(format!("#refused: {client} has the channel\r\u{7}").as_bytes());
+    fn refuse(&mut self, mut stream: TcpStream, why: &str, now: Instant) {
+        let _ = stream.write_all(format!("#refused: {why}\r\u{7}").as_bytes());
         let _ = stream.shutdown(Shutdown::Write);
         if self.refused.len() >= MOST_CONNECTIONS {
             self.refused.pop_front();

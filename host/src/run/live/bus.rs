@@ -15,6 +15,7 @@ pub mod leg;
 pub mod node;
 pub mod words;
 
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
@@ -38,7 +39,14 @@ use crate::run::live::picture::scene;
 /// Frames between reader and picture.
 const MOST_WAITING: usize = 1024;
 /// Longest line; longer ones are no frames.
-const LONGEST_LINE: u64 = 256;
+const LONGEST_LINE: usize = 256;
+/// An slcan adapter refuses a command.
+const BELL: u8 = 7;
+/// Time stamps may go back by this without a gap, and forward, s.
+const MOST_BACK_S: f64 = 1.0;
+const MOST_SILENT_S: f64 = 30.0;
+/// Gap in the picture where the time stamps jump, s.
+const GAP_S: f64 = 1.0;
 /// Time between two statuses, s.
 const STATUS_S: f64 = 0.2;
 /// Silence after which the status is reported without a frame.
@@ -80,40 +88,106 @@ enum Found {
     Bad(String),
 }
 
-/// Reads the lines to their end, with times in seconds.
-fn read(input: Box<dyn Read + Send>, lines: Lines, found: &SyncSender<Found>) {
-    let begin = Instant::now();
-    let end = if lines == Lines::Slcan { b'\r' } else { b'\n' };
-    let mut input = BufReader::new(input);
-    for number in 1_u64.. {
-        let mut line = Vec::new();
-        let read = input.by_ref().take(LONGEST_LINE).read_until(end, &mut line);
-        let report = match read {
-            Ok(0) => return,
-            Ok(_) => {
-                let text = String::from_utf8_lossy(&line);
-                let parsed = match lines {
-                    Lines::Slcan => {
-                        slcan::decode(&text).map(|frame| Some((begin.elapsed().as_secs_f64(), frame?)))
-                    }
-                    Lines::Candump => candump::parse(&text).map_err(|why| format!("line {number}: {why}")),
-                };
-                match parsed {
-                    Ok(None) => continue,
-                    Ok(Some((time_s, frame))) => Found::Frame(time_s, frame),
-                    Err(why) => Found::Bad(why),
-                }
-            }
+/// Reads the next line without its end; `None` at the end of the input. The rest of a line that is too long
+/// is dropped.
+fn next_line(input: &mut impl BufRead, lines: Lines) -> std::io::Result<Option<Vec<u8>>> {
+    let is_end = |byte: &u8| match lines {
+        Lines::Slcan => matches!(*byte, b'\r' | BELL),
+        Lines::Candump => *byte == b'\n',
+    };
+    let mut line = Vec::new();
+    loop {
+        let bytes = match input.fill_buf() {
             Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
-            Err(error) => {
-                let _ = found.send(Found::Bad(format!("cannot be read any further ({error})")));
-                return;
-            }
+            bytes => bytes?,
         };
-        if found.send(report).is_err() {
-            return;
+        if bytes.is_empty() {
+            return Ok(Some(line).filter(|line| !line.is_empty()));
+        }
+        let end = bytes.iter().position(is_end);
+        // A bell is a line of its own.
+        let part = &bytes[..end.map_or(bytes.len(), |end| end + usize::from(bytes[end] == BELL))];
+        line.extend(part.iter().take(LONGEST_LINE - line.len()));
+        let used = end.map_or(bytes.len(), |end| end + 1);
+        input.consume(used);
+        if end.is_some() {
+            return Ok(Some(line));
         }
     }
+}
+
+/// Reads the lines to their end, with times in seconds; returns the reason of the end.
+fn read(input: Box<dyn Read + Send>, lines: Lines, found: &SyncSender<Found>) -> String {
+    let begin = Instant::now();
+    let mut input = BufReader::new(input);
+    for number in 1_u64.. {
+        let line = match next_line(&mut input, lines) {
+            Ok(Some(line)) => line,
+            Ok(None) => break,
+            Err(error) => return format!("it cannot be read any further ({error})"),
+        };
+        let parsed = match (lines, String::from_utf8_lossy(&line)) {
+            _ if line.len() == LONGEST_LINE => Err(format!("line {number}: it is too long for a frame")),
+            (Lines::Slcan, _) if line == [BELL] => {
+                Err("the adapter refuses a command; it may not be able to listen only (L)".into())
+            }
+            (Lines::Slcan, text) => {
+                slcan::decode(&text).map(|frame| Some((begin.elapsed().as_secs_f64(), frame?)))
+            }
+            (Lines::Candump, text) => candump::parse(&text).map_err(|why| format!("line {number}: {why}")),
+        };
+        let report = match parsed {
+            Ok(None) => continue,
+            Ok(Some((time_s, frame))) => Found::Frame(time_s, frame),
+            Err(why) => Found::Bad(why),
+        };
+        if found.send(report).is_err() {
+            break;
+        }
+    }
+    match lines {
+        Lines::Slcan => "the adapter closed the connection".into(),
+        Lines::Candump => "the frames have ended".into(),
+    }
+}
+
+/// What the status shows of the bus itself.
+pub struct Wire<'a> {
+    /// Load in words.
+    pub load: &'a str,
+    /// Nodes that were heard.
+    pub heard: &'a str,
+    /// Whether no further frame can come.
+    pub has_ended: bool,
+}
+
+/// Time of the picture, s, from the time stamps of the frames.
+#[derive(Default)]
+struct Times {
+    /// Difference of time stamp and picture, s.
+    offset_s: Option<f64>,
+    now_s: f64,
+}
+
+impl Times {
+    /// Takes a time stamp, s. Returns a sentence if it jumped; the picture then goes on after a gap.
+    fn take(&mut self, stamp_s: f64) -> Option<String> {
+        let offset_s = *self.offset_s.get_or_insert(stamp_s);
+        let step_s = stamp_s - offset_s - self.now_s;
+        if (-MOST_BACK_S..=MOST_SILENT_S).contains(&step_s) {
+            self.now_s += step_s.max(0.0);
+            return None;
+        }
+        self.now_s += GAP_S;
+        self.offset_s = Some(stamp_s - self.now_s);
+        Some(format!("the time stamps jump by {step_s:.1} s; the picture goes on after {GAP_S} s"))
+    }
+}
+
+/// Node of a frame that only the node itself sends: emergency, SDO answer, heartbeat.
+fn sender(frame: &Frame) -> Option<u8> {
+    let node = (frame.id() & 0x7F) as u8;
+    (node > 0 && matches!(frame.id() & 0x780, 0x080 | 0x580 | 0x700)).then_some(node)
 }
 
 /// Bits on the wire over the last second.
@@ -143,7 +217,7 @@ impl Load {
     }
 }
 
-/// Shows the legs of a bus until the input ends.
+/// Shows the legs of a bus until the input ends; returns the reason of the end.
 ///
 /// # Errors
 /// The input has no frame, or the leg file does not fit.
@@ -151,79 +225,119 @@ pub fn watch<const N: usize, const B: usize>(
     leg: &LegFile,
     source: BusInput,
     out: &dyn Fn(LiveUpdate),
-) -> Result<(), ToolError> {
+) -> Result<String, ToolError> {
     let BusInput { input, lines, name, nodes, bits_per_s, model, speed } = source;
     let ids: Vec<[u8; N]> = nodes.chunks_exact(N).filter_map(|ids| ids.try_into().ok()).collect();
-    let heard = if lines == Lines::Candump {
+    let shown = if lines == Lines::Candump {
         Path::new(&name).file_name().unwrap_or_default()
     } else {
         name.as_ref()
     };
-    let mut described = scene(leg, format!("CANopen bus, {}", heard.display()), speed.unwrap_or(1.0));
+    let mut described = scene(leg, format!("CANopen bus, {}", shown.display()), speed.unwrap_or(1.0));
     let joints = described.legs.first().map(|leg| leg.joints.clone()).unwrap_or_default();
     described.legs =
         ids.iter().map(|ids| LegScene { name: leg_name(leg, ids), joints: joints.clone() }).collect();
     out(LiveUpdate::Scene(described));
-    let mut legs: Vec<Leg<N, B>> = Vec::new();
-    let mut called: Vec<String> = Vec::new();
+    let mut legs: Vec<(String, Leg<N, B>)> = Vec::new();
     for (place, own) in ids.iter().enumerate() {
-        legs.push(Leg::new(leg, *own, place, model.as_ref(), out)?);
-        called.push(if ids.len() > 1 { format!("leg {}: ", place + 1) } else { String::new() });
+        let called = if ids.len() > 1 { format!("leg {}: ", place + 1) } else { String::new() };
+        legs.push((called, Leg::new(leg, *own, place, model.as_ref(), out)?));
     }
     let note = |time_s: f64, weight, words: String| out(LiveUpdate::Note(LiveNote { time_s, weight, words }));
     let mut load = Load { bits_per_s, since_s: 0.0, bits: 0, frames: 0, words: String::new() };
     let mut clock = speed.map(Clock::new);
     let (send, found) = sync_channel(MOST_WAITING);
-    thread::spawn(move || read(input, lines, &send));
-    let (mut first_s, mut now_s, mut due_s, mut bad) = (None, 0.0_f64, 0.0, 0);
-    let mut arrived = Instant::now();
+    let reader = thread::spawn(move || read(input, lines, &send));
+    let (mut times, mut due_s, mut arrived) = (Times::default(), 0.0, Instant::now());
+    let (mut bad, mut first_bad, mut heard) = (0, None, BTreeSet::new());
     loop {
         match found.recv_timeout(SILENCE) {
-            Ok(Found::Frame(time_s, frame)) => {
-                now_s = (time_s - *first_s.get_or_insert(time_s)).max(now_s);
+            Ok(Found::Frame(stamp_s, frame)) => {
                 arrived = Instant::now();
+                if let Some(words) = times.take(stamp_s) {
+                    note(times.now_s, Severity::Warning, words);
+                }
                 if let Some(clock) = &mut clock {
-                    clock.wait((now_s * f64::from(SERVO_RATE_HZ)) as u64);
+                    clock.wait((times.now_s * f64::from(SERVO_RATE_HZ)) as u64);
                 }
                 load.add(&frame);
-                for (leg, called) in legs.iter_mut().zip(&called) {
-                    leg.take(&frame, now_s, called);
+                heard.extend(sender(&frame));
+                for (called, leg) in &mut legs {
+                    leg.take(&frame, times.now_s, called);
                 }
             }
             Ok(Found::Bad(words)) => {
                 bad += 1;
                 if bad <= MOST_REPORTED {
-                    note(now_s, Severity::Warning, format!("{name}: {words}"));
+                    note(times.now_s, Severity::Warning, format!("{name}: {words}"));
                 }
-            }
-            Err(RecvTimeoutError::Timeout) if first_s.is_some() && clock.is_none() => {
-                // A silent bus: only the status is new.
-                now_s += arrived.elapsed().as_secs_f64();
-                arrived = Instant::now();
+                first_bad.get_or_insert(words);
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
+        // On a silent bus only the status is new.
+        let silent_s = if clock.is_none() { arrived.elapsed().as_secs_f64() } else { 0.0 };
+        let now_s = times.now_s + if silent_s > SILENCE.as_secs_f64() { silent_s } else { 0.0 };
         load.at(now_s);
-        if now_s >= due_s {
+        if now_s >= due_s || now_s + STATUS_S < due_s {
             due_s = now_s + STATUS_S;
-            for (leg, called) in legs.iter_mut().zip(&called) {
-                leg.report(now_s, called, load.words.clone());
-            }
+            let numbers: Vec<String> = heard.iter().map(u8::to_string).collect();
+            let wire = Wire { load: &load.words, heard: &numbers.join(", "), has_ended: false };
+            legs.iter_mut().for_each(|(called, leg)| leg.report(now_s, called, &wire));
         }
     }
-    if first_s.is_none() {
-        return Err(ToolError::input(format!("{name}: no CAN frame; {bad} lines are none")));
+    let reason = reader.join().unwrap_or_else(|_| "its reader failed".into());
+    if times.offset_s.is_none() {
+        let first =
+            first_bad.map_or_else(String::new, |why| format!("; {bad} lines are none, the first: {why}"));
+        return Err(ToolError::input(format!("{name}: no CAN frame: {reason}{first}")));
     }
-    for (leg, called) in legs.iter_mut().zip(&called) {
-        leg.report(now_s, called, load.words.clone());
-    }
-    note(now_s, Severity::Note, "the source has ended".into());
-    Ok(())
+    let wire = Wire { load: &load.words, heard: "", has_ended: true };
+    legs.iter_mut().for_each(|(called, leg)| leg.report(times.now_s, called, &wire));
+    note(times.now_s, Severity::Note, "the source has ended".into());
+    Ok(format!("{name}: {reason}"))
 }
 
 /// Name of a leg with its nodes.
 fn leg_name(leg: &LegFile, ids: &[u8]) -> String {
     let ids: Vec<String> = ids.iter().map(u8::to_string).collect();
     format!("{}, nodes {}", leg.name, ids.join(" and "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn split(text: &[u8], lines: Lines) -> Vec<Vec<u8>> {
+        let mut input = BufReader::with_capacity(7, text);
+        core::iter::from_fn(|| next_line(&mut input, lines).expect("memory can be read")).collect()
+    }
+
+    #[test]
+    fn lines_end_where_the_adapter_ends_them_and_a_bell_is_a_line() {
+        assert_eq!(split(b"t1230\r\x07z\rrest", Lines::Slcan), [&b"t1230"[..], b"\x07", b"z", b"rest"]);
+        assert_eq!(split(b"one\n\ntwo", Lines::Candump), [&b"one"[..], b"", b"two"]);
+        let long = [&[b'x'; 1000][..], b"\nnext\n"].concat();
+        let lines = split(&long, Lines::Candump);
+        assert_eq!((lines.len(), lines[0].len(), &lines[1][..]), (2, LONGEST_LINE, &b"next"[..]));
+    }
+
+    #[test]
+    fn time_stamps_that_jump_leave_a_gap_of_a_second() {
+        let mut times = Times::default();
+        for (stamp_s, now_s, jumps) in [
+            (1e9, 0.0, false),
+            (1e9 + 2.0, 2.0, false),
+            (1e9 + 1.5, 2.0, false),
+            (1e9 + 22.0, 22.0, false),
+            (1e9 - 4000.0, 23.0, true),
+            (1e9 - 3999.0, 24.0, false),
+            (1e300, 25.0, true),
+            (5.0, 26.0, true),
+        ] {
+            assert_eq!(times.take(stamp_s).is_some(), jumps, "{stamp_s}");
+            assert!((times.now_s - now_s).abs() < 1e-6, "{stamp_s}: {} instead of {now_s}", times.now_s);
+        }
+    }
 }

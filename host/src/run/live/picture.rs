@@ -127,6 +127,7 @@ impl<'a, const N: usize> Picture<'a, N> {
     ) {
         self.log(logged);
         if !logged.sample.torque_nm.iter().all(|torque| torque.is_finite()) {
+            progress.break_off();
             return;
         }
         let Some(row) = progress.push(logged) else { return };

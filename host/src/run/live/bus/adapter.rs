@@ -20,7 +20,7 @@ pub fn listen(adapter: &str, bit_rate: u64) -> Result<Box<dyn Read + Send>, Tool
     };
     let commands = format!("C\rS{rate}\rL\r");
     let failed = |error: std::io::Error| ToolError::input(format!("--slcan: {adapter}: {error}"));
-    if Path::new(adapter).exists() {
+    if adapter.starts_with('/') || Path::new(adapter).exists() {
         let mut port = serial::open(Path::new(adapter)).map_err(failed)?;
         port.write_all(commands.as_bytes()).map_err(failed)?;
         return Ok(Box::new(port));

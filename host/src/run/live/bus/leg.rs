@@ -15,12 +15,13 @@ use crate::leg::background::Background;
 use crate::leg::setup::{PriorChoice, background};
 use crate::report::live::{EstimateOrigin, LiveOutcome, LiveStatus, LiveUpdate, Severity};
 use crate::rig::bus::alarms::{Alarms, reason};
-use crate::run::live::bus::node::{Event, Node};
-use crate::run::live::bus::words::{JointState, activity, doing};
+use crate::run::live::bus::Wire;
+use crate::run::live::bus::node::{Event, NmtState, Node};
+use crate::run::live::bus::words::{JointState, doing};
 use crate::run::live::picture::{HALF_SAMPLE_S, Picture};
 use crate::run::live::progress::Progress;
 
-/// Object values.
+/// Objects that are shown.
 const STATUSWORD: u16 = 0x6041;
 /// Inputs, and their copy for CORC.
 const INPUTS: [u16; 2] = [0x60FD, 0x219A];
@@ -28,6 +29,8 @@ const POSITION: u16 = 0x6064;
 const TARGET: u16 = 0x607A;
 const TORQUE: u16 = 0x6077;
 const RATED_TORQUE: u16 = 0x6076;
+/// Mode of operation, requested and present.
+const MODE: [u16; 2] = [0x6060, 0x6061];
 const IDENTIFICATION: u16 = 0x2100;
 const BASE: u16 = 0x2120;
 const BASE_SIGMA: u16 = 0x2121;
@@ -37,8 +40,14 @@ const SWITCH_CLOSED: u32 = 1 << 16;
 const INHIBITING: core::ops::RangeInclusive<u8> = 17..=20;
 /// Longest distance of two positions between which the motion is drawn, s.
 const LONGEST_GAP_S: f64 = 0.1;
-/// Values older than this are no present ones, s.
+/// Targets and states of an identification older than this are no present ones, s.
 const STALE_S: f64 = 0.5;
+/// A node that was silent for this time is not heard any more, s.
+const SILENT_S: f64 = 1.0;
+/// Time of a statusword without positions after which the lack is told, s.
+const NO_POSITION_S: f64 = 2.0;
+/// Time in which an equal line is not repeated, s.
+const REPEATED_S: f64 = 1.0;
 /// Bandwidth of torque and prediction, Hz: an adapter's times scatter by a millisecond, and the acceleration
 /// is their second derivative.
 const BANDWIDTH_HZ: f32 = 5.0;
@@ -63,15 +72,22 @@ pub struct Leg<'a, const N: usize, const B: usize> {
     anatomy: [AnatomicalJoint<f64>; N],
     nodes: [Node; N],
     alarms: Alarms,
-    /// Words of the last fault that an emergency message told.
+    /// Words of the last fault in an emergency message.
     fault: Option<&'static str>,
+    /// Last line about an emergency message, and its time, s.
+    line: (String, f64),
     last: Option<Measured<N>>,
+    /// Times of positions that wait for their torques, s.
+    waiting: Option<[f64; N]>,
+    /// Whether the lack of positions was told.
+    lacks_positions: bool,
     /// Number of the next point of the 500 Hz grid.
     next: u64,
     /// Drive states and activity of the last status, to notice changes.
     shown: String,
     base: Vec<[f32; 2]>,
-    verdict: Option<u32>,
+    /// Verdict and reasons that were shown.
+    verdict: Option<(u32, u32)>,
 }
 
 impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
@@ -86,7 +102,8 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         model: Option<&ModelFile>,
         out: &'a dyn Fn(LiveUpdate),
     ) -> Result<Self, ToolError> {
-        let background = background::<N, B>(leg, PriorChoice::Default, 0)?;
+        // The leg on the bus is not the one of the leg file: its true parameters are unknown.
+        let background = Background { truth: None, ..background::<N, B>(leg, PriorChoice::Default, 0)? };
         let mut progress = Progress::new(&background.device, BANDWIDTH_HZ, Estimator::Robust)?;
         if let Some(model) = model {
             let set = &model.base_set;
@@ -104,7 +121,10 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             nodes: ids.map(Node::new),
             alarms: Alarms::default(),
             fault: None,
+            line: (String::new(), f64::NEG_INFINITY),
             last: None,
+            waiting: None,
+            lacks_positions: false,
             next: 0,
             shown: String::new(),
             base: Vec::new(),
@@ -120,14 +140,29 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             match self.nodes[joint].take(frame, now_s) {
                 Some(Event::Nmt(state)) => {
                     self.picture.note(Severity::Note, format!("{called}{name}'s node {}", state.words()));
+                    if state == NmtState::BootUp {
+                        self.alarms.restarted(self.nodes[joint].emergency());
+                    }
                 }
                 Some(Event::Emergency) => {
                     if let Some(words) = self.alarms.emergency(frame) {
                         let fault = self.alarms.active_fault();
                         let severity = if fault.is_some() { Severity::Fault } else { Severity::Warning };
                         self.fault = fault.or(self.fault);
-                        self.picture.note(severity, format!("{called}{words}"));
+                        let (line, since_s) = &self.line;
+                        if *line != words || now_s - since_s > REPEATED_S {
+                            self.picture.note(severity, format!("{called}{words}"));
+                        }
+                        self.line = (words, now_s);
                     }
+                }
+                Some(Event::Unmapped { length, mapped }) => {
+                    let words = format!(
+                        "{called}{name}'s PDO {:03X} has {length} bytes, the known mapping {mapped}: it was mapped \
+                         before this page listened, so that it is not shown; start the page before the host",
+                        frame.id()
+                    );
+                    self.picture.note(Severity::Warning, words);
                 }
                 None => {}
             }
@@ -150,9 +185,16 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         let at = |object: u16| self.each(|node| node.time_s(object, 0));
         let Some(positions_at) = at(POSITION).filter(|at| at.iter().all(|at| *at > since)) else { return };
         let torques_at = at(TORQUE).filter(|at| at.iter().all(|at| now_s - *at < STALE_S));
-        if torques_at.is_some_and(|at| !at.iter().all(|at| *at > since)) {
-            return;
+        let has_torques = torques_at.is_some_and(|at| at.iter().all(|at| *at > since));
+        if torques_at.is_some() && !has_torques {
+            // Torques of the same cycle come later, if they come each cycle.
+            let waiting = *self.waiting.get_or_insert(positions_at);
+            if !positions_at.iter().zip(waiting).all(|(at, waiting)| *at > waiting) {
+                return;
+            }
         }
+        self.waiting = None;
+        let torques_at = torques_at.filter(|_| has_torques);
         let Some(position) = self.each(|node| node.signed(POSITION)) else { return };
         let torque = torques_at.and_then(|_| self.each(|node| node.signed(TORQUE)));
         let used = || positions_at.into_iter().chain(torques_at.into_iter().flatten());
@@ -218,10 +260,22 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     }
 
     /// Base parameters, verdict and status, as far as the bus has shown them.
-    pub fn report(&mut self, now_s: f64, called: &str, bus: String) {
+    pub fn report(&mut self, now_s: f64, called: &str, bus: &Wire<'_>) {
         self.picture.time_s = now_s;
-        self.report_result();
+        self.report_parameters();
+        self.report_verdict();
         let status = self.status(bus);
+        let since_s = self.last.map_or(0.0, |last| last.until_s);
+        let has_state = self.nodes.iter().any(|node| node.time_s(STATUSWORD, 0).is_some());
+        let lacks_positions = has_state && now_s - since_s > NO_POSITION_S;
+        if lacks_positions && !self.lacks_positions && !bus.has_ended {
+            let words = format!(
+                "{called}no positions (6064) of all joints: no PDO carries them, none is sent without SYNC, or they \
+                 were mapped before this page listened"
+            );
+            self.picture.note(Severity::Warning, words);
+        }
+        self.lacks_positions = lacks_positions;
         let shown = format!("{called}the leg {}; drive: {}", status.doing, status.drive);
         if shown != self.shown {
             self.picture.note(Severity::Note, shown.clone());
@@ -230,8 +284,8 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         self.picture.send(LiveUpdate::Status(status));
     }
 
-    /// Reports the parameters and the verdict once a host has read them.
-    fn report_result(&mut self) {
+    /// Reports the parameters once a host has read them.
+    fn report_parameters(&mut self) {
         let node = &self.nodes[0];
         let rank = self.background.model.base.rank();
         let base = |place: usize| {
@@ -255,13 +309,18 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             );
             self.base = base;
         }
-        let verdict = node.raw(IDENTIFICATION, 8).filter(|verdict| (1..=2).contains(verdict));
-        if verdict.is_some() && verdict != self.verdict {
-            let bits = node.raw(IDENTIFICATION, 9).unwrap_or(0);
+    }
+
+    /// Reports the verdict, and its reasons once a host has read them.
+    fn report_verdict(&mut self) {
+        let node = &self.nodes[0];
+        let read = node.raw(IDENTIFICATION, 8).filter(|verdict| (1..=2).contains(verdict));
+        let verdict = read.map(|verdict| (verdict, node.raw(IDENTIFICATION, 9).unwrap_or(0)));
+        if let Some((verdict, bits)) = verdict.filter(|_| verdict != self.verdict) {
             let reasons = Reason::ALL.into_iter().filter(|reason| bits >> *reason as u8 & 1 == 1);
             self.picture.send(LiveUpdate::Outcome(LiveOutcome {
                 leg: self.picture.place(),
-                verdict: if verdict == Some(1) { "accepted" } else { "refused" }.into(),
+                verdict: if verdict == 1 { "accepted" } else { "refused" }.into(),
                 validated: true,
                 reasons: reasons.map(|reason| reason.name().into()).collect(),
                 findings: Vec::new(),
@@ -270,11 +329,15 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         self.verdict = verdict;
     }
 
-    fn status(&self, bus: String) -> LiveStatus {
+    fn status(&self, bus: &Wire<'_>) -> LiveStatus {
         let joints = &self.picture.leg().joints;
         let named = |joint: usize, words: &str| format!("{}: {words}", joints[joint].name);
+        let now_s = self.picture.time_s;
+        let is_heard = |node: &Node| !bus.has_ended && node.heard_s().is_some_and(|at| now_s - at < SILENT_S);
         let states: [Option<JointState>; N] = core::array::from_fn(|joint| {
-            self.nodes[joint].raw(STATUSWORD, 0).and_then(|word| JointState::of(word as u16))
+            let node = &self.nodes[joint];
+            let word = node.raw(STATUSWORD, 0).filter(|_| is_heard(node))?;
+            JointState::of(word as u16)
         });
         let is_same = states.iter().all(|state| *state == states[0]);
         let name = |state: Option<JointState>| state.map_or("unknown", JointState::name);
@@ -283,25 +346,29 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         } else {
             (0..N).map(|joint| named(joint, name(states[joint]))).collect::<Vec<_>>().join("; ")
         };
-        let lowest = states.iter().flatten().min().copied();
-        let is_enabled = states.iter().all(|state| state.is_some_and(JointState::is_enabled));
-        let missing: Vec<String> =
-            self.nodes.iter().filter(|node| !node.is_seen()).map(|node| node.id().to_string()).collect();
+        let lowest = states.iter().flatten().min().copied().filter(|_| states.iter().all(Option::is_some));
+        let is_enabled = lowest.is_some_and(JointState::is_enabled);
+        let silent: Vec<String> =
+            self.nodes.iter().filter(|node| !is_heard(node)).map(|node| node.id().to_string()).collect();
         let number = |sub| {
             let node = &self.nodes[0];
-            let is_present =
-                node.time_s(IDENTIFICATION, sub).is_some_and(|at| self.picture.time_s - at < STALE_S);
+            let is_present = node.time_s(IDENTIFICATION, sub).is_some_and(|at| now_s - at < STALE_S);
             node.raw(IDENTIFICATION, sub).filter(|_| is_present)
         };
-        let activity = number(2).and_then(|state| activity(state, number(3).unwrap_or(0)));
         let modes: Vec<Option<i32>> =
-            self.nodes.iter().map(|node| node.signed(0x6061).or_else(|| node.signed(0x6060))).collect();
+            self.nodes.iter().map(|node| node.signed(node.newest(&MODE)?)).collect();
         let (doing, waits_for) = match lowest {
-            _ if !missing.is_empty() => {
-                (format!("is not heard: no frame of node {} yet", missing.join(", ")), "its first frame")
+            _ if bus.has_ended => ("is unknown: the source has ended".into(), "nothing"),
+            _ if !silent.is_empty() => {
+                let others =
+                    if bus.heard.is_empty() { String::new() } else { format!(" (heard: {})", bus.heard) };
+                (format!("is unknown: no frame of node {}{others}", silent.join(", ")), "a frame")
             }
-            None => ("is heard, but no statusword (6041)".into(), "a PDO with it, or a host that reads it"),
-            Some(_) if is_enabled => (doing(activity, &modes), "commands of its host"),
+            None => (
+                "is unknown: no statusword (6041) of every joint".into(),
+                "a PDO with it, or a host that reads it",
+            ),
+            Some(_) if is_enabled => (doing(number(2), number(3), &modes), "commands of its host"),
             Some(state) => ("is off".into(), state.waits_for()),
         };
         let has_fault = states.iter().flatten().any(|state| state.has_fault());
@@ -328,7 +395,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             limits: lowest.map(|_| limited.map(|joint| named(joint, "internal limit active")).collect()),
             speed: Number::UNKNOWN,
             processor: String::new(),
-            bus,
+            bus: bus.load.to_owned(),
         }
     }
 
@@ -336,7 +403,8 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     fn not_enabled(&self) -> String {
         let mut reasons = Vec::new();
         for (node, joint) in self.nodes.iter().zip(&self.picture.leg().joints) {
-            let Some(inputs) = INPUTS.iter().find_map(|index| node.raw(*index, 0)) else { continue };
+            let inputs = node.newest(&INPUTS).and_then(|index| node.raw(index, 0));
+            let Some(inputs) = inputs else { continue };
             let open = (inputs & SWITCH_CLOSED == 0).then_some(16);
             let set = INHIBITING.filter(|bit| inputs >> bit & 1 == 1);
             reasons.extend(open.into_iter().chain(set).map(|bit| format!("{}: {}", joint.name, reason(bit))));

@@ -4,13 +4,14 @@
 //! mapped object in a PDO                 value
 //! expedited SDO write, once confirmed    value, also of PDO parameters
 //! expedited SDO read, once answered      value
-//! boot-up message                        PDO parameters are the defaults again
+//! boot-up message                        communication parameters are the defaults again
 //! ```
 //!
-//! A listener sends nothing, so values that nobody sends or reads stay unknown. PDO parameters that the node
-//! had stored before are unknown too: their defaults are assumed until a host writes or reads them.
+//! A listener sends nothing, so values that nobody sends or reads stay unknown. Stored PDO parameters are
+//! unknown too: the defaults are assumed until a host writes or reads them. A PDO whose length does not fit
+//! its mapping is reported and not decoded.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use scarab::bus::Frame;
 use scarab::bus::dictionary::{Object, find};
@@ -21,8 +22,7 @@ const RECEIVED: (u16, u16) = (0x1400, 0x1600);
 const TRANSMITTED: (u16, u16) = (0x1800, 0x1A00);
 /// Bit of a PDO's COB-ID that disables it.
 const DISABLED: u32 = 1 << 31;
-/// Objects of PDO parameters.
-const PDO_PARAMETERS: core::ops::Range<u16> = 0x1400..0x1C00;
+const COMMUNICATION: core::ops::Range<u16> = 0x1000..0x2000;
 /// Indices below are dummy entries.
 const FIRST_OBJECT: u16 = 0x1000;
 
@@ -50,7 +50,7 @@ impl NmtState {
         }
     }
 
-    /// Words.
+    /// State as the end of a sentence.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -69,6 +69,13 @@ pub enum Event {
     Emergency,
     /// Another NMT state in its heartbeat.
     Nmt(NmtState),
+    /// PDO whose length, bytes, does not fit its mapping; reported once.
+    Unmapped {
+        /// Length of the frame.
+        length: usize,
+        /// Length of the mapped objects.
+        mapped: usize,
+    },
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +99,10 @@ pub struct Node {
     values: BTreeMap<(u16, u8), Known>,
     asked: Option<Asked>,
     state: Option<NmtState>,
-    is_seen: bool,
+    /// Time of the node's last own frame, s.
+    heard_s: Option<f64>,
+    /// COB-IDs of PDOs that do not fit their mapping.
+    unmapped: BTreeSet<u16>,
 }
 
 /// Number in the first four bytes, little-endian.
@@ -104,7 +114,14 @@ impl Node {
     /// A node of this ID, of which nothing is known.
     #[must_use]
     pub fn new(id: u8) -> Self {
-        Self { id, values: BTreeMap::new(), asked: None, state: None, is_seen: false }
+        Self {
+            id,
+            values: BTreeMap::new(),
+            asked: None,
+            state: None,
+            heard_s: None,
+            unmapped: BTreeSet::new(),
+        }
     }
 
     /// Node-ID.
@@ -113,16 +130,16 @@ impl Node {
         self.id
     }
 
-    /// Whether the node has sent anything.
+    /// Time of the node's last own frame, s.
     #[must_use]
-    pub fn is_seen(&self) -> bool {
-        self.is_seen
+    pub fn heard_s(&self) -> Option<f64> {
+        self.heard_s
     }
 
-    /// NMT state of its last heartbeat.
+    /// COB-ID of its emergency messages.
     #[must_use]
-    pub fn state(&self) -> Option<NmtState> {
-        self.state
+    pub fn emergency(&self) -> u16 {
+        (self.parameter(0x1014, 0) & 0x7FF) as u16
     }
 
     fn known(&self, index: u16, sub: u8) -> Option<Known> {
@@ -133,6 +150,13 @@ impl Node {
     #[must_use]
     pub fn raw(&self, index: u16, sub: u8) -> Option<u32> {
         self.known(index, sub).map(|known| known.raw)
+    }
+
+    /// The object among these that was seen last.
+    #[must_use]
+    pub fn newest(&self, indices: &[u16]) -> Option<u16> {
+        let seen = indices.iter().filter_map(|index| Some((*index, self.time_s(*index, 0)?)));
+        seen.max_by(|one, other| one.1.total_cmp(&other.1)).map(|(index, _)| index)
     }
 
     /// Value of a signed object, if known.
@@ -169,54 +193,75 @@ impl Node {
         let id = frame.id();
         if id == 0x600 + own {
             self.request(frame, now_s);
-        } else if id == 0x580 + own {
-            self.is_seen = true;
-            self.answer(frame, now_s);
-        } else if id == 0x700 + own {
-            self.is_seen = true;
-            return self.heartbeat(frame);
-        } else if u32::from(id) == self.parameter(0x1014, 0) {
-            self.is_seen = true;
-            return Some(Event::Emergency);
-        } else if self.pdo(frame, TRANSMITTED, now_s) {
-            self.is_seen = true;
-        } else {
-            self.pdo(frame, RECEIVED, now_s);
+            return None;
         }
-        None
+        let event = if id == 0x580 + own {
+            self.answer(frame, now_s);
+            None
+        } else if id == 0x700 + own {
+            self.heartbeat(frame)
+        } else if id == self.emergency() {
+            Some(Event::Emergency)
+        } else if let Some(event) = self.pdo(frame, TRANSMITTED, now_s) {
+            event
+        } else {
+            return self.pdo(frame, RECEIVED, now_s).flatten();
+        };
+        self.heard_s = Some(now_s);
+        event
     }
 
     fn heartbeat(&mut self, frame: &Frame) -> Option<Event> {
         let state = NmtState::of(*frame.data().first()?)?;
         if state == NmtState::BootUp {
-            self.values.retain(|(index, _), _| !PDO_PARAMETERS.contains(index));
+            self.values.retain(|(index, _), _| !COMMUNICATION.contains(index));
+            self.unmapped.clear();
         }
         let is_new = self.state != Some(state) || state == NmtState::BootUp;
         self.state = Some(state);
         is_new.then_some(Event::Nmt(state))
     }
 
-    /// Takes a frame as a PDO of one direction; returns whether it was one.
-    fn pdo(&mut self, frame: &Frame, (communication, mapping): (u16, u16), now_s: f64) -> bool {
+    /// Takes a frame as a PDO of one direction; `None` if it is none. Several PDOs may have its COB-ID.
+    fn pdo(
+        &mut self,
+        frame: &Frame,
+        (communication, mapping): (u16, u16),
+        now_s: f64,
+    ) -> Option<Option<Event>> {
         let is_own = |pdo: &u16| {
             let cob = self.parameter(communication + pdo, 1);
             cob & DISABLED == 0 && cob & 0x7FF == u32::from(frame.id())
         };
-        let Some(pdo) = (0..PDOS).find(is_own) else { return false };
+        let own: Vec<u16> = (0..PDOS).filter(is_own).collect();
+        if own.is_empty() {
+            return None;
+        }
+        let events = own.into_iter().filter_map(|pdo| self.mapped(frame, mapping + pdo, now_s));
+        Some(events.collect::<Vec<_>>().pop())
+    }
+
+    /// Decodes a PDO by the mapping at this index.
+    fn mapped(&mut self, frame: &Frame, mapping: u16, now_s: f64) -> Option<Event> {
+        let entries = self.parameter(mapping, 0).min(8) as u8;
+        let entries: Vec<u32> = (1..=entries).map(|entry| self.parameter(mapping, entry)).collect();
+        let bytes = |entry: &u32| (entry & 0xFF) as usize / 8;
+        let (length, mapped) = (frame.data().len(), entries.iter().map(bytes).sum());
+        // A node ignores the rest of a longer received PDO (CiA 301).
+        if length < mapped || length > mapped && mapping >= TRANSMITTED.1 {
+            return self.unmapped.insert(frame.id()).then_some(Event::Unmapped { length, mapped });
+        }
         let mut data = frame.data();
-        let entries = self.parameter(mapping + pdo, 0).min(8) as u8;
-        for entry in 1..=entries {
-            let mapped = self.parameter(mapping + pdo, entry);
-            let bytes = (mapped & 0xFF) as usize / 8;
-            let Some((value, rest)) = data.split_at_checked(bytes) else { break };
+        for entry in entries {
+            let Some((value, rest)) = data.split_at_checked(bytes(&entry)) else { break };
             data = rest;
-            let index = (mapped >> 16) as u16;
+            let index = (entry >> 16) as u16;
             if index >= FIRST_OBJECT {
-                let known = Known { raw: number(value), bytes, at_s: now_s };
-                self.values.insert((index, (mapped >> 8 & 0xFF) as u8), known);
+                let known = Known { raw: number(value), bytes: value.len(), at_s: now_s };
+                self.values.insert((index, (entry >> 8 & 0xFF) as u8), known);
             }
         }
-        true
+        None
     }
 
     /// Takes a request of an SDO client.
@@ -262,8 +307,8 @@ mod tests {
     use super::*;
     use crate::formats::candump;
 
-    fn write(node: &mut Node, object: u32, value: u32, bytes: u8) {
-        let [sub, low, high] = [object as u8, (object >> 8) as u8, (object >> 16) as u8];
+    fn write(node: &mut Node, (index, sub): (u16, u8), value: u32, bytes: u8) {
+        let [low, high] = index.to_le_bytes();
         let [a, b, c, d] = value.to_le_bytes();
         let command = 0x23 | (4 - bytes) << 2;
         let id = u16::from(node.id());
@@ -290,19 +335,40 @@ mod tests {
     fn a_mapping_that_a_host_writes_is_followed_until_the_node_starts_again() {
         // The compact mapping of docs/bus.md, as the knee hears it: one frame carries both targets.
         let mut knee = Node::new(2);
-        write(&mut knee, 0x1401_01, 0x8000_0302, 4);
-        write(&mut knee, 0x1601_00, 0, 1);
-        write(&mut knee, 0x1601_01, 0x0007_0020, 4);
-        write(&mut knee, 0x1601_02, 0x607A_0020, 4);
-        write(&mut knee, 0x1601_00, 2, 1);
+        write(&mut knee, (0x1401, 1), 0x8000_0302, 4);
+        write(&mut knee, (0x1601, 0), 0, 1);
+        write(&mut knee, (0x1601, 1), 0x0007_0020, 4);
+        write(&mut knee, (0x1601, 2), 0x607A_0020, 4);
+        write(&mut knee, (0x1601, 0), 2, 1);
         knee.take(&Frame::new(0x301, &[1, 0, 0, 0, 2, 0, 0, 0]), 1.0);
         assert_eq!(knee.signed(0x607A), None, "still disabled");
-        write(&mut knee, 0x1401_01, 0x301, 4);
+        write(&mut knee, (0x1401, 1), 0x301, 4);
         knee.take(&Frame::new(0x301, &[1, 0, 0, 0, 2, 0, 0, 0]), 1.0);
         assert_eq!(knee.signed(0x607A), Some(2));
         assert_eq!(knee.take(&Frame::new(0x702, &[0]), 2.0), Some(Event::Nmt(NmtState::BootUp)));
         knee.take(&Frame::new(0x301, &[1, 0, 0, 0, 3, 0, 0, 0]), 2.0);
         assert_eq!(knee.signed(0x607A), Some(2), "the default COB-ID is 302 again");
+    }
+
+    #[test]
+    fn a_pdo_that_does_not_fit_its_mapping_is_reported_once_and_not_decoded() {
+        let mut node = Node::new(1);
+        let short = Frame::new(0x281, &[1, 2, 3, 4, 5, 6]);
+        assert_eq!(node.take(&short, 1.0), Some(Event::Unmapped { length: 6, mapped: 8 }));
+        assert_eq!((node.take(&short, 1.0), node.signed(0x6064), node.heard_s()), (None, None, Some(1.0)));
+        // The rest of a longer received PDO is ignored.
+        assert_eq!(node.take(&Frame::new(0x301, &[7, 0, 0, 0, 9]), 1.0), None);
+        assert_eq!(node.signed(0x607A), Some(7));
+    }
+
+    #[test]
+    fn a_started_node_has_its_default_emergency_again() {
+        let mut node = Node::new(1);
+        write(&mut node, (0x1014, 0), 0x90, 4);
+        assert_eq!(node.take(&Frame::new(0x81, &[0; 8]), 1.0), None);
+        assert_eq!(node.take(&Frame::new(0x90, &[0; 8]), 1.0), Some(Event::Emergency));
+        node.take(&Frame::new(0x701, &[0]), 2.0);
+        assert_eq!(node.take(&Frame::new(0x81, &[0; 8]), 2.0), Some(Event::Emergency));
     }
 
     #[test]
@@ -339,7 +405,7 @@ mod tests {
         }
         assert!(frames > 500 && emergencies == 0, "{frames} frames, {emergencies} emergencies");
         for node in &nodes {
-            assert!(node.is_seen());
+            assert!(node.heard_s().is_some());
             // {6041}, {6064, 606C}, {6077}, {219A} at 180, 280, 380, 480 + node, by SYNC.
             let own = u32::from(node.id());
             let sent: Vec<[u32; 3]> = (0..4)

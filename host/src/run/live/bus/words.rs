@@ -57,39 +57,37 @@ impl JointState {
     }
 }
 
-/// Activity of a state number of 2100:2, with the motion of 2100:3.
+/// What an enabled leg does, by the state and the motion of its identification (2100:2, 3) and its modes.
 #[must_use]
-pub fn activity(state: u32, motion: u32) -> Option<Activity> {
-    let motion = motion.saturating_sub(1) as u8;
-    let phase = match state {
-        0 => return Some(Activity::Idle),
-        1 => IdentifyPhase::Approach,
-        2 => IdentifyPhase::Excite,
-        3 => IdentifyPhase::Settle,
-        4 => IdentifyPhase::Solve,
-        5 => IdentifyPhase::Validate { motion, step: Step::Approach },
-        6 => IdentifyPhase::Validate { motion, step: Step::Run },
-        7 => IdentifyPhase::Judge,
-        8 => return Some(Activity::Track(Step::Run)),
-        9 => return Some(Activity::Follow),
-        _ => return None,
+pub fn doing(state: Option<u32>, motion: Option<u32>, modes: &[Option<i32>]) -> String {
+    let phase = match (state, motion) {
+        (Some(1), _) => IdentifyPhase::Approach,
+        (Some(2), _) => IdentifyPhase::Excite,
+        (Some(3), _) => IdentifyPhase::Settle,
+        (Some(4), _) => IdentifyPhase::Solve,
+        (Some(5), Some(motion)) => validate(motion, Step::Approach),
+        (Some(6), Some(motion)) => validate(motion, Step::Run),
+        (Some(5), None) => return "moves to the start of an unused motion".into(),
+        (Some(6), None) => return "runs an unused motion".into(),
+        (Some(7), _) => IdentifyPhase::Judge,
+        (Some(8), _) => return "tracks a motion".into(),
+        _ => return follows(modes),
     };
-    Some(Activity::Identify(phase))
+    activity_words::doing(Activity::Identify(phase), DriveState::OperationEnabled)
 }
 
-/// What an enabled leg does.
-#[must_use]
-pub fn doing(activity: Option<Activity>, modes: &[Option<i32>]) -> String {
-    match activity {
-        Some(activity @ (Activity::Identify(_) | Activity::Track(_))) => {
-            activity_words::doing(activity, DriveState::OperationEnabled)
-        }
-        _ => {
-            let mut names: Vec<&str> = modes.iter().flatten().map(|mode| mode_name(*mode)).collect();
-            names.dedup();
-            let names = names.join(", ");
-            if names.is_empty() { "follows its host".into() } else { format!("follows its host: {names}") }
-        }
+/// Phase of an unused motion, counted from 1.
+const fn validate(motion: u32, step: Step) -> IdentifyPhase {
+    IdentifyPhase::Validate { motion: motion.saturating_sub(1) as u8, step }
+}
+
+fn follows(modes: &[Option<i32>]) -> String {
+    let mut names: Vec<&str> = modes.iter().flatten().map(|mode| mode_name(*mode)).collect();
+    names.dedup();
+    if names.is_empty() {
+        "follows its host".into()
+    } else {
+        format!("follows its host: {}", names.join(", "))
     }
 }
 
@@ -136,9 +134,9 @@ mod tests {
     #[test]
     fn modes_and_phases_are_named() {
         assert!(Mode::ALL.into_iter().all(|mode| mode_name(mode as i32) != "unknown mode"));
-        assert_eq!(doing(None, &[Some(8), Some(8)]), "follows its host: cyclic position");
-        assert_eq!(doing(None, &[None, None]), "follows its host");
-        assert_eq!(doing(activity(6, 2), &[Some(8)]), "runs unused motion 2 of 3 (gait-3)");
-        assert_eq!(activity(11, 0), None);
+        assert_eq!(doing(None, None, &[Some(8), Some(8)]), "follows its host: cyclic position");
+        assert_eq!(doing(Some(9), Some(0), &[None, None]), "follows its host");
+        assert_eq!(doing(Some(6), Some(2), &[Some(8)]), "runs unused motion 2 of 3 (gait-3)");
+        assert_eq!(doing(Some(6), None, &[Some(8)]), "runs an unused motion");
     }
 }
