@@ -151,9 +151,7 @@ impl Recording {
 
     /// Median time between two samples, s; zero for fewer than two samples.
     pub fn median_step_s(&self) -> f64 {
-        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+        median_step_s(&self.time_s)
     }
 
     /// Splits at a fraction (0 to 1) of the duration; fails if a part is too short for a recording.
@@ -240,4 +238,11 @@ impl Recording {
         }
         Ok(())
     }
+}
+
+/// Median time between two samples, s; zero for fewer than two samples.
+fn median_step_s(time_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }

@@ -106,6 +106,24 @@ pub struct CauseReport {
     pub sigma: Number,
     /// Sentence with the evidence.
     pub words: String,
+    /// Units in which the cause reads the columns.
+    #[serde(skip)]
+    pub reads: Vec<ReadAs>,
+}
+
+/// Reading of the columns in another unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReadAs {
+    /// Joint angles in degrees.
+    Degrees,
+    /// Joint angles in turns.
+    Turns,
+    /// Angles of the motor in rad, degrees or turns.
+    MotorRadians,
+    MotorDegrees,
+    MotorTurns,
+    /// Torques in mN m.
+    Millinewtons,
 }
 
 /// One direction: an error of the logging chain with its estimate.

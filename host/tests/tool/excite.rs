@@ -297,13 +297,51 @@ fn a_motion_above_the_torque_limit_is_refused_and_never_designed() {
     feeble.joints[0].torque_limit_nm = 5.0;
     let feeble = folder.write("feeble.toml", &feeble.to_toml());
     let message = scarab(&format!("excite {EFFORT} --leg"), &[&feeble]).refusal();
-    for word in
-        ["no exciting motion fits the limits: joint `hip`: ", "limit 5.000 N m (`torque_limit_nm`): raise it"]
-    {
+    for word in [
+        "no exciting motion fits the limits: joint `hip`: ",
+        "limit 5.000 N m (`torque_limit_nm`)",
+        ": raise it, ",
+    ] {
         assert!(message.contains(word), "{word}: {message}");
     }
     let checked = scarab("leg --check", &[&feeble]).ends_with(0).printed;
     assert!(checked.contains("\nexcite: not possible: ") && checked.contains("joint `hip`"), "{checked}");
+}
+
+/// The check searches less than the design: only the search for the least torque, equal in both, decides.
+#[test]
+fn check_and_design_agree_on_a_leg_with_too_little_torque() {
+    let folder = Folder::new();
+    let body = "com = [0.15, 0.0, 0.0], inertia_com = [0.002, 0.0, 0.0, 0.01, 0.0, 0.011], rotor_inertia = 0.02, \
+                coulomb = 0.3, viscous = 0.1";
+    let (mut ready, mut refused) = (0, 0);
+    for limit in [1.2, 0.9, 0.3] {
+        let joint = |name: &str, a: f64, mass: f64, range: &str| {
+            format!(
+                "[[joint]]\nname = \"{name}\"\ndh = {{ alpha = 0.0, a = {a:?}, d = 0.0 }}\nrange_deg = {range}\n\
+                 torque_limit_nm = {limit:?}\nprior = {{ mass = {mass:?}, {body} }}\n"
+            )
+        };
+        let (hip, knee) = (joint("hip", 0.0, 2.0, "[-60, 60]"), joint("knee", 0.3, 1.5, "[0, 100]"));
+        let leg =
+            folder.write("leg.toml", &format!("name = \"leg\"\ngravity = [9.81, 0.0, 0.0]\n{hip}{knee}"));
+        let checked = scarab("leg --check", &[&leg]).ends_with(0).printed;
+        for noise in ["0.1", "0.1,0.5"] {
+            let run = scarab(&format!("excite {EFFORT} --torque-noise-nm {noise} --leg"), &[&leg]);
+            if checked.contains("\nexcite: ready\n") {
+                ready += 1;
+                assert_eq!(run.code, Some(0), "{limit}: {}", run.errors);
+            } else {
+                refused += 1;
+                let reason = run.refusal().trim_start_matches("error: ").trim_end().to_owned();
+                assert!(
+                    checked.contains(&format!("\nexcite: not possible: {reason}\n")),
+                    "{reason}\n{checked}"
+                );
+            }
+        }
+    }
+    assert!(ready >= 2 && refused >= 2, "{ready} {refused}");
 }
 
 /// Two links that turn about y, as robot descriptions state them: mass, centre below the joint, moments; the

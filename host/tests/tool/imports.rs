@@ -126,6 +126,66 @@ fn a_unit_in_a_name_that_contradicts_the_one_in_use_is_refused() {
 }
 
 #[test]
+fn times_in_another_unit_are_refused_with_the_complete_command() {
+    let since_1970 = 1.7e9;
+    for (from_s, unit, per_s) in [
+        (since_1970, "ms", 1e3),
+        (since_1970, "us", 1e6),
+        (since_1970, "ns", 1e9),
+        // In range until ten seconds.
+        (9.0, "ns", 1e9),
+    ] {
+        let text = text("t_s,q1_rad,tau1_Nm\n", |[time, angle, torque]| {
+            format!("{:.0},{angle},{torque}", per_s * (from_s + time))
+        });
+        let skipping = Import { skip_bad: true, ..import("", "") };
+        for import in [&import("", ""), &skipping] {
+            let message = refusal(&text, import);
+            let command =
+                format!("cargo sim replay --columns t=t_s,q1=q1_rad,tau1=tau1_Nm --units {unit},rad,Nm");
+            assert!(message.contains(&format!(": is the time in {unit}? Then it would be 6")), "{message}");
+            assert!(message.ends_with(&command), "{unit}: {message}");
+        }
+        let read = read(&text, &import("t=t_s,q1=q1_rad,tau1=tau1_Nm", &format!("{unit},rad,Nm")));
+        assert_eq!(read.expect(unit).recording.time_s.len(), 200);
+    }
+    // A damaged first row is one row's.
+    let damaged = with_bad(&[(1, "1e300,0,4")]);
+    assert!(
+        refusal(&damaged, &import("", ""))
+            .starts_with("walk.csv:2: 1e300 in column `t_s` exceeds 1e10: is it in")
+    );
+    let skipping = Import { skip_bad: true, ..import("", "") };
+    assert_eq!(read(&damaged, &skipping).expect("one row").report.skipped, 1);
+}
+
+#[test]
+fn one_column_for_two_signals_is_refused() {
+    let text = text("t,a,b\n", plain);
+    for columns in ["t=t,q1=a,tau1=a", "t=t,q1=2,tau1=a", "t=1,q1=2,tau1=2"] {
+        assert_eq!(
+            refusal(&text, &import(columns, "")),
+            "walk.csv:1: --columns: q1 and tau1 are both read from column `a`: give every signal its own column"
+        );
+    }
+}
+
+#[test]
+fn a_misspelt_column_is_answered_with_the_nearest_name() {
+    let text = text("stamp,hip_angle,hip_torque\n", plain);
+    let message = refusal(&text, &import("t=stamp,q1=hip_angel,tau1=hip_torque", "s,rad,Nm"));
+    assert!(
+        message.ends_with(
+            ". The nearest name is `hip_angle`. If it is meant, repeat the command with it:\n  cargo sim replay --columns \
+             t=stamp,q1=hip_angle,tau1=hip_torque --units s,rad,Nm"
+        ),
+        "{message}"
+    );
+    let message = refusal(&text, &import("t=stamp,q1=zzz,tau1=hip_torque", ""));
+    assert!(!message.contains("nearest"), "{message}");
+}
+
+#[test]
 fn options_that_contradict_each_other_are_refused() {
     let column = |text: &str| text.parse::<scarab_host::formats::recording::import::ColumnChoice>();
     assert!(column("q1").expect_err("no column").contains("must be SIGNAL=COLUMN"));

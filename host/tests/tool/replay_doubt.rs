@@ -306,6 +306,53 @@ fn a_wrong_unit_is_named_once_with_the_options_that_read_it() {
 }
 
 #[test]
+fn two_wrong_units_are_named_together_with_the_options_that_read_them() {
+    let folder = Folder::new();
+    let leg = include_str!("../../legs/mujoco-leg.toml");
+    let encoder = "encoder = { side = \"joint\", counts = 16384, ratio = 1.0 }";
+    let geared = leg.replace(encoder, "encoder = { side = \"motor\", counts = 8192, ratio = 30.0 }");
+    let driven = leg.replacen("torque_per_ampere = 1.5", "torque_per_ampere = 2.5", 1);
+    let driven = driven.replacen("torque_per_ampere = 1.5", "torque_per_ampere = 12.0", 1);
+    let unknown = leg.replace("torque_per_ampere = 1.5\n", "");
+    assert!(geared != leg && driven != leg && unknown != leg);
+    let (degrees, motor_turns) = (1_f64.to_degrees(), 30.0 / core::f64::consts::TAU);
+    let angles =
+        |motor: bool| if motor { "t=t_s,motor1=q1_rad,motor2=q2_rad" } else { "t=t_s,q1=q1_rad,q2=q2_rad" };
+    let torques = |current: bool| if current { "i1=tau1_Nm,i2=tau2_Nm" } else { "tau1=tau1_Nm,tau2=tau2_Nm" };
+    let milli = 1000.0;
+    for (leg, angle, factors, name, columns, units) in [
+        (leg, degrees, [milli; 2], "units", (false, false), "s,deg,mNm"),
+        (&geared, motor_turns, [1.0; 2], "angle_unit", (true, false), "s,turn,Nm"),
+        (&geared, motor_turns, [milli; 2], "units", (true, false), "s,turn,mNm"),
+        (&driven, 1.0, [milli / 2.5, milli / 12.0], "torque_current", (false, true), "s,rad,mA"),
+        (&driven, degrees, [milli / 2.5, milli / 12.0], "torque_current", (false, true), "s,deg,mA"),
+        (&unknown, 1.0, [milli / 2.5, milli / 12.0], "torque_current", (false, true), "s,rad,mA"),
+    ] {
+        let mut wrong = samples();
+        for row in &mut wrong {
+            row[1..3].iter_mut().for_each(|value| *value *= angle);
+            row[3..].iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
+        }
+        let (file, json) = (folder.write("walk.csv", &csv(&wrong)), folder.path("report.json"));
+        let leg = folder.write("leg.toml", leg);
+        let run = |options: &str| {
+            let arguments = format!("replay --split 0.666666 {options} --leg");
+            scarab(&arguments, &[&leg, &file, Path::new("--json"), &json])
+        };
+        run("").ends_with(3);
+        let report = folder.json("report.json");
+        let cause = &report["likely_cause"];
+        assert_eq!(cause["name"], name, "{units}: {cause}");
+        let options = format!("--columns {},{} --units {units}", angles(columns.0), torques(columns.1));
+        let words = cause["words"].as_str().expect("words");
+        assert!(words.ends_with(&format!("; read it so by {options}")), "{units}: {words}");
+        if !words.contains("Then state each joint") {
+            run(&options).ends_with(0);
+        }
+    }
+}
+
+#[test]
 fn currents_that_were_read_as_torques_are_suspected_by_the_scale_of_the_prior() {
     const CONSTANT: f64 = 40.0;
     let folder = Folder::new();

@@ -68,6 +68,7 @@ fn saturated_torque_is_refused_or_where_short_excluded() {
     assert!(reasons(&report).contains(&"input"), "{report}");
     assert!(samples(&report).contains(&("saturation", Some(2), true)), "{:?}", samples(&report));
     assert!(run.printed.contains("tau2_Nm ends at a limit of 3.28"), "{}", run.printed);
+    assert!(run.printed.contains("of the samples lie, first at "), "{}", run.printed);
 
     let file = changed(&folder, |table| clip(table, "tau1_Nm", 0.93));
     let (run, report) = replay(&folder, &file, "");

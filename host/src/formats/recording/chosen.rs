@@ -7,7 +7,9 @@ use crate::formats::recording::columns::Column;
 use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
-use crate::formats::recording::suggest::{Reading, advice, example, unit_in_name};
+use crate::formats::recording::suggest::{
+    Reading, advice, command, example, nearest, readings, unit_in_name,
+};
 use crate::formats::recording::{LARGEST_POSITION_RAD, LARGEST_TIME_S, LARGEST_TORQUE_NM};
 use crate::report::reading::ColumnReport;
 
@@ -44,12 +46,13 @@ pub(crate) struct Chosen {
 impl Chosen {
     /// SI value of the time, joint angle or joint torque.
     pub(crate) fn value(&self, number: f64) -> Result<f64, Fault> {
-        let value = self.unit.to_si(number) * self.drive;
+        let value = self.si(number);
         if value.abs() > self.limit {
             return Err(Fault::Absurd {
                 column: self.column.name.clone(),
                 value: number,
-                limit: self.limit / self.factor().abs(),
+                limit: self.largest(),
+                advice: String::new(),
             });
         }
         Ok(value)
@@ -57,6 +60,16 @@ impl Chosen {
 
     fn factor(&self) -> f64 {
         self.unit.factor() * self.drive
+    }
+
+    /// SI value, also of a number out of range.
+    pub(crate) fn si(&self, number: f64) -> f64 {
+        self.unit.to_si(number) * self.drive
+    }
+
+    /// Largest magnitude accepted, as the file holds it.
+    pub(crate) fn largest(&self) -> f64 {
+        self.limit / self.factor().abs()
     }
 
     /// How the column is read, for a proposal.
@@ -94,6 +107,12 @@ pub(crate) fn choose(names: &Names, import: &Import) -> Result<(Vec<Chosen>, usi
             None => {
                 missing.get_or_insert(choices[0]);
             }
+        }
+    }
+    for (index, one) in order.iter().enumerate() {
+        let column: &Column = &found[one];
+        if let Some(other) = order[index + 1..].iter().find(|other| found[*other].index == column.index) {
+            return Err(Fault::SharedColumn { column: column.name.clone(), one: *one, other: *other });
         }
     }
     if let Some(signal) = missing {
@@ -135,7 +154,7 @@ impl Finder<'_> {
                     return Ok(Some((*signal, Column { index: number - 1, name })));
                 }
                 Some(ColumnName::Name(name)) if self.names.are_stated => {
-                    let column = self.named(name)?.ok_or_else(|| self.unnamed(name))?;
+                    let column = self.named(name)?.ok_or_else(|| self.unnamed(*signal, name))?;
                     return Ok(Some((*signal, column)));
                 }
                 Some(ColumnName::Name(_)) => return Err(self.no_header()),
@@ -209,8 +228,20 @@ impl Finder<'_> {
         self.missing_column(signal.column(self.import.unit(signal).0), self.advice(found))
     }
 
-    fn unnamed(&self, name: &str) -> Fault {
-        self.missing_column(name.to_owned(), String::new())
+    /// Stated name that the header lacks, with the nearest one of the header.
+    fn unnamed(&self, signal: Signal, name: &str) -> Fault {
+        let advice = nearest(&self.names.names, name).map_or(String::new(), |near| {
+            let mut readings = readings(self.import);
+            readings
+                .iter_mut()
+                .filter(|reading| reading.signal == signal)
+                .for_each(|reading| near.clone_into(&mut reading.column));
+            format!(
+                ". The nearest name is `{near}`. If it is meant, repeat the command with it:\n  {}",
+                command(self.import, &readings)
+            )
+        });
+        self.missing_column(name.to_owned(), advice)
     }
 
     fn missing_column(&self, column: String, advice: String) -> Fault {

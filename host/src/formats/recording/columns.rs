@@ -168,7 +168,8 @@ impl Column {
 
     fn check(&self, value: f64, limit: f64) -> Result<f64, Fault> {
         if value.abs() > limit {
-            return Err(Fault::Absurd { column: self.name.clone(), value, limit });
+            let advice = String::new();
+            return Err(Fault::Absurd { column: self.name.clone(), value, limit, advice });
         }
         Ok(value)
     }

@@ -16,6 +16,7 @@ use crate::formats::recording::signal::{Quantity, Signal, Unit};
 use crate::formats::recording::suggest::{Reading, command};
 use crate::formats::recording::{
     JointSeries, MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MOST_BAD_PERCENT, MOST_SAMPLES, Recording,
+    median_step_s,
 };
 use crate::report::reading::{ARRAYS, ReadReport, SkippedReport};
 
@@ -38,6 +39,8 @@ pub(crate) struct Decoder<'a> {
     /// Line of every sample.
     numbers: LineNumbers,
     skipped: Skipped,
+    /// First row with its line and time, where that time is out of range: the next row shows its unit.
+    suspect: Option<(usize, f64)>,
     /// Values of the current row.
     values: Vec<f64>,
 }
@@ -54,7 +57,7 @@ impl<'a> Decoder<'a> {
             joints_in_file,
         };
         let (numbers, skipped, values) = (LineNumbers::default(), Skipped::default(), Vec::new());
-        Ok(Self { file, import, columns, recording, numbers, skipped, values })
+        Ok(Self { file, import, columns, recording, numbers, skipped, suspect: None, values })
     }
 
     /// Indices of the chosen columns, in the order in which [`Decoder::take`] asks for their numbers.
@@ -74,11 +77,39 @@ impl<'a> Decoder<'a> {
     ) -> Result<(), FileError> {
         match self.push(number) {
             Ok(()) => {
+                self.settle(None)?;
                 self.numbers.push(line);
                 Ok(())
             }
-            Err(fault) => self.skip(line, fault),
+            Err(Fault::Absurd { column, value, limit, .. }) if column == self.columns[0].column.name => {
+                let is_first = self.recording.time_s.is_empty() && self.skipped.rows == 0;
+                if is_first && self.suspect.is_none() {
+                    self.suspect = Some((line, value));
+                    return Ok(());
+                }
+                self.settle(Some(value))?;
+                let advice = self.time_advice(&self.recording.time_s);
+                self.skip(line, Fault::Absurd { column, value, limit, advice })
+            }
+            Err(fault) => {
+                self.settle(None)?;
+                self.skip(line, fault)
+            }
         }
+    }
+
+    /// Reports the first row's time that was out of range; `next` is the next row's, if it is so too.
+    fn settle(&mut self, next: Option<f64>) -> Result<(), FileError> {
+        let Some((line, value)) = self.suspect.take() else { return Ok(()) };
+        let time = &self.columns[0];
+        let advice = next.map_or(String::new(), |next| self.time_advice(&[time.si(value), time.si(next)]));
+        let (column, limit) = (time.column.name.clone(), time.largest());
+        self.skip(line, Fault::Absurd { column, value, limit, advice })
+    }
+
+    /// Advice on the unit of these times, s.
+    fn time_advice(&self, time_s: &[f64]) -> String {
+        other_time_unit(time_s, self.import, self.columns.iter().map(Chosen::reading).collect())
     }
 
     /// Skips a row with this fault, if that is requested.
@@ -86,9 +117,9 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// The fault, where rows are not skipped.
     pub(crate) fn skip(&mut self, line: usize, fault: Fault) -> Result<(), FileError> {
-        if !self.import.skip_bad || !fault.is_of_row() {
+        if !self.import.skip_bad || !fault.is_of_row() || fault.is_of_unit() {
             // A fault of the first row is rather one of all rows.
-            let is_damage = fault.is_of_row() && !self.recording.time_s.is_empty();
+            let is_damage = fault.is_of_row() && !fault.is_of_unit() && !self.recording.time_s.is_empty();
             let fault = if is_damage { Fault::Skippable(Box::new(fault)) } else { fault };
             return Err(refuse(self.file, Some(line), fault));
         }
@@ -120,8 +151,10 @@ impl<'a> Decoder<'a> {
     }
 
     /// Checks the whole recording.
-    pub(crate) fn finish(self, format: String, header: bool) -> Result<Read, FileError> {
-        let Self { file, import, columns, recording, numbers, skipped, .. } = self;
+    pub(crate) fn finish(mut self, format: String, header: bool) -> Result<Read, FileError> {
+        self.settle(None)?;
+        let advice = self.time_advice(&self.recording.time_s);
+        let Self { file, columns, recording, numbers, skipped, .. } = self;
         let rows = recording.time_s.len() + skipped.rows;
         if skipped.rows * 100 > rows * MOST_BAD_PERCENT {
             let first = skipped
@@ -130,8 +163,7 @@ impl<'a> Decoder<'a> {
                 .map_or(String::new(), |(_, first)| format!("line {}: {}", first.line, first.reason));
             return Err(refuse(file, None, Fault::TooManyBad { skipped: skipped.rows, rows, first }));
         }
-        let readings: Vec<Reading> = columns.iter().map(Chosen::reading).collect();
-        recording.check(&numbers, &other_time_unit(&recording, import, readings))?;
+        recording.check(&numbers, &advice)?;
         let report = ReadReport {
             file: file.display().to_string(),
             format,
@@ -145,31 +177,34 @@ impl<'a> Decoder<'a> {
     }
 }
 
-/// Advice where the time is a recording in another unit only, else nothing.
-fn other_time_unit(recording: &Recording, import: &Import, mut readings: Vec<Reading>) -> String {
+/// Advice where these times are a recording in another unit only, else nothing. Two times show a rate, but no
+/// duration.
+fn other_time_unit(time_s: &[f64], import: &Import, mut readings: Vec<Reading>) -> String {
     let Some(time) = readings.iter_mut().find(|reading| reading.signal == Signal::Time) else {
         return String::new();
     };
+    let (step_s, duration_s) =
+        (median_step_s(time_s), time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0));
+    let is_pair = time_s.len() == 2;
     let is_valid = |unit: &Unit| {
         let factor = unit.factor() / time.unit.factor();
-        let rate = 1.0 / (factor * recording.median_step_s());
+        let rate = 1.0 / (factor * step_s);
         (MINIMUM_RATE_HZ..=LARGEST_RATE_HZ).contains(&rate)
-            && factor * recording.duration_s() >= MINIMUM_DURATION_S
+            && (is_pair || factor * duration_s >= MINIMUM_DURATION_S)
     };
     if is_valid(&time.unit) {
         return String::new();
     }
     let Some(unit) = Unit::of(Quantity::Time).find(is_valid) else { return String::new() };
     let factor = unit.factor() / time.unit.factor();
-    let (rate, duration) = (1.0 / (factor * recording.median_step_s()), factor * recording.duration_s());
-    let counts = recording.time_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
+    let rate = rounded(1.0 / (factor * step_s));
+    let over = if is_pair { String::new() } else { format!(" over {} s", rounded(factor * duration_s)) };
+    let counts = time_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
     let or_numbers = if counts { " or sample numbers" } else { "" };
     time.unit = unit;
     format!(
-        ": is the time in {}{or_numbers}? Then it would be {} Hz over {} s. If so, repeat the command with it:\n  {}",
+        ": is the time in {}{or_numbers}? Then it would be {rate} Hz{over}. If so, repeat the command with it:\n  {}",
         unit.name,
-        rounded(rate),
-        rounded(duration),
         command(import, &readings)
     )
 }

@@ -51,6 +51,18 @@ pub enum Fault {
         /// Columns of the file.
         columns: usize,
     },
+    /// One column is chosen for two signals.
+    #[error(
+        "--columns: {one} and {other} are both read from column `{column}`: give every signal its own column"
+    )]
+    SharedColumn {
+        /// Column name.
+        column: String,
+        /// First signal.
+        one: Signal,
+        /// Second signal.
+        other: Signal,
+    },
     /// The name of a column states another unit than the one in use.
     #[error("column `{column}` is in {named} by its name or type, but {signal} is read in {used}{advice}")]
     OtherUnit {
@@ -134,7 +146,10 @@ pub enum Fault {
         text: String,
     },
     /// The number is beyond any leg's range.
-    #[error("{} in column `{column}` exceeds {}: is it in another unit?", Short(*.value), Short(*.limit))]
+    #[error(
+        "{} in column `{column}` exceeds {}{}", Short(*.value), Short(*.limit),
+        if .advice.is_empty() { ": is it in another unit?" } else { .advice.as_str() }
+    )]
     Absurd {
         /// Column name.
         column: String,
@@ -142,6 +157,8 @@ pub enum Fault {
         value: f64,
         /// Largest magnitude accepted.
         limit: f64,
+        /// Unit in which the time would be valid, with the complete command.
+        advice: String,
     },
     /// The numbers are finite, but their torque is not.
     #[error("the torque of this state exceeds the range of double precision")]
@@ -210,6 +227,12 @@ impl Fault {
                 | Self::Absurd { .. }
                 | Self::TimeNotIncreasing { .. }
         )
+    }
+
+    /// Whether the fault is the unit of all rows.
+    #[must_use]
+    pub fn is_of_unit(&self) -> bool {
+        matches!(self, Self::Absurd { advice, .. } if !advice.is_empty())
     }
 }
 

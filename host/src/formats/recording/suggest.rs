@@ -16,6 +16,9 @@ use crate::formats::recording::signal::{Quantity, Signal, Unit};
 /// Similarity from which a name counts as a documented name with a typing error.
 const TYPING_ERROR: f64 = 0.75;
 
+/// Similarity from which the nearest name is offered for a stated one.
+const NEAREST: f64 = 0.5;
+
 /// Words of each quantity.
 const TIME: [&str; 9] =
     ["t", "time", "timestamp", "timestamps", "stamp", "times", "elapsed", "clock", "zeit"];
@@ -343,6 +346,17 @@ pub(crate) fn options(readings: &[Reading]) -> String {
         readings.iter().map(|reading| format!("{}={}", reading.signal, reading.column)).collect();
     let all: Vec<_> = readings.iter().map(|reading| (reading.signal, reading.unit)).collect();
     format!("--columns {} --units {}", quoted(&columns.join(",")), units(&all))
+}
+
+/// Name most similar to this one, if it is similar enough for a typing error; without a comma, which
+/// `--columns` cannot hold.
+pub(crate) fn nearest<'a>(names: &'a [String], name: &str) -> Option<&'a str> {
+    let likeness =
+        |other: &str| strsim::normalized_damerau_levenshtein(&other.to_lowercase(), &name.to_lowercase());
+    let close = names.iter().filter(|other| !other.contains(',')).map(|other| (likeness(other), other));
+    let nearest =
+        close.filter(|(likeness, _)| *likeness >= NEAREST).max_by(|one, other| one.0.total_cmp(&other.0));
+    nearest.map(|(_, other)| other.as_str())
 }
 
 /// Columns of a file without a header, by number.

@@ -8,6 +8,10 @@
 //! the most informative of them is the design
 //! ```
 //!
+//! Where no pace gives a motion, the swarm repeats with the torque penalty alone, of curves at the smallest
+//! size that the shrinking reaches. It shows whether a motion exists, and what the limits lack, whatever the
+//! noise and the requested effort.
+//!
 //! Several paces are tried, because the best speed is a trade-off of inertia, friction, limits and rows lost
 //! at reversals. A slow and a fast motion have different costs, and the swarm need not jump between them.
 //! Cost: [`DesignOptions::evaluations`] curves of about 0.2 ms in all; one run on the assumed leg per pace.
@@ -21,7 +25,7 @@ use scarab::leg::LegConfiguration;
 use scarab::motion::{ExcitationTable, Fourier, HARMONICS, JointEnvelope, Motion, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::swarm::{Bso, BsoSettings, Objective};
-use scarab::units::Second;
+use scarab::units::{Radian, Second};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
@@ -48,6 +52,8 @@ const CAPACITY: usize = 3 * PER_JOINT;
 /// Cost of exceeding the torque limit by 100 %, or of an equal reduction by the monitor, in units
 /// of ln det.
 const TORQUE_PENALTY: f64 = 1e3;
+/// Weight of torque below its limit where the least torque is searched.
+const LEAST_SHARE: f64 = 1e-2;
 /// Evaluations between two updates of the progress bar.
 const SLICE: u32 = 100;
 /// Rounding of the coefficients, rad: the file contains exactly the proved values.
@@ -65,6 +71,15 @@ pub struct DesignOptions {
     pub seed: u64,
     /// Scored curves, all paces together.
     pub evaluations: u32,
+}
+
+/// What the swarm looks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// Most information within the limits.
+    Information,
+    /// Least torque above its limit, by the smallest motions.
+    LeastTorque,
 }
 
 /// Limits of a design.
@@ -98,6 +113,7 @@ pub struct Candidate<const N: usize> {
 pub fn candidates<const N: usize, const B: usize>(
     frame: &Frame<'_, N, B>,
     options: &DesignOptions,
+    goal: Goal,
     progress: &ProgressBar,
 ) -> Result<Vec<Candidate<N>>, ToolError> {
     let paces = paces(options.duration_s, frame.leg.bandwidth_hz);
@@ -112,7 +128,10 @@ pub fn candidates<const N: usize, const B: usize>(
     progress.set_length(u64::from(share) * paces.len() as u64);
     let searched: Vec<_> = paces
         .into_par_iter()
-        .map(|(period_s, cycles)| search(frame, period_s, cycles, options.seed, share, progress))
+        .map(|(period_s, cycles)| {
+            let cost = Cost::new(frame, goal, Second(period_s as f32), cycles);
+            search(&cost, options.seed, share, progress)
+        })
         .collect();
     let mut found = Vec::with_capacity(searched.len());
     let mut obstacles = Vec::new();
@@ -165,12 +184,17 @@ fn paces(duration_s: f64, bandwidth_hz: f64) -> Vec<(f64, u32)> {
 /// Cost for the swarm.
 struct Cost<'a, const N: usize, const B: usize> {
     frame: &'a Frame<'a, N, B>,
+    goal: Goal,
     envelope: [JointEnvelope; N],
     period: Second,
     cycles: u32,
 }
 
-impl<const N: usize, const B: usize> Cost<'_, N, B> {
+impl<'a, const N: usize, const B: usize> Cost<'a, N, B> {
+    fn new(frame: &'a Frame<'a, N, B>, goal: Goal, period: Second, cycles: u32) -> Self {
+        Self { frame, goal, envelope: frame.configuration.envelope(), period, cycles }
+    }
+
     fn curve(&self, coordinates: &[f64]) -> Option<Fourier<N>> {
         candidate::curve(coordinates, self.period, Second(BLEND_S), &self.envelope)
     }
@@ -186,34 +210,46 @@ impl<const N: usize, const B: usize> Objective<f64> for Cost<'_, N, B> {
     }
 
     fn evaluate(&self, position: &[f64]) -> f64 {
-        let Some(curve) = self.curve(position) else { return f64::INFINITY };
-        let score = self.frame.scorer.score(&curve, self.cycles);
-        let excess = |joint: usize| {
-            let limit = self.frame.torque_limit[joint];
-            (score.torque[joint] / limit - 1.0).max(0.0) + score.cut[joint] / limit
+        let Some(curve) = self.curve(position).and_then(|curve| match self.goal {
+            Goal::Information => Some(curve),
+            Goal::LeastTorque => shrunk(curve, SHRINK.powi(SHRINKINGS as i32 - 1)),
+        }) else {
+            return f64::INFINITY;
         };
-        (0..N).map(excess).sum::<f64>() * TORQUE_PENALTY - score.merit
+        let score = self.frame.scorer.score(&curve, self.cycles);
+        let shares = (0..N).map(|joint| {
+            let limit = self.frame.torque_limit[joint];
+            (score.torque[joint] / limit, score.cut[joint] / limit)
+        });
+        let excess: f64 = shares.clone().map(|(torque, cut)| (torque - 1.0).max(0.0) + cut).sum();
+        match self.goal {
+            Goal::Information => excess * TORQUE_PENALTY - score.merit,
+            // Below the limits, the rest leaves room for friction and the position loop.
+            Goal::LeastTorque => excess + LEAST_SHARE * shares.map(|(torque, _)| torque).sum::<f64>(),
+        }
     }
 }
 
+/// Curve shrunk by a factor about its centre.
+fn shrunk<const N: usize>(curve: Fourier<N>, factor: f32) -> Option<Fourier<N>> {
+    let offset = curve.centre_rad().map(|centre| Radian((1.0 - factor) * centre));
+    curve.mapped([factor; N], offset).ok()
+}
+
 fn search<const N: usize, const B: usize>(
-    frame: &Frame<'_, N, B>,
-    period_s: f64,
-    cycles: u32,
+    cost: &Cost<'_, N, B>,
     seed: u64,
     evaluations: u32,
     progress: &ProgressBar,
 ) -> Result<Candidate<N>, Option<Obstacle>> {
-    let period = Second(period_s as f32);
-    let cost = Cost { frame, envelope: frame.configuration.envelope(), period, cycles };
     let mut swarm =
-        Bso::<f64, BEETLES, CAPACITY>::new(&cost, BsoSettings::default(), seed).map_err(|_| None)?;
+        Bso::<f64, BEETLES, CAPACITY>::new(cost, BsoSettings::default(), seed).map_err(|_| None)?;
     while swarm.evaluations() < evaluations {
-        swarm.advance(&cost, SLICE.min(evaluations - swarm.evaluations()));
+        swarm.advance(cost, SLICE.min(evaluations - swarm.evaluations()));
         progress.inc(u64::from(SLICE));
     }
     let curve = swarm.best().and_then(|best| cost.curve(best.position)).ok_or(None)?;
-    within_limits(frame, &curve, cycles, 1.0)
+    within_limits(cost.frame, &curve, cost.cycles, 1.0)
 }
 
 /// Motion shrunk by a factor about its centre.

@@ -91,7 +91,9 @@ impl Obstacle {
                 format!("its {word} reaches {value:.1}, limit {allowed:.1} {unit}: widen `{key}`")
             }
             Limit::Torque => {
-                format!("even a small motion needs {value:.3} N m, limit {allowed:.3} N m ({key}): {less}")
+                format!(
+                    "even the motion with the least torque needs {value:.3} N m, limit {allowed:.3} N m ({key}): {less}"
+                )
             }
             Limit::Approach => format!(
                 "the way to the motion needs {value:.3} N m, limit {allowed:.3} N m ({key}), because it may begin anywhere in \

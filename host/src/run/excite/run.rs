@@ -20,14 +20,19 @@ use crate::report::excite::{
 };
 use crate::run::excite::assumption::{Assumption, with_rotors};
 use crate::run::excite::bench::{Bench, ExciteOptions};
-use crate::run::excite::design::{Candidate, DesignOptions, SHRINK, candidates, smaller};
+use crate::run::excite::design::{Candidate, DesignOptions, Goal, SHRINK, candidates, smaller};
 use crate::run::excite::expectation::{Expectation, Rehearsal};
 
 /// Duration of a design, s, and error of each base parameter that its torque covers, percent, by default.
 pub const USUAL_DURATION_S: f64 = 22.0;
 pub const USUAL_MARGIN_PERCENT: f64 = 20.0;
-/// Curves that show whether a leg has a motion at all.
+/// Curves that show for most legs that they have a motion.
 const SHORT_SEARCH: u32 = 1800;
+/// Curves of the search for the motion with the least torque.
+const LEAST_TORQUE_SEARCH: u32 = 6000;
+/// Warning about that motion.
+const LEAST_TORQUE_WARNING: &str = "the search finds no informative motion within the torque limits: this one needs the least torque \
+     over its limit. Raise `torque_limit_nm` or narrow `range_deg` for smaller sigma";
 
 /// Motion with its report.
 #[derive(Clone, Debug)]
@@ -65,7 +70,8 @@ pub fn check<const N: usize, const B: usize>(
     Ok(())
 }
 
-/// Designs a motion, or checks a given one; if none fits, with rotor inertias where none are stated.
+/// Designs a motion, or checks a given one. If no motion fits, rotor inertias are assumed where none are
+/// stated; if none fits then, the one with the least torque is designed.
 ///
 /// # Errors
 /// The leg file cannot be used, or no motion fits.
@@ -73,22 +79,46 @@ pub fn excite<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ExciteOptions,
 ) -> Result<Excited, ToolError> {
-    match excited::<N, B>(leg, options) {
-        Err(error) => match with_rotors::<N, B>(leg) {
-            Some((with_rotors, lines)) => {
-                let mut excited = excited::<N, B>(&with_rotors, options)?;
-                excited.report.warnings.extend(lines);
-                Ok(excited)
+    let (mut excited, lines) = first_fitting::<N, B, _>(leg, options.given.is_none(), |leg, goal| {
+        excited::<N, B>(leg, options, goal)
+    })?;
+    excited.report.warnings.extend(lines);
+    Ok(excited)
+}
+
+/// First success of: the leg as stated, the leg with rotor inertias, the least torque. Adds lines about what
+/// is assumed.
+fn first_fitting<const N: usize, const B: usize, T>(
+    leg: &LegFile,
+    designs: bool,
+    attempt: impl Fn(&LegFile, Goal) -> Result<T, ToolError>,
+) -> Result<(T, Vec<String>), ToolError> {
+    let mut failed = match attempt(leg, Goal::Information) {
+        Ok(found) => return Ok((found, Vec::new())),
+        Err(error) => error,
+    };
+    let (leg, mut lines) = match with_rotors::<N, B>(leg) {
+        Some((with_rotors, lines)) => match attempt(&with_rotors, Goal::Information) {
+            Ok(found) => return Ok((found, lines)),
+            Err(error) => {
+                failed = error;
+                (with_rotors, lines)
             }
-            None => Err(error),
         },
-        excited => excited,
+        None => (leg.clone(), Vec::new()),
+    };
+    if !designs {
+        return Err(failed);
     }
+    let found = attempt(&leg, Goal::LeastTorque)?;
+    lines.push(LEAST_TORQUE_WARNING.to_owned());
+    Ok((found, lines))
 }
 
 fn excited<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ExciteOptions,
+    goal: Goal,
 ) -> Result<Excited, ToolError> {
     // First, because another leg's motion is the most likely mistake.
     if let Some((file, given)) = &options.given {
@@ -100,7 +130,7 @@ fn excited<const N: usize, const B: usize>(
         Some((file, given)) => {
             vec![bench.given(given).map_err(|reason| FileError::new(file.display(), reason))?]
         }
-        None => design(&bench, &options.design)?,
+        None => design(&bench, &options.design, goal)?,
     };
     let mut best: Option<(f64, Candidate<N>, Rehearsal<N, B>)> = None;
     let mut fault = None;
@@ -129,21 +159,16 @@ fn excited<const N: usize, const B: usize>(
     }
 }
 
-/// Whether a motion can be designed for this leg, by a short search: what a design must assume.
+/// Whether a motion can be designed for this leg, by a short search: what a design must assume. A refusal is
+/// that of [`excite`].
 ///
 /// # Errors
 /// The leg file cannot be used, or names the limit that no motion keeps.
 pub fn designable<const N: usize, const B: usize>(leg: &LegFile) -> Result<Vec<String>, ToolError> {
-    match designed_shortly::<N, B>(leg) {
-        Ok(()) => Ok(Vec::new()),
-        Err(error) => match with_rotors::<N, B>(leg) {
-            Some((with_rotors, lines)) => designed_shortly::<N, B>(&with_rotors).map(|()| lines),
-            None => Err(error),
-        },
-    }
+    first_fitting::<N, B, _>(leg, true, designed_shortly::<N, B>).map(|((), lines)| lines)
 }
 
-fn designed_shortly<const N: usize, const B: usize>(leg: &LegFile) -> Result<(), ToolError> {
+fn designed_shortly<const N: usize, const B: usize>(leg: &LegFile, goal: Goal) -> Result<(), ToolError> {
     let options = ExciteOptions {
         design: DesignOptions { duration_s: USUAL_DURATION_S, seed: DEFAULT_SEED, evaluations: SHORT_SEARCH },
         given: None,
@@ -153,7 +178,7 @@ fn designed_shortly<const N: usize, const B: usize>(leg: &LegFile) -> Result<(),
         assumption: Assumption::Best,
     };
     let bench = Bench::<N, B>::new(leg, &options)?;
-    let found = candidates(&bench.frame(), &options.design, &ProgressBar::hidden())?;
+    let found = searched(&bench, &options.design, goal, &ProgressBar::hidden())?;
     let rehearsed: Vec<_> =
         found.into_par_iter().map(|candidate| untouched(&bench, candidate).map(drop)).collect();
     rehearsed.into_iter().reduce(Result::or).unwrap_or(Ok(()))
@@ -201,6 +226,7 @@ const COARSE_SHRINK: f32 = 0.7;
 fn design<const N: usize, const B: usize>(
     bench: &Bench<N, B>,
     options: &DesignOptions,
+    goal: Goal,
 ) -> Result<Vec<Candidate<N>>, ToolError> {
     let progress = ProgressBar::new(u64::from(options.evaluations));
     if let Ok(style) =
@@ -208,9 +234,22 @@ fn design<const N: usize, const B: usize>(
     {
         progress.set_style(style);
     }
-    let found = candidates(&bench.frame(), options, &progress);
+    let found = searched(bench, options, goal, &progress);
     progress.finish_and_clear();
     found
+}
+
+fn searched<const N: usize, const B: usize>(
+    bench: &Bench<N, B>,
+    options: &DesignOptions,
+    goal: Goal,
+    progress: &ProgressBar,
+) -> Result<Vec<Candidate<N>>, ToolError> {
+    let options = match goal {
+        Goal::Information => *options,
+        Goal::LeastTorque => DesignOptions { evaluations: LEAST_TORQUE_SEARCH, ..*options },
+    };
+    candidates(&bench.frame(), &options, goal, progress)
 }
 
 impl<const N: usize, const B: usize> Bench<N, B> {

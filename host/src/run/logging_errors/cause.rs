@@ -12,7 +12,7 @@
 //! or a zero is significant.
 
 use crate::base::number::Number;
-use crate::report::doubt::{CauseReport, DirectionReport, SampleFinding};
+use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
 use crate::report::findings::FindingReport;
 use crate::run::logging_errors::directions::{CHANCE, Directions, Found, label};
 use crate::run::logging_errors::lag::{self, Lag};
@@ -31,6 +31,8 @@ const HALVED: f64 = 0.7;
 const WEAKER: f64 = 3.0;
 /// Misfits closer than this ratio count as equal: the simpler correction is named.
 const EQUAL: f64 = 1.1;
+/// Misfit over the torque up to which one correction may be all that is wrong.
+const SMALL_MISFIT: f64 = 0.2;
 /// Misfits closer than this ratio are those of mirrored legs.
 const MIRRORED: f64 = 1.001;
 
@@ -42,6 +44,7 @@ struct Correction<const N: usize> {
     name: &'static str,
     joint: Option<usize>,
     words: String,
+    reads: Vec<ReadAs>,
     apply: Change<N>,
 }
 
@@ -105,6 +108,7 @@ pub fn likely<const N: usize, const B: usize>(
                 value: midway.change.into(),
                 sigma: midway.sigma.into(),
                 words: midway_words(midway),
+                reads: Vec::new(),
             },
             quality: Quality {
                 remaining: here.remaining * (1.0 - midway.explained).max(0.0).sqrt(),
@@ -113,6 +117,7 @@ pub fn likely<const N: usize, const B: usize>(
             is_shared: false,
         });
     }
+    tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
     let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(errors, &tried.cause)).collect();
     let passing = tried.into_iter().zip(refused).filter(|(tried, refused)| {
         tried.quality.sound && (!here.sound || *refused || tried.quality.remaining < HALVED * here.remaining)
@@ -129,6 +134,7 @@ pub fn likely<const N: usize, const B: usize>(
             value: finding.value,
             sigma: Number::UNKNOWN,
             words: finding.words.clone(),
+            reads: Vec::new(),
         },
         (None, None) => weaker(question, errors, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
     }
@@ -144,6 +150,7 @@ fn motionless(findings: &[FindingReport]) -> Option<CauseReport> {
         value: finding.value,
         sigma: Number::UNKNOWN,
         words: format!("{}; record a motion that moves every joint", finding.words),
+        reads: Vec::new(),
     })
 }
 
@@ -180,6 +187,7 @@ fn encoder_steps<const N: usize, const B: usize>(
         value: share.into(),
         sigma: Number::UNKNOWN,
         words,
+        reads: Vec::new(),
     })
 }
 
@@ -191,8 +199,9 @@ pub fn in_degrees<const N: usize, const B: usize>(
     errors: &LoggingErrors<N, B>,
 ) -> Option<CauseReport> {
     let here = quality(question, &errors.equations);
-    let candidates = corrections::<N>().into_iter().filter(|correction| {
-        correction.name == "angle_unit" && spans(question, correction.joint, 2.0 * std::f64::consts::TAU)
+    let candidates = angle_units(question).into_iter().chain(unit_pairs(question)).filter(|correction| {
+        correction.reads.contains(&ReadAs::Degrees)
+            && spans(question, correction.joint, 2.0 * std::f64::consts::TAU)
     });
     let tried = candidates.filter_map(|correction| refit(question, &correction));
     nearest(
@@ -248,8 +257,10 @@ fn unknown() -> CauseReport {
         joint: None,
         value: Number::UNKNOWN,
         sigma: Number::UNKNOWN,
-        words: "no single correction of units, signs, columns, delay, scale or gravity makes the recording acceptable"
+        words: "no correction of units and no single one of signs, columns, delay, scale or gravity makes the recording \
+                acceptable"
             .into(),
+        reads: Vec::new(),
     }
 }
 
@@ -302,14 +313,22 @@ fn of_direction<const N: usize, const B: usize>(
 }
 
 fn refits<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Tried> {
-    let mut tried = Vec::new();
-    for correction in corrections::<N>() {
-        if correction.name == "angle_unit" && !spans(question, correction.joint, std::f64::consts::TAU) {
-            continue;
-        }
-        tried.extend(refit(question, &correction));
-    }
-    tried
+    corrections(question).iter().filter_map(|correction| refit(question, correction)).collect()
+}
+
+/// Equations with all angles in one other unit, for each unit that is possible.
+#[must_use]
+pub fn with_other_angles<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+) -> Vec<(ReadAs, Equations<N, B>)> {
+    let of_all = angle_units(question).into_iter().filter(|correction| correction.joint.is_none());
+    of_all
+        .filter_map(|correction| {
+            let motions: Vec<Motion<N>> =
+                question.motions.iter().map(|motion| corrected(question, motion, &correction)).collect();
+            Some((*correction.reads.first()?, question.equations(&motions).ok().flatten()?))
+        })
+        .collect()
 }
 
 /// Fit of the corrected motions; `None` with too few rows.
@@ -322,9 +341,14 @@ fn refit<const N: usize, const B: usize>(
     let equations = question.equations(&motions).ok().flatten()?;
     let quality = quality(question, &equations);
     let words = format!(
-        "{}; then the misfit is {:.1} % of the torque and the parameters are possible",
+        "{}; then the misfit is {:.1} % of the torque{}",
         correction.words,
-        100.0 * quality.remaining
+        100.0 * quality.remaining,
+        if quality.remaining < SMALL_MISFIT {
+            " and no inertia or friction is negative"
+        } else {
+            ": there is another error"
+        }
     );
     let cause = CauseReport {
         name: correction.name,
@@ -332,6 +356,7 @@ fn refit<const N: usize, const B: usize>(
         value: Number::UNKNOWN,
         sigma: Number::UNKNOWN,
         words,
+        reads: correction.reads.clone(),
     };
     Some(Tried { cause, quality, is_shared: false })
 }
@@ -365,42 +390,97 @@ fn corrected<const N: usize, const B: usize>(
     motion
 }
 
-/// All corrections of units, signs and columns; the simpler first.
-fn corrections<const N: usize>() -> Vec<Correction<N>> {
-    let mut all: Vec<Correction<N>> = Vec::new();
-    let chosen = |joint: Option<usize>, at: usize| joint.is_none_or(|joint| joint == at);
-    let mut subjects: Vec<Option<usize>> = vec![None];
-    if N > 1 {
-        subjects.extend((0..N).map(Some));
-    }
-    let joints =
-        |joint: Option<usize>| joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
-    all.push(Correction {
+/// All joints, then each where there are several.
+fn subjects<const N: usize>() -> impl Iterator<Item = Option<usize>> {
+    std::iter::once(None).chain((0..N).filter(|_| N > 1).map(Some))
+}
+
+fn words_of(joint: Option<usize>) -> String {
+    joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1))
+}
+
+/// Torque in mN m.
+fn millinewtons<const N: usize>() -> Correction<N> {
+    Correction {
         name: "torque_unit",
         joint: None,
         words: "torque divided by 1000: is it in mN m?".into(),
+        reads: vec![ReadAs::Millinewtons],
         apply: Box::new(|_, torques| torques.iter_mut().for_each(|torque| *torque /= 1000.0)),
-    });
-    for &joint in &subjects {
+    }
+}
+
+/// Corrections of the angles' unit: degrees that span more than a turn in rad, turns of the joint that span
+/// less, and angles of the motor where its gear ratio is stated.
+fn angle_units<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
+    use std::f64::consts::TAU;
+    let mut all = Vec::new();
+    let mut add = |joint: Option<usize>, reads: ReadAs, unit: &str, factors: [f64; N]| {
+        let factors = core::array::from_fn::<f64, N, _>(|at| {
+            if joint.is_none_or(|joint| joint == at) { factors[at] } else { 1.0 }
+        });
+        all.push(Correction {
+            name: "angle_unit",
+            joint,
+            words: format!("angle of {} read as {unit}", words_of(joint)),
+            reads: vec![reads],
+            apply: Box::new(move |angles, _| {
+                angles.iter_mut().zip(factors).for_each(|(angle, factor)| *angle *= factor);
+            }),
+        });
+    };
+    let degree = TAU / 360.0;
+    for joint in subjects::<N>().filter(|joint| spans(question, *joint, TAU)) {
+        add(joint, ReadAs::Degrees, "degrees", [degree; N]);
+    }
+    if !spans(question, None, TAU) {
+        add(None, ReadAs::Turns, "turns", [TAU; N]);
+    }
+    let ratios: Option<Vec<f64>> = question.motor_ratio.iter().copied().collect();
+    if let Some(ratios) = ratios {
+        let of_motor = |unit: f64| core::array::from_fn(|joint| unit / ratios[joint]);
+        add(None, ReadAs::MotorRadians, "angle of the motor in rad", of_motor(1.0));
+        add(None, ReadAs::MotorDegrees, "angle of the motor in degrees", of_motor(degree));
+        add(None, ReadAs::MotorTurns, "turns of the motor", of_motor(TAU));
+    }
+    all
+}
+
+/// Corrections of angle and torque at once.
+fn unit_pairs<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
+    let pair = |angle: Correction<N>| {
+        let torque = millinewtons::<N>();
+        Correction {
+            name: "units",
+            joint: angle.joint,
+            words: format!("{}, and {}", angle.words, torque.words),
+            reads: [angle.reads, torque.reads].concat(),
+            apply: Box::new(move |angles: &mut [f64; N], torques: &mut [f64; N]| {
+                (angle.apply)(angles, torques);
+                (torque.apply)(angles, torques);
+            }) as Change<N>,
+        }
+    };
+    angle_units(question).into_iter().map(pair).collect()
+}
+
+/// All single corrections of units, signs and columns; the simpler first.
+fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
+    let chosen = |joint: Option<usize>, at: usize| joint.is_none_or(|joint| joint == at);
+    let mut all = vec![millinewtons()];
+    for joint in subjects::<N>() {
         all.push(Correction {
             name: "torque_sign",
             joint,
-            words: format!("torque of {} negated", joints(joint)),
+            words: format!("torque of {} negated", words_of(joint)),
+            reads: Vec::new(),
             apply: Box::new(move |_, torques| {
                 let each = torques.iter_mut().enumerate();
                 each.filter(|(at, _)| chosen(joint, *at)).for_each(|(_, torque)| *torque = -*torque);
             }),
         });
-        all.push(Correction {
-            name: "angle_unit",
-            joint,
-            words: format!("angle of {} read as degrees", joints(joint)),
-            apply: Box::new(move |angles, _| {
-                let each = angles.iter_mut().enumerate();
-                each.filter(|(at, _)| chosen(joint, *at)).for_each(|(_, angle)| *angle = angle.to_radians());
-            }),
-        });
     }
+    all.extend(angle_units(question));
     for one in 0..N {
         for other in one + 1..N {
             let names = format!("{} and {}", one + 1, other + 1);
@@ -408,18 +488,21 @@ fn corrections<const N: usize>() -> Vec<Correction<N>> {
                 name: "joints_swapped",
                 joint: None,
                 words: format!("torques of joints {names} exchanged"),
+                reads: Vec::new(),
                 apply: Box::new(move |_, torques| torques.swap(one, other)),
             });
             all.push(Correction {
                 name: "joints_swapped",
                 joint: None,
                 words: format!("angles of joints {names} exchanged"),
+                reads: Vec::new(),
                 apply: Box::new(move |angles, _| angles.swap(one, other)),
             });
             all.push(Correction {
                 name: "joints_swapped",
                 joint: None,
                 words: format!("joints {names} exchanged"),
+                reads: Vec::new(),
                 apply: Box::new(move |angles, torques| {
                     angles.swap(one, other);
                     torques.swap(one, other);
@@ -432,6 +515,7 @@ fn corrections<const N: usize>() -> Vec<Correction<N>> {
             name: "direction",
             joint: Some(joint),
             words: format!("angle and torque of joint {} with the other sign", joint + 1),
+            reads: Vec::new(),
             apply: Box::new(move |angles, torques| {
                 angles[joint] = -angles[joint];
                 torques[joint] = -torques[joint];

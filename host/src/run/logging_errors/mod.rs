@@ -67,6 +67,8 @@ pub struct Question<const N: usize, const B: usize> {
     pub noise: [Option<f64>; N],
     /// Standard deviation of each base parameter by noise.
     pub sigma: [f64; B],
+    /// Motor turns per joint turn, where the leg file states an encoder at the motor.
+    pub motor_ratio: [Option<f64>; N],
     /// How the angles were read.
     pub encoders: Encoders<N>,
 }
@@ -336,6 +338,7 @@ pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
         value: finding.value.into(),
         sigma: finding.sigma.into(),
         words: format!("{}: {}", finding.file, finding.text),
+        reads: Vec::new(),
     }
 }
 

@@ -49,6 +49,7 @@ impl CauseReport {
                 direction.words(),
                 100.0 * direction.explained.known().unwrap_or(0.0)
             ),
+            reads: Vec::new(),
         }
     }
 }

@@ -267,6 +267,10 @@ impl<'a> Look<'a> {
                 format!(". These stretches are excluded, {:.1} % of the recording", 100.0 * lost)
             }
         };
+        let first = |is_marked: &[bool]| {
+            let sample = is_marked.iter().position(|&is_marked| is_marked).unwrap_or(0);
+            format!("{:.3} s", self.recording.time_s.get(sample).copied().unwrap_or(0.0))
+        };
         for limit in &self.limits {
             let share = limit.is_at.iter().filter(|&&at| at).count() as f64 / samples;
             findings.push(SampleFinding {
@@ -279,10 +283,11 @@ impl<'a> Look<'a> {
                 share,
                 refuses,
                 text: format!(
-                    "tau{}_Nm ends at a limit of {:.4} N m, where {:.1} % of the samples lie{}",
+                    "tau{}_Nm ends at a limit of {:.4} N m, where {:.1} % of the samples lie, first at {}{}",
                     limit.joint + 1,
                     limit.limit_nm,
                     100.0 * share,
+                    first(&limit.is_at),
                     fate("record with a larger range of the torque, or a calmer motion")
                 ),
             });
@@ -298,7 +303,8 @@ impl<'a> Look<'a> {
                 share: frozen_s / self.recording.duration_s(),
                 refuses,
                 text: format!(
-                    "columns are constant for {frozen_s:.2} s in all while the leg moves{}",
+                    "columns are constant for {frozen_s:.2} s in all while the leg moves, first at {}{}",
+                    first(&self.is_frozen),
                     fate("the recorder loses samples")
                 ),
             });

@@ -85,6 +85,7 @@ fn question(motions: Vec<Motion<2>>) -> Question<2, BASE> {
         bandwidth_hz: 8.0,
         prior: Some(prior),
         torque_limit: [150.0; 2],
+        motor_ratio: [None; 2],
         encoders: Encoders { joints: [None; 2], sample_s: 0.002 },
         noise: [Some(NOISE_NM * NOISE_NM / 500.0); 2],
         sigma: [0.0; BASE],

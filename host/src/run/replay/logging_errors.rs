@@ -17,7 +17,7 @@ use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::{JointSeries, Recording};
 use crate::leg::background::Background;
 use crate::report::RunReport;
-use crate::report::doubt::{BandwidthReport, RecordingsReport};
+use crate::report::doubt::{BandwidthReport, ReadAs, RecordingsReport};
 use crate::report::findings::FindingReport;
 use crate::run::logging_errors::encoder::{Encoder, Encoders};
 use crate::run::logging_errors::rows::{Equations, Filters, Motion};
@@ -238,7 +238,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             self.widen(run, errors);
             run.findings.extend(errors.findings());
             run.findings.extend(cause::in_degrees(&question, errors).map(|found| {
-                let remedy = units::remedy(self.options.import.as_ref(), found.name, found.joint);
+                let remedy = units::remedy(self.options.import.as_ref(), &found);
                 FindingReport {
                     reason: Reason::Input.name(),
                     test: found.name,
@@ -269,17 +269,27 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             stribeck_hz: self.stribeck_hz,
         });
         run.verdict = if run.accepted() { "accepted" } else { "refused" };
-        let current = errors
-            .as_ref()
-            .and_then(|errors| units::current(&question, &errors.equations, self.options.import.as_ref()));
+        let import = self.options.import.as_ref();
+        let current =
+            errors.as_ref().and_then(|errors| units::current(&question, &errors.equations, import, None));
         let mut suspected = current.as_ref();
         if !run.accepted() {
             let mut cause = cause::likely(&question, errors.as_ref(), samples, &run.findings);
-            if let Some(current) = suspected.take_if(|_| cause.name == "unknown") {
+            // A torque in mN m and a current in mA differ by the torque constants only.
+            let is_scale = cause.name == "unknown" || cause.reads.contains(&ReadAs::Millinewtons);
+            let with_angles = || {
+                let angles = cause::with_other_angles(&question);
+                angles
+                    .iter()
+                    .filter(|(read, _)| cause.name == "unknown" || cause.reads.contains(read))
+                    .find_map(|(read, equations)| units::current(&question, equations, import, Some(*read)))
+            };
+            if let Some(current) = suspected.take_if(|_| is_scale) {
                 cause = current.clone();
+            } else if let Some(current) = is_scale.then(with_angles).flatten() {
+                cause = current;
             } else {
-                let remedy = units::remedy(self.options.import.as_ref(), cause.name, cause.joint);
-                cause.words += &remedy.unwrap_or_default();
+                cause.words += &units::remedy(import, &cause).unwrap_or_default();
             }
             correct_words(run, cause.name);
             report.likely_cause = Some(cause);
@@ -337,6 +347,9 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
                 self.leg.joints.get(joint).map_or(f64::INFINITY, |joint| joint.torque_limit_nm)
             }),
             noise: self.noise,
+            motor_ratio: core::array::from_fn(|joint| {
+                self.options.import.as_ref()?.drives.get(joint)?.motor_ratio
+            }),
             encoders: encoders(self.wholes, self.leg),
             sigma: core::array::from_fn(|base| estimate.sigma(base).map_or(0.0, f64::from)),
             model,
@@ -398,7 +411,14 @@ fn at_prior_limit(run: &RunReport) -> Vec<String> {
 fn correct_words(run: &mut RunReport, cause: &str) {
     if !matches!(
         cause,
-        "torque_sign" | "torque_unit" | "angle_unit" | "joints_swapped" | "direction" | "gravity"
+        "torque_sign"
+            | "torque_unit"
+            | "angle_unit"
+            | "units"
+            | "torque_current"
+            | "joints_swapped"
+            | "direction"
+            | "gravity"
     ) {
         return;
     }
