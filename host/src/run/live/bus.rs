@@ -162,19 +162,26 @@ pub struct Wire<'a> {
 }
 
 /// Time of the picture, s, from the time stamps of the frames.
-#[derive(Default)]
 struct Times {
+    /// Longest silence; longer ones are jumps of the time stamps, s.
+    most_silent_s: f64,
     /// Difference of time stamp and picture, s.
     offset_s: Option<f64>,
     now_s: f64,
 }
 
 impl Times {
+    fn new(lines: Lines) -> Self {
+        // The clock of this program does not jump.
+        let most_silent_s = if lines == Lines::Slcan { f64::INFINITY } else { MOST_SILENT_S };
+        Self { most_silent_s, offset_s: None, now_s: 0.0 }
+    }
+
     /// Takes a time stamp, s. Returns a sentence if it jumped; the picture then goes on after a gap.
     fn take(&mut self, stamp_s: f64) -> Option<String> {
         let offset_s = *self.offset_s.get_or_insert(stamp_s);
         let step_s = stamp_s - offset_s - self.now_s;
-        if (-MOST_BACK_S..=MOST_SILENT_S).contains(&step_s) {
+        if (-MOST_BACK_S..=self.most_silent_s).contains(&step_s) {
             self.now_s += step_s.max(0.0);
             return None;
         }
@@ -208,7 +215,9 @@ impl Load {
     /// Ends a second.
     fn at(&mut self, now_s: f64) {
         let lasted_s = now_s - self.since_s;
-        if lasted_s >= 1.0 {
+        if lasted_s < 0.0 {
+            (self.since_s, self.bits, self.frames) = (now_s, 0, 0);
+        } else if lasted_s >= 1.0 {
             let percent = 100.0 * self.bits as f64 / (self.bits_per_s as f64 * lasted_s);
             let frames = f64::from(self.frames) / lasted_s;
             self.words = format!("{percent:.0} % of {} kbit/s, {frames:.0} frames/s", self.bits_per_s / 1000);
@@ -248,7 +257,7 @@ pub fn watch<const N: usize, const B: usize>(
     let mut clock = speed.map(Clock::new);
     let (send, found) = sync_channel(MOST_WAITING);
     let reader = thread::spawn(move || read(input, lines, &send));
-    let (mut times, mut due_s, mut arrived) = (Times::default(), 0.0, Instant::now());
+    let (mut times, mut due_s, mut arrived) = (Times::new(lines), 0.0, Instant::now());
     let (mut bad, mut first_bad, mut heard) = (0, None, BTreeSet::new());
     loop {
         match found.recv_timeout(SILENCE) {
@@ -325,7 +334,7 @@ mod tests {
 
     #[test]
     fn time_stamps_that_jump_leave_a_gap_of_a_second() {
-        let mut times = Times::default();
+        let mut times = Times::new(Lines::Candump);
         for (stamp_s, now_s, jumps) in [
             (1e9, 0.0, false),
             (1e9 + 2.0, 2.0, false),
@@ -339,5 +348,17 @@ mod tests {
             assert_eq!(times.take(stamp_s).is_some(), jumps, "{stamp_s}");
             assert!((times.now_s - now_s).abs() < 1e-6, "{stamp_s}: {} instead of {now_s}", times.now_s);
         }
+        let mut arrivals = Times::new(Lines::Slcan);
+        assert_eq!((arrivals.take(1.0), arrivals.take(3601.0), arrivals.now_s), (None, None, 3600.0));
+    }
+
+    #[test]
+    fn the_load_is_counted_again_after_time_goes_back() {
+        let mut load = Load { bits_per_s: 1_000_000, since_s: 0.0, bits: 0, frames: 0, words: String::new() };
+        load.at(100.0);
+        load.at(5.0);
+        (0..100).for_each(|_| load.add(&Frame::new(0x80, &[])));
+        load.at(6.0);
+        assert!(load.words.ends_with("% of 1000 kbit/s, 100 frames/s"), "{}", load.words);
     }
 }
