@@ -20,7 +20,8 @@
 //! | [`wearer`] | a wearer with a body of their own: limb, cuffs, muscles, intended motions |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!
-//! The plant needs neither `std` nor a heap.
+//! The plant needs neither `std` nor a heap. Without the feature `wearer`, as in the emulated image, it has no
+//! body of a wearer.
 #![no_std]
 
 #[cfg(test)]
@@ -41,5 +42,6 @@ mod maths;
 pub mod mechanism;
 pub mod pushes;
 pub mod sensors;
+#[cfg(feature = "wearer")]
 pub mod wearer;
 pub mod world;
