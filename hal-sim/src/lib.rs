@@ -20,8 +20,8 @@
 //! | [`wearer`] | a wearer with a body of their own: limb, cuffs, muscles, intended motions |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!
-//! The plant needs neither `std` nor a heap. Without the feature `wearer`, as in the emulated image, it has no
-//! body of a wearer.
+//! The plant needs neither `std` nor a heap. Without the feature `wearer`, as in the emulated image, it has
+//! no body of a wearer.
 #![no_std]
 
 #[cfg(test)]
