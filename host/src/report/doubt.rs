@@ -118,12 +118,14 @@ pub enum ReadAs {
     Degrees,
     /// Joint angles in turns.
     Turns,
-    /// Angles of the motor in rad, degrees or turns.
+    /// Angles of the motor in rad.
     MotorRadians,
+    /// Angles of the motor in degrees.
     MotorDegrees,
+    /// Angles of the motor in turns.
     MotorTurns,
     /// Torques in mN m.
-    Millinewtons,
+    MillinewtonMetres,
 }
 
 /// One direction: an error of the logging chain with its estimate.

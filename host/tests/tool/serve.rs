@@ -288,6 +288,29 @@ fn a_listener_hears_host_and_boards_and_disturbs_neither() {
 }
 
 #[test]
+fn a_ninth_listener_is_refused_and_the_others_go_on() {
+    let serve = Serve::new();
+    let listen = || {
+        let mut listener = Client::silent(&serve);
+        listener.say("L\r");
+        listener
+    };
+    let mut listeners = Vec::new();
+    for _ in 0..8 {
+        let mut listener = listen();
+        assert_eq!(listener.line().as_deref(), Some(""));
+        listeners.push(listener);
+    }
+    let mut ninth = listen();
+    assert_eq!(ninth.line().as_deref(), Some("#refused: 8 listen already"));
+    let mut client = Client::new(&serve);
+    client.frame(0x55, &[]);
+    for listener in &mut listeners {
+        while listener.line().expect("it still listens") != "t0550" {}
+    }
+}
+
+#[test]
 fn frames_delayed_by_a_stopped_process_still_stop_but_never_enable() {
     let serve = Serve::new();
     let mut client = Client::new(&serve);

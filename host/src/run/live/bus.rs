@@ -41,7 +41,7 @@ const MOST_WAITING: usize = 1024;
 /// Longest line; longer ones are no frames.
 const LONGEST_LINE: usize = 256;
 /// An slcan adapter refuses a command.
-const BELL: u8 = 7;
+const BELL: u8 = slcan::BELL[0];
 /// Time stamps may go back by this without a gap, and forward, s.
 const MOST_BACK_S: f64 = 1.0;
 const MOST_SILENT_S: f64 = 30.0;
@@ -81,8 +81,8 @@ pub struct BusInput {
     pub speed: Option<f64>,
 }
 
-/// What the reader has found.
-enum Found {
+/// Frame or line that the reader has received.
+enum Received {
     Frame(f64, Frame),
     /// A line that is no frame, or an error of the input.
     Bad(String),
@@ -117,7 +117,7 @@ fn next_line(input: &mut impl BufRead, lines: Lines) -> std::io::Result<Option<V
 }
 
 /// Reads the lines to their end, with times in seconds; returns the reason of the end.
-fn read(input: Box<dyn Read + Send>, lines: Lines, found: &SyncSender<Found>) -> String {
+fn read(input: Box<dyn Read + Send>, lines: Lines, received: &SyncSender<Received>) -> String {
     let begin = Instant::now();
     let mut input = BufReader::new(input);
     for number in 1_u64.. {
@@ -138,10 +138,10 @@ fn read(input: Box<dyn Read + Send>, lines: Lines, found: &SyncSender<Found>) ->
         };
         let report = match parsed {
             Ok(None) => continue,
-            Ok(Some((time_s, frame))) => Found::Frame(time_s, frame),
-            Err(why) => Found::Bad(why),
+            Ok(Some((time_s, frame))) => Received::Frame(time_s, frame),
+            Err(why) => Received::Bad(why),
         };
-        if found.send(report).is_err() {
+        if received.send(report).is_err() {
             break;
         }
     }
@@ -152,7 +152,7 @@ fn read(input: Box<dyn Read + Send>, lines: Lines, found: &SyncSender<Found>) ->
 }
 
 /// What the status shows of the bus itself.
-pub struct Wire<'a> {
+pub struct BusStatus<'a> {
     /// Load in words.
     pub load: &'a str,
     /// Nodes that were heard.
@@ -249,19 +249,19 @@ pub fn watch<const N: usize, const B: usize>(
     out(LiveUpdate::Scene(described));
     let mut legs: Vec<(String, Leg<N, B>)> = Vec::new();
     for (place, own) in ids.iter().enumerate() {
-        let called = if ids.len() > 1 { format!("leg {}: ", place + 1) } else { String::new() };
-        legs.push((called, Leg::new(leg, *own, place, model.as_ref(), out)?));
+        let prefix = if ids.len() > 1 { format!("leg {}: ", place + 1) } else { String::new() };
+        legs.push((prefix, Leg::new(leg, *own, place, model.as_ref(), out)?));
     }
     let note = |time_s: f64, weight, words: String| out(LiveUpdate::Note(LiveNote { time_s, weight, words }));
     let mut load = Load { bits_per_s, since_s: 0.0, bits: 0, frames: 0, words: String::new() };
     let mut clock = speed.map(Clock::new);
-    let (send, found) = sync_channel(MOST_WAITING);
+    let (send, received) = sync_channel(MOST_WAITING);
     let reader = thread::spawn(move || read(input, lines, &send));
     let (mut times, mut due_s, mut arrived) = (Times::new(lines), 0.0, Instant::now());
     let (mut bad, mut first_bad, mut heard) = (0, None, BTreeSet::new());
     loop {
-        match found.recv_timeout(SILENCE) {
-            Ok(Found::Frame(stamp_s, frame)) => {
+        match received.recv_timeout(SILENCE) {
+            Ok(Received::Frame(stamp_s, frame)) => {
                 arrived = Instant::now();
                 if let Some(words) = times.take(stamp_s) {
                     note(times.now_s, Severity::Warning, words);
@@ -271,11 +271,11 @@ pub fn watch<const N: usize, const B: usize>(
                 }
                 load.add(&frame);
                 heard.extend(sender(&frame));
-                for (called, leg) in &mut legs {
-                    leg.take(&frame, times.now_s, called);
+                for (prefix, leg) in &mut legs {
+                    leg.take(&frame, times.now_s, prefix);
                 }
             }
-            Ok(Found::Bad(words)) => {
+            Ok(Received::Bad(words)) => {
                 bad += 1;
                 if bad <= MOST_REPORTED {
                     note(times.now_s, Severity::Warning, format!("{name}: {words}"));
@@ -292,8 +292,8 @@ pub fn watch<const N: usize, const B: usize>(
         if now_s >= due_s || now_s + STATUS_S < due_s {
             due_s = now_s + STATUS_S;
             let numbers: Vec<String> = heard.iter().map(u8::to_string).collect();
-            let wire = Wire { load: &load.words, heard: &numbers.join(", "), has_ended: false };
-            legs.iter_mut().for_each(|(called, leg)| leg.report(now_s, called, &wire));
+            let bus = BusStatus { load: &load.words, heard: &numbers.join(", "), has_ended: false };
+            legs.iter_mut().for_each(|(prefix, leg)| leg.report(now_s, prefix, &bus));
         }
     }
     let reason = reader.join().unwrap_or_else(|_| "its reader failed".into());
@@ -302,8 +302,8 @@ pub fn watch<const N: usize, const B: usize>(
             first_bad.map_or_else(String::new, |why| format!("; {bad} lines are none, the first: {why}"));
         return Err(ToolError::input(format!("{name}: no CAN frame: {reason}{first}")));
     }
-    let wire = Wire { load: &load.words, heard: "", has_ended: true };
-    legs.iter_mut().for_each(|(called, leg)| leg.report(times.now_s, called, &wire));
+    let bus = BusStatus { load: &load.words, heard: "", has_ended: true };
+    legs.iter_mut().for_each(|(prefix, leg)| leg.report(times.now_s, prefix, &bus));
     note(times.now_s, Severity::Note, "the source has ended".into());
     Ok(format!("{name}: {reason}"))
 }

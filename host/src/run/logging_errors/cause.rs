@@ -400,12 +400,12 @@ fn words_of(joint: Option<usize>) -> String {
 }
 
 /// Torque in mN m.
-fn millinewtons<const N: usize>() -> Correction<N> {
+fn millinewton_metres<const N: usize>() -> Correction<N> {
     Correction {
         name: "torque_unit",
         joint: None,
         words: "torque divided by 1000: is it in mN m?".into(),
-        reads: vec![ReadAs::Millinewtons],
+        reads: vec![ReadAs::MillinewtonMetres],
         apply: Box::new(|_, torques| torques.iter_mut().for_each(|torque| *torque /= 1000.0)),
     }
 }
@@ -449,7 +449,7 @@ fn angle_units<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
 /// Corrections of angle and torque at once.
 fn unit_pairs<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
     let pair = |angle: Correction<N>| {
-        let torque = millinewtons::<N>();
+        let torque = millinewton_metres::<N>();
         Correction {
             name: "units",
             joint: angle.joint,
@@ -467,7 +467,7 @@ fn unit_pairs<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<
 /// All single corrections of units, signs and columns; the simpler first.
 fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
     let chosen = |joint: Option<usize>, at: usize| joint.is_none_or(|joint| joint == at);
-    let mut all = vec![millinewtons()];
+    let mut all = vec![millinewton_metres()];
     for joint in subjects::<N>() {
         all.push(Correction {
             name: "torque_sign",

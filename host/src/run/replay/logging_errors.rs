@@ -276,7 +276,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         if !run.accepted() {
             let mut cause = cause::likely(&question, errors.as_ref(), samples, &run.findings);
             // A torque in mN m and a current in mA differ by the torque constants only.
-            let is_scale = cause.name == "unknown" || cause.reads.contains(&ReadAs::Millinewtons);
+            let is_scale = cause.name == "unknown" || cause.reads.contains(&ReadAs::MillinewtonMetres);
             let with_angles = || {
                 let angles = cause::with_other_angles(&question);
                 angles

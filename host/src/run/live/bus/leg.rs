@@ -15,7 +15,7 @@ use crate::leg::background::Background;
 use crate::leg::setup::{PriorChoice, background};
 use crate::report::live::{EstimateOrigin, LiveOutcome, LiveStatus, LiveUpdate, Severity};
 use crate::rig::bus::alarms::{Alarms, reason};
-use crate::run::live::bus::Wire;
+use crate::run::live::bus::BusStatus;
 use crate::run::live::bus::node::{Event, NmtState, Node};
 use crate::run::live::bus::words::{JointState, doing};
 use crate::run::live::picture::{HALF_SAMPLE_S, Picture};
@@ -44,7 +44,7 @@ const LONGEST_GAP_S: f64 = 0.1;
 const STALE_S: f64 = 0.5;
 /// A node that was silent for this time is not heard any more, s.
 const SILENT_S: f64 = 1.0;
-/// Time of a statusword without positions after which the lack is told, s.
+/// Time of a statusword without positions after which the lack is reported, s.
 const NO_POSITION_S: f64 = 2.0;
 /// Time in which an equal line is not repeated, s.
 const REPEATED_S: f64 = 1.0;
@@ -79,7 +79,7 @@ pub struct Leg<'a, const N: usize, const B: usize> {
     last: Option<Measured<N>>,
     /// Times of positions that wait for their torques, s.
     waiting: Option<[f64; N]>,
-    /// Whether the lack of positions was told.
+    /// Whether the lack of positions was reported.
     lacks_positions: bool,
     /// Number of the next point of the 500 Hz grid.
     next: u64,
@@ -132,14 +132,14 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         })
     }
 
-    /// Takes a frame of the bus; `called` names the leg in the timeline.
-    pub fn take(&mut self, frame: &Frame, now_s: f64, called: &str) {
+    /// Takes a frame of the bus; `prefix` names the leg in the timeline.
+    pub fn take(&mut self, frame: &Frame, now_s: f64, prefix: &str) {
         self.picture.time_s = now_s;
         for joint in 0..N {
             let name = &self.picture.leg().joints[joint].name;
             match self.nodes[joint].take(frame, now_s) {
                 Some(Event::Nmt(state)) => {
-                    self.picture.note(Severity::Note, format!("{called}{name}'s node {}", state.words()));
+                    self.picture.note(Severity::Note, format!("{prefix}{name}'s node {}", state.words()));
                     if state == NmtState::BootUp {
                         self.alarms.restarted(self.nodes[joint].emergency());
                     }
@@ -151,14 +151,14 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
                         self.fault = fault.or(self.fault);
                         let (line, since_s) = &self.line;
                         if *line != words || now_s - since_s > REPEATED_S {
-                            self.picture.note(severity, format!("{called}{words}"));
+                            self.picture.note(severity, format!("{prefix}{words}"));
                         }
                         self.line = (words, now_s);
                     }
                 }
                 Some(Event::Unmapped { length, mapped }) => {
                     let words = format!(
-                        "{called}{name}'s PDO {:03X} has {length} bytes, the known mapping {mapped}: it was mapped \
+                        "{prefix}{name}'s PDO {:03X} has {length} bytes, the known mapping {mapped}: it was mapped \
                          before this page listened, so that it is not shown; start the page before the host",
                         frame.id()
                     );
@@ -260,7 +260,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     }
 
     /// Base parameters, verdict and status, as far as the bus has shown them.
-    pub fn report(&mut self, now_s: f64, called: &str, bus: &Wire<'_>) {
+    pub fn report(&mut self, now_s: f64, prefix: &str, bus: &BusStatus<'_>) {
         self.picture.time_s = now_s;
         self.report_parameters();
         self.report_verdict();
@@ -270,13 +270,13 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         let lacks_positions = has_state && now_s - since_s > NO_POSITION_S;
         if lacks_positions && !self.lacks_positions && !bus.has_ended {
             let words = format!(
-                "{called}no positions (6064) of all joints: no PDO carries them, none is sent without SYNC, or they \
+                "{prefix}no positions (6064) of all joints: no PDO carries them, none is sent without SYNC, or they \
                  were mapped before this page listened"
             );
             self.picture.note(Severity::Warning, words);
         }
         self.lacks_positions = lacks_positions;
-        let shown = format!("{called}the leg {}; drive: {}", status.doing, status.drive);
+        let shown = format!("{prefix}the leg {}; drive: {}", status.doing, status.drive);
         if shown != self.shown {
             self.picture.note(Severity::Note, shown.clone());
             self.shown = shown;
@@ -329,7 +329,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         self.verdict = verdict;
     }
 
-    fn status(&self, bus: &Wire<'_>) -> LiveStatus {
+    fn status(&self, bus: &BusStatus<'_>) -> LiveStatus {
         let joints = &self.picture.leg().joints;
         let named = |joint: usize, words: &str| format!("{}: {words}", joints[joint].name);
         let now_s = self.picture.time_s;
@@ -410,5 +410,162 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             reasons.extend(open.into_iter().chain(set).map(|bit| format!("{}: {}", joint.name, reason(bit))));
         }
         if reasons.is_empty() { "no request of its host to enable it".into() } else { reasons.join("; ") }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::cell::RefCell;
+
+    use super::*;
+    use crate::formats::leg_file::DEFAULT_LEG;
+
+    const BUS: BusStatus<'_> = BusStatus { load: "", heard: "1, 2", has_ended: false };
+
+    /// Reports about a leg of nodes 1 and 2.
+    struct Bench<'a> {
+        leg: Leg<'a, 2, 13>,
+        reports: &'a RefCell<Vec<LiveUpdate>>,
+    }
+
+    impl Bench<'_> {
+        fn frame(&mut self, now_s: f64, id: u16, data: &[u8]) {
+            self.leg.take(&Frame::new(id, data), now_s, "");
+        }
+
+        /// An SDO that reads a number.
+        fn read(&mut self, now_s: f64, (index, sub): (u16, u8), value: u32) {
+            let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+            self.frame(now_s, 0x601, &[0x40, low, high, sub, 0, 0, 0, 0]);
+            self.frame(now_s, 0x581, &[0x43, low, high, sub, a, b, c, d]);
+        }
+
+        fn status(&mut self, now_s: f64, bus: &BusStatus<'_>) -> LiveStatus {
+            self.leg.report(now_s, "", bus);
+            let reports = self.reports.borrow();
+            let found = reports.iter().rev().find_map(|report| match report {
+                LiveUpdate::Status(status) => Some(status.clone()),
+                _ => None,
+            });
+            found.expect("a status")
+        }
+
+        /// Lines of the timeline with this word.
+        fn lines(&self, word: &str) -> usize {
+            let reports = self.reports.borrow();
+            let notes = reports.iter().filter(|report| match report {
+                LiveUpdate::Note(note) => note.words.contains(word),
+                _ => false,
+            });
+            notes.count()
+        }
+    }
+
+    fn with_bench(test: impl FnOnce(&mut Bench<'_>)) {
+        let file = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let reports = RefCell::new(Vec::new());
+        let out = |report| reports.borrow_mut().push(report);
+        let leg = Leg::new(&file, [1, 2], 0, None, &out).expect("the default leg");
+        test(&mut Bench { leg, reports: &reports });
+    }
+
+    #[test]
+    fn a_silent_node_and_the_end_of_the_source_leave_the_state_unknown() {
+        with_bench(|bench| {
+            bench.frame(1.0, 0x181, &[0x37, 2]);
+            let status = bench.status(1.1, &BUS);
+            assert_eq!(status.doing, "is unknown: no frame of node 2 (heard: 1, 2)");
+            bench.frame(1.2, 0x182, &[0x37, 2]);
+            assert_eq!(bench.status(1.3, &BUS).drive, "operation enabled");
+            let ended = BusStatus { has_ended: true, ..BUS };
+            assert_eq!(bench.status(1.3, &ended).doing, "is unknown: the source has ended");
+            let silent = bench.status(2.3, &BUS);
+            assert_eq!((silent.drive.as_str(), silent.fault), ("unknown", None));
+        });
+    }
+
+    #[test]
+    fn the_newest_mode_and_the_newest_inputs_count() {
+        with_bench(|bench| {
+            [0x181, 0x182].into_iter().for_each(|id| bench.frame(1.0, id, &[0x37, 2]));
+            bench.read(1.0, (0x6061, 0), 1);
+            assert_eq!(bench.status(1.0, &BUS).doing, "follows its host: profile position");
+            bench.read(1.1, (0x6060, 0), 8);
+            assert_eq!(bench.status(1.1, &BUS).doing, "follows its host: cyclic position");
+            bench.frame(1.2, 0x181, &[0x50, 2]);
+            bench.read(1.2, (0x219A, 0), 1 << 16);
+            bench.frame(1.3, 0x481, &[0, 0, 5, 0]);
+            assert_eq!(bench.status(1.3, &BUS).not_enabled, "hip: the joints' zeros are unknown");
+        });
+    }
+
+    #[test]
+    fn the_fault_is_the_newest_one_and_a_started_node_may_report_it_again() {
+        with_bench(|bench| {
+            let overspeed = [0, 0x84, 0x81, 1, 0, 0, 0, 0];
+            bench.frame(1.0, 0x81, &[0x30, 0x81, 0x11, 1, 0, 0, 0, 0]);
+            bench.frame(1.1, 0x81, &overspeed);
+            // The other node of the leg sends the same.
+            bench.frame(1.1, 0x82, &overspeed);
+            [0x181, 0x182].into_iter().for_each(|id| bench.frame(1.2, id, &[0x18, 2]));
+            let status = bench.status(1.2, &BUS);
+            assert_eq!(status.fault.as_deref(), Some("it was faster than 1.1 times its speed limit"));
+            assert_eq!(bench.lines("8400"), 1);
+            [0x701, 0x702].into_iter().for_each(|id| bench.frame(5.0, id, &[0]));
+            bench.frame(6.0, 0x81, &overspeed);
+            assert_eq!(bench.lines("8400"), 2);
+        });
+    }
+
+    #[test]
+    fn verdict_reasons_and_parameters_are_shown_as_a_host_reads_them() {
+        with_bench(|bench| {
+            bench.read(1.0, (0x2100, 8), 2);
+            bench.status(1.0, &BUS);
+            bench.read(2.0, (0x2100, 9), 1 << 2);
+            for base in 1..=13 {
+                bench.read(2.0, (0x2120, base), 2.5_f32.to_bits());
+                bench.read(2.0, (0x2121, base), 0.5_f32.to_bits());
+            }
+            bench.status(2.0, &BUS);
+            let reports = bench.reports.borrow();
+            let outcomes = reports.iter().filter_map(|report| match report {
+                LiveUpdate::Outcome(outcome) => Some((outcome.verdict.clone(), outcome.reasons.clone())),
+                _ => None,
+            });
+            let refused = |reasons: &[&str]| {
+                ("refused".to_owned(), reasons.iter().map(|reason| (*reason).to_owned()).collect::<Vec<_>>())
+            };
+            assert_eq!(outcomes.collect::<Vec<_>>(), [refused(&[]), refused(&["residual"])]);
+            let estimate = reports.iter().find_map(|report| match report {
+                LiveUpdate::Estimate(estimate) => Some(estimate),
+                _ => None,
+            });
+            let values = &estimate.expect("an estimate").values;
+            // The true parameters of a real leg are unknown.
+            let is_read = |value: &crate::report::live::LiveParameter| {
+                (value.value.known(), value.sigma.known(), value.truth.known())
+                    == (Some(2.5), Some(0.5), None)
+            };
+            assert!(values.len() == 13 && values.iter().all(is_read), "{values:?}");
+        });
+    }
+
+    #[test]
+    fn torques_that_come_slower_than_positions_do_not_hold_these_back() {
+        with_bench(|bench| {
+            for cycle in 0..200_u8 {
+                let now_s = f64::from(cycle) * 0.01;
+                for node in [1_u16, 2] {
+                    bench.frame(now_s + 1e-4 * f64::from(node), 0x280 + node, &[cycle, 0, 0, 0, 0, 0, 0, 0]);
+                    if cycle % 20 == 0 {
+                        bench.frame(now_s + 1e-3, 0x380 + node, &[10, 0]);
+                    }
+                }
+            }
+            let reports = bench.reports.borrow();
+            let samples = reports.iter().filter(|report| matches!(report, LiveUpdate::Sample(_))).count();
+            assert!((90..=100).contains(&samples), "{samples} samples in 2 s");
+        });
     }
 }

@@ -7,7 +7,7 @@
 //! boot-up message                        communication parameters are the defaults again
 //! ```
 //!
-//! A listener sends nothing, so values that nobody sends or reads stay unknown. Stored PDO parameters are
+//! A listener sends nothing, so values that no frame carries stay unknown. Stored PDO parameters are
 //! unknown too: the defaults are assumed until a host writes or reads them. A PDO whose length does not fit
 //! its mapping is reported and not decoded.
 

@@ -43,11 +43,11 @@ fn apply(readings: &mut [Reading], read: ReadAs, joint: Option<usize>) -> usize 
         ReadAs::MotorRadians => ("rad", true),
         ReadAs::MotorDegrees => ("deg", true),
         ReadAs::MotorTurns => ("turn", true),
-        ReadAs::Millinewtons => ("mNm", false),
+        ReadAs::MillinewtonMetres => ("mNm", false),
     };
     let Some(unit) = Unit::named(unit) else { return 0 };
     // The torques of a joint whose angle is wrong are those of all joints.
-    let joint = if read == ReadAs::Millinewtons { None } else { joint };
+    let joint = if read == ReadAs::MillinewtonMetres { None } else { joint };
     let is_meant = |signal: Signal| {
         let is_of_joint = matches!(signal, Signal::Angle(_) | Signal::Torque(_));
         is_of_joint && joint.is_none_or(|joint| signal.joint() == Some(joint))
