@@ -13,6 +13,7 @@
 //! | [`ident`] | filter chain, information factor, least squares, statistics, verdict |
 //! | [`motor`] | field-oriented current control of one axis, 24 kHz, and its calibration |
 //! | [`safety`], [`servo`] | monitor and drive states; the 4 kHz tick |
+//! | [`assist`] | torque from the identified model: transparency, weight support, periodic assistance |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
 //! | [`operation`] | work of each axis, signals between tasks, rights of the operator's contacts |
 //! | `place` | large values built in place |
@@ -22,6 +23,7 @@
 //! | [`board`], `task` | one board's registers and interrupts; tasks and priorities (microcontroller only) |
 #![no_std]
 
+pub mod assist;
 pub mod board;
 pub mod bus;
 pub mod checksum;

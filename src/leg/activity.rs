@@ -16,6 +16,8 @@ pub enum Activity {
     Track(Step),
     /// Follows the commands of a host, tick by tick.
     Follow,
+    /// Gives torque from the identified model; see [`crate::assist`].
+    Assist(AssistPhase),
 }
 
 impl Activity {
@@ -24,6 +26,13 @@ impl Activity {
     #[inline]
     pub const fn follows_host(self) -> bool {
         matches!(self, Self::Follow)
+    }
+
+    /// Whether the leg gives torque from the identified model and holds no position.
+    #[must_use]
+    #[inline]
+    pub const fn assists(self) -> bool {
+        matches!(self, Self::Assist(_))
     }
 }
 
@@ -47,6 +56,17 @@ pub enum IdentifyPhase {
     },
     /// Rests until the verdict.
     Judge,
+}
+
+/// Phase of a session of assistance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AssistPhase {
+    /// Fades in.
+    Enter,
+    /// Acts with its whole torque.
+    Run,
+    /// Fades out.
+    Leave,
 }
 
 /// The two steps of every motion.

@@ -1,14 +1,19 @@
 //! Control half of a leg: activity, motions, servo, log. Ticked at 4 kHz.
 
+mod assist;
 mod host;
 
+pub use assist::Wearing;
 pub use host::Host;
+
+use assist::Assistance;
 
 use super::activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 use super::configuration::{LegConfiguration, LegError, ProvedMotion};
 use super::identification::Finding;
 use super::model::IdentifiedModel;
 use super::model_blend::ModelBlend;
+use crate::assist::AssistShares;
 use crate::checksum::Checksum;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
@@ -21,10 +26,10 @@ use crate::units::{NewtonMetre, RadianPerSecond, RadianPerSecondSquared};
 /// Rest after a motion before the next step: half a second.
 const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
 
-/// Request of an operator, valid for one tick. `Identify` and `Track` are refused unless the drive is enabled
-/// and the commanded motion is at rest. To stop a moving leg, request a quick stop or wait for the end of the
-/// motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Request of an operator, valid for one tick. `Identify`, `Track` and `Assist` are refused unless the drive
+/// is enabled and the commanded motion is at rest. To stop a moving leg, request a quick stop or wait for the
+/// end of the motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ControlRequest {
     /// A step of the drive's power states.
     Power(PowerRequest),
@@ -39,13 +44,18 @@ pub enum ControlRequest {
     /// Use the offered update, in motion or at rest. Its torque replaces that of the old model within half a
     /// second. Refused if no update is offered.
     TakeUpdate,
+    /// Begin a session of assistance. Refused without the models that the shares need, and while the model
+    /// monitor reports a change.
+    Assist(AssistShares),
+    /// Fade the session of assistance out.
+    EndAssist,
 }
 
 impl ControlRequest {
     /// Returns whether the request commands a motion.
     #[must_use]
     pub const fn moves(&self) -> bool {
-        matches!(self, Self::Identify | Self::Track { .. })
+        matches!(self, Self::Identify | Self::Track { .. } | Self::Assist(_))
     }
 }
 
@@ -94,6 +104,7 @@ pub struct Control<const N: usize> {
     /// Last explanation of the rows since the alarm.
     cause: Option<Cause>,
     verdict: Option<Verdict>,
+    assistance: Assistance<N>,
 }
 
 impl<const N: usize> Control<N> {
@@ -124,6 +135,7 @@ impl<const N: usize> Control<N> {
             change: None,
             cause: None,
             verdict: None,
+            assistance: Assistance::new(),
         })
     }
 
@@ -137,6 +149,7 @@ impl<const N: usize> Control<N> {
         (self.motion, self.motion_tick) = (Motion::Hold([0.0; N]), 0);
         self.tracked = None;
         self.models.interrupt();
+        self.assistance.interrupt();
     }
 
     /// Activity.
@@ -242,8 +255,9 @@ impl<const N: usize> Control<N> {
         self.tick = self.tick.wrapping_add(1);
         let refused = request.as_ref().is_some_and(|request| !self.may_begin(request, host.as_ref()));
         let took_update = !refused && matches!(request, Some(ControlRequest::TakeUpdate));
-        let power = self.accept(request.filter(|_| !refused));
+        let power = self.accept(request.filter(|_| !refused), gravity);
         let commanded = self.obey(host.as_mut());
+        let assisted = self.assist();
         let motion = match &commanded {
             Some(commanded) => commanded.motion,
             None => self.motion.state_at(self.motion_tick),
@@ -253,7 +267,7 @@ impl<const N: usize> Control<N> {
         let mixed = self.models.advance();
         let feedforward = self.models.faded(mixed.as_ref());
         let feedforward = feedforward.as_ref();
-        let efforts = commanded.as_ref().map(|commanded| &commanded.efforts);
+        let efforts = commanded.as_ref().map(|commanded| &commanded.efforts).or(assisted.as_ref());
         let command = ServoCommand { motion, feedforward, power };
         let servo = self.servo.tick_with(sample, &command, efforts, gravity);
         if let Some(host) = &mut host {
@@ -276,10 +290,16 @@ impl<const N: usize> Control<N> {
             // Without power the commanded pose follows the joints: enabling must not cause a motion.
             self.activity = Activity::Idle;
             self.models.interrupt();
+            self.assistance.interrupt();
             self.hold(servo.position.map(|angle| angle.0));
+        } else if self.activity.assists() {
+            self.hold(servo.position.map(|angle| angle.0));
+            self.end_assist();
         } else {
             self.proceed();
         }
+        let (velocity, torque) = (servo.velocity, servo.decision.torque);
+        self.assistance.measure(velocity.map(|velocity| velocity.0), torque.map(|torque| torque.0));
         // A sample that the servo rejected as a glitch does not enter the log.
         let mut believed = *sample;
         for (joint, counts) in believed.joints.iter_mut().zip(servo.accepted_counts) {
@@ -304,8 +324,12 @@ impl<const N: usize> Control<N> {
         match request {
             ControlRequest::Power(_) => true,
             ControlRequest::TakeUpdate => self.is_update_offered(),
+            ControlRequest::EndAssist => self.activity.assists(),
+            // A session holds no position, so its commanded motion says nothing about rest.
+            _ if self.activity.assists() => false,
             ControlRequest::Identify => enabled && still,
             ControlRequest::Track { .. } => enabled && still && self.tracked.is_some(),
+            ControlRequest::Assist(shares) => enabled && still && self.may_assist(shares),
         }
     }
 
@@ -315,7 +339,7 @@ impl<const N: usize> Control<N> {
         self.models.withdraw();
     }
 
-    fn accept(&mut self, request: Option<ControlRequest>) -> Option<PowerRequest> {
+    fn accept(&mut self, request: Option<ControlRequest>, gravity: [f32; 3]) -> Option<PowerRequest> {
         match request? {
             ControlRequest::Power(power) => return Some(power),
             ControlRequest::Identify => {
@@ -335,6 +359,8 @@ impl<const N: usize> Control<N> {
                 self.models.take();
                 (self.change, self.cause) = (None, None);
             }
+            ControlRequest::Assist(shares) => self.begin_assist(shares, gravity),
+            ControlRequest::EndAssist => self.assistance.leave(),
         }
         None
     }
@@ -364,6 +390,7 @@ impl<const N: usize> Control<N> {
             Activity::Track(Step::Run) => self.rest(Activity::Idle),
             Activity::Idle
             | Activity::Follow
+            | Activity::Assist(_)
             | Activity::Identify(IdentifyPhase::Solve | IdentifyPhase::Judge) => {}
         }
     }
@@ -402,6 +429,7 @@ impl<const N: usize> Control<N> {
                     self.verdict = Some(verdict);
                     // A refused result leaves the previous model in use.
                     if let Some(model) = model {
+                        self.assistance.accept(&model);
                         self.models.accept(model);
                     }
                     self.rest(Activity::Idle);
@@ -411,7 +439,10 @@ impl<const N: usize> Control<N> {
             // Obsolete: these concern an earlier motion and a model that this identification may replace.
             Finding::Changed(_) | Finding::Updated { .. }
                 if matches!(self.activity, Activity::Identify(_)) => {}
-            Finding::Changed(change) => (self.change, self.cause) = (Some(change), None),
+            Finding::Changed(change) => {
+                (self.change, self.cause) = (Some(change), None);
+                self.assistance.leave();
+            }
             Finding::Updated { cause, model, .. } => {
                 match model {
                     Some(model) => self.models.offer(model),

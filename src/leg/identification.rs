@@ -287,7 +287,7 @@ where
         Some(Finding::Updated {
             cause: update.cause,
             verdict: update.verdict,
-            model: model.then(|| IdentifiedModel::new(&self.model, &update.estimate.values)),
+            model: model.then(|| IdentifiedModel::of_estimate(&self.model, &update.estimate)),
         })
     }
 
@@ -305,7 +305,7 @@ where
         let verdict = self.judge_with(&mut |_| {});
         self.verdict = Some(verdict);
         let estimate = self.solver.as_ref().map(Solver::estimate).filter(|_| verdict.is_accepted());
-        let model = estimate.map(|estimate| IdentifiedModel::new(&self.model, &estimate.values));
+        let model = estimate.map(|estimate| IdentifiedModel::of_estimate(&self.model, &estimate));
         Finding::Judged { verdict, model }
     }
 
@@ -317,7 +317,7 @@ where
     pub fn took_result(&mut self) -> Option<IdentifiedModel<N>> {
         let solver = self.solver.as_ref().filter(|_| self.verdict.is_some_and(Verdict::is_accepted))?;
         let estimate = solver.estimate();
-        let model = IdentifiedModel::new(&self.model, &estimate.values);
+        let model = IdentifiedModel::of_estimate(&self.model, &estimate);
         let others = self.validation.iter().flatten();
         self.model_monitor.accept(Baseline::new(estimate, solver.record(), others));
         self.accepted_stribeck = self.model.stribeck;

@@ -20,6 +20,7 @@
 //! ```
 
 mod activity;
+mod assured;
 mod configuration;
 mod control;
 mod description;
@@ -34,9 +35,9 @@ mod stored;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
+pub use activity::{Activity, AssistPhase, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 pub use configuration::{LegConfiguration, LegError, ProvedMotion};
-pub use control::{Control, ControlOutput, ControlRequest, Host, LoggedSample};
+pub use control::{Control, ControlOutput, ControlRequest, Host, LoggedSample, Wearing};
 pub use description::{
     DescriptionError, JointDescription, LegDescription, LinkDescription, MotorDescription,
 };
@@ -49,6 +50,7 @@ pub use results::{FoundBase, FoundFit, FoundParameter};
 pub use stored::{RestoreError, StoredModel};
 
 // Interface of the leg: other modules that report or store these values import them from here only.
+pub use crate::assist::{AssistLaw, AssistSession, AssistShares, AssistTorque, Assured};
 pub use crate::ident::{
     Cause, Change, Constant, Estimate, Evidence, Filters, MotionWindow, Plan, Reason, SearchState, Status,
     StribeckFit, Test, Verdict,
@@ -75,6 +77,7 @@ use crate::safety::Derating;
 pub struct Leg<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
     control: Control<N>,
     identification: Identification<N, B, TAPS, PENDING>,
+    law: AssistLaw<N>,
     following: Following<N>,
     commands: Option<[JointCommand; N]>,
     cancel: bool,
@@ -91,6 +94,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         Ok(Self {
             control: Control::new(configuration)?,
             identification: Identification::new(configuration)?,
+            law: AssistLaw::new(),
             following: Following::new(configuration),
             commands: None,
             cancel: false,
@@ -113,6 +117,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         if let Some(logged) = &output.logged {
             self.identification.push(logged);
         }
+        self.assist(&output);
         let begun = matches!(request, Some(ControlRequest::Identify)) && !output.refused;
         if begun || !matches!(self.control.activity(), Activity::Identify(_)) {
             self.identification.cancel();
@@ -126,6 +131,37 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
             let _ = self.identification.took_result();
         }
         output
+    }
+
+    /// Runs the law of the assistance on a logged sample.
+    fn assist(&mut self, output: &ControlOutput<N>) {
+        if let Some(session) = self.control.take_session() {
+            self.law.begin(session);
+        }
+        if !self.control.activity().assists() {
+            self.law.end();
+        } else if let Some(logged) = &output.logged
+            && let Some(torque) = self.law.step(&logged.sample)
+        {
+            self.control.receive_torque(&torque);
+        }
+    }
+
+    /// Law of the assistance.
+    #[must_use]
+    pub fn law(&self) -> &AssistLaw<N> {
+        &self.law
+    }
+
+    /// Sets whether the leg of the next identifications is empty or worn, see [`Control::set_wearing`].
+    pub fn set_wearing(&mut self, wearing: Option<Wearing>) {
+        self.control.set_wearing(wearing);
+    }
+
+    /// Sets a model of the empty or the worn leg, see [`Control::set_model`].
+    #[must_use]
+    pub fn set_model(&mut self, wearing: Wearing, model: IdentifiedModel<N>) -> bool {
+        self.control.set_model(wearing, model)
     }
 
     /// Resets to the state after the start, except for the model in use; see [`Control::restart`].

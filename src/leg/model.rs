@@ -2,7 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::ident::{Constant, RowModel};
+use super::assured::assured;
+use crate::assist::{Assured, CompensationModel};
+use crate::ident::{Constant, Estimate, RowModel};
 use crate::model::friction::Stribeck;
 use crate::model::{
     Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, Parameter, Payload, rigid_body_torques,
@@ -19,15 +21,59 @@ pub struct IdentifiedModel<const N: usize> {
     parameters: LegParameters<f32, N>,
     stribeck: [Stribeck<f32>; N],
     constant: [Constant; N],
+    assured: Assured<N>,
 }
 
 impl<const N: usize> IdentifiedModel<N> {
-    /// Creates the model with these base parameters.
+    /// Creates the model with these base parameters, of unknown uncertainty.
     #[must_use]
     pub fn new<const B: usize>(model: &RowModel<f32, N, B>, base_values: &[f32; B]) -> Self {
         let parameters = model.base.complete(base_values, &[[0.0; PARAMETERS_PER_JOINT]; N]);
         let constant = model.drive_choice.map(|choice| choice.meaning);
-        Self { chain: model.chain, parameters, stribeck: model.stribeck, constant }
+        let (chain, stribeck) = (model.chain, model.stribeck);
+        Self { chain, parameters, stribeck, constant, assured: Assured::NOTHING }
+    }
+
+    /// Creates the model of an estimate, with its lower confidence bounds.
+    #[must_use]
+    pub fn of_estimate<const B: usize>(model: &RowModel<f32, N, B>, estimate: &Estimate<f32, B>) -> Self {
+        Self { assured: assured(model, estimate), ..Self::new(model, &estimate.values) }
+    }
+
+    /// The same model with other confidence bounds.
+    #[must_use]
+    pub fn with_assured(self, assured: Assured<N>) -> Self {
+        Self { assured, ..self }
+    }
+
+    /// Lower confidence bounds of friction and inertia.
+    #[must_use]
+    pub fn assured(&self) -> &Assured<N> {
+        &self.assured
+    }
+
+    /// Models of an empty leg and, where known, of the same leg worn, for the assistance; `gravity` in the
+    /// base frame, m/s^2.
+    #[must_use]
+    pub fn compensation(&self, worn: Option<&Self>, gravity: [f32; 3]) -> CompensationModel<N> {
+        let difference = |worn: &Self| {
+            let mut wearer = worn.parameters;
+            for (worn, empty) in wearer.iter_mut().flatten().zip(self.parameters.iter().flatten()) {
+                *worn -= *empty;
+            }
+            wearer
+        };
+        CompensationModel {
+            chain: self.chain,
+            gravity,
+            empty: self.parameters,
+            wearer: worn.map(difference),
+            offset_nm: core::array::from_fn(|joint| match self.constant[joint] {
+                Constant::Offset => self.parameters[joint][Parameter::OFF.index()],
+                Constant::Asymmetry => 0.0,
+            }),
+            assured: self.assured,
+        }
     }
 
     /// Model of the leg with a known load; a negative mass removes one. The load need not be identified.
@@ -45,7 +91,7 @@ impl<const N: usize> IdentifiedModel<N> {
         stribeck: [Stribeck<f32>; N],
         constant: [Constant; N],
     ) -> Self {
-        Self { chain, parameters, stribeck, constant }
+        Self { chain, parameters, stribeck, constant, assured: Assured::NOTHING }
     }
 
     /// Stribeck friction of each joint: a factor on its Coulomb friction.

@@ -292,6 +292,8 @@ impl<const N: usize> ServoLevel<N> {
             Some(ControlRequest::Identify) => Some("identify"),
             Some(ControlRequest::Track { .. }) => Some("track"),
             Some(ControlRequest::TakeUpdate) => Some("take_update"),
+            Some(ControlRequest::Assist(_)) => Some("assist"),
+            Some(ControlRequest::EndAssist) => Some("end_assist"),
         };
         if let Some(name) = name {
             record(Record::Request { tick, name, accepted });

@@ -53,12 +53,18 @@ pub struct Effort {
     pub held: bool,
     /// Limit of the commanded torque; the motion's control does not wind up against it.
     pub largest: NewtonMetre,
+    /// Share of the controller's damping that acts while the motion is not held, 0..1.
+    pub damping_share: f32,
 }
 
 impl Effort {
     /// Effort of the motion alone.
-    pub const HELD: Self =
-        Self { torque: NewtonMetre::ZERO, held: true, largest: NewtonMetre(f32::INFINITY) };
+    pub const HELD: Self = Self {
+        torque: NewtonMetre::ZERO,
+        held: true,
+        largest: NewtonMetre(f32::INFINITY),
+        damping_share: 0.0,
+    };
 }
 
 /// Result of one tick, in the model's angles and signs.
@@ -256,7 +262,9 @@ impl<const N: usize> Servo<N> {
             match efforts.map(|efforts| &efforts[joint]) {
                 None => held,
                 Some(Effort { torque, held: true, .. }) => held + *torque,
-                Some(Effort { torque, held: false, .. }) => *torque,
+                Some(Effort { torque, damping_share, .. }) => {
+                    *torque - self.damping(joint, *damping_share, velocity[joint])
+                }
             }
         });
 
@@ -276,12 +284,19 @@ impl<const N: usize> Servo<N> {
         let decision = self.monitor.decide(&observation, &request);
         self.settle(&tracking_error, &wanted_torque, &decision);
         for joint in 0..N {
-            if efforts.is_some_and(|efforts| !efforts[joint].held) {
+            if let Some(Effort { held: false, damping_share, .. }) = efforts.map(|efforts| &efforts[joint]) {
                 // Preset, so that the motion's control later starts from the present torque.
-                self.controllers[joint].preset(&self.joints[joint].controller, decision.torque[joint]);
+                let damping = self.damping(joint, *damping_share, velocity[joint]);
+                let preset = decision.torque[joint] + damping;
+                self.controllers[joint].preset(&self.joints[joint].controller, preset);
             }
         }
         ServoOutput { position, velocity, accepted_counts, tracking_error, wanted_torque, decision }
+    }
+
+    /// Torque of a share of the controller's damping.
+    fn damping(&self, joint: usize, share: f32, velocity: RadianPerSecond) -> NewtonMetre {
+        NewtonMetre(share * self.joints[joint].controller.damping_nm_s_per_rad() * velocity.0)
     }
 
     /// Moves the observers by one tick; returns which readings were rejected.

@@ -3,8 +3,8 @@
 //! No match has a wildcard: a new state needs a word to compile.
 
 use crate::leg::{
-    Activity, AxisFault, CalibrationRefusal, Cause, DriveState, FaultCode, IdentifyPhase, MotorConstant,
-    Parameter, Phase, RefusalReason, Segment, Step,
+    Activity, AssistPhase, AxisFault, CalibrationRefusal, Cause, DriveState, FaultCode, IdentifyPhase,
+    MotorConstant, Parameter, Phase, RefusalReason, Segment, Step,
 };
 
 /// Word for the drive state.
@@ -43,6 +43,9 @@ pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
         Activity::Track(Step::Approach) => ("track", "approach", 0),
         Activity::Track(Step::Run) => ("track", "run", 0),
         Activity::Follow => ("follow", "-", 0),
+        Activity::Assist(AssistPhase::Enter) => ("assist", "enter", 0),
+        Activity::Assist(AssistPhase::Run) => ("assist", "run", 0),
+        Activity::Assist(AssistPhase::Leave) => ("assist", "leave", 0),
     }
 }
 

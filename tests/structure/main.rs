@@ -17,7 +17,7 @@ use tokens::{Token, tokens};
 type Table = [(&'static str, &'static [&'static str])];
 
 /// Modules of the firmware; the open ones are allowed to all.
-const FIRMWARE: [(&str, &[&str]); 20] = [
+const FIRMWARE: [(&str, &[&str]); 21] = [
     ("units", &[]),
     ("real", &[]),
     ("place", &[]),
@@ -31,7 +31,8 @@ const FIRMWARE: [(&str, &[&str]); 20] = [
     ("motor", &["hal"]),
     ("safety", &["hal"]),
     ("servo", &["hal", "model", "motion", "motor", "safety"]),
-    ("leg", &["hal", "model", "motion", "swarm", "ident", "motor", "safety", "servo"]),
+    ("assist", &["model", "servo"]),
+    ("leg", &["hal", "model", "motion", "swarm", "ident", "motor", "safety", "servo", "assist"]),
     ("trace", &["hal", "leg"]),
     ("store", &["hal", "leg"]),
     ("bus", &["hal", "leg"]),

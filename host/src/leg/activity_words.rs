@@ -1,6 +1,6 @@
 //! Describes what a leg does and waits for, in sentences without their subject.
 
-use scarab::leg::{Activity, DriveState, IdentifyPhase, Step, VALIDATION_MOTIONS};
+use scarab::leg::{Activity, AssistPhase, DriveState, IdentifyPhase, Step, VALIDATION_MOTIONS};
 
 use crate::leg::motions::VALIDATION_NAMES;
 
@@ -25,6 +25,9 @@ pub fn doing(activity: Activity, state: DriveState) -> String {
         Activity::Track(Step::Approach) => "moves to the start of the tracked motion".into(),
         Activity::Track(Step::Run) => "tracks a motion".into(),
         Activity::Follow => "follows its host".into(),
+        Activity::Assist(AssistPhase::Enter) => "fades its assistance in".into(),
+        Activity::Assist(AssistPhase::Run) => "assists its wearer".into(),
+        Activity::Assist(AssistPhase::Leave) => "fades its assistance out".into(),
     }
 }
 
@@ -43,6 +46,8 @@ pub const fn waits_for(activity: Activity, state: DriveState) -> &'static str {
         DriveState::OperationEnabled => match activity {
             Activity::Idle => "a request of the operator",
             Activity::Follow => "commands of its host",
+            Activity::Assist(AssistPhase::Enter | AssistPhase::Leave) => "the end of the fade",
+            Activity::Assist(AssistPhase::Run) => "the end of the session",
             Activity::Identify(IdentifyPhase::Settle) => "the last samples",
             Activity::Identify(IdentifyPhase::Solve) => "the end of the search",
             Activity::Identify(IdentifyPhase::Judge) => "the verdict",

@@ -23,7 +23,7 @@ use super::abort::Abort;
 use super::dictionary::Object;
 use super::drive::Axis;
 use super::objects::{Lost, Objects};
-use crate::leg::{Activity, IdentifyPhase, Parameter, Permission, Plan, Reason, Status, Step};
+use crate::leg::{Activity, AssistPhase, IdentifyPhase, Parameter, Permission, Plan, Reason, Status, Step};
 
 /// Request of a host to the leg, besides power and targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,6 +158,9 @@ const fn state(activity: Activity) -> (u8, u8) {
         Activity::Identify(IdentifyPhase::Judge) => (7, 0),
         Activity::Track(_) => (8, 0),
         Activity::Follow => (9, 0),
+        Activity::Assist(AssistPhase::Enter) => (10, 0),
+        Activity::Assist(AssistPhase::Run) => (11, 0),
+        Activity::Assist(AssistPhase::Leave) => (12, 0),
     }
 }
 

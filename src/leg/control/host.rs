@@ -11,8 +11,8 @@ pub struct Host<'a, const N: usize> {
     pub following: &'a mut Following<N>,
     /// Commands of this tick.
     pub commands: &'a [JointCommand; N],
-    /// Whether an identification or a tracked motion is cancelled: the joints slow down to rest along their
-    /// profiles.
+    /// Whether the activity is cancelled: of an identification or a tracked motion the joints slow down to
+    /// rest along their profiles, assistance fades out.
     pub cancel: bool,
     /// Whether the drive holds its pose: commands are not followed yet.
     pub waits: bool,
@@ -23,6 +23,12 @@ impl<const N: usize> Control<N> {
     pub(super) fn obey(&mut self, host: Option<&mut Host<'_, N>>) -> Option<Commanded<N>> {
         let Host { following, commands, cancel, waits } = host?;
         if *waits || !self.servo.state().is_enabled() {
+            return None;
+        }
+        if self.activity.assists() {
+            if *cancel {
+                self.assistance.leave();
+            }
             return None;
         }
         if *cancel && !self.activity.follows_host() {

@@ -150,8 +150,12 @@ impl<const N: usize> Following<N> {
             motion.position_rad[joint] = anatomy.angle_to_chain(course.position());
             motion.velocity_rad_per_s[joint] = anatomy.to_chain(course.velocity() + velocity_offset);
             motion.acceleration_rad_per_s2[joint] = anatomy.to_chain(course.acceleration());
-            commanded.efforts[joint] =
-                Effort { torque: NewtonMetre(anatomy.to_chain(torque)), held, largest: NewtonMetre(largest) };
+            commanded.efforts[joint] = Effort {
+                torque: NewtonMetre(anatomy.to_chain(torque)),
+                held,
+                largest: NewtonMetre(largest),
+                damping_share: 0.0,
+            };
             self.largest[joint] = NewtonMetre(largest);
             if failed {
                 let fault = Fault { code: FaultCode::FollowingError, joint: joint as u8 };

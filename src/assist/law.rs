@@ -1,0 +1,176 @@
+//! One sample of the 500 Hz log in, one torque for the 4 kHz tick out.
+//!
+//! Why a level of its own: five evaluations of a model take about 8,000 instructions. Once per sample they
+//! cost 2 % of the processor; in the tick they would not fit.
+//!
+//! The torque belongs to a time [`AHEAD_S`] after the sample's: half of the eight ticks of its mean, the
+//! computation, and the ramp of the tick. Weight is extrapolated over that time; acceleration is late by it
+//! and by the differentiator's delay.
+
+use super::differentiator::{Derivatives, Differentiator};
+use super::energy::EnergyObserver;
+use super::model::CompensationModel;
+use super::periodic::PeriodicAssist;
+use super::shares::AssistShares;
+use crate::model::JointState;
+use crate::real::is_finite;
+use crate::servo::{LOG_RATE_HZ, LogSample};
+
+const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
+/// Time from the middle of a sample to the middle of the ramp that its torque commands, plus the drive's
+/// lag of 1 ms, s.
+pub const AHEAD_S: f32 = 0.003;
+
+/// Shares and models of one session of assistance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AssistSession<const N: usize> {
+    /// Shares of the torques.
+    pub shares: AssistShares,
+    /// Models of the empty and the worn leg.
+    pub model: CompensationModel<N>,
+}
+
+/// Torque for the 4 kHz tick, joint (D-H) sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AssistTorque<const N: usize> {
+    /// Last tick of the sample.
+    pub tick: u32,
+    /// Whole torque besides friction and damping, N m.
+    pub torque_nm: [f32; N],
+    /// Its part that carries weight, N m.
+    pub support_nm: [f32; N],
+    /// Damping that the energy observer requires, N m s/rad.
+    pub damping: f32,
+    /// Whether the session must end: the energy budget is used up.
+    pub is_exhausted: bool,
+}
+
+/// State during a session.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Running<const N: usize> {
+    session: AssistSession<N>,
+    angles: [Differentiator; N],
+    torques: [Differentiator; N],
+    last_angle: [f32; N],
+    last_support: [f32; N],
+    last_assist: [f32; N],
+    energy: EnergyObserver<N>,
+    periodic: PeriodicAssist<N>,
+}
+
+/// The law of one leg; idle between sessions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AssistLaw<const N: usize> {
+    session: Option<AssistSession<N>>,
+    running: Option<Running<N>>,
+}
+
+impl<const N: usize> AssistLaw<N> {
+    /// Idle law.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { session: None, running: None }
+    }
+
+    /// Begins a session with the next sample.
+    pub fn begin(&mut self, session: AssistSession<N>) {
+        (self.session, self.running) = (Some(session), None);
+    }
+
+    /// Ends the session.
+    pub fn end(&mut self) {
+        (self.session, self.running) = (None, None);
+    }
+
+    /// Energy observer of the present session.
+    #[must_use]
+    pub fn energy(&self) -> Option<&EnergyObserver<N>> {
+        self.running.as_ref().map(|running| &running.energy)
+    }
+
+    /// Assistance of a periodic motion in the present session.
+    #[must_use]
+    pub fn periodic(&self) -> Option<&PeriodicAssist<N>> {
+        self.running.as_ref().map(|running| &running.periodic)
+    }
+
+    /// Takes a sample; `None` between sessions.
+    pub fn step(&mut self, sample: &LogSample<N>) -> Option<AssistTorque<N>> {
+        if let Some(session) = self.session.take() {
+            self.running = Some(Running::begin(session, sample));
+        }
+        Some(self.running.as_mut()?.step(sample))
+    }
+}
+
+impl<const N: usize> Running<N> {
+    fn begin(session: AssistSession<N>, sample: &LogSample<N>) -> Self {
+        Self {
+            last_support: support(&session, &sample.position_rad),
+            session,
+            angles: sample.position_rad.map(Differentiator::at),
+            torques: sample.torque_nm.map(Differentiator::at),
+            last_angle: sample.position_rad,
+            last_assist: [0.0; N],
+            energy: EnergyObserver::new(),
+            periodic: PeriodicAssist::new(),
+        }
+    }
+
+    fn step(&mut self, sample: &LogSample<N>) -> AssistTorque<N> {
+        let AssistSession { shares, model } = &self.session;
+        let mut state = JointState { q: [0.0; N], qd: [0.0; N], qdd: [0.0; N] };
+        let (mut torque, mut velocity) = ([0.0; N], [0.0; N]);
+        for joint in 0..N {
+            let Derivatives { value, first, second } = self.angles[joint].push(sample.position_rad[joint]);
+            (state.q[joint], state.qd[joint], state.qdd[joint]) = (value, first, second);
+            torque[joint] = self.torques[joint].push(sample.torque_nm[joint]).value;
+            velocity[joint] = (sample.position_rad[joint] - self.last_angle[joint]) * LOG_RATE_HZ as f32;
+        }
+        let support = support(&self.session, &sample.position_rad);
+        // Both energies belong to the way between the two samples.
+        let between = core::array::from_fn(|joint| 0.5 * (support[joint] + self.last_support[joint]));
+        let measured = [&sample.position_rad, &sample.torque_nm, &velocity];
+        self.energy.push(model, measured, &between, &self.last_assist);
+        let inertia = model.inertia(&state);
+        let mut assist = [0.0; N];
+        if shares.periodic != 0.0 {
+            let wearer = model.wearer_torque(&state);
+            let weight = model.weight(&state.q);
+            let own = core::array::from_fn(|joint| {
+                let friction = model.friction(joint, state.qd[joint]);
+                wearer[joint] + inertia[joint] + weight[joint] + friction - torque[joint]
+            });
+            let (share, angles) = (shares.periodic, &sample.position_rad);
+            assist = self.periodic.step(model, share, angles, [&own, &wearer], AHEAD_S);
+        }
+        let certain = shares.inertia * model.assured.inertia_share;
+        let mut output = AssistTorque {
+            tick: sample.tick,
+            torque_nm: [0.0; N],
+            support_nm: [0.0; N],
+            damping: self.energy.damping(),
+            is_exhausted: self.energy.is_exhausted(),
+        };
+        for joint in 0..N {
+            let change = (support[joint] - self.last_support[joint]) * (AHEAD_S / DT);
+            output.support_nm[joint] = support[joint] + change;
+            output.torque_nm[joint] = output.support_nm[joint] + certain * inertia[joint] + assist[joint];
+        }
+        output.is_exhausted |= !output.torque_nm.iter().copied().all(is_finite);
+        (self.last_angle, self.last_support, self.last_assist) = (sample.position_rad, support, assist);
+        output
+    }
+}
+
+/// Torque that carries weight: the empty leg's, and a share of the wearer's.
+fn support<const N: usize>(session: &AssistSession<N>, q: &[f32; N]) -> [f32; N] {
+    let AssistSession { shares, model } = session;
+    let mut support = model.weight(q);
+    if shares.weight != 0.0 {
+        for (support, weight) in support.iter_mut().zip(model.wearer_weight(q)) {
+            *support += shares.weight * weight;
+        }
+    }
+    support
+}

@@ -1,0 +1,129 @@
+//! Assistance of a periodic motion: a share of the wearer's predicted torque, behind a gate.
+//!
+//! ```text
+//! assist = s e tau_w(q*, q*', q*'')            predicted for the time at which the torque acts
+//! own    = <tau_h tau_w> / <tau_w tau_w>       share that the wearer gives, means over about a cycle
+//! tau_h  = inertia + weight + friction of both legs - measured torque
+//! gate   = clamp((predicted - 0.8) / 0.1, 0, 1) clamp((own / (1 - s) - 0.25) / 0.25, 0, 1)
+//! e      follows the gate, from 0 to 1 in a cycle, from 1 to 0 in half a cycle
+//! ```
+//!
+//! The gate has two parts. The motion must be periodic: the oscillators predict it. And the wearer must mean
+//! it: a leg that swings limply, or against its wearer, shows no effort of its own, although it may be
+//! periodic. `own` is 1 - s for a wearer who gives the rest.
+//!
+//! The energy given in a cycle never exceeds the share of the positive work that the prediction needs; beyond
+//! it the assistance is off until the next cycle.
+
+use super::model::CompensationModel;
+use super::oscillator::Oscillator;
+use crate::model::JointState;
+use crate::real::{abs, clamp, max};
+use crate::servo::LOG_RATE_HZ;
+
+const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
+/// Predicted share of the motion at which the gate begins to open, and is open.
+const PERIODIC: [f32; 2] = [0.8, 0.9];
+/// The same for the wearer's own share, relative to the expected one.
+const OWN: [f32; 2] = [0.25, 0.5];
+/// Torque below which a motion needs no assistance, N m; also keeps the quotient finite.
+const SMALLEST_NM: f32 = 1.0;
+
+fn ramp([from, to]: [f32; 2], value: f32) -> f32 {
+    clamp((value - from) / (to - from), 0.0, 1.0)
+}
+
+/// Oscillators, gate and ledger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PeriodicAssist<const N: usize> {
+    oscillator: Oscillator<N>,
+    gate: f32,
+    /// Means over about a cycle of own times predicted torque, and of predicted torque squared, (N m)^2.
+    own: f32,
+    expected: f32,
+    /// Energy given in this cycle, and the predicted positive work of this and the last cycle, J.
+    given_j: f32,
+    needed_j: f32,
+    allowed_j: f32,
+}
+
+impl<const N: usize> PeriodicAssist<N> {
+    /// Assistance before the first sample.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            oscillator: Oscillator::new(),
+            gate: 0.0,
+            own: 0.0,
+            expected: 0.0,
+            given_j: 0.0,
+            needed_j: 0.0,
+            allowed_j: 0.0,
+        }
+    }
+
+    /// Oscillators.
+    #[must_use]
+    pub fn oscillator(&self) -> &Oscillator<N> {
+        &self.oscillator
+    }
+
+    /// Opening of the gate, 0..1.
+    #[must_use]
+    pub fn gate(&self) -> f32 {
+        self.gate
+    }
+
+    /// Takes the angles (rad) of a sample and the torque that the wearer gives and needs (N m) at one earlier
+    /// time, and returns the assistance for `ahead` s after the sample, N m.
+    pub fn step(
+        &mut self,
+        model: &CompensationModel<N>,
+        share: f32,
+        angles: &[f32; N],
+        [own, needed]: [&[f32; N]; 2],
+        ahead: f32,
+    ) -> [f32; N] {
+        let before = self.oscillator.phase();
+        self.oscillator.push(angles);
+        let cycles = self.oscillator.hertz() * DT;
+        let (mut product, mut square) = (0.0, 0.0);
+        for (own, needed) in own.iter().zip(needed) {
+            product += own * needed;
+            square += needed * needed;
+        }
+        self.own += cycles * (product - self.own);
+        self.expected += cycles * (square - self.expected);
+        let own_share = self.own / max(self.expected, SMALLEST_NM * SMALLEST_NM);
+        let state = self.oscillator.predict(ahead);
+        let torque = model.wearer_torque(&state);
+        if self.oscillator.phase() < before {
+            (self.allowed_j, self.needed_j, self.given_j) = (self.needed_j, 0.0, 0.0);
+        }
+        let is_spent = self.given_j > abs(share) * self.allowed_j;
+        let gate = if is_spent {
+            0.0
+        } else {
+            ramp(PERIODIC, self.oscillator.predicted_share()) * ramp(OWN, own_share / (1.0 - share))
+        };
+        self.gate += clamp(gate - self.gate, -2.0 * cycles, cycles);
+        self.assisted(&state, &torque, share)
+    }
+
+    /// Scales the predicted torque and keeps the ledger of the cycle.
+    fn assisted(&mut self, state: &JointState<f32, N>, torque: &[f32; N], share: f32) -> [f32; N] {
+        let mut assist = [0.0; N];
+        for joint in 0..N {
+            assist[joint] = share * self.gate * torque[joint];
+            self.given_j += assist[joint] * state.qd[joint] * DT;
+            self.needed_j += max(torque[joint] * state.qd[joint], 0.0) * DT;
+        }
+        assist
+    }
+}
+
+impl<const N: usize> Default for PeriodicAssist<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,260 @@
+//! Assistance in the 4 kHz tick: interpolation between two torques of the law, friction, fading.
+//!
+//! ```text
+//! tau = l (tau_law + s_f friction(q') - b q') + (1 - l) (tau_0 - D q')
+//! ```
+//!
+//! `l` moves between 0 and 1 within [`FADE_S`]. D is the damping of the position controller. tau_0 is the
+//! torque that held the leg when the session began; while the session ends, the torque that carries its
+//! weight. At l = 0 the torque is that of the controller without a position error: both ends are free of
+//! steps.
+//!
+//! Torques of the law arrive every eighth tick, and each is reached on a ramp of eight ticks. One that fails
+//! to come for [`LATEST_TICKS`] ends the session. Cost: some 20 operations for each joint.
+
+use super::law::{AssistSession, AssistTorque};
+use super::model::{Assured, faded_sign};
+use crate::real::{clamp, is_finite};
+use crate::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
+
+/// Time in which assistance fades in or out, s.
+pub const FADE_S: f32 = 0.5;
+const FADE_PER_TICK: f32 = 1.0 / (FADE_S * SERVO_RATE_HZ as f32);
+/// Ticks without a new torque after which the session ends: 10 ms.
+pub const LATEST_TICKS: u32 = 40;
+/// Largest change of torque from one sample to the next as a share of the cap.
+const LARGEST_STEP: f32 = 0.1;
+
+/// Torque of one tick, joint (D-H) sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AssistDemand<const N: usize> {
+    /// Torque, N m.
+    pub torque_nm: [f32; N],
+    /// Share of the controller's damping that acts beside it, 0..1.
+    pub damping_share: f32,
+}
+
+/// State of a session between two ticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AssistTick<const N: usize> {
+    share: f32,
+    is_leaving: bool,
+    friction_share: f32,
+    assured: Assured<N>,
+    cap_nm: [f32; N],
+    /// Torque that holds the leg without the law.
+    hold_nm: [f32; N],
+    /// Ramp of the law's torque.
+    torque_nm: [f32; N],
+    slope_nm: [f32; N],
+    support_nm: [f32; N],
+    damping: f32,
+    /// Ticks since the newest torque of the law; `None` before the first.
+    age: Option<u32>,
+    waited: u32,
+}
+
+impl<const N: usize> AssistTick<N> {
+    /// Begins a session with the torque that holds the leg now (N m). `cap_nm` are the joints' torque caps.
+    #[must_use]
+    pub fn begin(session: &AssistSession<N>, hold_nm: [f32; N], cap_nm: [f32; N]) -> Self {
+        Self {
+            share: 0.0,
+            is_leaving: false,
+            friction_share: session.shares.friction,
+            assured: session.model.assured,
+            cap_nm,
+            hold_nm,
+            torque_nm: hold_nm,
+            slope_nm: [0.0; N],
+            support_nm: hold_nm,
+            damping: 0.0,
+            age: None,
+            waited: 0,
+        }
+    }
+
+    /// Takes a torque of the law.
+    pub fn receive(&mut self, torque: &AssistTorque<N>) {
+        for joint in 0..N {
+            let wanted = torque.torque_nm[joint];
+            if !is_finite(wanted) {
+                return self.leave();
+            }
+            let step = LARGEST_STEP * self.cap_nm[joint];
+            let change = match self.age {
+                Some(_) => clamp(wanted - self.torque_nm[joint], -step, step),
+                // The share is zero at the first torque.
+                None => {
+                    self.torque_nm[joint] = wanted;
+                    0.0
+                }
+            };
+            self.slope_nm[joint] = change * (1.0 / TICKS_PER_LOG as f32);
+        }
+        (self.support_nm, self.damping, self.age) = (torque.support_nm, torque.damping, Some(0));
+        if torque.is_exhausted {
+            self.leave();
+        }
+    }
+
+    /// Ends the session; the torque fades out.
+    pub fn leave(&mut self) {
+        self.is_leaving = true;
+    }
+
+    /// Whether the session is ending.
+    #[must_use]
+    pub const fn is_leaving(&self) -> bool {
+        self.is_leaving
+    }
+
+    /// Whether the session has faded out.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.is_leaving && !(self.share > 0.0)
+    }
+
+    /// Whether the whole assistance acts.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.share >= 1.0
+    }
+
+    /// Runs one tick at these velocities, rad/s.
+    pub fn advance(&mut self, velocity: &[f32; N]) -> AssistDemand<N> {
+        self.waited = match self.age {
+            Some(_) => 0,
+            None => self.waited + 1,
+        };
+        if self.age.unwrap_or(self.waited) > LATEST_TICKS {
+            self.leave();
+        }
+        let step = match (self.is_leaving, self.age) {
+            (true, _) => -FADE_PER_TICK,
+            (false, Some(_)) => FADE_PER_TICK,
+            (false, None) => 0.0,
+        };
+        self.share = clamp(self.share + step, 0.0, 1.0);
+        let moves = self.age.is_some_and(|age| age < TICKS_PER_LOG);
+        self.age = self.age.map(|age| age.saturating_add(1));
+        let mut demand = AssistDemand { torque_nm: [0.0; N], damping_share: 1.0 - self.share };
+        for joint in 0..N {
+            if moves {
+                self.torque_nm[joint] += self.slope_nm[joint];
+            }
+            let Assured { coulomb_nm, viscous, .. } = &self.assured;
+            let speed = velocity[joint];
+            let friction = coulomb_nm[joint] * faded_sign(speed) + viscous[joint] * speed;
+            let law = self.torque_nm[joint] + self.friction_share * friction - self.damping * speed;
+            if self.is_leaving {
+                self.hold_nm[joint] = self.support_nm[joint];
+            }
+            demand.torque_nm[joint] = self.share * law + (1.0 - self.share) * self.hold_nm[joint];
+        }
+        demand
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{AssistShares, CompensationModel};
+    use super::*;
+    use crate::model::{Chain, DenavitHartenberg, PARAMETERS_PER_JOINT};
+
+    fn session() -> AssistSession<2> {
+        let geometry = DenavitHartenberg { alpha: 0.0, a: 0.0, d: 0.0 };
+        let chain =
+            Chain::new(&[geometry, DenavitHartenberg { a: 0.4, ..geometry }]).expect("finite numbers");
+        AssistSession {
+            shares: AssistShares { friction: 1.0, ..AssistShares::GRAVITY_ONLY },
+            model: CompensationModel {
+                chain,
+                gravity: [9.81, 0.0, 0.0],
+                empty: [[0.0; PARAMETERS_PER_JOINT]; 2],
+                wearer: None,
+                offset_nm: [0.0; 2],
+                assured: Assured { coulomb_nm: [4.0; 2], viscous: [3.0; 2], inertia_share: 1.0 },
+            },
+        }
+    }
+
+    fn torque(torque_nm: f32) -> AssistTorque<2> {
+        AssistTorque {
+            tick: 0,
+            torque_nm: [torque_nm; 2],
+            support_nm: [5.0; 2],
+            damping: 0.0,
+            is_exhausted: false,
+        }
+    }
+
+    #[test]
+    fn torque_moves_from_hold_to_law_and_back_without_a_step() {
+        let mut tick = AssistTick::begin(&session(), [20.0; 2], [85.0; 2]);
+        let mut last = 20.0;
+        let mut largest = 0.0_f32;
+        let mut run = |tick: &mut AssistTick<2>, ticks: u32, law: f32| {
+            for number in 0..ticks {
+                if number % TICKS_PER_LOG == 0 {
+                    tick.receive(&torque(law));
+                }
+                let now = tick.advance(&[0.0; 2]).torque_nm[0];
+                largest = largest.max((now - last).abs());
+                last = now;
+            }
+            last
+        };
+        assert!((run(&mut tick, 2001, -30.0) + 30.0).abs() < 1e-3);
+        assert!(tick.is_complete());
+        tick.leave();
+        assert!((run(&mut tick, 2001, -30.0) - 5.0).abs() < 1e-3);
+        assert!(tick.has_ended());
+        // 50 N m in half a second.
+        assert!(largest < 0.05, "{largest}");
+    }
+
+    #[test]
+    fn a_jump_of_the_law_is_limited_to_a_tenth_of_the_cap_per_sample() {
+        let mut tick = AssistTick::begin(&session(), [0.0; 2], [85.0; 2]);
+        for number in 0..2400 {
+            if number % TICKS_PER_LOG == 0 {
+                tick.receive(&torque(0.0));
+            }
+            let _ = tick.advance(&[0.0; 2]);
+        }
+        tick.receive(&torque(80.0));
+        let ramp: [f32; 8] = core::array::from_fn(|_| tick.advance(&[0.0; 2]).torque_nm[0]);
+        assert!((ramp[7] - 8.5).abs() < 1e-3 && (ramp[3] - 4.25).abs() < 1e-3, "{ramp:?}");
+    }
+
+    #[test]
+    fn friction_fades_to_zero_at_rest() {
+        let mut tick = AssistTick::begin(&session(), [0.0; 2], [85.0; 2]);
+        for number in 0..2400 {
+            if number % TICKS_PER_LOG == 0 {
+                tick.receive(&torque(0.0));
+            }
+            let _ = tick.advance(&[0.0; 2]);
+        }
+        let found = [0.0, 0.025, 1.0, -1.0].map(|speed| tick.advance(&[speed, 0.0]).torque_nm[0]);
+        for (found, expected) in found.into_iter().zip([0.0, 2.075, 7.0, -7.0]) {
+            assert!((found - expected).abs() < 1e-3, "{found} against {expected}");
+        }
+    }
+
+    #[test]
+    fn a_silent_or_broken_law_ends_the_session() {
+        let mut silent = AssistTick::begin(&session(), [0.0; 2], [85.0; 2]);
+        for _ in 0..=LATEST_TICKS + 1 {
+            let _ = silent.advance(&[0.0; 2]);
+        }
+        assert!(silent.is_leaving());
+        let mut broken = AssistTick::begin(&session(), [0.0; 2], [85.0; 2]);
+        broken.receive(&torque(f32::NAN));
+        assert!(broken.is_leaving() && broken.advance(&[0.0; 2]).torque_nm == [0.0; 2]);
+        let mut exhausted = AssistTick::begin(&session(), [0.0; 2], [85.0; 2]);
+        exhausted.receive(&AssistTorque { is_exhausted: true, ..torque(1.0) });
+        assert!(exhausted.is_leaving());
+    }
+}

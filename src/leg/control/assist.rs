@@ -1,0 +1,172 @@
+//! Sessions of assistance: their beginning, torque and end; see [`crate::assist`].
+//!
+//! A session begins from rest, holds no position, and ends in the pose in which the leg then is. The law runs
+//! elsewhere, at 500 Hz: it gets a session by [`Control::take_session`] and answers every logged sample by
+//! [`Control::receive_torque`].
+
+use super::{Activity, Control};
+use crate::assist::{AssistDemand, AssistSession, AssistShares, AssistTick, AssistTorque};
+use crate::leg::activity::AssistPhase;
+use crate::leg::model::IdentifiedModel;
+use crate::servo::Effort;
+use crate::units::NewtonMetre;
+
+/// Whether somebody wears the leg.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wearing {
+    /// The exoskeleton alone.
+    Empty,
+    /// The exoskeleton with its wearer.
+    Worn,
+}
+
+/// Models, and the session of assistance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Assistance<const N: usize> {
+    pub(super) empty: Option<IdentifiedModel<N>>,
+    pub(super) worn: Option<IdentifiedModel<N>>,
+    /// What the operator said about the leg of the next identification.
+    pub(super) wearing: Option<Wearing>,
+    tick: Option<AssistTick<N>>,
+    /// Session that the law has not taken yet.
+    session: Option<AssistSession<N>>,
+    velocity: [f32; N],
+    torque: [f32; N],
+}
+
+impl<const N: usize> Assistance<N> {
+    pub(super) fn new() -> Self {
+        Self {
+            empty: None,
+            worn: None,
+            wearing: None,
+            tick: None,
+            session: None,
+            velocity: [0.0; N],
+            torque: [0.0; N],
+        }
+    }
+
+    /// Drops the session without a fade, because the drive gives no torque.
+    pub(super) fn interrupt(&mut self) {
+        (self.tick, self.session) = (None, None);
+    }
+
+    /// Fades the session out.
+    pub(super) fn leave(&mut self) {
+        if let Some(tick) = &mut self.tick {
+            tick.leave();
+        }
+    }
+
+    /// Takes the servo's results of this tick: velocities (rad/s) and torques (N m).
+    pub(super) fn measure(&mut self, velocity: [f32; N], torque: [f32; N]) {
+        (self.velocity, self.torque) = (velocity, torque);
+    }
+
+    /// Sets the accepted model of the leg that the operator named.
+    pub(super) fn accept(&mut self, model: &IdentifiedModel<N>) {
+        match self.wearing {
+            Some(Wearing::Empty) => self.empty = Some(*model),
+            Some(Wearing::Worn) => self.worn = Some(*model),
+            None => {}
+        }
+    }
+}
+
+impl<const N: usize> Control<N> {
+    /// Sets whether the leg of the next identifications is empty or worn; its accepted model becomes that of
+    /// [`Self::model_of`].
+    pub fn set_wearing(&mut self, wearing: Option<Wearing>) {
+        self.assistance.wearing = wearing;
+    }
+
+    /// What was said about the leg.
+    #[must_use]
+    pub fn wearing(&self) -> Option<Wearing> {
+        self.assistance.wearing
+    }
+
+    /// Model of the empty or the worn leg.
+    #[must_use]
+    pub fn model_of(&self, wearing: Wearing) -> Option<&IdentifiedModel<N>> {
+        match wearing {
+            Wearing::Empty => self.assistance.empty.as_ref(),
+            Wearing::Worn => self.assistance.worn.as_ref(),
+        }
+    }
+
+    /// Sets a restored model of the empty or the worn leg. Refused (`false`) during an activity.
+    #[must_use]
+    pub fn set_model(&mut self, wearing: Wearing, model: IdentifiedModel<N>) -> bool {
+        let is_idle = matches!(self.activity, Activity::Idle | Activity::Follow);
+        if is_idle {
+            match wearing {
+                Wearing::Empty => self.assistance.empty = Some(model),
+                Wearing::Worn => self.assistance.worn = Some(model),
+            }
+        }
+        is_idle
+    }
+
+    /// Session that began since the last call; for the law.
+    #[must_use]
+    pub fn take_session(&mut self) -> Option<AssistSession<N>> {
+        self.assistance.session.take()
+    }
+
+    /// Takes the law's answer to a logged sample.
+    pub fn receive_torque(&mut self, torque: &AssistTorque<N>) {
+        if let Some(tick) = &mut self.assistance.tick {
+            tick.receive(torque);
+        }
+    }
+
+    /// Whether these shares can be given now, at rest with the drive enabled.
+    pub(super) fn may_assist(&self, shares: &AssistShares) -> bool {
+        let models = &self.assistance;
+        shares.are_permitted()
+            && models.empty.is_some()
+            && (models.worn.is_some() || !shares.need_worn_model())
+            && self.change.is_none()
+    }
+
+    /// Begins a session.
+    pub(super) fn begin_assist(&mut self, shares: AssistShares, gravity: [f32; 3]) {
+        let Some(empty) = &self.assistance.empty else { return };
+        let worn = self.assistance.worn.as_ref().filter(|_| shares.need_worn_model());
+        let session = AssistSession { shares, model: empty.compensation(worn, gravity) };
+        let cap = self.servo.limits().joints().map(|joint| joint.torque_cap().0);
+        let hold = self.assistance.torque;
+        self.assistance.tick = Some(AssistTick::begin(&session, hold, cap));
+        self.assistance.session = Some(session);
+        self.models.want(false);
+        self.activity = Activity::Assist(AssistPhase::Enter);
+    }
+
+    /// Efforts of the session in this tick.
+    pub(super) fn assist(&mut self) -> Option<[Effort; N]> {
+        if !self.activity.assists() {
+            return None;
+        }
+        let velocity = self.assistance.velocity;
+        let tick = self.assistance.tick.as_mut()?;
+        let AssistDemand { torque_nm, damping_share } = tick.advance(&velocity);
+        let phase = match (tick.is_leaving(), tick.is_complete()) {
+            (true, _) => AssistPhase::Leave,
+            (false, true) => AssistPhase::Run,
+            (false, false) => AssistPhase::Enter,
+        };
+        self.activity = Activity::Assist(phase);
+        let torques = torque_nm.map(NewtonMetre);
+        Some(torques.map(|torque| Effort { torque, held: false, damping_share, ..Effort::HELD }))
+    }
+
+    /// Ends a session that has faded out, in the present pose.
+    pub(super) fn end_assist(&mut self) {
+        if self.assistance.tick.as_ref().is_none_or(AssistTick::has_ended) {
+            self.assistance.interrupt();
+            self.activity = Activity::Idle;
+        }
+    }
+}
