@@ -1,15 +1,16 @@
 //! Energy that the leg gives to its wearer, and the damping that bounds it.
 //!
 //! ```text
-//! E += sum_j (tau_j - support_j) dq_j - (FC_low |dq_j| + FV_low q'_j dq_j) - assist_j dq_j - d(q'' M q' / 2)
-//! E  = max(E, 0)
+//! E += sum_j (tau_j - support_j - assist_j) dq_j - (FC_low |dq_j| + FV_low q'_j dq_j) - s_i k dT
+//! E  = max(E, 0),   T = q'' M q' / 2
 //! b  = B_MAX clamp(2 E / BUDGET - 1, 0, 1)
 //! ```
 //!
-//! Energy of the motors that went neither into the weight's potential, nor into friction, nor into kinetic
-//! energy, has passed to the wearer. Torque is the measured one, so the balance holds whatever computed it.
-//! The lower bound of friction makes it an upper bound of the energy. The support's potential is conservative
-//! and returns on the way down; the assistance of a periodic motion has a bound of its own.
+//! Energy of the motors that went neither into the weight's potential, nor into friction, nor into the
+//! kinetic energy that the compensation of inertia lends, stays with the leg's own motion and its wearer.
+//! What passes to the wearer is E less the rise of (1 - s_i k) T, so from rest it is at most E. Torque is the
+//! measured one: the balance holds whatever computed it. The lower bound of friction makes it an upper bound.
+//! Weight and inertia return what they took; the assistance of a periodic motion has a bound of its own.
 //!
 //! E starts again from zero whenever the wearer has given energy: a wearer who worked for an hour has not
 //! earned an hour's push. So the energy given since any instant stays below [`BUDGET_J`], which the damping
@@ -49,20 +50,21 @@ impl<const N: usize> EnergyObserver<N> {
     }
 
     /// Takes a sample: angles (rad), measured torques (N m), and velocities (rad/s) of the angles' time.
-    /// `support` and `assist` are the torques (N m) whose energy does not count.
+    /// `excepted` are the torques (N m) whose energy does not count; `inertia_share` is the compensated share
+    /// of the mass matrix.
     pub fn push(
         &mut self,
         model: &CompensationModel<N>,
         [angle, torque, velocity]: [&[f32; N]; 3],
-        support: &[f32; N],
-        assist: &[f32; N],
+        excepted: &[f32; N],
+        inertia_share: f32,
     ) {
-        let kinetic_j = model.kinetic_energy(angle, velocity);
+        let kinetic_j = inertia_share * model.kinetic_energy(angle, velocity);
         if let Some(last) = &self.last {
             let mut work = last.kinetic_j - kinetic_j;
             for joint in 0..N {
                 let way = angle[joint] - last.angle[joint];
-                let mean = 0.5 * (torque[joint] + last.torque[joint]) - support[joint] - assist[joint];
+                let mean = 0.5 * (torque[joint] + last.torque[joint]) - excepted[joint];
                 let friction = model.assured.coulomb_nm[joint] * abs(way)
                     + model.assured.viscous[joint] * velocity[joint] * way;
                 work += mean * way - friction;

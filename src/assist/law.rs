@@ -4,10 +4,10 @@
 //! cost 2 % of the processor; in the tick they would not fit.
 //!
 //! The torque belongs to a time [`AHEAD_S`] after the sample's: half of the eight ticks of its mean, the
-//! computation, and the ramp of the tick. Weight is extrapolated over that time; acceleration is late by it
-//! and by the differentiator's delay.
+//! computation, and the ramp of the tick. Weight is extrapolated over that time. Acceleration must not wait
+//! for it: the tick multiplies its own with the mass matrix that the law gives.
 
-use super::differentiator::{Derivatives, Differentiator};
+use super::differentiator::{Derivatives, Differentiator, Gains};
 use super::energy::EnergyObserver;
 use super::model::CompensationModel;
 use super::periodic::PeriodicAssist;
@@ -35,8 +35,10 @@ pub struct AssistSession<const N: usize> {
 pub struct AssistTorque<const N: usize> {
     /// Last tick of the sample.
     pub tick: u32,
-    /// Whole torque besides friction and damping, N m.
+    /// Whole torque besides inertia, friction and damping, N m.
     pub torque_nm: [f32; N],
+    /// Compensated mass matrix, kg m^2.
+    pub inertia: [[f32; N]; N],
     /// Its part that carries weight, N m.
     pub support_nm: [f32; N],
     /// Damping that the energy observer requires, N m s/rad.
@@ -122,42 +124,48 @@ impl<const N: usize> Running<N> {
         let mut state = JointState { q: [0.0; N], qd: [0.0; N], qdd: [0.0; N] };
         let (mut torque, mut velocity) = ([0.0; N], [0.0; N]);
         for joint in 0..N {
-            let Derivatives { value, first, second } = self.angles[joint].push(sample.position_rad[joint]);
+            let Derivatives { value, first, second } =
+                self.angles[joint].push(&Gains::LOG, sample.position_rad[joint]);
             (state.q[joint], state.qd[joint], state.qdd[joint]) = (value, first, second);
-            torque[joint] = self.torques[joint].push(sample.torque_nm[joint]).value;
+            torque[joint] = self.torques[joint].push(&Gains::LOG, sample.torque_nm[joint]).value;
             velocity[joint] = (sample.position_rad[joint] - self.last_angle[joint]) * LOG_RATE_HZ as f32;
         }
         let support = support(&self.session, &sample.position_rad);
-        // Both energies belong to the way between the two samples.
-        let between = core::array::from_fn(|joint| 0.5 * (support[joint] + self.last_support[joint]));
+        let certain = shares.inertia * model.assured.inertia_share;
+        // Torques of the way between the two samples.
+        let excepted = core::array::from_fn(|joint| {
+            0.5 * (support[joint] + self.last_support[joint]) + self.last_assist[joint]
+        });
         let measured = [&sample.position_rad, &sample.torque_nm, &velocity];
-        self.energy.push(model, measured, &between, &self.last_assist);
-        let inertia = model.inertia(&state);
+        self.energy.push(model, measured, &excepted, certain);
         let mut assist = [0.0; N];
         if shares.periodic != 0.0 {
-            let wearer = model.wearer_torque(&state);
-            let weight = model.weight(&state.q);
+            let moved = 1.0 - certain;
+            let needed = model.wearer_needs(&state, moved);
+            let (inertia, weight) = (model.inertia(&state), model.weight(&state.q));
             let own = core::array::from_fn(|joint| {
                 let friction = model.friction(joint, state.qd[joint]);
-                wearer[joint] + inertia[joint] + weight[joint] + friction - torque[joint]
+                needed[joint] + certain * inertia[joint] + weight[joint] + friction - torque[joint]
             });
             let (share, angles) = (shares.periodic, &sample.position_rad);
-            assist = self.periodic.step(model, share, angles, [&own, &wearer], AHEAD_S);
+            assist = self.periodic.step(model, share, angles, [&own, &needed], moved, AHEAD_S);
         }
-        let certain = shares.inertia * model.assured.inertia_share;
         let mut output = AssistTorque {
             tick: sample.tick,
             torque_nm: [0.0; N],
+            inertia: model.mass_matrix(&sample.position_rad, certain),
             support_nm: [0.0; N],
             damping: self.energy.damping(),
             is_exhausted: self.energy.is_exhausted(),
         };
+        let centrifugal = model.inertia(&JointState { qdd: [0.0; N], ..state });
         for joint in 0..N {
             let change = (support[joint] - self.last_support[joint]) * (AHEAD_S / DT);
             output.support_nm[joint] = support[joint] + change;
-            output.torque_nm[joint] = output.support_nm[joint] + certain * inertia[joint] + assist[joint];
+            output.torque_nm[joint] = output.support_nm[joint] + certain * centrifugal[joint] + assist[joint];
         }
-        output.is_exhausted |= !output.torque_nm.iter().copied().all(is_finite);
+        let inertia = output.inertia.iter().flatten();
+        output.is_exhausted |= !output.torque_nm.iter().chain(inertia).copied().all(is_finite);
         (self.last_angle, self.last_support, self.last_assist) = (sample.position_rad, support, assist);
         output
     }

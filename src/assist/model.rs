@@ -97,11 +97,29 @@ impl<const N: usize> CompensationModel<N> {
         }
     }
 
+    /// Torque that moves the wearer's leg and a share of the empty leg's inertia, N m: that of a wearer in a
+    /// transparent leg.
+    #[must_use]
+    pub fn wearer_needs(&self, state: &JointState<f32, N>, inertia_share: f32) -> [f32; N] {
+        let mut torque = self.wearer_torque(state);
+        for (torque, inertia) in torque.iter_mut().zip(self.inertia(state)) {
+            *torque += inertia_share * inertia;
+        }
+        torque
+    }
+
     /// Lower bound of a moving joint's friction, N m.
     #[must_use]
     pub fn friction(&self, joint: usize, qd: f32) -> f32 {
         let bound = |bounds: &[f32; N]| bounds.get(joint).copied().unwrap_or(0.0);
         bound(&self.assured.coulomb_nm) * faded_sign(qd) + bound(&self.assured.viscous) * qd
+    }
+
+    /// Share of the empty leg's mass matrix, kg m^2.
+    #[must_use]
+    pub fn mass_matrix(&self, q: &[f32; N], share: f32) -> [[f32; N]; N] {
+        let matrix = mass_matrix(&self.chain, &self.empty, q);
+        core::array::from_fn(|row| core::array::from_fn(|column| share * matrix[(row, column)]))
     }
 
     /// Kinetic energy of the empty leg, J.

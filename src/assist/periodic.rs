@@ -1,8 +1,9 @@
 //! Assistance of a periodic motion: a share of the wearer's predicted torque, behind a gate.
 //!
 //! ```text
-//! assist = s e tau_w(q*, q*', q*'')            predicted for the time at which the torque acts
-//! own    = <tau_h tau_w> / <tau_w tau_w>       share that the wearer gives, means over about a cycle
+//! assist = s e tau_n(q*, q*', q*'')            predicted for the time at which the torque acts
+//! tau_n  = tau_w + (1 - s_i k) inertia         torque that the wearer of a transparent leg gives
+//! own    = <tau_h tau_n> / <tau_n tau_n>       share that the wearer gives, means over about a cycle
 //! tau_h  = inertia + weight + friction of both legs - measured torque
 //! gate   = clamp((predicted - 0.8) / 0.1, 0, 1) clamp((own / (1 - s) - 0.25) / 0.25, 0, 1)
 //! e      follows the gate, from 0 to 1 in a cycle, from 1 to 0 in half a cycle
@@ -75,13 +76,15 @@ impl<const N: usize> PeriodicAssist<N> {
     }
 
     /// Takes the angles (rad) of a sample and the torque that the wearer gives and needs (N m) at one earlier
-    /// time, and returns the assistance for `ahead` s after the sample, N m.
+    /// time, and returns the assistance for `ahead` s after the sample, N m. `inertia_share` is the share of
+    /// the empty leg's inertia that the wearer moves.
     pub fn step(
         &mut self,
         model: &CompensationModel<N>,
         share: f32,
         angles: &[f32; N],
         [own, needed]: [&[f32; N]; 2],
+        inertia_share: f32,
         ahead: f32,
     ) -> [f32; N] {
         let before = self.oscillator.phase();
@@ -96,7 +99,7 @@ impl<const N: usize> PeriodicAssist<N> {
         self.expected += cycles * (square - self.expected);
         let own_share = self.own / max(self.expected, SMALLEST_NM * SMALLEST_NM);
         let state = self.oscillator.predict(ahead);
-        let torque = model.wearer_torque(&state);
+        let torque = model.wearer_needs(&state, inertia_share);
         if self.oscillator.phase() < before {
             (self.allowed_j, self.needed_j, self.given_j) = (self.needed_j, 0.0, 0.0);
         }

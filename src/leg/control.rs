@@ -298,8 +298,7 @@ impl<const N: usize> Control<N> {
         } else {
             self.proceed();
         }
-        let (velocity, torque) = (servo.velocity, servo.decision.torque);
-        self.assistance.measure(velocity.map(|velocity| velocity.0), torque.map(|torque| torque.0));
+        self.assistance.measure(&servo);
         // A sample that the servo rejected as a glitch does not enter the log.
         let mut believed = *sample;
         for (joint, counts) in believed.joints.iter_mut().zip(servo.accepted_counts) {

@@ -8,7 +8,7 @@ use super::{Activity, Control};
 use crate::assist::{AssistDemand, AssistSession, AssistShares, AssistTick, AssistTorque};
 use crate::leg::activity::AssistPhase;
 use crate::leg::model::IdentifiedModel;
-use crate::servo::Effort;
+use crate::servo::{Effort, ServoOutput};
 use crate::units::NewtonMetre;
 
 /// Whether somebody wears the leg.
@@ -30,6 +30,7 @@ pub(super) struct Assistance<const N: usize> {
     tick: Option<AssistTick<N>>,
     /// Session that the law has not taken yet.
     session: Option<AssistSession<N>>,
+    position: [f32; N],
     velocity: [f32; N],
     torque: [f32; N],
 }
@@ -42,6 +43,7 @@ impl<const N: usize> Assistance<N> {
             wearing: None,
             tick: None,
             session: None,
+            position: [0.0; N],
             velocity: [0.0; N],
             torque: [0.0; N],
         }
@@ -59,9 +61,13 @@ impl<const N: usize> Assistance<N> {
         }
     }
 
-    /// Takes the servo's results of this tick: velocities (rad/s) and torques (N m).
-    pub(super) fn measure(&mut self, velocity: [f32; N], torque: [f32; N]) {
-        (self.velocity, self.torque) = (velocity, torque);
+    /// Takes the servo's results of this tick.
+    pub(super) fn measure(&mut self, output: &ServoOutput<N>) {
+        for joint in 0..N {
+            self.position[joint] = output.position[joint].0;
+            self.velocity[joint] = output.velocity[joint].0;
+            self.torque[joint] = output.decision.torque[joint].0;
+        }
     }
 
     /// Sets the accepted model of the leg that the operator named.
@@ -137,8 +143,8 @@ impl<const N: usize> Control<N> {
         let worn = self.assistance.worn.as_ref().filter(|_| shares.need_worn_model());
         let session = AssistSession { shares, model: empty.compensation(worn, gravity) };
         let cap = self.servo.limits().joints().map(|joint| joint.torque_cap().0);
-        let hold = self.assistance.torque;
-        self.assistance.tick = Some(AssistTick::begin(&session, hold, cap));
+        let Assistance { position, torque, .. } = self.assistance;
+        self.assistance.tick = Some(AssistTick::begin(&session, position, torque, cap));
         self.assistance.session = Some(session);
         self.models.want(false);
         self.activity = Activity::Assist(AssistPhase::Enter);
@@ -149,9 +155,9 @@ impl<const N: usize> Control<N> {
         if !self.activity.assists() {
             return None;
         }
-        let velocity = self.assistance.velocity;
+        let Assistance { position, velocity, .. } = self.assistance;
         let tick = self.assistance.tick.as_mut()?;
-        let AssistDemand { torque_nm, damping_share } = tick.advance(&velocity);
+        let AssistDemand { torque_nm, damping_share } = tick.advance(&position, &velocity);
         let phase = match (tick.is_leaving(), tick.is_complete()) {
             (true, _) => AssistPhase::Leave,
             (false, true) => AssistPhase::Run,
