@@ -144,6 +144,8 @@ pub trait Hardware<const N: usize> {
     fn pend_servo(&mut self);
     /// Requests a round of the bus, to run as soon as the levels above it are done.
     fn pend_bus(&mut self);
+    /// Requests a run of the assistance, like one of the bus.
+    fn pend_assist(&mut self);
 
     /// Reads the operator's contacts.
     fn contacts(&self) -> Contacts;

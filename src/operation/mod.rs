@@ -22,6 +22,7 @@
 //! all axes run. An axis that loses its rotor position ends the servo's ticks in its own tick; the
 //! housekeeping then discards calibration and reference.
 
+mod assist;
 mod axis_state;
 mod bus_round;
 mod contacts;
@@ -41,6 +42,7 @@ mod testing;
 mod token_bucket;
 mod watch;
 
+pub use assist::AssistLevel;
 pub use axis_state::{AxisState, Order, Outcome};
 pub use bus_round::{BusRound, StoreJob};
 pub use contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
@@ -52,7 +54,7 @@ pub use housekeeper::{Housekeeper, HousekeepingSettings};
 pub use identify::{IdentificationLevel, Slice};
 pub use mailboxes::TxScheduler;
 pub use queues::{
-    BusEnds, BusQueues, Calibrated, CurrentEnds, Ends, EventQueue, HostEnds, HousekeepingEnds,
+    AssistEnds, BusEnds, BusQueues, Calibrated, CurrentEnds, Ends, EventQueue, HostEnds, HousekeepingEnds,
     IdentificationEnds, LegEvent, Queues, ServoEnds,
 };
 pub use servo::ServoLevel;

@@ -13,6 +13,8 @@
 //! | servo | identification | [`LegEvent`], in order |
 //! | identification | servo | findings |
 //! | housekeeping | identification | records |
+//! | servo | assist | sessions, their samples |
+//! | assist | servo | torques |
 //! | housekeeping | storage | calibrations that passed |
 //! | bus interrupt | bus | received frames |
 //! | bus | servo | [`LegOrder`] |
@@ -23,7 +25,10 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use super::axis_state::{Order, Outcome};
 use crate::bus::device::{LegOrder, LegStatus};
 use crate::hal::{Frame, JointSample};
-use crate::leg::{Activity, ControlRequest, DriveState, Finding, LoggedSample, Plan, StoredCalibration};
+use crate::leg::{
+    Activity, AssistSession, AssistTorque, ControlRequest, DriveState, Finding, LogSample, LoggedSample,
+    Plan, StoredCalibration,
+};
 use crate::trace::Record;
 
 /// Axis that passed its calibration, and the part of the calibration that can be stored.
@@ -54,6 +59,9 @@ pub const RESERVED: usize = 8;
 /// Length of the queue of received frames: 1.5 ms of the shortest at 1 Mbit/s.
 pub const FRAMES: usize = 33;
 
+/// Length of the queue of samples to the assistance: three wait at most.
+pub const SAMPLES: usize = 4;
+
 /// Queue from the servo to the identification, separate from [`Queues`] because of its size.
 pub type EventQueue<const N: usize> = Queue<LegEvent<N>, EVENTS>;
 
@@ -68,6 +76,9 @@ pub struct Queues<const N: usize> {
     drive: Queue<DriveState, 8>,
     notes: Queue<Record<N>, 15>,
     calibrated: Queue<Calibrated, 4>,
+    sessions: Queue<AssistSession<N>, 2>,
+    assisted: Queue<LogSample<N>, SAMPLES>,
+    torques: Queue<AssistTorque<N>, SAMPLES>,
 }
 
 /// Ends of the current loops.
@@ -88,6 +99,9 @@ pub struct ServoEnds<'a, const N: usize> {
     pub(super) findings: Consumer<'a, Finding<N>>,
     pub(super) drive: Producer<'a, DriveState>,
     pub(super) events: Producer<'a, LegEvent<N>>,
+    pub(super) sessions: Producer<'a, AssistSession<N>>,
+    pub(super) assisted: Producer<'a, LogSample<N>>,
+    pub(super) torques: Consumer<'a, AssistTorque<N>>,
     /// Ends towards the bus.
     pub host: Option<HostEnds<'a, N>>,
 }
@@ -113,6 +127,13 @@ pub struct IdentificationEnds<'a, const N: usize> {
     pub notes: Consumer<'a, Record<N>>,
 }
 
+/// Ends of the assistance.
+pub struct AssistEnds<'a, const N: usize> {
+    pub(super) sessions: Consumer<'a, AssistSession<N>>,
+    pub(super) samples: Consumer<'a, LogSample<N>>,
+    pub(super) torques: Producer<'a, AssistTorque<N>>,
+}
+
 /// Both ends of every queue.
 pub struct Ends<'a, const N: usize> {
     /// Level 0.
@@ -123,6 +144,8 @@ pub struct Ends<'a, const N: usize> {
     pub housekeeping: HousekeepingEnds<'a, N>,
     /// Thread level.
     pub identification: IdentificationEnds<'a, N>,
+    /// Level 5.
+    pub assist: AssistEnds<'a, N>,
     /// Calibrations for the storage, thread level.
     pub calibrated: Consumer<'a, Calibrated>,
 }
@@ -156,6 +179,9 @@ impl<const N: usize> Queues<N> {
             drive: Queue::new(),
             notes: Queue::new(),
             calibrated: Queue::new(),
+            sessions: Queue::new(),
+            assisted: Queue::new(),
+            torques: Queue::new(),
         }
     }
 
@@ -171,6 +197,9 @@ impl<const N: usize> Queues<N> {
         let (give_note, take_note) = self.notes.split();
         let (give_calibrated, calibrated) = self.calibrated.split();
         let (give_event, take_event) = events.split();
+        let (give_session, take_session) = self.sessions.split();
+        let (give_assisted, take_assisted) = self.assisted.split();
+        let (give_torque, take_torque) = self.torques.split();
         Ends {
             current: CurrentEnds { orders: take_orders, outcomes: give_outcomes, samples: give_samples },
             servo: ServoEnds {
@@ -179,6 +208,9 @@ impl<const N: usize> Queues<N> {
                 findings: take_finding,
                 drive: give_drive,
                 events: give_event,
+                sessions: give_session,
+                assisted: give_assisted,
+                torques: take_torque,
                 host: None,
             },
             housekeeping: HousekeepingEnds {
@@ -194,6 +226,7 @@ impl<const N: usize> Queues<N> {
                 findings: give_finding,
                 notes: take_note,
             },
+            assist: AssistEnds { sessions: take_session, samples: take_assisted, torques: give_torque },
             calibrated,
         }
     }

@@ -7,7 +7,7 @@
 //! faults      reported by the board's other levels; gains and limits (every 64 ms); supply; derating
 //! request     of the operator, else of a host; filtered by the inhibit word, the enabling switch and the
 //!             holding brake
-//! leg         -> current targets, permission, holding brake
+//! leg         -> current targets, permission, holding brake; the samples of a session of assistance
 //! out         report to the bus; limits, requests, states, samples as events for identification and trace
 //! ```
 
@@ -135,6 +135,9 @@ impl<const N: usize> ServoLevel<N> {
         {
             send(LegEvent::TookResult, ends, signals);
         }
+        while let Some(torque) = ends.torques.dequeue() {
+            control.receive_torque(&torque);
+        }
         self.look_around(control, signals);
         let request = self.next_request(control, ends, signals, hardware);
         // Until the brake is open the drive holds its pose.
@@ -144,6 +147,7 @@ impl<const N: usize> ServoLevel<N> {
         let sample = Sample { joints: self.sample };
         let commands = self.host.as_mut().and_then(|host| host.commands(waits));
         let output = control.tick_with(&sample, permitted, gravity, commands);
+        assist(control, &output, ends, hardware);
         signals.set_targets(output.servo.drive());
         signals.set_permission(output.servo.decision.state.permission());
         self.hold(output.servo.decision.state, signals, hardware);
@@ -346,6 +350,25 @@ impl<const N: usize> ServoLevel<N> {
 
 fn not_enabled<const N: usize>(tick: u32, refused: Refusal) -> Record<N> {
     Record::NotEnabled { tick, joint: refused.number(), why: words::refusal(refused.reason) }
+}
+
+/// Sends a new session and its samples to the law, and requests its run.
+fn assist<const N: usize, H: Hardware<N>>(
+    control: &mut Control<N>,
+    output: &ControlOutput<N>,
+    ends: &mut ServoEnds<'_, N>,
+    hardware: &mut H,
+) {
+    if let Some(session) = control.take_session() {
+        let _ = ends.sessions.enqueue(session);
+    }
+    if control.activity().assists()
+        && let Some(logged) = &output.logged
+    {
+        // Without an answer the session ends.
+        let _ = ends.assisted.enqueue(logged.sample);
+        hardware.pend_assist();
+    }
 }
 
 /// Sends an event; one that does not fit is counted.

@@ -184,6 +184,8 @@ pub struct Statistics<const N: usize> {
     pub current_ticks: [Word; N],
     /// Longest servo tick, processor cycles, including current ticks in it.
     pub servo_worst: Word,
+    /// Longest run of the assistance, processor cycles, including the levels above it.
+    pub assist_worst: Word,
     /// Servo ticks that came late.
     pub servo_missed: Word,
     /// Servo ticks.
@@ -209,6 +211,7 @@ impl<const N: usize> Statistics<N> {
             current_missed: Word::new(0),
             current_ticks: [const { Word::new(0) }; N],
             servo_worst: Word::new(0),
+            assist_worst: Word::new(0),
             servo_missed: Word::new(0),
             servo_ticks: Word::new(0),
             rounds: Word::new(0),

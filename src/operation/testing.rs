@@ -137,6 +137,8 @@ pub(super) struct TestHardware<const N: usize> {
     pub holding_brake_released: bool,
     pub servo_pended: u32,
     pub bus_pended: u32,
+    /// Requests of the assistance.
+    pub assist_pended: u32,
     pub contacts: Contacts,
     pub encoder_counts: [u16; N],
     /// Frames of the absolute encoders at rotor and joint.
@@ -180,6 +182,7 @@ impl<const N: usize> TestHardware<N> {
             holding_brake_released: false,
             servo_pended: 0,
             bus_pended: 0,
+            assist_pended: 0,
             contacts: Contacts::default(),
             encoder_counts: [0; N],
             encoder_frames: [[u16::MAX; 2]; N],
@@ -284,6 +287,10 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     fn pend_bus(&mut self) {
         self.access();
         self.bus_pended += 1;
+    }
+    fn pend_assist(&mut self) {
+        self.access();
+        self.assist_pended += 1;
     }
     fn contacts(&self) -> Contacts {
         self.contacts

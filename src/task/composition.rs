@@ -6,7 +6,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 
 use super::identify::{BoardFunctions, Introduction, crashed};
 use super::leg::JOINTS;
-use super::{SIGNALS, bus, current, housekeeping, identify, leg, memory, servo, storage, vectors};
+use super::{SIGNALS, assist, bus, current, housekeeping, identify, leg, memory, servo, storage, vectors};
 use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::board::odrive_v3_6::identity::{Identity, Reset};
 use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
@@ -86,10 +86,13 @@ fn hand_out(
         servo: mut servo_ends,
         housekeeping: mut housekeeping_ends,
         identification,
+        assist: assist_ends,
         calibrated,
     } = QUEUES.take().split(memory::events());
     static LOOPS: StaticCell<current::Current> = StaticCell::new();
     place(&current::LOOPS, LOOPS.init(current::Current::new(current, divider)));
+    static ASSIST: StaticCell<assist::AssistLoop> = StaticCell::new();
+    place(&assist::ASSIST, ASSIST.init(assist::AssistLoop::new(assist_ends)));
 
     let mut control = built.as_ref().and_then(|(configuration, _)| Control::new(configuration).ok());
     let notes = &mut housekeeping_ends.notes;

@@ -5,6 +5,7 @@
 //! level 1  servo        4 kHz: both joints' samples, leg::Control, targets                      never masked
 //! level 4  CAN1_RX0     frames from the CAN controller                                          masked
 //! level 5  bus          at every frame and 2 kHz: nodes, axes, stored parameters                masked
+//! level 5  assist       500 Hz in a session: law of the assistance                               masked
 //! level 6  housekeeping 500 Hz: operator, gate drivers, temperatures, calibration, watchdog     executor
 //! thread   identify     the rest of the time: leg::Identification, records to the probe         executor
 //! ```
@@ -18,6 +19,8 @@
 use self::leg::JOINTS;
 use crate::operation::Signals;
 
+#[cfg(feature = "board-odrive-v3-6")]
+pub mod assist;
 pub mod bus;
 #[cfg(feature = "board-odrive-v3-6")]
 mod composition;

@@ -3,10 +3,10 @@
 
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{
-    ADC, CAN1_RX0, CAN1_TX, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS,
+    ADC, CAN1_RX0, CAN1_TX, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_FS, OTG_HS,
 };
 
-use super::{SIGNALS, bus, current, servo};
+use super::{SIGNALS, assist, bus, current, servo};
 use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::board::odrive_v3_6::{can, contacts, encoder};
 use crate::safety::InhibitReason;
@@ -17,7 +17,7 @@ pub fn enable() {
     // SAFETY: called once, from `main`, outside any critical section. Levels are set, and the handlers take
     // their locks only by trying.
     unsafe {
-        for vector in [EXTI4, EXTI9_5, EXTI15_10, OTG_HS, CAN1_RX0, CAN1_TX, ADC] {
+        for vector in [EXTI4, EXTI9_5, EXTI15_10, OTG_HS, OTG_FS, CAN1_RX0, CAN1_TX, ADC] {
             vector.enable();
         }
     }
@@ -67,6 +67,11 @@ fn CAN1_RX0() {
 fn CAN1_TX() {
     can::acknowledge();
     bus::interrupt(&mut Odrive);
+}
+
+#[interrupt]
+fn OTG_FS() {
+    assist::interrupt();
 }
 
 /// Executor of the housekeeping.

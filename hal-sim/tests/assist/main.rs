@@ -14,8 +14,8 @@ use hal_sim::world::World;
 use nalgebra::{Matrix3, Vector3};
 use scarab::hal::Sample;
 use scarab::leg::{
-    AssistShares, Assured, BASE, ControlOutput, ControlRequest, IdentifiedModel, JOINTS, Leg, LegConfiguration,
-    PowerRequest, Wearing,
+    AssistShares, Assured, BASE, ControlOutput, ControlRequest, IdentifiedModel, JOINTS, Leg,
+    LegConfiguration, PowerRequest, Wearing,
 };
 use scarab::model::{LegParameters, RigidBody};
 use scarab::{ident, leg, model, motion, motor, safety, units};
@@ -27,7 +27,11 @@ mod x2 {
 type DeviceLeg = Leg<JOINTS, BASE, 256, 26>;
 
 fn body(mass: f64, com: [f64; 2], sagittal: f64) -> BodyDescription {
-    BodyDescription { mass, com: [com[0], com[1], 0.0], inertia_com: [sagittal * 0.2, 0.0, 0.0, sagittal, 0.0, sagittal] }
+    BodyDescription {
+        mass,
+        com: [com[0], com[1], 0.0],
+        inertia_com: [sagittal * 0.2, 0.0, 0.0, sagittal, 0.0, sagittal],
+    }
 }
 
 fn joined(parts: &[(f64, [f64; 2], f64)]) -> (f64, [f64; 2], f64) {
@@ -47,18 +51,19 @@ fn exoskeleton() -> LegDescription<2> {
         (0.47, [0.40 - 0.0562, 0.0], 0.000_794_1),
         (1.25, [0.40, 0.088_34], 0.004_441),
     ]);
-    let joint = |a: f64, part: (f64, [f64; 2], f64), direction: f64, coulomb: f64, viscous: f64| JointDescription {
-        stops: None,
-        frame: DenavitHartenberg { alpha: 0.0, a, d: 0.0 },
-        direction,
-        zero_offset: 0.0,
-        body: body(part.0, part.1, part.2),
-        rotor_inertia: 1.9,
-        friction: FrictionDescription { coulomb, viscous, offset: 0.0, stribeck: None },
-        drive: DriveDescription { torque_per_ampere: 1.5, current_limit: 57.0, lag: 1e-3 },
-        encoder: EncoderDescription { side: EncoderSide::Motor, counts: 8192.0, ratio: 50.0 },
-        current_sensor: CurrentSensorDescription::default(),
-    };
+    let joint =
+        |a: f64, part: (f64, [f64; 2], f64), direction: f64, coulomb: f64, viscous: f64| JointDescription {
+            stops: None,
+            frame: DenavitHartenberg { alpha: 0.0, a, d: 0.0 },
+            direction,
+            zero_offset: 0.0,
+            body: body(part.0, part.1, part.2),
+            rotor_inertia: 1.9,
+            friction: FrictionDescription { coulomb, viscous, offset: 0.0, stribeck: None },
+            drive: DriveDescription { torque_per_ampere: 1.5, current_limit: 57.0, lag: 1e-3 },
+            encoder: EncoderDescription { side: EncoderSide::Motor, counts: 8192.0, ratio: 50.0 },
+            current_sensor: CurrentSensorDescription::default(),
+        };
     LegDescription {
         gravity: [9.81, 0.0, 0.0],
         joints: [joint(0.0, thigh, 1.0, 4.58, 5.01), joint(0.39, shank, -1.0, 4.67, 3.26)],
@@ -79,13 +84,18 @@ fn limb() -> [(f64, [f64; 2], f64); 2] {
     ]
 }
 
-fn firm(distance: f64) -> CuffDescription { let k: f64 = option_env!("CUFFK").unwrap_or("20e3").parse().unwrap(); let d: f64 = option_env!("CUFFD").unwrap_or("400").parse().unwrap();
-    CuffDescription { distance, along: hal_sim::wearer::description::CuffSpring { stiffness: k / 4.0, damping: d / 4.0, play: 0.0 }, across: hal_sim::wearer::description::CuffSpring { stiffness: k, damping: d, play: 0.0 } }
+fn firm(distance: f64) -> CuffDescription {
+    let k: f64 = option_env!("CUFFK").unwrap_or("20e3").parse().unwrap();
+    let d: f64 = option_env!("CUFFD").unwrap_or("400").parse().unwrap();
+    CuffDescription {
+        distance,
+        along: hal_sim::wearer::description::CuffSpring { stiffness: k / 4.0, damping: d / 4.0, play: 0.0 },
+        across: hal_sim::wearer::description::CuffSpring { stiffness: k, damping: d, play: 0.0 },
+    }
 }
 
 fn person(insisting: bool) -> WearerDescription {
-    let [thigh, shank] =
-        limb().map(|(mass, com, inertia_com)| SegmentDescription { mass, com, inertia_com });
+    let [thigh, shank] = limb().map(|(mass, com, inertia_com)| SegmentDescription { mass, com, inertia_com });
     let muscles = if insisting {
         let stiff = |stiffness: f64, damping: f64| MuscleDescription {
             torque_limit: 400.0,
@@ -131,7 +141,10 @@ fn parameters(bodies: [BodyDescription; 2], drives: [[f64; 3]; 2]) -> LegParamet
 
 const DRIVES: [[f64; 3]; 2] = [[1.9, 4.58, 5.01], [1.9, 4.67, 3.26]];
 
-fn true_model(configuration: &LegConfiguration<2, BASE>, parameters: &LegParameters<f32, 2>) -> IdentifiedModel<2> {
+fn true_model(
+    configuration: &LegConfiguration<2, BASE>,
+    parameters: &LegParameters<f32, 2>,
+) -> IdentifiedModel<2> {
     let values = configuration.model.base.project(parameters);
     let assured = Assured {
         coulomb_nm: [parameters[0][11], parameters[1][11]],
@@ -159,7 +172,11 @@ impl Bench {
         let limbs = limb();
         let joint_worn = core::array::from_fn(|joint| {
             let (mass, com, inertia) = joined(&[
-                (bodies[joint].mass, [bodies[joint].com[0], bodies[joint].com[1]], bodies[joint].inertia_com[5]),
+                (
+                    bodies[joint].mass,
+                    [bodies[joint].com[0], bodies[joint].com[1]],
+                    bodies[joint].inertia_com[5],
+                ),
                 limbs[joint],
             ]);
             body(mass, com, inertia)
@@ -227,12 +244,24 @@ fn measure(bench: &mut Bench, seconds: f64) -> Rms {
 
 #[test]
 fn try_it() {
-    let gait = |hz: f64| IntendedMotion::Gait(Gait { offset: [0.33, 0.5], scale: [f64::min(0.7, 0.45 / hz); 2], ..Gait::at_cadence(hz) });
+    let gait = |hz: f64| {
+        IntendedMotion::Gait(Gait {
+            offset: [0.33, 0.5],
+            scale: [f64::min(0.7, 0.45 / hz); 2],
+            ..Gait::at_cadence(hz)
+        })
+    };
     let motions = [
         ("gait 0.5", gait(0.5)),
         ("gait 0.8", gait(0.8)),
         ("gait 1.2", gait(1.2)),
-        ("kick", IntendedMotion::Strokes(Strokes { postures: [[0.5, 1.3], [0.5, 0.5]], durations: [0.5, 0.05, 0.6, 0.2] })),
+        (
+            "kick",
+            IntendedMotion::Strokes(Strokes {
+                postures: [[0.5, 1.3], [0.5, 0.5]],
+                durations: [0.5, 0.05, 0.6, 0.2],
+            }),
+        ),
     ];
     for (name, motion) in motions {
         for (label, shares) in [
@@ -254,8 +283,15 @@ fn try_it() {
             let rms = measure(&mut bench, 10.0);
             println!(
                 "{name} {label:9} interaction {:6.2} {:6.2}  muscle {:6.2} {:6.2}  error {:.4} {:.4}  energy {:.2} b {:.1} {:?}",
-                rms.interaction[0], rms.interaction[1], rms.muscle[0], rms.muscle[1], rms.error[0], rms.error[1],
-                rms.energy, rms.damping, bench.leg.control().state(),
+                rms.interaction[0],
+                rms.interaction[1],
+                rms.muscle[0],
+                rms.muscle[1],
+                rms.error[0],
+                rms.error[1],
+                rms.energy,
+                rms.damping,
+                bench.leg.control().state(),
             );
         }
     }
@@ -263,7 +299,13 @@ fn try_it() {
 
 #[test]
 fn energy_compared() {
-    let gait = |hz: f64| IntendedMotion::Gait(Gait { offset: [0.33, 0.5], scale: [f64::min(0.7, 0.45 / hz); 2], ..Gait::at_cadence(hz) });
+    let gait = |hz: f64| {
+        IntendedMotion::Gait(Gait {
+            offset: [0.33, 0.5],
+            scale: [f64::min(0.7, 0.45 / hz); 2],
+            ..Gait::at_cadence(hz)
+        })
+    };
     let mut bench = Bench::new(&person(true), [0.5, 0.6]);
     bench.enable();
     bench.tick(Some(ControlRequest::Assist(AssistShares::GRAVITY_ONLY)));
@@ -278,9 +320,14 @@ fn energy_compared() {
             let position = bench.world.truth().position;
             println!(
                 "{:.2} true {:.3} above low {:.3} observer {:.3} torque {:.1?} q {:.2?} {:?} limits {:?}",
-                f64::from(tick) / 4000.0, given, given - low,
+                f64::from(tick) / 4000.0,
+                given,
+                given - low,
                 bench.leg.law().energy().map_or(-1.0, |energy| energy.given_j()),
-                output.servo.decision.torque, position, bench.leg.control().activity(), output.servo.decision.limited,
+                output.servo.decision.torque,
+                position,
+                bench.leg.control().activity(),
+                output.servo.decision.limited,
             );
         }
     }
@@ -288,11 +335,15 @@ fn energy_compared() {
 
 #[test]
 fn weight() {
-    let extension = IntendedMotion::Strokes(Strokes { postures: [[0.6, 1.4], [0.6, 0.5]], durations: [1.5, 0.5, 2.0, 1.0] });
+    let extension = IntendedMotion::Strokes(Strokes {
+        postures: [[0.6, 1.4], [0.6, 0.5]],
+        durations: [1.5, 0.5, 2.0, 1.0],
+    });
     for share in [0.0, 0.5, 1.0] {
         let mut bench = Bench::new(&person(true), [0.5, 1.0]);
         bench.enable();
-        let shares = AssistShares { friction: 1.0, inertia: 0.5, weight: share, ..AssistShares::GRAVITY_ONLY };
+        let shares =
+            AssistShares { friction: 1.0, inertia: 0.5, weight: share, ..AssistShares::GRAVITY_ONLY };
         assert!(!bench.tick(Some(ControlRequest::Assist(shares))).refused);
         bench.world.intend(Intention::Follow(extension)).expect("valid");
         let _ = measure(&mut bench, 5.0);
@@ -302,22 +353,38 @@ fn weight() {
 
 #[test]
 fn periodic() {
-    let gait = |hz: f64| IntendedMotion::Gait(Gait { offset: [0.33, 0.5], scale: [f64::min(0.7, 0.45 / hz); 2], ..Gait::at_cadence(hz) });
+    let gait = |hz: f64| {
+        IntendedMotion::Gait(Gait {
+            offset: [0.33, 0.5],
+            scale: [f64::min(0.7, 0.45 / hz); 2],
+            ..Gait::at_cadence(hz)
+        })
+    };
     for hz in [0.5, 0.8, 1.2] {
         for share in [0.0, 0.3, -0.3] {
             let mut bench = Bench::new(&person(true), [0.5, 0.6]);
             bench.enable();
-            let shares = AssistShares { friction: 1.0, inertia: 0.8, periodic: share, ..AssistShares::GRAVITY_ONLY };
+            let shares =
+                AssistShares { friction: 1.0, inertia: 0.8, periodic: share, ..AssistShares::GRAVITY_ONLY };
             assert!(!bench.tick(Some(ControlRequest::Assist(shares))).refused);
             bench.world.intend(Intention::Follow(gait(hz))).expect("valid");
             for second in 0..6 {
                 let _ = measure(&mut bench, 1.0);
                 if let Some(periodic) = bench.leg.law().periodic() {
-                    print!("{second}: gate {:.2} f {:.3} share {:.2}; ", periodic.gate(), periodic.oscillator().hertz(), periodic.oscillator().predicted_share());
+                    print!(
+                        "{second}: gate {:.2} f {:.3} share {:.2}; ",
+                        periodic.gate(),
+                        periodic.oscillator().hertz(),
+                        periodic.oscillator().predicted_share()
+                    );
                 }
             }
             println!();
-            println!("gait {hz} periodic {share}: {:.2?} {:?}", measure(&mut bench, 10.0), bench.leg.control().activity());
+            println!(
+                "gait {hz} periodic {share}: {:.2?} {:?}",
+                measure(&mut bench, 10.0),
+                bench.leg.control().activity()
+            );
             if let Some(periodic) = bench.leg.law().periodic() {
                 println!("    {:?} gate {:.2}", periodic.oscillator().hertz(), periodic.gate());
             }
@@ -327,11 +394,20 @@ fn periodic() {
 
 #[test]
 fn limp() {
-    let gait = |hz: f64| IntendedMotion::Gait(Gait { offset: [0.33, 0.5], scale: [f64::min(0.7, 0.45 / hz); 2], ..Gait::at_cadence(hz) });
+    let gait = |hz: f64| {
+        IntendedMotion::Gait(Gait {
+            offset: [0.33, 0.5],
+            scale: [f64::min(0.7, 0.45 / hz); 2],
+            ..Gait::at_cadence(hz)
+        })
+    };
     for (label, shares) in [
         ("transparent", AssistShares { friction: 1.0, inertia: 0.8, ..AssistShares::GRAVITY_ONLY }),
         ("weight", AssistShares { friction: 1.0, inertia: 0.8, weight: 0.5, ..AssistShares::GRAVITY_ONLY }),
-        ("periodic", AssistShares { friction: 1.0, inertia: 0.8, periodic: 0.5, ..AssistShares::GRAVITY_ONLY }),
+        (
+            "periodic",
+            AssistShares { friction: 1.0, inertia: 0.8, periodic: 0.5, ..AssistShares::GRAVITY_ONLY },
+        ),
     ] {
         for after in [Intention::Limp, Intention::Resist] {
             let mut bench = Bench::new(&person(false), [0.5, 0.6]);
@@ -349,7 +425,13 @@ fn limp() {
                 let rms = measure(&mut bench, 1.25);
                 let now = received(&bench);
                 let velocity = bench.world.velocity();
-                print!("  given {:.2} J e {:.2} gate {:.2} v {:.2?}", now - last, rms.energy, bench.leg.law().periodic().map_or(0.0, |p| p.gate()), velocity);
+                print!(
+                    "  given {:.2} J e {:.2} gate {:.2} v {:.2?}",
+                    now - last,
+                    rms.energy,
+                    bench.leg.law().periodic().map_or(0.0, |p| p.gate()),
+                    velocity
+                );
                 last = now;
             }
             println!(" {:?}", bench.leg.control().activity());

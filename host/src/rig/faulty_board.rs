@@ -175,6 +175,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         // A disabled detector must have no effect: leg and levels continue from their previous state.
         let before = (!self.blind.is_empty()).then(|| (self.leg.clone(), self.board.clone()));
         let output = self.board.servo(self.leg.halves().0, self.gravity);
+        self.board.assist();
         if let Some((leg, board)) = before
             && self.is_blind(self.leg.control().state().fault().map(|fault| fault.code))
         {

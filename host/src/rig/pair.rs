@@ -8,7 +8,7 @@ use hal_sim::world::periods::PERIODS_PER_TICK;
 use hal_sim::world::{TICK_S, World};
 use scarab::hal::{LegDrives, Sample};
 use scarab::ident::{Kernel, LowPass, Record, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
-use scarab::leg::{Activity, ControlOutput, ControlRequest, IdentifyPhase, Leg, LegConfiguration};
+use scarab::leg::{Activity, AssistLaw, ControlOutput, ControlRequest, IdentifyPhase, Leg, LegConfiguration};
 use scarab::motion::Periodic;
 use scarab::safety::{DriveState, PowerRequest};
 
@@ -243,6 +243,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             }
             if core::mem::take(&mut board.registers.servo_due) {
                 self.output = board.servo(self.leg.halves().0, gravity).or(self.output);
+                board.assist();
                 board.identify(&mut self.leg, self.evaluations);
             }
             let mut commands = board.registers.commands;
@@ -276,6 +277,12 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             }
         }
         None
+    }
+
+    /// Law of the assistance.
+    #[must_use]
+    pub fn law(&self) -> &AssistLaw<N> {
+        self.board.as_ref().map_or(self.leg.law(), |board| board.law())
     }
 
     /// Reason why the drive is no longer enabled.

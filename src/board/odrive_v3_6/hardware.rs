@@ -75,6 +75,10 @@ impl Hardware<2> for Odrive {
         can::pend();
     }
 
+    fn pend_assist(&mut self) {
+        interrupts::pend_assist();
+    }
+
     fn contacts(&self) -> Contacts {
         Contacts { enabling: contacts::enabling(), start: contacts::start() }
     }

@@ -8,13 +8,14 @@
 //! | 3 | 3 | TIM5 | time of the executors |
 //! | 4 | 4 | CAN1_RX0 | frames out of the CAN controller |
 //! | 5 | 5 | CAN1_TX | the bus' nodes and axes, pended by CAN1_RX0 and by the servo |
+//! | 5 | 5 | OTG_FS | law of the assistance, pended by the servo |
 //! | 6 | 6 | I2C3_EV | executor of the housekeeping; and every vector that is not named |
 //!
 //! Critical sections mask priority 3 and below. Reset leaves every vector at priority 0, where it could
 //! interrupt a critical section of the same data. So all are moved before anything is enabled.
 
 use embassy_stm32::interrupt::{
-    ADC, CAN1_RX0, CAN1_TX, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS, Priority, TIM5,
+    ADC, CAN1_RX0, CAN1_TX, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_FS, OTG_HS, Priority, TIM5,
 };
 
 use super::registers::store;
@@ -36,7 +37,9 @@ pub(super) fn set_levels() {
     OTG_HS.set_priority(Priority::P2);
     TIM5.set_priority(Priority::P3);
     CAN1_RX0.set_priority(Priority::P4);
-    CAN1_TX.set_priority(Priority::P5);
+    for vector in [CAN1_TX, OTG_FS] {
+        vector.set_priority(Priority::P5);
+    }
     I2C3_EV.set_priority(Priority::P6);
 }
 
@@ -44,4 +47,9 @@ pub(super) fn set_levels() {
 #[inline(always)]
 pub fn pend_servo() {
     OTG_HS.pend();
+}
+
+/// Requests a run of the assistance.
+pub fn pend_assist() {
+    OTG_FS.pend();
 }

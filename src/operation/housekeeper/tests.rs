@@ -59,7 +59,7 @@ impl Bench {
 
     /// Runs one round and collects its output.
     fn round(&mut self) {
-        let Ends { mut current, mut servo, mut housekeeping, mut identification, mut calibrated } =
+        let Ends { mut current, mut servo, mut housekeeping, mut identification, mut calibrated, .. } =
             self.queues.split(&mut self.events);
         self.keeper.round(&mut housekeeping, &self.signals, &mut self.hardware);
         for (axis, orders) in current.orders.iter_mut().enumerate() {

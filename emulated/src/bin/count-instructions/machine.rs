@@ -137,6 +137,11 @@ impl Hardware<2> for Machine {
         REGISTERS.requests[1].set(1);
     }
 
+    #[inline(always)]
+    fn pend_assist(&mut self) {
+        REGISTERS.requests[1].set(2);
+    }
+
     fn contacts(&self) -> Contacts {
         let port = REGISTERS.ports[0].get();
         Contacts { enabling: port & 1 << 2 != 0, start: port & 1 << 3 != 0 }

@@ -22,6 +22,9 @@ impl Hardware<JOINTS> for Machine {
         vectors::pend_servo();
     }
     fn pend_bus(&mut self) {}
+
+    /// No session begins without an operator's or a host's request.
+    fn pend_assist(&mut self) {}
     fn contacts(&self) -> Contacts {
         Contacts::default()
     }

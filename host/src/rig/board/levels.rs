@@ -7,6 +7,7 @@
 //! every 48th period   housekeeping
 //! when requested      servo, then thread level; the servo is requested after the last axis' sixth tick
 //! every period        current tick of each axis
+//! when requested      assistance, after the servo
 //! every 12th period   watch
 //! when requested      bus (`tool::bus::board`)
 //! ```
@@ -25,11 +26,14 @@ use scarab::board::odrive_v3_6::settings::drives;
 use scarab::bus::device::Device;
 use scarab::bus::identification::Results;
 use scarab::hal::{AxisSample, CURRENT_RATE_HZ, Frame, JointSample};
-use scarab::leg::{AbsoluteAngle, AxisFault, Control, ControlOutput, ControlRequest, Following, JointZero};
+use scarab::leg::{
+    AbsoluteAngle, AssistLaw, AxisFault, Control, ControlOutput, ControlRequest, Following, JointZero,
+};
 use scarab::motor::{Chopper, SenseScale};
 use scarab::operation::{
-    AxisState, BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings,
-    IdentificationLevel, Queues, RATE_HZ, ServoLevel, Signals, Slice, StoreJob, Tick, Watch,
+    AssistLevel, AxisState, BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper,
+    HousekeepingSettings, IdentificationLevel, Queues, RATE_HZ, ServoLevel, Signals, Slice, StoreJob, Tick,
+    Watch,
 };
 use scarab::safety::{BrakeDelays, GUARD_RATE_HZ, SupplyLimits};
 
@@ -91,6 +95,7 @@ pub struct Levels<const N: usize> {
     servo: ServoLevel<N>,
     housekeeper: Housekeeper<N>,
     identification: IdentificationLevel,
+    assist: AssistLevel<N>,
     watch: Watch<N>,
     settings: HousekeepingSettings<N>,
     chopper: Chopper,
@@ -155,6 +160,7 @@ impl<const N: usize> Levels<N> {
             .with_holding_brake(holding_brake),
             housekeeper: Housekeeper::new(settings),
             identification: IdentificationLevel::new(leg.identification().swarm_seed()),
+            assist: AssistLevel::new(),
             settings,
             chopper,
             supply,
@@ -235,6 +241,20 @@ impl<const N: usize> Levels<N> {
         let output = self.servo.tick(control, gravity, &mut ends, &self.signals, &mut self.registers);
         self.signals.statistics.servo_ticks.add();
         output
+    }
+
+    /// Assistance, level 5, when it is due.
+    pub fn assist(&mut self) {
+        if core::mem::take(&mut self.registers.assist_due) {
+            let mut ends = self.queues.get().split(self.events.get()).assist;
+            self.assist.run(&mut ends);
+        }
+    }
+
+    /// Law of the assistance.
+    #[must_use]
+    pub fn law(&self) -> &AssistLaw<N> {
+        self.assist.law()
     }
 
     /// Thread level: processes the servo's samples, then a slice of the search.

@@ -77,6 +77,8 @@ pub struct Registers<const N: usize> {
     pub servo_due: bool,
     /// Whether a round of the bus was requested.
     pub bus_due: bool,
+    /// The assistance was requested.
+    pub assist_due: bool,
     /// The bus controller.
     pub can: CanController,
     /// Whether the watchdog was fed since this was cleared.
@@ -106,6 +108,7 @@ impl<const N: usize> Registers<N> {
             converted: None,
             servo_due: false,
             bus_due: false,
+            assist_due: false,
             can: CanController {
                 mailbox: Mailbox::default(),
                 state: Controller::Active,
@@ -186,6 +189,10 @@ impl<const N: usize> Hardware<N> for Registers<N> {
 
     fn pend_bus(&mut self) {
         self.bus_due = true;
+    }
+
+    fn pend_assist(&mut self) {
+        self.assist_due = true;
     }
 
     fn contacts(&self) -> Contacts {

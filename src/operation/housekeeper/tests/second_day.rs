@@ -76,7 +76,7 @@ impl Machine {
     }
 
     fn period(&mut self) {
-        let Ends { mut current, mut servo, mut housekeeping, mut identification, mut calibrated } =
+        let Ends { mut current, mut servo, mut housekeeping, mut identification, mut calibrated, .. } =
             self.queues.split(&mut self.events);
         if self.period.is_multiple_of(CURRENT_RATE_HZ / RATE_HZ) {
             self.keeper.round(&mut housekeeping, &self.signals, &mut self.hardware);
