@@ -26,15 +26,15 @@
 use super::communication::Identity;
 use super::drive::{Axis, AxisConstants, Coupling};
 use super::emergency::ErrorReport;
-use super::identification::{IdentificationRequest, JointObjects, LegObjects, Results};
+use super::identification::{JointObjects, LegCommand, LegObjects, Results};
 use super::nmt::Reset;
 use super::node::{FrameEffect, Node, Storing};
 use super::node_id::NodeId;
 use super::stored_parameters::StoredNode;
 use crate::hal::{Controller, Frame};
 use crate::leg::{
-    Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, NoticeCode, Permission, Plan,
-    PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
+    Activity, AssistShares, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, NoticeCode,
+    Permission, Plan, PowerRequest, RETURN_SPEED, Refusal, RefusalReason, Wearing,
 };
 
 mod storage;
@@ -98,7 +98,7 @@ impl<const N: usize> LegStatus<N> {
 }
 
 /// Request to the leg, besides the joints' targets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LegRequest {
     /// Step of the drive's power states.
     Power(PowerRequest),
@@ -108,11 +108,17 @@ pub enum LegRequest {
         plan: Plan,
         /// Seed of the swarm's random numbers.
         seed: u64,
+        /// Whether the leg is empty or worn, if a host said so.
+        wearing: Option<Wearing>,
     },
     /// Cancel the identification.
     Cancel,
     /// Use the offered model update.
     TakeUpdate,
+    /// Begin assistance.
+    Assist(AssistShares),
+    /// Fade the assistance out.
+    EndAssist,
 }
 
 /// Orders for the leg's next tick.
@@ -308,9 +314,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         // on the way up is discarded: nothing requested before the leg is enabled starts afterwards.
         let requested = match power {
             None => self.leg.take_request(),
-            Some(power) if power.enables() && self.leg.has_requested(IdentificationRequest::Identify) => {
-                self.leg.take_request()
-            }
+            Some(power) if power.enables() && self.leg.requests_motion() => self.leg.take_request(),
             Some(_) => None,
         };
         self.request = match (power, requested) {
@@ -320,16 +324,19 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             }
             (Some(power), _) => Some(LegRequest::Power(power)),
             // While the operator controls the leg, a host must not start a motion.
-            (None, Some(IdentificationRequest::Identify | IdentificationRequest::TakeUpdate))
+            (None, Some(LegCommand::Identify | LegCommand::TakeUpdate | LegCommand::Assist))
                 if !self.hosted =>
             {
                 None
             }
-            (None, Some(IdentificationRequest::Identify)) => {
-                Some(LegRequest::Identify { plan: self.leg.plan, seed: self.leg.seed })
+            (None, Some(LegCommand::Identify)) => {
+                let (plan, seed, wearing) = (self.leg.plan, self.leg.seed, self.leg.wearing);
+                Some(LegRequest::Identify { plan, seed, wearing })
             }
-            (None, Some(IdentificationRequest::Cancel)) => Some(LegRequest::Cancel),
-            (None, Some(IdentificationRequest::TakeUpdate)) => Some(LegRequest::TakeUpdate),
+            (None, Some(LegCommand::Assist)) => Some(LegRequest::Assist(self.leg.shares)),
+            (None, Some(LegCommand::EndAssist)) => Some(LegRequest::EndAssist),
+            (None, Some(LegCommand::Cancel)) => Some(LegRequest::Cancel),
+            (None, Some(LegCommand::TakeUpdate)) => Some(LegRequest::TakeUpdate),
             (None, None) => None,
         };
         self.explain(status, rises || self.refused);

@@ -39,6 +39,7 @@ pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x2132, 1, "Fit: root mean square torque", true),
     (0x2133, 1, "Fit: rows", true),
     (0x2140, 1, "Log", false),
+    (0x2150, 1, "Assistance", false),
     (0x607D, 1, "Software position limit", true),
     (0x608F, 1, "Position encoder resolution", false),
     (0x6091, 1, "Gear ratio", false),
@@ -145,7 +146,7 @@ rows! {
     0x2011, 0, U8, Both, No, 0, "Model in the feedforward";
     0x2012, 0, U8, Both, No, 1, "Return into the range";
     0x2013, 0, U8, Both, No, 1, "Silent host is missed";
-    0x2100, 0, U8, Const, No, 12, "Number of entries";
+    0x2100, 0, U8, Const, No, 13, "Number of entries";
     0x2100, 1, U8, Both, No, 0, "Command";
     0x2100, 2, U8, Read, Transmit, 0, "State";
     0x2100, 3, U8, Read, Transmit, 0, "Motion of the validation";
@@ -158,6 +159,7 @@ rows! {
     0x2100, 10, U32, Read, No, 0, "Iterations";
     0x2100, 11, U32, Read, No, 0, "Evaluations";
     0x2100, 12, U8, Read, Transmit, 0, "Change";
+    0x2100, 13, U8, Both, No, 0, "Leg: empty or worn";
     0x2110 x 3, 0, U8, Const, No, 14, "Number of entries";
     0x2110 x 2, 1 x 14, F32, Read, No, 0, "Parameter";
     0x2112, 1 x 14, U8, Read, No, 0, "Parameter";
@@ -175,6 +177,11 @@ rows! {
     0x2140, 2, Domain, Read, No, 0, "Samples";
     0x2140, 3, U32, Read, No, 0, "Samples waiting";
     0x2140, 4, U32, Read, No, 0, "Samples lost";
+    0x2150, 0, U8, Const, No, 4, "Number of entries";
+    0x2150, 1, U16, Both, No, 0, "Share of friction";
+    0x2150, 2, U16, Both, No, 0, "Share of inertia";
+    0x2150, 3, U16, Both, No, 0, "Share of the wearer's weight";
+    0x2150, 4, I16, Both, No, 0, "Share of the periodic torque";
     0x2194, 0, U32, Both, Any, 0, "Digital outputs, raw";
     0x219A, 0, U32, Read, Transmit, 0, "Digital inputs, raw";
     0x6007, 0, I16, Both, No, 3, "Abort connection option code";

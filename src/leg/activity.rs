@@ -28,6 +28,13 @@ impl Activity {
         matches!(self, Self::Follow)
     }
 
+    /// Whether the leg identifies itself.
+    #[must_use]
+    #[inline]
+    pub const fn is_identifying(self) -> bool {
+        matches!(self, Self::Identify(_))
+    }
+
     /// Whether the leg gives torque from the identified model and holds no position.
     #[must_use]
     #[inline]

@@ -10,7 +10,7 @@ use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::{Hardware, Sample};
 use crate::leg::{
     Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand, JointStatus,
-    Permission, Plan, PowerRequest, Refusal,
+    Permission, Plan, PowerRequest, Refusal, Wearing,
 };
 use crate::units::{NewtonMetre, Volt};
 
@@ -19,8 +19,19 @@ const TICKS: u32 = 2;
 /// Time constant of the reported torque, ticks: 2 ms.
 const LAG_TICKS: f32 = 8.0;
 
-/// A request and, where it begins an identification, its plan and seed.
-pub type HostRequest = (ControlRequest, Option<(Plan, u64)>);
+/// Settings of a host for an identification.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Prepared {
+    /// One-time or sequential.
+    pub plan: Plan,
+    /// Seed of the search.
+    pub seed: u64,
+    /// Whether the leg is empty or worn, if the host said so.
+    pub wearing: Option<Wearing>,
+}
+
+/// A request and, where it begins an identification, its settings.
+pub type HostRequest = (ControlRequest, Option<Prepared>);
 
 /// State of the servo's side of the bus.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,8 +155,12 @@ impl<const N: usize> HostSide<N> {
         }
         Some(match self.request.take()? {
             LegRequest::Power(power) => (ControlRequest::Power(power), None),
-            LegRequest::Identify { plan, seed } => (ControlRequest::Identify, Some((plan, seed))),
+            LegRequest::Identify { plan, seed, wearing } => {
+                (ControlRequest::Identify, Some(Prepared { plan, seed, wearing }))
+            }
             LegRequest::TakeUpdate => (ControlRequest::TakeUpdate, None),
+            LegRequest::Assist(shares) => (ControlRequest::Assist(shares), None),
+            LegRequest::EndAssist => (ControlRequest::EndAssist, None),
             LegRequest::Cancel => return None,
         })
     }

@@ -9,7 +9,7 @@ use super::queues::{EVENTS, IdentificationEnds, LegEvent};
 use super::signals::Signals;
 use crate::leg::{
     Activity, Finding, Identification, IdentifiedModel, IdentifyPhase, LoggedSample, MotionWindow, Reason,
-    Segment, Verdict,
+    Segment, Verdict, Wearing,
 };
 use crate::servo::TICKS_PER_LOG;
 use crate::trace::{Record, judged, words};
@@ -24,6 +24,8 @@ pub struct IdentificationLevel {
     gap: bool,
     /// Seed of the current search.
     seed: u64,
+    /// Whether the leg of the current identification is empty or worn, if known.
+    wearing: Option<Wearing>,
     /// Verdict that control has not taken yet.
     verdict: Option<Verdict>,
     /// Control has taken the result.
@@ -52,6 +54,7 @@ impl IdentificationLevel {
             last: None,
             gap: false,
             seed,
+            wearing: None,
             verdict: None,
             taken: false,
             publish: None,
@@ -81,7 +84,8 @@ impl IdentificationLevel {
                     sample(&logged);
                     self.take(&logged, identification);
                 }
-                LegEvent::Begun(prepared) => {
+                LegEvent::Begun(prepared, wearing) => {
+                    self.wearing = wearing;
                     identification.cancel();
                     if let Some((plan, seed)) = prepared {
                         identification.prepare(plan, seed);
@@ -213,6 +217,12 @@ impl IdentificationLevel {
     #[must_use]
     pub fn tick(&self) -> u32 {
         self.last.map_or(0, |(tick, _)| tick)
+    }
+
+    /// Whether the leg of the current identification is empty or worn, if known.
+    #[must_use]
+    pub const fn wearing(&self) -> Option<Wearing> {
+        self.wearing
     }
 
     /// Seed of the current search.

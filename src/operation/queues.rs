@@ -27,7 +27,7 @@ use crate::bus::device::{LegOrder, LegStatus};
 use crate::hal::{Frame, JointSample};
 use crate::leg::{
     Activity, AssistSession, AssistTorque, ControlRequest, DriveState, Finding, LogSample, LoggedSample,
-    Plan, StoredCalibration,
+    Plan, StoredCalibration, Wearing,
 };
 use crate::trace::Record;
 
@@ -41,8 +41,8 @@ pub enum LegEvent<const N: usize> {
     Sample(LoggedSample<N>),
     /// The leg's activity has changed.
     Activity(Activity),
-    /// An identification begins; with plan and seed if a host gave them.
-    Begun(Option<(Plan, u64)>),
+    /// An identification begins; with plan and seed if a host gave them, and what is known about the leg.
+    Begun(Option<(Plan, u64)>, Option<Wearing>),
     /// The offered update is now in use.
     TookUpdate,
     /// The result of the identification was taken; an accepted model is now in use.

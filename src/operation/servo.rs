@@ -13,14 +13,14 @@
 
 use core::array;
 
-use super::host_side::HostSide;
+use super::host_side::{HostSide, Prepared};
 use super::queues::{LegEvent, RESERVED, ServoEnds};
 use super::signals::Signals;
 use crate::checksum::Checksum;
 use crate::hal::{Hardware, JointSample, Sample};
 use crate::leg::{
-    Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Plan,
-    Refusal, permitted,
+    Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Refusal,
+    permitted,
 };
 use crate::safety::{
     BrakeDelays, DeratingRamps, Fault, FaultCode, HoldingBrake, InhibitReason, JointShares, SupplyCurrent,
@@ -54,7 +54,7 @@ pub struct ServoLevel<const N: usize> {
     /// Side of the bus, where there is one.
     host: Option<HostSide<N>>,
     /// Plan and seed of a host's identification.
-    prepared: Option<(Plan, u64)>,
+    prepared: Option<Prepared>,
     /// Last refusal in this drive state.
     refused: Option<Refusal>,
 }
@@ -213,6 +213,11 @@ impl<const N: usize> ServoLevel<N> {
         let (request, prepared) = host.request(by_hand).unzip();
         if let Some(prepared) = prepared {
             self.prepared = prepared;
+            if let Some(Prepared { wearing, .. }) = prepared
+                && !control.activity().is_identifying()
+            {
+                control.set_wearing(wearing);
+            }
         }
         host.held(request, control.state(), signals, hardware)
     }
@@ -303,7 +308,8 @@ impl<const N: usize> ServoLevel<N> {
             record(Record::Request { tick, name, accepted });
         }
         if accepted && matches!(permitted, Some(ControlRequest::Identify)) {
-            send(LegEvent::Begun(self.prepared), ends, signals);
+            let prepared = self.prepared.map(|prepared| (prepared.plan, prepared.seed));
+            send(LegEvent::Begun(prepared, control.wearing()), ends, signals);
         }
         let mut record = |record| send(LegEvent::Record(record), ends, signals);
         let decision = &output.servo.decision;

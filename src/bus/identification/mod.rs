@@ -1,4 +1,4 @@
-//! Objects from 2100 on: the identification of a leg, available at each of its nodes.
+//! Objects from 2100 on: identification and assistance of a leg, available at each of its nodes.
 //!
 //! ```text
 //! 2100   command, state, plan, seed, verdict                      of the leg, equal at each node
@@ -6,6 +6,7 @@
 //! 2120   base parameters                                          of the leg: value, sigma, carrier, flags
 //! 2130   fit of the joint's torque, per motion
 //! 2140   500 Hz log ([`Log`])
+//! 2150   shares of the assistance, per mille
 //! ```
 //!
 //! A command is passed to the leg at its next tick, like those of the operator's contacts. Numbers are those
@@ -23,17 +24,24 @@ use super::abort::Abort;
 use super::dictionary::Object;
 use super::drive::Axis;
 use super::objects::{Lost, Objects};
-use crate::leg::{Activity, AssistPhase, IdentifyPhase, Parameter, Permission, Plan, Reason, Status, Step};
+use crate::leg::{
+    Activity, AssistPhase, AssistShares, IdentifyPhase, Parameter, Permission, Plan, Reason, Status, Step,
+    Wearing,
+};
 
 /// Request of a host to the leg, besides power and targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum IdentificationRequest {
+pub enum LegCommand {
     /// Start an identification: excite, solve, validate.
     Identify,
     /// Cancel the identification.
     Cancel,
     /// Use the offered model update.
     TakeUpdate,
+    /// Begin assistance with the shares of 2150.
+    Assist,
+    /// Fade the assistance out.
+    EndAssist,
 }
 
 /// Objects of the leg, shared by its nodes.
@@ -51,9 +59,13 @@ pub struct LegObjects<const N: usize, const L: usize> {
     pub seed: u64,
     /// Number of models accepted on this board.
     pub generation: u32,
+    /// Whether the leg of the next identification is empty or worn, if a host said so.
+    pub wearing: Option<Wearing>,
+    /// Shares of the next assistance.
+    pub shares: AssistShares,
     /// Last command written.
     command: u8,
-    requested: Option<IdentificationRequest>,
+    requested: Option<LegCommand>,
     /// Pending store request; `true` restores the defaults.
     store: Option<bool>,
 }
@@ -69,20 +81,22 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
             plan,
             seed,
             generation,
+            wearing: None,
+            shares: AssistShares::GRAVITY_ONLY,
             command: 0,
             requested: None,
             store: None,
         }
     }
 
-    /// Whether this request is pending.
+    /// Whether a request is pending that begins a motion.
     #[must_use]
-    pub fn has_requested(&self, request: IdentificationRequest) -> bool {
-        self.requested == Some(request)
+    pub fn requests_motion(&self) -> bool {
+        matches!(self.requested, Some(LegCommand::Identify | LegCommand::Assist))
     }
 
     /// Takes the pending request.
-    pub fn take_request(&mut self) -> Option<IdentificationRequest> {
+    pub fn take_request(&mut self) -> Option<LegCommand> {
         self.requested.take()
     }
 
@@ -113,6 +127,11 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
                 [_, true] => 2,
                 [changed, _] => u32::from(changed),
             },
+            13 => match self.wearing {
+                None => 0,
+                Some(Wearing::Empty) => 1,
+                Some(Wearing::Worn) => 2,
+            },
             _ => return Err(Abort::NoSubindex),
         })
     }
@@ -120,26 +139,66 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
     fn write(&mut self, sub: u8, value: u32) -> Result<(), Abort> {
         let is_identifying = matches!(self.activity, Activity::Identify(_));
         match (sub, value) {
-            (1, 0..=3) => {
+            (1, 0..=5) => {
                 self.requested = match value {
-                    1 => Some(IdentificationRequest::Identify),
-                    2 => Some(IdentificationRequest::Cancel),
-                    3 => Some(IdentificationRequest::TakeUpdate),
+                    1 => Some(LegCommand::Identify),
+                    2 => Some(LegCommand::Cancel),
+                    3 => Some(LegCommand::TakeUpdate),
+                    4 => Some(LegCommand::Assist),
+                    5 => Some(LegCommand::EndAssist),
                     _ => None,
                 };
                 self.command = value as u8;
             }
-            // Plan and seed are locked during an identification.
-            (4..=6, _) if is_identifying => return Err(Abort::State),
+            // Plan, seed and leg are locked during an identification.
+            (4..=6 | 13, _) if is_identifying => return Err(Abort::State),
             (4, 0) => self.plan = Plan::OneTime,
             (4, 1) => self.plan = Plan::Sequential,
             (5, _) => self.seed = self.seed & !0xFFFF_FFFF | u64::from(value),
             (6, _) => self.seed = self.seed & 0xFFFF_FFFF | u64::from(value) << 32,
+            (13, 0) => self.wearing = None,
+            (13, 1) => self.wearing = Some(Wearing::Empty),
+            (13, 2) => self.wearing = Some(Wearing::Worn),
             _ => return Err(Abort::Range),
         }
         Ok(())
     }
+
+    /// Share of 2150, and its place.
+    fn share(&mut self, sub: u8) -> Result<&mut f32, Abort> {
+        Ok(match sub {
+            1 => &mut self.shares.friction,
+            2 => &mut self.shares.inertia,
+            3 => &mut self.shares.weight,
+            4 => &mut self.shares.periodic,
+            _ => return Err(Abort::NoSubindex),
+        })
+    }
+
+    /// Reads a share, per mille.
+    fn read_share(&self, sub: u8) -> Result<u32, Abort> {
+        let AssistShares { friction, inertia, weight, periodic } = self.shares;
+        let share = *[friction, inertia, weight, periodic]
+            .get(usize::from(sub).wrapping_sub(1))
+            .ok_or(Abort::NoSubindex)?;
+        let rounded = if share < 0.0 { share * PER_MILLE - 0.5 } else { share * PER_MILLE + 0.5 };
+        Ok((rounded as i32).cast_unsigned())
+    }
+
+    /// Writes a share, per mille; one outside its range is refused.
+    fn write_share(&mut self, sub: u8, value: u32) -> Result<(), Abort> {
+        let before = self.shares;
+        *self.share(sub)? = f32::from(value as i16) / PER_MILLE;
+        if !self.shares.are_permitted() {
+            self.shares = before;
+            return Err(Abort::Range);
+        }
+        Ok(())
+    }
 }
+
+/// Unit of the shares on the bus.
+const PER_MILLE: f32 = 1000.0;
 
 /// State number of 2100:2, and the validation motion, counted from 1.
 const fn state(activity: Activity) -> (u8, u8) {
@@ -224,6 +283,7 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
             (0x2140, 1) => Ok(self.leg.log.held()),
             (0x2140, 3) => Ok(self.leg.log.waiting()),
             (0x2140, 4) => Ok(self.leg.log.lost()),
+            (0x2150, sub) => self.leg.read_share(sub),
             (0x2101..=0x2193, _) => self.found(object),
             _ => self.axis.read(object),
         }
@@ -236,6 +296,7 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
                 self.leg.log.hold(value != 0);
                 Ok(())
             }
+            (0x2150, sub) => self.leg.write_share(sub, value),
             _ => self.axis.write(object, value),
         }
     }

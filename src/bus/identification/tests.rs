@@ -140,14 +140,11 @@ fn a_command_is_passed_once_and_settings_are_locked_meanwhile() {
     );
     assert_eq!((leg.plan, leg.seed), (Plan::Sequential, 7));
     assert_eq!(write(&mut leg, 1, 1), Ok(()));
-    assert_eq!((leg.take_request(), leg.take_request()), (Some(IdentificationRequest::Identify), None));
+    assert_eq!((leg.take_request(), leg.take_request()), (Some(LegCommand::Identify), None));
     leg.activity = Activity::Identify(IdentifyPhase::Excite);
     assert_eq!((write(&mut leg, 4, 0), write(&mut leg, 5, 1)), (Err(Abort::State), Err(Abort::State)));
     assert_eq!(write(&mut leg, 1, 2), Ok(()));
-    assert_eq!(
-        (leg.take_request(), write(&mut leg, 1, 9)),
-        (Some(IdentificationRequest::Cancel), Err(Abort::Range))
-    );
+    assert_eq!((leg.take_request(), write(&mut leg, 1, 9)), (Some(LegCommand::Cancel), Err(Abort::Range)));
 }
 
 #[test]

@@ -117,7 +117,9 @@ fn unreported(_: Fault) {
 
 #[test]
 fn a_request_waits_behind_the_operators_and_none_is_lost() {
-    let identify = LegRequest::Identify { plan: Plan::Sequential, seed: 7 };
+    let prepared = Prepared { plan: Plan::Sequential, seed: 7, wearing: Some(Wearing::Worn) };
+    let Prepared { plan, seed, wearing } = prepared;
+    let identify = LegRequest::Identify { plan, seed, wearing };
     let mut bench =
         Bench::new(&[order(Some(ENABLE)), order(Some(identify)), order(Some(LegRequest::TakeUpdate))]);
     let stop = ControlRequest::Power(PowerRequest::QuickStop);
@@ -129,7 +131,7 @@ fn a_request_waits_behind_the_operators_and_none_is_lost() {
     }
     let expected = [
         (ControlRequest::Power(UP), None),
-        (ControlRequest::Identify, Some((Plan::Sequential, 7))),
+        (ControlRequest::Identify, Some(prepared)),
         (ControlRequest::TakeUpdate, None),
     ];
     for expected in expected {

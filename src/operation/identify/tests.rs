@@ -79,7 +79,7 @@ fn training(ticks: &[u32]) -> impl Iterator<Item = LegEvent<2>> {
 fn a_missing_sample_ends_the_identification_with_refused_input() {
     for waits in [IdentifyPhase::Settle, IdentifyPhase::Solve, IdentifyPhase::Judge] {
         let mut bench = Bench::new();
-        bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        bench.receive([LegEvent::Begun(None, None), phase(IdentifyPhase::Excite)]);
         bench.level.published();
         // The sample at 24 was lost.
         bench.signals.statistics.samples_lost.add();
@@ -104,7 +104,7 @@ fn a_missing_sample_ends_the_identification_with_refused_input() {
 #[test]
 fn samples_of_several_motions_one_after_the_other_have_no_gap() {
     let mut bench = Bench::new();
-    bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+    bench.receive([LegEvent::Begun(None, None), phase(IdentifyPhase::Excite)]);
     // The tick wraps.
     bench.receive(training(&[u32::MAX - 11, u32::MAX - 3, 4, 12]));
     let (first, second) = (Some(Segment::Validation(0)), Some(Segment::Validation(1)));
@@ -119,10 +119,10 @@ fn samples_of_several_motions_one_after_the_other_have_no_gap() {
 #[test]
 fn a_new_identification_starts_without_the_previous_gap() {
     let mut bench = Bench::new();
-    bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+    bench.receive([LegEvent::Begun(None, None), phase(IdentifyPhase::Excite)]);
     bench.receive(training(&[8, 24]));
     assert!(bench.level.gap);
-    bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Settle)]);
+    bench.receive([LegEvent::Begun(None, None), phase(IdentifyPhase::Settle)]);
     bench.work();
     assert_eq!((bench.level.gap, bench.finding(), bench.lost()), (false, None, 0));
 }
@@ -132,13 +132,13 @@ fn a_hosts_identification_begins_with_its_plan_and_seed() {
     let mut bench = Bench::new();
     let seed = bench.identification.swarm_seed();
     assert_eq!(bench.level.seed(), seed);
-    bench.receive([LegEvent::Begun(None)]);
+    bench.receive([LegEvent::Begun(None, None)]);
     assert_eq!((bench.level.seed(), bench.identification.swarm_seed()), (seed, seed));
     for plan in [Plan::OneTime, Plan::Sequential] {
         let mut expected = bench.identification.clone();
         expected.prepare(plan, seed + 7);
         bench.level.published();
-        bench.receive([LegEvent::Begun(Some((plan, seed + 7)))]);
+        bench.receive([LegEvent::Begun(Some((plan, seed + 7)), None)]);
         assert!(*bench.identification == *expected, "{plan:?}");
         assert_eq!((bench.level.seed(), bench.identification.swarm_seed()), (seed + 7, seed + 7));
         // The new identification has no results yet.
@@ -150,7 +150,7 @@ fn a_hosts_identification_begins_with_its_plan_and_seed() {
 fn a_leg_that_stops_identifying_cancels_the_search() {
     let is_searching = |activity: LegEvent<2>| {
         let mut bench = Bench::new();
-        bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        bench.receive([LegEvent::Begun(None, None), phase(IdentifyPhase::Excite)]);
         let ticks: Vec<u32> = (1..=80).map(|sample| 8 * sample).collect();
         bench.receive(training(&ticks));
         bench.receive([logged(648, None), activity]);
@@ -177,7 +177,7 @@ fn a_result_counts_only_after_control_has_taken_it() {
     let judged = || {
         let mut bench = Bench::new();
         assert_eq!(Results::verdict(&*bench.identification), None);
-        bench.receive([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        bench.receive([LegEvent::Begun(None, None), phase(IdentifyPhase::Excite)]);
         bench.level.published();
         bench.receive(training(&ticks));
         bench.receive([logged(648, None), phase(IdentifyPhase::Solve)]);

@@ -145,7 +145,7 @@ impl Bench {
             Some(match event {
                 LegEvent::Sample(_) => return None,
                 LegEvent::Activity(_) => "activity",
-                LegEvent::Begun(_) => "begun",
+                LegEvent::Begun(..) => "begun",
                 LegEvent::TookUpdate => "took update",
                 LegEvent::TookResult => "took result",
                 LegEvent::Record(Record::Fault { .. }) => "fault",

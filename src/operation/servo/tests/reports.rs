@@ -3,6 +3,7 @@
 use super::super::super::queues::RESERVED;
 use super::*;
 use crate::leg::LimitCode;
+use crate::leg::Plan;
 use crate::safety::Winding;
 use crate::safety::winding::tests::RATING;
 
@@ -140,11 +141,11 @@ fn an_identification_begins_with_the_requested_plan_and_seed() {
     bench.ask(ControlRequest::Identify);
     bench.tick();
     assert_eq!(bench.names(), ["request", "begun", "state", "activity"]);
-    assert!(bench.events.contains(&LegEvent::Begun(None)));
+    assert!(bench.events.contains(&LegEvent::Begun(None, None)));
     let mut bench = Bench::enabled();
-    bench.order(None, Some(LegRequest::Identify { plan: Plan::Sequential, seed: 7 }));
+    bench.order(None, Some(LegRequest::Identify { plan: Plan::Sequential, seed: 7, wearing: None }));
     bench.tick();
-    assert!(bench.events.contains(&LegEvent::Begun(Some((Plan::Sequential, 7)))));
+    assert!(bench.events.contains(&LegEvent::Begun(Some((Plan::Sequential, 7)), None)));
 }
 
 #[test]
