@@ -8,7 +8,7 @@ use crate::counter::Tally;
 pub const PROCESSOR_HZ: f32 = 168e6;
 /// Assumed cycles per instruction with the flash accelerator; to be confirmed on the board.
 pub const CYCLES_PER_INSTRUCTION: f32 = 1.34;
-const MOST_LINES: usize = 6;
+const MOST_LINES: usize = 8;
 
 #[derive(Clone, Copy)]
 struct Line {

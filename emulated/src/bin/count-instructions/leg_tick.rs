@@ -45,7 +45,7 @@ fn follow(motion: &MotionState<JOINTS>, currents: [Ampere; JOINTS]) -> Sample<JO
 
 /// One function, with a host or without, as in the image.
 #[inline(never)]
-fn tick(
+pub fn tick(
     control: &mut Control<JOINTS>,
     sample: &Sample<JOINTS>,
     request: Option<ControlRequest>,

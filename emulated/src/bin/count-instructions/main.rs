@@ -11,6 +11,7 @@
 #![no_main]
 
 mod account;
+mod assist;
 mod axis_parts;
 mod axis_tick;
 mod bus;
@@ -37,6 +38,7 @@ fn main() -> ! {
         let axis = copies::report() & axis_tick::report() & interrupt::report(&mut account);
         let search = leg::model().and_then(|model| {
             leg_tick::report(&model, &mut account)?;
+            assist::report(&model, &mut account)?;
             identification::report(&model, &mut account)
         });
         let swarm = swarm::report().and_then(|()| own_objective::report()).and_then(|()| bus::report());
