@@ -26,6 +26,7 @@ pub const LEG: LegDescription<2> = LegDescription {
         ),
     },
     holding_brake: None,
+    assist: None,
     joints: [
         JointDescription {
             geometry: DenavitHartenberg {

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::activity::VALIDATION_MOTIONS;
 use super::configuration::LegConfiguration;
+use crate::assist::AssistShares;
 use crate::ident::{Choice, DriveChoice, Estimator, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds};
 use crate::model::{
     AnatomicalJoint, BaseParameters, Chain, ColumnMask, DenavitHartenberg, PARAMETERS_PER_JOINT, Parameter,
@@ -120,6 +121,9 @@ pub struct LegDescription<const N: usize> {
     pub supply: SupplyLimits,
     /// Delays of the holding brake, if there is one.
     pub holding_brake: Option<BrakeDelays>,
+    /// Shares of the assistance that the start button of the enabled leg begins and ends; `None` lets it
+    /// identify.
+    pub assist: Option<AssistShares>,
     /// Joints, proximal first.
     pub joints: [JointDescription; N],
     /// Prior knowledge of links and drives, if any.

@@ -9,7 +9,7 @@
 //! held + start, not calibrated                 calibrate both axes, one after the other
 //! open + start, calibrated, no reference       the joints stand at their zero: take the reference
 //! held, calibrated and referenced              shutdown, switch on, enable; once for each closing
-//! held + start, enabled                        identify
+//! held + start, enabled                        identify; or begin and end assistance, as configured
 //! let go                                       quick stop of an enabled drive, else voltage off; ends a
 //!                                             calibration
 //! open + start for two seconds                 reset of a fault
@@ -57,8 +57,8 @@ pub enum OperatorRequest {
     EndCalibration,
     /// Take the reference: the joints stand at their zero.
     Reference,
-    /// Identify the leg's parameters.
-    Identify,
+    /// Begin what the leg is configured for: an identification or assistance.
+    Begin,
     /// Clear faults and inhibit reasons.
     Reset,
 }
@@ -78,7 +78,7 @@ impl OperatorRequest {
             Self::Calibrate => "calibrate",
             Self::EndCalibration => "end_calibration",
             Self::Reference => "reference",
-            Self::Identify => "identify",
+            Self::Begin => "begin",
             Self::Reset => "reset",
         }
     }
@@ -145,7 +145,7 @@ impl Operator {
         (self.ready, self.pressed) = (false, 0);
         let pressed = self.start.closed && !before.1;
         match now.drive {
-            Some(DriveState::OperationEnabled) => return pressed.then_some(OperatorRequest::Identify),
+            Some(DriveState::OperationEnabled) => return pressed.then_some(OperatorRequest::Begin),
             _ if pressed && !now.calibrated && !now.calibrating && !now.blocked => {
                 return Some(OperatorRequest::Calibrate);
             }
@@ -347,7 +347,7 @@ mod tests {
             |now: Situation| requested(&mut holding(), Situation { start: true, ..now }, RATE_HZ).next();
         assert_eq!(with(Situation { enabling: true, ..REST }), Some(OperatorRequest::Calibrate));
         let enabled = Situation { enabling: true, drive: Some(DriveState::OperationEnabled), ..READY };
-        assert_eq!(with(enabled), Some(OperatorRequest::Identify));
+        assert_eq!(with(enabled), Some(OperatorRequest::Begin));
 
         let mut operator = trusted();
         let stands = Situation { calibrated: true, ..REST };

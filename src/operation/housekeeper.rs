@@ -31,8 +31,8 @@ use super::queues::HousekeepingEnds;
 use super::signals::{I2T_UNIT, Signals};
 use crate::hal::{AxisSample, Contacts, Hardware};
 use crate::leg::{
-    AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Mismatch, MotorFindings,
-    PowerRequest, StoredCalibration,
+    AssistShares, AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Mismatch,
+    MotorFindings, PowerRequest, StoredCalibration,
 };
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, EncoderSetting, JointZero};
 use crate::real::max;
@@ -66,6 +66,8 @@ pub struct HousekeepingSettings<const N: usize> {
     pub thermistors: [Option<Thermistor>; N],
     /// Encoders of each axis.
     pub encoders: [EncoderSettings; N],
+    /// Shares of the assistance that the start button begins; `None` lets it begin an identification.
+    pub assist: Option<AssistShares>,
 }
 
 /// Access of a round to queues, signals and hardware.
@@ -526,8 +528,11 @@ impl<const N: usize> Housekeeper<N> {
         let accepted = match request {
             OperatorRequest::Power(request) => level.request(ControlRequest::Power(request)),
             // The servo records the result.
-            OperatorRequest::Identify => {
-                level.request(ControlRequest::Identify);
+            OperatorRequest::Begin => {
+                level.request(match self.settings.assist {
+                    Some(shares) => ControlRequest::Assist(shares),
+                    None => ControlRequest::Identify,
+                });
                 return;
             }
             OperatorRequest::Calibrate => {

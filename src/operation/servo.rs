@@ -204,7 +204,13 @@ impl<const N: usize> ServoLevel<N> {
         signals: &Signals<N>,
         hardware: &H,
     ) -> Option<ControlRequest> {
-        let by_hand = ends.requests.dequeue();
+        // The button that began a session ends it.
+        let by_hand = match ends.requests.dequeue() {
+            Some(ControlRequest::Assist(_)) if control.activity().assists() => {
+                Some(ControlRequest::EndAssist)
+            }
+            request => request,
+        };
         let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) else {
             return by_hand;
         };

@@ -125,7 +125,9 @@ fn hand_out(
     let thermistors = leg::LEG.joints.map(|joint| joint.motor.thermistor);
     converter::prepare_thermistors(thermistors.map(|thermistor| thermistor.is_some()));
     let hottest_c = HOTTEST_C;
-    let settings = HousekeepingSettings { axes, calibration, hottest_c, windings, thermistors, encoders };
+    let assist = leg::LEG.assist;
+    let settings =
+        HousekeepingSettings { axes, calibration, hottest_c, windings, thermistors, encoders, assist };
     let mut housekeeper = Housekeeper::new(settings).with_stored(stored);
     // Random memory after a power-up does not have the checksum.
     if let Some(celsius) = windings::stored() {

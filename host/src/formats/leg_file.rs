@@ -30,6 +30,7 @@
 //! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated static friction, speed of its decay | none |
 //! | `truth`, `prior` | see below | none |
 //! | `brake` | `{ release_ms, engage_ms }`: times of a holding brake on the board's output | none |
+//! | `assist` | `{ friction, inertia, weight, periodic }`: the start button of the enabled leg begins and ends assistance with these shares | none: it identifies |
 //! | `[joint.motor]`, `supply` | complete drive ([`MotorFile`], [`SupplyFile`]) | none, 48 V |
 //!
 //! `torque_noise_percent` refers to each joint's mean absolute torque, per logged 500 Hz sample. The noise
@@ -41,6 +42,7 @@
 //! default to 0. `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of
 //! mass. All are in the joint's D-H frame with the D-H sign. Only a simulation needs `truth`.
 
+pub mod assist;
 pub mod check;
 mod convert;
 pub mod draft;
@@ -60,6 +62,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::base::error::FileError;
 use crate::base::toml_file;
+use crate::formats::leg_file::assist::AssistFile;
 
 /// Default leg.
 pub const DEFAULT_LEG: &str = "x2-wearer-75kg";
@@ -112,6 +115,9 @@ pub struct LegFile {
     /// Holding brake on the board's output.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub brake: Option<BrakeFile>,
+    /// Assistance of the start button.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assist: Option<AssistFile>,
     /// Joints, proximal first.
     #[serde(rename = "joint")]
     pub joints: Vec<JointFile>,
@@ -394,6 +400,7 @@ impl LegFile {
             supply_current_a: None,
             charge_current_a: None,
             brake: None,
+            assist: None,
             joints,
         }
     }

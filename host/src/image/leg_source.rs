@@ -64,6 +64,7 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, FileError> 
         gravity: model.gravity.into(),
         supply: leg.supply_limits(),
         holding_brake: leg.brake_delays(),
+        assist: leg.assist.map(|assist| assist.shares()),
         joints,
         prior: configuration.prior.map(|prior| prior.map(|link| link_description(&link))),
         plan: configuration.plan,
@@ -118,6 +119,7 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
     let has_direction = description.joints.iter().any(|joint| joint.motor.absolute.joint.is_some());
     let direction = if has_direction { "use crate::motor::Direction::*;\n" } else { "" };
     let delays = if description.holding_brake.is_some() { "BrakeDelays, " } else { "" };
+    let shares = if description.assist.is_some() { "AssistShares, " } else { "" };
     let has_thermistor = description.joints.iter().any(|joint| joint.motor.thermistor.is_some());
     let thermistor = if has_thermistor { "Thermistor, " } else { "" };
     // The debug form of plain data is valid source; `?` writes numbers that read back bit for bit.
@@ -126,7 +128,7 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
          #[rustfmt::skip]\n\
          mod described {{\n\
          use crate::ident::{{Choice::*, Constant::*, DriveChoice, Estimator::*, Plan::*}};\n\
-         use crate::leg::{{JointDescription, LegDescription, LinkDescription, MotorDescription}};\n\
+         use crate::leg::{{{shares}JointDescription, LegDescription, LinkDescription, MotorDescription}};\n\
          use crate::model::DenavitHartenberg;\n\
          use crate::motion::ExcitationTable;\n\
          use crate::motor::AbsoluteEncoders;\n\

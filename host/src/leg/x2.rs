@@ -144,6 +144,7 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
         supply_current_a: None,
         charge_current_a: None,
         brake: None,
+        assist: None,
         joints: vec![hip, knee],
     }
 }

@@ -179,5 +179,6 @@ fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSe
         windings: parts.map(|(.., winding, _, _)| winding),
         thermistors: parts.map(|(.., thermistor, _)| thermistor),
         encoders: parts.map(|(.., encoders)| encoders),
+        assist: leg.assist.map(|assist| assist.shares()),
     })
 }

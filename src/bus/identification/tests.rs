@@ -205,3 +205,23 @@ fn nothing_is_stored_while_the_drive_may_switch() {
     let mut objects = JointObjects { axis: &mut axis, joint: 0, leg: &mut leg, results: &ACCEPTED };
     assert_eq!(objects.store(true), Err(Abort::State));
 }
+
+#[test]
+fn shares_are_written_within_their_limits_and_read_back() {
+    let mut leg = leg();
+    let mut write = |sub: u8, value: i16| {
+        let value = u32::from(value.cast_unsigned());
+        with(&mut leg, &ACCEPTED, |objects| objects.write(Object::at(0x2150, sub), value))
+    };
+    let cases = [(1, 1000), (2, 800), (3, 0), (4, -500)];
+    for (sub, value) in cases {
+        assert_eq!(write(sub, value), Ok(()), "{sub}");
+    }
+    for (sub, value) in [(1, 1001), (2, 801), (3, -1), (4, 501)] {
+        assert_eq!(write(sub, value), Err(Abort::Range), "{sub}");
+    }
+    for (sub, value) in cases {
+        let found = with(&mut leg, &ACCEPTED, |objects| objects.read(Object::at(0x2150, sub)));
+        assert_eq!(found.map(|found| found as i16), Ok(value), "{sub}");
+    }
+}

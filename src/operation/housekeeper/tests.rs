@@ -28,6 +28,7 @@ const HOUSEKEEPING: HousekeepingSettings<2> = HousekeepingSettings {
     windings: [RATING; 2],
     thermistors: [None; 2],
     encoders: [EncoderSettings { absolute: AbsoluteEncoders::NONE, counts_per_turn: 8192, ratio: 50.0 }; 2],
+    assist: None,
 };
 
 struct Bench {

@@ -15,6 +15,7 @@ use crate::motor::SenseScale;
 use crate::safety::BoardFault;
 use crate::units::Ampere;
 
+mod assist;
 mod faults;
 mod holding_brake;
 mod reports;

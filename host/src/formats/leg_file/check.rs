@@ -8,6 +8,8 @@ use std::collections::HashSet;
 
 use nalgebra::Matrix3;
 
+use scarab::assist::shares::{LARGEST_INERTIA, LARGEST_PERIODIC};
+
 use crate::base::toml_file::{Fault, Step};
 use crate::formats::leg_file::{JointFile, LegFile, LinkParameters, Switch};
 
@@ -124,6 +126,14 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
         if let Some(limit) = limit {
             top.within(key, limit, 0.5, 500.0)?;
         }
+    }
+    if let Some(assist) = &leg.assist {
+        let place = Place { joint: None, table: Some("assist") };
+        let (inertia, periodic) = (f64::from(LARGEST_INERTIA), f64::from(LARGEST_PERIODIC));
+        place.within("friction", assist.friction, 0.0, 1.0)?;
+        place.within("inertia", assist.inertia, 0.0, inertia)?;
+        place.within("weight", assist.weight, 0.0, 1.0)?;
+        place.within("periodic", assist.periodic, -periodic, periodic)?;
     }
     if let Some(brake) = &leg.brake {
         let place = Place { joint: None, table: Some("brake") };
