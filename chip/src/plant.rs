@@ -26,6 +26,10 @@ use hal_sim::drive::shunts::ShuntState;
 use hal_sim::drive::supply::Supply;
 use hal_sim::end_stop;
 use hal_sim::leg::{Leg, LegState};
+use hal_sim::wearer::description::{WearerDescription, WearerError};
+use hal_sim::wearer::muscles::Intention;
+use hal_sim::wearer::{Wearer, WearerTruth};
+use hal_sim::world::periods::PERIODS_PER_TICK;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -353,6 +357,9 @@ pub struct Plant {
     anatomy: [Anatomy; JOINTS],
     mirrored: f64,
     hand: Option<Hand>,
+    wearer: Option<Wearer>,
+    /// Mechanical steps with a wearer.
+    worn_steps: u64,
     noise: Xoshiro256PlusPlus,
     /// Instant up to which the motors were advanced, and of the last mechanical step.
     electric: Ticks,
@@ -394,6 +401,8 @@ impl Plant {
             anatomy,
             mirrored: if leg.mirrored { -1.0 } else { 1.0 },
             hand: None,
+            wearer: None,
+            worn_steps: 0,
             noise: Xoshiro256PlusPlus::seed_from_u64(seed),
             electric: 0,
             mechanic: 0,
@@ -432,6 +441,31 @@ impl Plant {
     /// Releases the leg from the hand.
     pub fn let_go(&mut self) {
         self.hand = None;
+    }
+
+    /// Puts the exoskeleton on a wearer, who is limp and in its posture, and releases it from the hand.
+    ///
+    /// # Errors
+    /// The wearer does not fit.
+    pub fn wear(&mut self, wearer: &WearerDescription) -> Result<(), WearerError> {
+        self.wearer = Some(Wearer::new(wearer, &self.description, &self.state)?);
+        (self.worn_steps, self.hand) = (0, None);
+        Ok(())
+    }
+
+    /// Lets the wearer intend something from now on.
+    ///
+    /// # Errors
+    /// The leg is not worn, or the motion is not permitted.
+    pub fn intend(&mut self, intention: Intention) -> Result<(), WearerError> {
+        let now = self.worn_steps as f64 * PERIOD_S;
+        self.wearer.as_mut().ok_or(WearerError::NotWorn)?.intend(intention, now)
+    }
+
+    /// True state of the wearer, if any.
+    #[must_use]
+    pub fn wearer_truth(&self) -> Option<WearerTruth> {
+        self.wearer.as_ref().map(|wearer| wearer.truth(&self.state))
     }
 
     /// Whether a hand holds the leg.
@@ -648,7 +682,16 @@ impl Plant {
             let stopped = end_stop::torque(stops, position[joint], velocity[joint]);
             self.anatomy[joint].flip(motor + stopped)
         });
-        self.leg.advance(&mut self.state, &acting, &acting, PERIOD_S);
+        let Some(wearer) = &mut self.wearer else {
+            return self.leg.advance(&mut self.state, &acting, &acting, PERIOD_S);
+        };
+        let steps = u64::from(PERIODS_PER_TICK);
+        if self.worn_steps.is_multiple_of(steps) {
+            // Muscles hold their torque for a servo tick, as in the simulated world.
+            wearer.decide(self.worn_steps / steps, self.worn_steps as f64 * PERIOD_S);
+        }
+        self.worn_steps += 1;
+        wearer.advance(&self.leg, &mut self.state, [&acting, &acting], PERIOD_S);
     }
 
     /// Code of a converter's channel at an instant up to which the motors were advanced; `gains` are those of

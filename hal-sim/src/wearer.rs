@@ -121,7 +121,7 @@ struct Ledger {
 
 /// Wearer of an exoskeleton of hip and knee.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Wearer {
+pub struct Wearer {
     plane: ExoskeletonPlane,
     body: Body,
     cuffs: [Cuff; 2],
@@ -146,7 +146,7 @@ impl Wearer {
     /// # Errors
     /// [`WearerError`] if the leg is not a hip and a knee in a vertical plane, a number is out of range, or
     /// the cuffs are too stiff or too damped to be integrated.
-    pub(crate) fn new<const N: usize>(
+    pub fn new<const N: usize>(
         wearer: &WearerDescription,
         leg: &LegDescription<N>,
         state: &LegState<N>,
@@ -201,7 +201,7 @@ impl Wearer {
     ///
     /// # Errors
     /// [`WearerError::OutOfRange`] for a motion with a wrong number.
-    pub(crate) fn intend(&mut self, intention: Intention, now: f64) -> Result<(), WearerError> {
+    pub fn intend(&mut self, intention: Intention, now: f64) -> Result<(), WearerError> {
         if let Intention::Follow(motion) = &intention {
             motion.check()?;
         }
@@ -210,13 +210,13 @@ impl Wearer {
     }
 
     /// Sets the wearer at rest at the exoskeleton's posture, where the present intention begins again.
-    pub(crate) fn place<const N: usize>(&mut self, state: &LegState<N>, now: f64) {
+    pub fn place<const N: usize>(&mut self, state: &LegState<N>, now: f64) {
         self.limb = LimbState { angles: self.exoskeleton(state).angles, rates: [0.0; 2] };
         self.muscles.restart(convert_angles(self.limb.angles), now);
     }
 
     /// Decides the muscles' torque of the servo tick that begins now (s).
-    pub(crate) fn decide(&mut self, tick: u64, now: f64) {
+    pub fn decide(&mut self, tick: u64, now: f64) {
         let (position, velocity) = (convert_angles(self.limb.angles), convert_angles(self.limb.rates));
         self.muscles.decide(&self.body, tick, now, position, velocity);
     }
@@ -240,14 +240,14 @@ impl Wearer {
     }
 
     /// Interaction torque at a state of the exoskeleton, N m, joint (D-H) sign.
-    pub(crate) fn interaction<const N: usize>(&self, state: &LegState<N>) -> [f64; N] {
+    pub fn interaction<const N: usize>(&self, state: &LegState<N>) -> [f64; N] {
         let loads = self.loads(&self.exoskeleton(state), &self.limb);
         as_first_two(self.plane.flipped(convert_torques(sum(loads.map(|load| load.on_exoskeleton)))))
     }
 
     /// Advances both bodies by `duration` s under a torque of motors and surroundings (N m, joint sign) that
     /// changes linearly between two values.
-    pub(crate) fn advance<const N: usize>(
+    pub fn advance<const N: usize>(
         &mut self,
         leg: &Leg<N>,
         state: &mut LegState<N>,
@@ -324,7 +324,7 @@ impl Wearer {
     }
 
     /// True state now.
-    pub(crate) fn truth<const N: usize>(&self, state: &LegState<N>) -> WearerTruth {
+    pub fn truth<const N: usize>(&self, state: &LegState<N>) -> WearerTruth {
         let limb = &self.limb;
         let loads = self.loads(&self.exoskeleton(state), limb);
         let (position, velocity) = (convert_angles(limb.angles), convert_angles(limb.rates));
