@@ -52,4 +52,4 @@ pub mod tick;
 pub use law::{AssistLaw, AssistSession, AssistTorque};
 pub use model::{Assured, CompensationModel};
 pub use shares::AssistShares;
-pub use tick::{AssistDemand, AssistTick};
+pub use tick::{AssistDemand, AssistEnd, AssistTick};

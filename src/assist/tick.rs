@@ -30,6 +30,21 @@ pub const LATEST_TICKS: u32 = 40;
 /// Largest change of torque from one sample to the next as a share of the cap.
 const LARGEST_STEP: f32 = 0.1;
 
+/// Reason why a session ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AssistEnd {
+    /// The operator or a host asked for it.
+    Requested,
+    /// The energy budget is used up.
+    Energy,
+    /// A torque of the law is not finite.
+    NotFinite,
+    /// The law is silent.
+    Late,
+    /// The model monitor reports a change.
+    Changed,
+}
+
 /// Torque of one tick, joint (D-H) sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AssistDemand<const N: usize> {
@@ -43,7 +58,8 @@ pub struct AssistDemand<const N: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AssistTick<const N: usize> {
     share: f32,
-    is_leaving: bool,
+    /// Reason of a session that is ending.
+    end: Option<AssistEnd>,
     friction_share: f32,
     assured: Assured<N>,
     cap_nm: [f32; N],
@@ -68,7 +84,7 @@ impl<const N: usize> AssistTick<N> {
     pub fn begin(session: &AssistSession<N>, angles: [f32; N], hold_nm: [f32; N], cap_nm: [f32; N]) -> Self {
         Self {
             share: 0.0,
-            is_leaving: false,
+            end: None,
             friction_share: session.shares.friction,
             assured: session.model.assured,
             cap_nm,
@@ -89,7 +105,7 @@ impl<const N: usize> AssistTick<N> {
         for joint in 0..N {
             let wanted = torque.torque_nm[joint];
             if !is_finite(wanted) {
-                return self.leave();
+                return self.leave(AssistEnd::NotFinite);
             }
             let step = LARGEST_STEP * self.cap_nm[joint];
             let change = match self.age {
@@ -105,25 +121,25 @@ impl<const N: usize> AssistTick<N> {
         (self.support_nm, self.damping, self.age) = (torque.support_nm, torque.damping, Some(0));
         self.inertia = torque.inertia;
         if torque.is_exhausted {
-            self.leave();
+            self.leave(AssistEnd::Energy);
         }
     }
 
-    /// Ends the session; the torque fades out.
-    pub fn leave(&mut self) {
-        self.is_leaving = true;
+    /// Ends the session; the torque fades out. The first reason stays.
+    pub fn leave(&mut self, why: AssistEnd) {
+        self.end = self.end.or(Some(why));
     }
 
-    /// Whether the session is ending.
+    /// Reason of a session that is ending.
     #[must_use]
-    pub const fn is_leaving(&self) -> bool {
-        self.is_leaving
+    pub const fn end(&self) -> Option<AssistEnd> {
+        self.end
     }
 
     /// Whether the session has faded out.
     #[must_use]
     pub fn has_ended(&self) -> bool {
-        self.is_leaving && !(self.share > 0.0)
+        self.end.is_some() && !(self.share > 0.0)
     }
 
     /// Whether the whole assistance acts.
@@ -143,9 +159,9 @@ impl<const N: usize> AssistTick<N> {
             None => self.waited + 1,
         };
         if self.age.unwrap_or(self.waited) > LATEST_TICKS {
-            self.leave();
+            self.leave(AssistEnd::Late);
         }
-        let step = match (self.is_leaving, self.age) {
+        let step = match (self.end.is_some(), self.age) {
             (true, _) => -FADE_PER_TICK,
             (false, Some(_)) => FADE_PER_TICK,
             (false, None) => 0.0,
@@ -165,7 +181,7 @@ impl<const N: usize> AssistTick<N> {
             for (inertia, acceleration) in self.inertia[joint].iter().zip(&acceleration) {
                 law += inertia * acceleration;
             }
-            if self.is_leaving {
+            if self.end.is_some() {
                 self.hold_nm[joint] = self.support_nm[joint];
             }
             demand.torque_nm[joint] = self.share * law + (1.0 - self.share) * self.hold_nm[joint];
@@ -226,7 +242,7 @@ mod tests {
         };
         assert!((run(&mut tick, 4001, -30.0) + 30.0).abs() < 1e-3);
         assert!(tick.is_complete());
-        tick.leave();
+        tick.leave(AssistEnd::Requested);
         assert!((run(&mut tick, 4001, -30.0) - 5.0).abs() < 1e-3);
         assert!(tick.has_ended());
         // 50 N m in a second.
@@ -268,12 +284,15 @@ mod tests {
         for _ in 0..=LATEST_TICKS + 1 {
             let _ = silent.advance(&[0.0; 2], &[0.0; 2]);
         }
-        assert!(silent.is_leaving());
+        assert_eq!(silent.end(), Some(AssistEnd::Late));
         let mut broken = AssistTick::begin(&session(), [0.0; 2], [0.0; 2], [85.0; 2]);
         broken.receive(&torque(f32::NAN));
-        assert!(broken.is_leaving() && broken.advance(&[0.0; 2], &[0.0; 2]).torque_nm == [0.0; 2]);
+        assert!(
+            broken.end() == Some(AssistEnd::NotFinite)
+                && broken.advance(&[0.0; 2], &[0.0; 2]).torque_nm == [0.0; 2]
+        );
         let mut exhausted = AssistTick::begin(&session(), [0.0; 2], [0.0; 2], [85.0; 2]);
         exhausted.receive(&AssistTorque { is_exhausted: true, ..torque(1.0) });
-        assert!(exhausted.is_leaving());
+        assert_eq!(exhausted.end(), Some(AssistEnd::Energy));
     }
 }

@@ -3,7 +3,7 @@
 mod assist;
 mod host;
 
-pub use assist::Wearing;
+pub use assist::{AssistNote, AssistRefusal, Wearing};
 pub use host::Host;
 
 use assist::Assistance;
@@ -13,7 +13,7 @@ use super::configuration::{LegConfiguration, LegError, ProvedMotion};
 use super::identification::Finding;
 use super::model::IdentifiedModel;
 use super::model_blend::ModelBlend;
-use crate::assist::AssistShares;
+use crate::assist::{AssistEnd, AssistShares};
 use crate::checksum::Checksum;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
@@ -254,6 +254,9 @@ impl<const N: usize> Control<N> {
     ) -> ControlOutput<N> {
         self.tick = self.tick.wrapping_add(1);
         let refused = request.as_ref().is_some_and(|request| !self.may_begin(request, host.as_ref()));
+        if let Some(ControlRequest::Assist(shares)) = request.as_ref().filter(|_| refused) {
+            self.note_refusal(shares);
+        }
         let took_update = !refused && matches!(request, Some(ControlRequest::TakeUpdate));
         let power = self.accept(request.filter(|_| !refused), gravity);
         let commanded = self.obey(host.as_mut());
@@ -328,7 +331,7 @@ impl<const N: usize> Control<N> {
             _ if self.activity.assists() => false,
             ControlRequest::Identify => enabled && still,
             ControlRequest::Track { .. } => enabled && still && self.tracked.is_some(),
-            ControlRequest::Assist(shares) => enabled && still && self.may_assist(shares),
+            ControlRequest::Assist(shares) => enabled && still && self.assist_refusal(shares).is_none(),
         }
     }
 
@@ -359,7 +362,7 @@ impl<const N: usize> Control<N> {
                 (self.change, self.cause) = (None, None);
             }
             ControlRequest::Assist(shares) => self.begin_assist(shares, gravity),
-            ControlRequest::EndAssist => self.assistance.leave(),
+            ControlRequest::EndAssist => self.assistance.leave(AssistEnd::Requested),
         }
         None
     }
@@ -440,7 +443,7 @@ impl<const N: usize> Control<N> {
                 if matches!(self.activity, Activity::Identify(_)) => {}
             Finding::Changed(change) => {
                 (self.change, self.cause) = (Some(change), None);
-                self.assistance.leave();
+                self.assistance.leave(AssistEnd::Changed);
             }
             Finding::Updated { cause, model, .. } => {
                 match model {

@@ -37,7 +37,9 @@ pub(crate) mod testing;
 
 pub use activity::{Activity, AssistPhase, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 pub use configuration::{LegConfiguration, LegError, ProvedMotion};
-pub use control::{Control, ControlOutput, ControlRequest, Host, LoggedSample, Wearing};
+pub use control::{
+    AssistNote, AssistRefusal, Control, ControlOutput, ControlRequest, Host, LoggedSample, Wearing,
+};
 pub use description::{
     DescriptionError, JointDescription, LegDescription, LinkDescription, MotorDescription,
 };
@@ -50,7 +52,7 @@ pub use results::{FoundBase, FoundFit, FoundParameter};
 pub use stored::{RestoreError, StoredModel};
 
 // Interface of the leg: other modules that report or store these values import them from here only.
-pub use crate::assist::{AssistLaw, AssistSession, AssistShares, AssistTorque, Assured};
+pub use crate::assist::{AssistEnd, AssistLaw, AssistSession, AssistShares, AssistTorque, Assured};
 pub use crate::ident::{
     Cause, Change, Constant, Estimate, Evidence, Filters, MotionWindow, Plan, Reason, SearchState, Status,
     StribeckFit, Test, Verdict,

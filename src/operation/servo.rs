@@ -147,6 +147,10 @@ impl<const N: usize> ServoLevel<N> {
         let sample = Sample { joints: self.sample };
         let commands = self.host.as_mut().and_then(|host| host.commands(waits));
         let output = control.tick_with(&sample, permitted, gravity, commands);
+        if let Some(note) = control.take_assist_note() {
+            let ((event, why), tick) = (words::assist(note), self.tick);
+            send(LegEvent::Record(Record::Assist { tick, event, why }), ends, signals);
+        }
         assist(control, &output, ends, hardware);
         signals.set_targets(output.servo.drive());
         signals.set_permission(output.servo.decision.state.permission());

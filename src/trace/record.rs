@@ -113,6 +113,15 @@ macro_rules! trace_records {
         /// False if refused.
         accepted: bool,
     }
+    /// A session of assistance was refused or is ending.
+    Assist "assist n={=u32} tick={=u32} event={=str} why={=str}" {
+        /// Servo tick.
+        tick: u32,
+        /// Event, see [`super::words::assist`].
+        event: &'static str,
+        /// Reason, see [`super::words::assist`].
+        why: &'static str,
+    }
     /// Refusal of a step towards an enabled drive.
     NotEnabled "not_enabled n={=u32} tick={=u32} joint={=u8} why={=str}" {
         /// Servo tick.

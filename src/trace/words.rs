@@ -3,8 +3,8 @@
 //! No match has a wildcard: a new state needs a word to compile.
 
 use crate::leg::{
-    Activity, AssistPhase, AxisFault, CalibrationRefusal, Cause, DriveState, FaultCode, IdentifyPhase,
-    MotorConstant, Parameter, Phase, RefusalReason, Segment, Step,
+    Activity, AssistEnd, AssistNote, AssistPhase, AssistRefusal, AxisFault, CalibrationRefusal, Cause,
+    DriveState, FaultCode, IdentifyPhase, MotorConstant, Parameter, Phase, RefusalReason, Segment, Step,
 };
 
 /// Word for the drive state.
@@ -46,6 +46,33 @@ pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
         Activity::Assist(AssistPhase::Enter) => ("assist", "enter", 0),
         Activity::Assist(AssistPhase::Run) => ("assist", "run", 0),
         Activity::Assist(AssistPhase::Leave) => ("assist", "leave", 0),
+    }
+}
+
+/// Words for the event of a session of assistance and for its reason.
+#[must_use]
+pub const fn assist(note: AssistNote) -> (&'static str, &'static str) {
+    match note {
+        AssistNote::Refused(why) => (
+            "refused",
+            match why {
+                AssistRefusal::Busy => "busy",
+                AssistRefusal::Shares => "shares",
+                AssistRefusal::NoEmptyModel => "no_empty_model",
+                AssistRefusal::NoWornModel => "no_worn_model",
+                AssistRefusal::Changed => "changed",
+            },
+        ),
+        AssistNote::Ending(why) => (
+            "ending",
+            match why {
+                AssistEnd::Requested => "requested",
+                AssistEnd::Energy => "energy",
+                AssistEnd::NotFinite => "not_finite",
+                AssistEnd::Late => "late",
+                AssistEnd::Changed => "changed",
+            },
+        ),
     }
 }
 

@@ -5,7 +5,7 @@
 //! [`Control::receive_torque`].
 
 use super::{Activity, Control};
-use crate::assist::{AssistDemand, AssistSession, AssistShares, AssistTick, AssistTorque};
+use crate::assist::{AssistDemand, AssistEnd, AssistSession, AssistShares, AssistTick, AssistTorque};
 use crate::leg::activity::AssistPhase;
 use crate::leg::model::IdentifiedModel;
 use crate::servo::{Effort, ServoOutput};
@@ -20,6 +20,30 @@ pub enum Wearing {
     Worn,
 }
 
+/// Reason why a session is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AssistRefusal {
+    /// The drive is not enabled, moves, or does something else.
+    Busy,
+    /// A share is out of its range.
+    Shares,
+    /// No model of the empty leg.
+    NoEmptyModel,
+    /// No model of the worn leg, which the shares need.
+    NoWornModel,
+    /// The model monitor reports a change.
+    Changed,
+}
+
+/// Event of a session, for a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AssistNote {
+    /// A session was refused.
+    Refused(AssistRefusal),
+    /// A session is ending.
+    Ending(AssistEnd),
+}
+
 /// Models, and the session of assistance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Assistance<const N: usize> {
@@ -30,6 +54,8 @@ pub(super) struct Assistance<const N: usize> {
     tick: Option<AssistTick<N>>,
     /// Session that the law has not taken yet.
     session: Option<AssistSession<N>>,
+    /// Event that was not recorded yet.
+    note: Option<AssistNote>,
     position: [f32; N],
     velocity: [f32; N],
     torque: [f32; N],
@@ -43,6 +69,7 @@ impl<const N: usize> Assistance<N> {
             wearing: None,
             tick: None,
             session: None,
+            note: None,
             position: [0.0; N],
             velocity: [0.0; N],
             torque: [0.0; N],
@@ -55,9 +82,9 @@ impl<const N: usize> Assistance<N> {
     }
 
     /// Fades the session out.
-    pub(super) fn leave(&mut self) {
+    pub(super) fn leave(&mut self, why: AssistEnd) {
         if let Some(tick) = &mut self.tick {
-            tick.leave();
+            tick.leave(why);
         }
     }
 
@@ -128,13 +155,30 @@ impl<const N: usize> Control<N> {
         }
     }
 
-    /// Whether these shares can be given now, at rest with the drive enabled.
-    pub(super) fn may_assist(&self, shares: &AssistShares) -> bool {
+    /// Event of a session since the last call.
+    #[must_use]
+    pub fn take_assist_note(&mut self) -> Option<AssistNote> {
+        self.assistance.note.take()
+    }
+
+    /// Reason why these shares cannot be given, besides an activity or a motion.
+    pub(super) fn assist_refusal(&self, shares: &AssistShares) -> Option<AssistRefusal> {
         let models = &self.assistance;
-        shares.are_permitted()
-            && models.empty.is_some()
-            && (models.worn.is_some() || !shares.need_worn_model())
-            && self.change.is_none()
+        if !shares.are_permitted() {
+            Some(AssistRefusal::Shares)
+        } else if models.empty.is_none() {
+            Some(AssistRefusal::NoEmptyModel)
+        } else if models.worn.is_none() && shares.need_worn_model() {
+            Some(AssistRefusal::NoWornModel)
+        } else {
+            self.change.map(|_| AssistRefusal::Changed)
+        }
+    }
+
+    /// Notes why a session was refused.
+    pub(super) fn note_refusal(&mut self, shares: &AssistShares) {
+        let why = self.assist_refusal(shares).unwrap_or(AssistRefusal::Busy);
+        self.assistance.note = Some(AssistNote::Refused(why));
     }
 
     /// Begins a session.
@@ -158,11 +202,16 @@ impl<const N: usize> Control<N> {
         let Assistance { position, velocity, .. } = self.assistance;
         let tick = self.assistance.tick.as_mut()?;
         let AssistDemand { torque_nm, damping_share } = tick.advance(&position, &velocity);
-        let phase = match (tick.is_leaving(), tick.is_complete()) {
-            (true, _) => AssistPhase::Leave,
-            (false, true) => AssistPhase::Run,
-            (false, false) => AssistPhase::Enter,
+        let phase = match (tick.end(), tick.is_complete()) {
+            (Some(_), _) => AssistPhase::Leave,
+            (None, true) => AssistPhase::Run,
+            (None, false) => AssistPhase::Enter,
         };
+        if let Some(why) = tick.end()
+            && self.activity != Activity::Assist(AssistPhase::Leave)
+        {
+            self.assistance.note = Some(AssistNote::Ending(why));
+        }
         self.activity = Activity::Assist(phase);
         let torques = torque_nm.map(NewtonMetre);
         Some(torques.map(|torque| Effort { torque, held: false, damping_share, ..Effort::HELD }))

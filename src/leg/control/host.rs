@@ -1,6 +1,7 @@
 //! Control by a host: while the drive is enabled, `Follow` replaces `Idle`.
 
 use super::{Activity, Control};
+use crate::assist::AssistEnd;
 use crate::leg::follow::{Commanded, Following, JointCommand};
 use crate::motion::{Motion, MotionState};
 
@@ -27,7 +28,7 @@ impl<const N: usize> Control<N> {
         }
         if self.activity.assists() {
             if *cancel {
-                self.assistance.leave();
+                self.assistance.leave(AssistEnd::Requested);
             }
             return None;
         }

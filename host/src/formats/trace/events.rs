@@ -6,8 +6,8 @@
 use scarab::trace::GRAMMAR;
 
 use crate::formats::trace::records::{
-    AxisFault, Board, Boot, Calibration, CalibrationFindings, Change, Crash, Fault, GateDriver, Limit,
-    NotEnabled, Received, Refused, Request, State, Update,
+    Assist, AxisFault, Board, Boot, Calibration, CalibrationFindings, Change, Crash, Fault, GateDriver,
+    Limit, NotEnabled, Received, Refused, Request, State, Update,
 };
 
 /// Severity of an event.
@@ -76,6 +76,9 @@ pub fn of(record: &Received, servo_hz: f64) -> Option<Event> {
             let weight = if *accepted { Weight::Note } else { Weight::Warning };
             let answer = if *accepted { "accepted" } else { "REFUSED" };
             (at(*tick), weight, format!("the operator asks: {}, {answer}", spaced(name)))
+        }
+        Received::Assist(Assist { tick, event, why }) => {
+            (at(*tick), Weight::Warning, format!("assistance {event}: {}", spaced(why)))
         }
         Received::NotEnabled(NotEnabled { tick, joint, why }) => {
             let words = format!("the drive is NOT enabled: {}, {}", place(*joint), spaced(why));

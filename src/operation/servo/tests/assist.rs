@@ -41,6 +41,26 @@ fn the_button_begins_a_session_and_ends_it() {
 }
 
 #[test]
+fn refusals_and_ends_are_recorded_with_their_reason() {
+    let (mut bench, mut law) = (Bench::enabled(), AssistLevel::new());
+    let record = |bench: &Bench, event, why| {
+        bench.events.iter().any(|found| matches!(found, LegEvent::Record(Record::Assist { event: e, why: w, .. }) if *e == event && *w == why))
+    };
+    bench.ask(ControlRequest::Assist(SHARES));
+    run(&mut bench, &mut law, 2);
+    assert!(record(&bench, "refused", "no_empty_model"));
+    assert!(bench.control.set_model(Wearing::Empty, model()));
+    bench.ask(ControlRequest::Assist(AssistShares { weight: 0.5, ..SHARES }));
+    run(&mut bench, &mut law, 2);
+    assert!(record(&bench, "refused", "no_worn_model"));
+    bench.ask(ControlRequest::Assist(SHARES));
+    run(&mut bench, &mut law, 20);
+    bench.order(None, Some(LegRequest::EndAssist));
+    run(&mut bench, &mut law, 2);
+    assert!(record(&bench, "ending", "requested"));
+}
+
+#[test]
 fn without_an_answer_of_the_law_the_session_ends() {
     let mut bench = ready();
     bench.ask(ControlRequest::Assist(SHARES));
