@@ -1,6 +1,7 @@
 //! The command line: one file for each command.
 
 pub mod arguments;
+mod assist;
 pub mod common;
 mod compare;
 mod eds;
@@ -42,7 +43,7 @@ use crate::formats::shard::Argument;
 #[derive(Parser, Debug)]
 #[command(name = "scarab", version, max_term_width = HELP_WIDTH, after_help = "\
 Options without a command belong to `identify`. `scarab COMMAND --help` has an example of each.
-Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, live, excite, monitor, motor, serve.
+Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, live, excite, monitor, assist, motor, serve.
 Board: fw, flash-leg, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
 struct Cli {
     #[command(subcommand)]
@@ -94,6 +95,9 @@ enum Command {
     /// Change load or friction while a leg walks: detection time, identified cause, false alarms.
     #[command(after_help = "Example: cargo sim monitor --seeds 1..20")]
     Monitor(monitor::MonitorArguments),
+    /// Let a wearer move in a leg that is transparent, carries weight or assists: interaction torque, effort.
+    #[command(after_help = "Example: cargo sim assist --mode transparent --motion gait --out target/assist")]
+    Assist(assist::AssistArguments),
     /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
     #[command(after_help = "Example: cargo sim motor --figures target/motor")]
     Motor(motor::MotorArguments),
@@ -204,6 +208,7 @@ fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
         Command::Serve(arguments) => serve::run(arguments),
         Command::Kept(arguments) => kept::run(arguments),
         Command::Monitor(arguments) => monitor::run(arguments),
+        Command::Assist(arguments) => assist::run(arguments),
         Command::Motor(arguments) => motor::run(arguments),
         Command::Regressor(arguments) => regressor::run(arguments),
         Command::Emulate(arguments) => emulate::emulate(arguments),

@@ -25,8 +25,9 @@ use nalgebra::{Matrix3, Vector3};
 use scarab::model::RigidBody;
 
 use crate::base::error::ToolError;
-use crate::formats::anthropometry::{Segment, Wearer, joined};
+use crate::formats::anthropometry::{Segment, Wearer};
 use crate::formats::leg_file::{LegFile, LinkParameters, SegmentsFile};
+use crate::leg::link_body::{body, joined_with, linked, without};
 
 /// Shortest and longest thigh, m.
 pub const THIGH_RANGE_M: [f64; 2] = [0.402, 0.505];
@@ -172,35 +173,19 @@ impl Size {
 
 impl Change<'_> {
     fn link(&self, link: &LinkParameters, mass: f64) -> Result<LinkParameters, String> {
-        let whole = body(link.mass, link.com, link.inertia_com);
-        let Some(after) = self.after else { return Ok(linked(link, &stretched(&whole, self.stretch))) };
-        let (kilogram, com, inertia) = joined(&(self.before)(mass));
-        let machine = difference(&whole, &body(kilogram, com, inertia)).ok_or_else(|| {
+        let Some(after) = self.after else {
+            let whole = body(link.mass, link.com, link.inertia_com);
+            return Ok(linked(link, &stretched(&whole, self.stretch)));
+        };
+        let machine = without(link, &(self.before)(mass)).ok_or_else(|| {
             format!(
                 "its link is lighter than the {} of a wearer of {mass} kg, which it contains by `segments`",
                 self.name
             )
         })?;
-        let (kilogram, com, inertia) = joined(&after(mass));
-        let wearer = body(-kilogram, com, inertia.map(|element| -element));
-        let sum = difference(&stretched(&machine, self.stretch), &wearer);
+        let sum = joined_with(&stretched(&machine, self.stretch), &after(mass));
         sum.map(|sum| linked(link, &sum)).ok_or_else(|| "has no mass".into())
     }
-}
-
-fn body(mass: f64, com: [f64; 3], [xx, xy, xz, yy, yz, zz]: [f64; 6]) -> RigidBody<f64> {
-    RigidBody {
-        mass,
-        centre_of_mass: Vector3::from(com),
-        inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
-    }
-}
-
-/// Body that remains without a part.
-fn difference(whole: &RigidBody<f64>, part: &RigidBody<f64>) -> Option<RigidBody<f64>> {
-    let (mut left, part) = (whole.to_parameters(), part.to_parameters());
-    left.iter_mut().zip(part).for_each(|(left, part)| *left -= part);
-    RigidBody::from_parameters(&left)
 }
 
 fn stretched(body: &RigidBody<f64>, stretch: f64) -> RigidBody<f64> {
@@ -211,17 +196,6 @@ fn stretched(body: &RigidBody<f64>, stretch: f64) -> RigidBody<f64> {
         mass: body.mass,
         centre_of_mass: along * body.centre_of_mass,
         inertia: Matrix3::identity() * spread.trace() - spread,
-    }
-}
-
-/// Rotor and friction of the old link with a new body.
-fn linked(link: &LinkParameters, body: &RigidBody<f64>) -> LinkParameters {
-    let tensor = &body.inertia;
-    LinkParameters {
-        mass: body.mass,
-        com: body.centre_of_mass.into(),
-        inertia_com: [tensor.m11, tensor.m12, tensor.m13, tensor.m22, tensor.m23, tensor.m33],
-        ..*link
     }
 }
 

@@ -2,10 +2,12 @@
 
 pub mod added_mass;
 pub mod analysis;
+pub mod assist;
 pub mod compare_model;
 pub mod consistent;
 pub mod disturbances;
 pub mod excite;
+pub mod identified;
 pub mod identify;
 pub mod information;
 pub mod live;

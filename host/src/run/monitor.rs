@@ -20,6 +20,7 @@ use crate::formats::leg_file::{LegFile, PushesFile};
 use crate::report::monitor::{AlarmReport, MonitorRun};
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
+use crate::run::identified::identify;
 use update::update_report;
 
 /// Limit after which a change counts as not detected.
@@ -28,8 +29,6 @@ const LONGEST_WAIT_S: f64 = 600.0;
 const LONGEST_UPDATE_S: f64 = 120.0;
 /// Walking time with the update in use.
 const AFTER_S: f64 = 60.0;
-/// Limit of an identification, which takes 53 s.
-const LONGEST_IDENTIFICATION_S: f64 = 300.0;
 /// Rest after a false alarm: damping until standstill.
 const REST_S: f64 = 4.0;
 /// Step in which a slow change of friction is simulated.
@@ -88,22 +87,7 @@ fn identified<const N: usize, const B: usize>(
     seed: u64,
 ) -> Result<Result<Pair<N, B>, Vec<&'static str>>, ToolError> {
     let mut pair = Pair::new(leg, context, seed)?;
-    if !pair.enable(context.gravity) {
-        return Err(leg.error("the drive refused to be enabled at the start").into());
-    }
-    let mut request = Some(ControlRequest::Identify);
-    while pair.leg.control().verdict().is_none() {
-        pair.tick(request.take(), context.gravity);
-        let identifying = matches!(pair.leg.control().activity(), Activity::Identify(_));
-        if (!identifying && pair.leg.control().verdict().is_none())
-            || pair.ticks > ticks(LONGEST_IDENTIFICATION_S)
-        {
-            return Err(leg.error(pair.stop_words(leg)).into());
-        }
-    }
-    let reasons = pair.leg.control().verdict().into_iter().flat_map(|verdict| verdict.reasons());
-    let reasons: Vec<_> = reasons.map(scarab::ident::Reason::name).collect();
-    Ok(if pair.leg.control().model().is_some() { Ok(pair) } else { Err(reasons) })
+    Ok(identify(leg, context, &mut pair)?.map(|()| pair))
 }
 
 /// Walking pair with its tracking error.

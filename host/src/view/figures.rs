@@ -18,6 +18,7 @@
 //! Curves also differ in lightness and width, so they can be distinguished in grey. Drawings have four
 //! times the shown size with a `viewBox` of that size, since the backend rounds to whole pixels.
 
+pub mod assist;
 pub mod canvas;
 pub mod curve;
 pub mod faults;

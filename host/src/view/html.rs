@@ -8,6 +8,7 @@
 //! Keys without a section of their own, for example from a later report, are shown in a generic
 //! table (`html/generic.rs`).
 
+pub mod assist;
 mod choices;
 pub mod faults;
 mod generic;

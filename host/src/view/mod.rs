@@ -1,5 +1,6 @@
 //! Results as tables, figures and pages. Runs nothing.
 
+pub mod assist;
 pub mod document;
 pub mod excite;
 pub mod figures;

@@ -1,0 +1,21 @@
+//! The identified model at work: what the compensation leaves of the torque between exoskeleton and wearer.
+//!
+//! | part | contents |
+//! | --- | --- |
+//! | [`draws`] | random wearers and exoskeletons |
+//! | [`mod@energy`] | energy given to limp and resisting wearers; legs at rest |
+//! | [`motions`] | motions of the wearer within ranges and speed limits |
+//! | [`subject`] | leg, wearer, and the models identified of both |
+//! | [`trial`] | one run of leg and wearer |
+//! | [`study`] | every mode, motion and comparison over all seeds |
+//! | [`mod@periodic`] | locking, effort and stopping of a periodic motion |
+//! | [`stability`] | largest stable share of inertia over stiffness and damping of the cuffs |
+
+pub mod draws;
+pub mod energy;
+pub mod motions;
+pub mod periodic;
+pub mod stability;
+pub mod study;
+pub mod subject;
+pub mod trial;
