@@ -7,9 +7,10 @@ use crate::base::{files, output};
 use crate::cli::arguments::OutputFolder;
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
+use crate::formats::leg_file::assist::AssistFile;
 use crate::leg::setup::DEFAULT_SEED;
 use crate::run::assist::motions::Exercise;
-use crate::run::assist::study::{AssistOptions, Mode, Shares, study};
+use crate::run::assist::study::{AssistOptions, Mode, study};
 use crate::run::assist::subject::Cuffs;
 use crate::view::html::{self, Circumstances};
 use crate::view::{assist as text, figures};
@@ -145,7 +146,7 @@ impl AssistArguments {
         Ok(AssistOptions {
             modes,
             exercises: chosen.iter().flat_map(|motion| motion.exercises()).collect(),
-            shares: Shares {
+            shares: AssistFile {
                 friction: share("friction", self.friction, [0.0, 1.0])?,
                 inertia: share("inertia", self.inertia, [0.0, 0.8])?,
                 weight: share("weight", self.weight, [0.0, 1.0])?,

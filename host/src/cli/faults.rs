@@ -8,6 +8,7 @@ use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::base::shard::Shard;
 use crate::base::{files, output};
 use crate::cli::arguments::{Output, Updated};
+use crate::cli::assist::ModeArgument;
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
 use crate::faults::campaign::{CampaignOptions, campaign};
@@ -17,7 +18,10 @@ use crate::faults::report::{CampaignReport, line};
 use crate::faults::results::Campaign;
 use crate::faults::run::{Blind, Manner, Outcome};
 use crate::faults::trial::KINDS;
+use crate::formats::leg_file::LegFile;
+use crate::formats::leg_file::assist::AssistFile;
 use crate::formats::shard::{Argument, CampaignHeader, Program, ShardResults};
+use crate::run::assist::study::Mode;
 use crate::view::html::{self, Circumstances};
 use crate::view::{document, figures};
 
@@ -63,7 +67,11 @@ pub struct FaultsArguments {
     /// `--fault pairs`, a run of those. The run repeats bit for bit for equal --seconds, leg and program.
     #[arg(long, value_name = "SEED", conflicts_with_all = ["seeds", "every_tick", "sweep", "pairs"], value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     replay: Option<u64>,
-    /// Inject only in the first S seconds of each identification.
+    /// Inject while the leg assists a walking wearer, instead of while it identifies itself. Only rows that
+    /// fork a machine, the sweep and the pairs are run.
+    #[arg(long, value_enum, value_name = "MODE")]
+    assist: Option<ModeArgument>,
+    /// Inject only in the first S seconds of each identification or session.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
     /// Only the runs of shard I of N, from 1, into --json; `merge` joins all of them.
@@ -132,8 +140,20 @@ impl FaultsArguments {
         self.fault.iter().any(|name| name == kind)
     }
 
+    /// The leg, with the shares of its assistance.
+    fn leg(&self) -> Result<LegFile, ToolError> {
+        let leg = self.leg.load()?;
+        Ok(match self.assist {
+            Some(mode) => LegFile { assist: Some(Mode::from(mode).shares(&AssistFile::USUAL)), ..leg },
+            None => leg,
+        })
+    }
+
     fn options(&self) -> Result<CampaignOptions, ToolError> {
         let mut rows = rows(&self.fault, self.full)?;
+        if self.assist.is_some() {
+            rows.retain(|entry| matches!(entry, Entry::Forked(_)));
+        }
         if self.blind {
             rows.retain(Entry::can_be_blind);
             let named = |name: &String| rows.iter().any(|entry| entry.head().id == name);
@@ -188,7 +208,7 @@ impl FaultsArguments {
 /// Injects and reports; exit code 3 if anything was missed.
 pub fn run(arguments: &FaultsArguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
     let options = arguments.options()?;
-    let leg = arguments.leg.load()?;
+    let leg = arguments.leg()?;
     // Checked first: hours of runs must not end without a document for their table.
     if let Some(path) = &arguments.docs {
         document::check(path, DOCUMENT[0], DOCUMENT[1])?;

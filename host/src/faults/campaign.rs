@@ -1,4 +1,5 @@
-//! Many runs, forked from identifications that the operator's contacts started.
+//! Many runs, forked from identifications that the operator's contacts started, or from sessions of assistance
+//! of a leg whose file states one ([`Worn`]).
 //!
 //! Forks share their base: it runs once, and every run is a clone of it at the run's period. The base of a
 //! run follows from the run's seed, so that one run can be repeated alone. A row that is run in two ways uses
@@ -26,6 +27,7 @@ use crate::faults::results::{Base, Campaign};
 use crate::faults::run::{Manner, Outcome, run};
 use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::faults::trial::Trial;
+use crate::faults::worn::{self, Worn};
 use crate::formats::leg_file::LegFile;
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 use crate::rig::options::{DriveModel, SimulationOptions};
@@ -153,6 +155,8 @@ fn based(
 ) -> Result<Campaign, ToolError> {
     let mut campaign = Campaign::default();
     let every = options.every_tick && base == base_of(1);
+    let worn = Worn::of(leg, base)?;
+    let leg = worn.as_ref().map_or(leg, |worn| &worn.exoskeleton);
     let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
     let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
     if widened {
@@ -160,7 +164,7 @@ fn based(
             (joint.torque, joint.current) = (joint.torque * WIDENED, joint.current * WIDENED);
         }
     }
-    let mut length = length(leg, &context, base)?;
+    let mut length = if worn.is_some() { worn::LENGTH } else { length(leg, &context, base)? };
     if let Some(seconds) = options.seconds {
         length = length.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
     }
@@ -173,7 +177,13 @@ fn based(
         return Ok(campaign);
     }
     let mut rig = Rig::new(leg, &context, base)?;
+    if let Some(worn) = &worn {
+        worn.dress(&mut rig)?;
+    }
     begin(leg, &mut rig)?;
+    if let Some(worn) = &worn {
+        worn.walk(&mut rig)?;
+    }
     jobs.sort_by_key(|(period, job)| (*period, job.order()));
     // The shard with the last stop runs the identification to its end.
     let last_stop = stops.last().copied().map(|stop| if Some(stop) == last_of_all { length } else { stop });

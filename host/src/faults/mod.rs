@@ -39,3 +39,4 @@ pub mod results;
 pub mod run;
 pub mod scenario;
 pub mod trial;
+pub mod worn;

@@ -1,4 +1,4 @@
-//! The operator who starts an identification by the contacts.
+//! The operator who starts an identification, or what else the leg is configured for, by the contacts.
 
 use scarab::hal::Contacts;
 use scarab::leg::Activity;
@@ -13,7 +13,7 @@ use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 const OPEN: u64 = PERIODS_PER_S / 5;
 const ENABLED: u64 = PERIODS_PER_S;
 
-/// Starts an identification as an operator does: contacts open, the switch held until the drive is enabled,
+/// Starts an identification, or a session of assistance, as an operator does: contacts open, the switch held until the drive is enabled,
 /// the button.
 pub fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError> {
     for _ in 0..OPEN {
@@ -29,10 +29,10 @@ pub fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError
     rig.hand = Contacts { enabling: true, start: true };
     for _ in 0..ENABLED {
         rig.advance();
-        if matches!(rig.leg.control().activity(), Activity::Identify(_)) {
+        if matches!(rig.leg.control().activity(), Activity::Identify(_) | Activity::Assist(_)) {
             rig.hand.start = false;
             return Ok(());
         }
     }
-    Err(leg.error("the operator's contacts do not begin an identification").into())
+    Err(leg.error("the operator's contacts begin nothing").into())
 }

@@ -19,6 +19,9 @@ pub struct AssistFile {
 }
 
 impl AssistFile {
+    /// Shares of a campaign and of the chip model's session: those of `cargo sim assist` unless given.
+    pub const USUAL: Self = Self { friction: 1.0, inertia: 0.5, weight: 0.5, periodic: 0.3 };
+
     /// Shares for the firmware.
     #[must_use]
     pub fn shares(&self) -> AssistShares {

@@ -22,8 +22,9 @@
 //!
 //! ```text
 //! 4 kHz    x, v: tracking observer with two poles at 100 Hz            of the last tick
-//!          x'' = s^2 H x,  H two poles at 80 Hz, damping ratio 0.7
-//!          u = r + s_f B v + s M_e (x'' + lead / T (x'' - x''_before))
+//!          x'' = s^2 H x,  H two poles at 50 Hz, damping ratio 0.7
+//!          j' = 2 pi 60 Hz ((x'' - x''_before) / T - j)                low-pass of its change
+//!          u = r + s_f B v + s M_e (x'' + lead j)
 //!          r on a ramp of 8 ticks to the newest torque
 //!          c' = (u - c) / lag                                           drive
 //! 500 Hz   m = mean of q over 8 ticks
@@ -47,8 +48,8 @@ use hal_sim::wearer::description::{CuffDescription, WearerDescription};
 use hal_sim::world::{TICK_S, World};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rayon::prelude::*;
+use scarab::assist::differentiator::LEAD_S;
 use scarab::assist::law::AHEAD_S;
-use scarab::assist::tick::LEAD_S;
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
@@ -59,7 +60,9 @@ const KNEES_DEG: [f64; 5] = [10.0, 30.0, 50.0, 70.0, 90.0];
 /// Ticks of a sample.
 const TICKS: usize = 8;
 /// Corner (Hz) and damping ratio of the differentiator.
-const CORNER_HZ: f64 = 80.0;
+const CORNER_HZ: f64 = 50.0;
+/// Low-pass of the acceleration's change, Hz.
+const CHANGE_HZ: f64 = 60.0;
 const DAMPING_RATIO: f64 = 0.7;
 /// Poles of the servo's observer, Hz.
 const OBSERVER_HZ: f64 = 100.0;
@@ -125,6 +128,8 @@ enum Pair {
     Band,
     Low,
     Acceleration,
+    /// Low-passed change of the acceleration, per tick.
+    Change,
     /// Weight at the last sample.
     Weight,
     /// Ramp to the newest torque.
@@ -310,7 +315,11 @@ fn led_acceleration(state: &mut LoopState) -> Vector2<f64> {
     let now = rate * rate * high;
     let before = Pair::Acceleration.of(state);
     Pair::Acceleration.set(state, now);
-    now + LEAD_TICKS * (now - before)
+    let share = 1.0 - (-TAU * CHANGE_HZ * TICK_S).exp();
+    let change = Pair::Change.of(state);
+    let change = change + share * (now - before - change);
+    Pair::Change.set(state, change);
+    now + LEAD_TICKS * change
 }
 
 /// Matrix exponential by its series, for norms of about 1: the last term is below 1e-20.

@@ -14,6 +14,7 @@ use super::trial::{Drives, Trial, trial};
 use crate::base::error::ToolError;
 use crate::base::number::Number;
 use crate::formats::leg_file::LegFile;
+use crate::formats::leg_file::assist::AssistFile;
 use crate::leg::setup::base_rank;
 use crate::leg::two_bodies::{MuscleTone, TwoBodies};
 use crate::report::SCHEMA;
@@ -33,19 +34,6 @@ pub enum Mode {
     Periodic,
 }
 
-/// Shares that the operator chose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shares {
-    /// Share of friction's lower bound.
-    pub friction: f64,
-    /// Share of the inertia's lower bound.
-    pub inertia: f64,
-    /// Share of the wearer's weight.
-    pub weight: f64,
-    /// Share of the wearer's periodic torque; negative resists.
-    pub periodic: f64,
-}
-
 impl Mode {
     /// Name in the report.
     #[must_use]
@@ -57,22 +45,13 @@ impl Mode {
         }
     }
 
-    fn shares(self, chosen: &Shares) -> Shares {
+    /// Shares of this mode, of those that the operator chose.
+    #[must_use]
+    pub fn shares(self, chosen: &AssistFile) -> AssistFile {
         match self {
-            Self::Transparent => Shares { weight: 0.0, periodic: 0.0, ..*chosen },
-            Self::Weight => Shares { periodic: 0.0, ..*chosen },
-            Self::Periodic => Shares { weight: 0.0, ..*chosen },
-        }
-    }
-}
-
-impl Shares {
-    fn request(&self) -> AssistShares {
-        AssistShares {
-            friction: self.friction as f32,
-            inertia: self.inertia as f32,
-            weight: self.weight as f32,
-            periodic: self.periodic as f32,
+            Self::Transparent => AssistFile { weight: 0.0, periodic: 0.0, ..*chosen },
+            Self::Weight => AssistFile { periodic: 0.0, ..*chosen },
+            Self::Periodic => AssistFile { weight: 0.0, ..*chosen },
         }
     }
 }
@@ -85,7 +64,7 @@ pub struct AssistOptions {
     /// Motions of the wearer.
     pub exercises: Vec<Exercise>,
     /// Shares.
-    pub shares: Shares,
+    pub shares: AssistFile,
     /// Cuffs of the wearer.
     pub cuffs: Cuffs,
     /// First and last seed.
@@ -185,14 +164,14 @@ fn safety<const B: usize>(
     };
     let is_possible = |mode: &&Mode| **mode == Mode::Transparent || subject.worn.is_some();
     let possible = options.modes.iter().filter(is_possible);
-    let shares: Vec<_> = possible.map(|mode| mode.shares(&options.shares).request()).collect();
-    let transparent = Mode::Transparent.shares(&options.shares).request();
+    let shares: Vec<_> = possible.map(|mode| mode.shares(&options.shares).shares()).collect();
+    let transparent = Mode::Transparent.shares(&options.shares).shares();
     let passivity = energy(subject, &shares, options.energy_runs, budget_j)?;
     Ok((passivity, limit_cycles(subject, transparent, options.drawn_legs)?))
 }
 
-fn shares_report(mode: Mode, chosen: &Shares) -> SharesReport {
-    let Shares { friction, inertia, weight, periodic } = mode.shares(chosen);
+fn shares_report(mode: Mode, chosen: &AssistFile) -> SharesReport {
+    let AssistFile { friction, inertia, weight, periodic } = mode.shares(chosen);
     SharesReport { mode: mode.name(), friction, inertia, weight, periodic }
 }
 
@@ -221,7 +200,7 @@ fn run_seed<const B: usize>(
         .collect::<Result<_, ToolError>>()?;
     let is_periodic = options.modes.contains(&Mode::Periodic) && subject.worn.is_some();
     let cadences: Vec<f64> = options.exercises.iter().filter_map(|exercise| exercise.cadence_hz()).collect();
-    let shares = Mode::Periodic.shares(&options.shares).request();
+    let shares = Mode::Periodic.shares(&options.shares).shares();
     let wearer = options.cuffs.on(&subject.bodies.wearer(MuscleTone::Firm));
     let periodic = cadences
         .into_par_iter()
@@ -244,10 +223,10 @@ fn compare<const B: usize>(
     let motion = exercise.intended(joints, subject.seed);
     let shares = mode.shares(&options.shares);
     let run = |drives: Drives<'_>| trial(subject, rig, motion, drives);
-    let of_empty = |shares: &Shares, model| run(Drives::AssistEmpty(shares.request(), model));
+    let of_empty = |shares: &AssistFile, model| run(Drives::AssistEmpty(shares.shares(), model));
     if mode != Mode::Transparent {
         let models = [&subject.empty.identified, &subject.worn()?.identified];
-        let identified = run(Drives::Assist(shares.request(), models))?;
+        let identified = run(Drives::Assist(shares.shares(), models))?;
         let without = of_empty(&Mode::Transparent.shares(&shares), &subject.empty.identified)?;
         return Ok(Compared { identified, without, ..Compared::default() });
     }
@@ -399,7 +378,7 @@ mod tests {
         AssistOptions {
             modes: vec![Mode::Transparent, Mode::Weight],
             exercises: vec![Exercise::Extension],
-            shares: Shares { friction: 1.0, inertia: 0.5, weight: 0.5, periodic: 0.3 },
+            shares: AssistFile { friction: 1.0, inertia: 0.5, weight: 0.5, periodic: 0.3 },
             cuffs: Cuffs { stiffness, damping },
             seeds: (1, 1),
             energy_runs: 4,
