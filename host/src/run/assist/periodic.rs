@@ -8,7 +8,7 @@
 //! effort   = rms of both muscles in a cycle, over that of the same cycle without assistance
 //! ```
 //!
-//! The wearer walks in the air, and after [`CHANGE_S`] changes the cadence by 20 %. In other runs the wearer
+//! The wearer walks in the air, and after `CHANGE_S` changes the cadence by 20 %. In other runs the wearer
 //! walks as long and then is limp or resists; energy that the leg gives counts from the second cycle on.
 
 use core::f64::consts::TAU;
