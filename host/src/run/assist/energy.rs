@@ -5,12 +5,12 @@
 //! given = max over t1 < t2 of X(t2) - X(t1)
 //! ```
 //!
-//! Each run draws a wearer with cuffs and neural delay, a payload of up to [`LARGEST_PAYLOAD_KG`] that no
+//! Each run draws a wearer with cuffs and neural delay, a payload of up to `LARGEST_PAYLOAD_KG` that no
 //! model knows, and models at the surface of three sigma of their estimates, in a random direction. The leg
 //! starts at rest in a random posture with the wearer limp or resisting. Energy of an earlier motion is thus
 //! not counted as given.
 //!
-//! At rest: a wearer walks and then holds still. After [`REST_S`] the velocities of a drawn exoskeleton must
+//! At rest: a wearer walks and then holds still. After `REST_S` the velocities of a drawn exoskeleton must
 //! be below one encoder count per 0.1 s; otherwise the friction compensation keeps it moving.
 
 use hal_sim::wearer::muscles::Intention;

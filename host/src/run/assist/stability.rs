@@ -264,7 +264,7 @@ impl CompensationLoop {
         spectral_radius(self.map(compensated))
     }
 
-    /// Largest share of inertia below which every share is stable, at most 1, within [`WIDTH`].
+    /// Largest share of inertia below which every share is stable, at most 1, within `WIDTH`.
     #[must_use]
     pub fn largest_inertia(&self, friction: f64) -> f64 {
         let is_stable = |inertia: f64| self.growth(Compensated { inertia, friction }) < 1.0;
