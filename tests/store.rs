@@ -1,10 +1,14 @@
 //! Persistent data, tested on a flash with a power failure at any byte.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use embassy_futures::block_on;
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use hal_sim::flash::{Flash, FlashError};
 use scarab::leg::{
-    AbsoluteAngle, Constant, CounterDirection, DriveState, ElectricalAngle, EncoderSetting, Fault, FaultCode,
-    Fingerprint, JointZero, StoredCalibration, StoredModel, Stribeck,
+    AbsoluteAngle, Assured, Constant, CounterDirection, DriveState, ElectricalAngle, EncoderSetting, Fault,
+    FaultCode, Fingerprint, JointZero, StoredCalibration, StoredModel, Stribeck,
 };
 use scarab::store::{
     CalibrationRecord, JointProvenance, Key, LoadError, ModelRecord, Permit, Provenance, RecordError,
@@ -55,13 +59,18 @@ fn model(number: u32) -> ModelRecord<2> {
             parameters: [0, 1].map(|joint| core::array::from_fn(|index| value(joint, index))),
             stribeck: [Stribeck { excess: 0.3, velocity: 0.05 }; 2],
             constant: [Constant::Offset, Constant::Asymmetry],
+            assured: Assured {
+                coulomb_nm: [0.25 * number as f32, 1.5],
+                viscous: [0.125, 0.5 * number as f32],
+                inertia_share: 1.0 / (number + 1) as f32,
+            },
         },
         provenance: Provenance {
             firmware: [0, 1, 0],
             generation: number,
             swarm_seed: 0xFEDC_BA98_7654_3210,
             bridge: Some(Celsius(41.5)),
-            worn: Some(number.is_multiple_of(2)),
+            worn: (!number.is_multiple_of(3)).then_some(false),
             joints: [0.44, 0.42].map(|length| JointProvenance {
                 length: Metre(length),
                 torque_per_ampere: NewtonMetrePerAmpere(3.2),
@@ -72,6 +81,13 @@ fn model(number: u32) -> ModelRecord<2> {
     }
 }
 
+/// Model of the worn leg.
+fn worn(number: u32) -> ModelRecord<2> {
+    let mut worn = model(number);
+    worn.provenance.worn = Some(true);
+    worn
+}
+
 fn store<const BYTES: usize>(flash: Flash<BYTES, 2>) -> Store<Flash<BYTES, 2>> {
     Store::new(flash, 0..2 * BYTES as u32).expect("two sectors")
 }
@@ -80,29 +96,36 @@ fn store<const BYTES: usize>(flash: Flash<BYTES, 2>) -> Store<Flash<BYTES, 2>> {
 #[derive(Clone, Debug, PartialEq)]
 struct Content {
     calibrations: [Option<CalibrationRecord>; 2],
-    model: Option<ModelRecord<2>>,
+    /// Models in the order of [`Key::MODELS`].
+    models: [Option<ModelRecord<2>>; 2],
     objects: [Option<Vec<u8>>; 2],
 }
+
+const NOTHING: Content = Content { calibrations: [None; 2], models: [None; 2], objects: [None, None] };
 
 fn content<const BYTES: usize>(flash: Flash<BYTES, 2>) -> Result<(Content, Flash<BYTES, 2>), LoadError> {
     let mut store = store(flash);
     let mut bytes = [0; 512];
     let calibrations = [block_on(store.load(Key::Calibration1))?, block_on(store.load(Key::Calibration2))?];
-    let model = block_on(store.load(Key::Model))?;
+    let models = [block_on(store.load(Key::Model))?, block_on(store.load(Key::WornModel))?];
     let mut objects = [None, None];
     for (object, key) in objects.iter_mut().zip([Key::Objects1, Key::Objects2]) {
         *object = block_on(store.load_bytes(key, &mut bytes))?.map(|length| bytes[..length].to_vec());
     }
-    Ok((Content { calibrations, model, objects }, store.into_flash()))
+    Ok((Content { calibrations, models, objects }, store.into_flash()))
 }
+
+/// Kinds of changes.
+const CHANGES: u32 = 6;
 
 /// Stores the operator's `number`th change.
 fn keep<const BYTES: usize>(store: &mut Store<Flash<BYTES, 2>>, number: u32) -> Result<Saved, SaveError> {
     let permit = permit();
-    match number % 5 {
+    match number % CHANGES {
         0 => block_on(store.save(&permit, Key::Calibration1, &calibration(number))),
         1 => block_on(store.save(&permit, Key::Calibration2, &calibration(number))),
         2 | 3 => block_on(store.save(&permit, Key::Model, &model(number))),
+        4 => block_on(store.save(&permit, Key::WornModel, &worn(number))),
         _ => block_on(store.save_bytes(
             &permit,
             Key::Objects1,
@@ -114,19 +137,19 @@ fn keep<const BYTES: usize>(store: &mut Store<Flash<BYTES, 2>>, number: u32) -> 
 #[test]
 fn stored_data_is_present_after_a_start() {
     let mut first = store(Small::new(1));
-    for number in 0..5 {
+    for number in 0..CHANGES {
         assert_eq!(keep(&mut first, number), Ok(Saved::Written), "{number}");
     }
     let (found, _) = content(first.into_flash()).unwrap();
     assert_eq!(found.calibrations, [Some(calibration(0)), Some(calibration(1))]);
-    assert_eq!(found.model, Some(model(3)));
-    assert_eq!(found.objects, [Some(4_u32.to_le_bytes().repeat(5)), None]);
+    assert_eq!(found.models, [Some(model(3)), Some(worn(4))]);
+    assert_eq!(found.objects, [Some(5_u32.to_le_bytes().repeat(6)), None]);
 }
 
 #[test]
 fn an_empty_flash_contains_no_data() {
     let (found, _) = content(Small::new(1)).unwrap();
-    assert_eq!(found, Content { calibrations: [None; 2], model: None, objects: [None, None] });
+    assert_eq!(found, NOTHING);
 }
 
 #[test]
@@ -228,7 +251,7 @@ fn a_power_cut_during_a_repair_leaves_the_old_or_the_new() {
 #[test]
 fn corrupt_flash_gives_stored_data_or_an_error() {
     let mut kept = store(Small::new(3));
-    for number in 0..5 {
+    for number in 0..CHANGES {
         keep(&mut kept, number).unwrap();
     }
     let flash = kept.into_flash();
@@ -243,7 +266,9 @@ fn corrupt_flash_gives_stored_data_or_an_error() {
                 // Remaining data equals data that was stored once.
                 assert!(found.calibrations[0].is_none() || found.calibrations[0] == whole.calibrations[0]);
                 assert!(found.calibrations[1].is_none() || found.calibrations[1] == whole.calibrations[1]);
-                assert!(found.model.is_none() || found.model == Some(model(2)) || found.model == whole.model);
+                let [unworn, of_worn] = found.models;
+                assert!(unworn.is_none() || unworn == Some(model(2)) || unworn == whole.models[0]);
+                assert!(of_worn.is_none() || of_worn == whole.models[1]);
                 assert!(found.objects[0].is_none() || found.objects[0] == whole.objects[0]);
                 partly += 1;
             }
@@ -259,7 +284,7 @@ fn corrupt_flash_gives_stored_data_or_an_error() {
         let mut foreign = Small::new(1);
         foreign.bytes_mut().fill_with(|| random.byte());
         if let Ok((found, _)) = content(foreign) {
-            assert_eq!(found, Content { calibrations: [None; 2], model: None, objects: [None, None] });
+            assert_eq!(found, NOTHING);
         }
     }
 }
@@ -289,6 +314,48 @@ fn implausible_records_are_neither_stored_nor_read() {
     let found = block_on(store.load::<CalibrationRecord>(Key::Calibration1));
     assert_eq!(found, Err(LoadError::Record(RecordError::Newer { schema: 9 })));
     assert_eq!(block_on(store.save_bytes(&permit(), Key::Objects1, &[0; 500])), Err(SaveError::TooLong));
+}
+
+/// Record of schema 1, which had no confidence bounds.
+fn first_schema(record: &ModelRecord<2>) -> Vec<u8> {
+    let ModelRecord { model, provenance } = record;
+    let mut bytes = vec![1, 0];
+    bytes.extend(model.fingerprint.0.to_le_bytes());
+    bytes.extend(provenance.firmware);
+    bytes.extend(provenance.generation.to_le_bytes());
+    bytes.extend(provenance.swarm_seed.to_le_bytes());
+    bytes.extend(provenance.bridge.expect("known").0.to_le_bytes());
+    bytes.push(provenance.worn.map_or(2, u8::from));
+    for (joint, from) in provenance.joints.iter().enumerate() {
+        let curve = model.stribeck[joint];
+        bytes.extend(model.parameters[joint].iter().flat_map(|value| value.to_le_bytes()));
+        bytes.extend([curve.excess, curve.velocity].iter().flat_map(|value| value.to_le_bytes()));
+        bytes.push(u8::from(model.constant[joint] == Constant::Asymmetry));
+        let numbers = [from.length.0, from.torque_per_ampere.0, from.rms.0, from.mean_absolute.0];
+        bytes.extend(numbers.iter().flat_map(|value| value.to_le_bytes()));
+    }
+    bytes
+}
+
+#[test]
+fn a_model_of_schema_1_has_no_confidence_bounds() {
+    let mut store = store(Small::new(1));
+    for number in [7, 9] {
+        let bytes = first_schema(&model(number));
+        assert_eq!(bytes.len(), 2 + 190);
+        block_on(store.save_bytes(&permit(), Key::Model, &bytes)).unwrap();
+        let mut expected = model(number);
+        assert_ne!(expected.model.assured, Assured::NOTHING);
+        expected.model.assured = Assured::NOTHING;
+        assert_eq!(block_on(store.load(Key::Model)), Ok(Some(expected)));
+    }
+    // Stored again, the record has schema 2 and its bounds.
+    block_on(store.save(&permit(), Key::Model, &model(7))).unwrap();
+    let mut bytes = [0; 512];
+    let length = block_on(store.load_bytes(Key::Model, &mut bytes)).unwrap().expect("stored");
+    assert_eq!((length, &bytes[2..192]), (2 + 210, &first_schema(&model(7))[2..]));
+    assert_eq!((&bytes[..2], &bytes[192..196]), (&[2, 0][..], &1.75_f32.to_le_bytes()[..]));
+    assert_eq!(block_on(store.load(Key::Model)), Ok(Some(model(7))));
 }
 
 #[test]
@@ -333,7 +400,7 @@ fn ten_thousand_models_need_few_erasures() {
         "10,000 models: {worked} bytes programmed, erasures {:?} of 10,000 permitted for a sector",
         flash.erasures()
     );
-    // A record with its log's header has 204 bytes: some 640 in a sector.
+    // A record with its log's header has 224 bytes: some 580 in a sector.
     assert!(flash.erasures().iter().all(|&erased| erased <= 15), "{:?}", flash.erasures());
 }
 
@@ -341,11 +408,12 @@ fn storage(flash: Small) -> Storage<Small, 2> {
     Storage::new(store(flash))
 }
 
-/// Data that a start finds: calibrations, generation of the model, bytes of the first node.
-fn found(flash: Small) -> ([Option<StoredCalibration>; 2], Option<u32>, Vec<u8>, Small) {
+/// Data that a start finds: calibrations, generations of the models, bytes of the first node.
+fn found(flash: Small) -> ([Option<StoredCalibration>; 2], [Option<u32>; 2], Vec<u8>, Small) {
     let mut storage = storage(flash);
     let calibrations = [0, 1].map(|axis| block_on(storage.calibration(axis)));
-    let generation = block_on(storage.model()).expect("readable").map(|kept| kept.provenance.generation);
+    let generation = Key::MODELS
+        .map(|key| block_on(storage.model(key)).expect("readable").map(|kept| kept.provenance.generation));
     let mut bytes = [0; 64];
     let length = block_on(storage.objects(0, &mut bytes)).expect("readable");
     (calibrations, generation, bytes[..length].to_vec(), storage.into_flash())
@@ -359,7 +427,7 @@ fn a_save_stores_objects_calibrations_and_the_model() {
     first.calibrated(0, Some(stored[0]));
     assert_eq!(block_on(first.save(&permit(), [b"hip", b"knee"], 4)), Some(4));
     let (calibrations, generation, objects, flash) = found(first.into_flash());
-    assert_eq!((calibrations, generation, &objects[..]), ([None; 2], None, &b"hip"[..]));
+    assert_eq!((calibrations, generation, &objects[..]), ([None; 2], [None; 2], &b"hip"[..]));
 
     let mut second = storage(flash);
     stored.iter().enumerate().for_each(|(axis, stored)| second.calibrated(axis, Some(*stored)));
@@ -368,7 +436,97 @@ fn a_save_stores_objects_calibrations_and_the_model() {
     // Nothing changed, so nothing new is stored.
     assert_eq!(block_on(second.save(&permit(), [b"HIP", b"knee"], 5)), Some(5));
     let (calibrations, generation, objects, _) = found(second.into_flash());
-    assert_eq!((calibrations, generation, &objects[..]), (stored.map(Some), Some(5), &b"HIP"[..]));
+    assert_eq!((calibrations, generation, &objects[..]), (stored.map(Some), [Some(5), None], &b"HIP"[..]));
+}
+
+#[test]
+fn models_of_the_empty_and_the_worn_leg_are_stored_side_by_side() {
+    let save = |storage: &mut Storage<Small, 2>, before: u32| {
+        block_on(storage.save(&permit(), [b"hip", b"knee"], before))
+    };
+    let mut first = storage(Small::new(1));
+    for accepted in [worn(8), model(7), worn(9)] {
+        first.accept(accepted);
+    }
+    assert_eq!(save(&mut first, 4), Some(6));
+    assert_eq!(save(&mut first, 6), Some(6), "nothing is pending");
+    let stored = Key::MODELS.map(|key| block_on(first.model(key)).expect("readable"));
+    let at = |mut model: ModelRecord<2>, generation| {
+        model.provenance.generation = generation;
+        Some(model)
+    };
+    assert_eq!(stored, [at(model(7), 5), at(worn(9), 6)]);
+
+    // A newer model replaces that of its key only; one of unknown leg replaces the empty leg's.
+    first.accept(worn(10));
+    assert_eq!(save(&mut first, 6), Some(7));
+    let (_, generations, _, flash) = found(first.into_flash());
+    assert_eq!(generations, [Some(5), Some(7)]);
+    let mut second = storage(flash);
+    assert_eq!(model(12).provenance.worn, None);
+    second.accept(model(12));
+    assert_eq!(save(&mut second, 7), Some(8));
+    assert_eq!(found(second.into_flash()).1, [Some(8), Some(7)]);
+}
+
+/// Flash whose power the test switches while a storage uses it.
+#[derive(Clone)]
+struct Shared(Rc<RefCell<Small>>);
+
+impl ErrorType for Shared {
+    type Error = FlashError;
+}
+
+impl ReadNorFlash for Shared {
+    const READ_SIZE: usize = Small::READ_SIZE;
+
+    async fn read(&mut self, offset: u32, into: &mut [u8]) -> Result<(), FlashError> {
+        block_on(self.0.borrow_mut().read(offset, into))
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.borrow().capacity()
+    }
+}
+
+impl NorFlash for Shared {
+    const WRITE_SIZE: usize = Small::WRITE_SIZE;
+    const ERASE_SIZE: usize = Small::ERASE_SIZE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        block_on(self.0.borrow_mut().erase(from, to))
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        block_on(self.0.borrow_mut().write(offset, bytes))
+    }
+}
+
+#[test]
+fn a_failed_save_of_both_models_is_completed_by_the_next() {
+    let save = |cut: Option<u64>| {
+        let flash = Shared(Rc::new(RefCell::new(Small::new(1))));
+        let mut storage = Storage::new(Store::new(flash.clone(), 0..2 * SECTOR as u32).expect("two sectors"));
+        storage.accept(model(1));
+        storage.accept(worn(2));
+        flash.0.borrow_mut().fail_after(cut);
+        let first = block_on(storage.save(&permit(), [b"hip", b"knee"], 4));
+        flash.0.borrow_mut().fail_after(None);
+        let second = block_on(storage.save(&permit(), [b"hip", b"knee"], first.unwrap_or(4)));
+        drop(storage);
+        let flash = flash.0.borrow().clone();
+        let work = flash.worked();
+        (first, second, content(flash).unwrap().0, work)
+    };
+    let (first, second, expected, work) = save(None);
+    assert_eq!((first, second), (Some(6), Some(6)));
+    let generation = |model: &Option<ModelRecord<2>>| model.map(|model| model.provenance.generation);
+    assert_eq!(expected.models.each_ref().map(generation), [Some(5), Some(6)]);
+    for cut in 1..=work {
+        let (first, second, found, _) = save(Some(cut));
+        assert_eq!((first, second), (None, Some(6)), "byte {cut}");
+        assert_eq!(found, expected, "byte {cut}");
+    }
 }
 
 #[test]
@@ -377,14 +535,15 @@ fn erased_data_is_not_stored_again_by_the_next_save() {
     let find = |storage: &mut Storage<Small, 2>| {
         (0..2).for_each(|axis| storage.calibrated(axis, Some(calibration(axis as u32).0)));
         storage.accept(model(3));
+        storage.accept(worn(3));
     };
     find(&mut storage);
-    assert_eq!(block_on(storage.save(&permit(), [b"hip", b"knee"], 0)), Some(1));
+    assert_eq!(block_on(storage.save(&permit(), [b"hip", b"knee"], 0)), Some(2));
     find(&mut storage);
     assert_eq!(block_on(storage.forget(&permit())), Some(0));
     assert_eq!(block_on(storage.save(&permit(), [b"new", b"new"], 0)), Some(0));
     let (calibrations, generation, objects, _) = found(storage.into_flash());
-    assert_eq!((calibrations, generation, &objects[..]), ([None; 2], None, &b"new"[..]));
+    assert_eq!((calibrations, generation, &objects[..]), ([None; 2], [None; 2], &b"new"[..]));
 }
 
 #[test]

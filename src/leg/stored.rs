@@ -16,6 +16,7 @@
 
 use super::configuration::LegConfiguration;
 use super::model::IdentifiedModel;
+use crate::assist::Assured;
 use crate::ident::Constant;
 use crate::model::friction::Stribeck;
 use crate::model::{Fingerprint, LegParameters};
@@ -32,6 +33,8 @@ pub struct StoredModel<const N: usize> {
     pub stribeck: [Stribeck<f32>; N],
     /// See [`IdentifiedModel::constant`].
     pub constant: [Constant; N],
+    /// See [`IdentifiedModel::assured`].
+    pub assured: Assured<N>,
 }
 
 /// Reason why a stored model is rejected.
@@ -55,6 +58,13 @@ pub enum RestoreError {
         /// Index of the joint, from 0.
         joint: usize,
     },
+    /// A lower bound of this joint's friction is negative or not finite.
+    FrictionBound {
+        /// Index of the joint, from 0.
+        joint: usize,
+    },
+    /// The certain share of the inertia is not from 0 to 1.
+    InertiaShare,
 }
 
 impl<const N: usize, const B: usize> LegConfiguration<N, B> {
@@ -79,6 +89,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
             parameters: *model.equivalent_parameters(),
             stribeck: *model.stribeck(),
             constant: *model.constant(),
+            assured: *model.assured(),
         }
     }
 
@@ -101,14 +112,22 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
                 && is_finite(curve.velocity)
                 && curve.velocity > 0.0
         };
-        match stored.stribeck.iter().position(|curve| !is_curve(curve)) {
-            Some(joint) => Err(RestoreError::Stribeck { joint }),
-            None => Ok(IdentifiedModel::of_parameters(
-                self.model.chain,
-                stored.parameters,
-                stored.stribeck,
-                stored.constant,
-            )),
+        if let Some(joint) = stored.stribeck.iter().position(|curve| !is_curve(curve)) {
+            return Err(RestoreError::Stribeck { joint });
         }
+        let Assured { coulomb_nm, viscous, inertia_share } = &stored.assured;
+        let is_bound = |(coulomb, viscous): (&f32, &f32)| {
+            [coulomb, viscous].into_iter().all(|bound| is_finite(*bound) && *bound >= 0.0)
+        };
+        if let Some(joint) = coulomb_nm.iter().zip(viscous).position(|bounds| !is_bound(bounds)) {
+            return Err(RestoreError::FrictionBound { joint });
+        }
+        // False for NaN too.
+        if !(0.0..=1.0).contains(inertia_share) {
+            return Err(RestoreError::InertiaShare);
+        }
+        let (chain, StoredModel { parameters, stribeck, constant, .. }) = (self.model.chain, *stored);
+        let model = IdentifiedModel::of_parameters(chain, parameters, stribeck, constant);
+        Ok(model.with_assured(stored.assured))
     }
 }

@@ -1,4 +1,4 @@
-//! Nonvolatile store: objects of the bus, calibrations, the accepted model.
+//! Nonvolatile store: objects of the bus, calibrations, the accepted models.
 //!
 //! Why: a leg that needs calibration and identification after every power cut is not used, and one with wrong
 //! stored values pushes its wearer wrongly. Therefore only accepted values are stored, and stored values are
@@ -14,7 +14,7 @@
 //! | --- | --- | --- |
 //! | objects of a node of the bus | 1, 2 | the bus |
 //! | calibration of an axis | 3, 4 | `motor::Calibration`, past a check at the motor |
-//! | model and where it comes from | 5 | `LegConfiguration::restore`, past the fingerprint |
+//! | model and where it comes from | 5, of a worn leg 6 | `LegConfiguration::restore`, past the fingerprint |
 //!
 //! **Only with the bridges off.** The STM32F405 has one bank of flash. It stalls while it is written (16 us a
 //! word) or erased (1 to 2 s for 128 KB), and with it every instruction fetch, including the current loop's.
@@ -66,14 +66,26 @@ pub enum Key {
     Calibration1 = 3,
     /// Calibration of the second axis.
     Calibration2 = 4,
-    /// Model of the leg.
+    /// Model of the leg, empty or unknown whether worn. Only this one is the feedforward after a start; a
+    /// worn leg's model serves the assistance alone.
     Model = 5,
+    /// Model of the worn leg.
+    WornModel = 6,
 }
 
 impl Key {
     /// All keys.
-    pub const ALL: [Self; 5] =
-        [Self::Objects1, Self::Objects2, Self::Calibration1, Self::Calibration2, Self::Model];
+    pub const ALL: [Self; 6] = [
+        Self::Objects1,
+        Self::Objects2,
+        Self::Calibration1,
+        Self::Calibration2,
+        Self::Model,
+        Self::WornModel,
+    ];
+
+    /// Keys of the models, see [`ModelRecord::key`].
+    pub const MODELS: [Self; 2] = [Self::Model, Self::WornModel];
 }
 
 /// Proof that the bridges are off: given by a drive with its outputs off, required for every write.

@@ -9,10 +9,11 @@ use core::borrow::BorrowMut;
 use zerocopy::little_endian::{F32, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
+use super::Key;
 use super::record::{LONGEST, RecordError, Storable};
 use crate::leg::{
-    Constant, Fingerprint, Identification, IdentifiedModel, LegConfiguration, MotionWindow,
-    PARAMETERS_PER_JOINT, StoredModel, Stribeck,
+    Assured, Constant, Fingerprint, Identification, IdentifiedModel, LegConfiguration, MotionWindow,
+    PARAMETERS_PER_JOINT, StoredModel, Stribeck, Wearing,
 };
 use crate::units::{Celsius, Metre, NewtonMetre, NewtonMetrePerAmpere};
 
@@ -46,6 +47,14 @@ pub struct Provenance<const N: usize> {
     pub joints: [JointProvenance; N],
 }
 
+impl<const N: usize> Provenance<N> {
+    /// Whether the identified leg was empty or worn, if known.
+    #[must_use]
+    pub fn wearing(&self) -> Option<Wearing> {
+        self.worn.map(|worn| if worn { Wearing::Worn } else { Wearing::Empty })
+    }
+}
+
 /// A model with its provenance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelRecord<const N: usize> {
@@ -73,14 +82,24 @@ const fn version_of(text: &[u8]) -> [u8; 3] {
 }
 
 impl<const N: usize> ModelRecord<N> {
-    /// Builds the stored form of a newly accepted model from its identification, with
-    /// the given generation and seed.
+    /// Key under which the record is stored: a worn leg's model has its own.
+    #[must_use]
+    pub fn key(&self) -> Key {
+        match self.provenance.wearing() {
+            Some(Wearing::Worn) => Key::WornModel,
+            Some(Wearing::Empty) | None => Key::Model,
+        }
+    }
+
+    /// Builds the stored form of a newly accepted model from its identification, with the given generation
+    /// and seed; `wearing` is unknown unless the operator set it.
     pub fn of<const B: usize, const TAPS: usize, const PENDING: usize, W>(
         configuration: &LegConfiguration<N, B>,
         identification: &Identification<N, B, TAPS, PENDING, W>,
         model: &IdentifiedModel<N>,
         generation: u32,
         swarm_seed: u64,
+        wearing: Option<Wearing>,
     ) -> Self
     where
         W: BorrowMut<MotionWindow<f32, N, B>>,
@@ -107,7 +126,7 @@ impl<const N: usize> ModelRecord<N> {
                 generation,
                 swarm_seed,
                 bridge: None,
-                worn: None,
+                worn: wearing.map(|wearing| wearing == Wearing::Worn),
                 joints,
             },
         }
@@ -129,7 +148,7 @@ pub struct JointLayout {
     mean_absolute_nm: F32,
 }
 
-/// Layout in the flash, 28 bytes and the joints'.
+/// Layout in the flash: 28 bytes, 81 for each joint; since schema 2 also 4, and 8 for each joint.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct ModelLayout<const N: usize> {
@@ -142,6 +161,11 @@ pub struct ModelLayout<const N: usize> {
     /// Leg worn: 0 no, 1 yes, 2 unknown.
     worn: u8,
     joints: [JointLayout; N],
+    /// Lower bounds of Coulomb and viscous friction, added in schema 2.
+    coulomb_bound_nm: [F32; N],
+    viscous_bound: [F32; N],
+    /// Certain share of the inertia, added in schema 2.
+    inertia_share: F32,
 }
 
 impl<const N: usize> Default for ModelLayout<N> {
@@ -164,14 +188,17 @@ impl<const N: usize> Default for ModelLayout<N> {
                 rms_nm: zero,
                 mean_absolute_nm: zero,
             }; N],
+            coulomb_bound_nm: [zero; N],
+            viscous_bound: [zero; N],
+            inertia_share: zero,
         }
     }
 }
 
 impl<const N: usize> Storable for ModelRecord<N> {
     type Layout = ModelLayout<N>;
-    const LENGTHS: &'static [usize] = &[{
-        let length = 28 + 81 * N;
+    const LENGTHS: &'static [usize] = &[28 + 81 * N, {
+        let length = 28 + 81 * N + 4 * (2 * N + 1);
         assert!(length == size_of::<ModelLayout<N>>() && length <= LONGEST);
         length
     }];
@@ -198,11 +225,14 @@ impl<const N: usize> Storable for ModelRecord<N> {
                     mean_absolute_nm: F32::new(from.mean_absolute.0),
                 }
             }),
+            coulomb_bound_nm: model.assured.coulomb_nm.map(F32::new),
+            viscous_bound: model.assured.viscous.map(F32::new),
+            inertia_share: F32::new(model.assured.inertia_share),
         }
     }
 
     /// Checks only the closed lists: `LegConfiguration::restore`, the only way into
-    /// use, checks numbers and curves.
+    /// use, checks numbers, curves and bounds.
     fn from_layout(layout: &ModelLayout<N>) -> Result<Self, RecordError> {
         let worn = match layout.worn {
             0 => Some(false),
@@ -228,6 +258,11 @@ impl<const N: usize> Storable for ModelRecord<N> {
                     velocity: joint.stribeck_velocity.get(),
                 }),
                 constant,
+                assured: Assured {
+                    coulomb_nm: layout.coulomb_bound_nm.map(F32::get),
+                    viscous: layout.viscous_bound.map(F32::get),
+                    inertia_share: layout.inertia_share.get(),
+                },
             },
             provenance: Provenance {
                 firmware: layout.firmware,

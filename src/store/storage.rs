@@ -3,12 +3,12 @@
 //! ```text
 //! found       accept(model), calibrated(axis, ..)       pending: stored only when a host asks
 //! "save"      keep(objects, generation)                 objects of all nodes; calibrations, once all axes
-//!                                                       have one; a pending model
+//!                                                       have one; pending models
 //! "load"      forget()                                  erases the store, discards pending results
 //! ```
 //!
-//! After "load", the next "save" stores nothing found before it: a model that a host
-//! discarded must not come back.
+//! The worn leg's model and any other are pending side by side and stored under their own keys. After "load",
+//! the next "save" stores nothing found before it: a model that a host discarded must not come back.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
@@ -21,8 +21,8 @@ const CALIBRATIONS: [Key; 2] = [Key::Calibration1, Key::Calibration2];
 /// Stored parameters and pending results of a leg with `N` joints, two at most; see the module.
 pub struct Storage<F: NorFlash, const N: usize> {
     store: Store<F>,
-    /// Model accepted since the last "save".
-    accepted: Option<ModelRecord<N>>,
+    /// Models accepted since the last "save", in the order of [`Key::MODELS`].
+    accepted: [Option<ModelRecord<N>>; 2],
     /// Calibration that each axis passed, if it can be stored.
     calibrations: [Option<StoredCalibration>; N],
 }
@@ -31,12 +31,16 @@ impl<F: NorFlash, const N: usize> Storage<F, N> {
     /// Manager without pending results.
     #[must_use]
     pub const fn new(store: Store<F>) -> Self {
-        Self { store, accepted: None, calibrations: [None; N] }
+        Self { store, accepted: [None; 2], calibrations: [None; N] }
     }
 
-    /// Sets the pending model; replaces an older pending one.
+    /// Sets the pending model of its key; replaces an older pending one.
     pub fn accept(&mut self, model: ModelRecord<N>) {
-        self.accepted = Some(model);
+        for (key, accepted) in Key::MODELS.into_iter().zip(&mut self.accepted) {
+            if key == model.key() {
+                *accepted = Some(model);
+            }
+        }
     }
 
     /// Sets the pending calibration of an axis; `None` if the axis passed one that cannot be stored.
@@ -58,9 +62,10 @@ impl<F: NorFlash, const N: usize> Storage<F, N> {
         self.store.load::<CalibrationRecord>(key).await.ok()?.map(|record| record.0)
     }
 
-    /// Reads the stored model. The outer `None` means that reading failed, the inner that no model is stored.
-    pub async fn model(&mut self) -> Option<Option<ModelRecord<N>>> {
-        self.store.load(Key::Model).await.ok()
+    /// Reads the stored model of one of [`Key::MODELS`]. The outer `None` means that reading failed, the
+    /// inner that no model is stored.
+    pub async fn model(&mut self, key: Key) -> Option<Option<ModelRecord<N>>> {
+        self.store.load(key).await.ok()
     }
 
     /// Stores these objects of each node and all pending results. Returns the number of models stored so far;
@@ -75,18 +80,23 @@ impl<F: NorFlash, const N: usize> Storage<F, N> {
                 self.store.save(permit, key, &CalibrationRecord(*calibration)).await.ok()?;
             }
         }
-        let Some(mut model) = self.accepted else { return Some(generation) };
-        model.provenance.generation = generation.wrapping_add(1);
-        self.store.save(permit, Key::Model, &model).await.ok()?;
-        self.accepted = None;
-        Some(model.provenance.generation)
+        let mut generation = generation;
+        for accepted in self.accepted.iter().flatten() {
+            let mut model = *accepted;
+            generation = generation.wrapping_add(1);
+            model.provenance.generation = generation;
+            self.store.save(permit, model.key(), &model).await.ok()?;
+        }
+        // Pending until all are stored: a repeated save gives each the same generation.
+        self.accepted = [None; 2];
+        Some(generation)
     }
 
     /// Erases everything. Returns the number of models stored so far, zero; `None` if
     /// the store could not be erased.
     pub async fn forget(&mut self, permit: &Permit) -> Option<u32> {
         self.store.forget_all(permit).await.ok()?;
-        (self.accepted, self.calibrations) = (None, [None; N]);
+        (self.accepted, self.calibrations) = ([None; 2], [None; N]);
         Some(0)
     }
 

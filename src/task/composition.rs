@@ -17,13 +17,14 @@ use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, watchdog};
 use crate::board::{stack, windings};
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::{LONGEST, NodeId, Storing};
-use crate::leg::{Control, Following, StoredCalibration};
+use crate::leg::{Control, Following, IdentifiedModel, StoredCalibration, Wearing};
 use crate::motor::SenseScale;
 use crate::operation::{
     Calibrated, EncoderSettings, Ends, HostEnds, Housekeeper, HousekeepingEnds, HousekeepingSettings, Queues,
     ServoLevel,
 };
 use crate::safety::InhibitReason;
+use crate::store::Key;
 use crate::trace::Record;
 use cortex_m::peripheral::DWT;
 
@@ -199,11 +200,17 @@ fn join(
                 None => device.storing(Storing::Failed),
             }
         }
-        match storage.model(configuration) {
-            Some(Some((model, generation))) if control.adopt(model) => device.set_generation(generation),
-            Some(None) => {}
-            _ => device.storing(Storing::Failed),
+        let mut newest = 0;
+        for key in Key::MODELS {
+            match storage.model(configuration, key) {
+                Some(Some((model, provenance))) if take_model(control, key, model, provenance.wearing()) => {
+                    newest = newest.max(provenance.generation);
+                }
+                Some(None) => {}
+                _ => device.storing(Storing::Failed),
+            }
         }
+        device.set_generation(newest);
     }
     // A controller that does not answer stays off (`can::status`): the operator keeps the leg, and a record
     // reports the fault.
@@ -219,6 +226,18 @@ fn join(
     }
     let following = Some(Following::new(configuration));
     Joined { host: Some(servo), following, results: Some(thread), storage, stored: calibrations }
+}
+
+/// Takes a restored model into use; returns whether `control` took it. Only that of [`Key::Model`] becomes
+/// the feedforward.
+fn take_model(
+    control: &mut Control<JOINTS>,
+    key: Key,
+    model: IdentifiedModel<JOINTS>,
+    wearing: Option<Wearing>,
+) -> bool {
+    (key != Key::Model || control.adopt(model))
+        && wearing.is_none_or(|wearing| control.set_model(wearing, model))
 }
 
 fn introduction(board: &Board) -> Introduction {

@@ -179,7 +179,8 @@ impl Thread {
             Slice::Judged(model) => {
                 state.report = Some(Report::default());
                 if let (Some((bus, leg)), Some(model)) = (&mut self.bus, &model) {
-                    bus.accept(ModelRecord::of(leg, self.identification, model, 0, state.level.seed()));
+                    let (seed, wearing) = (state.level.seed(), state.level.wearing());
+                    bus.accept(ModelRecord::of(leg, self.identification, model, 0, seed, wearing));
                 }
                 true
             }

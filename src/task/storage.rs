@@ -21,13 +21,16 @@ use crate::bus::device::StoreCommand;
 use crate::bus::{LONGEST, StoredNode};
 use crate::leg::{IdentifiedModel, StoredCalibration};
 use crate::operation::{Calibrated, StoreJob, Storing};
-use crate::store::{self, Permit, Store};
+use crate::store::{self, Key, Permit, Provenance, Store};
 
 /// Polling interval of the task, ms.
 const ROUND_MS: u64 = 10;
 
 /// Interval between the steps of a flash write, ms.
 const STEP_MS: u64 = 1;
+
+/// A stored model that belongs to this leg, with its provenance.
+pub type RestoredModel = (IdentifiedModel<JOINTS>, Provenance<JOINTS>);
 
 /// The store and the ends of its queues.
 pub struct StorageTask {
@@ -67,11 +70,11 @@ impl StorageTask {
         core::array::from_fn(|axis| at_once(self.storage.calibration(axis))?)
     }
 
-    /// Stored model and its generation, if there is one; `None` where it cannot be read or belongs
-    /// to another leg.
-    pub fn model(&mut self, leg: &Leg) -> Option<Option<(IdentifiedModel<JOINTS>, u32)>> {
-        match at_once(self.storage.model())?? {
-            Some(record) => Some(Some((leg.restore(&record.model).ok()?, record.provenance.generation))),
+    /// Stored model of one of [`Key::MODELS`] and its provenance, if there is one; `None` where it cannot be
+    /// read or belongs to another leg.
+    pub fn model(&mut self, leg: &Leg, key: Key) -> Option<Option<RestoredModel>> {
+        match at_once(self.storage.model(key))?? {
+            Some(record) => Some(Some((leg.restore(&record.model).ok()?, record.provenance))),
             None => Some(None),
         }
     }

@@ -1,6 +1,6 @@
 //! A stored model offered to a leg after a restart.
 
-use scarab::leg::{RestoreError, StoredModel};
+use scarab::leg::{Assured, RestoreError, StoredModel};
 use scarab::units::{NewtonMetrePerAmpere, Radian};
 
 use super::*;
@@ -84,6 +84,38 @@ fn an_invalid_stribeck_curve_is_refused_with_its_joint() {
         let mut stored = kept();
         (stored.stribeck[joint].excess, stored.stribeck[joint].velocity) = (excess, velocity);
         assert_eq!(context().configuration.restore(&stored), Err(RestoreError::Stribeck { joint }));
+    }
+}
+
+#[test]
+fn invalid_confidence_bounds_are_refused() {
+    let stored = kept();
+    let assured = stored.assured;
+    assert!(
+        assured.inertia_share > 0.5 && assured.coulomb_nm.iter().all(|bound| *bound > 0.0),
+        "{assured:?}"
+    );
+    for value in [-0.01, f32::NAN, f32::INFINITY] {
+        for joint in 0..JOINTS {
+            let mut coulomb = stored;
+            coulomb.assured.coulomb_nm[joint] = value;
+            let mut viscous = stored;
+            viscous.assured.viscous[joint] = value;
+            for stored in [coulomb, viscous] {
+                let refused = context().configuration.restore(&stored);
+                assert_eq!(refused, Err(RestoreError::FrictionBound { joint }), "{value}");
+            }
+        }
+    }
+    for inertia_share in [-0.01, 1.01, f32::NAN, f32::INFINITY] {
+        let stored = StoredModel { assured: Assured { inertia_share, ..assured }, ..stored };
+        assert_eq!(context().configuration.restore(&stored), Err(RestoreError::InertiaShare));
+    }
+    let whole = StoredModel { assured: Assured { inertia_share: 1.0, ..assured }, ..stored };
+    let none = StoredModel { assured: Assured::NOTHING, ..stored };
+    for stored in [whole, none] {
+        let restored = context().configuration.restore(&stored).expect("valid bounds");
+        assert_eq!(restored.assured(), &stored.assured);
     }
 }
 

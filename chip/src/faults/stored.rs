@@ -4,10 +4,10 @@ use std::rc::Rc;
 
 use scarab::leg::{DriveState, Fingerprint};
 use scarab::safety::NoticeCode;
-use scarab::store::ModelRecord;
+use scarab::store::{Key, ModelRecord};
 use scarab_host::base::error::ToolError;
 use scarab_host::base::random::Random;
-use scarab_host::faults::bench::kept::{corrupt, identified, readable, window};
+use scarab_host::faults::bench::kept::{corrupt, identified, readable, window, worn};
 use scarab_host::formats::kept_file::memory::Memory;
 
 use crate::faults::{DAMP_S, Machines, Verdict, begin};
@@ -27,7 +27,7 @@ const WAYS: u64 = 6;
 /// Answer to a request that is refused in this state of the drive (CiA 301: 0800 0022).
 const REFUSED: [u8; 4] = [0x22, 0, 0, 0x08];
 
-/// A board that has stored two generations of objects and of models.
+/// A board that has stored two generations of objects and of models, and a model of the worn leg.
 pub struct Stored {
     flash: Vec<u8>,
     fingerprint: Fingerprint,
@@ -61,11 +61,17 @@ impl Machines<'_> {
         let mut longer = leg.clone();
         longer.joints.iter_mut().for_each(|joint| joint.torque_per_ampere *= 1.1);
         let [older, own, other] = [identified(&leg, 2)?, identified(&leg, 1)?, identified(&longer, 3)?];
-        let kept =
-            [&older, &own].into_iter().all(|model| memory.keep_any(DriveState::SwitchOnDisabled, model));
+        let mut of_worn = worn(&own);
+        of_worn.provenance.generation = older.provenance.generation + 1;
+        let kept = [&older, &own, &of_worn]
+            .into_iter()
+            .all(|model| memory.keep_any(DriveState::SwitchOnDisabled, model));
         let stored = Stored { flash: memory.bytes().to_vec(), fingerprint: own.model.fingerprint, other };
-        let expected =
-            Start { windows: [WINDOWS[1]; 2], generation: own.provenance.generation, reports: [false; 2] };
+        let expected = Start {
+            windows: [WINDOWS[1]; 2],
+            generation: of_worn.provenance.generation,
+            reports: [false; 2],
+        };
         let found = start(self.session, &booted, &stored.flash)?;
         if !kept || found != expected {
             return Err(ToolError::input(format!("a sound memory gives {found:?} instead of {expected:?}")));
@@ -102,14 +108,16 @@ pub fn rotten(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErr
     corrupt(&mut memory, &stored.other, way, &mut random);
     let flash = memory.bytes().to_vec();
     let is_readable = readable(&mut memory);
-    let model = memory.any_model::<JOINTS>();
-    let own = model.filter(|model| model.model.fingerprint == stored.fingerprint);
+    let models = Key::MODELS.map(|key| memory.any_model::<JOINTS>(key));
+    let is_own = |model: &&ModelRecord<JOINTS>| model.model.fingerprint == stored.fingerprint;
+    let own = models.iter().flatten().filter(is_own);
+    let is_foreign = !models.iter().flatten().all(|model| is_own(&model));
     let objects = [0, 1].map(|joint| memory.objects(joint).ok().flatten());
     let default = window(&[]);
     let expected = Start {
         windows: objects.map(|objects| objects.as_deref().map_or(default, window)),
-        generation: own.map_or(0, |model| model.provenance.generation),
-        reports: [!is_readable || model.is_some() && own.is_none(); JOINTS],
+        generation: own.map(|model| model.provenance.generation).max().unwrap_or(0),
+        reports: [!is_readable || is_foreign; JOINTS],
     };
     if !expected.windows.iter().all(|value| WINDOWS.contains(value) || *value == default) {
         return Err(ToolError::input(format!("the store reads what was never stored: {expected:?}")));

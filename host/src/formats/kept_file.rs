@@ -1,4 +1,4 @@
-//! Stored data of a board as a readable file: objects of its nodes, calibrations, and the model.
+//! Stored data of a board as a readable file: objects of its nodes, calibrations, and the models.
 //!
 //! Why: the data can be moved to a replacement board, and calibrations can be viewed or compared without a
 //! bus. A board does not trust the file: it still checks a calibration at the motor and a model against the
@@ -24,6 +24,7 @@ mod text;
 
 pub use flash::FlashContents;
 
+use scarab::store::Key;
 use serde::Deserialize;
 
 use crate::base::error::FileError;
@@ -44,8 +45,10 @@ pub struct KeptFile {
     /// Calibrations of the axes.
     #[serde(default)]
     pub calibration: Vec<AxisCalibration>,
-    /// The accepted model.
+    /// The accepted model of the leg, empty or unknown whether worn.
     pub model: Option<ModelPart>,
+    /// The accepted model of the worn leg.
+    pub worn_model: Option<ModelPart>,
 }
 
 /// Joint of the leg with its node and axis.
@@ -176,6 +179,9 @@ pub struct ModelPart {
     pub bridge_temperature_c: Option<f64>,
     /// Whether a person wore the leg; absent if unknown.
     pub worn: Option<bool>,
+    /// Share of the mass matrix that is certain by 2 sigma, 0 to 1; 0 if unknown.
+    #[serde(default)]
+    pub inertia_lower_bound: f64,
     /// Joints, from the base.
     pub joint: Vec<ModelJoint>,
 }
@@ -192,6 +198,9 @@ pub struct ModelJoint {
     pub stribeck: StribeckPart,
     /// Meaning of the constant column.
     pub constant: ConstantPart,
+    /// Friction that is certain by 2 sigma; 0 if unknown.
+    #[serde(default)]
+    pub friction_lower_bound: FrictionBound,
     /// Distance to the previous joint, m.
     pub length_m: f64,
     /// Torque constant at the joint, N m/A.
@@ -234,6 +243,16 @@ pub struct StribeckPart {
     pub velocity_rad_s: f64,
 }
 
+/// Lower bounds of a joint's friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionBound {
+    /// Coulomb friction, N m.
+    pub coulomb_nm: f64,
+    /// Viscous friction, N m s/rad.
+    pub viscous_nm_s_rad: f64,
+}
+
 /// Meaning of a joint's constant column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -273,7 +292,14 @@ impl KeptFile {
         for axis in &self.calibration {
             axis.to_kept().map_err(|why| format!("calibration of the {}: {why}", axis.joint.name()))?;
         }
-        self.model.as_ref().map_or(Ok(()), |model| model.check().map_err(|why| format!("model: {why}")))
+        for (table, key, model) in
+            [("model", Key::Model, &self.model), ("worn_model", Key::WornModel, &self.worn_model)]
+        {
+            if let Some(model) = model {
+                model.check(key).map_err(|why| format!("{table}: {why}"))?;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::Path;
 
+use scarab::leg::{Assured, Wearing};
 use scarab_host::formats::kept_file::memory::{BYTES, Memory};
 use scarab_host::formats::leg_file::geometry::fingerprint;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
@@ -49,20 +50,25 @@ winding_c = 25.3
 joint_zero = { rotor_counts = -1234, joint_steps = 16383, setting = 200 }
 "#;
 
-fn model(fingerprint: &str) -> String {
+/// Model of this table, `model` or `worn_model`; the hip's ZZ differs.
+fn model(table: &str, fingerprint: &str) -> String {
+    let is_worn = table == "worn_model";
     let joint = |name: &str, zz: &str, more: &str| {
         format!(
-            "\n[[model.joint]]\njoint = \"{name}\"\nparameters = {{ XX = 0.0, XY = 0.0, XZ = -0.0, YY = 0.0, YZ = 0.0, ZZ = {zz}, \
+            "\n[[{table}.joint]]\njoint = \"{name}\"\nparameters = {{ XX = 0.0, XY = 0.0, XZ = -0.0, YY = 0.0, YZ = 0.0, ZZ = {zz}, \
              HX = 2.75, HY = -0.125, HZ = 0.0, M = 0.0, IA = 1e-10, FC = 3.3333333, FV = 1.1, OFF = -0.2 }}\n\
-             stribeck = {{ excess = 0.25, velocity_rad_s = 0.1 }}\nconstant = \"asymmetry\"\nlength_m = 0.43\n\
+             stribeck = {{ excess = 0.25, velocity_rad_s = 0.1 }}\nconstant = \"asymmetry\"\n\
+             friction_lower_bound = {{ coulomb_nm = 3.1, viscous_nm_s_rad = 0.9 }}\nlength_m = 0.43\n\
              torque_per_ampere = 1.9\n{more}"
         )
     };
     let head = format!(
-        "\n[model]\nfingerprint = \"{fingerprint}\"\nfirmware = \"0.1.0\"\ngeneration = 4294967295\n\
-         swarm_seed = \"18446744073709551615\"\nbridge_temperature_c = 41.3\nworn = true\n"
+        "\n[{table}]\nfingerprint = \"{fingerprint}\"\nfirmware = \"0.1.0\"\ngeneration = 4294967295\n\
+         swarm_seed = \"18446744073709551615\"\nbridge_temperature_c = 41.3\nworn = {is_worn}\n\
+         inertia_lower_bound = 0.95\n"
     );
-    let hip = joint("hip", "1.2345679", "rms_nm = 0.31\nmean_absolute_nm = 17.2\n");
+    let zz = if is_worn { "2.5" } else { "1.2345679" };
+    let hip = joint("hip", zz, "rms_nm = 0.31\nmean_absolute_nm = 17.2\n");
     format!("{head}{hip}{}", joint("knee", "0.4", ""))
 }
 
@@ -72,7 +78,8 @@ fn own_fingerprint() -> String {
 
 /// Complete file in a person's formatting.
 fn text() -> String {
-    format!("schema = 1\n{NODES}{CALIBRATIONS}{}", model(&own_fingerprint()))
+    let own = own_fingerprint();
+    format!("schema = 1\n{NODES}{CALIBRATIONS}{}{}", model("model", &own), model("worn_model", &own))
 }
 
 /// Text after the leading comment.
@@ -114,13 +121,26 @@ fn a_repeated_export_after_import_has_the_same_text() {
 }
 
 #[test]
+fn a_file_without_bounds_gives_models_without_bounds() {
+    let folder = Folder::new();
+    let flash = folder.path("flash.bin");
+    let bounds = |line: &&str| !line.contains("lower_bound");
+    let older: Vec<String> = text().lines().filter(bounds).map(|line| format!("{line}\n")).collect();
+    import(&folder, &older.concat(), &flash).ends_with(0);
+    let none = text()
+        .replace("inertia_lower_bound = 0.95", "inertia_lower_bound = 0.0")
+        .replace("coulomb_nm = 3.1, viscous_nm_s_rad = 0.9", "coulomb_nm = 0.0, viscous_nm_s_rad = 0.0");
+    assert_eq!(content(&export(&flash).ends_with(0).printed), none);
+}
+
+#[test]
 fn unnamed_parts_stay_and_calibrations_of_different_age_are_not_mixed() {
     let folder = Folder::new();
     let flash = folder.path("flash.bin");
     let exported = import(&folder, "schema = 1\n", &flash).ends_with(0);
     assert!(exported.printed.starts_with("flash: "), "{}", exported.printed);
     let empty = export(&flash).ends_with(0);
-    assert_eq!((content(&empty.printed), empty.errors.matches("absent: ").count()), ("schema = 1\n", 5));
+    assert_eq!((content(&empty.printed), empty.errors.matches("absent: ").count()), ("schema = 1\n", 6));
 
     import(&folder, &text(), &flash).ends_with(0);
     let knee =
@@ -155,17 +175,23 @@ fn a_board_uses_an_imported_flash_but_refuses_another_leg_s_model() {
         let bytes = fs::read(&flash).expect("written");
         let mut network = network::<2, 13>(&leg, &options, Some(&bytes)).expect("the default leg");
         let board = &mut network.boards()[0];
-        let model = board.rig.leg.control().model().map(|model| *model.equivalent_parameters());
-        (board.nodes().each_ref().map(|node| node.id().number()), model)
+        let control = board.rig.leg.control();
+        let [empty, worn] = [Wearing::Empty, Wearing::Worn].map(|wearing| control.model_of(wearing).copied());
+        assert_eq!(control.model(), empty.as_ref(), "the feedforward");
+        (board.nodes().each_ref().map(|node| node.id().number()), [empty, worn])
     };
-    let (numbers, model_there) = start(&text(), "own.bin");
-    let [hip, knee] = model_there.expect("the model of this leg");
+    let (numbers, models) = start(&text(), "own.bin");
+    let [empty, worn] = models.map(|model| model.expect("a model of this leg"));
+    let [hip, knee] = empty.equivalent_parameters();
     assert_eq!(numbers, [9, 2]);
     assert_eq!((hip[5], hip[6], hip[13], knee[5]), (1.234_567_9, 2.75, -0.2, 0.4));
+    assert_eq!(worn.equivalent_parameters()[0][5], 2.5);
+    let bounds = Assured { coulomb_nm: [3.1; 2], viscous: [0.9; 2], inertia_share: 0.95 };
+    assert_eq!([empty.assured(), worn.assured()], [&bounds; 2]);
 
-    let other = format!("schema = 1\n{NODES}{}", model("0123456789abcdef"));
-    let (numbers, model_there) = start(&other, "other.bin");
-    assert_eq!((numbers, model_there), ([9, 2], None));
+    let [model, worn_model] = ["model", "worn_model"].map(|table| model(table, "0123456789abcdef"));
+    let (numbers, models) = start(&format!("schema = 1\n{NODES}{model}{worn_model}"), "other.bin");
+    assert_eq!((numbers, models), ([9, 2], [None; 2]));
 }
 
 #[test]
@@ -191,8 +217,9 @@ fn damaged_parts_are_reported_and_the_rest_is_exported() {
         let expected = format!("schema = 1\n\n[[node]]\njoint = \"knee\"\nobjects = []\n{CALIBRATIONS}");
         assert_eq!(content(&run.printed), expected);
         let said: Vec<&str> = run.errors.lines().collect();
-        assert!(said.len() == 2 && said[0].starts_with("absent: ") && said[0].ends_with("model"), "{said:?}");
-        assert!(said[1].contains("objects of the hip: ") && said[1].contains(why), "{said:?}");
+        assert!(said.len() == 3 && said[..2].iter().all(|line| line.starts_with("absent: ")), "{said:?}");
+        assert!(said[0].ends_with(" model") && said[1].ends_with("model of the worn leg"), "{said:?}");
+        assert!(said[2].contains("objects of the hip: ") && said[2].contains(why), "{said:?}");
     }
 
     // Unrelated data: nothing is read, and nothing is overwritten.
@@ -283,6 +310,13 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
             "`joint`: knee instead of hip",
         ),
         (&own_fingerprint(), "12345", "`fingerprint` is `12345`; it must be 16 hexadecimal digits"),
+        ("worn = false", "worn = true", "model: `worn` is true: the model of a worn leg is `worn_model`"),
+        ("worn = true", "worn = false", "worn_model: `worn` must be true"),
+        ("worn = true\n", "", "worn_model: `worn` must be true"),
+        ("inertia_lower_bound = 0.95", "inertia_lower_bound = 1.05", "it must be from 0 to 1"),
+        ("inertia_lower_bound = 0.95", "inertia_lower_bound = nan", "`inertia_lower_bound` is NaN"),
+        ("{ coulomb_nm = 3.1", "{ coulomb_nm = -3.1", "`coulomb_nm` is -3.1; it must not be below 0"),
+        (", viscous_nm_s_rad = 0.9", "", "missing field `viscous_nm_s_rad`"),
         ("[model]", "[model", ":"),
     ] {
         let bad = whole.replacen(old, new, 1);

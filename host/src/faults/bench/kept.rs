@@ -10,9 +10,9 @@
 //!
 //! Requirements. F1: each record is the old or the new one; no later record is new where an earlier one is
 //! old; the next save succeeds. F2: each node has the newest of its intact records, or its start values; the
-//! leg has its model likewise, if it is its own. Unreadable and foreign data is reported (5530). F3: with the
-//! drive on the request is refused (0800 0022), no byte of the flash changes, and the leg moves on. With the
-//! drive off the processor stalls, which no check reports as a fault.
+//! leg has its models likewise, if they are its own. Unreadable and foreign data is reported (5530). F3: with
+//! the drive on the request is refused (0800 0022), no byte of the flash changes, and the leg moves on. With
+//! the drive off the processor stalls, which no check reports as a fault.
 //!
 //! The flashes of F1 were filled before, to all levels up to one where the next record requires erasing a
 //! sector.
@@ -22,7 +22,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use scarab::bus::{LONGEST, stored_entries};
-use scarab::leg::{ControlRequest, DriveState, IdentifiedModel, NoticeCode};
+use scarab::leg::{ControlRequest, DriveState, IdentifiedModel, NoticeCode, Wearing};
 use scarab::store::{Key, ModelRecord};
 
 use crate::base::error::ToolError;
@@ -104,22 +104,34 @@ pub fn identified(leg: &LegFile, seed: u64) -> Result<ModelRecord<JOINTS>, ToolE
         pair.tick(request.take(), context.gravity);
         if let Some(model) = pair.leg.control().model() {
             let identification = pair.leg.identification();
-            return Ok(ModelRecord::of(&context.configuration, identification, model, seed as u32, seed));
+            let configuration = &context.configuration;
+            return Ok(ModelRecord::of(configuration, identification, model, seed as u32, seed, None));
         }
     }
     Err(refused().into())
 }
 
-/// All data that a board stores.
+/// The model as that of the worn leg.
+#[must_use]
+pub fn worn(model: &ModelRecord<JOINTS>) -> ModelRecord<JOINTS> {
+    let mut worn = *model;
+    worn.provenance.worn = Some(true);
+    worn
+}
+
+/// All data that a board stores; models in the order of [`Key::MODELS`].
 #[derive(Clone, Debug, PartialEq)]
 struct All {
     objects: [Option<Vec<u8>>; 2],
-    model: Option<ModelRecord<JOINTS>>,
+    models: [Option<ModelRecord<JOINTS>>; 2],
 }
 
 impl All {
     fn of(memory: &mut Memory) -> Self {
-        Self { objects: [0, 1].map(|joint| memory.objects(joint).ok().flatten()), model: memory.any_model() }
+        Self {
+            objects: [0, 1].map(|joint| memory.objects(joint).ok().flatten()),
+            models: Key::MODELS.map(|key| memory.any_model(key)),
+        }
     }
 
     /// Random bytes; the store does not interpret them.
@@ -129,9 +141,11 @@ impl All {
             random.fill_bytes(&mut bytes);
             Some(bytes)
         });
-        let mut model = *model;
-        model.provenance.generation = random.next_u32();
-        Self { objects, model: Some(model) }
+        let models = [*model, worn(model)].map(|mut model| {
+            model.provenance.generation = random.next_u32();
+            Some(model)
+        });
+        Self { objects, models }
     }
 
     /// Stores all in the board's order; returns whether all succeeded.
@@ -140,14 +154,16 @@ impl All {
             self.objects.iter().enumerate().all(|(joint, bytes)| {
                 bytes.as_ref().is_some_and(|bytes| memory.keep_objects(OFF, joint, bytes))
             });
-        objects && self.model.as_ref().is_some_and(|model| memory.keep_any(OFF, model))
+        let write = |model: &Option<_>| model.as_ref().is_some_and(|model| memory.keep_any(OFF, model));
+        objects && self.models.iter().all(write)
     }
 
     /// Returns whether each record comes from one of both sets, and no new record follows an old one.
     fn is_between(&self, old: &Self, new: &Self) -> bool {
         let parts = |all: &Self| {
             let [first, second] = all.objects.clone();
-            [(first, None), (second, None), (None, all.model)]
+            let [model, worn] = all.models;
+            [(first, None), (second, None), (None, model), (None, worn)]
         };
         let (read, old, new) = (parts(self), parts(old), parts(new));
         let mut may_be_new = true;
@@ -243,6 +259,7 @@ struct Rotting {
     board: Board<JOINTS, BASE>,
     /// All stored objects of each node.
     objects: [Vec<Vec<u8>>; 2],
+    /// Stored for the empty and for the worn leg.
     models: [(ModelRecord<JOINTS>, IdentifiedModel<JOINTS>); 2],
     kept: ModelRecord<JOINTS>,
     other: ModelRecord<JOINTS>,
@@ -274,8 +291,10 @@ impl Rotting {
             for (joint, objects) in objects.iter_mut().enumerate() {
                 objects.extend(host.board().memory().objects(joint).ok().flatten());
             }
-            if !host.board().memory().keep_any(OFF, kept) {
-                return Err(refused("its flash does not store a model"));
+            for model in [*kept, worn(kept)] {
+                if !host.board().memory().keep_any(OFF, &model) {
+                    return Err(refused("its flash does not store a model"));
+                }
             }
         }
         let mut models = Vec::new();
@@ -317,14 +336,14 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
         board.memory().keep_objects(OFF, 0, &bytes);
     }
     board.power_on();
-    let used = board.rig.leg.control().model().copied();
+    let control = board.rig.leg.control();
+    let used = [control.model().copied(), control.model_of(Wearing::Worn).copied()];
     let was_kept = (0..2).all(|joint| {
         after.objects[joint].as_ref().is_none_or(|bytes| rotting.objects[joint].contains(bytes))
     });
-    let is_foreign =
-        after.model.is_some_and(|model| model.model.fingerprint != rotting.kept.model.fingerprint);
-    let expected = after.model.filter(|_| !is_foreign).map(|kept| rotting.own(&kept));
-    let is_own = used == expected.flatten();
+    let belongs = |kept: &ModelRecord<JOINTS>| kept.model.fingerprint == rotting.kept.model.fingerprint;
+    let is_foreign = !after.models.iter().flatten().all(belongs);
+    let is_own = used == after.models.map(|kept| rotting.own(&kept.filter(belongs)?));
     let mut host = Host::new(board);
     host.run(20);
     let windows = [host.read(1, WINDOW, 0)?, host.read(2, WINDOW, 0)?];
@@ -351,8 +370,11 @@ pub fn window(bytes: &[u8]) -> u32 {
 
 /// Returns whether every record can be read, whatever its content.
 pub fn readable(memory: &mut Memory) -> bool {
-    let model = memory.with(|store| block_on(store.load::<ModelRecord<JOINTS>>(Key::Model)));
-    (0..2).all(|joint| memory.objects(joint).is_ok()) && model.is_some_and(|model| model.is_ok())
+    (0..2).all(|joint| memory.objects(joint).is_ok())
+        && Key::MODELS.into_iter().all(|key| {
+            let model = memory.with(|store| block_on(store.load::<ModelRecord<JOINTS>>(key)));
+            model.is_some_and(|model| model.is_ok())
+        })
 }
 
 /// Corrupts the memory in one of six ways: bits, stretches, another leg's model, all of it.
@@ -374,7 +396,8 @@ pub fn corrupt(memory: &mut Memory, other: &ModelRecord<JOINTS>, way: u64, rando
             }
         }
         4 => {
-            memory.keep_any(OFF, other);
+            let other = if random.coin() { worn(other) } else { *other };
+            memory.keep_any(OFF, &other);
         }
         _ => bytes.fill([0x00, 0xFF][random.below(2) as usize]),
     }

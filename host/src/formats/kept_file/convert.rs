@@ -3,15 +3,15 @@
 use std::f64::consts::PI;
 
 use scarab::leg::{
-    AbsoluteAngle, Constant, CounterDirection, ElectricalAngle, EncoderSetting, Fingerprint, JointZero,
-    StoredCalibration, StoredModel, Stribeck,
+    AbsoluteAngle, Assured, Constant, CounterDirection, ElectricalAngle, EncoderSetting, Fingerprint,
+    JointZero, StoredCalibration, StoredModel, Stribeck,
 };
-use scarab::store::{CalibrationRecord, JointProvenance, ModelRecord, Provenance};
+use scarab::store::{CalibrationRecord, JointProvenance, Key, ModelRecord, Provenance};
 use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
 
 use crate::formats::kept_file::{
-    AxisCalibration, ConstantPart, Counter, Encoder, Joint, JointZeroPart, ModelJoint, ModelPart, Parameters,
-    StribeckPart,
+    AxisCalibration, ConstantPart, Counter, Encoder, FrictionBound, Joint, JointZeroPart, ModelJoint,
+    ModelPart, Parameters, StribeckPart,
 };
 use crate::formats::temperature::RANGE_C;
 
@@ -140,6 +140,8 @@ struct KeptJoint {
     parameters: [f32; 14],
     stribeck: Stribeck<f32>,
     constant: Constant,
+    coulomb_bound_nm: f32,
+    viscous_bound: f32,
     from: JointProvenance,
 }
 
@@ -162,6 +164,8 @@ impl ModelJoint {
                 ConstantPart::Offset => Constant::Offset,
                 ConstantPart::Asymmetry => Constant::Asymmetry,
             },
+            coulomb_bound_nm: not_below_zero("coulomb_nm", self.friction_lower_bound.coulomb_nm)?,
+            viscous_bound: not_below_zero("viscous_nm_s_rad", self.friction_lower_bound.viscous_nm_s_rad)?,
             from: JointProvenance {
                 length: Metre(finite("length_m", self.length_m)?),
                 torque_per_ampere: NewtonMetrePerAmpere(above_zero(
@@ -200,6 +204,10 @@ impl ModelPart {
                     Constant::Offset => ConstantPart::Offset,
                     Constant::Asymmetry => ConstantPart::Asymmetry,
                 },
+                friction_lower_bound: FrictionBound {
+                    coulomb_nm: (*model.assured.coulomb_nm.get(place)?).into(),
+                    viscous_nm_s_rad: (*model.assured.viscous.get(place)?).into(),
+                },
                 length_m: from.length.0.into(),
                 torque_per_ampere: from.torque_per_ampere.0.into(),
                 rms_nm: known(from.rms.0),
@@ -213,6 +221,7 @@ impl ModelPart {
             swarm_seed: provenance.swarm_seed.to_string(),
             bridge_temperature_c: provenance.bridge.map(|bridge| bridge.0.into()),
             worn: provenance.worn,
+            inertia_lower_bound: model.assured.inertia_share.into(),
             joint: Joint::ALL.into_iter().enumerate().take(N).filter_map(joint).collect(),
         }
     }
@@ -234,6 +243,10 @@ impl ModelPart {
         if let Some(celsius) = self.bridge_temperature_c.filter(|celsius| !(low..=high).contains(celsius)) {
             return Err(format!("`bridge_temperature_c` is {celsius}; it must be from {low} to {high}"));
         }
+        let inertia_share = not_below_zero("inertia_lower_bound", self.inertia_lower_bound)?;
+        if inertia_share > 1.0 {
+            return Err(format!("`inertia_lower_bound` is {inertia_share}; it must be from 0 to 1"));
+        }
         let fault = |key: &str, value: &str, why: &str| format!("`{key}` is `{value}`; it must be {why}");
         Ok(ModelRecord {
             model: StoredModel {
@@ -242,6 +255,11 @@ impl ModelPart {
                 parameters: joints.each_ref().map(|joint| joint.parameters),
                 stribeck: joints.each_ref().map(|joint| joint.stribeck),
                 constant: joints.each_ref().map(|joint| joint.constant),
+                assured: Assured {
+                    coulomb_nm: joints.each_ref().map(|joint| joint.coulomb_bound_nm),
+                    viscous: joints.each_ref().map(|joint| joint.viscous_bound),
+                    inertia_share,
+                },
             },
             provenance: Provenance {
                 firmware: version(&self.firmware)
@@ -257,7 +275,13 @@ impl ModelPart {
         })
     }
 
-    pub(super) fn check(&self) -> Result<(), String> {
+    /// Checks the part as the model of this key.
+    pub(super) fn check(&self, key: Key) -> Result<(), String> {
+        match (key == Key::WornModel, self.worn == Some(true)) {
+            (true, false) => return Err("`worn` must be true".into()),
+            (false, true) => return Err("`worn` is true: the model of a worn leg is `worn_model`".into()),
+            _ => {}
+        }
         match self.joint.len() {
             1 => self.to_kept::<1>().map(drop),
             3 => self.to_kept::<3>().map(drop),

@@ -13,6 +13,8 @@ use crate::formats::kept_file::{
 
 const OBJECTS: [(Joint, Key); 2] = [(Joint::Hip, Key::Objects1), (Joint::Knee, Key::Objects2)];
 const CALIBRATIONS: [(Joint, Key); 2] = [(Joint::Hip, Key::Calibration1), (Joint::Knee, Key::Calibration2)];
+/// Name of each model in messages, and its key.
+const MODELS: [(&str, Key); 2] = [("model", Key::Model), ("model of the worn leg", Key::WornModel)];
 const LONGEST: usize = 402;
 
 /// Contents of a flash.
@@ -54,21 +56,21 @@ fn load<R: Storable>(memory: &mut Memory, key: Key) -> Result<Option<R>, LoadErr
     memory.with(|store| block_on(store.load::<R>(key))).unwrap_or(Err(LoadError::Flash))
 }
 
-fn model<const N: usize>(memory: &mut Memory) -> Result<Option<ModelPart>, LoadError> {
-    Ok(load::<ModelRecord<N>>(memory, Key::Model)?.map(|kept| ModelPart::of_kept(&kept)))
+fn model<const N: usize>(memory: &mut Memory, key: Key) -> Result<Option<ModelPart>, LoadError> {
+    Ok(load::<ModelRecord<N>>(memory, key)?.map(|kept| ModelPart::of_kept(&kept)))
 }
 
 /// Model with as many joints as the length of its record.
-fn any_model(memory: &mut Memory) -> Result<Option<ModelPart>, String> {
+fn any_model(memory: &mut Memory, key: Key) -> Result<Option<ModelPart>, String> {
     let other = |found| found == Err(LoadError::Record(RecordError::Length));
-    let mut found = model::<2>(memory);
+    let mut found = model::<2>(memory, key);
     for of_another in [model::<1>, model::<3>] {
         if other(found.clone()) {
-            found = of_another(memory);
+            found = of_another(memory, key);
         }
     }
     let found = found.map_err(load_words)?;
-    found.map(|part| part.check().map(|()| part)).transpose()
+    found.map(|part| part.check(key).map(|()| part)).transpose()
 }
 
 fn node(memory: &mut Memory, joint: Joint, key: Key) -> Result<Option<NodeObjects>, String> {
@@ -136,8 +138,11 @@ impl KeptFile {
             let part = found.note(&format!("calibration of the {}", joint.name()), part);
             found.file.calibration.extend(part);
         }
-        let part = any_model(&mut memory.clone());
-        found.file.model = found.note("model", part);
+        let [model, worn_model] = MODELS.map(|(what, key)| {
+            let part = any_model(&mut memory.clone(), key);
+            found.note(what, part)
+        });
+        (found.file.model, found.file.worn_model) = (model, worn_model);
         if found.absent.len() == Key::ALL.len() {
             found.damaged.extend(foreign(memory));
         }
@@ -178,12 +183,15 @@ impl KeptFile {
                 saved(memory.with(|store| block_on(store.save(&permit, key, &kept))), &what)?;
             }
         }
-        let Some(model) = &self.model else { return Ok(()) };
-        match model.joint.len() {
-            1 => keep_model(memory, &permit, &model.to_kept::<1>()?),
-            3 => keep_model(memory, &permit, &model.to_kept::<3>()?),
-            _ => keep_model(memory, &permit, &model.to_kept::<2>()?),
+        for ((what, _), model) in MODELS.into_iter().zip([&self.model, &self.worn_model]) {
+            let Some(model) = model else { continue };
+            match model.joint.len() {
+                1 => keep_model(memory, &permit, &model.to_kept::<1>()?, what)?,
+                3 => keep_model(memory, &permit, &model.to_kept::<3>()?, what)?,
+                _ => keep_model(memory, &permit, &model.to_kept::<2>()?, what)?,
+            }
         }
+        Ok(())
     }
 }
 
@@ -191,7 +199,8 @@ fn keep_model<const N: usize>(
     memory: &mut Memory,
     permit: &Permit,
     kept: &ModelRecord<N>,
+    what: &str,
 ) -> Result<(), String> {
-    let save = |store: &mut Store<Cells>| block_on(store.save(permit, Key::Model, kept));
-    saved(memory.with(save), "model")
+    let save = |store: &mut Store<Cells>| block_on(store.save(permit, kept.key(), kept));
+    saved(memory.with(save), what)
 }

@@ -7,7 +7,7 @@ use embassy_futures::block_on;
 use hal_sim::flash::Flash;
 use scarab::bus::LONGEST;
 use scarab::leg::{DriveState, IdentifiedModel, LegConfiguration};
-use scarab::store::{Key, ModelRecord, Permit, Store};
+use scarab::store::{Key, ModelRecord, Permit, Provenance, Store};
 
 /// Size and number of the sectors used on the STM32F405.
 pub const SECTOR: usize = 128 * 1024;
@@ -25,6 +25,12 @@ pub struct Memory {
 }
 
 const KEYS: [Key; 2] = [Key::Objects1, Key::Objects2];
+
+/// Name of a stored model in messages.
+#[must_use]
+pub fn model_name(key: Key) -> &'static str {
+    if key == Key::WornModel { "the stored model of the worn leg" } else { "the stored model" }
+}
 
 impl Memory {
     /// Creates a flash with this content, or an erased one.
@@ -60,15 +66,16 @@ impl Memory {
         self.flash.as_ref().map_or((0, 0), |flash| (flash.worked(), flash.erasures().iter().sum()))
     }
 
-    /// Returns the stored model without a check of its leg; `None` if there is none or it cannot be read.
-    pub fn any_model<const N: usize>(&mut self) -> Option<ModelRecord<N>> {
-        self.with(|store| block_on(store.load::<ModelRecord<N>>(Key::Model)))?.ok().flatten()
+    /// Returns the stored model of this key without a check of its leg; `None` if there is none or it cannot
+    /// be read.
+    pub fn any_model<const N: usize>(&mut self, key: Key) -> Option<ModelRecord<N>> {
+        self.with(|store| block_on(store.load::<ModelRecord<N>>(key)))?.ok().flatten()
     }
 
-    /// Stores any model.
+    /// Stores any model under its key.
     pub fn keep_any<const N: usize>(&mut self, state: DriveState, kept: &ModelRecord<N>) -> bool {
         let Some(permit) = Permit::of(state) else { return false };
-        self.with(|store| block_on(store.save(&permit, Key::Model, kept))).is_some_and(|saved| saved.is_ok())
+        self.with(|store| block_on(store.save(&permit, kept.key(), kept))).is_some_and(|saved| saved.is_ok())
     }
 
     /// Content of the flash, for fault injection.
@@ -100,16 +107,21 @@ impl Memory {
         self.with(|store| block_on(store.save_bytes(&permit, *key, bytes))).is_some_and(|saved| saved.is_ok())
     }
 
-    /// Returns the stored model with its generation, if it belongs to this leg.
+    /// Returns the stored model of this key with its provenance, if it belongs to this leg.
+    ///
+    /// # Errors
+    /// Reason why it cannot be read or does not belong to this leg.
     pub fn model<const N: usize, const B: usize>(
         &mut self,
         configuration: &LegConfiguration<N, B>,
-    ) -> Result<Option<(IdentifiedModel<N>, u32)>, String> {
-        let kept = self.with(|store| block_on(store.load::<ModelRecord<N>>(Key::Model)));
-        let kept = kept.transpose().map_err(|why| format!("the stored model: {why:?}"))?.flatten();
+        key: Key,
+    ) -> Result<Option<(IdentifiedModel<N>, Provenance<N>)>, String> {
+        let kept = self.with(|store| block_on(store.load::<ModelRecord<N>>(key)));
+        let kept = kept.transpose().map_err(|why| format!("{}: {why:?}", model_name(key)))?.flatten();
         let Some(kept) = kept else { return Ok(None) };
-        let model = configuration.restore(&kept.model).map_err(|why| format!("the stored model: {why:?}"))?;
-        Ok(Some((model, kept.provenance.generation)))
+        let model =
+            configuration.restore(&kept.model).map_err(|why| format!("{}: {why:?}", model_name(key)))?;
+        Ok(Some((model, kept.provenance)))
     }
 
     /// Erases everything; returns whether this succeeded.

@@ -5,8 +5,8 @@ use std::fmt::Display;
 use crate::base::toml_file::quoted;
 use crate::formats::kept_file::objects::{is_pattern, is_wide};
 use crate::formats::kept_file::{
-    AxisCalibration, ConstantPart, Counter, JointZeroPart, KeptFile, ModelJoint, ModelPart, NodeObjects,
-    ObjectValue,
+    AxisCalibration, ConstantPart, Counter, FrictionBound, JointZeroPart, KeptFile, ModelJoint, ModelPart,
+    NodeObjects, ObjectValue,
 };
 
 const HEAD: &str = "\
@@ -22,7 +22,8 @@ impl KeptFile {
         line(&mut out, "schema", self.schema);
         self.node.iter().for_each(|part| node(&mut out, part));
         self.calibration.iter().for_each(|part| calibration(&mut out, part));
-        self.model.iter().for_each(|part| model(&mut out, part));
+        self.model.iter().for_each(|part| model(&mut out, "model", part));
+        self.worn_model.iter().for_each(|part| model(&mut out, "worn_model", part));
         out
     }
 }
@@ -86,19 +87,20 @@ fn calibration(out: &mut String, axis: &AxisCalibration) {
     }
 }
 
-fn model(out: &mut String, model: &ModelPart) {
-    *out += "\n[model]\n";
+fn model(out: &mut String, table: &str, model: &ModelPart) {
+    *out += &format!("\n[{table}]\n");
     line(out, "fingerprint", quoted(&model.fingerprint));
     line(out, "firmware", quoted(&model.firmware));
     line(out, "generation", model.generation);
     line(out, "swarm_seed", quoted(&model.swarm_seed));
     model.bridge_temperature_c.iter().for_each(|celsius| line(out, "bridge_temperature_c", float(*celsius)));
     model.worn.iter().for_each(|worn| line(out, "worn", worn));
-    model.joint.iter().for_each(|joint| model_joint(out, joint));
+    line(out, "inertia_lower_bound", float(model.inertia_lower_bound));
+    model.joint.iter().for_each(|joint| model_joint(out, table, joint));
 }
 
-fn model_joint(out: &mut String, joint: &ModelJoint) {
-    *out += "\n[[model.joint]]\n";
+fn model_joint(out: &mut String, table: &str, joint: &ModelJoint) {
+    *out += &format!("\n[[{table}.joint]]\n");
     line(out, "joint", quoted(joint.joint.name()));
     let parameters = scarab::model::Parameter::ALL.into_iter().zip(joint.parameters.to_array());
     let parameters: Vec<String> =
@@ -111,6 +113,10 @@ fn model_joint(out: &mut String, joint: &ModelJoint) {
         ConstantPart::Asymmetry => "asymmetry",
     };
     line(out, "constant", quoted(constant));
+    let FrictionBound { coulomb_nm, viscous_nm_s_rad } = joint.friction_lower_bound;
+    let (coulomb, viscous) = (float(coulomb_nm), float(viscous_nm_s_rad));
+    let bound = format!("{{ coulomb_nm = {coulomb}, viscous_nm_s_rad = {viscous} }}");
+    line(out, "friction_lower_bound", bound);
     line(out, "length_m", float(joint.length_m));
     line(out, "torque_per_ampere", float(joint.torque_per_ampere));
     joint.rms_nm.iter().for_each(|rms| line(out, "rms_nm", float(*rms)));

@@ -28,6 +28,7 @@ use scarab::bus::identification::Results;
 use scarab::hal::{AxisSample, CURRENT_RATE_HZ, Frame, JointSample};
 use scarab::leg::{
     AbsoluteAngle, AssistLaw, AxisFault, Control, ControlOutput, ControlRequest, Following, JointZero,
+    Wearing,
 };
 use scarab::motor::{Chopper, SenseScale};
 use scarab::operation::{
@@ -272,6 +273,12 @@ impl<const N: usize> Levels<N> {
     #[must_use]
     pub fn seed(&self) -> u64 {
         self.identification.seed()
+    }
+
+    /// Whether the leg of this identification is empty or worn, if known.
+    #[must_use]
+    pub fn wearing(&self) -> Option<Wearing> {
+        self.identification.wearing()
     }
 
     /// Current tick, level 0, of one axis in a period.

@@ -18,14 +18,14 @@ use scarab::bus::device::Device;
 use scarab::bus::drive::{AxisConstants, Mode};
 use scarab::bus::{Frame, Identity, Node, NodeId, Storing};
 use scarab::hal::{Contacts, Controller};
-use scarab::leg::ControlRequest;
+use scarab::leg::{ControlRequest, IdentifiedModel, Wearing};
 use scarab::operation::Slice;
 use scarab::safety::PowerRequest;
 use scarab::servo::SERVO_RATE_HZ;
-use scarab::store::ModelRecord;
+use scarab::store::{Key, ModelRecord};
 
 use crate::base::error::ToolError;
-use crate::formats::kept_file::memory::Memory;
+use crate::formats::kept_file::memory::{Memory, model_name};
 use crate::formats::leg_file::{EncoderFile, LegFile};
 use crate::rig::bus::storing::Flashing;
 use crate::rig::bus::wire::Mailbox;
@@ -143,14 +143,18 @@ impl<const N: usize, const B: usize> Board<N, B> {
     /// returns the reasons.
     fn recall(&mut self) -> Vec<String> {
         let mut lost = Vec::new();
-        match self.memory.model(&self.context.configuration) {
-            Ok(Some((model, generation))) if self.rig.leg.adopt(model) => {
-                self.device.set_generation(generation);
+        let mut newest = 0;
+        for key in Key::MODELS {
+            match self.memory.model(&self.context.configuration, key) {
+                Ok(Some((model, provenance))) if self.take_model(key, model, provenance.wearing()) => {
+                    newest = newest.max(provenance.generation);
+                }
+                Ok(Some(_)) => lost.push(format!("{}: not accepted", model_name(key))),
+                Ok(None) => {}
+                Err(why) => lost.push(why),
             }
-            Ok(Some(_)) => lost.push("the stored model: not accepted".into()),
-            Ok(None) => {}
-            Err(why) => lost.push(why),
         }
+        self.device.set_generation(newest);
         for joint in 0..N {
             match self.memory.objects(joint) {
                 Ok(bytes) => self.device.recall(joint, &bytes.unwrap_or_default()),
@@ -161,6 +165,12 @@ impl<const N: usize, const B: usize> Board<N, B> {
             self.device.storing(Storing::Failed);
         }
         lost
+    }
+
+    /// Takes a restored model into use as the board does; returns whether the leg took it.
+    fn take_model(&mut self, key: Key, model: IdentifiedModel<N>, wearing: Option<Wearing>) -> bool {
+        let leg = &mut self.rig.leg;
+        (key != Key::Model || leg.adopt(model)) && wearing.is_none_or(|wearing| leg.set_model(wearing, model))
     }
 
     /// Receives a frame of another controller at its end.
@@ -220,9 +230,10 @@ impl<const N: usize, const B: usize> Board<N, B> {
         for period in 0..u64::from(PERIODS_PER_TICK) {
             self.rig.advance();
             if let Slice::Judged(Some(model)) = core::mem::replace(&mut self.rig.slice, Slice::Idle) {
-                let (identification, seed) = (self.rig.leg.identification(), self.rig.board.seed());
-                let model = ModelRecord::of(&self.context.configuration, identification, &model, 0, seed);
-                self.flashing.accept(model);
+                let (identification, level) = (self.rig.leg.identification(), &self.rig.board);
+                let (configuration, seed) = (&self.context.configuration, level.seed());
+                let record = ModelRecord::of(configuration, identification, &model, 0, seed, level.wearing());
+                self.flashing.accept(record);
             }
             if self.rig.board.registers.bus_due {
                 self.round(now_ns + period * PERIOD_NS);

@@ -329,6 +329,7 @@ mod tests {
     use crate::rig::options::{DriveModel, SimulationOptions};
     use crate::rig::pair::Context;
     use scarab::hal::SERVO_RATE_HZ;
+    use scarab::leg::Wearing;
 
     fn host(leg: &LegFile) -> Host {
         let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
@@ -363,6 +364,50 @@ mod tests {
         assert_eq!(ask(22_222, save, true), (codes(0x5530), 11_111));
         assert_eq!(ask(33_333, load, true), (codes(0x5530), 11_111));
         assert_eq!(ask(44_444, load, false), (codes(0), 87_266));
+    }
+
+    /// Identifies the leg as empty (1) or worn (2); afterwards the drive is off.
+    fn identify(host: &mut Host, wearing: u32) {
+        const LONGEST_S: u32 = 300;
+        host.write(1, 0x2100, 13, wearing, 1).expect("an idle leg");
+        assert!(enable(host));
+        host.write(1, 0x2100, 1, 1, 1).expect("an enabled leg");
+        host.run(SECOND);
+        // Idle, or following the host's targets.
+        let idles = |host: &mut Host| matches!(host.read(1, 0x2100, 2), Ok(0 | 9));
+        let ended = (0..LONGEST_S).any(|_| {
+            host.run(SECOND);
+            idles(host)
+        });
+        let verdict = host.read(1, 0x2100, 8).expect("a verdict");
+        assert!(ended && verdict == 1, "not accepted: {verdict}, {:x?}", host.emergencies);
+        NODES.into_iter().for_each(|node| host.command(node, 0));
+        host.run(SECOND);
+        assert!(!host.is_enabled());
+    }
+
+    #[test]
+    fn models_of_the_empty_and_the_worn_leg_survive_a_restart() {
+        let mut host = host(&LegFile::load(DEFAULT_LEG).expect("shipped"));
+        host.network.send(Frame::new(START, &[1, 0]));
+        host.run(40);
+        let identified = [(1, Wearing::Empty), (2, Wearing::Worn)].map(|(value, wearing)| {
+            identify(&mut host, value);
+            *host.rig().leg.control().model_of(wearing).expect("accepted")
+        });
+        assert_ne!(identified[0], identified[1]);
+        host.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4).expect("a drive that is off");
+        host.run(8);
+        while host.board().flashing().is_under_way() {
+            host.run(1);
+        }
+        host.board().power_on();
+        host.run(40);
+        assert_eq!(host.read(1, 0x2100, 7).expect("a counter"), 2);
+        let control = host.rig().leg.control();
+        let restored = [Wearing::Empty, Wearing::Worn].map(|wearing| control.model_of(wearing).copied());
+        assert_eq!(restored, identified.map(Some));
+        assert_eq!(control.model(), Some(&identified[0]), "the feedforward");
     }
 
     #[test]

@@ -11,7 +11,7 @@ use scarab::bus::device::StoreCommand;
 use scarab::bus::{Frame, StoredNode};
 use scarab::leg::DriveState;
 use scarab::operation::{Inhibit, Storing};
-use scarab::store::ModelRecord;
+use scarab::store::{Key, ModelRecord};
 
 use crate::formats::kept_file::memory::{Memory, SECTOR};
 use crate::rig::board::levels::Levels;
@@ -33,19 +33,19 @@ pub struct StorageRequest<const N: usize> {
     pub what: StoreCommand,
     /// Objects of each node.
     pub objects: [StoredNode; N],
-    /// An accepted model that is not stored yet.
-    pub model: Option<ModelRecord<N>>,
+    /// Accepted models that are not stored yet, in the order of [`Key::MODELS`].
+    pub models: [Option<ModelRecord<N>>; 2],
 }
 
 impl<const N: usize> StorageRequest<N> {
-    /// Stores all objects and a model, or erases everything; returns whether this succeeded.
+    /// Stores all objects and models, or erases everything; returns whether this succeeded.
     fn change(&self, memory: &mut Memory, state: DriveState) -> bool {
         match self.what {
             StoreCommand::Defaults => memory.forget(state),
             StoreCommand::All => {
                 let mut nodes = self.objects.iter().enumerate();
                 nodes.all(|(joint, kept)| memory.keep_objects(state, joint, kept.bytes()))
-                    && self.model.is_none_or(|model| memory.keep_any(state, &model))
+                    && self.models.iter().flatten().all(|model| memory.keep_any(state, model))
             }
         }
     }
@@ -55,7 +55,9 @@ impl<const N: usize> StorageRequest<N> {
     pub fn generation(&self) -> Option<u32> {
         match self.what {
             StoreCommand::Defaults => Some(0),
-            StoreCommand::All => self.model.map(|model| model.provenance.generation),
+            StoreCommand::All => {
+                self.models.iter().flatten().next_back().map(|model| model.provenance.generation)
+            }
         }
     }
 }
@@ -65,8 +67,8 @@ impl<const N: usize> StorageRequest<N> {
 pub struct Flashing<const N: usize> {
     storing: Storing,
     requested: Option<StorageRequest<N>>,
-    /// An accepted model that is not stored yet.
-    accepted: Option<ModelRecord<N>>,
+    /// Accepted models that are not stored yet, in the order of [`Key::MODELS`].
+    accepted: [Option<ModelRecord<N>>; 2],
     /// Whether the flash was changed.
     has_kept: bool,
     /// Time of the next step.
@@ -90,7 +92,7 @@ impl<const N: usize> Flashing<N> {
         Self {
             storing: Storing::new(),
             requested: None,
-            accepted: None,
+            accepted: [None; 2],
             has_kept: false,
             due_ns: 0,
             until_ns: 0,
@@ -110,7 +112,11 @@ impl<const N: usize> Flashing<N> {
 
     /// Sets the model to be stored with the next request.
     pub(super) fn accept(&mut self, model: ModelRecord<N>) {
-        self.accepted = Some(model);
+        for (key, accepted) in Key::MODELS.into_iter().zip(&mut self.accepted) {
+            if key == model.key() {
+                *accepted = Some(model);
+            }
+        }
     }
 
     /// Whether the processor stalls.
@@ -154,11 +160,13 @@ impl<const N: usize> Flashing<N> {
             return self.storing.look_after(inhibit, registers);
         };
         if self.requested.is_none() {
-            let model = self.accepted.map(|mut model| {
-                model.provenance.generation = keep.generation + 1;
-                model
-            });
-            self.requested = Some(StorageRequest { what: keep.what, objects: keep.objects, model });
+            let mut models = self.accepted;
+            let mut generation = keep.generation;
+            for model in models.iter_mut().flatten() {
+                generation = generation.wrapping_add(1);
+                model.provenance.generation = generation;
+            }
+            self.requested = Some(StorageRequest { what: keep.what, objects: keep.objects, models });
         }
         let Some(requested) = &self.requested else { return };
         let done = self.storing.step(inhibit, signals.permission(), registers, || {
@@ -175,7 +183,7 @@ impl<const N: usize> Flashing<N> {
         let Some(done) = done else { return };
         if let Some(generation) = requested.generation().filter(|_| done) {
             keep.generation = generation;
-            self.accepted = None;
+            self.accepted = [None; 2];
             if requested.what == StoreCommand::Defaults {
                 signals.forget_stored();
             }
