@@ -10,10 +10,13 @@ use clap::{Args, Parser, Subcommand};
 use scarab_host::base::error::ToolError;
 use scarab_host::base::files;
 use scarab_host::base::number::Number;
+use scarab_host::cli::assist::ModeArgument;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_host::image::build;
+use scarab_host::run::assist::subject::Cuffs;
 use serde::Serialize;
 
+use crate::assist::{self, AssistComparison};
 use crate::image::Image;
 use crate::machine::Options;
 use crate::report::{ChipReport, LEVELS, LoadReport};
@@ -33,6 +36,9 @@ struct Arguments {
 enum Command {
     /// Start the board and operate it by its contacts.
     Run(RunArguments),
+    /// Let the image assist a walking wearer, and compare the interaction torque with the host's complete
+    /// drives; exit code 3 if they differ by more than 5 %.
+    Assist(AssistArguments),
     /// Open the emergency stop's contact at many phases of the PWM period.
     Stops(StopArguments),
     /// Measure the sampling instants of both axes.
@@ -90,6 +96,25 @@ struct RunArguments {
     /// Time to run after the last step, s.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     seconds: f64,
+}
+
+#[derive(Args, Debug)]
+struct AssistArguments {
+    /// Shipped leg or leg file with a wearer (`segments`).
+    #[arg(long, default_value = DEFAULT_LEG)]
+    leg: String,
+    /// Mode; may be repeated. All three unless given.
+    #[arg(long, value_enum)]
+    mode: Vec<ModeArgument>,
+    /// Seed of noise and identification.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Cycles per instruction, 1 to 2.
+    #[arg(long, default_value_t = 1.34, value_parser = factor)]
+    time_factor: f64,
+    /// Write the result as JSON here.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -165,6 +190,7 @@ fn factor(text: &str) -> Result<f64, String> {
 pub fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run(arguments) => run(&arguments),
+        Command::Assist(arguments) => run_assist(&arguments),
         Command::Stops(arguments) => run_stops(&arguments),
         Command::Sampling(common) => run_sampling(&common),
         Command::StoreCuts(common) => run_store_cuts(&common),
@@ -333,6 +359,33 @@ fn print_run(report: &ChipReport, wall_s: f64) {
         report.simulated_s / wall_s,
         1e-6 * report.instructions as f64 / wall_s
     );
+}
+
+fn run_assist(arguments: &AssistArguments) -> Result<bool, ToolError> {
+    let leg = LegFile::load(&arguments.leg)?;
+    let options = Options { time_factor: arguments.time_factor, ..Options::default() };
+    let all = [ModeArgument::Transparent, ModeArgument::Weight, ModeArgument::Periodic];
+    let modes = if arguments.mode.is_empty() { &all[..] } else { &arguments.mode };
+    // Firm cuffs: their resonance lies above a gait's harmonics, where small differences would grow.
+    let cuffs = Cuffs { stiffness: 20e3, damping: 400.0 };
+    let mut found = Vec::new();
+    for mode in modes {
+        let comparison = assist::compare(&leg, (*mode).into(), &cuffs, arguments.seed, &options)?;
+        println!(
+            "{:<12} interaction torque, N m rms: image {:.3} {:.3}, host {:.3} {:.3}; phases {}; law {:.1} % of the processor; missed {}",
+            comparison.mode,
+            comparison.image_rms_nm[0],
+            comparison.image_rms_nm[1],
+            comparison.host_rms_nm[0],
+            comparison.host_rms_nm[1],
+            comparison.image_phases.join(" "),
+            100.0 * comparison.law_share,
+            comparison.missed_current_ticks,
+        );
+        found.push(comparison);
+    }
+    write(arguments.json.as_deref(), &found)?;
+    Ok(found.iter().all(AssistComparison::is_good))
 }
 
 fn run_stops(arguments: &StopArguments) -> Result<bool, ToolError> {

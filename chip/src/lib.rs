@@ -16,6 +16,7 @@
 //! | [`machine`] | the processor core around the chip; save and restore |
 //! | [`rtt`] | records of the image, as a debug probe reads them |
 //! | [`session`] | an operator at the contacts: calibrate, reference, enable, identify |
+//! | [`assist`] | a session of assistance on a wearer, image against host |
 //! | [`report`] | results as JSON |
 //! | [`situations`] | the processor's load, from idle to a host at 1 kHz |
 //! | [`stops`], [`sampling`] | emergency stops over the PWM period; sampling instants |
@@ -30,6 +31,7 @@
     reason = "the model runs on the host only and may use std's mathematics"
 )]
 
+pub mod assist;
 pub mod chip;
 pub mod cli;
 pub mod drivers;

@@ -16,7 +16,7 @@ use crate::session::Session;
 use crate::time::{TICK_HZ, microseconds, seconds};
 
 /// Interrupts of the image: name, exception number.
-pub const LEVELS: [(&str, u8); 9] = [
+pub const LEVELS: [(&str, u8); 10] = [
     ("stop", 16 + 10),
     ("current_interrupt", 16 + 18),
     ("index_0", 16 + 23),
@@ -25,6 +25,7 @@ pub const LEVELS: [(&str, u8); 9] = [
     ("clock", 16 + 50),
     ("bus_receive", 16 + 20),
     ("bus", 16 + 19),
+    ("assist", 16 + 67),
     ("housekeeping", 16 + 72),
 ];
 
@@ -39,6 +40,8 @@ pub struct LoadReport {
     pub servo: f64,
     /// Bus, both levels.
     pub bus: f64,
+    /// Law of the assistance.
+    pub assist: f64,
     /// Housekeeping and its clock.
     pub housekeeping: f64,
     /// Thread.
@@ -134,6 +137,7 @@ pub fn load(session: &Session) -> LoadReport {
         level0: share(&["stop", "current_interrupt", "index_0", "index_1"]),
         servo: share(&["servo"]),
         bus: share(&["bus_receive", "bus"]),
+        assist: share(&["assist"]),
         housekeeping: share(&["housekeeping", "clock"]),
         thread: chip.load.share(0, chip.now),
     }
@@ -287,6 +291,7 @@ mod tests {
                 level0: 0.3,
                 servo: 0.1,
                 bus: 0.03,
+                assist: 0.0,
                 housekeeping: 0.03,
                 thread: 0.04,
             },

@@ -1,7 +1,7 @@
 //! The command line: one file for each command.
 
 pub mod arguments;
-mod assist;
+pub mod assist;
 pub mod common;
 mod compare;
 mod eds;
