@@ -25,7 +25,7 @@ use crate::servo::LOG_RATE_HZ;
 const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
 /// Predicted share of the motion at which the gate begins to open, and is open.
 const PERIODIC: [f32; 2] = [0.8, 0.9];
-/// The same for the wearer's own share, relative to the expected one.
+/// Likewise for the wearer's own share, relative to the expected one.
 const OWN: [f32; 2] = [0.25, 0.5];
 /// Torque below which a motion needs no assistance, N m; also keeps the quotient finite.
 const SMALLEST_NM: f32 = 1.0;

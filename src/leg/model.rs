@@ -40,7 +40,7 @@ impl<const N: usize> IdentifiedModel<N> {
         Self { assured: assured(model, estimate), ..Self::new(model, &estimate.values) }
     }
 
-    /// The same model with other confidence bounds.
+    /// This model with other confidence bounds.
     #[must_use]
     pub fn with_assured(self, assured: Assured<N>) -> Self {
         Self { assured, ..self }

@@ -1,5 +1,5 @@
-//! Many runs, forked from identifications that the operator's contacts started, or from sessions of assistance
-//! of a leg whose file states one ([`Worn`]).
+//! Many runs, forked from identifications that the operator's contacts started, or from sessions of
+//! assistance of a leg whose file states one ([`Worn`]).
 //!
 //! Forks share their base: it runs once, and every run is a clone of it at the run's period. The base of a
 //! run follows from the run's seed, so that one run can be repeated alone. A row that is run in two ways uses

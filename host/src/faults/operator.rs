@@ -13,8 +13,8 @@ use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 const OPEN: u64 = PERIODS_PER_S / 5;
 const ENABLED: u64 = PERIODS_PER_S;
 
-/// Starts an identification, or a session of assistance, as an operator does: contacts open, the switch held until the drive is enabled,
-/// the button.
+/// Starts an identification or a session of assistance as an operator does: contacts open, the switch held
+/// until the drive is enabled, the button.
 pub fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError> {
     for _ in 0..OPEN {
         rig.advance();

@@ -67,7 +67,7 @@ fn without_an_answer_of_the_law_the_session_ends() {
     for _ in 0..60 {
         bench.tick();
     }
-    // It never had a share of the torque.
+    // The law never had a share of the torque.
     assert!(!bench.control.activity().assists());
 }
 
