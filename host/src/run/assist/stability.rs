@@ -23,7 +23,7 @@
 //! ```text
 //! 4 kHz    x, v: tracking observer with two poles at 100 Hz            of the last tick
 //!          x'' = s^2 H x,  H two poles at 50 Hz, damping ratio 0.7
-//!          j' = 2 pi 60 Hz ((x'' - x''_before) / T - j)                low-pass of its change
+//!          j: (x'' - x''_before) / T, low-passed at 60 Hz
 //!          u = r + s_f B v + s M_e (x'' + lead j)
 //!          r on a ramp of 8 ticks to the newest torque
 //!          c' = (u - c) / lag                                           drive
@@ -61,13 +61,11 @@ const KNEES_DEG: [f64; 5] = [10.0, 30.0, 50.0, 70.0, 90.0];
 const TICKS: usize = 8;
 /// Corner (Hz) and damping ratio of the differentiator.
 const CORNER_HZ: f64 = 50.0;
-/// Low-pass of the acceleration's change, Hz.
-const CHANGE_HZ: f64 = 60.0;
 const DAMPING_RATIO: f64 = 0.7;
 /// Poles of the servo's observer, Hz.
 const OBSERVER_HZ: f64 = 100.0;
-/// Lead of the acceleration, in ticks.
-const LEAD_TICKS: f64 = LEAD_S as f64 / TICK_S;
+/// Low-pass of the acceleration's lead, Hz.
+const LEAD_HZ: f64 = 60.0;
 /// Time over which the weight is extrapolated, in samples.
 const AHEAD_SAMPLES: f64 = AHEAD_S as f64 / (TICKS as f64 * TICK_S);
 /// Squarings for the largest eigenvalue.
@@ -128,8 +126,8 @@ enum Pair {
     Band,
     Low,
     Acceleration,
-    /// Low-passed change of the acceleration, per tick.
-    Change,
+    /// Low-passed change of the acceleration per second.
+    Jerk,
     /// Weight at the last sample.
     Weight,
     /// Ramp to the newest torque.
@@ -313,13 +311,12 @@ fn led_acceleration(state: &mut LoopState) -> Vector2<f64> {
     Pair::Low.set(state, low + 2.0 * corner * middle);
     let rate = 2.0 * corner / TICK_S;
     let now = rate * rate * high;
-    let before = Pair::Acceleration.of(state);
+    let change = (now - Pair::Acceleration.of(state)) / TICK_S;
     Pair::Acceleration.set(state, now);
-    let share = 1.0 - (-TAU * CHANGE_HZ * TICK_S).exp();
-    let change = Pair::Change.of(state);
-    let change = change + share * (now - before - change);
-    Pair::Change.set(state, change);
-    now + LEAD_TICKS * change
+    let jerk = Pair::Jerk.of(state);
+    let jerk = change + (-TAU * LEAD_HZ * TICK_S).exp() * (jerk - change);
+    Pair::Jerk.set(state, jerk);
+    now + f64::from(LEAD_S) * jerk
 }
 
 /// Matrix exponential by its series, for norms of about 1: the last term is below 1e-20.
