@@ -225,7 +225,7 @@ fn acceleration_is_that_of_the_firmware() {
         Pair::Position.set(&mut state, Vector2::new(angle, 0.0));
         let expected = f64::from(firmware.push(angle as f32));
         let found = led_acceleration(&mut state)[0];
-        // Of up to 5000 rad/s^2; angles of 1 rad are rounded to 6e-8 rad.
+        // Accelerations reach 5000 rad/s^2; angles of 1 rad are rounded to 6e-8 rad.
         assert!((found - expected).abs() < 1.0, "{tick}: {found} {expected}");
     }
 }
