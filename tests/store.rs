@@ -408,8 +408,11 @@ fn storage(flash: Small) -> Storage<Small, 2> {
     Storage::new(store(flash))
 }
 
-/// Data that a start finds: calibrations, generations of the models, bytes of the first node.
-fn found(flash: Small) -> ([Option<StoredCalibration>; 2], [Option<u32>; 2], Vec<u8>, Small) {
+/// Calibrations, generations of the models, bytes of the first node, and the flash with them.
+type Found = ([Option<StoredCalibration>; 2], [Option<u32>; 2], Vec<u8>, Small);
+
+/// Data that a start finds.
+fn found(flash: Small) -> Found {
     let mut storage = storage(flash);
     let calibrations = [0, 1].map(|axis| block_on(storage.calibration(axis)));
     let generation = Key::MODELS
