@@ -22,8 +22,9 @@
 //!
 //! ```text
 //! 4 kHz    x, v: tracking observer with two poles at 100 Hz            of the last tick
-//!          x'' = s^2 H x,  H two poles at 80 Hz, damping ratio 0.7
-//!          u = r + s_f B v + s M_e (x'' + lead / T (x'' - x''_before))
+//!          x'' = s^2 H x,  H two poles at 50 Hz, damping ratio 0.7
+//!          j: (x'' - x''_before) / T, low-passed at 60 Hz
+//!          u = r + s_f B v + s M_e (x'' + lead j)
 //!          r on a ramp of 8 ticks to the newest torque
 //!          c' = (u - c) / lag                                           drive
 //! 500 Hz   m = mean of q over 8 ticks
@@ -47,8 +48,8 @@ use hal_sim::wearer::description::{CuffDescription, WearerDescription};
 use hal_sim::world::{TICK_S, World};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rayon::prelude::*;
+use scarab::assist::differentiator::LEAD_S;
 use scarab::assist::law::AHEAD_S;
-use scarab::assist::tick::LEAD_S;
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
@@ -59,12 +60,12 @@ const KNEES_DEG: [f64; 5] = [10.0, 30.0, 50.0, 70.0, 90.0];
 /// Ticks of a sample.
 const TICKS: usize = 8;
 /// Corner (Hz) and damping ratio of the differentiator.
-const CORNER_HZ: f64 = 80.0;
+const CORNER_HZ: f64 = 50.0;
 const DAMPING_RATIO: f64 = 0.7;
 /// Poles of the servo's observer, Hz.
 const OBSERVER_HZ: f64 = 100.0;
-/// Lead of the acceleration, in ticks.
-const LEAD_TICKS: f64 = LEAD_S as f64 / TICK_S;
+/// Low-pass of the acceleration's lead, Hz.
+const LEAD_HZ: f64 = 60.0;
 /// Time over which the weight is extrapolated, in samples.
 const AHEAD_SAMPLES: f64 = AHEAD_S as f64 / (TICKS as f64 * TICK_S);
 /// Squarings for the largest eigenvalue.
@@ -125,6 +126,8 @@ enum Pair {
     Band,
     Low,
     Acceleration,
+    /// Low-passed change of the acceleration per second.
+    Jerk,
     /// Weight at the last sample.
     Weight,
     /// Ramp to the newest torque.
@@ -308,9 +311,12 @@ fn led_acceleration(state: &mut LoopState) -> Vector2<f64> {
     Pair::Low.set(state, low + 2.0 * corner * middle);
     let rate = 2.0 * corner / TICK_S;
     let now = rate * rate * high;
-    let before = Pair::Acceleration.of(state);
+    let change = (now - Pair::Acceleration.of(state)) / TICK_S;
     Pair::Acceleration.set(state, now);
-    now + LEAD_TICKS * (now - before)
+    let jerk = Pair::Jerk.of(state);
+    let jerk = change + (-TAU * LEAD_HZ * TICK_S).exp() * (jerk - change);
+    Pair::Jerk.set(state, jerk);
+    now + f64::from(LEAD_S) * jerk
 }
 
 /// Matrix exponential by its series, for norms of about 1: the last term is below 1e-20.
