@@ -3,7 +3,7 @@
 //! ```text
 //! E += sum_j (tau_j - support_j - assist_j) dq_j - (FC_low |dq_j| + FV_low q'_j dq_j) - s_i k dT
 //! E  = max(E, 0),   T = q'' M q' / 2
-//! b  = B_MAX clamp(2 E / BUDGET - 1, 0, 1)
+//! b  = B_MAX clamp((4 E / BUDGET - 1) / 3, 0, 1)
 //! ```
 //!
 //! Energy of the motors that went neither into the weight's potential, nor into friction, nor into the
@@ -14,7 +14,7 @@
 //!
 //! E starts again from zero whenever the wearer has given energy: a wearer who worked for an hour has not
 //! earned an hour's push. So the energy given since any instant stays below [`BUDGET_J`], which the damping
-//! enforces from half of it on; at the budget the assistance ends.
+//! enforces from a quarter of it on; at the budget the assistance ends.
 //!
 //! Source: passivity observer and controller of Hannaford and Ryu, 2002, without a measured force.
 //! Cost: one mass matrix (210 instructions) and some 30 operations.
@@ -25,7 +25,7 @@ use crate::real::{abs, clamp, max};
 /// Most energy given from any instant on, J: a shank of 4 kg lifted by 10 cm.
 pub const BUDGET_J: f32 = 4.0;
 /// Damping at the budget, N m s/rad.
-const STRONGEST: f32 = 30.0;
+const STRONGEST: f32 = 60.0;
 
 /// Values of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,7 +83,7 @@ impl<const N: usize> EnergyObserver<N> {
     /// Damping that the energy requires, N m s/rad.
     #[must_use]
     pub fn damping(&self) -> f32 {
-        STRONGEST * clamp(2.0 / BUDGET_J * self.given_j - 1.0, 0.0, 1.0)
+        STRONGEST * clamp((4.0 / BUDGET_J * self.given_j - 1.0) * (1.0 / 3.0), 0.0, 1.0)
     }
 
     /// Whether the budget is used up, or the energy is not a number.

@@ -3,10 +3,16 @@
 use clap::{Args, ValueEnum};
 
 use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::base::shard::Shard;
 use crate::base::{files, output};
 use crate::cli::arguments::OutputFolder;
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
+use crate::faults::campaign::{CampaignOptions, campaign};
+use crate::faults::entry::{Entry, entries};
+use crate::faults::report::CampaignReport;
+use crate::faults::run::{Blind, Manner};
+use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::assist::AssistFile;
 use crate::leg::setup::DEFAULT_SEED;
 use crate::run::assist::motions::Exercise;
@@ -90,7 +96,7 @@ pub struct AssistArguments {
     #[arg(
         long,
         value_name = "N/M",
-        default_value_t = 8000.0,
+        default_value_t = 20_000.0,
         allow_negative_numbers = true,
         help_heading = "Simulated wearer"
     )]
@@ -99,7 +105,7 @@ pub struct AssistArguments {
     #[arg(
         long,
         value_name = "N S/M",
-        default_value_t = 80.0,
+        default_value_t = 400.0,
         allow_negative_numbers = true,
         help_heading = "Simulated wearer"
     )]
@@ -116,6 +122,9 @@ pub struct AssistArguments {
     /// Random exoskeletons that are observed at rest.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(0..=MOST_RUNS))]
     drawn_legs: u64,
+    /// Runs of each fault of the catalogue that are injected in each mode.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_RUNS))]
+    fault_runs: u64,
     /// Write the page (assist.html), the report (assist.json) and the figures into this directory.
     #[arg(long, value_name = "DIR")]
     out: Option<OutputFolder>,
@@ -163,11 +172,41 @@ impl AssistArguments {
     }
 }
 
+/// Injects the faults that fork a machine, in each mode: missed runs with broken invariants, and all runs.
+fn inject(leg: &LegFile, options: &AssistOptions, runs: u64) -> Result<[usize; 2], ToolError> {
+    let rows: Vec<Entry> = entries().into_iter().filter(|entry| matches!(entry, Entry::Forked(_))).collect();
+    let campaigns = CampaignOptions {
+        rows: rows.clone(),
+        seeds: (1..=runs).collect(),
+        every_tick: false,
+        manner: Manner { blind: Blind::None, recorded: false, brief: false },
+        sweep: Vec::new(),
+        pairs: Vec::new(),
+        whole: false,
+        seconds: None,
+        shard: Shard::WHOLE,
+    };
+    let mut counts = [0; 2];
+    for mode in &options.modes {
+        let leg = LegFile { assist: Some(mode.shares(&options.shares)), ..leg.clone() };
+        let found = campaign(&leg, &campaigns)?;
+        let report = CampaignReport::new(&rows, &found);
+        let missed: usize = report.rows.iter().map(|row| row.missed + row.false_alarms).sum();
+        counts[0] += missed + report.invariants_broken + report.base_alarms.len();
+        counts[1] += report.runs;
+    }
+    Ok(counts)
+}
+
 /// Measures and reports; exit code 3 if a limit was exceeded.
 pub fn run(arguments: &AssistArguments) -> Result<u8, ToolError> {
     let options = arguments.options()?;
     let leg = arguments.leg.load()?;
-    let report = study(&leg, &options)?;
+    let mut report = study(&leg, &options)?;
+    if arguments.fault_runs > 0 {
+        let [missed, faults] = inject(&leg, &options, arguments.fault_runs)?;
+        (report.missed, report.faults) = (Some(missed), faults);
+    }
     output::print(&text::text(&report))?;
     if let Some(directory) = &arguments.out {
         let drawn = figures::assist::all(&report)?;

@@ -159,8 +159,8 @@ pub fn notes(report: &AssistReport) -> Vec<String> {
     if report.legs_at_rest > 0 {
         notes.push(format!("limit cycles at rest: {} of {} legs", report.limit_cycles, report.legs_at_rest));
     }
-    if report.faults > 0 {
-        notes.push(format!("injected faults missed: {} of {}", report.missed, report.faults));
+    if let Some(missed) = report.missed {
+        notes.push(format!("injected faults missed: {missed} of {}", report.faults));
     }
     if let Some(mass) = &report.body_mass {
         notes.push(format!(

@@ -143,7 +143,7 @@ fn study_sized<const B: usize>(leg: &LegFile, options: &AssistOptions) -> Result
         energy: passivity,
         limit_cycles,
         legs_at_rest: if seeds.is_empty() { 0 } else { options.drawn_legs },
-        missed: 0,
+        missed: None,
         faults: 0,
         periodic: seeds.iter().flat_map(|seed| seed.periodic.iter().copied()).collect(),
         wearer_sums,
