@@ -1,7 +1,7 @@
 //! A leg that assists a walking wearer, as the base of a campaign's forks.
 //!
-//! The leg file's `assist` states the shares, and the start button begins the session. The models are the true
-//! ones: the campaign tests what the drive does with a fault, not with a wrong model.
+//! The leg file's `assist` states the shares, and the start button begins the session. The models are the
+//! true ones: the campaign tests what the drive does with a fault, not with a wrong model.
 
 use hal_sim::wearer::description::WearerDescription;
 use hal_sim::wearer::motion::IntendedMotion;

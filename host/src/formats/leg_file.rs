@@ -30,7 +30,7 @@
 //! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated static friction, speed of its decay | none |
 //! | `truth`, `prior` | see below | none |
 //! | `brake` | `{ release_ms, engage_ms }`: times of a holding brake on the board's output | none |
-//! | `assist` | `{ friction, inertia, weight, periodic }`: the start button of the enabled leg begins and ends assistance with these shares | none: it identifies |
+//! | `assist` | `{ friction, inertia, weight, periodic }`: assistance of the start button | none |
 //! | `[joint.motor]`, `supply` | complete drive ([`MotorFile`], [`SupplyFile`]) | none, 48 V |
 //!
 //! `torque_noise_percent` refers to each joint's mean absolute torque, per logged 500 Hz sample. The noise

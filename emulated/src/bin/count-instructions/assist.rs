@@ -1,6 +1,6 @@
 //! A session of assistance with every share: the 4 kHz tick, and the law at 500 Hz.
 //!
-//! The joints swing periodically, as a wearer would move them, so that the oscillators lock and the gate opens.
+//! The joints swing periodically, as a wearer would move them: the oscillators lock and the gate opens.
 
 use core::hint::black_box;
 
