@@ -193,7 +193,7 @@ fn filled(model: &ModelRecord<JOINTS>) -> Vec<Filled> {
     old.keep(&mut memory);
     let mut all: Vec<Filled> = Vec::new();
     let mut erasing = 0;
-    // A sector holds about 120 of these saves; the sequence repeats after both sectors.
+    // A sector holds about 150 of these saves; the sequence repeats after both sectors.
     for _ in 0..400 {
         let new = All::random(&mut random, model);
         let mut tried = memory.clone();
