@@ -36,11 +36,9 @@ impl<F: NorFlash, const N: usize> Storage<F, N> {
 
     /// Sets the pending model of its key; replaces an older pending one.
     pub fn accept(&mut self, model: ModelRecord<N>) {
-        for (key, accepted) in Key::MODELS.into_iter().zip(&mut self.accepted) {
-            if key == model.key() {
-                *accepted = Some(model);
-            }
-        }
+        let [other, worn] = &mut self.accepted;
+        let accepted = if model.key() == Key::WornModel { worn } else { other };
+        *accepted = Some(model);
     }
 
     /// Sets the pending calibration of an axis; `None` if the axis passed one that cannot be stored.

@@ -17,7 +17,7 @@ use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, watchdog};
 use crate::board::{stack, windings};
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::{LONGEST, NodeId, Storing};
-use crate::leg::{Control, Following, IdentifiedModel, StoredCalibration, Wearing};
+use crate::leg::{Control, Following, StoredCalibration};
 use crate::motor::SenseScale;
 use crate::operation::{
     Calibrated, EncoderSettings, Ends, HostEnds, Housekeeper, HousekeepingEnds, HousekeepingSettings, Queues,
@@ -203,8 +203,8 @@ fn join(
         let mut newest = 0;
         for key in Key::MODELS {
             match storage.model(configuration, key) {
-                Some(Some((model, provenance))) if take_model(control, key, model, provenance.wearing()) => {
-                    newest = newest.max(provenance.generation);
+                Some(Some(restored)) if take_model(control, key, &restored) => {
+                    newest = newest.max(restored.generation);
                 }
                 Some(None) => {}
                 _ => device.storing(Storing::Failed),
@@ -230,12 +230,9 @@ fn join(
 
 /// Takes a restored model into use; returns whether `control` took it. Only that of [`Key::Model`] becomes
 /// the feedforward.
-fn take_model(
-    control: &mut Control<JOINTS>,
-    key: Key,
-    model: IdentifiedModel<JOINTS>,
-    wearing: Option<Wearing>,
-) -> bool {
+#[inline(never)]
+fn take_model(control: &mut Control<JOINTS>, key: Key, restored: &storage::RestoredModel) -> bool {
+    let &storage::RestoredModel { model, wearing, .. } = restored;
     (key != Key::Model || control.adopt(model))
         && wearing.is_none_or(|wearing| control.set_model(wearing, model))
 }

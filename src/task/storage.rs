@@ -19,9 +19,9 @@ use crate::board::odrive_v3_6::flash::Flash;
 use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::bus::device::StoreCommand;
 use crate::bus::{LONGEST, StoredNode};
-use crate::leg::{IdentifiedModel, StoredCalibration};
+use crate::leg::{IdentifiedModel, StoredCalibration, Wearing};
 use crate::operation::{Calibrated, StoreJob, Storing};
-use crate::store::{self, Key, Permit, Provenance, Store};
+use crate::store::{self, Key, ModelRecord, Permit, Store};
 
 /// Polling interval of the task, ms.
 const ROUND_MS: u64 = 10;
@@ -29,8 +29,15 @@ const ROUND_MS: u64 = 10;
 /// Interval between the steps of a flash write, ms.
 const STEP_MS: u64 = 1;
 
-/// A stored model that belongs to this leg, with its provenance.
-pub type RestoredModel = (IdentifiedModel<JOINTS>, Provenance<JOINTS>);
+/// A stored model that belongs to this leg.
+pub struct RestoredModel {
+    /// The model.
+    pub model: IdentifiedModel<JOINTS>,
+    /// Whether the identified leg was empty or worn, if known.
+    pub wearing: Option<Wearing>,
+    /// Number of models accepted on this board when it was stored.
+    pub generation: u32,
+}
 
 /// The store and the ends of its queues.
 pub struct StorageTask {
@@ -70,11 +77,16 @@ impl StorageTask {
         core::array::from_fn(|axis| at_once(self.storage.calibration(axis))?)
     }
 
-    /// Stored model of one of [`Key::MODELS`] and its provenance, if there is one; `None` where it cannot be
-    /// read or belongs to another leg.
+    /// Stored model of one of [`Key::MODELS`], if there is one; `None` where it cannot be read or belongs to
+    /// another leg.
+    #[inline(never)]
     pub fn model(&mut self, leg: &Leg, key: Key) -> Option<Option<RestoredModel>> {
         match at_once(self.storage.model(key))?? {
-            Some(record) => Some(Some((leg.restore(&record.model).ok()?, record.provenance))),
+            Some(ModelRecord { model, provenance }) => Some(Some(RestoredModel {
+                model: leg.restore(&model).ok()?,
+                wearing: provenance.wearing(),
+                generation: provenance.generation,
+            })),
             None => Some(None),
         }
     }

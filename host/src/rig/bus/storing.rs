@@ -112,11 +112,9 @@ impl<const N: usize> Flashing<N> {
 
     /// Sets the model to be stored with the next request.
     pub(super) fn accept(&mut self, model: ModelRecord<N>) {
-        for (key, accepted) in Key::MODELS.into_iter().zip(&mut self.accepted) {
-            if key == model.key() {
-                *accepted = Some(model);
-            }
-        }
+        let [other, worn] = &mut self.accepted;
+        let accepted = if model.key() == Key::WornModel { worn } else { other };
+        *accepted = Some(model);
     }
 
     /// Whether the processor stalls.
