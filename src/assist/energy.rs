@@ -20,7 +20,7 @@
 //! Cost: one mass matrix (210 instructions) and some 30 operations.
 
 use super::model::CompensationModel;
-use crate::real::{abs, clamp, max};
+use crate::real::{abs, clamp};
 
 /// Most energy given from any instant on, J: a shank of 4 kg lifted by 10 cm.
 pub const BUDGET_J: f32 = 4.0;
@@ -69,7 +69,9 @@ impl<const N: usize> EnergyObserver<N> {
                     + model.assured.viscous[joint] * velocity[joint] * way;
                 work += mean * way - friction;
             }
-            self.given_j = max(self.given_j + work, 0.0);
+            let given_j = self.given_j + work;
+            // Not a number stays so and ends the session.
+            self.given_j = if given_j < 0.0 { 0.0 } else { given_j };
         }
         self.last = Some(Instant { angle: *angle, torque: *torque, kinetic_j });
     }

@@ -24,6 +24,8 @@ pub const AHEAD_S: f32 = 0.003;
 /// Shares and models of one session of assistance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AssistSession<const N: usize> {
+    /// Number of the session; torques of another one are ignored.
+    pub number: u32,
     /// Shares of the torques.
     pub shares: AssistShares,
     /// Models of the empty and the worn leg.
@@ -33,8 +35,8 @@ pub struct AssistSession<const N: usize> {
 /// Torque for the 4 kHz tick, joint (D-H) sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AssistTorque<const N: usize> {
-    /// Last tick of the sample.
-    pub tick: u32,
+    /// Number of the session.
+    pub session: u32,
     /// Whole torque besides inertia, friction and damping, N m.
     pub torque_nm: [f32; N],
     /// Compensated mass matrix, kg m^2.
@@ -120,7 +122,7 @@ impl<const N: usize> Running<N> {
     }
 
     fn step(&mut self, sample: &LogSample<N>) -> AssistTorque<N> {
-        let AssistSession { shares, model } = &self.session;
+        let AssistSession { shares, model, .. } = &self.session;
         let mut state = JointState { q: [0.0; N], qd: [0.0; N], qdd: [0.0; N] };
         let (mut torque, mut velocity) = ([0.0; N], [0.0; N]);
         for joint in 0..N {
@@ -141,17 +143,19 @@ impl<const N: usize> Running<N> {
         let mut assist = [0.0; N];
         if shares.periodic != 0.0 {
             let moved = 1.0 - certain;
-            let needed = model.wearer_needs(&state, moved);
+            let needed = model.wearer_needs(&state, moved, shares.weight);
             let (inertia, weight) = (model.inertia(&state), model.weight(&state.q));
+            let carried = model.wearer_weight(&state.q).map(|weight| shares.weight * weight);
             let own = core::array::from_fn(|joint| {
                 let friction = model.friction(joint, state.qd[joint]);
-                needed[joint] + certain * inertia[joint] + weight[joint] + friction - torque[joint]
+                needed[joint] + carried[joint] + certain * inertia[joint] + weight[joint] + friction
+                    - torque[joint]
             });
-            let (share, angles) = (shares.periodic, &sample.position_rad);
-            assist = self.periodic.step(model, share, angles, [&own, &needed], moved, AHEAD_S);
+            let taken = [shares.periodic, moved, shares.weight];
+            assist = self.periodic.step(model, taken, &sample.position_rad, [&own, &needed], AHEAD_S);
         }
         let mut output = AssistTorque {
-            tick: sample.tick,
+            session: self.session.number,
             torque_nm: [0.0; N],
             inertia: model.mass_matrix(&sample.position_rad, certain),
             support_nm: [0.0; N],
@@ -173,7 +177,7 @@ impl<const N: usize> Running<N> {
 
 /// Torque that carries weight: the empty leg's, and a share of the wearer's.
 fn support<const N: usize>(session: &AssistSession<N>, q: &[f32; N]) -> [f32; N] {
-    let AssistSession { shares, model } = session;
+    let AssistSession { shares, model, .. } = session;
     let mut support = model.weight(q);
     if shares.weight != 0.0 {
         for (support, weight) in support.iter_mut().zip(model.wearer_weight(q)) {

@@ -97,13 +97,23 @@ impl<const N: usize> CompensationModel<N> {
         }
     }
 
-    /// Torque that moves the wearer's leg and a share of the empty leg's inertia, N m: that of a wearer in a
-    /// transparent leg.
+    /// Torque that moves the wearer's leg and a share of the empty leg's inertia, less the carried share of the
+    /// wearer's weight, N m: that of a wearer in a transparent leg.
     #[must_use]
-    pub fn wearer_needs(&self, state: &JointState<f32, N>, inertia_share: f32) -> [f32; N] {
+    pub fn wearer_needs(
+        &self,
+        state: &JointState<f32, N>,
+        inertia_share: f32,
+        carried_share: f32,
+    ) -> [f32; N] {
         let mut torque = self.wearer_torque(state);
         for (torque, inertia) in torque.iter_mut().zip(self.inertia(state)) {
             *torque += inertia_share * inertia;
+        }
+        if carried_share != 0.0 {
+            for (torque, weight) in torque.iter_mut().zip(self.wearer_weight(&state.q)) {
+                *torque -= carried_share * weight;
+            }
         }
         torque
     }

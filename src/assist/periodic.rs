@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! assist = s e tau_n(q*, q*', q*'')            predicted for the time at which the torque acts
-//! tau_n  = tau_w + (1 - s_i k) inertia         torque that the wearer of a transparent leg gives
+//! tau_n  = tau_w + (1 - s_i k) inertia - s_w G_w     torque that the wearer of the leg gives without it
 //! own    = <tau_h tau_n> / <tau_n tau_n>       share that the wearer gives, means over about a cycle
 //! tau_h  = inertia + weight + friction of both legs - measured torque
 //! gate   = clamp((predicted - 0.8) / 0.1, 0, 1) clamp((own / (1 - s) - 0.25) / 0.25, 0, 1)
@@ -13,8 +13,8 @@
 //! it: a leg that swings limply, or against its wearer, shows no effort of its own, although it may be
 //! periodic. `own` is 1 - s for a wearer who gives the rest.
 //!
-//! The energy given in a cycle never exceeds the share of the positive work that the prediction needs; beyond
-//! it the assistance is off until the next cycle.
+//! The assistance ends within 50 ms, until the next cycle, once its work on the measured motion exceeds its
+//! share of the positive work that the prediction needed in the cycle before.
 
 use super::model::CompensationModel;
 use super::oscillator::Oscillator;
@@ -27,6 +27,8 @@ const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
 const PERIODIC: [f32; 2] = [0.8, 0.9];
 /// Likewise for the wearer's own share, relative to the expected one.
 const OWN: [f32; 2] = [0.25, 0.5];
+/// Closing of the gate in a sample once the energy of a cycle is given: 50 ms in all.
+const SPENT_PER_SAMPLE: f32 = DT / 0.05;
 /// Torque below which a motion needs no assistance, N m; also keeps the quotient finite.
 const SMALLEST_NM: f32 = 1.0;
 
@@ -46,6 +48,9 @@ pub struct PeriodicAssist<const N: usize> {
     given_j: f32,
     needed_j: f32,
     allowed_j: f32,
+    /// Assistance and angles of the last sample.
+    last_assist: [f32; N],
+    last_angle: [f32; N],
 }
 
 impl<const N: usize> PeriodicAssist<N> {
@@ -60,6 +65,8 @@ impl<const N: usize> PeriodicAssist<N> {
             given_j: 0.0,
             needed_j: 0.0,
             allowed_j: 0.0,
+            last_assist: [0.0; N],
+            last_angle: [0.0; N],
         }
     }
 
@@ -76,17 +83,20 @@ impl<const N: usize> PeriodicAssist<N> {
     }
 
     /// Takes the angles (rad) of a sample and the torque that the wearer gives and needs (N m) at one earlier
-    /// time, and returns the assistance for `ahead` s after the sample, N m. `inertia_share` is the share of
-    /// the empty leg's inertia that the wearer moves.
+    /// time, and returns the assistance for `ahead` s after the sample, N m. The shares are those of the
+    /// assistance, of the empty leg's inertia that the wearer moves, and of the wearer's weight that is carried.
     pub fn step(
         &mut self,
         model: &CompensationModel<N>,
-        share: f32,
+        [share, inertia_share, carried_share]: [f32; 3],
         angles: &[f32; N],
         [own, needed]: [&[f32; N]; 2],
-        inertia_share: f32,
         ahead: f32,
     ) -> [f32; N] {
+        // Measured work of the last assistance.
+        for joint in 0..N {
+            self.given_j += self.last_assist[joint] * (angles[joint] - self.last_angle[joint]);
+        }
         let before = self.oscillator.phase();
         self.oscillator.push(angles);
         let cycles = self.oscillator.hertz() * DT;
@@ -99,18 +109,20 @@ impl<const N: usize> PeriodicAssist<N> {
         self.expected += cycles * (square - self.expected);
         let own_share = self.own / max(self.expected, SMALLEST_NM * SMALLEST_NM);
         let state = self.oscillator.predict(ahead);
-        let torque = model.wearer_needs(&state, inertia_share);
+        let torque = model.wearer_needs(&state, inertia_share, carried_share);
         if self.oscillator.phase() < before {
             (self.allowed_j, self.needed_j, self.given_j) = (self.needed_j, 0.0, 0.0);
         }
-        let is_spent = self.given_j > abs(share) * self.allowed_j;
-        let gate = if is_spent {
-            0.0
+        if self.given_j > abs(share) * self.allowed_j {
+            self.gate = max(self.gate - SPENT_PER_SAMPLE, 0.0);
         } else {
-            ramp(PERIODIC, self.oscillator.predicted_share()) * ramp(OWN, own_share / (1.0 - share))
-        };
-        self.gate += clamp(gate - self.gate, -2.0 * cycles, cycles);
-        self.assisted(&state, &torque, share)
+            let gate =
+                ramp(PERIODIC, self.oscillator.predicted_share()) * ramp(OWN, own_share / (1.0 - share));
+            self.gate += clamp(gate - self.gate, -2.0 * cycles, cycles);
+        }
+        let assist = self.assisted(&state, &torque, share);
+        (self.last_assist, self.last_angle) = (assist, *angles);
+        assist
     }
 
     /// Scales the predicted torque and keeps the ledger of the cycle.
@@ -118,7 +130,6 @@ impl<const N: usize> PeriodicAssist<N> {
         let mut assist = [0.0; N];
         for joint in 0..N {
             assist[joint] = share * self.gate * torque[joint];
-            self.given_j += assist[joint] * state.qd[joint] * DT;
             self.needed_j += max(torque[joint] * state.qd[joint], 0.0) * DT;
         }
         assist

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! `l` moves between 0 and 1 within [`FADE_S`]. D is the damping of the position controller. tau_0 is the
-//! torque that held the leg when the session began; while the session ends, the torque that carries its
-//! weight. At l = 0 the torque is that of the controller without a position error: both ends are free of
+//! torque that held the leg when the session began; while the session ends it moves to the torque that carries
+//! the leg's weight, by at most a tenth of the cap in each sample time. At l = 0 the torque is that of the controller without a position error: both ends are free of
 //! steps.
 //!
 //! S is the compensated mass matrix. A delay T of the compensated inertia acts as the negative damping
@@ -29,6 +29,9 @@ const FADE_PER_TICK: f32 = 1.0 / (FADE_S * SERVO_RATE_HZ as f32);
 pub const LATEST_TICKS: u32 = 40;
 /// Largest change of torque from one sample to the next as a share of the cap.
 const LARGEST_STEP: f32 = 0.1;
+
+/// Largest change of the torque that holds the leg, from one tick to the next, as a share of the cap.
+const HOLD_STEP: f32 = LARGEST_STEP / TICKS_PER_LOG as f32;
 
 /// Reason why a session ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +61,8 @@ pub struct AssistDemand<const N: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AssistTick<const N: usize> {
     share: f32,
+    /// Number of the session.
+    session: u32,
     /// Reason of a session that is ending.
     end: Option<AssistEnd>,
     friction_share: f32,
@@ -84,6 +89,7 @@ impl<const N: usize> AssistTick<N> {
     pub fn begin(session: &AssistSession<N>, angles: [f32; N], hold_nm: [f32; N], cap_nm: [f32; N]) -> Self {
         Self {
             share: 0.0,
+            session: session.number,
             end: None,
             friction_share: session.shares.friction,
             assured: session.model.assured,
@@ -102,6 +108,12 @@ impl<const N: usize> AssistTick<N> {
 
     /// Takes a torque of the law.
     pub fn receive(&mut self, torque: &AssistTorque<N>) {
+        if torque.session != self.session {
+            return;
+        }
+        if !torque.inertia.iter().flatten().copied().all(is_finite) || !is_finite(torque.damping) {
+            return self.leave(AssistEnd::NotFinite);
+        }
         for joint in 0..N {
             let wanted = torque.torque_nm[joint];
             if !is_finite(wanted) {
@@ -182,7 +194,8 @@ impl<const N: usize> AssistTick<N> {
                 law += inertia * acceleration;
             }
             if self.end.is_some() {
-                self.hold_nm[joint] = self.support_nm[joint];
+                let step = HOLD_STEP * self.cap_nm[joint];
+                self.hold_nm[joint] += clamp(self.support_nm[joint] - self.hold_nm[joint], -step, step);
             }
             demand.torque_nm[joint] = self.share * law + (1.0 - self.share) * self.hold_nm[joint];
         }
@@ -201,6 +214,7 @@ mod tests {
         let chain =
             Chain::new(&[geometry, DenavitHartenberg { a: 0.4, ..geometry }]).expect("finite numbers");
         AssistSession {
+            number: 7,
             shares: AssistShares { friction: 1.0, ..AssistShares::GRAVITY_ONLY },
             model: CompensationModel {
                 chain,
@@ -215,7 +229,7 @@ mod tests {
 
     fn torque(torque_nm: f32) -> AssistTorque<2> {
         AssistTorque {
-            tick: 0,
+            session: 7,
             torque_nm: [torque_nm; 2],
             inertia: [[0.0; 2]; 2],
             support_nm: [5.0; 2],
@@ -247,6 +261,35 @@ mod tests {
         assert!(tick.has_ended());
         // 50 N m in a second.
         assert!(largest < 0.025, "{largest}");
+    }
+
+    #[test]
+    fn leaving_early_moves_the_hold_torque_without_a_step() {
+        let mut tick = AssistTick::begin(&session(), [0.0; 2], [60.0; 2], [85.0; 2]);
+        let mut last = 60.0;
+        for number in 0..4000 {
+            if number % TICKS_PER_LOG == 0 {
+                tick.receive(&torque(5.0));
+            }
+            if number == 400 {
+                tick.leave(AssistEnd::Requested);
+            }
+            let now = tick.advance(&[0.0; 2], &[0.0; 2]).torque_nm[0];
+            // A tenth of the cap in eight ticks.
+            assert!((now - last).abs() < 1.1, "{number}: {last} to {now}");
+            last = now;
+        }
+        assert!((last - 5.0).abs() < 1e-3 && tick.has_ended());
+    }
+
+    #[test]
+    fn torques_of_another_session_are_ignored() {
+        let mut tick = AssistTick::begin(&session(), [0.0; 2], [20.0; 2], [85.0; 2]);
+        for _ in 0..=LATEST_TICKS + 1 {
+            tick.receive(&AssistTorque { session: 6, ..torque(80.0) });
+            let _ = tick.advance(&[0.0; 2], &[0.0; 2]);
+        }
+        assert_eq!(tick.end(), Some(AssistEnd::Late));
     }
 
     #[test]

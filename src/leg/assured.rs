@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! FC_low = max(FC - 2 sigma, 0),   FV_low likewise            of parameters that were measured alone
-//! k      = min over postures q and directions u of  1 - 2 sigma(u' M u) / (u' M u),  at least 0
+//! k      = min over 16 postures q and 4 directions u of  1 - 2 sigma(u' M u) / (u' M u),  at least 0
 //! u' M u = sum_j u_j y_j(q, 0, u) p,    y_j regressor without gravity,    sigma^2 = y Cov y'
 //! ```
 //!
-//! Compensating the share k of M gives in no posture and direction more inertia than the leg has, with the
-//! confidence of 2 sigma. Directions: each joint alone and each pair together and against each other.
+//! Compensating the share k of M gives in none of these postures and directions more inertia than the leg has,
+//! with the confidence of 2 sigma. Directions: each joint alone and each pair together and against each other.
 //! Postures: sixteen angles of every joint but the first, on which M does not depend.
 //!
 //! Cost: some 300,000 instructions for two joints, once for each accepted model.

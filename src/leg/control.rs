@@ -331,7 +331,9 @@ impl<const N: usize> Control<N> {
             _ if self.activity.assists() => false,
             ControlRequest::Identify => enabled && still,
             ControlRequest::Track { .. } => enabled && still && self.tracked.is_some(),
-            ControlRequest::Assist(shares) => enabled && still && self.assist_refusal(shares).is_none(),
+            ControlRequest::Assist(shares) => {
+                enabled && still && self.rests_for_assist() && self.assist_refusal(shares).is_none()
+            }
         }
     }
 
@@ -443,7 +445,7 @@ impl<const N: usize> Control<N> {
                 if matches!(self.activity, Activity::Identify(_)) => {}
             Finding::Changed(change) => {
                 (self.change, self.cause) = (Some(change), None);
-                self.assistance.leave(AssistEnd::Changed);
+                self.assistance.change();
             }
             Finding::Updated { cause, model, .. } => {
                 match model {

@@ -22,7 +22,7 @@ impl<const N: usize> AssistLevel<N> {
     /// Answers the samples that wait.
     #[inline(never)]
     pub fn run(&mut self, ends: &mut AssistEnds<'_, N>) {
-        if let Some(session) = ends.sessions.dequeue() {
+        while let Some(session) = ends.sessions.dequeue() {
             self.law.begin(session);
         }
         // At most a queue's worth.

@@ -146,6 +146,10 @@ impl<const N: usize> ServoLevel<N> {
             .filter(|request| !(waits && request.moves()));
         let sample = Sample { joints: self.sample };
         let commands = self.host.as_mut().and_then(|host| host.commands(waits));
+        if matches!(permitted, Some(ControlRequest::Identify)) && !control.activity().is_identifying() {
+            // The statement belongs to this identification alone.
+            control.set_wearing(self.prepared.and_then(|prepared| prepared.wearing));
+        }
         let output = control.tick_with(&sample, permitted, gravity, commands);
         if let Some(note) = control.take_assist_note() {
             let ((event, why), tick) = (words::assist(note), self.tick);
@@ -223,11 +227,6 @@ impl<const N: usize> ServoLevel<N> {
         let (request, prepared) = host.request(by_hand).unzip();
         if let Some(prepared) = prepared {
             self.prepared = prepared;
-            if let Some(Prepared { wearing, .. }) = prepared
-                && !control.activity().is_identifying()
-            {
-                control.set_wearing(wearing);
-            }
         }
         host.held(request, control.state(), signals, hardware)
     }
@@ -377,6 +376,7 @@ fn assist<const N: usize, H: Hardware<N>>(
 ) {
     if let Some(session) = control.take_session() {
         let _ = ends.sessions.enqueue(session);
+        hardware.pend_assist();
     }
     if control.activity().assists()
         && let Some(logged) = &output.logged

@@ -195,6 +195,12 @@ impl<const N: usize> Servo<N> {
         self.monitor.limit_codes(decision)
     }
 
+    /// Damping of a joint's controller, N m s/rad; zero beyond the last joint.
+    #[must_use]
+    pub fn damping(&self, joint: usize) -> f32 {
+        self.joints.get(joint).map_or(0.0, |joint| joint.controller.damping_nm_s_per_rad())
+    }
+
     /// Limits of each joint.
     #[must_use]
     pub fn limits(&self) -> &Limits<N> {
@@ -263,7 +269,7 @@ impl<const N: usize> Servo<N> {
                 None => held,
                 Some(Effort { torque, held: true, .. }) => held + *torque,
                 Some(Effort { torque, damping_share, .. }) => {
-                    *torque - self.damping(joint, *damping_share, velocity[joint])
+                    *torque - self.damped(joint, *damping_share, velocity[joint])
                 }
             }
         });
@@ -286,8 +292,9 @@ impl<const N: usize> Servo<N> {
         for joint in 0..N {
             if let Some(Effort { held: false, damping_share, .. }) = efforts.map(|efforts| &efforts[joint]) {
                 // Preset, so that the motion's control later starts from the present torque.
-                let damping = self.damping(joint, *damping_share, velocity[joint]);
-                let preset = decision.torque[joint] + damping;
+                let damping = self.damped(joint, *damping_share, velocity[joint]);
+                // The held tick adds the feedforward.
+                let preset = decision.torque[joint] + damping - NewtonMetre(feedforward[joint]);
                 self.controllers[joint].preset(&self.joints[joint].controller, preset);
             }
         }
@@ -295,7 +302,7 @@ impl<const N: usize> Servo<N> {
     }
 
     /// Torque of a share of the controller's damping.
-    fn damping(&self, joint: usize, share: f32, velocity: RadianPerSecond) -> NewtonMetre {
+    fn damped(&self, joint: usize, share: f32, velocity: RadianPerSecond) -> NewtonMetre {
         NewtonMetre(share * self.joints[joint].controller.damping_nm_s_per_rad() * velocity.0)
     }
 

@@ -8,8 +8,12 @@ use super::{Activity, Control};
 use crate::assist::{AssistDemand, AssistEnd, AssistSession, AssistShares, AssistTick, AssistTorque};
 use crate::leg::activity::AssistPhase;
 use crate::leg::model::IdentifiedModel;
+use crate::real::abs;
 use crate::servo::{Effort, ServoOutput};
 use crate::units::NewtonMetre;
+
+/// Measured speed below which a leg rests, rad/s.
+const FASTEST_REST: f32 = 0.05;
 
 /// Whether somebody wears the leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,11 +53,15 @@ pub enum AssistNote {
 pub(super) struct Assistance<const N: usize> {
     pub(super) empty: Option<IdentifiedModel<N>>,
     pub(super) worn: Option<IdentifiedModel<N>>,
-    /// What the operator said about the leg of the next identification.
+    /// Wearing of the leg of the next identification.
     pub(super) wearing: Option<Wearing>,
+    /// The model monitor reported a change after these models were accepted.
+    is_changed: bool,
     tick: Option<AssistTick<N>>,
     /// Session that the law has not taken yet.
     session: Option<AssistSession<N>>,
+    /// Number of the newest session.
+    number: u32,
     /// Event that was not recorded yet.
     note: Option<AssistNote>,
     position: [f32; N],
@@ -67,8 +75,10 @@ impl<const N: usize> Assistance<N> {
             empty: None,
             worn: None,
             wearing: None,
+            is_changed: false,
             tick: None,
             session: None,
+            number: 0,
             note: None,
             position: [0.0; N],
             velocity: [0.0; N],
@@ -88,6 +98,13 @@ impl<const N: usize> Assistance<N> {
         }
     }
 
+    /// Ends the session because the leg has changed, and permits none until one of its models is accepted
+    /// again.
+    pub(super) fn change(&mut self) {
+        self.is_changed = true;
+        self.leave(AssistEnd::Changed);
+    }
+
     /// Takes the servo's results of this tick.
     pub(super) fn measure(&mut self, output: &ServoOutput<N>) {
         for joint in 0..N {
@@ -99,8 +116,10 @@ impl<const N: usize> Assistance<N> {
 
     /// Sets the accepted model of the leg that the operator named.
     pub(super) fn accept(&mut self, model: &IdentifiedModel<N>) {
+        self.is_changed = false;
         match self.wearing {
-            Some(Wearing::Empty) => self.empty = Some(*model),
+            // The difference to a model of another empty leg would be no wearer.
+            Some(Wearing::Empty) => (self.empty, self.worn) = (Some(*model), None),
             Some(Wearing::Worn) => self.worn = Some(*model),
             None => {}
         }
@@ -161,6 +180,13 @@ impl<const N: usize> Control<N> {
         self.assistance.note.take()
     }
 
+    /// Whether the leg rests and does nothing else: a push or a swing does not count as rest.
+    pub(super) fn rests_for_assist(&self) -> bool {
+        matches!(self.activity, Activity::Idle | Activity::Follow)
+            && !self.servo.returns().contains(&true)
+            && self.assistance.velocity.iter().all(|speed| abs(*speed) < FASTEST_REST)
+    }
+
     /// Reason why these shares cannot be given, besides an activity or a motion.
     pub(super) fn assist_refusal(&self, shares: &AssistShares) -> Option<AssistRefusal> {
         let models = &self.assistance;
@@ -171,7 +197,7 @@ impl<const N: usize> Control<N> {
         } else if models.worn.is_none() && shares.need_worn_model() {
             Some(AssistRefusal::NoWornModel)
         } else {
-            self.change.map(|_| AssistRefusal::Changed)
+            models.is_changed.then_some(AssistRefusal::Changed)
         }
     }
 
@@ -185,10 +211,14 @@ impl<const N: usize> Control<N> {
     pub(super) fn begin_assist(&mut self, shares: AssistShares, gravity: [f32; 3]) {
         let Some(empty) = &self.assistance.empty else { return };
         let worn = self.assistance.worn.as_ref().filter(|_| shares.need_worn_model());
-        let session = AssistSession { shares, model: empty.compensation(worn, gravity) };
+        self.assistance.number = self.assistance.number.wrapping_add(1);
+        let number = self.assistance.number;
+        let session = AssistSession { number, shares, model: empty.compensation(worn, gravity) };
         let cap = self.servo.limits().joints().map(|joint| joint.torque_cap().0);
-        let Assistance { position, torque, .. } = self.assistance;
-        self.assistance.tick = Some(AssistTick::begin(&session, position, torque, cap));
+        let Assistance { position, velocity, torque, .. } = self.assistance;
+        // The session damps as the controller did, so that is no part of the torque that holds the leg.
+        let hold = core::array::from_fn(|joint| torque[joint] + self.servo.damping(joint) * velocity[joint]);
+        self.assistance.tick = Some(AssistTick::begin(&session, position, hold, cap));
         self.assistance.session = Some(session);
         self.models.want(false);
         self.activity = Activity::Assist(AssistPhase::Enter);
