@@ -104,16 +104,3 @@ fn a_session_that_leaves_while_it_enters_has_no_step_of_torque() {
     assert_eq!(bench.leg.control().activity(), Activity::Idle);
     assert!(largest < TENTH_OF_CAP, "{largest}");
 }
-
-#[test]
-fn a_leg_that_is_pushed_begins_no_session() {
-    let mut bench = Bench::enabled(&person(), POSTURE);
-    bench.run(SECOND);
-    bench.world.push(1, 60.0, 0.4);
-    bench.run(SECOND / 20);
-    let speed = bench.world.velocity()[1].abs();
-    let refused = bench.tick(Some(ControlRequest::Assist(MOST))).refused;
-    assert!(refused || speed < 0.05, "{speed} rad/s");
-    bench.run(2 * SECOND);
-    assert!(!bench.tick(Some(ControlRequest::Assist(MOST))).refused);
-}
