@@ -236,12 +236,27 @@ impl AssistRow {
 }
 
 impl AssistReport {
-    /// Whether every seed has a result, no budget was exceeded, no leg oscillated, and no fault was missed.
+    /// What failed: refused models, energy, rest, faults, stability; empty if nothing did.
     #[must_use]
-    pub fn is_as_it_should_be(&self) -> bool {
-        self.refused.is_empty()
-            && self.energy.exceeded == 0
-            && self.limit_cycles == 0
-            && self.missed.unwrap_or(0) == 0
+    pub fn failures(&self) -> Vec<String> {
+        let mut failures = Vec::new();
+        if let Some(refused) = self.refused.first() {
+            failures.push(format!("model `{}` refused", refused.model));
+        }
+        let limit = self.stability.largest_share_held;
+        if let Some(shares) = self.shares.iter().find(|shares| shares.inertia > limit) {
+            let share = shares.inertia;
+            failures.push(format!("inertia share {share:.2} above the largest stable one, {limit:.2}"));
+        }
+        if self.energy.exceeded > 0 {
+            failures.push(format!("energy budget exceeded in {} runs", self.energy.exceeded));
+        }
+        if self.limit_cycles > 0 {
+            failures.push(format!("limit cycles of {} legs at rest", self.limit_cycles));
+        }
+        if let Some(missed) = self.missed.filter(|missed| *missed > 0) {
+            failures.push(format!("{missed} injected faults missed"));
+        }
+        failures
     }
 }

@@ -141,7 +141,8 @@ pub fn wearer_sums(report: &AssistReport) -> Table {
 /// Lines about energy, rest, faults and stability; only what was run.
 #[must_use]
 pub fn notes(report: &AssistReport) -> Vec<String> {
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> =
+        report.failures().into_iter().map(|failure| format!("FAILED: {failure}")).collect();
     for refused in &report.refused {
         let reasons = refused.reasons.join(", ");
         notes.push(format!("seed {}: model `{}` refused: {reasons}", refused.seed, refused.model));
@@ -164,13 +165,13 @@ pub fn notes(report: &AssistReport) -> Vec<String> {
     }
     if let Some(mass) = &report.body_mass {
         notes.push(format!(
-            "body mass of the wearer: {:.1} kg +- {:.1} kg, assuming {}",
+            "body mass of the wearer: {:.1} kg +- {:.1} kg, assuming {}; sigma contains neither tissue nor cuffs",
             mass.kg, mass.sigma_kg, mass.assumption
         ));
     }
     let stability = &report.stability;
     notes.push(format!(
-        "largest stable share of inertia with these cuffs ({} N/m, {} N s/m): {:.2} on a limp limb, {:.2} on a held one",
+        "largest stable share of inertia with these cuffs ({} N/m, {} N s/m) and models without error: {:.2} on a limp limb, {:.2} on a held one",
         stability.stiffness_n_per_m,
         stability.damping_n_s_per_m,
         stability.largest_share_limp,

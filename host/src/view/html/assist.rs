@@ -10,8 +10,9 @@ use crate::view::html::{Circumstances, drawing, page_head};
 /// Creates the page.
 #[must_use]
 pub fn page(circumstances: &Circumstances, report: &AssistReport, figures: &[Figure]) -> String {
-    let is_good = report.is_as_it_should_be();
-    let verdict = if is_good { "within its limits" } else { "limits exceeded" };
+    let failures = report.failures();
+    let is_good = failures.is_empty();
+    let verdict = if is_good { "no limit exceeded".to_owned() } else { failures.join(", ") };
     let group = |group: Group| -> Markup {
         html! { @for figure in figures.iter().filter(|figure| figure.group == group) { (drawing(figure)) } }
     };
