@@ -17,7 +17,7 @@
 //! to come for [`LATEST_TICKS`] ends the session. Cost: some 20 operations for each joint.
 
 use super::differentiator::LedAcceleration;
-use super::law::{AssistSession, AssistTorque};
+use super::law::AssistTorque;
 use super::model::{Assured, faded_sign};
 use crate::real::{clamp, is_finite};
 use crate::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
@@ -83,16 +83,22 @@ pub struct AssistTick<const N: usize> {
 }
 
 impl<const N: usize> AssistTick<N> {
-    /// Begins a session at rest at these angles (rad), with the torque that holds the leg (N m). `cap_nm` are
-    /// the joints' torque caps.
+    /// Begins a session at rest at these angles (rad), with the torque that holds the leg (N m), a share of the
+    /// friction and its bounds. `cap_nm` are the joints' torque caps.
     #[must_use]
-    pub fn begin(session: &AssistSession<N>, angles: [f32; N], hold_nm: [f32; N], cap_nm: [f32; N]) -> Self {
+    pub fn begin(
+        number: u32,
+        (friction_share, assured): (f32, Assured<N>),
+        angles: [f32; N],
+        hold_nm: [f32; N],
+        cap_nm: [f32; N],
+    ) -> Self {
         Self {
             share: 0.0,
-            session: session.number,
+            session: number,
             end: None,
-            friction_share: session.shares.friction,
-            assured: session.model.assured,
+            friction_share,
+            assured,
             cap_nm,
             hold_nm,
             torque_nm: hold_nm,
@@ -205,26 +211,11 @@ impl<const N: usize> AssistTick<N> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AssistShares, CompensationModel};
     use super::*;
-    use crate::model::{Chain, DenavitHartenberg, PARAMETERS_PER_JOINT};
 
-    fn session() -> AssistSession<2> {
-        let geometry = DenavitHartenberg { alpha: 0.0, a: 0.0, d: 0.0 };
-        let chain =
-            Chain::new(&[geometry, DenavitHartenberg { a: 0.4, ..geometry }]).expect("finite numbers");
-        AssistSession {
-            number: 7,
-            shares: AssistShares { friction: 1.0, ..AssistShares::GRAVITY_ONLY },
-            model: CompensationModel {
-                chain,
-                gravity: [9.81, 0.0, 0.0],
-                empty: [[0.0; PARAMETERS_PER_JOINT]; 2],
-                wearer: None,
-                offset_nm: [0.0; 2],
-                assured: Assured { coulomb_nm: [4.0; 2], viscous: [3.0; 2], inertia_share: 1.0 },
-            },
-        }
+    fn begun(hold_nm: f32) -> AssistTick<2> {
+        let assured = Assured { coulomb_nm: [4.0; 2], viscous: [3.0; 2], inertia_share: 1.0 };
+        AssistTick::begin(7, (1.0, assured), [0.0; 2], [hold_nm; 2], [85.0; 2])
     }
 
     fn torque(torque_nm: f32) -> AssistTorque<2> {
@@ -240,7 +231,7 @@ mod tests {
 
     #[test]
     fn torque_moves_from_hold_to_law_and_back_without_a_step() {
-        let mut tick = AssistTick::begin(&session(), [0.0; 2], [20.0; 2], [85.0; 2]);
+        let mut tick = begun(20.0);
         let mut last = 20.0;
         let mut largest = 0.0_f32;
         let mut run = |tick: &mut AssistTick<2>, ticks: u32, law: f32| {
@@ -265,7 +256,7 @@ mod tests {
 
     #[test]
     fn leaving_early_moves_the_hold_torque_without_a_step() {
-        let mut tick = AssistTick::begin(&session(), [0.0; 2], [60.0; 2], [85.0; 2]);
+        let mut tick = begun(60.0);
         let mut last = 60.0;
         for number in 0..4000 {
             if number % TICKS_PER_LOG == 0 {
@@ -284,7 +275,7 @@ mod tests {
 
     #[test]
     fn torques_of_another_session_are_ignored() {
-        let mut tick = AssistTick::begin(&session(), [0.0; 2], [20.0; 2], [85.0; 2]);
+        let mut tick = begun(20.0);
         for _ in 0..=LATEST_TICKS + 1 {
             tick.receive(&AssistTorque { session: 6, ..torque(80.0) });
             let _ = tick.advance(&[0.0; 2], &[0.0; 2]);
@@ -294,7 +285,7 @@ mod tests {
 
     #[test]
     fn a_jump_of_the_law_is_limited_to_a_tenth_of_the_cap_per_sample() {
-        let mut tick = AssistTick::begin(&session(), [0.0; 2], [0.0; 2], [85.0; 2]);
+        let mut tick = begun(0.0);
         for number in 0..4800 {
             if number % TICKS_PER_LOG == 0 {
                 tick.receive(&torque(0.0));
@@ -308,7 +299,7 @@ mod tests {
 
     #[test]
     fn friction_fades_to_zero_at_rest() {
-        let mut tick = AssistTick::begin(&session(), [0.0; 2], [0.0; 2], [85.0; 2]);
+        let mut tick = begun(0.0);
         for number in 0..4800 {
             if number % TICKS_PER_LOG == 0 {
                 tick.receive(&torque(0.0));
@@ -323,18 +314,18 @@ mod tests {
 
     #[test]
     fn a_silent_or_broken_law_ends_the_session() {
-        let mut silent = AssistTick::begin(&session(), [0.0; 2], [0.0; 2], [85.0; 2]);
+        let mut silent = begun(0.0);
         for _ in 0..=LATEST_TICKS + 1 {
             let _ = silent.advance(&[0.0; 2], &[0.0; 2]);
         }
         assert_eq!(silent.end(), Some(AssistEnd::Late));
-        let mut broken = AssistTick::begin(&session(), [0.0; 2], [0.0; 2], [85.0; 2]);
+        let mut broken = begun(0.0);
         broken.receive(&torque(f32::NAN));
         assert!(
             broken.end() == Some(AssistEnd::NotFinite)
                 && broken.advance(&[0.0; 2], &[0.0; 2]).torque_nm == [0.0; 2]
         );
-        let mut exhausted = AssistTick::begin(&session(), [0.0; 2], [0.0; 2], [85.0; 2]);
+        let mut exhausted = begun(0.0);
         exhausted.receive(&AssistTorque { is_exhausted: true, ..torque(1.0) });
         assert_eq!(exhausted.end(), Some(AssistEnd::Energy));
     }

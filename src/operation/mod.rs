@@ -54,8 +54,8 @@ pub use housekeeper::{Housekeeper, HousekeepingSettings};
 pub use identify::{IdentificationLevel, Slice};
 pub use mailboxes::TxScheduler;
 pub use queues::{
-    AssistEnds, BusEnds, BusQueues, Calibrated, CurrentEnds, Ends, EventQueue, HostEnds, HousekeepingEnds,
-    IdentificationEnds, LegEvent, Queues, ServoEnds,
+    AssistEnds, AssistQueues, BusEnds, BusQueues, Calibrated, CurrentEnds, Ends, EventQueue, HostEnds,
+    HousekeepingEnds, IdentificationEnds, LegEvent, Queues, ServoAssistEnds, ServoEnds,
 };
 pub use servo::ServoLevel;
 pub use signals::{Inhibit, Signals, Statistics, Word};

@@ -76,9 +76,6 @@ pub struct Queues<const N: usize> {
     drive: Queue<DriveState, 8>,
     notes: Queue<Record<N>, 15>,
     calibrated: Queue<Calibrated, 4>,
-    sessions: Queue<AssistSession<N>, 2>,
-    assisted: Queue<LogSample<N>, SAMPLES>,
-    torques: Queue<AssistTorque<N>, SAMPLES>,
 }
 
 /// Ends of the current loops.
@@ -99,9 +96,8 @@ pub struct ServoEnds<'a, const N: usize> {
     pub(super) findings: Consumer<'a, Finding<N>>,
     pub(super) drive: Producer<'a, DriveState>,
     pub(super) events: Producer<'a, LegEvent<N>>,
-    pub(super) sessions: Producer<'a, AssistSession<N>>,
-    pub(super) assisted: Producer<'a, LogSample<N>>,
-    pub(super) torques: Consumer<'a, AssistTorque<N>>,
+    /// Ends towards the assistance, where there is one.
+    pub assist: Option<ServoAssistEnds<'a, N>>,
     /// Ends towards the bus.
     pub host: Option<HostEnds<'a, N>>,
 }
@@ -127,13 +123,6 @@ pub struct IdentificationEnds<'a, const N: usize> {
     pub notes: Consumer<'a, Record<N>>,
 }
 
-/// Ends of the assistance.
-pub struct AssistEnds<'a, const N: usize> {
-    pub(super) sessions: Consumer<'a, AssistSession<N>>,
-    pub(super) samples: Consumer<'a, LogSample<N>>,
-    pub(super) torques: Producer<'a, AssistTorque<N>>,
-}
-
 /// Both ends of every queue.
 pub struct Ends<'a, const N: usize> {
     /// Level 0.
@@ -144,8 +133,6 @@ pub struct Ends<'a, const N: usize> {
     pub housekeeping: HousekeepingEnds<'a, N>,
     /// Thread level.
     pub identification: IdentificationEnds<'a, N>,
-    /// Level 5.
-    pub assist: AssistEnds<'a, N>,
     /// Calibrations for the storage, thread level.
     pub calibrated: Consumer<'a, Calibrated>,
 }
@@ -179,9 +166,6 @@ impl<const N: usize> Queues<N> {
             drive: Queue::new(),
             notes: Queue::new(),
             calibrated: Queue::new(),
-            sessions: Queue::new(),
-            assisted: Queue::new(),
-            torques: Queue::new(),
         }
     }
 
@@ -197,9 +181,6 @@ impl<const N: usize> Queues<N> {
         let (give_note, take_note) = self.notes.split();
         let (give_calibrated, calibrated) = self.calibrated.split();
         let (give_event, take_event) = events.split();
-        let (give_session, take_session) = self.sessions.split();
-        let (give_assisted, take_assisted) = self.assisted.split();
-        let (give_torque, take_torque) = self.torques.split();
         Ends {
             current: CurrentEnds { orders: take_orders, outcomes: give_outcomes, samples: give_samples },
             servo: ServoEnds {
@@ -208,9 +189,7 @@ impl<const N: usize> Queues<N> {
                 findings: take_finding,
                 drive: give_drive,
                 events: give_event,
-                sessions: give_session,
-                assisted: give_assisted,
-                torques: take_torque,
+                assist: None,
                 host: None,
             },
             housekeeping: HousekeepingEnds {
@@ -226,7 +205,6 @@ impl<const N: usize> Queues<N> {
                 findings: give_finding,
                 notes: take_note,
             },
-            assist: AssistEnds { sessions: take_session, samples: take_assisted, torques: give_torque },
             calibrated,
         }
     }
@@ -274,6 +252,52 @@ impl<const N: usize> Queues<N> {
 }
 
 impl<const N: usize> Default for Queues<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Queues of the assistance, separate from [`Queues`] because the emulated image has none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AssistQueues<const N: usize> {
+    sessions: Queue<AssistSession<N>, 2>,
+    samples: Queue<LogSample<N>, SAMPLES>,
+    torques: Queue<AssistTorque<N>, SAMPLES>,
+}
+
+/// The servo's ends towards the assistance.
+pub struct ServoAssistEnds<'a, const N: usize> {
+    pub(super) sessions: Producer<'a, AssistSession<N>>,
+    pub(super) samples: Producer<'a, LogSample<N>>,
+    pub(super) torques: Consumer<'a, AssistTorque<N>>,
+}
+
+/// Ends of the assistance, level 5.
+pub struct AssistEnds<'a, const N: usize> {
+    pub(super) sessions: Consumer<'a, AssistSession<N>>,
+    pub(super) samples: Consumer<'a, LogSample<N>>,
+    pub(super) torques: Producer<'a, AssistTorque<N>>,
+}
+
+impl<const N: usize> AssistQueues<N> {
+    /// Creates empty queues.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { sessions: Queue::new(), samples: Queue::new(), torques: Queue::new() }
+    }
+
+    /// Splits every queue.
+    #[must_use]
+    pub fn split(&mut self) -> (ServoAssistEnds<'_, N>, AssistEnds<'_, N>) {
+        let (give_session, sessions) = self.sessions.split();
+        let (give_sample, samples) = self.samples.split();
+        let (torques, take_torque) = self.torques.split();
+        let servo = ServoAssistEnds { sessions: give_session, samples: give_sample, torques: take_torque };
+        (servo, AssistEnds { sessions, samples, torques })
+    }
+}
+
+impl<const N: usize> Default for AssistQueues<N> {
     fn default() -> Self {
         Self::new()
     }

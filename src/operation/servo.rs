@@ -135,7 +135,7 @@ impl<const N: usize> ServoLevel<N> {
         {
             send(LegEvent::TookResult, ends, signals);
         }
-        while let Some(torque) = ends.torques.dequeue() {
+        while let Some(torque) = ends.assist.as_mut().and_then(|assist| assist.torques.dequeue()) {
             control.receive_torque(&torque);
         }
         self.look_around(control, signals);
@@ -374,6 +374,7 @@ fn assist<const N: usize, H: Hardware<N>>(
     ends: &mut ServoEnds<'_, N>,
     hardware: &mut H,
 ) {
+    let Some(ends) = &mut ends.assist else { return };
     if let Some(session) = control.take_session() {
         let _ = ends.sessions.enqueue(session);
         hardware.pend_assist();
@@ -382,7 +383,7 @@ fn assist<const N: usize, H: Hardware<N>>(
         && let Some(logged) = &output.logged
     {
         // Without an answer the session ends.
-        let _ = ends.assisted.enqueue(logged.sample);
+        let _ = ends.samples.enqueue(logged.sample);
         hardware.pend_assist();
     }
 }

@@ -20,8 +20,8 @@ use crate::bus::{LONGEST, NodeId, Storing};
 use crate::leg::{Control, Following, StoredCalibration};
 use crate::motor::SenseScale;
 use crate::operation::{
-    Calibrated, EncoderSettings, Ends, HostEnds, Housekeeper, HousekeepingEnds, HousekeepingSettings, Queues,
-    ServoLevel,
+    AssistQueues, Calibrated, EncoderSettings, Ends, HostEnds, Housekeeper, HousekeepingEnds,
+    HousekeepingSettings, Queues, ServoLevel,
 };
 use crate::safety::InhibitReason;
 use crate::store::Key;
@@ -87,11 +87,13 @@ fn hand_out(
         servo: mut servo_ends,
         housekeeping: mut housekeeping_ends,
         identification,
-        assist: assist_ends,
         calibrated,
     } = QUEUES.take().split(memory::events());
     static LOOPS: StaticCell<current::Current> = StaticCell::new();
     place(&current::LOOPS, LOOPS.init(current::Current::new(current, divider)));
+    static ASSIST_QUEUES: ConstStaticCell<AssistQueues<JOINTS>> = ConstStaticCell::new(AssistQueues::new());
+    let (servo_assist, assist_ends) = ASSIST_QUEUES.take().split();
+    servo_ends.assist = Some(servo_assist);
     static ASSIST: StaticCell<assist::AssistLoop> = StaticCell::new();
     place(&assist::ASSIST, ASSIST.init(assist::AssistLoop::new(assist_ends)));
 

@@ -58,8 +58,8 @@ pub(super) struct Assistance<const N: usize> {
     /// The model monitor reported a change after these models were accepted.
     is_changed: bool,
     tick: Option<AssistTick<N>>,
-    /// Session that the law has not taken yet.
-    session: Option<AssistSession<N>>,
+    /// Shares of a session that the law has not taken yet, and gravity in the base frame, m/s^2.
+    begun: Option<(AssistShares, [f32; 3])>,
     /// Number of the newest session.
     number: u32,
     /// Event that was not recorded yet.
@@ -77,7 +77,7 @@ impl<const N: usize> Assistance<N> {
             wearing: None,
             is_changed: false,
             tick: None,
-            session: None,
+            begun: None,
             number: 0,
             note: None,
             position: [0.0; N],
@@ -88,7 +88,7 @@ impl<const N: usize> Assistance<N> {
 
     /// Drops the session without a fade, because the drive gives no torque.
     pub(super) fn interrupt(&mut self) {
-        (self.tick, self.session) = (None, None);
+        (self.tick, self.begun) = (None, None);
     }
 
     /// Fades the session out.
@@ -164,7 +164,11 @@ impl<const N: usize> Control<N> {
     /// Session that began since the last call; for the law.
     #[must_use]
     pub fn take_session(&mut self) -> Option<AssistSession<N>> {
-        self.assistance.session.take()
+        let (shares, gravity) = self.assistance.begun.take()?;
+        let empty = self.assistance.empty.as_ref()?;
+        let worn = self.assistance.worn.as_ref().filter(|_| shares.need_worn_model());
+        let number = self.assistance.number;
+        Some(AssistSession { number, shares, model: empty.compensation(worn, gravity) })
     }
 
     /// Takes the law's answer to a logged sample.
@@ -210,16 +214,14 @@ impl<const N: usize> Control<N> {
     /// Begins a session.
     pub(super) fn begin_assist(&mut self, shares: AssistShares, gravity: [f32; 3]) {
         let Some(empty) = &self.assistance.empty else { return };
-        let worn = self.assistance.worn.as_ref().filter(|_| shares.need_worn_model());
         self.assistance.number = self.assistance.number.wrapping_add(1);
-        let number = self.assistance.number;
-        let session = AssistSession { number, shares, model: empty.compensation(worn, gravity) };
         let cap = self.servo.limits().joints().map(|joint| joint.torque_cap().0);
-        let Assistance { position, velocity, torque, .. } = self.assistance;
+        let Assistance { number, position, velocity, torque, .. } = self.assistance;
         // The session damps as the controller did, so that is no part of the torque that holds the leg.
         let hold = core::array::from_fn(|joint| torque[joint] + self.servo.damping(joint) * velocity[joint]);
-        self.assistance.tick = Some(AssistTick::begin(&session, position, hold, cap));
-        self.assistance.session = Some(session);
+        let friction = (shares.friction, *empty.assured());
+        self.assistance.tick = Some(AssistTick::begin(number, friction, position, hold, cap));
+        self.assistance.begun = Some((shares, gravity));
         self.models.want(false);
         self.activity = Activity::Assist(AssistPhase::Enter);
     }

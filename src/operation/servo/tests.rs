@@ -2,10 +2,11 @@
 
 extern crate std;
 
+use std::boxed::Box;
 use std::vec::Vec;
 
 use super::super::testing::{TestHardware, commanded, ends, on_a_bus};
-use super::super::{BusEnds, Ends};
+use super::super::{AssistEnds, AssistQueues, BusEnds, Ends};
 use super::*;
 use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::{Contacts, DriveCommand};
@@ -33,6 +34,7 @@ struct Bench {
     signals: Signals<2>,
     ends: Ends<'static, 2>,
     bus: BusEnds<'static, 2>,
+    assist: AssistEnds<'static, 2>,
     counts: [i32; 2],
     /// The identification takes its events.
     is_received: bool,
@@ -51,6 +53,8 @@ impl Bench {
         let level = ServoLevel::new(&control, RAMPS, VOLT_PER_CODE, Some(Following::new(&configuration)));
         let mut ends = ends();
         ends.servo.host = Some(host);
+        let (servo, assist) = Box::leak(Box::new(AssistQueues::new())).split();
+        ends.servo.assist = Some(servo);
         hardware.contacts = Contacts { enabling: true, start: false };
         let signals = Signals::new();
         signals.set_permits(true);
@@ -62,6 +66,7 @@ impl Bench {
             signals,
             ends,
             bus,
+            assist,
             counts: [COUNTS; 2],
             is_received: true,
             events: Vec::new(),

@@ -32,9 +32,9 @@ use scarab::leg::{
 };
 use scarab::motor::{Chopper, SenseScale};
 use scarab::operation::{
-    AssistLevel, AxisState, BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper,
-    HousekeepingSettings, IdentificationLevel, Queues, RATE_HZ, ServoLevel, Signals, Slice, StoreJob, Tick,
-    Watch,
+    AssistLevel, AssistQueues, AxisState, BusQueues, BusRound, CurrentLoops, EventQueue, Handover,
+    Housekeeper, HousekeepingSettings, IdentificationLevel, Queues, RATE_HZ, ServoLevel, Signals, Slice,
+    StoreJob, Tick, Watch,
 };
 use scarab::safety::{BrakeDelays, GUARD_RATE_HZ, SupplyLimits};
 
@@ -93,6 +93,7 @@ pub struct Levels<const N: usize> {
     /// Bus level, if the board is on a bus.
     pub bus: Option<Box<BusLevel<N>>>,
     events: Locked<EventQueue<N>>,
+    assist_queues: Locked<AssistQueues<N>>,
     servo: ServoLevel<N>,
     housekeeper: Housekeeper<N>,
     identification: IdentificationLevel,
@@ -151,6 +152,7 @@ impl<const N: usize> Levels<N> {
             loops: loops([AxisState::OFF; N], chopper),
             bus: following.is_some().then(Box::default),
             events: Locked::new(EventQueue::new()),
+            assist_queues: Locked::new(AssistQueues::new()),
             servo: ServoLevel::new(
                 leg.control(),
                 drives::derating(SenseScale::DIVIDER),
@@ -238,6 +240,7 @@ impl<const N: usize> Levels<N> {
     /// Servo, level 1; `None` while the joints' samples are invalid.
     pub fn servo(&mut self, control: &mut Control<N>, gravity: [f32; 3]) -> Option<ControlOutput<N>> {
         let mut ends = self.queues.get().split(self.events.get()).servo;
+        ends.assist = Some(self.assist_queues.get().split().0);
         ends.host = self.bus.as_mut().map(|bus| bus.queues.get().split().1);
         let output = self.servo.tick(control, gravity, &mut ends, &self.signals, &mut self.registers);
         self.signals.statistics.servo_ticks.add();
@@ -247,7 +250,7 @@ impl<const N: usize> Levels<N> {
     /// Assistance, level 5, when it is due.
     pub fn assist(&mut self) {
         if core::mem::take(&mut self.registers.assist_due) {
-            let mut ends = self.queues.get().split(self.events.get()).assist;
+            let (_, mut ends) = self.assist_queues.get().split();
             self.assist.run(&mut ends);
         }
     }

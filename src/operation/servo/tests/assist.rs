@@ -20,7 +20,7 @@ fn run(bench: &mut Bench, law: &mut AssistLevel<2>, ticks: u32) {
         let pended = bench.hardware.assist_pended;
         bench.tick();
         if bench.hardware.assist_pended > pended {
-            law.run(&mut bench.ends.assist);
+            law.run(&mut bench.assist);
         }
     }
 }
