@@ -97,8 +97,8 @@ impl<const N: usize> CompensationModel<N> {
         }
     }
 
-    /// Torque that moves the wearer's leg and a share of the empty leg's inertia, less the carried share of the
-    /// wearer's weight, N m: that of a wearer in a transparent leg.
+    /// Torque that moves the wearer's leg and a share of the empty leg's inertia, less the carried share of
+    /// the wearer's weight, N m: that of a wearer in a transparent leg.
     #[must_use]
     pub fn wearer_needs(
         &self,

@@ -82,9 +82,10 @@ impl<const N: usize> PeriodicAssist<N> {
         self.gate
     }
 
-    /// Takes the angles (rad) of a sample and the torque that the wearer gives and needs (N m) at one earlier
-    /// time, and returns the assistance for `ahead` s after the sample, N m. The shares are those of the
-    /// assistance, of the empty leg's inertia that the wearer moves, and of the wearer's weight that is carried.
+    /// Takes the angles (rad) of a sample and the torque that the wearer gives and needs (N m) at one
+    /// earlier time, and returns the assistance for `ahead` s after the sample, N m. The shares are those of
+    /// the assistance, of the empty leg's inertia that the wearer moves, and of the wearer's weight that is
+    /// carried.
     pub fn step(
         &mut self,
         model: &CompensationModel<N>,

@@ -5,9 +5,9 @@
 //! ```
 //!
 //! `l` moves between 0 and 1 within [`FADE_S`]. D is the damping of the position controller. tau_0 is the
-//! torque that held the leg when the session began; while the session ends it moves to the torque that carries
-//! the leg's weight, by at most a tenth of the cap in each sample time. At l = 0 the torque is that of the controller without a position error: both ends are free of
-//! steps.
+//! torque that held the leg when the session began; while the session ends it moves to the torque that
+//! carries the leg's weight, by at most a tenth of the cap in each sample time. At l = 0 the torque is that
+//! of the controller without a position error: both ends are free of steps.
 //!
 //! S is the compensated mass matrix. A delay T of the compensated inertia acts as the negative damping
 //! -S w^2 T, which makes a cuff's resonance grow. So the acceleration is that of this tick and led
@@ -83,8 +83,8 @@ pub struct AssistTick<const N: usize> {
 }
 
 impl<const N: usize> AssistTick<N> {
-    /// Begins a session at rest at these angles (rad), with the torque that holds the leg (N m), a share of the
-    /// friction and its bounds. `cap_nm` are the joints' torque caps.
+    /// Begins a session at rest at these angles (rad), with the torque that holds the leg (N m), a share of
+    /// the friction and its bounds. `cap_nm` are the joints' torque caps.
     #[must_use]
     pub fn begin(
         number: u32,

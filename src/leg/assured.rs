@@ -6,9 +6,9 @@
 //! u' M u = sum_j u_j y_j(q, 0, u) p,    y_j regressor without gravity,    sigma^2 = y Cov y'
 //! ```
 //!
-//! Compensating the share k of M gives in none of these postures and directions more inertia than the leg has,
-//! with the confidence of 2 sigma. Directions: each joint alone and each pair together and against each other.
-//! Postures: sixteen angles of every joint but the first, on which M does not depend.
+//! Compensating the share k of M gives in none of these postures and directions more inertia than the leg
+//! has, with the confidence of 2 sigma. Directions: each joint alone and each pair together and against each
+//! other. Postures: sixteen angles of every joint but the first, on which M does not depend.
 //!
 //! Cost: some 300,000 instructions for two joints, once for each accepted model.
 
