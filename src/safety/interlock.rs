@@ -42,7 +42,9 @@ pub const READS: u32 = 16;
 /// Returns whether a line is active in [`READS`] reads in a row; the first inactive read ends the check.
 #[inline(always)]
 pub fn stays_active(mut is_active: impl FnMut() -> bool) -> bool {
-    (0..READS).all(|_| is_active())
+    // Written out: a loop around each of the sixteen reads doubles the time to an open contact.
+    let mut four = || is_active() && is_active() && is_active() && is_active();
+    four() && four() && four() && four()
 }
 
 /// Missed ticks, or unanswered requests to the servo, in a row that are a fault.
