@@ -57,6 +57,20 @@ enum Command {
     Drivers(DriverArguments),
 }
 
+/// Seed, time and result of a simulation.
+#[derive(Args, Clone, Debug)]
+struct Simulated {
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Cycles per instruction, 1 to 2.
+    #[arg(long, default_value_t = 1.34, value_parser = factor)]
+    time_factor: f64,
+    /// Write the result as JSON here.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
 /// Image, leg, time and seed.
 #[derive(Args, Clone, Debug)]
 struct Common {
@@ -72,15 +86,8 @@ struct Common {
     /// Image (ELF) of that leg; built unless given.
     #[arg(long)]
     image: Option<PathBuf>,
-    /// Seed of the sensors' noise.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Cycles per instruction, 1 to 2.
-    #[arg(long, default_value_t = 1.34, value_parser = factor)]
-    time_factor: f64,
-    /// Write the result as JSON here.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    run: Simulated,
 }
 
 #[derive(Args, Debug)]
@@ -106,15 +113,8 @@ struct AssistArguments {
     /// Mode; may be repeated. All three unless given.
     #[arg(long, value_enum)]
     mode: Vec<ModeArgument>,
-    /// Seed of noise and identification.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Cycles per instruction, 1 to 2.
-    #[arg(long, default_value_t = 1.34, value_parser = factor)]
-    time_factor: f64,
-    /// Write the result as JSON here.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    run: Simulated,
 }
 
 #[derive(Args, Debug)]
@@ -222,12 +222,12 @@ impl Common {
             None => build::build(&options)?,
         };
         let image: Rc<Image> = Image::load(&path)?;
-        let options = Options { time_factor: self.time_factor, ..Options::default() };
-        Session::new(&image, &leg, &options, self.seed)
+        let options = Options { time_factor: self.run.time_factor, ..Options::default() };
+        Session::new(&image, &leg, &options, self.run.seed)
     }
 
     fn write(&self, result: &impl Serialize) -> Result<(), ToolError> {
-        write(self.json.as_deref(), result)
+        write(self.run.json.as_deref(), result)
     }
 }
 
@@ -252,7 +252,7 @@ fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
         return Err(error);
     }
     let identified = arguments.steps.contains(&Step::Identify);
-    let mut report = ChipReport::new(&mut session, identified, common.time_factor, common.seed)?;
+    let mut report = ChipReport::new(&mut session, identified, common.run.time_factor, common.run.seed)?;
     report.stop = stops::at_end(&mut session)?;
     print_run(&report, begun.elapsed().as_secs_f64());
     common.write(&report)?;
@@ -363,14 +363,14 @@ fn print_run(report: &ChipReport, wall_s: f64) {
 
 fn run_assist(arguments: &AssistArguments) -> Result<bool, ToolError> {
     let leg = LegFile::load(&arguments.leg)?;
-    let options = Options { time_factor: arguments.time_factor, ..Options::default() };
+    let options = Options { time_factor: arguments.run.time_factor, ..Options::default() };
     let all = [ModeArgument::Transparent, ModeArgument::Weight, ModeArgument::Periodic];
     let modes = if arguments.mode.is_empty() { &all[..] } else { &arguments.mode };
     // Firm cuffs: their resonance lies above a gait's harmonics, where small differences would grow.
     let cuffs = Cuffs { stiffness: 20e3, damping: 400.0 };
     let mut found = Vec::new();
     for mode in modes {
-        let comparison = assist::compare(&leg, (*mode).into(), &cuffs, arguments.seed, &options)?;
+        let comparison = assist::compare(&leg, (*mode).into(), &cuffs, arguments.run.seed, &options)?;
         println!(
             "{:<12} interaction torque, N m rms: image {:.3} {:.3}, host {:.3} {:.3}; phases {}; law {:.1} % of the processor; missed {}",
             comparison.mode,
@@ -384,7 +384,7 @@ fn run_assist(arguments: &AssistArguments) -> Result<bool, ToolError> {
         );
         found.push(comparison);
     }
-    write(arguments.json.as_deref(), &found)?;
+    write(arguments.run.json.as_deref(), &found)?;
     Ok(found.iter().all(AssistComparison::is_good))
 }
 
@@ -392,7 +392,7 @@ fn run_stops(arguments: &StopArguments) -> Result<bool, ToolError> {
     let common = &arguments.common;
     let mut session = common.session()?;
     session.boot()?;
-    let report = stops::run(&mut session, arguments.phases, common.time_factor)?;
+    let report = stops::run(&mut session, arguments.phases, common.run.time_factor)?;
     for situation in &report.situations {
         println!(
             "{:<12} {} stops, a bridge on at {}: off after {:.2} us mean, {:.2} us worst, permanently {:.2} us; on again {} ({:.2} us), stayed on {}",

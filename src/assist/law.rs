@@ -1,7 +1,7 @@
 //! One sample of the 500 Hz log in, one torque for the 4 kHz tick out.
 //!
-//! Why a level of its own: five evaluations of a model take about 8,000 instructions. Once per sample they
-//! cost 2 % of the processor; in the tick they would not fit.
+//! Why a level of its own: with every share, a sample takes about 10,000 instructions. Once per sample they
+//! cost 4 % of the processor; in the tick they would not fit.
 //!
 //! The torque belongs to a time [`AHEAD_S`] after the sample's: half of the eight ticks of its mean, the
 //! computation, and the ramp of the tick. Weight is extrapolated over that time. Acceleration must not wait
@@ -39,10 +39,10 @@ pub struct AssistTorque<const N: usize> {
     pub session: u32,
     /// Whole torque besides inertia, friction and damping, N m.
     pub torque_nm: [f32; N],
+    /// The part of `torque_nm` that carries weight, N m.
+    pub support_nm: [f32; N],
     /// Compensated mass matrix, kg m^2.
     pub inertia: [[f32; N]; N],
-    /// Its part that carries weight, N m.
-    pub support_nm: [f32; N],
     /// Damping that the energy observer requires, N m s/rad.
     pub damping: f32,
     /// Whether the session must end: the energy budget is used up.
@@ -146,9 +146,9 @@ impl<const N: usize> Running<N> {
             let needed = model.wearer_needs(&state, moved, shares.weight);
             let (inertia, weight) = (model.inertia(&state), model.weight(&state.q));
             let carried = model.wearer_weight(&state.q).map(|weight| shares.weight * weight);
+            let friction = model.assured.friction(&state.qd);
             let own = core::array::from_fn(|joint| {
-                let friction = model.friction(joint, state.qd[joint]);
-                needed[joint] + carried[joint] + certain * inertia[joint] + weight[joint] + friction
+                needed[joint] + carried[joint] + certain * inertia[joint] + weight[joint] + friction[joint]
                     - torque[joint]
             });
             let taken = [shares.periodic, moved, shares.weight];

@@ -5,14 +5,15 @@
 //!        + s_i k (M(q) q'' + C(q, q') q')                   share of its inertia, at most the lower bound k
 //!        + s_f (FC_low c(q') + FV_low q')                   share of its friction's lower bounds
 //!        + s_w G_w(q)                                       share of the wearer's weight
-//!        + s_p e tau_w(q*, q*', q*'')                       share of the wearer's torque, predicted
+//!        + s_p e tau_n(q*, q*', q*'')                       share of the wearer's torque, predicted
 //!        - b q'                                             damping, once too much energy was given
 //! ```
 //!
 //! | symbol | meaning | unit |
 //! | --- | --- | --- |
 //! | G, M, C | gravity, mass matrix and centrifugal terms of the model `empty`, rotors included | |
-//! | G_w, tau_w | gravity and inverse dynamics of the difference `worn` - `empty`: the wearer's leg | N m |
+//! | G_w | gravity of the difference `worn` - `empty`: the wearer's leg | N m |
+//! | tau_n | torque that the wearer of the leg gives without this share, see [`periodic`] | N m |
 //! | FC_low, FV_low, k | value - 2 sigma of friction; the same bound of the mass matrix, relative | |
 //! | q* | motion that the oscillators predict | rad |
 //! | e | gate of the periodic assist, 0..1: periodic motion and effort of the wearer | |

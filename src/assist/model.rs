@@ -20,6 +20,19 @@ pub struct Assured<const N: usize> {
 impl<const N: usize> Assured<N> {
     /// Bounds of a model whose uncertainty is unknown: only its weight may be carried.
     pub const NOTHING: Self = Self { coulomb_nm: [0.0; N], viscous: [0.0; N], inertia_share: 0.0 };
+
+    /// Lower bound of the friction of moving joints, N m. The sign of Coulomb friction is linear within
+    /// [`FRICTION_BAND`].
+    #[must_use]
+    #[inline]
+    pub fn friction(&self, qd: &[f32; N]) -> [f32; N] {
+        let mut torque = [0.0; N];
+        for joint in 0..N {
+            let sign = clamp(qd[joint] * (1.0 / FRICTION_BAND), -1.0, 1.0);
+            torque[joint] = self.coulomb_nm[joint] * sign + self.viscous[joint] * qd[joint];
+        }
+        torque
+    }
 }
 
 /// Torques of the empty leg, and of the wearer's leg if that is known.
@@ -43,12 +56,6 @@ pub struct CompensationModel<const N: usize> {
 /// Speed below which compensated Coulomb friction fades to zero, rad/s. Friction at rest is not compensated:
 /// it can take either sign there, and a torque that helps it one way pushes the other way.
 pub const FRICTION_BAND: f32 = 0.05;
-
-/// Sign of a measured velocity, linear within [`FRICTION_BAND`].
-#[must_use]
-pub fn faded_sign(qd: f32) -> f32 {
-    clamp(qd * (1.0 / FRICTION_BAND), -1.0, 1.0)
-}
 
 /// Torque of one set of parameters with their rotors' inertia, N m.
 fn torques<const N: usize>(
@@ -116,13 +123,6 @@ impl<const N: usize> CompensationModel<N> {
             }
         }
         torque
-    }
-
-    /// Lower bound of a moving joint's friction, N m.
-    #[must_use]
-    pub fn friction(&self, joint: usize, qd: f32) -> f32 {
-        let bound = |bounds: &[f32; N]| bounds.get(joint).copied().unwrap_or(0.0);
-        bound(&self.assured.coulomb_nm) * faded_sign(qd) + bound(&self.assured.viscous) * qd
     }
 
     /// Share of the empty leg's mass matrix, kg m^2.

@@ -9,16 +9,15 @@
 //! e      follows the gate, from 0 to 1 in a cycle, from 1 to 0 in half a cycle
 //! ```
 //!
-//! The gate has two parts. The motion must be periodic: the oscillators predict it. And the wearer must mean
-//! it: a leg that swings limply, or against its wearer, shows no effort of its own, although it may be
-//! periodic. `own` is 1 - s for a wearer who gives the rest.
+//! The gate has two parts. The motion must be periodic: the oscillators predict it. And the wearer must give
+//! torque for it: a leg that swings limply, or against its wearer, may be periodic too. `own` is 1 - s for a
+//! wearer who gives the rest.
 //!
 //! The assistance ends within 50 ms, until the next cycle, once its work on the measured motion exceeds its
 //! share of the positive work that the prediction needed in the cycle before.
 
 use super::model::CompensationModel;
 use super::oscillator::Oscillator;
-use crate::model::JointState;
 use crate::real::{abs, clamp, max};
 use crate::servo::LOG_RATE_HZ;
 
@@ -121,18 +120,11 @@ impl<const N: usize> PeriodicAssist<N> {
                 ramp(PERIODIC, self.oscillator.predicted_share()) * ramp(OWN, own_share / (1.0 - share));
             self.gate += clamp(gate - self.gate, -2.0 * cycles, cycles);
         }
-        let assist = self.assisted(&state, &torque, share);
-        (self.last_assist, self.last_angle) = (assist, *angles);
-        assist
-    }
-
-    /// Scales the predicted torque and keeps the ledger of the cycle.
-    fn assisted(&mut self, state: &JointState<f32, N>, torque: &[f32; N], share: f32) -> [f32; N] {
-        let mut assist = [0.0; N];
-        for joint in 0..N {
-            assist[joint] = share * self.gate * torque[joint];
-            self.needed_j += max(torque[joint] * state.qd[joint], 0.0) * DT;
+        for (torque, qd) in torque.iter().zip(&state.qd) {
+            self.needed_j += max(torque * qd, 0.0) * DT;
         }
+        let assist = torque.map(|torque| share * self.gate * torque);
+        (self.last_assist, self.last_angle) = (assist, *angles);
         assist
     }
 }

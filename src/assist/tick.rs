@@ -18,7 +18,7 @@
 
 use super::differentiator::LedAcceleration;
 use super::law::AssistTorque;
-use super::model::{Assured, faded_sign};
+use super::model::Assured;
 use crate::real::{clamp, is_finite};
 use crate::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 
@@ -187,15 +187,14 @@ impl<const N: usize> AssistTick<N> {
         self.share = clamp(self.share + step, 0.0, 1.0);
         let moves = self.age.is_some_and(|age| age < TICKS_PER_LOG);
         self.age = self.age.map(|age| age.saturating_add(1));
+        let friction = self.assured.friction(velocity);
         let mut demand = AssistDemand { torque_nm: [0.0; N], damping_share: 1.0 - self.share };
         for joint in 0..N {
             if moves {
                 self.torque_nm[joint] += self.slope_nm[joint];
             }
-            let Assured { coulomb_nm, viscous, .. } = &self.assured;
-            let speed = velocity[joint];
-            let friction = coulomb_nm[joint] * faded_sign(speed) + viscous[joint] * speed;
-            let mut law = self.torque_nm[joint] + self.friction_share * friction - self.damping * speed;
+            let compensated = self.friction_share * friction[joint] - self.damping * velocity[joint];
+            let mut law = self.torque_nm[joint] + compensated;
             for (inertia, acceleration) in self.inertia[joint].iter().zip(&acceleration) {
                 law += inertia * acceleration;
             }

@@ -15,7 +15,7 @@
 use crate::findings::{Access, NO_REGISTER, NOT_MODELLED};
 use crate::time::{NEVER, Ticks};
 
-/// Timers of the model, in the order of [`Id`].
+/// Timers of the model, in the order of their numbers.
 pub const NAMES: [&str; 6] = ["TIM1", "TIM8", "TIM2", "TIM3", "TIM4", "TIM5"];
 
 const CR1: u32 = 0x00;

@@ -29,6 +29,29 @@ pub struct WearerDescription {
     pub cuffs: [CuffDescription; 2],
 }
 
+impl WearerDescription {
+    /// Wearer with these segments (thigh, shank), muscles and cuffs, whose joint axes are the exoskeleton's.
+    /// The delay of the reflexes is 70 ms, an assumption.
+    #[must_use]
+    pub const fn aligned(
+        [thigh, shank]: [SegmentDescription; 2],
+        thigh_length: f64,
+        muscles: [MuscleDescription; 2],
+        cuffs: [CuffDescription; 2],
+    ) -> Self {
+        Self {
+            thigh,
+            shank,
+            thigh_length,
+            hip_offset: [0.0; 2],
+            passive: [PassiveDescription::HIP, PassiveDescription::KNEE],
+            muscles,
+            neural_delay: 0.07,
+            cuffs,
+        }
+    }
+}
+
 /// Rigid segment in the plane of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SegmentDescription {

@@ -6,8 +6,7 @@ use hal_sim::description::{
 };
 use hal_sim::wearer::WearerTruth;
 use hal_sim::wearer::description::{
-    CuffDescription, CuffSpring, Impedance, MuscleDescription, PassiveDescription, SegmentDescription,
-    WearerDescription,
+    CuffDescription, CuffSpring, Impedance, MuscleDescription, SegmentDescription, WearerDescription,
 };
 use hal_sim::wearer::muscles::Intention;
 use hal_sim::world::World;
@@ -107,18 +106,10 @@ pub fn firm_cuff(distance: f64) -> CuffDescription {
 
 /// A wearer of 75 kg with firm muscles.
 pub fn person() -> WearerDescription {
-    let [thigh, shank] =
+    let segments =
         limb_segments().map(|(mass, com, inertia_com)| SegmentDescription { mass, com, inertia_com });
-    WearerDescription {
-        thigh,
-        shank,
-        thigh_length: THIGH_M,
-        hip_offset: [0.0; 2],
-        passive: [PassiveDescription::HIP, PassiveDescription::KNEE],
-        muscles: [MuscleDescription::FIRM_HIP, MuscleDescription::FIRM_KNEE],
-        neural_delay: 0.07,
-        cuffs: [firm_cuff(0.28), firm_cuff(0.25)],
-    }
+    let muscles = [MuscleDescription::FIRM_HIP, MuscleDescription::FIRM_KNEE];
+    WearerDescription::aligned(segments, THIGH_M, muscles, [firm_cuff(0.28), firm_cuff(0.25)])
 }
 
 /// A wearer who moves as intended, whatever the exoskeleton does: experiments with and without assistance

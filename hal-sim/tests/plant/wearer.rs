@@ -41,17 +41,9 @@ fn limb() -> [SegmentDescription; 2] {
 }
 
 fn person() -> WearerDescription {
-    let [thigh, shank] = limb();
-    WearerDescription {
-        thigh,
-        shank,
-        thigh_length: THIGH_M,
-        hip_offset: [0.0; 2],
-        passive: [PassiveDescription::HIP, PassiveDescription::KNEE],
-        muscles: [MuscleDescription::HIP, MuscleDescription::KNEE],
-        neural_delay: 0.07,
-        cuffs: [CuffDescription::padded(0.28), CuffDescription::padded(0.25)],
-    }
+    let muscles = [MuscleDescription::HIP, MuscleDescription::KNEE];
+    let cuffs = [CuffDescription::padded(0.28), CuffDescription::padded(0.25)];
+    WearerDescription::aligned(limb(), THIGH_M, muscles, cuffs)
 }
 
 /// Person without passive torques; cuffs without damping.

@@ -18,7 +18,7 @@
 //! a designer knows the machine better than the wearer.
 
 use hal_sim::wearer::description::{
-    CuffDescription, Impedance, MuscleDescription, PassiveDescription, SegmentDescription, WearerDescription,
+    CuffDescription, Impedance, MuscleDescription, SegmentDescription, WearerDescription,
 };
 use scarab::model::is_physically_consistent;
 
@@ -30,8 +30,6 @@ use crate::leg::link_body::{linked, without};
 /// Distance of a cuff from the joint above, as a share of the segment's length.
 const THIGH_CUFF: f64 = 0.65;
 const SHANK_CUFF: f64 = 0.58;
-/// Neural delay of a wearer with no other one, s.
-pub const NEURAL_DELAY_S: f64 = 0.07;
 
 /// Exoskeleton and wearer of a leg file.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,23 +154,15 @@ fn machine(link: &LinkParameters, part: &[Segment]) -> Option<LinkParameters> {
 /// A person for the simulated hardware: aligned joint axes, padded cuffs.
 #[must_use]
 pub fn description(person: &Wearer, tone: MuscleTone) -> WearerDescription {
-    let [thigh, shank] = parts(person).map(|part| {
+    let segments = parts(person).map(|part| {
         let (mass, [along, forward, _], inertia) = joined(&part);
         SegmentDescription { mass, com: [along, forward], inertia_com: inertia[5] }
     });
-    WearerDescription {
-        thigh,
-        shank,
-        thigh_length: person.thigh,
-        hip_offset: [0.0; 2],
-        passive: [PassiveDescription::HIP, PassiveDescription::KNEE],
-        muscles: tone.muscles(),
-        neural_delay: NEURAL_DELAY_S,
-        cuffs: [
-            CuffDescription::padded(THIGH_CUFF * person.thigh),
-            CuffDescription::padded(SHANK_CUFF * person.shank),
-        ],
-    }
+    let cuffs = [
+        CuffDescription::padded(THIGH_CUFF * person.thigh),
+        CuffDescription::padded(SHANK_CUFF * person.shank),
+    ];
+    WearerDescription::aligned(segments, person.thigh, tone.muscles(), cuffs)
 }
 
 #[cfg(test)]

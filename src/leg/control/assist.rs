@@ -15,7 +15,7 @@ use crate::units::NewtonMetre;
 /// Measured speed below which a leg rests, rad/s.
 const FASTEST_REST: f32 = 0.05;
 
-/// Whether somebody wears the leg.
+/// Whether the leg is worn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wearing {
     /// The exoskeleton alone.
