@@ -142,6 +142,10 @@ struct ServeArguments {
     /// Address of the TCP port with the slcan protocol.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:29536")]
     slcan: SocketAddr,
+    /// Begin with a board as delivered: not calibrated. The simulated operator does what `cargo sim
+    /// commission` asks for.
+    #[arg(long)]
+    delivered: bool,
     /// Simulated time to serve, s; without it until the process ends.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -483,13 +487,17 @@ fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
 fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
     let mut session = arguments.common.session()?;
     session.boot()?;
-    for step in [Step::Calibrate, Step::Reference] {
-        session.step(step)?;
+    if !arguments.delivered {
+        for step in [Step::Calibrate, Step::Reference] {
+            session.step(step)?;
+        }
+        // A host enables the drive; the leg is let go at its last position.
+        session.hold_switch(true);
     }
-    // A host enables the drive; the leg is let go at its last position.
-    session.hold_switch(true);
     session.machine.chip_mut().can.connected = false;
-    serve::serve(&mut session, arguments.slcan, arguments.seconds)?;
+    session.prints = true;
+    let operator = arguments.delivered.then(serve::Operator::default);
+    serve::serve(&mut session, arguments.slcan, arguments.seconds, operator)?;
     print_findings(&session);
     Ok(crate::report::findings(&session).0.is_empty())
 }

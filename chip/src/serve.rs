@@ -1,17 +1,22 @@
 //! The image on the simulated bus, for existing host software: an slcan adapter on a TCP port.
 //!
-//! The operator has calibrated the motors, taken the reference and holds the enabling switch. Simulated time
-//! follows the clock where the processor is fast enough, and is slower elsewhere.
+//! The operator has calibrated the motors, taken the reference and holds the enabling switch; or the board is
+//! as delivered, and the operator does what a commissioning host asks ([`Operator`]). Simulated time follows
+//! the clock where the processor is fast enough, and is slower elsewhere.
 
 use std::io::Write;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
+use scarab::bus::Frame;
+use scarab::bus::commissioning::{BoardState, StepResult};
 use scarab_host::base::error::ToolError;
 use scarab_host::rig::bus::server::{Server, What};
+use scarab_host::rig::pair::start_position;
 
+use crate::plant::JOINTS;
 use crate::session::Session;
-use crate::time::seconds;
+use crate::time::{Ticks, seconds, ticks};
 
 /// Simulated time between two polls of the port, s.
 const SLICE_S: f64 = 1e-3;
@@ -20,11 +25,69 @@ const QUEUE: usize = 64;
 /// Lag beyond which lost time is skipped.
 const MOST_LAG: Duration = Duration::from_millis(50);
 
+/// Time of a motion by hand, and until the switch is closed after it, s.
+const BY_HAND_S: f64 = 1.0;
+const STANDS_S: f64 = 1.5;
+
+/// Operator who reads what the board answers to a commissioning host, as its screen would say it: holds or
+/// opens the enabling switch where the board refuses a step because of it, brings the joints to their zero
+/// once the motors are calibrated, and into their range after the reference.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Operator {
+    /// The joints were brought to their zero, and into their range.
+    is_at_zero: bool,
+    is_in_range: bool,
+    /// When the enabling switch is to be closed.
+    closes: Option<Ticks>,
+}
+
+impl Operator {
+    /// Looks at a frame of the board.
+    fn look(&mut self, frame: &Frame, session: &mut Session) {
+        // Answers to reads of 2160:2 and 3.
+        let &[0x4F, 0x60, 0x21, sub, value, ..] = frame.data() else { return };
+        let now = session.now();
+        if sub == 3 {
+            if value == StepResult::SwitchOpen as u8 {
+                session.hold_switch(true);
+            } else if value == StepResult::SwitchClosed as u8 || value == StepResult::ContactsNotOpened as u8
+            {
+                session.hold_switch(false);
+            }
+        }
+        let has = |bit: u8| sub == 2 && value & bit != 0;
+        if has(BoardState::CALIBRATED) && !has(BoardState::REFERENCED) && !self.is_at_zero {
+            self.is_at_zero = true;
+            session.machine.chip_mut().plant.couple(now);
+            session.machine.chip_mut().plant.move_by_hand([0.0; JOINTS], now, BY_HAND_S);
+        }
+        if has(BoardState::REFERENCED) && !self.is_in_range {
+            self.is_in_range = true;
+            let to = start_position(&session.leg);
+            session.machine.chip_mut().plant.move_by_hand(to, now, BY_HAND_S);
+            session.hold_switch(false);
+            self.closes = Some(now + ticks(STANDS_S));
+        }
+    }
+
+    /// Closes the switch when it is due.
+    fn act(&mut self, session: &mut Session) {
+        if self.closes.take_if(|closes| *closes <= session.now()).is_some() {
+            session.hold_switch(true);
+        }
+    }
+}
+
 /// Serves for a time, s, or until the process ends.
 ///
 /// # Errors
 /// The port cannot be opened, or the model does not support an action of the processor.
-pub fn serve(session: &mut Session, address: SocketAddr, duration: Option<f64>) -> Result<(), ToolError> {
+pub fn serve(
+    session: &mut Session,
+    address: SocketAddr,
+    duration: Option<f64>,
+    mut operator: Option<Operator>,
+) -> Result<(), ToolError> {
     let refused = |error: std::io::Error| ToolError::input(format!("{address}: {error}"));
     let mut server = Server::new(address).map_err(refused)?;
     println!("listening {}", server.address().map_err(refused)?);
@@ -60,9 +123,15 @@ pub fn serve(session: &mut Session, address: SocketAddr, duration: Option<f64>) 
         if plant.is_held() && plant.axes.iter().all(|axis| axis.is_armed()) {
             plant.let_go();
         }
-        for (_, frame) in session.machine.chip_mut().can.sent.drain(..) {
-            server.show(&frame);
-            server.send(&frame);
+        let sent: Vec<Frame> =
+            session.machine.chip_mut().can.sent.drain(..).map(|(_, frame)| frame).collect();
+        for frame in &sent {
+            server.show(frame);
+            server.send(frame);
+        }
+        if let Some(operator) = &mut operator {
+            sent.iter().for_each(|frame| operator.look(frame, session));
+            operator.act(session);
         }
         server.flush().iter().for_each(|event| eprintln!("{event}"));
         due += Duration::from_secs_f64(SLICE_S);

@@ -74,8 +74,19 @@ pub struct Session {
 }
 
 /// Records that are printed when they arrive.
-const TIMELINE: [&str; 9] =
-    ["boot", "crash", "refused", "gate_driver", "state", "not_enabled", "fault", "axis_fault", "calibration"];
+const TIMELINE: [&str; 11] = [
+    "boot",
+    "crash",
+    "refused",
+    "request",
+    "gate_driver",
+    "state",
+    "activity",
+    "not_enabled",
+    "fault",
+    "axis_fault",
+    "calibration",
+];
 
 /// Longest write of the flash, s.
 const STORE_S: f64 = 5.0;

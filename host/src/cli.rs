@@ -2,6 +2,7 @@
 
 pub mod arguments;
 pub mod assist;
+mod commission;
 pub mod common;
 mod compare;
 mod eds;
@@ -44,7 +45,7 @@ use crate::formats::shard::Argument;
 #[command(name = "scarab", version, max_term_width = HELP_WIDTH, after_help = "\
 Options without a command belong to `identify`. `scarab COMMAND --help` has an example of each.
 Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, live, excite, monitor, assist, motor, serve.
-Board: fw, flash-leg, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
+Board: fw, flash-leg, commission, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -89,6 +90,9 @@ enum Command {
     /// Serve legs on a CANopen bus, reached by host software over TCP (slcan).
     #[command(after_help = "Example: cargo sim serve --slcan 127.0.0.1:0")]
     Serve(serve::ServeArguments),
+    /// Commission a board over its bus, step by step: calibrate, reference, identify, store.
+    #[command(after_help = "Example: cargo sim commission --slcan /dev/ttyACM0 --out commissioned")]
+    Commission(commission::CommissionArguments),
     /// Export and import the stored data of a board: its flash as TOML, and TOML into a flash.
     #[command(after_help = "Example: cargo sim kept export flash.bin --out kept.toml")]
     Kept(kept::KeptArguments),
@@ -206,6 +210,7 @@ fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
         Command::Export(arguments) => export::run(arguments),
         Command::Eds(arguments) => eds::run(arguments),
         Command::Serve(arguments) => serve::run(arguments),
+        Command::Commission(arguments) => commission::run(arguments),
         Command::Kept(arguments) => kept::run(arguments),
         Command::Monitor(arguments) => monitor::run(arguments),
         Command::Assist(arguments) => assist::run(arguments),

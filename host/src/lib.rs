@@ -8,6 +8,7 @@
 //! | [`report`] | results as plain data: the JSON |
 //! | [`formats`] | files: leg, model, motion, recording, stored data of a board, trace, EDS, URDF |
 //! | [`leg`] | a leg file becomes the firmware's configuration, its prior and its plant |
+//! | [`client`] | CANopen master behind an slcan adapter |
 //! | [`rig`] | firmware and simulated hardware put together, the bus included |
 //! | [`run`] | one experiment each: identify, replay, monitor, design of a motion, motor stand, prediction |
 //! | [`image`] | the flash image, and the whole firmware in the emulator |
@@ -23,6 +24,7 @@
 
 pub mod base;
 pub mod cli;
+pub mod client;
 pub mod faults;
 pub mod formats;
 pub mod image;

@@ -8,6 +8,7 @@
 //! frame received           receive(frame, now, sender)          a reset node recalls its stored parameters
 //! mailbox free             poll(joint, now) -> frame            repeat until there is none
 //! leg has ticked           update(LegStatus), order() -> LegOrder   commands, one request, faults of a host
+//! host wrote 2160:1        take_step()                          once
 //! host wrote 1010 or 1011  take_store(into) -> Keeping          then storing(Busy), stored(done, objects)
 //! ```
 //!
@@ -23,6 +24,7 @@
 //!
 //! Cost per tick: two polls of a node and one copy of the leg's values. Measured: docs/results/bus.md.
 
+use super::commissioning::{BoardStatus, CommissioningStep};
 use super::communication::Identity;
 use super::drive::{Axis, AxisConstants, Coupling};
 use super::emergency::ErrorReport;
@@ -400,6 +402,16 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     #[must_use]
     pub const fn is_hosted(&self) -> bool {
         self.hosted
+    }
+
+    /// Takes over the board's state and telemetry.
+    pub fn update_board(&mut self, status: &BoardStatus<N>) {
+        self.leg.board.update(status);
+    }
+
+    /// Takes the commissioning step that a host asked for.
+    pub fn take_step(&mut self) -> Option<CommissioningStep> {
+        self.leg.board.take_step()
     }
 
     /// Adds a sample to the log.

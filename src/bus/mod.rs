@@ -11,12 +11,14 @@
 //! | [`Node`] | network management, heartbeat, emergency, SYNC, SDO, PDO; stored objects |
 //! | [`identification`] | the leg's identification and its log, as objects of every node |
 //! | [`drive`] | CiA 402 for one joint; coupling of the joints of one leg |
+//! | [`commissioning`] | steps of commissioning and telemetry of the board |
 //! | [`device`] | one board: nodes, axes, stored parameters, control source of the drive |
 //!
 //! No frame can cause a panic, an endless loop or an allocation. The cost per frame is stated at [`Node`].
 
 mod abort;
 mod access;
+pub mod commissioning;
 mod communication;
 pub mod device;
 pub mod dictionary;

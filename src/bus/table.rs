@@ -25,6 +25,7 @@ pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x1600, 4, "RPDO mapping parameter", false),
     (0x1800, 4, "TPDO communication parameter", false),
     (0x1A00, 4, "TPDO mapping parameter", false),
+    (0x2020, 1, "Impedance", true),
     (0x2100, 1, "Identification", false),
     (0x2110, 1, "Parameter", true),
     (0x2111, 1, "Parameter standard deviation", true),
@@ -40,6 +41,8 @@ pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x2133, 1, "Fit: rows", true),
     (0x2140, 1, "Log", false),
     (0x2150, 1, "Assistance", false),
+    (0x2160, 1, "Commissioning", false),
+    (0x2170, 1, "Telemetry", false),
     (0x607D, 1, "Software position limit", true),
     (0x608F, 1, "Position encoder resolution", false),
     (0x6091, 1, "Gear ratio", false),
@@ -146,6 +149,11 @@ rows! {
     0x2011, 0, U8, Both, No, 0, "Model in the feedforward";
     0x2012, 0, U8, Both, No, 1, "Return into the range";
     0x2013, 0, U8, Both, No, 1, "Silent host is missed";
+    0x2020, 0, U8, Const, No, 4, "Number of entries";
+    0x2020, 1, U16, Both, Receive, 0, "Stiffness";
+    0x2020, 2, U16, Both, Receive, 0, "Damping";
+    0x2020, 3, U16, Read, No, 0, "Largest stiffness";
+    0x2020, 4, U16, Read, No, 0, "Largest damping";
     0x2100, 0, U8, Const, No, 13, "Number of entries";
     0x2100, 1, U8, Both, No, 0, "Command";
     0x2100, 2, U8, Read, Transmit, 0, "State";
@@ -182,6 +190,22 @@ rows! {
     0x2150, 2, U16, Both, No, 0, "Share of inertia";
     0x2150, 3, U16, Both, No, 0, "Share of the wearer's weight";
     0x2150, 4, I16, Both, No, 0, "Share of the periodic torque";
+    0x2160, 0, U8, Const, No, 6, "Number of entries";
+    0x2160, 1, U8, Both, No, 0, "Command: 1 calibrate, 2 take the reference, 3 reset";
+    0x2160, 2, U8, Read, Transmit, 0, "State";
+    0x2160, 3, U8, Read, Transmit, 0, "Result";
+    0x2160, 4, U8, Read, No, 0, "Refused axis";
+    0x2160, 5, U8, Read, No, 0, "Reason of the refusal";
+    0x2160, 6, U8, Read, No, 0, "Detail of the reason";
+    0x2170, 0, U8, Const, No, 8, "Number of entries";
+    0x2170, 1, U32, Read, Transmit, 0, "Inhibit reasons";
+    0x2170, 2, I16, Read, Transmit, 0, "Bridge temperature";
+    0x2170, 3, I16, Read, Transmit, 0, "Winding temperature";
+    0x2170, 4, I16, Read, Transmit, 0, "Phase current A";
+    0x2170, 5, I16, Read, Transmit, 0, "Phase current B";
+    0x2170, 6, I16, Read, Transmit, 0, "Phase current C";
+    0x2170, 7, U32, Read, Transmit, 0, "Longest current interrupt";
+    0x2170, 8, U32, Read, Transmit, 0, "Longest servo tick";
     0x2194, 0, U32, Both, Any, 0, "Digital outputs, raw";
     0x219A, 0, U32, Read, Transmit, 0, "Digital inputs, raw";
     0x6007, 0, I16, Both, No, 3, "Abort connection option code";

@@ -43,7 +43,7 @@ pub use control::{
 pub use description::{
     DescriptionError, JointDescription, LegDescription, LinkDescription, MotorDescription,
 };
-pub use follow::{Following, JointCommand, JointStatus, Mode, SetPoint, Target};
+pub use follow::{Following, ImpedanceTarget, JointCommand, JointStatus, Mode, SetPoint, Target};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
 pub use model_monitor::{ModelMonitor, UPDATE_ROWS};
@@ -69,7 +69,7 @@ pub use crate::safety::{
     DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,
     NoticeCode, Permission, PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
 };
-pub use crate::servo::LogSample;
+pub use crate::servo::{JointConfiguration, LogSample};
 
 use crate::hal::Sample;
 use crate::safety::Derating;

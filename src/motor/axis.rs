@@ -52,7 +52,9 @@
 use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;
 use super::model_watch::Shown;
-use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, ShuntWatch, SpeedTracker};
+use super::{
+    Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Phases, Rotating, ShuntWatch, SpeedTracker,
+};
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample, SERVO_RATE_HZ};
 use crate::real::{abs, clamp, is_finite, min};
@@ -463,6 +465,13 @@ impl Axis {
     pub const fn square_a2(&self) -> f32 {
         let (d, q) = (self.measured.d.0, self.measured.q.0);
         d * d + q * q
+    }
+
+    /// Currents in the phases B and C at the last tick.
+    #[must_use]
+    pub fn phase_currents(&self) -> [Ampere; 2] {
+        let Phases { b, c, .. } = self.measured.to_stationary(self.angle().rotation()).to_phases();
+        [b, c]
     }
 
     /// Electrical power into the motor at the last tick, W; negative where the motor returns energy to the

@@ -6,6 +6,7 @@
 //! log          all waiting samples
 //! time         timeouts of the host, however full the bus is
 //! store        results and new requests
+//! board        its telemetry; steps of commissioning that a host asked for
 //! leg          its report, then its next order; both wait until the leg has taken the previous order, which
 //!             would be overwritten otherwise, and a request with it
 //! mailboxes    [`TxScheduler`]
@@ -137,6 +138,10 @@ impl BusRound {
                 device.look_back(now_us);
             }
             Self::store(device, storage);
+            device.update_board(&signals.board_status());
+            if let Some(step) = device.take_step() {
+                signals.ask(step);
+            }
             self.exchange(device, ends, signals);
             self.transmitter.fill(hardware, self.lasting, now_us, device, results);
             self.waiting = hardware.mailboxes_waiting();

@@ -15,11 +15,15 @@
 //! open + start for two seconds                 reset of a fault
 //! ```
 //!
+//! A host on the bus may ask for calibration, reference and reset too ([`Operator::refusal`]): the rules are
+//! those of the button, and the switch stays with the operator.
+//!
 //! A contact counts after 20 ms without change; an opened enabling switch counts at once. With the switch
 //! open the button counts only after it was open too. So a button that is welded closed neither resets nor
 //! takes a reference each time the operator lets go. Ticked at [`RATE_HZ`]. A request may be refused and is
 //! repeated only by the operator.
 
+use crate::bus::commissioning::{CommissioningStep, StepResult};
 use crate::leg::{DriveState, PowerRequest};
 
 /// Ticks per second.
@@ -61,6 +65,16 @@ pub enum OperatorRequest {
     Begin,
     /// Clear faults and inhibit reasons.
     Reset,
+}
+
+impl From<CommissioningStep> for OperatorRequest {
+    fn from(step: CommissioningStep) -> Self {
+        match step {
+            CommissioningStep::Calibrate => Self::Calibrate,
+            CommissioningStep::Reference => Self::Reference,
+            CommissioningStep::Reset => Self::Reset,
+        }
+    }
 }
 
 impl OperatorRequest {
@@ -124,6 +138,30 @@ impl Operator {
         self.trusted && self.enabling.closed
     }
 
+    /// Returns why a step of commissioning is refused now, or `None`. The reasons are those for which the
+    /// start button requests nothing.
+    #[must_use]
+    pub fn refusal(&self, step: CommissioningStep, now: &Situation) -> Option<StepResult> {
+        use CommissioningStep::{Calibrate, Reference};
+        use StepResult::{
+            AlreadyDone, Calibrating, ContactsNotOpened, DriveOn, Inhibited, NotCalibrated, SwitchClosed,
+            SwitchOpen,
+        };
+        let closed = self.enabling.closed;
+        let reasons = [
+            (!self.trusted, ContactsNotOpened),
+            (step == Calibrate && !closed, SwitchOpen),
+            (step != Calibrate && closed, SwitchClosed),
+            (now.calibrating, Calibrating),
+            (stop(now).is_some(), DriveOn),
+            (step == Calibrate && now.blocked, Inhibited),
+            (step == Calibrate && now.calibrated, AlreadyDone),
+            (step == Reference && !now.calibrated, NotCalibrated),
+            (step == Reference && now.referenced, AlreadyDone),
+        ];
+        reasons.into_iter().find_map(|(applies, reason)| applies.then_some(reason))
+    }
+
     /// Runs one tick.
     pub fn tick(&mut self, now: &Situation) -> Option<OperatorRequest> {
         let before = (self.enabling.closed, self.start.closed);
@@ -146,7 +184,7 @@ impl Operator {
         let pressed = self.start.closed && !before.1;
         match now.drive {
             Some(DriveState::OperationEnabled) => return pressed.then_some(OperatorRequest::Begin),
-            _ if pressed && !now.calibrated && !now.calibrating && !now.blocked => {
+            _ if pressed && self.refusal(CommissioningStep::Calibrate, now).is_none() => {
                 return Some(OperatorRequest::Calibrate);
             }
             _ => {}
@@ -184,7 +222,8 @@ impl Operator {
         self.ready = true;
         let short = before.1 && self.pressed > 0 && self.pressed < RESET_TICKS;
         self.pressed = 0;
-        (short && now.calibrated && !now.referenced).then_some(OperatorRequest::Reference)
+        let permitted = self.refusal(CommissioningStep::Reference, now).is_none();
+        (short && permitted).then_some(OperatorRequest::Reference)
     }
 }
 
@@ -379,6 +418,51 @@ mod tests {
                 "{now:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_host_may_ask_for_what_the_button_would_request() {
+        use CommissioningStep::{Calibrate, Reference, Reset};
+        let held = Situation { enabling: true, ..REST };
+        let stands = Situation { calibrated: true, ..REST };
+        let enabled = Situation { enabling: true, drive: Some(DriveState::OperationEnabled), ..READY };
+        for (now, expected) in [
+            (held, [None, Some(StepResult::SwitchClosed), Some(StepResult::SwitchClosed)]),
+            (REST, [Some(StepResult::SwitchOpen), Some(StepResult::NotCalibrated), None]),
+            (stands, [Some(StepResult::SwitchOpen), None, None]),
+            (READY, [Some(StepResult::SwitchOpen), Some(StepResult::AlreadyDone), None]),
+            (
+                Situation { blocked: true, ..held },
+                [Some(StepResult::Inhibited), Some(StepResult::SwitchClosed), Some(StepResult::SwitchClosed)],
+            ),
+            (
+                Situation { calibrating: true, ..held },
+                [
+                    Some(StepResult::Calibrating),
+                    Some(StepResult::SwitchClosed),
+                    Some(StepResult::SwitchClosed),
+                ],
+            ),
+            (
+                enabled,
+                [Some(StepResult::DriveOn), Some(StepResult::SwitchClosed), Some(StepResult::SwitchClosed)],
+            ),
+        ] {
+            let mut operator = trusted();
+            for _ in 0..RATE_HZ {
+                let _ = operator.tick(&now);
+            }
+            assert_eq!(
+                [Calibrate, Reference, Reset].map(|step| operator.refusal(step, &now)),
+                expected,
+                "{now:?}"
+            );
+        }
+        let stuck = Operator::default();
+        assert_eq!(stuck.refusal(Reset, &REST), Some(StepResult::ContactsNotOpened));
+        // The drive is on, although the switch has just opened.
+        let opened = Situation { enabling: false, ..enabled };
+        assert_eq!(trusted().refusal(Reset, &opened), Some(StepResult::DriveOn));
     }
 
     #[test]

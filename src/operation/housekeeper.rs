@@ -29,13 +29,13 @@ use super::contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
 use super::encoders::{EncoderCheck, EncoderSettings};
 use super::queues::HousekeepingEnds;
 use super::signals::{I2T_UNIT, Signals};
+use crate::bus::commissioning::{BoardState, CommissioningStep, StepReport, StepResult};
 use crate::hal::{AxisSample, Contacts, Hardware};
 use crate::leg::{
     AssistShares, AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Mismatch,
     MotorFindings, PowerRequest, StoredCalibration,
 };
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, EncoderSetting, JointZero};
-use crate::real::max;
 use crate::safety::{
     BoardFault, CheckClock, InhibitReason, Thermistor, Winding, WindingRating, of_gate_driver, of_temperature,
 };
@@ -127,6 +127,10 @@ pub struct Housekeeper<const N: usize> {
     joint_zeros: [Option<JointZero>; N],
     /// Rounds since a reset was requested.
     resetting: Option<u8>,
+    /// Step of commissioning that a host asked for and that has not ended.
+    step: Option<CommissioningStep>,
+    /// Report of the last calibration that failed.
+    failure: StepReport,
     drive: Option<DriveState>,
     windings: [Winding; N],
     /// Windings whose temperature is assumed.
@@ -159,6 +163,8 @@ impl<const N: usize> Housekeeper<N> {
             origins: [0; N],
             joint_zeros: [None; N],
             resetting: None,
+            step: None,
+            failure: StepReport::of(StepResult::Interrupted),
             drive: None,
             windings: settings.windings.map(|rating| Winding::new(rating, None)),
             assumed: [true; N],
@@ -213,7 +219,8 @@ impl<const N: usize> Housekeeper<N> {
         signals.statistics.rounds.add();
         self.act(&mut Level { ends, signals, hardware });
         signals.set_permits(self.permits());
-        signals.set_calibrated(self.is_calibrated());
+        self.report_step(signals);
+        signals.set_board_state(self.board_state(signals));
     }
 
     fn act(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
@@ -227,6 +234,8 @@ impl<const N: usize> Housekeeper<N> {
         let situation = self.situation(level);
         if let Some(request) = self.operator.tick(&situation) {
             self.accept(request, level);
+        } else {
+            self.take_step(&situation, level);
         }
         self.advance_reference(level);
     }
@@ -249,6 +258,47 @@ impl<const N: usize> Housekeeper<N> {
     /// Returns whether the operator permits enabling, by contact or host; never during a reset.
     fn permits(&self) -> bool {
         self.resetting.is_none() && self.operator.holds()
+    }
+
+    fn board_state(&self, signals: &Signals<N>) -> BoardState {
+        let bits = [
+            (self.is_calibrated(), BoardState::CALIBRATED),
+            (signals.has_begun(), BoardState::REFERENCED),
+            (self.calibrating.is_some(), BoardState::CALIBRATING),
+            (self.operator.holds(), BoardState::SWITCH_CLOSED),
+        ];
+        BoardState(bits.into_iter().filter(|(is_set, _)| *is_set).fold(0, |bits, (_, bit)| bits | bit))
+    }
+
+    /// Takes the step that a host asked for: refused by the rules of the contacts, or carried out.
+    fn take_step(&mut self, situation: &Situation, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        let Some(step) = level.signals.take_step() else { return };
+        match self.operator.refusal(step, situation) {
+            Some(why) => level.signals.set_report(StepReport::of(why)),
+            None => {
+                self.step = Some(step);
+                self.failure = StepReport::of(StepResult::Interrupted);
+                self.accept(step.into(), level);
+            }
+        }
+    }
+
+    /// Reports the result of a host's step once it has ended.
+    fn report_step(&mut self, signals: &Signals<N>) {
+        let done =
+            |is_done: bool, otherwise| if is_done { StepReport::of(StepResult::Done) } else { otherwise };
+        let report = match self.step {
+            Some(CommissioningStep::Calibrate) if self.calibrating.is_none() => {
+                done(self.is_calibrated(), self.failure)
+            }
+            Some(CommissioningStep::Reference) if self.reference.is_none() && !self.placed => {
+                done(signals.has_begun(), StepReport::of(StepResult::JointMoved))
+            }
+            Some(CommissioningStep::Reset) if self.resetting.is_none() => StepReport::of(StepResult::Done),
+            _ => return,
+        };
+        self.step = None;
+        signals.set_report(report);
     }
 
     fn situation(&self, level: &Level<'_, '_, N, impl Hardware<N>>) -> Situation {
@@ -283,15 +333,14 @@ impl<const N: usize> Housekeeper<N> {
         }
         if due.temperatures {
             // The servo damps these faults; derating starts 20 degrees below.
-            let (mut hottest_c, most) = (f32::MIN, self.settings.hottest_c);
+            let most = self.settings.hottest_c;
             for axis in 0..N {
                 let degrees = level.hardware.temperature(axis);
-                hottest_c = max(hottest_c, degrees.unwrap_or(most));
+                level.signals.set_bridge_c(axis, degrees.unwrap_or(most));
                 if let Some(fault) = of_temperature(degrees, most) {
                     level.signals.report(fault, axis);
                 }
             }
-            level.signals.set_hottest_c(hottest_c);
             self.check_thermistors(level);
             for (axis, _) in self.windings.iter().enumerate().filter(|(_, winding)| winding.is_too_hot()) {
                 level.signals.report(BoardFault::Winding, axis);
@@ -356,8 +405,14 @@ impl<const N: usize> Housekeeper<N> {
                 self.run_axis(axis, calibration, level);
             }
             Outcome::Refused(refusal) => {
-                let (result, number) = words::calibration(*refusal);
-                level.record(refused(joint, result, number, refusal.mismatch()));
+                let (word, detail) = (words::calibration(*refusal), refusal.detail());
+                level.record(refused(joint, word, detail, refusal.mismatch()));
+                self.failure = StepReport {
+                    result: StepResult::CalibrationRefused as u8,
+                    axis: joint,
+                    reason: refusal.number(),
+                    detail: detail.min(255) as u8,
+                };
                 self.calibrating = None;
                 use CalibrationRefusal::{BusVoltage, Load, Moved, Travel, Turning};
                 if matches!(refusal, Moved) {

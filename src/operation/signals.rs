@@ -5,6 +5,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use crate::bus::commissioning::{BoardState, BoardStatus, CommissioningStep, StepReport, StepResult};
 use crate::hal::DriveCommand;
 use crate::leg::Permission;
 use crate::motor::AxisRequest;
@@ -192,6 +193,8 @@ pub struct Statistics<const N: usize> {
     pub servo_ticks: Word,
     /// Rounds of the housekeeping.
     pub rounds: Word,
+    /// Longest current interrupt and servo tick, ns, in the time of the last report.
+    pub longest_ns: [Word; 2],
     /// Samples lost because the queue to the identification was full.
     pub samples_lost: Word,
     /// Records lost because the queue to the trace was full.
@@ -215,6 +218,7 @@ impl<const N: usize> Statistics<N> {
             servo_missed: Word::new(0),
             servo_ticks: Word::new(0),
             rounds: Word::new(0),
+            longest_ns: [const { Word::new(0) }; 2],
             samples_lost: Word::new(0),
             records_lost: Word::new(0),
             bus: [Word::new(0), Word::new(u32::MAX), Word::new(0)],
@@ -255,8 +259,10 @@ pub struct Signals<const N: usize> {
     begun: Word,
     /// Faults of each joint that the servo has not read yet, one bit per [`BoardFault`].
     reported: [Word; N],
-    /// Temperature of the hottest bridge, degrees Celsius, as bits.
-    hottest_c: Word,
+    /// Temperature of each bridge, degrees Celsius, as bits.
+    bridges_c: [Word; N],
+    /// Currents in the phases B and C of each motor, A, as bits.
+    phases: [[Word; 2]; N],
     /// Integral of each motor's squared current, in [`I2T_UNIT`], wrapping.
     i2t: [Word; N],
     /// Temperature of each winding, degrees Celsius, and its share of the torque cap, as bits.
@@ -271,7 +277,10 @@ pub struct Signals<const N: usize> {
     permission: Word,
     hosted: Word,
     permits: Word,
-    calibrated: Word,
+    board_state: Word,
+    /// Step of commissioning that the bus asked for, and the report of the last one.
+    asked: Word,
+    report: Word,
     forgotten: Word,
 }
 
@@ -285,7 +294,8 @@ impl<const N: usize> Signals<N> {
             targets: [const { Word::new(OFF) }; N],
             begun: Word::new(0),
             reported: [const { Word::new(0) }; N],
-            hottest_c: Word::new(0),
+            bridges_c: [const { Word::new(0) }; N],
+            phases: [const { [const { Word::new(0) }; 2] }; N],
             i2t: [const { Word::new(0) }; N],
             windings: [const { [Word::new(0), Word::new(FULL_SHARE)] }; N],
             current_shares: [const { Word::new(FULL_SHARE) }; N],
@@ -294,7 +304,9 @@ impl<const N: usize> Signals<N> {
             permission: Word::new(0),
             hosted: Word::new(0),
             permits: Word::new(0),
-            calibrated: Word::new(0),
+            board_state: Word::new(0),
+            asked: Word::new(0),
+            report: Word::new(0),
             forgotten: Word::new(0),
         }
     }
@@ -354,15 +366,71 @@ impl<const N: usize> Signals<N> {
         BoardFault::ALL.into_iter().filter(move |fault| bits & fault.bit() != 0)
     }
 
-    /// Temperature of the hottest bridge, degrees Celsius; NaN leaves no torque.
+    /// Temperature of the hottest bridge, degrees Celsius; NaN, which leaves no torque, if one is unknown.
     #[must_use]
     pub fn hottest_c(&self) -> f32 {
-        f32::from_bits(self.hottest_c.get())
+        let hottest = |hottest: f32, bridge: &Word| {
+            let celsius = f32::from_bits(bridge.get());
+            if celsius > hottest || celsius.is_nan() { celsius } else { hottest }
+        };
+        self.bridges_c.iter().fold(f32::MIN, hottest)
     }
 
-    /// Sets the temperature of the hottest bridge, degrees Celsius.
-    pub fn set_hottest_c(&self, degrees_c: f32) {
-        self.hottest_c.set(degrees_c.to_bits());
+    /// Sets the temperature of a bridge, degrees Celsius; NaN if it is unknown.
+    pub fn set_bridge_c(&self, axis: usize, degrees_c: f32) {
+        if let Some(bridge) = self.bridges_c.get(axis) {
+            bridge.set(degrees_c.to_bits());
+        }
+    }
+
+    /// Sets the currents in the phases B and C of an axis.
+    #[inline(always)]
+    pub fn set_phase_currents(&self, axis: usize, [b, c]: [Ampere; 2]) {
+        if let Some([first, second]) = self.phases.get(axis) {
+            first.set(b.0.to_bits());
+            second.set(c.0.to_bits());
+        }
+    }
+
+    /// Asks for a step of commissioning, from the bus.
+    pub fn ask(&self, step: CommissioningStep) {
+        self.asked.set(step as u32);
+    }
+
+    /// Takes the step that was asked for. The report says that it is under way before it is taken, so that no
+    /// host reads the result of the step before.
+    pub fn take_step(&self) -> Option<CommissioningStep> {
+        let step = CommissioningStep::of(self.asked.get())?;
+        self.set_report(StepReport::of(StepResult::UnderWay));
+        self.asked.set(0);
+        Some(step)
+    }
+
+    /// Sets the report of the step that was taken last.
+    pub fn set_report(&self, report: StepReport) {
+        self.report.set(u32::from_le_bytes([report.result, report.axis, report.reason, report.detail]));
+    }
+
+    /// State and telemetry for the bus.
+    #[must_use]
+    pub fn board_status(&self) -> BoardStatus<N> {
+        let real = |word: &Word| f32::from_bits(word.get());
+        let is_asked = self.asked.get() != 0;
+        let [result, axis, reason, detail] = self.report.get().to_le_bytes();
+        let report = if is_asked {
+            StepReport::of(StepResult::UnderWay)
+        } else {
+            StepReport { result, axis, reason, detail }
+        };
+        BoardStatus {
+            state: BoardState(self.board_state.get() as u8),
+            report,
+            causes: self.inhibit.causes(),
+            bridge_c: self.bridges_c.each_ref().map(real),
+            winding_c: self.windings.each_ref().map(|[celsius, _]| real(celsius)),
+            currents_a: self.phases.each_ref().map(|phases| phases.each_ref().map(real)),
+            longest_ns: self.statistics.longest_ns.each_ref().map(Word::get),
+        }
     }
 
     /// Adds a motor's squared current (A^2) over one servo period.
@@ -507,12 +575,12 @@ impl<const N: usize> Signals<N> {
     /// Returns whether every axis has a calibration.
     #[must_use]
     pub fn is_calibrated(&self) -> bool {
-        self.calibrated.get() != 0
+        self.board_state.get() & u32::from(BoardState::CALIBRATED) != 0
     }
 
-    /// Sets whether every axis has a calibration.
-    pub fn set_calibrated(&self, calibrated: bool) {
-        self.calibrated.set(calibrated.into());
+    /// Sets the state of the board.
+    pub fn set_board_state(&self, state: BoardState) {
+        self.board_state.set(state.0.into());
     }
 
     /// Marks all stored parameters as erased.

@@ -1,6 +1,6 @@
 //! Configuration of the servo's joints, and its checks.
 
-use super::JointScale;
+use super::{ControllerGains, JointScale};
 use crate::safety::{JointLimits, LimitsError};
 use crate::units::{Ampere, Hertz, KilogramMetreSquared, NewtonMetre, Radian, RadianPerSecond};
 
@@ -55,6 +55,14 @@ impl JointConfiguration {
             torque_per_ampere: self.scale.signed_torque_per_ampere(),
             inertia: self.inertia,
         }
+    }
+
+    /// Stiffness (N m/rad) and damping (N m s/rad) of the position control: the largest that a host may ask
+    /// of the joint, because the margins of the loop are proved for them.
+    #[must_use]
+    pub fn stiffest_impedance(&self) -> [f32; 2] {
+        let gains = ControllerGains::new(self.inertia, self.bandwidth, self.torque);
+        [gains.stiffness_nm_per_rad(), gains.damping_nm_s_per_rad()]
     }
 
     pub(super) fn check(&self, joint: usize) -> Result<(), ServoError> {

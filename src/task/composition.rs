@@ -15,7 +15,7 @@ use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
 use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, watchdog};
 use crate::board::{stack, windings};
-use crate::bus::drive::{AxisConstants, Mode};
+use crate::bus::drive::AxisConstants;
 use crate::bus::{LONGEST, NodeId, Storing};
 use crate::leg::{Control, Following, StoredCalibration};
 use crate::motor::SenseScale;
@@ -171,18 +171,9 @@ fn join(
     calibrated: Consumer<'static, Calibrated>,
     notes: &mut Producer<'static, Record<JOINTS>>,
 ) -> Joined {
-    let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
     let constants = core::array::from_fn(|joint| {
-        let (joint, motor) = (&configuration.joints[joint], &leg::LEG.joints[joint].motor);
-        AxisConstants {
-            rated_torque: joint.limits().torque_cap(),
-            rated_current: joint.current,
-            modes,
-            torque_per_ampere: joint.scale.torque_per_ampere,
-            speed: joint.speed,
-            counts_per_turn: motor.counts_per_turn,
-            ratio: motor.ratio,
-        }
+        let motor = &leg::LEG.joints[joint].motor;
+        AxisConstants::of(&configuration.joints[joint], motor.counts_per_turn, motor.ratio)
     });
     let [low, middle, high] = identity.unique;
     let identity = crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6");

@@ -271,10 +271,15 @@ impl Thread {
     fn send_loops(&self, state: &State) {
         let statistics = &SIGNALS.statistics;
         let board = &self.board;
+        let [current_worst, servo_worst] =
+            [&statistics.current_worst, &statistics.servo_worst].map(|worst| worst.swap(0));
+        for (longest, cycles) in statistics.longest_ns.iter().zip([current_worst, servo_worst]) {
+            longest.set((cycles as f32 * (1e9 / board.clock_hz as f32)) as u32);
+        }
         send(&Record::Loops {
             tick: state.level.tick(),
-            current_worst: statistics.current_worst.swap(0),
-            servo_worst: statistics.servo_worst.swap(0),
+            current_worst,
+            servo_worst,
             current_missed: statistics.current_missed.get(),
             servo_missed: statistics.servo_missed.get(),
             cycles_per_tick: board.clock_hz / SERVO_RATE_HZ,

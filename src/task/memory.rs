@@ -1,7 +1,7 @@
 //! Static memory of the large objects.
 //!
-//! The identification lies in core-coupled memory; its window of blocks, half of the total, in
-//! the other memory.
+//! The identification lies in core-coupled memory; its window of blocks, half of the total, and the nodes of
+//! the bus in the other memory.
 #![expect(unsafe_code, reason = "sections of the linker script")]
 
 use static_cell::{ConstStaticCell, StaticCell};
@@ -39,7 +39,6 @@ pub fn events() -> &'static mut EventQueue<JOINTS> {
     EVENTS.init_with(EventQueue::new)
 }
 
-#[unsafe(link_section = ".ccm.device")]
 static DEVICE: StaticCell<bus::BoardDevice> = StaticCell::new();
 
 /// Nodes and axes of the bus, once.

@@ -4,7 +4,7 @@
 
 use crate::leg::{
     Activity, AssistEnd, AssistNote, AssistPhase, AssistRefusal, AxisFault, CalibrationRefusal, Cause,
-    DriveState, FaultCode, IdentifyPhase, MotorConstant, Parameter, Phase, RefusalReason, Segment, Step,
+    DriveState, FaultCode, IdentifyPhase, Parameter, RefusalReason, Segment, Step,
 };
 
 /// Word for the drive state.
@@ -154,48 +154,37 @@ pub const fn unit(parameter: Parameter) -> &'static str {
     }
 }
 
-/// Word for the refusal of a calibration, and its number: a phase from 1, a stored constant (resistance 1,
-/// direct inductance 2, quadrature inductance 3), or pole pairs or counts that would fit.
+/// Word for the refusal of a calibration.
 #[must_use]
-pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
+pub const fn calibration(refusal: CalibrationRefusal) -> &'static str {
     use CalibrationRefusal as Why;
     match refusal {
-        Why::Overcurrent => ("overcurrent", 0),
-        Why::CurrentSense => ("current_sense", 0),
-        Why::BusVoltage => ("bus_voltage", 0),
-        Why::ShuntOffset(phase) => ("shunt_zero", number(phase)),
-        Why::Turning => ("turning", 0),
-        Why::PhaseOpen(phase) => ("phase_open", number(phase)),
-        Why::ShuntInverted(phase) => ("shunt_inverted", number(phase)),
-        Why::ShuntsInverted => ("shunts_inverted", 0),
-        Why::ShuntsSwapped => ("shunts_swapped", 0),
-        Why::CurrentDirection => ("current_direction", 0),
-        Why::PhaseImbalance => ("phase_imbalance", 0),
-        Why::MotorConstants => ("motor_constants", 0),
-        Why::OtherMotor(MotorConstant::Resistance, _) => ("other_motor", 1),
-        Why::OtherMotor(MotorConstant::DirectInductance, _) => ("other_motor", 2),
-        Why::OtherMotor(MotorConstant::QuadratureInductance, _) => ("other_motor", 3),
-        Why::Flux(_) => ("flux", 0),
-        Why::TimeOut => ("time_out", 0),
-        Why::NoCounts => ("no_counts", 0),
-        Why::Direction => ("direction", 0),
-        Why::PolePairs { found, .. } => ("pole_pairs", found as u32),
-        Why::CountsPerTurn { found, .. } => ("counts_per_turn", found),
-        Why::Slipped => ("slipped", 0),
-        Why::Load(percent) => ("load", percent as u32),
-        Why::Travel => ("travel", 0),
-        Why::NoIndex => ("no_index", 0),
-        Why::IndexMoved => ("index_moved", 0),
-        Why::StoredOffset(_) => ("stored_offset", 0),
-        Why::Moved => ("moved", 0),
-    }
-}
-
-const fn number(phase: Phase) -> u32 {
-    match phase {
-        Phase::A => 1,
-        Phase::B => 2,
-        Phase::C => 3,
+        Why::Overcurrent => "overcurrent",
+        Why::CurrentSense => "current_sense",
+        Why::BusVoltage => "bus_voltage",
+        Why::ShuntOffset(_) => "shunt_zero",
+        Why::Turning => "turning",
+        Why::PhaseOpen(_) => "phase_open",
+        Why::ShuntInverted(_) => "shunt_inverted",
+        Why::ShuntsInverted => "shunts_inverted",
+        Why::ShuntsSwapped => "shunts_swapped",
+        Why::CurrentDirection => "current_direction",
+        Why::PhaseImbalance => "phase_imbalance",
+        Why::MotorConstants => "motor_constants",
+        Why::OtherMotor(..) => "other_motor",
+        Why::Flux(_) => "flux",
+        Why::TimeOut => "time_out",
+        Why::NoCounts => "no_counts",
+        Why::Direction => "direction",
+        Why::PolePairs { .. } => "pole_pairs",
+        Why::CountsPerTurn { .. } => "counts_per_turn",
+        Why::Slipped => "slipped",
+        Why::Load(_) => "load",
+        Why::Travel => "travel",
+        Why::NoIndex => "no_index",
+        Why::IndexMoved => "index_moved",
+        Why::StoredOffset(_) => "stored_offset",
+        Why::Moved => "moved",
     }
 }
 
@@ -222,7 +211,7 @@ mod tests {
             refusal(RefusalReason::Moving),
             axis_fault(AxisFault::NotANumber),
             cause(Cause::Payload { link: 1 }).0,
-            calibration(CalibrationRefusal::CountsPerTurn { stated: 8192, found: 4000 }).0,
+            calibration(CalibrationRefusal::CountsPerTurn { stated: 8192, found: 4000 }),
         ];
         for word in words {
             assert!(!word.is_empty() && !word.contains([' ', '[']), "{word}");

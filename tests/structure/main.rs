@@ -51,17 +51,18 @@ const IDENT: [(&str, &[&str]); 5] = [
 ];
 
 /// Modules of the host tool: each uses only modules above it, so there is no cycle.
-const HOST: [(&str, &[&str]); 10] = [
+const HOST: [(&str, &[&str]); 11] = [
     ("base", &[]),
     ("report", &["base"]),
     ("formats", &["base", "report"]),
+    ("client", &["base", "formats"]),
     ("leg", &["base", "formats"]),
     ("rig", &["base", "formats", "leg"]),
-    ("run", &["base", "report", "formats", "leg", "rig"]),
+    ("run", &["base", "report", "formats", "client", "leg", "rig"]),
     ("image", &["base", "report", "formats", "leg", "rig", "run"]),
     ("faults", &["base", "report", "formats", "leg", "rig", "run", "image"]),
     ("view", &["base", "report", "formats"]),
-    ("cli", &["base", "report", "formats", "leg", "rig", "run", "image", "faults", "view"]),
+    ("cli", &["base", "report", "formats", "client", "leg", "rig", "run", "image", "faults", "view"]),
 ];
 
 /// Firmware modules that every other firmware module may use.

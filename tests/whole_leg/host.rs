@@ -1,6 +1,6 @@
 //! A leg under tick-by-tick host control, in every supported mode of CiA 402.
 
-use scarab::leg::{Fault, FaultCode, JointCommand, JointStatus, SetPoint, Target};
+use scarab::leg::{Fault, FaultCode, ImpedanceTarget, JointCommand, JointStatus, SetPoint, Target};
 use scarab::safety::PowerRequest;
 use scarab::units::{NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
 
@@ -537,4 +537,116 @@ fn a_host_s_search_for_a_stop_ends_at_the_range() {
         );
         assert!(is_enabled(&hosted.pair) && most < 50.0 && beyond(joint, hosted.truth(joint)) < 0.009);
     }
+}
+
+/// Commands a spring and a damper around a position.
+fn impedance(hosted: &mut Hosted, joint: usize, position: f32, stiffness: f32, damping: f32) {
+    hosted.commands[joint].torque_slope_nm_per_s = 400.0;
+    hosted.commands[joint].target = Target::Impedance(ImpedanceTarget {
+        position: Radian(position),
+        velocity: RadianPerSecond::ZERO,
+        stiffness,
+        damping,
+        torque: NewtonMetre::ZERO,
+    });
+}
+
+/// Stiffness and damping that a joint showed: least squares of its torque over deviation and velocity of the
+/// plant, rad and rad/s.
+fn shown(samples: &[[f64; 3]]) -> [f64; 2] {
+    let count = samples.len() as f64;
+    let mean = |place: usize| samples.iter().map(|sample| sample[place]).sum::<f64>() / count;
+    let means = [mean(0), mean(1), mean(2)];
+    let product = |a: usize, b: usize| {
+        samples.iter().map(|sample| (sample[a] - means[a]) * (sample[b] - means[b])).sum::<f64>()
+    };
+    let [aa, ab, bb, at, bt] = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2)].map(|(a, b)| product(a, b));
+    let determinant = aa * bb - ab * ab;
+    [(bb * at - ab * bt) / determinant, (aa * bt - ab * at) / determinant]
+}
+
+#[test]
+fn a_joint_shows_the_commanded_stiffness_and_damping() {
+    for (joint, stiffness, damping) in [(0, 150.0, 12.0), (0, 400.0, 30.0), (1, 80.0, 6.0), (1, 200.0, 15.0)]
+    {
+        let mut hosted = Hosted::new();
+        hosted.run(SECOND);
+        let from = hosted.position(joint);
+        impedance(&mut hosted, joint, from, stiffness, damping);
+        hosted.run(SECOND);
+        impedance(&mut hosted, joint, from + 0.15, stiffness, damping);
+        let mut samples = Vec::new();
+        let mut before = hosted.truth(joint);
+        for _ in 0..SECOND {
+            hosted.run(1);
+            let now = hosted.truth(joint);
+            let velocity = (now - before) * f64::from(scarab::hal::SERVO_RATE_HZ);
+            before = now;
+            samples.push([
+                f64::from(from) + 0.15 - now,
+                -velocity,
+                f64::from(hosted.status[joint].torque_demand.0),
+            ]);
+        }
+        let [k, d] = shown(&samples);
+        assert!((k / f64::from(stiffness) - 1.0).abs() < 0.05, "{joint}: {k} of {stiffness} N m/rad");
+        assert!((d / f64::from(damping) - 1.0).abs() < 0.05, "{joint}: {d} of {damping} N m s/rad");
+        assert!(!hosted.status[joint].limited && is_enabled(&hosted.pair));
+    }
+}
+
+#[test]
+fn every_permitted_impedance_comes_to_rest_after_a_push() {
+    for joint in 0..JOINTS {
+        let [stiffest, strongest] = context().configuration.joints[joint].stiffest_impedance();
+        for (stiffness, damping) in [
+            (30.0, 0.0),
+            (300.0, 0.0),
+            (0.3 * stiffest, 0.0),
+            (stiffest, 0.0),
+            (2.0 * stiffest, 2.0 * strongest),
+            (0.0, strongest),
+            (300.0, strongest),
+        ] {
+            let mut hosted = Hosted::new();
+            hosted.run(SECOND);
+            let from = hosted.position(joint);
+            impedance(&mut hosted, joint, from, stiffness, damping);
+            let [mut worst, mut torque] = [0.0_f32; 2];
+            hosted.run(SECOND);
+            hosted.pair.world.push(joint, 8.0, 0.1);
+            hosted.run(4 * SECOND);
+            for _ in 0..SECOND {
+                hosted.run(1);
+                worst = worst.max(hosted.status[joint].velocity.0.abs());
+                torque = torque.max(hosted.status[joint].torque_demand.0.abs());
+            }
+            let words = format!("{joint}: {stiffness} {damping}: {worst} rad/s, {torque} N m");
+            assert!(worst < 0.03 && is_enabled(&hosted.pair), "{words}");
+        }
+    }
+}
+
+#[test]
+fn the_impedance_mode_begins_and_ends_without_a_torque_step() {
+    let mut hosted = Hosted::new();
+    hosted.run(2 * SECOND);
+    let from = hosted.position(1);
+    let mut last = hosted.status[1].torque_demand.0;
+    let mut step = 0.0_f32;
+    let mut run = |hosted: &mut Hosted, ticks| {
+        for _ in 0..ticks {
+            hosted.run(1);
+            let now = hosted.status[1].torque_demand.0;
+            (step, last) = (step.max((now - last).abs()), now);
+        }
+        step
+    };
+    impedance(&mut hosted, 1, from + 0.2, 200.0, 15.0);
+    hosted.commands[1].torque_slope_nm_per_s = 40.0;
+    assert!(run(&mut hosted, 1) < 1.0, "begins");
+    run(&mut hosted, SECOND);
+    hosted.commands[1].target = Target::Hold;
+    let step = run(&mut hosted, SECOND);
+    assert!(step < 1.0 && is_enabled(&hosted.pair), "{step} N m");
 }

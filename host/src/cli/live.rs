@@ -18,6 +18,7 @@ use crate::cli::identify::DriveArgument;
 use crate::cli::import::ImportArguments;
 use crate::cli::leg_options::LegOptions;
 use crate::cli::serve::bit_rates;
+use crate::client::adapter::listen;
 use crate::formats::leg_file::LegFile;
 use crate::formats::model_file::ModelFile;
 use crate::formats::recording::Recording;
@@ -26,7 +27,6 @@ use crate::leg::setup::DEFAULT_SEED;
 use crate::report::live::LiveUpdate;
 use crate::rig::options::SimulationOptions;
 use crate::rig::perturb::Perturbation;
-use crate::run::live::bus::adapter::listen;
 use crate::run::live::bus::{BusInput, Lines, watch};
 use crate::run::live::playback::play;
 use crate::run::live::simulated::{LiveOptions, identify};
@@ -188,7 +188,11 @@ impl LiveArguments {
         let model = model.transpose()?;
         let bits_per_s = 1000 * self.bit_rate;
         let (lines, name, (input, speed)) = match (&self.slcan, &self.candump) {
-            (Some(adapter), _) => (Lines::Slcan, adapter.clone(), (listen(adapter, self.bit_rate)?, None)),
+            (Some(adapter), _) => (
+                Lines::Slcan,
+                adapter.clone(),
+                (Box::new(listen(adapter, self.bit_rate)?) as Box<dyn Read + Send>, None),
+            ),
             (None, Some(file)) => (Lines::Candump, file.display().to_string(), self.open(file)?),
             (None, None) => return Ok(None),
         };

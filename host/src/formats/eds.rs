@@ -9,12 +9,14 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Write};
 
 use scarab::bus::Identity;
+use scarab::bus::commissioning::StepResult;
 use scarab::bus::dictionary::{Access, Mapping, Row, Type};
 use scarab::bus::table::{GROUPS, NAMES, ROWS};
+use scarab::safety::InhibitReason;
 
 /// Date and time of the last change to the dictionary, in the form of CiA 306. Constants instead of a clock:
 /// the data sheets of one version are the same whenever they are written.
-const CHANGED: [&str; 2] = ["11-26-2026", "03:30PM"];
+const CHANGED: [&str; 2] = ["11-27-2026", "01:30AM"];
 
 /// One subindex of an object.
 struct Part {
@@ -82,7 +84,30 @@ fn write_all(out: &mut String, joint: &str) -> fmt::Result {
     for (index, parts) in &objects {
         write_object(out, *index, parts, &identity)?;
     }
+    let comments = comments();
+    writeln!(out, "\n[Comments]\nLines={}", comments.len())?;
+    for (number, comment) in (1..).zip(comments) {
+        writeln!(out, "Line{number}={comment}")?;
+    }
     Ok(())
+}
+
+/// Numbers, bits and units that the names do not say.
+fn comments() -> Vec<String> {
+    let mut lines: Vec<String> = [
+        "2020:1 and :3 stiffness, unit 0.1 N m/rad; :2 and :4 damping, unit 0.01 N m s/rad",
+        "2160:2 bits: 0 calibrated, 1 joints have their zeros, 2 calibrating, 3 enabling switch closed",
+        "2160:4 axis that the calibration refused, from 1; :5 reason, :6 detail (docs/bus.md)",
+        "2170:2 and :3 unit 0.1 degrees Celsius, -32768 unknown; :4 to :6 unit 0.01 A; :7 and :8 ns",
+    ]
+    .map(String::from)
+    .into();
+    lines.extend(StepResult::ALL.map(|result| format!("2160:3 value {}: {}", result as u8, result.words())));
+    lines.extend(InhibitReason::ALL.map(|cause| {
+        let words = cause.code().map_or("", |code| code.words());
+        format!("2170:1 bit {}: {} {words}", cause as u8, cause.name()).trim_end().to_owned()
+    }));
+    lines
 }
 
 fn write_object(
@@ -154,7 +179,7 @@ mod tests {
     fn the_date_is_that_of_the_last_change_to_the_dictionary() {
         let text = text("hip");
         assert_eq!(text, super::text("hip"));
-        assert!(text.contains("\nCreationDate=11-26-2026\nCreationTime=03:30PM\n"));
+        assert!(text.contains("\nCreationDate=11-27-2026\nCreationTime=01:30AM\n"));
         let objects = text.split_once("[DummyUsage]").expect("its sections").1;
         let sum = objects.bytes().fold(Checksum::EMPTY, |sum, byte| sum.word(u32::from(byte)));
         // Another dictionary: set CHANGED to the day of the change and write its sum here.

@@ -12,6 +12,7 @@ pub mod motion_samples;
 pub mod recording;
 pub mod robot;
 pub mod shard;
+pub mod slcan;
 pub mod temperature;
 pub mod trace;
 pub mod urdf;

@@ -3,6 +3,7 @@
 //! The names of the fields are an interface. An unknown number is `null`, never NaN.
 
 pub mod assist;
+pub mod commission;
 pub mod disturbances;
 pub mod doubt;
 pub mod excite;

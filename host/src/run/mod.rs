@@ -3,6 +3,7 @@
 pub mod added_mass;
 pub mod analysis;
 pub mod assist;
+pub mod commission;
 pub mod compare_model;
 pub mod consistent;
 pub mod disturbances;

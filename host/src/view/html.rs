@@ -10,6 +10,7 @@
 
 pub mod assist;
 mod choices;
+pub mod commission;
 pub mod faults;
 mod generic;
 mod head;

@@ -28,10 +28,10 @@
 //! Source: CiA 402, controlword and statusword; bit 15 is manufacturer-specific.
 
 use super::coupling::level;
-use super::{JointCommand, JointStatus, Mode, SetPoint, Target};
+use super::{ImpedanceTarget, JointCommand, JointStatus, Mode, SetPoint, Target};
 use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::Lost;
-use crate::leg::{DriveEvent, DriveState, FaultCode, PowerRequest, RefusalReason};
+use crate::leg::{DriveEvent, DriveState, FaultCode, JointConfiguration, PowerRequest, RefusalReason};
 use crate::units::{
     Ampere, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond, RadianPerSecondSquared, Second,
 };
@@ -61,9 +61,27 @@ pub struct AxisConstants {
     pub counts_per_turn: u32,
     /// Motor revolutions per joint revolution.
     pub ratio: f32,
+    /// Largest stiffness (N m/rad) and damping (N m s/rad) of the impedance mode.
+    pub impedance: [f32; 2],
 }
 
 impl AxisConstants {
+    /// Constants of a joint whose encoder has this many counts per motor revolution, behind this gear ratio.
+    /// All modes are supported.
+    #[must_use]
+    pub fn of(joint: &JointConfiguration, counts_per_turn: u32, ratio: f32) -> Self {
+        Self {
+            rated_torque: joint.limits().torque_cap(),
+            rated_current: joint.current,
+            modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+            torque_per_ampere: joint.scale.torque_per_ampere,
+            speed: joint.speed,
+            counts_per_turn,
+            ratio,
+            impedance: joint.stiffest_impedance(),
+        }
+    }
+
     /// Placeholder of a joint whose constants are unknown.
     pub const UNKNOWN: Self = Self {
         rated_torque: NewtonMetre(1.0),
@@ -73,8 +91,13 @@ impl AxisConstants {
         speed: RadianPerSecond::ZERO,
         counts_per_turn: 0,
         ratio: 0.0,
+        impedance: [0.0; 2],
     };
 }
+
+/// Units of stiffness (N m/rad) and damping (N m s/rad) on the bus.
+pub(super) const STIFFNESS_UNIT: f32 = 0.1;
+pub(super) const DAMPING_UNIT: f32 = 0.01;
 
 /// No homing method was written; homing then fails.
 const NO_METHOD: i8 = -1;
@@ -106,6 +129,8 @@ pub(super) struct Settings {
     pub period_index: i8,
     pub outputs: u32,
     pub target_velocity: i32,
+    /// Stiffness and damping, units of 2020.
+    pub impedance: [u16; 2],
     pub feedforward: bool,
     pub returns: bool,
     pub watches: bool,
@@ -143,6 +168,7 @@ impl Settings {
         period_index: -3,
         outputs: 0,
         target_velocity: 0,
+        impedance: [0; 2],
         feedforward: false,
         returns: true,
         watches: true,
@@ -384,7 +410,7 @@ impl Axis {
             Some(Mode::ProfilePosition) => (self.taken, status.deviates),
             Some(Mode::Homing) => (status.homed, status.deviates),
             Some(Mode::CyclicPosition) => (self.is_powered(), status.deviates),
-            Some(Mode::CyclicVelocity | Mode::CyclicTorque) => (self.is_powered(), false),
+            Some(Mode::CyclicVelocity | Mode::CyclicTorque | Mode::Impedance) => (self.is_powered(), false),
             _ => (false, false),
         };
         let waits = self.own.is_enabled() && !self.is_powered();
@@ -429,6 +455,13 @@ impl Axis {
                 Target::CyclicVelocity { velocity: velocity + velocity_offset, torque_offset }
             }
             Some(Mode::CyclicTorque) => Target::CyclicTorque(target_torque + torque_offset),
+            Some(Mode::Impedance) => Target::Impedance(ImpedanceTarget {
+                position: radian(settings.target_position),
+                velocity,
+                stiffness: f32::from(settings.impedance[0]) * STIFFNESS_UNIT,
+                damping: f32::from(settings.impedance[1]) * DAMPING_UNIT,
+                torque: target_torque,
+            }),
         };
         let acceleration = |micro: u32| RadianPerSecondSquared(micro as f32 * 1e-6);
         JointCommand {

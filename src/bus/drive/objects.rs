@@ -1,7 +1,7 @@
 //! Reads and writes the objects of the drive profile.
 
 use super::Mode;
-use super::control::{Axis, Settings};
+use super::control::{Axis, DAMPING_UNIT, STIFFNESS_UNIT, Settings};
 use crate::bus::abort::Abort;
 use crate::bus::dictionary::Object;
 use crate::bus::objects::{Lost, Objects};
@@ -30,6 +30,10 @@ impl Objects for Axis {
             (0x2011, _) => u32::from(settings.feedforward),
             (0x2012, _) => u32::from(settings.returns),
             (0x2013, _) => u32::from(settings.watches),
+            (0x2020, 1) => u32::from(settings.impedance[0]),
+            (0x2020, 2) => u32::from(settings.impedance[1]),
+            (0x2020, 3) => u32::from((constants.impedance[0] / STIFFNESS_UNIT) as u16),
+            (0x2020, 4) => u32::from((constants.impedance[1] / DAMPING_UNIT) as u16),
             // Objects of the leg; they are not held here.
             (0x2120, 0) => 13,
             (0x2100..=0x2193, _) => return Err(Abort::NoData),
@@ -101,6 +105,8 @@ impl Objects for Axis {
             (0x2011, _) if value <= 1 => settings.feedforward = value == 1,
             (0x2012, _) if value <= 1 => settings.returns = value == 1,
             (0x2013, _) if value <= 1 => settings.watches = value == 1,
+            (0x2020, 1) => settings.impedance[0] = value as u16,
+            (0x2020, 2) => settings.impedance[1] = value as u16,
             (0x6007, _) if is(&[0, 1, 2, 3]) => settings.connection_option = value as i16,
             (0x6040, _) => self.control(value as u16),
             // Fault reactions are chosen per fault; a halt always slows down along the profile.

@@ -7,6 +7,7 @@
 //! 2130   fit of the joint's torque, per motion
 //! 2140   500 Hz log ([`Log`])
 //! 2150   shares of the assistance, per mille
+//! 2160   the board ([`super::commissioning`]), and 2170
 //! ```
 //!
 //! A command is passed to the leg at its next tick, like those of the operator's contacts. Numbers are those
@@ -21,6 +22,7 @@ pub use results::Results;
 pub use results_copy::ResultsCopy;
 
 use super::abort::Abort;
+use super::commissioning::BoardObjects;
 use super::dictionary::Object;
 use super::drive::Axis;
 use super::objects::{Lost, Objects};
@@ -61,6 +63,8 @@ pub struct LegObjects<const N: usize, const L: usize> {
     pub generation: u32,
     /// Whether the leg of the next identification is empty or worn, if a host said so.
     pub wearing: Option<Wearing>,
+    /// Commissioning and telemetry of the board.
+    pub board: BoardObjects<N>,
     /// Shares of the next assistance.
     pub shares: AssistShares,
     /// Last command written.
@@ -82,6 +86,7 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
             seed,
             generation,
             wearing: None,
+            board: BoardObjects::NEW,
             shares: AssistShares::GRAVITY_ONLY,
             command: 0,
             requested: None,
@@ -284,6 +289,8 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
             (0x2140, 3) => Ok(self.leg.log.waiting()),
             (0x2140, 4) => Ok(self.leg.log.lost()),
             (0x2150, sub) => self.leg.read_share(sub),
+            (0x2160, sub) => self.leg.board.commissioning(sub),
+            (0x2170, sub) => self.leg.board.telemetry(self.joint, sub),
             (0x2101..=0x2193, _) => self.found(object),
             _ => self.axis.read(object),
         }
@@ -297,6 +304,7 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
                 Ok(())
             }
             (0x2150, sub) => self.leg.write_share(sub, value),
+            (0x2160, sub) => self.leg.board.ask(sub, value),
             _ => self.axis.write(object, value),
         }
     }

@@ -101,6 +101,7 @@ fn profile_objects_have_the_units_of_cia_402() {
         counts_per_turn: 8192,
         ratio: 50.0,
         modes: 0,
+        impedance: [800.0, 31.5],
     };
     let mut axis = Axis::new(constants);
     axis.update(&JointStatus { torque: NewtonMetre(-30.0), bus: Volt(47.9), ..JointStatus::NONE });
@@ -110,4 +111,5 @@ fn profile_objects_have_the_units_of_cia_402() {
     // 4.5 rad/s times 50 is 2148.6 revolutions per minute.
     assert_eq!((read(0x6080, 0), read(0x607F, 0)), (2148, 4_500_000));
     assert_eq!((read(0x608F, 1), read(0x6091, 1)), (8192, 50_000));
+    assert_eq!((read(0x2020, 3), read(0x2020, 4)), (8000, 3150));
 }

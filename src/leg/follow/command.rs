@@ -23,11 +23,13 @@ pub enum Mode {
     CyclicVelocity = 9,
     /// Applies a torque per cycle.
     CyclicTorque = 10,
+    /// Acts as a spring and a damper around a moving position; manufacturer-specific.
+    Impedance = -1,
 }
 
 impl Mode {
     /// All modes.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::ProfilePosition,
         Self::ProfileVelocity,
         Self::ProfileTorque,
@@ -35,12 +37,14 @@ impl Mode {
         Self::CyclicPosition,
         Self::CyclicVelocity,
         Self::CyclicTorque,
+        Self::Impedance,
     ];
 
-    /// Bit of the mode in 6502.
+    /// Bit of the mode in 6502; manufacturer-specific modes begin at bit 16.
     #[must_use]
     pub const fn bit(self) -> u32 {
-        1 << (self as i8 - 1)
+        let number = self as i8;
+        1 << if number > 0 { number - 1 } else { 15 - number }
     }
 
     /// Returns the mode with this number.
@@ -95,6 +99,23 @@ pub enum Target {
     },
     /// Torque, without interpolation.
     CyclicTorque(NewtonMetre),
+    /// Spring and damper, without interpolation.
+    Impedance(ImpedanceTarget),
+}
+
+/// Target of [`Mode::Impedance`]: torque = K (position - q) + D (velocity - q') + torque.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImpedanceTarget {
+    /// Position at which the spring gives no torque.
+    pub position: Radian,
+    /// Velocity at which the damper gives no torque.
+    pub velocity: RadianPerSecond,
+    /// Stiffness K, N m/rad.
+    pub stiffness: f32,
+    /// Damping D, N m s/rad.
+    pub damping: f32,
+    /// Torque added to spring and damper.
+    pub torque: NewtonMetre,
 }
 
 impl Target {
@@ -110,6 +131,7 @@ impl Target {
             Self::CyclicPosition { .. } => Mode::CyclicPosition,
             Self::CyclicVelocity { .. } => Mode::CyclicVelocity,
             Self::CyclicTorque(_) => Mode::CyclicTorque,
+            Self::Impedance(_) => Mode::Impedance,
         })
     }
 }

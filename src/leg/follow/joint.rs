@@ -6,6 +6,7 @@
 //! profile torque       torque along its slope, no position control; halt ramps it to zero
 //! homing               comes to rest and sets the position to the requested offset
 //! cyclic               position or velocity interpolated over the period, or the torque directly
+//! impedance            torque of a spring and a damper around the target
 //! no mode, halt        comes to rest along the profile and holds
 //! ```
 //!
@@ -17,7 +18,7 @@
 //! While a joint returns into its range (`safety::Monitor`), every position or velocity mode moves it slowly.
 //! Targets are limited to the range, and the commanded position is never farther out than the joint.
 
-use super::command::{JointCommand, Mode, SetPoint, Target};
+use super::command::{ImpedanceTarget, JointCommand, Mode, SetPoint, Target};
 use crate::motion::{Course, Rates};
 use crate::real::{abs, clamp, max, min};
 use crate::safety::{RETURN_SPEED, RETURN_TORQUE};
@@ -30,6 +31,11 @@ const STANDING: f32 = 0.005;
 /// Longest period that is interpolated: a quarter of a second.
 const LONGEST_PERIOD: u32 = SERVO_RATE_HZ / 4;
 
+/// Delay from a motion to the torque that answers it, s: encoder, servo and current loop. A spring that acts
+/// so late feeds energy into the joint like a damper of minus stiffness times this delay, so the damping is
+/// never less than that.
+const DELAY_S: f32 = 0.003;
+
 /// Limits of a joint, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
@@ -41,6 +47,8 @@ pub struct Bounds {
     pub acceleration: f32,
     /// Largest torque, N m.
     pub torque: f32,
+    /// Largest stiffness (N m/rad) and damping (N m s/rad) of the impedance mode.
+    pub impedance: [f32; 2],
 }
 
 /// Measured values of the previous tick, anatomical.
@@ -80,8 +88,10 @@ pub struct Demand {
 pub struct Follower {
     mode: Option<Mode>,
     course: Course,
-    /// Torque of the torque modes, N m.
+    /// Torque of the torque modes and of the impedance, N m.
     torque: f32,
+    /// Impedance: difference to the torque before the mode, which decays, N m.
+    carried: f32,
     /// [`JointCommand::is_requested`] of the previous tick.
     seen: u8,
     /// Profile position: the active set-point.
@@ -115,6 +125,7 @@ impl Follower {
         mode: None,
         course: Course::at_rest(0.0),
         torque: 0.0,
+        carried: 0.0,
         seen: 0,
         goal: None,
         next: None,
@@ -205,6 +216,18 @@ impl Follower {
                 self.stop(&rates, bounds, measured);
                 demand
             }
+            Target::Impedance(target) => {
+                let torque = self.spring(&target, range, bounds, measured);
+                if begins || resumes {
+                    self.carried = measured.torque.0 - torque;
+                }
+                let most = command.torque_slope_nm_per_s * TICK_S;
+                self.carried -= clamp(self.carried, -most, most);
+                self.torque = self.bounded(torque + self.carried, -largest, largest);
+                let near = abs(target.position.0 - measured.position.0) <= command.position_window.0;
+                self.reach(near, command.position_time);
+                return self.give(demand, measured);
+            }
             Target::ProfilePosition(point) => {
                 self.take(point, is_requested);
                 self.go(command, &rates, range, bounds, measured);
@@ -288,6 +311,24 @@ impl Follower {
     fn close_gap(&mut self) {
         self.course = self.course();
         self.gap = Course::at_rest(0.0);
+    }
+
+    /// Torque of spring and damper at the joint's present place, each within its limits.
+    fn spring(
+        &mut self,
+        target: &ImpedanceTarget,
+        [low, high]: [f32; 2],
+        bounds: &Bounds,
+        measured: &Measured,
+    ) -> f32 {
+        let [stiffest, strongest] = bounds.impedance;
+        let stiffness = self.bounded(target.stiffness, 0.0, stiffest);
+        let damping = self.bounded(target.damping, DELAY_S * stiffness, strongest);
+        // The measured values are those of the previous tick.
+        let place = measured.position.0 + TICK_S * measured.velocity.0;
+        let position = self.bounded(target.position.0, low, high);
+        let velocity = self.bounded(target.velocity.0, -bounds.speed, bounds.speed);
+        stiffness * (position - place) + damping * (velocity - measured.velocity.0) + target.torque.0
     }
 
     /// Torque only, without position control.

@@ -17,7 +17,7 @@
 mod command;
 mod joint;
 
-pub use command::{JointCommand, JointStatus, Mode, SetPoint, Target};
+pub use command::{ImpedanceTarget, JointCommand, JointStatus, Mode, SetPoint, Target};
 
 use joint::{Bounds, Demand, Follower, Measured};
 
@@ -70,6 +70,7 @@ impl<const N: usize> Following<N> {
                     speed: limits.speed.0,
                     acceleration: configuration.acceleration[joint].0,
                     torque: limits.torque_cap().0,
+                    impedance: configuration.joints[joint].stiffest_impedance(),
                 }
             }),
             anatomy,

@@ -107,7 +107,89 @@ pub enum Refusal {
     Moved,
 }
 
+/// Values of a mismatch that only a record carries.
+const UNKNOWN: Mismatch = Mismatch { stated: f32::NAN, found: f32::NAN };
+
 impl Refusal {
+    /// Every reason in the order of its number, without its details.
+    pub const ALL: [Self; 26] = [
+        Self::Overcurrent,
+        Self::CurrentSense,
+        Self::BusVoltage,
+        Self::ShuntOffset(Phase::A),
+        Self::Turning,
+        Self::PhaseOpen(Phase::A),
+        Self::ShuntInverted(Phase::A),
+        Self::ShuntsInverted,
+        Self::ShuntsSwapped,
+        Self::CurrentDirection,
+        Self::PhaseImbalance,
+        Self::MotorConstants,
+        Self::OtherMotor(MotorConstant::Resistance, UNKNOWN),
+        Self::Flux(UNKNOWN),
+        Self::TimeOut,
+        Self::NoCounts,
+        Self::Direction,
+        Self::PolePairs { stated: 0, found: 0 },
+        Self::CountsPerTurn { stated: 0, found: 0 },
+        Self::Slipped,
+        Self::Load(0),
+        Self::Travel,
+        Self::NoIndex,
+        Self::IndexMoved,
+        Self::StoredOffset(UNKNOWN),
+        Self::Moved,
+    ];
+
+    /// Number on the bus (2160:5), from 1.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Overcurrent => 1,
+            Self::CurrentSense => 2,
+            Self::BusVoltage => 3,
+            Self::ShuntOffset(_) => 4,
+            Self::Turning => 5,
+            Self::PhaseOpen(_) => 6,
+            Self::ShuntInverted(_) => 7,
+            Self::ShuntsInverted => 8,
+            Self::ShuntsSwapped => 9,
+            Self::CurrentDirection => 10,
+            Self::PhaseImbalance => 11,
+            Self::MotorConstants => 12,
+            Self::OtherMotor(..) => 13,
+            Self::Flux(_) => 14,
+            Self::TimeOut => 15,
+            Self::NoCounts => 16,
+            Self::Direction => 17,
+            Self::PolePairs { .. } => 18,
+            Self::CountsPerTurn { .. } => 19,
+            Self::Slipped => 20,
+            Self::Load(_) => 21,
+            Self::Travel => 22,
+            Self::NoIndex => 23,
+            Self::IndexMoved => 24,
+            Self::StoredOffset(_) => 25,
+            Self::Moved => 26,
+        }
+    }
+
+    /// Number beside the reason: a phase from 1, a stored constant (resistance 1, direct inductance 2,
+    /// quadrature inductance 3), pole pairs or counts that would fit, or a load in percent; else 0.
+    #[must_use]
+    pub const fn detail(self) -> u32 {
+        match self {
+            Self::ShuntOffset(phase) | Self::PhaseOpen(phase) | Self::ShuntInverted(phase) => {
+                phase as u32 + 1
+            }
+            Self::OtherMotor(constant, _) => constant as u32 + 1,
+            Self::PolePairs { found, .. } => found as u32,
+            Self::CountsPerTurn { found, .. } => found,
+            Self::Load(percent) => percent as u32,
+            _ => 0,
+        }
+    }
+
     /// Both values of a contradiction to the leg file or to the stored calibration.
     #[must_use]
     pub const fn mismatch(self) -> Option<Mismatch> {
@@ -142,6 +224,15 @@ mod tests {
             assert_eq!(Mismatch::beyond(0.25, stated, found).is_some(), contradicts, "{found}");
         }
         assert_eq!(Mismatch::beyond(0.25, 2.0, 4.0), Some(Mismatch { stated: 2.0, found: 4.0 }));
+    }
+
+    #[test]
+    fn the_numbers_count_from_one_in_the_order_of_the_list() {
+        for (place, refusal) in (1..).zip(Refusal::ALL) {
+            assert_eq!(refusal.number(), place, "{refusal:?}");
+        }
+        assert_eq!(Refusal::PhaseOpen(Phase::C).detail(), 3);
+        assert_eq!(Refusal::OtherMotor(MotorConstant::QuadratureInductance, UNKNOWN).detail(), 3);
     }
 
     #[test]

@@ -58,7 +58,7 @@ impl Bench {
         hardware.contacts = Contacts { enabling: true, start: false };
         let signals = Signals::new();
         signals.set_permits(true);
-        signals.set_hottest_c(30.0);
+        signals.set_bridge_c(0, 30.0);
         let mut bench = Self {
             control,
             level,

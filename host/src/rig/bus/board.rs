@@ -15,7 +15,7 @@
 
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use scarab::bus::device::Device;
-use scarab::bus::drive::{AxisConstants, Mode};
+use scarab::bus::drive::AxisConstants;
 use scarab::bus::{Frame, Identity, Node, NodeId, Storing};
 use scarab::hal::{Contacts, Controller};
 use scarab::leg::{ControlRequest, IdentifiedModel, Wearing};
@@ -74,18 +74,9 @@ fn device<const N: usize, const B: usize>(
     first: u8,
 ) -> Device<N, LOG> {
     let configuration = &context.configuration;
-    let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
     let constants = core::array::from_fn(|joint| {
-        let (joint, encoder) = (&configuration.joints[joint], &encoders[joint]);
-        AxisConstants {
-            rated_torque: joint.limits().torque_cap(),
-            rated_current: joint.current,
-            modes,
-            torque_per_ampere: joint.scale.torque_per_ampere,
-            speed: joint.speed,
-            counts_per_turn: encoder.counts,
-            ratio: encoder.ratio as f32,
-        }
+        let encoder = &encoders[joint];
+        AxisConstants::of(&configuration.joints[joint], encoder.counts, encoder.ratio as f32)
     });
     Device::new(
         core::array::from_fn(|joint| own_number(first, joint)),

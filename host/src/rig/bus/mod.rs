@@ -5,7 +5,7 @@
 //! | [`board`] | firmware and plant of a leg, with its nodes |
 //! | [`wire`], [`network`] | arbitration and bit timing; several legs and a host on one bus |
 //! | [`host`] | a host that moves a leg and can stop sending |
-//! | [`slcan`], [`server`] | serial line protocol and TCP port for host software |
+//! | [`server`] | TCP port for host software |
 //! | [`adapter`], [`effect`] | queue between port and bus; which frames may be sent late |
 //! | [`pace`] | real-time pace and the report of delays |
 //! | [`alarms`] | lines about faults and emergency messages |
@@ -21,6 +21,5 @@ pub mod network;
 pub mod pace;
 pub mod serve;
 pub mod server;
-pub mod slcan;
 pub mod storing;
 pub mod wire;

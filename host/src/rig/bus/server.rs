@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use scarab::bus::Frame;
 use socket2::{SockRef, TcpKeepalive};
 
-use crate::rig::bus::slcan::{BELL, DONE, Line, Received, TAKEN, encode};
+use crate::formats::slcan::{BELL, DONE, Line, Received, TAKEN, encode};
 
 /// Unread bytes after which a client is disconnected.
 const MOST_UNREAD: usize = 1 << 22;

@@ -2,7 +2,6 @@
 //!
 //! | part | content |
 //! | --- | --- |
-//! | [`adapter`] | opens an slcan adapter |
 //! | [`node`] | object values that a node's frames show |
 //! | [`leg`] | motion, torque, result and state of a leg from the values of its nodes |
 //! | [`words`] | sentences about them |
@@ -10,7 +9,6 @@
 //! Positions between two PDOs are interpolated. Torque is predicted by a stored model, or by the base
 //! parameters that a host reads.
 
-pub mod adapter;
 pub mod leg;
 pub mod node;
 pub mod words;
@@ -29,8 +27,8 @@ use crate::base::error::ToolError;
 use crate::formats::candump;
 use crate::formats::leg_file::LegFile;
 use crate::formats::model_file::ModelFile;
+use crate::formats::slcan;
 use crate::report::live::{LegScene, LiveNote, LiveUpdate, Severity};
-use crate::rig::bus::slcan;
 use crate::rig::bus::wire::bits;
 use crate::run::live::bus::leg::Leg;
 use crate::run::live::clock::Clock;

@@ -23,7 +23,7 @@ fn limits(bench: &Bench) -> Vec<(u32, u8)> {
 fn limits_are_reported_once_a_second_and_one_per_tick() {
     let mut bench = Bench::enabled();
     // Derating leaves no torque to draw the joints back to their start.
-    bench.signals.set_hottest_c(100.0);
+    bench.signals.set_bridge_c(0, 100.0);
     for _ in 0..60 {
         bench.counts = bench.counts.map(|counts| counts + 1);
         bench.tick();

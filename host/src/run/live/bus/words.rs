@@ -102,6 +102,7 @@ const fn mode_name(mode: i32) -> &'static str {
         8 => "cyclic position",
         9 => "cyclic velocity",
         10 => "cyclic torque",
+        -1 => "impedance",
         _ => "unknown mode",
     }
 }

@@ -1,0 +1,618 @@
+//! Guided commissioning of a board over its bus: from an unknown board to a stored, accepted identification.
+//!
+//! ```text
+//! find        nodes, firmware, serial number            wiring   supply, temperatures, inhibit reasons
+//! calibrate   2160:1 = 1, switch held                   reference 2160:1 = 2, switch open, joints at zero
+//! enable      controlwords 6, 7, F, switch held         identify  2100:1 = 1
+//! store       controlword 0, 1010:1 = "save"
+//! ```
+//!
+//! Nothing is remembered here: each step reads from the board whether it is done already. So an interrupted
+//! procedure is resumed by starting it again. The operator's part is asked for in words, and the board itself
+//! says when it is done: a step that it refuses because of the switch is asked again until the switch is
+//! right.
+
+use std::time::{Duration, Instant};
+
+use scarab::bus::commissioning::{BoardState, CommissioningStep, StepResult};
+use scarab::bus::{Abort, Frame};
+use scarab::leg::{CalibrationRefusal, JOINTS, Parameter, Reason, RefusalReason};
+use scarab::model::planar::BASE;
+use scarab::safety::{InhibitReason, NoticeCode};
+use scarab::trace::words;
+
+use crate::base::error::ToolError;
+use crate::base::names::parameter_name;
+use crate::base::number::Number;
+use crate::client::{Client, HOST, Object, RequestError};
+use crate::report::commission::{CommissionReport, JointCommissioned, ParameterRead, StepTaken};
+use crate::run::live::bus::words::JointState;
+
+/// A step of the procedure, in its order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum Step {
+    /// Find the nodes of the leg.
+    Find,
+    /// Check supply, temperatures and inhibit reasons.
+    Wiring,
+    /// Calibrate both motors.
+    Calibrate,
+    /// Take the joints' zero.
+    Reference,
+    /// Enable the drive.
+    Enable,
+    /// Identify the leg.
+    Identify,
+    /// Store calibration and model.
+    Store,
+}
+
+impl Step {
+    /// All steps.
+    pub const ALL: [Self; 7] = [
+        Self::Find,
+        Self::Wiring,
+        Self::Calibrate,
+        Self::Reference,
+        Self::Enable,
+        Self::Identify,
+        Self::Store,
+    ];
+
+    /// Name in the report.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Find => "find",
+            Self::Wiring => "wiring",
+            Self::Calibrate => "calibrate",
+            Self::Reference => "reference",
+            Self::Enable => "enable",
+            Self::Identify => "identify",
+            Self::Store => "store",
+        }
+    }
+}
+
+/// What the procedure should do.
+#[derive(Clone, Copy, Debug)]
+pub struct CommissionOptions {
+    /// Node-IDs of hip and knee.
+    pub nodes: [u8; JOINTS],
+    /// Last step.
+    pub until: Step,
+    /// Longest wait for the operator, s.
+    pub patience_s: f64,
+}
+
+/// Interval between two looks at the board.
+const LOOK: Duration = Duration::from_millis(100);
+/// Interval between two requests that the operator's switch still refuses.
+const AGAIN: Duration = Duration::from_millis(400);
+/// Longest calibration and reference, s.
+const LONGEST_STEP_S: f64 = 180.0;
+/// Longest identification, s.
+const LONGEST_IDENTIFICATION_S: f64 = 600.0;
+/// Longest write of the flash, s.
+const LONGEST_STORE_S: f64 = 30.0;
+/// Plausible supply, V, and temperatures, degrees Celsius.
+const SUPPLY_V: [f64; 2] = [20.0, 58.0];
+const TEMPERATURE_C: [f64; 2] = [-20.0, 90.0];
+
+const COMMAND: Object = Object(0x2160, 1);
+const STATE: Object = Object(0x2160, 2);
+const RESULT: Object = Object(0x2160, 3);
+const REASONS: Object = Object(0x2170, 1);
+const STATUSWORD: Object = Object(0x6041, 0);
+const CONTROLWORD: Object = Object(0x6040, 0);
+const INPUTS: Object = Object(0x60FD, 0);
+const IDENTIFY: Object = Object(0x2100, 1);
+const ACTIVITY: Object = Object(0x2100, 2);
+const VERDICT: Object = Object(0x2100, 8);
+/// Heartbeat that the nodes watch while the drive is on: this host's, within half a second.
+const WATCHED: Object = Object(0x1016, 1);
+const WATCHED_MS: u32 = 500;
+const SAVE: u32 = u32::from_le_bytes(*b"save");
+
+/// The procedure.
+pub struct Commission<'a> {
+    client: Client,
+    options: CommissionOptions,
+    say: &'a mut dyn FnMut(&str),
+    report: CommissionReport,
+}
+
+fn refused(words: impl Into<String>) -> ToolError {
+    ToolError::Refused(words.into())
+}
+
+fn adapter(error: RequestError) -> ToolError {
+    error.of(0, Object(0, 0))
+}
+
+/// Words of the inhibit reasons in a bit mask.
+fn inhibits(causes: u32) -> String {
+    let names = InhibitReason::ALL.into_iter().filter(|cause| causes & cause.bit() != 0);
+    let words: Vec<String> = names
+        .map(|cause| match cause.code() {
+            Some(code) => format!("{} ({})", cause.name(), code.words()),
+            None => cause.name().to_owned(),
+        })
+        .collect();
+    words.join(", ")
+}
+
+/// Words of a refused calibration.
+fn calibration(axis: u32, reason: u32, detail: u32) -> String {
+    let known = CalibrationRefusal::ALL.into_iter().find(|refusal| u32::from(refusal.number()) == reason);
+    let word = known.map_or("an unknown reason", words::calibration);
+    let detail = if detail == 0 { String::new() } else { format!(" {detail}") };
+    format!("the calibration refused axis {axis}: {word}{detail} (docs/board.md says what to do)")
+}
+
+impl<'a> Commission<'a> {
+    /// Prepares the procedure; `say` shows a line to the operator.
+    #[must_use]
+    pub fn new(client: Client, options: CommissionOptions, say: &'a mut dyn FnMut(&str)) -> Self {
+        let joints = options.nodes.map(|node| JointCommissioned { node, ..JointCommissioned::default() });
+        let report = CommissionReport { joints: joints.into(), ..CommissionReport::default() };
+        Self { client, options, say, report }
+    }
+
+    /// Runs all steps up to the last one. The report holds what was reached, also after an error.
+    pub fn run(mut self) -> (CommissionReport, Result<(), ToolError>) {
+        let mut result = Ok(());
+        let until = self.options.until;
+        for step in Step::ALL.into_iter().filter(|step| *step <= until) {
+            let begun = Instant::now();
+            let found = self.perform(step);
+            let words = match &found {
+                Ok(words) => words.clone(),
+                Err(error) => format!("failed: {error}"),
+            };
+            self.line(&format!("{:<10} {words}", step.name()));
+            let seconds = begun.elapsed().as_secs_f64();
+            self.report.steps.push(StepTaken { step: step.name(), result: words, seconds });
+            if let Err(error) = found {
+                result = Err(error);
+                break;
+            }
+        }
+        (self.report, result)
+    }
+
+    fn perform(&mut self, step: Step) -> Result<String, ToolError> {
+        match step {
+            Step::Find => self.find(),
+            Step::Wiring => self.check_wiring(),
+            Step::Calibrate => self.calibrate(),
+            Step::Reference => self.reference(),
+            Step::Enable => self.enable(),
+            Step::Identify => self.identify(),
+            Step::Store => self.store(),
+        }
+    }
+
+    fn line(&mut self, words: &str) {
+        (self.say)(words);
+    }
+
+    /// Node whose objects are equal at both.
+    fn first(&self) -> u8 {
+        self.options.nodes[0]
+    }
+
+    fn read(&mut self, object: Object) -> Result<u32, ToolError> {
+        self.client.read(self.first(), object)
+    }
+
+    fn wait(&mut self, time: Duration) -> Result<(), ToolError> {
+        self.client.wait(time).map_err(adapter)
+    }
+
+    fn has(&mut self, state: u8) -> Result<bool, ToolError> {
+        Ok(self.read(STATE)? & u32::from(state) != 0)
+    }
+
+    /// Asks the operator for something until `is_done`, at most for the operator's time.
+    fn ask(
+        &mut self,
+        words: &str,
+        mut is_done: impl FnMut(&mut Self) -> Result<bool, ToolError>,
+    ) -> Result<(), ToolError> {
+        let begun = Instant::now();
+        let mut is_said = false;
+        while !is_done(self)? {
+            if !is_said {
+                self.line(&format!("           please: {words}"));
+                is_said = true;
+            }
+            if begun.elapsed().as_secs_f64() > self.options.patience_s {
+                return Err(refused(format!(
+                    "waited {} s for the operator: {words}; start the command again to resume",
+                    self.options.patience_s
+                )));
+            }
+            self.wait(AGAIN)?;
+        }
+        Ok(())
+    }
+
+    fn find(&mut self) -> Result<String, ToolError> {
+        for node in self.options.nodes {
+            // Network management: start the node.
+            self.client.send(&Frame::new(0, &[1, node])).map_err(adapter)?;
+        }
+        let mut serials = Vec::new();
+        for node in self.options.nodes {
+            let kind = self.client.read(node, Object(0x1000, 0))?;
+            if kind & 0xFFFF != 402 {
+                return Err(refused(format!("node {node} is no drive of CiA 402: device type {kind:08X}")));
+            }
+            serials.push(self.client.read(node, Object(0x1018, 4))?);
+            if let Err(error) = self.client.bytes(node, COMMAND) {
+                return Err(if error.is(Abort::NoObject) {
+                    refused(format!(
+                        "node {node} has no object 2160: other firmware, or too old; flash this one"
+                    ))
+                } else {
+                    error.of(node, COMMAND)
+                });
+            }
+        }
+        let first = self.first();
+        self.report.device = self.client.text(first, Object(0x1008, 0))?;
+        self.report.firmware = self.client.text(first, Object(0x100A, 0))?;
+        self.report.serial = serials[0];
+        if serials.iter().any(|serial| *serial != serials[0]) {
+            return Err(refused(format!(
+                "nodes {:?} are on different boards: serial numbers {serials:08X?}",
+                self.options.nodes
+            )));
+        }
+        let CommissionReport { device, firmware, serial, .. } = &self.report;
+        Ok(format!(
+            "{device}, firmware {firmware}, serial number {serial:08X}, nodes {:?}",
+            self.options.nodes
+        ))
+    }
+
+    /// Reads a temperature of 2170, degrees Celsius.
+    fn temperature(&mut self, node: u8, sub: u8) -> Result<f64, ToolError> {
+        let tenths = self.client.read(node, Object(0x2170, sub))? as i16;
+        Ok(if tenths == i16::MIN { f64::NAN } else { f64::from(tenths) / 10.0 })
+    }
+
+    fn check_wiring(&mut self) -> Result<String, ToolError> {
+        let volt = f64::from(self.read(Object(0x6079, 0))?) / 1e3;
+        self.report.supply_v = volt.into();
+        if !(SUPPLY_V[0]..=SUPPLY_V[1]).contains(&volt) {
+            return Err(refused(format!(
+                "the supply has {volt:.1} V, limits {} to {} V: check the supply and its fuse",
+                SUPPLY_V[0], SUPPLY_V[1]
+            )));
+        }
+        for (joint, node) in self.options.nodes.into_iter().enumerate() {
+            let [bridge_c, winding_c] = [self.temperature(node, 2)?, self.temperature(node, 3)?];
+            let found = &mut self.report.joints[joint];
+            (found.bridge_c, found.winding_c) = (bridge_c.into(), winding_c.into());
+            if !(TEMPERATURE_C[0]..=TEMPERATURE_C[1]).contains(&bridge_c) {
+                return Err(refused(format!(
+                    "the bridge of node {node} reads {bridge_c:.0} degrees Celsius, limits {} to {}: its thermistor or the board is defective, or hot",
+                    TEMPERATURE_C[0], TEMPERATURE_C[1]
+                )));
+            }
+        }
+        let causes = self.read(REASONS)?;
+        if causes != 0 {
+            self.line(&format!("           inhibited: {}", inhibits(causes)));
+            self.reset(causes)?;
+        }
+        Ok(format!("supply {volt:.1} V, temperatures plausible, nothing inhibits"))
+    }
+
+    /// Resets the inhibit reasons, once the operator has removed their causes.
+    fn reset(&mut self, causes: u32) -> Result<(), ToolError> {
+        if causes & InhibitReason::for_ever() != 0 {
+            return Err(refused(format!(
+                "no reset clears {}: this needs another image, configuration or board",
+                inhibits(causes & InhibitReason::for_ever())
+            )));
+        }
+        self.ask("remove the cause (close the emergency stop), and open the enabling switch", |this| {
+            this.perform_step(CommissioningStep::Reset, LONGEST_STEP_S)?;
+            // A reason that still holds comes back within a millisecond.
+            this.wait(LOOK)?;
+            Ok(this.read(REASONS)? == 0)
+        })
+    }
+
+    /// Asks the board for a step; returns its result once it has ended.
+    fn perform_step(&mut self, step: CommissioningStep, longest_s: f64) -> Result<StepResult, ToolError> {
+        let node = self.first();
+        self.client.write(node, COMMAND, step as u32, 1)?;
+        let begun = Instant::now();
+        while begun.elapsed().as_secs_f64() < longest_s {
+            let number = self.read(RESULT)?;
+            let result = StepResult::ALL.into_iter().find(|result| *result as u32 == number);
+            match result {
+                Some(StepResult::UnderWay) => self.wait(LOOK)?,
+                Some(result) => return Ok(result),
+                None => return Err(refused(format!("node {node} has an unknown result {number} in 2160:3"))),
+            }
+        }
+        Err(refused(format!("{step:?} has not ended after {longest_s} s")))
+    }
+
+    /// Performs a step, and asks the operator to set the switch as the step requires.
+    fn guide(&mut self, step: CommissioningStep, words: &str) -> Result<(), ToolError> {
+        self.ask(words, |this| match this.perform_step(step, LONGEST_STEP_S)? {
+            StepResult::Done | StepResult::AlreadyDone => Ok(true),
+            StepResult::SwitchOpen | StepResult::SwitchClosed | StepResult::ContactsNotOpened => Ok(false),
+            // The joints were still being moved to their zero.
+            StepResult::JointMoved => Ok(false),
+            // Another host, or an interrupted procedure, has begun it.
+            StepResult::Calibrating => Ok(false),
+            StepResult::CalibrationRefused => {
+                let [axis, reason, detail] = [4, 5, 6].map(|sub| this.read(Object(0x2160, sub)));
+                Err(refused(calibration(axis?, reason?, detail?)))
+            }
+            StepResult::Inhibited => {
+                let causes = this.read(REASONS)?;
+                Err(refused(format!("inhibited: {}", inhibits(causes))))
+            }
+            StepResult::Interrupted => Err(refused(
+                "the calibration was interrupted: the enabling switch was let go, or a fault; start the command again",
+            )),
+            StepResult::DriveOn => {
+                this.turn_off()?;
+                Ok(false)
+            }
+            StepResult::NotCalibrated | StepResult::None | StepResult::UnderWay => {
+                Err(refused(format!("the board refuses {step:?}")))
+            }
+        })
+    }
+
+    fn calibrate(&mut self) -> Result<String, ToolError> {
+        if self.has(BoardState::CALIBRATED)? {
+            return Ok("both axes are calibrated".into());
+        }
+        self.guide(
+            CommissioningStep::Calibrate,
+            "open the enabling switch, then hold it until both motors are calibrated; they turn: keep clear",
+        )?;
+        Ok("both axes calibrated".into())
+    }
+
+    fn reference(&mut self) -> Result<String, ToolError> {
+        if self.has(BoardState::REFERENCED)? {
+            return Ok("the joints have their zeros".into());
+        }
+        self.guide(
+            CommissioningStep::Reference,
+            "open the enabling switch, bring both joints to their anatomical zero and keep them still",
+        )?;
+        self.ask("keep the joints still", |this| this.has(BoardState::REFERENCED))?;
+        Ok("zeros taken".into())
+    }
+
+    fn states(&mut self) -> Result<[Option<JointState>; JOINTS], ToolError> {
+        let mut states = [None; JOINTS];
+        for (state, node) in states.iter_mut().zip(self.options.nodes) {
+            *state = JointState::of(self.client.read(node, STATUSWORD)? as u16);
+        }
+        Ok(states)
+    }
+
+    fn command(&mut self, word: u32) -> Result<(), ToolError> {
+        for node in self.options.nodes {
+            self.client.write(node, CONTROLWORD, word, 2)?;
+        }
+        self.wait(LOOK)
+    }
+
+    /// Turns the drive off.
+    fn turn_off(&mut self) -> Result<(), ToolError> {
+        self.command(0)?;
+        self.wait(Duration::from_millis(500))
+    }
+
+    fn enable(&mut self) -> Result<String, ToolError> {
+        // The leg stops if this process ends.
+        self.client.begin_heartbeats();
+        self.watch_heartbeats(u32::from(HOST) << 16 | WATCHED_MS)?;
+        self.ask(
+            "move the leg into its range of motion, open the enabling switch, then hold it; the leg will hold its pose",
+            |this| {
+                let states = this.states()?;
+                if states.iter().all(|state| state.is_some_and(JointState::is_enabled)) {
+                    return Ok(true);
+                }
+                if states.iter().flatten().any(|state| state.has_fault()) {
+                    let code = this.read(Object(0x603F, 0))?;
+                    this.line(&format!("           fault {code:04X}; resetting"));
+                    this.command(0x80)?;
+                }
+                for word in [6, 7, 15] {
+                    this.command(word)?;
+                }
+                let is_enabled =
+                    this.states()?.iter().all(|state| state.is_some_and(JointState::is_enabled));
+                if !is_enabled {
+                    // Its requests would otherwise be repeated as soon as the reason ends.
+                    this.command(0)?;
+                }
+                Ok(is_enabled)
+            },
+        )
+        .map_err(|error| match self.why_not_enabled() {
+            Ok(why) if !why.is_empty() => refused(format!("{error}; the board says: {why}")),
+            _ => error,
+        })?;
+        let nodes = self.options.nodes;
+        for (joint, node) in nodes.into_iter().enumerate() {
+            let micro = self.client.read(node, Object(0x6064, 0))?.cast_signed();
+            self.report.joints[joint].position_rad = (f64::from(micro) * 1e-6).into();
+        }
+        Ok("enabled; the leg holds its pose".into())
+    }
+
+    fn watch_heartbeats(&mut self, value: u32) -> Result<(), ToolError> {
+        for node in self.options.nodes {
+            self.client.write(node, WATCHED, value, 4)?;
+        }
+        Ok(())
+    }
+
+    /// Reasons in 60FD against enabling.
+    fn why_not_enabled(&mut self) -> Result<String, ToolError> {
+        let mut reasons = Vec::new();
+        for node in self.options.nodes {
+            let inputs = self.client.read(node, INPUTS)?;
+            let set = |reason: RefusalReason| inputs & reason.bit() != 0;
+            for (applies, reason) in [
+                (!set(RefusalReason::SwitchOpen), RefusalReason::SwitchOpen),
+                (set(RefusalReason::Blocked), RefusalReason::Blocked),
+                (set(RefusalReason::NoReference), RefusalReason::NoReference),
+                (set(RefusalReason::NotCalibrated), RefusalReason::NotCalibrated),
+                (set(RefusalReason::OutOfRange), RefusalReason::OutOfRange),
+                (set(RefusalReason::Moving), RefusalReason::Moving),
+                (set(RefusalReason::Encoder), RefusalReason::Encoder),
+            ] {
+                if applies {
+                    reasons.push(format!("node {node}: {}", words::refusal(reason)));
+                }
+            }
+        }
+        Ok(reasons.join(", "))
+    }
+
+    fn identify(&mut self) -> Result<String, ToolError> {
+        let before = self.read(Object(0x2100, 7))?;
+        // An identification under way is that of an interrupted procedure.
+        if !(1..=7).contains(&self.read(ACTIVITY)?) {
+            let node = self.first();
+            self.client.write(node, IDENTIFY, 1, 1)?;
+            self.wait(Duration::from_millis(500))?;
+        }
+        self.line("           the leg moves for about a minute: keep clear, and hold the switch");
+        let begun = Instant::now();
+        let mut last = 0;
+        loop {
+            let (activity, motion) = (self.read(ACTIVITY)?, self.read(Object(0x2100, 3))?);
+            if activity != last {
+                let words = crate::run::live::bus::words::doing(Some(activity), Some(motion), &[]);
+                self.line(&format!("           {words}"));
+                last = activity;
+            }
+            if !self.states()?.iter().all(|state| state.is_some_and(JointState::is_enabled)) {
+                let (code, causes) = (self.read(Object(0x603F, 0))?, self.read(REASONS)?);
+                return Err(refused(format!(
+                    "the drive is off: error code {code:04X}; inhibit reasons: {}; start the command again",
+                    if causes == 0 { "none".into() } else { inhibits(causes) }
+                )));
+            }
+            if !(1..=7).contains(&activity) {
+                break;
+            }
+            if begun.elapsed().as_secs_f64() > LONGEST_IDENTIFICATION_S {
+                return Err(refused(format!("no verdict after {LONGEST_IDENTIFICATION_S} s")));
+            }
+            self.wait(LOOK)?;
+        }
+        self.wait(LOOK)?;
+        self.read_results()?;
+        match self.report.verdict {
+            Some("accepted") => Ok(format!("accepted; {before} models were accepted on this board before")),
+            Some(_) => {
+                Err(refused(format!("the identification is refused: {}", self.report.reasons.join(", "))))
+            }
+            None => Err(refused("the identification was cancelled")),
+        }
+    }
+
+    /// Reads verdict, parameters and fit.
+    fn read_results(&mut self) -> Result<(), ToolError> {
+        self.report.verdict = match self.read(VERDICT)? {
+            1 => Some("accepted"),
+            2 => Some("refused"),
+            _ => None,
+        };
+        let bits = self.read(Object(0x2100, 9))?;
+        let set = Reason::ALL.into_iter().enumerate().filter(|(place, _)| bits & 1 << place != 0);
+        self.report.reasons = set.map(|(_, reason)| reason.name()).collect();
+        let first = self.first();
+        self.report.base.clear();
+        for sub in 1..=BASE as u8 {
+            let carrier = self.client.read(first, Object(0x2122, sub))?;
+            let flags = self.client.read(first, Object(0x2123, sub))?;
+            let parameter = Parameter::ALL.get((carrier as usize & 0xFF).wrapping_sub(1));
+            let grouped = if flags & 2 != 0 { "grouped" } else { "single" };
+            self.report.base.push(ParameterRead {
+                name: parameter.map_or("-".into(), |parameter| {
+                    parameter_name((carrier as usize >> 8).saturating_sub(1), *parameter)
+                }),
+                value: self.client.real(first, Object(0x2120, sub))?.into(),
+                sigma: self.client.real(first, Object(0x2121, sub))?.into(),
+                status: if flags & 4 != 0 { "dropped" } else { grouped },
+            });
+        }
+        for (joint, node) in self.options.nodes.into_iter().enumerate() {
+            let mut parameters = Vec::new();
+            for (sub, parameter) in (1..).zip(Parameter::ALL) {
+                parameters.push(ParameterRead {
+                    name: parameter_name(joint, parameter),
+                    value: self.client.real(node, Object(0x2110, sub))?.into(),
+                    sigma: self.client.real(node, Object(0x2111, sub))?.into(),
+                    status: match self.client.read(node, Object(0x2112, sub))? {
+                        1 => "identified",
+                        2 => "grouped",
+                        3 => "weak",
+                        4 => "prior",
+                        _ => "-",
+                    },
+                });
+            }
+            let mut predicted: Vec<Number> = Vec::new();
+            for sub in 2..=4 {
+                predicted.push(self.client.real(node, Object(0x2130, sub))?.into());
+            }
+            let found = &mut self.report.joints[joint];
+            (found.parameters, found.predicted_rms_nm) = (parameters, predicted);
+        }
+        Ok(())
+    }
+
+    fn store(&mut self) -> Result<String, ToolError> {
+        self.turn_off()?;
+        // Not to be stored: the next host has another number.
+        self.watch_heartbeats(0)?;
+        let node = self.first();
+        self.client.take_emergencies();
+        self.ask("let the leg come to rest", |this| {
+            match this.client.try_write(node, Object(0x1010, 1), SAVE, 4) {
+                Ok(()) => Ok(true),
+                Err(error) if error.is(Abort::State) => Ok(false),
+                Err(error) => Err(error.of(node, Object(0x1010, 1))),
+            }
+        })?;
+        let begun = Instant::now();
+        let mut writes = false;
+        while begun.elapsed().as_secs_f64() < LONGEST_STORE_S {
+            self.wait(LOOK)?;
+            for emergency in self.client.take_emergencies().into_iter().filter(|found| found.node == node) {
+                writes |= emergency.code == NoticeCode::Storing.number();
+                if emergency.code == NoticeCode::StoreFailed.number() {
+                    return Err(refused("the board could not store its parameters"));
+                }
+                if emergency.code == 0 && writes {
+                    self.report.stored = true;
+                    self.report.generation = self.read(Object(0x2100, 7))?;
+                    return Ok(format!("stored; {} models accepted on this board", self.report.generation));
+                }
+            }
+        }
+        Err(refused(format!("the board has not confirmed its store within {LONGEST_STORE_S} s")))
+    }
+}

@@ -1,0 +1,92 @@
+//! Page of a commissioning.
+
+use maud::{DOCTYPE, html};
+
+use crate::base::number::Number;
+use crate::base::table::{Table, cells};
+use crate::report::commission::{CommissionReport, ParameterRead};
+use crate::view::html::page_head;
+
+/// Value with some digits, or a dash.
+fn digits(value: Number, count: usize) -> String {
+    value.known().map_or("-".into(), |value| format!("{value:.count$}"))
+}
+
+fn parameters(read: &[ParameterRead]) -> Table {
+    let mut table = Table::default().label("parameter").numbers(["value", "sigma"]).text(["status"]);
+    for parameter in read {
+        table.row(cells![
+            &parameter.name,
+            digits(parameter.value, 4),
+            digits(parameter.sigma, 4),
+            parameter.status,
+        ]);
+    }
+    table
+}
+
+fn joints(report: &CommissionReport) -> Table {
+    let mut table = Table::default().label("joint").numbers([
+        "node",
+        "bridge, °C",
+        "winding, °C",
+        "angle, rad",
+        "worst predicted rms, N m",
+    ]);
+    for (name, joint) in ["hip", "knee"].into_iter().zip(&report.joints) {
+        let worst = joint.predicted_rms_nm.iter().filter_map(|rms| rms.known()).reduce(f64::max);
+        table.row(cells![
+            name,
+            joint.node.to_string(),
+            digits(joint.bridge_c, 1),
+            digits(joint.winding_c, 1),
+            digits(joint.position_rad, 3),
+            digits(worst.into(), 2),
+        ]);
+    }
+    table
+}
+
+/// Creates the page.
+#[must_use]
+pub fn page(report: &CommissionReport) -> String {
+    let verdict = match (report.verdict, report.stored) {
+        (Some("accepted"), true) => "accepted and stored",
+        (Some("accepted"), false) => "accepted, not stored",
+        (Some(_), _) => "refused",
+        (None, _) => "not identified",
+    };
+    let mut steps = Table::default().label("step").numbers(["s"]).text(["result"]);
+    for step in &report.steps {
+        steps.row(cells![step.step, format!("{:.1}", step.seconds), &step.result]);
+    }
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            (page_head(&format!("Commissioning of {:08X}: {verdict}", report.serial)))
+            body {
+                main {
+                    header {
+                        p.over { "Scarab \u{b7} commissioning" }
+                        h1 { (report.device) " " (format!("{:08X}", report.serial)) ": " (verdict) }
+                        p.when { "Firmware " (report.firmware) ", supply " (digits(report.supply_v, 1)) " V" }
+                    }
+                    section { h2 { "Steps" } (steps.to_html()) }
+                    section { h2 { "Joints" } (joints(report).to_html()) }
+                    @if report.verdict.is_some() {
+                        section {
+                            h2 { "Base parameters" }
+                            p { "SI units, as in the leg file. The sums are those that torque determines." }
+                            (parameters(&report.base).to_html())
+                        }
+                        @for (name, joint) in ["hip", "knee"].into_iter().zip(&report.joints) {
+                            section { h2 { "Parameters of the " (name) } (parameters(&joint.parameters).to_html()) }
+                        }
+                        @if !report.reasons.is_empty() { p { "Refused because of: " (report.reasons.join(", ")) } }
+                    }
+                }
+            }
+        }
+    };
+    page.into_string()
+}
