@@ -52,9 +52,7 @@
 use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;
 use super::model_watch::Shown;
-use super::{
-    Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Phases, Rotating, ShuntWatch, SpeedTracker,
-};
+use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, ShuntWatch, SpeedTracker};
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample, SERVO_RATE_HZ};
 use crate::real::{abs, clamp, is_finite, min};
@@ -447,12 +445,6 @@ impl Axis {
         Ok(AxisCommand { enabled: true, duty })
     }
 
-    /// Electrical angle of the current rotor position.
-    #[inline(always)]
-    fn angle(&self) -> ElectricalAngle {
-        self.constants.scale.angle(self.position).plus(self.constants.offset)
-    }
-
     /// Whether the index pulses show a lost rotor position.
     fn is_off_the_index(&mut self) -> bool {
         let Constants { indexed, unindexed, scale, .. } = &self.constants;
@@ -467,11 +459,11 @@ impl Axis {
         d * d + q * q
     }
 
-    /// Currents in the phases B and C at the last tick.
+    /// Electrical angle of the current rotor position.
+    #[inline(always)]
     #[must_use]
-    pub fn phase_currents(&self) -> [Ampere; 2] {
-        let Phases { b, c, .. } = self.measured.to_stationary(self.angle().rotation()).to_phases();
-        [b, c]
+    pub fn angle(&self) -> ElectricalAngle {
+        self.constants.scale.angle(self.position).plus(self.constants.offset)
     }
 
     /// Electrical power into the motor at the last tick, W; negative where the motor returns energy to the

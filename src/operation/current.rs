@@ -187,7 +187,7 @@ impl<const N: usize> CurrentLoops<N> {
             {
                 signals.set_current_share(axis, running.current_share());
                 signals.set_power(axis, running.power_w());
-                signals.set_phase_currents(axis, running.phase_currents());
+                signals.set_rotor_currents(axis, running.measured(), running.angle());
                 // A servo that does not read its samples is detected below.
                 let _ = samples.enqueue(running.joint_sample());
             }

@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use crate::bus::commissioning::{BoardState, BoardStatus, CommissioningStep, StepReport, StepResult};
 use crate::hal::DriveCommand;
 use crate::leg::Permission;
-use crate::motor::AxisRequest;
+use crate::motor::{AxisRequest, ElectricalAngle, Phases, Rotating};
 use crate::safety::{BoardFault, InhibitReason, Winding};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Ampere;
@@ -261,8 +261,8 @@ pub struct Signals<const N: usize> {
     reported: [Word; N],
     /// Temperature of each bridge, degrees Celsius, as bits.
     bridges_c: [Word; N],
-    /// Currents in the phases B and C of each motor, A, as bits.
-    phases: [[Word; 2]; N],
+    /// Currents of each motor along and across the flux, A, as bits, and the rotor's electrical angle.
+    rotor_currents: [[Word; 3]; N],
     /// Integral of each motor's squared current, in [`I2T_UNIT`], wrapping.
     i2t: [Word; N],
     /// Temperature of each winding, degrees Celsius, and its share of the torque cap, as bits.
@@ -295,7 +295,7 @@ impl<const N: usize> Signals<N> {
             begun: Word::new(0),
             reported: [const { Word::new(0) }; N],
             bridges_c: [const { Word::new(0) }; N],
-            phases: [const { [const { Word::new(0) }; 2] }; N],
+            rotor_currents: [const { [const { Word::new(0) }; 3] }; N],
             i2t: [const { Word::new(0) }; N],
             windings: [const { [Word::new(0), Word::new(FULL_SHARE)] }; N],
             current_shares: [const { Word::new(FULL_SHARE) }; N],
@@ -383,13 +383,22 @@ impl<const N: usize> Signals<N> {
         }
     }
 
-    /// Sets the currents in the phases B and C of an axis.
+    /// Sets the currents of a motor and its rotor's angle.
     #[inline(always)]
-    pub fn set_phase_currents(&self, axis: usize, [b, c]: [Ampere; 2]) {
-        if let Some([first, second]) = self.phases.get(axis) {
-            first.set(b.0.to_bits());
-            second.set(c.0.to_bits());
+    pub fn set_rotor_currents(&self, axis: usize, current: Rotating<Ampere>, angle: ElectricalAngle) {
+        if let Some([direct, quadrature, rotor]) = self.rotor_currents.get(axis) {
+            direct.set(current.d.0.to_bits());
+            quadrature.set(current.q.0.to_bits());
+            rotor.set(angle.units().cast_unsigned());
         }
+    }
+
+    /// Currents in the phases B and C of an axis, A.
+    fn phase_currents_a([direct, quadrature, rotor]: &[Word; 3]) -> [f32; 2] {
+        let [d, q] = [direct, quadrature].map(|word| Ampere(f32::from_bits(word.get())));
+        let angle = ElectricalAngle::from_units(rotor.get().cast_signed());
+        let Phases { b, c, .. } = Rotating { d, q }.to_stationary(angle.rotation()).to_phases();
+        [b.0, c.0]
     }
 
     /// Asks for a step of commissioning, from the bus.
@@ -428,7 +437,7 @@ impl<const N: usize> Signals<N> {
             causes: self.inhibit.causes(),
             bridge_c: self.bridges_c.each_ref().map(real),
             winding_c: self.windings.each_ref().map(|[celsius, _]| real(celsius)),
-            currents_a: self.phases.each_ref().map(|phases| phases.each_ref().map(real)),
+            currents_a: self.rotor_currents.each_ref().map(Self::phase_currents_a),
             longest_ns: self.statistics.longest_ns.each_ref().map(Word::get),
         }
     }

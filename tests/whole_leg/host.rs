@@ -575,20 +575,19 @@ fn a_joint_shows_the_commanded_stiffness_and_damping() {
         impedance(&mut hosted, joint, from, stiffness, damping);
         hosted.run(SECOND);
         impedance(&mut hosted, joint, from + 0.15, stiffness, damping);
-        let mut samples = Vec::new();
+        // The torque answers the motion at the time when it acts, six ticks after it is demanded.
+        let (mut samples, mut demanded) = (Vec::new(), [f64::NAN; 6]);
         let mut before = hosted.truth(joint);
         for _ in 0..SECOND {
             hosted.run(1);
             let now = hosted.truth(joint);
-            let velocity = (now - before) * f64::from(scarab::hal::SERVO_RATE_HZ);
+            let velocity = (now - before) * f64::from(SERVO_RATE_HZ);
             before = now;
-            samples.push([
-                f64::from(from) + 0.15 - now,
-                -velocity,
-                f64::from(hosted.status[joint].torque_demand.0),
-            ]);
+            samples.push([f64::from(from) + 0.15 - now, -velocity, demanded[0]]);
+            demanded.rotate_left(1);
+            demanded[5] = f64::from(hosted.status[joint].torque_demand.0);
         }
-        let [k, d] = shown(&samples);
+        let [k, d] = shown(&samples[6..]);
         assert!((k / f64::from(stiffness) - 1.0).abs() < 0.05, "{joint}: {k} of {stiffness} N m/rad");
         assert!((d / f64::from(damping) - 1.0).abs() < 0.05, "{joint}: {d} of {damping} N m s/rad");
         assert!(!hosted.status[joint].limited && is_enabled(&hosted.pair));

@@ -186,5 +186,5 @@ mod tests {
         assert_eq!(format!("{sum:?}"), SUM);
     }
 
-    const SUM: &str = "Checksum(2995092789)";
+    const SUM: &str = "Checksum(1334046917)";
 }

@@ -93,6 +93,8 @@ const AGAIN: Duration = Duration::from_millis(400);
 const LONGEST_STEP_S: f64 = 180.0;
 /// Longest identification, s.
 const LONGEST_IDENTIFICATION_S: f64 = 600.0;
+/// Longest return into the range before an identification, s.
+const LONGEST_RETURN_S: f64 = 30.0;
 /// Longest write of the flash, s.
 const LONGEST_STORE_S: f64 = 30.0;
 /// Plausible supply, V, and temperatures, degrees Celsius.
@@ -427,6 +429,8 @@ impl<'a> Commission<'a> {
             |this| {
                 let states = this.states()?;
                 if states.iter().all(|state| state.is_some_and(JointState::is_enabled)) {
+                    // The contacts may have enabled it: from here on this host controls the leg.
+                    this.command(15)?;
                     return Ok(true);
                 }
                 if states.iter().flatten().any(|state| state.has_fault()) {
@@ -492,9 +496,7 @@ impl<'a> Commission<'a> {
         let before = self.read(Object(0x2100, 7))?;
         // An identification under way is that of an interrupted procedure.
         if !(1..=7).contains(&self.read(ACTIVITY)?) {
-            let node = self.first();
-            self.client.write(node, IDENTIFY, 1, 1)?;
-            self.wait(Duration::from_millis(500))?;
+            self.begin_identification()?;
         }
         self.line("           the leg moves for about a minute: keep clear, and hold the switch");
         let begun = Instant::now();
@@ -530,6 +532,22 @@ impl<'a> Commission<'a> {
             }
             None => Err(refused("the identification was cancelled")),
         }
+    }
+
+    /// Starts the identification; a leg that still returns into its range refuses it.
+    fn begin_identification(&mut self) -> Result<(), ToolError> {
+        let node = self.first();
+        let begun = Instant::now();
+        while begun.elapsed().as_secs_f64() < LONGEST_RETURN_S {
+            self.client.write(node, IDENTIFY, 1, 1)?;
+            self.wait(AGAIN)?;
+            if (1..=7).contains(&self.read(ACTIVITY)?) {
+                return Ok(());
+            }
+        }
+        Err(refused(format!(
+            "the leg has not begun within {LONGEST_RETURN_S} s: it does not come to rest, or another host controls it"
+        )))
     }
 
     /// Reads verdict, parameters and fit.

@@ -31,10 +31,10 @@ const STANDING: f32 = 0.005;
 /// Longest period that is interpolated: a quarter of a second.
 const LONGEST_PERIOD: u32 = SERVO_RATE_HZ / 4;
 
-/// Delay from a motion to the torque that answers it, s: encoder, servo and current loop. A spring that acts
-/// so late feeds energy into the joint like a damper of minus stiffness times this delay, so the damping is
-/// never less than that.
-const DELAY_S: f32 = 0.003;
+/// Delay from a motion to the torque that answers it, s: one tick, and the current loop. A spring that acts
+/// so late is like one with a negative damper, stiffness times this delay. So the place is extrapolated over
+/// it, and the damping is never less than that.
+const DELAY_S: f32 = 0.0015;
 
 /// Limits of a joint, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -324,8 +324,7 @@ impl Follower {
         let [stiffest, strongest] = bounds.impedance;
         let stiffness = self.bounded(target.stiffness, 0.0, stiffest);
         let damping = self.bounded(target.damping, DELAY_S * stiffness, strongest);
-        // The measured values are those of the previous tick.
-        let place = measured.position.0 + TICK_S * measured.velocity.0;
+        let place = measured.position.0 + DELAY_S * measured.velocity.0;
         let position = self.bounded(target.position.0, low, high);
         let velocity = self.bounded(target.velocity.0, -bounds.speed, bounds.speed);
         stiffness * (position - place) + damping * (velocity - measured.velocity.0) + target.torque.0
