@@ -30,14 +30,15 @@ const BY_HAND_S: f64 = 1.0;
 const STANDS_S: f64 = 1.5;
 
 /// Operator who reads what the board answers to a commissioning host, as its screen would say it: holds or
-/// opens the enabling switch where the board refuses a step because of it, brings the joints to their zero
-/// once the motors are calibrated, and into their range after the reference.
+/// opens the enabling switch where the board refuses a step because of it, holds it while the joints are
+/// brought to their zero and lets it go there, and brings the leg into its range after the reference.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Operator {
     /// The joints were brought to their zero, and into their range.
     is_at_zero: bool,
     is_in_range: bool,
-    /// When the enabling switch is to be closed.
+    /// When the enabling switch is to be opened, and closed.
+    opens: Option<Ticks>,
     closes: Option<Ticks>,
 }
 
@@ -60,6 +61,8 @@ impl Operator {
             self.is_at_zero = true;
             session.machine.chip_mut().plant.couple(now);
             session.machine.chip_mut().plant.move_by_hand([0.0; JOINTS], now, BY_HAND_S);
+            session.hold_switch(true);
+            self.opens = Some(now + ticks(STANDS_S));
         }
         if has(BoardState::REFERENCED) && !self.is_in_range {
             self.is_in_range = true;
@@ -70,8 +73,11 @@ impl Operator {
         }
     }
 
-    /// Closes the switch when it is due.
+    /// Opens and closes the switch when it is due.
     fn act(&mut self, session: &mut Session) {
+        if self.opens.take_if(|opens| *opens <= session.now()).is_some() {
+            session.hold_switch(false);
+        }
         if self.closes.take_if(|closes| *closes <= session.now()).is_some() {
             session.hold_switch(true);
         }

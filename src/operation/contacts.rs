@@ -24,7 +24,7 @@
 //! repeated only by the operator.
 
 use crate::bus::commissioning::{CommissioningStep, StepResult};
-use crate::leg::{DriveState, PowerRequest};
+use crate::leg::{DriveState, Permission, PowerRequest};
 
 /// Ticks per second.
 pub const RATE_HZ: u32 = 500;
@@ -127,6 +127,8 @@ pub struct Operator {
     ready: bool,
     /// Ticks for which the button has been pressed since then.
     pressed: u32,
+    /// Ticks for which the switch has been open.
+    opened: u32,
     /// Steps towards enabled requested during this closing of the switch.
     steps: u8,
 }
@@ -142,18 +144,22 @@ impl Operator {
     /// start button requests nothing.
     #[must_use]
     pub fn refusal(&self, step: CommissioningStep, now: &Situation) -> Option<StepResult> {
-        use CommissioningStep::{Calibrate, Reference};
+        use CommissioningStep::{Calibrate, Reference, Reset};
         use StepResult::{
             AlreadyDone, Calibrating, ContactsNotOpened, DriveOn, Inhibited, NotCalibrated, SwitchClosed,
             SwitchOpen,
         };
         let closed = self.enabling.closed;
+        // A drive that damps must not lose its gate drivers.
+        let acts = now.drive.is_some_and(|drive| drive.permission() != Permission::Off);
+        // As long as the button is pressed for a reset.
+        let is_fresh = step == Reset && self.opened < RESET_TICKS;
         let reasons = [
             (!self.trusted, ContactsNotOpened),
             (step == Calibrate && !closed, SwitchOpen),
-            (step != Calibrate && closed, SwitchClosed),
+            (step != Calibrate && closed || is_fresh, SwitchClosed),
             (now.calibrating, Calibrating),
-            (stop(now).is_some(), DriveOn),
+            (stop(now).is_some() || acts, DriveOn),
             (step == Calibrate && now.blocked, Inhibited),
             (step == Calibrate && now.calibrated, AlreadyDone),
             (step == Reference && !now.calibrated, NotCalibrated),
@@ -169,6 +175,7 @@ impl Operator {
         self.start.tick(now.start);
         // An opened switch counts at once.
         self.enabling.closed &= now.enabling;
+        self.opened = if self.enabling.closed { 0 } else { self.opened.saturating_add(1) };
         if !self.trusted {
             let open = !now.enabling && !now.start;
             self.open = if open { self.open + 1 } else { 0 };
@@ -449,7 +456,7 @@ mod tests {
             ),
         ] {
             let mut operator = trusted();
-            for _ in 0..RATE_HZ {
+            for _ in 0..RESET_TICKS {
                 let _ = operator.tick(&now);
             }
             assert_eq!(
@@ -460,9 +467,17 @@ mod tests {
         }
         let stuck = Operator::default();
         assert_eq!(stuck.refusal(Reset, &REST), Some(StepResult::ContactsNotOpened));
-        // The drive is on, although the switch has just opened.
-        let opened = Situation { enabling: false, ..enabled };
-        assert_eq!(trusted().refusal(Reset, &opened), Some(StepResult::DriveOn));
+        // The switch has just opened.
+        let mut operator = trusted();
+        assert_eq!(operator.refusal(Reset, &REST), Some(StepResult::SwitchClosed));
+        for _ in 0..RESET_TICKS {
+            let _ = operator.tick(&REST);
+        }
+        // The drive is on, or damps.
+        for drive in [DriveState::OperationEnabled, DriveState::QuickStopActive { remaining_ticks: 1 }] {
+            let now = Situation { drive: Some(drive), ..READY };
+            assert_eq!(operator.refusal(Reset, &now), Some(StepResult::DriveOn));
+        }
     }
 
     #[test]

@@ -270,9 +270,10 @@ impl<const N: usize> Housekeeper<N> {
         BoardState(bits.into_iter().filter(|(is_set, _)| *is_set).fold(0, |bits, (_, bit)| bits | bit))
     }
 
-    /// Takes the step that a host asked for: refused by the rules of the contacts, or carried out.
+    /// Takes the step that a host asked for: refused by the rules of the contacts, or carried out. While one
+    /// is under way, others are dropped.
     fn take_step(&mut self, situation: &Situation, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
-        let Some(step) = level.signals.take_step() else { return };
+        let Some(step) = level.signals.take_step().filter(|_| self.step.is_none()) else { return };
         match self.operator.refusal(step, situation) {
             Some(why) => level.signals.set_report(StepReport::of(why)),
             None => {
@@ -294,7 +295,9 @@ impl<const N: usize> Housekeeper<N> {
             Some(CommissioningStep::Reference) if self.reference.is_none() && !self.placed => {
                 done(signals.has_begun(), StepReport::of(StepResult::JointMoved))
             }
-            Some(CommissioningStep::Reset) if self.resetting.is_none() => StepReport::of(StepResult::Done),
+            Some(CommissioningStep::Reset) if self.resetting.is_none() => {
+                done(signals.inhibit.is_clear(), StepReport::of(StepResult::Inhibited))
+            }
             _ => return,
         };
         self.step = None;
@@ -383,6 +386,7 @@ impl<const N: usize> Housekeeper<N> {
         match outcome {
             Outcome::Calibrated(_) if self.is_contradicted(axis) => {
                 level.record(refused(joint, "absolute_encoder", 0, None));
+                self.failure = StepReport { axis: joint, ..StepReport::of(StepResult::JointMoved) };
                 self.calibrating = None;
             }
             Outcome::Calibrated(calibration) => {
@@ -564,7 +568,9 @@ impl<const N: usize> Housekeeper<N> {
         match calibrator {
             Some(Ok(_)) if is_contradicted || is_absolute && position.is_none() => {
                 self.calibrating = None;
-                level.record(refused(axis as u8 + 1, "absolute_encoder", 0, None));
+                let joint = axis as u8 + 1;
+                self.failure = StepReport { axis: joint, ..StepReport::of(StepResult::JointMoved) };
+                level.record(refused(joint, "absolute_encoder", 0, None));
             }
             Some(Ok(calibrator)) => {
                 self.calibrating = Some(axis);
@@ -573,9 +579,15 @@ impl<const N: usize> Housekeeper<N> {
                     Some((counter, counts)) => calibrator.at_position(counter, counts),
                     None => calibrator,
                 };
-                level.order(axis, Order::Calibrate(calibrator));
+                if !level.order(axis, Order::Calibrate(calibrator)) {
+                    self.calibrating = None;
+                }
             }
-            _ => level.signals.inhibit.raise(InhibitReason::Configuration),
+            _ => {
+                self.calibrating = None;
+                self.failure = StepReport::of(StepResult::Inhibited);
+                level.signals.inhibit.raise(InhibitReason::Configuration);
+            }
         }
     }
 

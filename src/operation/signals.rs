@@ -409,10 +409,11 @@ impl<const N: usize> Signals<N> {
     /// Takes the step that was asked for. The report says that it is under way before it is taken, so that no
     /// host reads the result of the step before.
     pub fn take_step(&self) -> Option<CommissioningStep> {
-        let step = CommissioningStep::of(self.asked.get())?;
+        if self.asked.get() == 0 {
+            return None;
+        }
         self.set_report(StepReport::of(StepResult::UnderWay));
-        self.asked.set(0);
-        Some(step)
+        CommissioningStep::of(self.asked.swap(0))
     }
 
     /// Sets the report of the step that was taken last.

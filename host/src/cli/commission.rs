@@ -30,6 +30,9 @@ pub struct CommissionArguments {
     /// Longest wait for the operator, s.
     #[arg(long, value_name = "S", default_value_t = 120.0)]
     patience: f64,
+    /// Identify again, although the board has an accepted result since its start.
+    #[arg(long)]
+    again: bool,
     /// Write the page (commission.html) and the report (commission.json) into this directory.
     #[arg(long, value_name = "DIR")]
     out: Option<OutputFolder>,
@@ -50,7 +53,12 @@ pub fn run(arguments: &CommissionArguments) -> Result<u8, ToolError> {
         )));
     }
     let client = Client::new(open(&arguments.slcan, arguments.bit_rate)?)?;
-    let options = CommissionOptions { nodes, until: arguments.until, patience_s: arguments.patience };
+    let options = CommissionOptions {
+        nodes,
+        until: arguments.until,
+        patience_s: arguments.patience,
+        again: arguments.again,
+    };
     let mut say = |words: &str| {
         let _ = output::print(&format!("{words}\n"));
     };

@@ -182,6 +182,8 @@ impl Client {
 
     /// Sends a request, repeatedly if it is not answered.
     fn ask(&mut self, node: u8, request: [u8; 8], object: Option<Object>) -> Result<[u8; 8], RequestError> {
+        // A late answer to an earlier request.
+        self.receive(Instant::now(), |_| false)?;
         let end = Instant::now() + PATIENCE;
         while Instant::now() < end {
             self.send(&Frame::new(REQUEST + u16::from(node), &request))?;
@@ -190,7 +192,18 @@ impl Client {
                 let named = |Object(index, sub): Object| {
                     data.get(1..4) == Some(&[index as u8, (index >> 8) as u8, sub])
                 };
-                frame.id() == ANSWER + u16::from(node) && data.len() == 8 && object.is_none_or(named)
+                // An abort, or the answer to this kind of request: segment, upload, download.
+                let kind = data.first().map(|command| command >> 5);
+                let expected = match request[0] >> 5 {
+                    3 => 0,
+                    2 => 2,
+                    _ => 3,
+                };
+                let answers = kind == Some(4) || kind == Some(expected);
+                frame.id() == ANSWER + u16::from(node)
+                    && data.len() == 8
+                    && answers
+                    && object.is_none_or(named)
             };
             let Some(frame) = self.receive(end.min(Instant::now() + REPEAT), answers)? else { continue };
             let Ok(data) = <[u8; 8]>::try_from(frame.data()) else { continue };

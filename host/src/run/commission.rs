@@ -83,12 +83,16 @@ pub struct CommissionOptions {
     pub until: Step,
     /// Longest wait for the operator, s.
     pub patience_s: f64,
+    /// Identify although the board has an accepted result since its start.
+    pub again: bool,
 }
 
 /// Interval between two looks at the board.
 const LOOK: Duration = Duration::from_millis(100);
 /// Interval between two requests that the operator's switch still refuses.
 const AGAIN: Duration = Duration::from_millis(400);
+/// Time to read what is asked for, before anything acts.
+const READ_TIME: Duration = Duration::from_secs(2);
 /// Longest calibration and reference, s.
 const LONGEST_STEP_S: f64 = 180.0;
 /// Longest identification, s.
@@ -114,6 +118,8 @@ const VERDICT: Object = Object(0x2100, 8);
 /// Heartbeat that the nodes watch while the drive is on: this host's, within half a second.
 const WATCHED: Object = Object(0x1016, 1);
 const WATCHED_MS: u32 = 500;
+const LOST_HOST: Object = Object(0x6007, 0);
+const MODE: Object = Object(0x6060, 0);
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 
 /// The procedure.
@@ -121,6 +127,8 @@ pub struct Commission<'a> {
     client: Client,
     options: CommissionOptions,
     say: &'a mut dyn FnMut(&str),
+    /// Watched heartbeat and mode of each node before this host.
+    before: Option<[[u32; 2]; JOINTS]>,
     report: CommissionReport,
 }
 
@@ -158,7 +166,7 @@ impl<'a> Commission<'a> {
     pub fn new(client: Client, options: CommissionOptions, say: &'a mut dyn FnMut(&str)) -> Self {
         let joints = options.nodes.map(|node| JointCommissioned { node, ..JointCommissioned::default() });
         let report = CommissionReport { joints: joints.into(), ..CommissionReport::default() };
-        Self { client, options, say, report }
+        Self { client, options, say, before: None, report }
     }
 
     /// Runs all steps up to the last one. The report holds what was reached, also after an error.
@@ -180,7 +188,9 @@ impl<'a> Commission<'a> {
                 break;
             }
         }
-        (self.report, result)
+        // Whatever happened, the leg is not left enabled.
+        let given_back = self.give_back();
+        (self.report, result.and(given_back))
     }
 
     fn perform(&mut self, step: Step) -> Result<String, ToolError> {
@@ -216,19 +226,16 @@ impl<'a> Commission<'a> {
         Ok(self.read(STATE)? & u32::from(state) != 0)
     }
 
-    /// Asks the operator for something until `is_done`, at most for the operator's time.
+    /// Asks the operator for something, then tries it until `is_done`, at most for the operator's time.
     fn ask(
         &mut self,
         words: &str,
         mut is_done: impl FnMut(&mut Self) -> Result<bool, ToolError>,
     ) -> Result<(), ToolError> {
+        self.line(&format!("           please: {words}"));
+        self.wait(READ_TIME)?;
         let begun = Instant::now();
-        let mut is_said = false;
         while !is_done(self)? {
-            if !is_said {
-                self.line(&format!("           please: {words}"));
-                is_said = true;
-            }
             if begun.elapsed().as_secs_f64() > self.options.patience_s {
                 return Err(refused(format!(
                     "waited {} s for the operator: {words}; start the command again to resume",
@@ -321,8 +328,11 @@ impl<'a> Commission<'a> {
                 inhibits(causes & InhibitReason::for_ever())
             )));
         }
-        self.ask("remove the cause (close the emergency stop), and open the enabling switch", |this| {
-            this.perform_step(CommissioningStep::Reset, LONGEST_STEP_S)?;
+        self.ask("remove the cause (close the emergency stop), and keep the enabling switch open", |this| {
+            let result = this.perform_step(CommissioningStep::Reset, LONGEST_STEP_S)?;
+            if result != StepResult::Done && result != StepResult::Inhibited {
+                return Ok(false);
+            }
             // A reason that still holds comes back within a millisecond.
             this.wait(LOOK)?;
             Ok(this.read(REASONS)? == 0)
@@ -351,8 +361,6 @@ impl<'a> Commission<'a> {
         self.ask(words, |this| match this.perform_step(step, LONGEST_STEP_S)? {
             StepResult::Done | StepResult::AlreadyDone => Ok(true),
             StepResult::SwitchOpen | StepResult::SwitchClosed | StepResult::ContactsNotOpened => Ok(false),
-            // The joints were still being moved to their zero.
-            StepResult::JointMoved => Ok(false),
             // Another host, or an interrupted procedure, has begun it.
             StepResult::Calibrating => Ok(false),
             StepResult::CalibrationRefused => {
@@ -370,9 +378,7 @@ impl<'a> Commission<'a> {
                 this.turn_off()?;
                 Ok(false)
             }
-            StepResult::NotCalibrated | StepResult::None | StepResult::UnderWay => {
-                Err(refused(format!("the board refuses {step:?}")))
-            }
+            why => Err(refused(format!("the board refuses {step:?}: {}", why.words()))),
         })
     }
 
@@ -391,11 +397,26 @@ impl<'a> Commission<'a> {
         if self.has(BoardState::REFERENCED)? {
             return Ok("the joints have their zeros".into());
         }
-        self.guide(
-            CommissioningStep::Reference,
-            "open the enabling switch, bring both joints to their anatomical zero and keep them still",
+        // Without zeros the switch enables nothing; letting it go states the pose, as the button would.
+        let mut was_closed = false;
+        self.ask(
+            "hold the enabling switch while you bring both joints to their anatomical zero; let it go there and keep them still",
+            |this| {
+                let is_closed = this.has(BoardState::SWITCH_CLOSED)?;
+                was_closed |= is_closed;
+                if is_closed || !was_closed {
+                    return Ok(false);
+                }
+                match this.perform_step(CommissioningStep::Reference, LONGEST_STEP_S)? {
+                    StepResult::Done | StepResult::AlreadyDone => Ok(true),
+                    why => {
+                        this.line(&format!("           not taken: {}; hold the switch again", why.words()));
+                        was_closed = false;
+                        Ok(false)
+                    }
+                }
+            },
         )?;
-        self.ask("keep the joints still", |this| this.has(BoardState::REFERENCED))?;
         Ok("zeros taken".into())
     }
 
@@ -420,10 +441,17 @@ impl<'a> Commission<'a> {
         self.wait(Duration::from_millis(500))
     }
 
+    /// Whether the board has an accepted result since its start, and no new one is wanted.
+    fn is_identified(&mut self) -> Result<bool, ToolError> {
+        Ok(!self.options.again && self.read(VERDICT)? == 1)
+    }
+
     fn enable(&mut self) -> Result<String, ToolError> {
-        // The leg stops if this process ends.
-        self.client.begin_heartbeats();
-        self.watch_heartbeats(u32::from(HOST) << 16 | WATCHED_MS)?;
+        if self.is_identified()? {
+            return Ok("not needed: the leg is identified".into());
+        }
+        self.take_control()?;
+        let mut may_reset = true;
         self.ask(
             "move the leg into its range of motion, open the enabling switch, then hold it; the leg will hold its pose",
             |this| {
@@ -433,7 +461,8 @@ impl<'a> Commission<'a> {
                     this.command(15)?;
                     return Ok(true);
                 }
-                if states.iter().flatten().any(|state| state.has_fault()) {
+                // Once: a fault that returns must not be reset again and again.
+                if states.iter().flatten().any(|state| state.has_fault()) && core::mem::take(&mut may_reset) {
                     let code = this.read(Object(0x603F, 0))?;
                     this.line(&format!("           fault {code:04X}; resetting"));
                     this.command(0x80)?;
@@ -462,9 +491,30 @@ impl<'a> Commission<'a> {
         Ok("enabled; the leg holds its pose".into())
     }
 
-    fn watch_heartbeats(&mut self, value: u32) -> Result<(), ToolError> {
-        for node in self.options.nodes {
-            self.client.write(node, WATCHED, value, 4)?;
+    /// Prepares both nodes for this host: they watch its heartbeat, and hold their pose once enabled.
+    fn take_control(&mut self) -> Result<(), ToolError> {
+        self.client.begin_heartbeats();
+        for (place, node) in self.options.nodes.into_iter().enumerate() {
+            if self.client.read(node, LOST_HOST)? == 0 {
+                return Err(refused(format!(
+                    "node {node} would not stop when its host is lost: 6007 is 0; write 3 to it"
+                )));
+            }
+            let before = [self.client.read(node, WATCHED)?, self.client.read(node, MODE)?];
+            self.before.get_or_insert([[0; 2]; JOINTS])[place] = before;
+            self.client.write(node, WATCHED, u32::from(HOST) << 16 | WATCHED_MS, 4)?;
+            self.client.write(node, MODE, 0, 1)?;
+        }
+        Ok(())
+    }
+
+    /// Turns the drive off, and restores what [`Self::take_control`] has replaced.
+    fn give_back(&mut self) -> Result<(), ToolError> {
+        let Some(before) = self.before.take() else { return Ok(()) };
+        self.turn_off()?;
+        for (node, [watched, mode]) in self.options.nodes.into_iter().zip(before) {
+            self.client.write(node, WATCHED, watched, 4)?;
+            self.client.write(node, MODE, mode, 1)?;
         }
         Ok(())
     }
@@ -493,6 +543,10 @@ impl<'a> Commission<'a> {
     }
 
     fn identify(&mut self) -> Result<String, ToolError> {
+        if self.is_identified()? {
+            self.read_results()?;
+            return Ok("accepted since the start of the board (--again identifies anew)".into());
+        }
         let before = self.read(Object(0x2100, 7))?;
         // An identification under way is that of an interrupted procedure.
         if !(1..=7).contains(&self.read(ACTIVITY)?) {
@@ -603,9 +657,8 @@ impl<'a> Commission<'a> {
     }
 
     fn store(&mut self) -> Result<String, ToolError> {
-        self.turn_off()?;
-        // Not to be stored: the next host has another number.
-        self.watch_heartbeats(0)?;
+        // Before anything is stored.
+        self.give_back()?;
         let node = self.first();
         self.client.take_emergencies();
         self.ask("let the leg come to rest", |this| {

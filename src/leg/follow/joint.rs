@@ -218,7 +218,7 @@ impl Follower {
             }
             Target::Impedance(target) => {
                 let torque = self.spring(&target, range, bounds, measured);
-                if begins || resumes {
+                if begins || resumes || ends {
                     self.carried = measured.torque.0 - torque;
                 }
                 let most = command.torque_slope_nm_per_s * TICK_S;

@@ -61,6 +61,9 @@ fn a_reset_clears_the_inhibit_reasons_unless_the_switch_is_closed() {
     bench.signals.inhibit.raise(InhibitReason::EmergencyStop);
     assert_eq!(ask(&mut bench, CommissioningStep::Reset, true), StepReport::of(StepResult::SwitchClosed));
     assert!(!bench.signals.inhibit.is_clear());
+    // Open for two seconds, as long as the button would be pressed.
+    assert_eq!(ask(&mut bench, CommissioningStep::Reset, false), StepReport::of(StepResult::SwitchClosed));
+    (0..20).for_each(|_| drop(bench.hold(false, false)));
     assert_eq!(ask(&mut bench, CommissioningStep::Reset, false), StepReport::of(StepResult::Done));
     assert!(bench.signals.inhibit.is_clear());
 }
