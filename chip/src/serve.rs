@@ -25,6 +25,8 @@ const QUEUE: usize = 64;
 /// Lag beyond which lost time is skipped.
 const MOST_LAG: Duration = Duration::from_millis(50);
 
+/// Time to read what the host asks for, s.
+const READS_S: f64 = 2.0;
 /// Time of a motion by hand, and until the switch is closed after it, s.
 const BY_HAND_S: f64 = 1.0;
 const STANDS_S: f64 = 1.5;
@@ -34,6 +36,8 @@ const STANDS_S: f64 = 1.5;
 /// brought to their zero and lets it go there, and brings the leg into its range after the reference.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Operator {
+    /// When the board was first seen to have no zeros, while a host looks at it.
+    asked: Option<Ticks>,
     /// The joints were brought to their zero, and into their range.
     is_at_zero: bool,
     is_in_range: bool,
@@ -57,7 +61,9 @@ impl Operator {
             }
         }
         let has = |bit: u8| sub == 2 && value & bit != 0;
-        if has(BoardState::CALIBRATED) && !has(BoardState::REFERENCED) && !self.is_at_zero {
+        let lacks_zeros = has(BoardState::CALIBRATED) && !has(BoardState::REFERENCED);
+        let asked = if lacks_zeros { *self.asked.get_or_insert(now) } else { now };
+        if now - asked > ticks(READS_S) && !self.is_at_zero {
             self.is_at_zero = true;
             session.machine.chip_mut().plant.couple(now);
             session.machine.chip_mut().plant.move_by_hand([0.0; JOINTS], now, BY_HAND_S);
