@@ -545,7 +545,7 @@ impl<'a> Commission<'a> {
     fn identify(&mut self) -> Result<String, ToolError> {
         if self.is_identified()? {
             self.read_results()?;
-            return Ok("accepted since the start of the board (--again identifies anew)".into());
+            return Ok("accepted since the start of the board (--again identifies once more)".into());
         }
         let before = self.read(Object(0x2100, 7))?;
         // An identification under way is that of an interrupted procedure.
