@@ -206,10 +206,10 @@ impl Subjected {
             brake_resistor: true,
             board_volts: None,
         };
-        let image: Rc<Image> = Image::load(&build::build(&build)?)?;
+        let image: Rc<Image> = Image::load(&build::build(&build)?.image)?;
         let mut session = Session::new(&image, &self.exoskeleton, options, seed)?;
         session.prints = true;
-        let mut memory = Memory::new(Some(session.machine.chip_mut().flash.cells_mut()));
+        let mut memory = Memory::new(Some(session.machine.chip_mut().flash.parameters_mut()));
         let [empty, worn] = self.models()?;
         let off = DriveState::SwitchOnDisabled;
         let is_stored = memory.keep_any(off, &self.record(&empty, false))
@@ -217,7 +217,7 @@ impl Subjected {
         if !is_stored {
             return Err(self.error("the models do not fit the image's flash"));
         }
-        session.machine.chip_mut().flash.cells_mut().copy_from_slice(memory.bytes());
+        session.machine.chip_mut().flash.parameters_mut().copy_from_slice(memory.bytes());
         session.boot()?;
         for step in [Step::Calibrate, Step::Reference, Step::Enable] {
             session.step(step)?;

@@ -12,7 +12,7 @@ use crate::peripherals::can::Can;
 use crate::peripherals::debug::Debug;
 use crate::peripherals::drv8301::Drivers;
 use crate::peripherals::exti::Exti;
-use crate::peripherals::flash::{self, Flash};
+use crate::peripherals::flash::Flash;
 use crate::peripherals::gpio::{Gpio, Mode, Pin};
 use crate::peripherals::iwdg::Iwdg;
 use crate::peripherals::pwm::{Outputs, Pins};
@@ -747,20 +747,14 @@ impl Chip {
         self.spi.answer(answer);
     }
 
-    /// Reads bytes of the flash sectors for stored data.
-    pub fn load_stored(&mut self, offset: u32, size: usize) -> u32 {
+    /// Reads bytes of the flash from sector 4 on.
+    pub fn load_flash(&mut self, offset: u32, size: usize) -> u32 {
         self.flash.load(offset, size, &mut Access { now: self.now, findings: &mut self.findings })
     }
 
-    /// Programs the flash sectors for stored data.
-    pub fn program_stored(&mut self, offset: u32, size: usize, value: u32) {
+    /// Programs the flash from sector 4 on.
+    pub fn program_flash(&mut self, offset: u32, size: usize, value: u32) {
         self.flash.store(offset, size, value, &mut Access { now: self.now, findings: &mut self.findings });
-    }
-
-    /// Length of both sectors.
-    #[must_use]
-    pub const fn stored_bytes() -> usize {
-        2 * flash::SECTOR
     }
 
     /// Adds a frame that the partner on the bus sends.

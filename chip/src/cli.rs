@@ -223,7 +223,7 @@ impl Common {
             build::Options { leg: leg.clone(), log: false, brake_resistor: true, board_volts: None };
         let path = match &self.image {
             Some(path) => path.clone(),
-            None => build::build(&options)?,
+            None => build::build(&options)?.image,
         };
         let image: Rc<Image> = Image::load(&path)?;
         let options = Options { time_factor: self.run.time_factor, ..Options::default() };

@@ -427,12 +427,12 @@ impl Check {
 
     fn flash(&mut self) -> Result<(), ToolError> {
         self.next(0.1, 0)?;
-        self.machine.chip_mut().flash.cells_mut()[128 * 1024..].fill(0);
+        self.machine.chip_mut().flash.parameters_mut()[128 * 1024..].fill(0);
         self.next(5.0, 0)?;
-        let blank = self.machine.chip_mut().flash.cells_mut()[128 * 1024..].iter().all(|cell| *cell == 0xFF);
+        let blank = self.machine.chip_mut().flash.parameters_mut()[128 * 1024..].iter().all(|cell| *cell == 0xFF);
         self.next(0.1, 0)?;
         let [erase, read, write, outcomes] = self.take();
-        let cells = &self.machine.chip_mut().flash.cells_mut()[128 * 1024 + 0x40..][..16];
+        let cells = &self.machine.chip_mut().flash.parameters_mut()[128 * 1024 + 0x40..][..16];
         let words: Vec<u32> = cells
             .chunks_exact(4)
             .map(|cell| u32::from_le_bytes([cell[0], cell[1], cell[2], cell[3]]))

@@ -6,12 +6,16 @@ use std::rc::Rc;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile32, FileHeader, ProgramHeader};
 use object::{Endianness, Object, ObjectSymbol, SymbolKind};
+use scarab_boot::Region;
 use scarab_host::base::error::{FileError, ToolError};
 
 /// Address of the flash, and the size that an image may have; sectors 10 and 11 follow.
 pub const FLASH: u32 = 0x0800_0000;
 /// Size of the flash without the sectors for stored data.
 pub const FLASH_BYTES: usize = 768 * 1024;
+
+/// Name of the bootloader's file.
+const BOOTLOADER: &str = "scarab-boot";
 
 /// Symbol of the image.
 #[derive(Clone, Debug)]
@@ -33,15 +37,30 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads an image.
+    /// Reads an image, and the bootloader beside it where it has none of its own.
     ///
     /// # Errors
-    /// The file cannot be read, or is not an image of the board.
+    /// A file cannot be read, or is not an image of the board.
     pub fn load(path: &Path) -> Result<Rc<Self>, ToolError> {
-        let elf = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
-        Self::parse(elf).map(Rc::new).map_err(|reason| {
-            ToolError::input(format!("{}: not an image of the board: {reason}", path.display()))
-        })
+        let read = |path: &Path| {
+            let elf = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
+            Self::parse(elf).map_err(|reason| {
+                ToolError::input(format!("{}: not an image of the board: {reason}", path.display()))
+            })
+        };
+        let mut image = read(path)?;
+        if image.word(FLASH) == Some(u32::MAX) {
+            image.add(read(&path.with_file_name(BOOTLOADER))?);
+        }
+        Ok(Rc::new(image))
+    }
+
+    /// Adds the bytes and names of a bootloader.
+    fn add(&mut self, bootloader: Self) {
+        let end = (Region::IMAGE.address - FLASH) as usize;
+        self.flash[..end].copy_from_slice(&bootloader.flash[..end]);
+        self.functions.extend(bootloader.functions);
+        self.functions.sort_by_key(|symbol| symbol.address);
     }
 
     /// Parses an ELF file.

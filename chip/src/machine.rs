@@ -16,6 +16,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use scarab_host::base::error::ToolError;
+use scarab_boot::Region;
 use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode, Prot};
 use unicorn_engine::{ArmCpuModel, RegisterARM as Register, Unicorn};
 
@@ -108,6 +109,9 @@ impl Snapshot {
         &self.chip
     }
 }
+
+/// Bytes of the sectors that nothing changes: 0 to 3.
+const FIXED_BYTES: usize = (Region::STATE.address - FLASH) as usize;
 
 /// The microcontroller on its board.
 pub struct Machine {
@@ -211,7 +215,7 @@ impl Machine {
 
     /// Moves the used part of the stack down until so many bytes are left below it, as deep calls do.
     pub fn use_up_stack(&mut self, left: u32) {
-        let top = self.image().word(FLASH).unwrap_or(0);
+        let top = self.image().word(Region::IMAGE.address).unwrap_or(0);
         let pointer = get(&self.core, Register::SP);
         let mut used = vec![0; top.wrapping_sub(pointer) as usize % RAM_BYTES];
         // A frame's place depends on the pointer's alignment.
@@ -372,7 +376,11 @@ impl Machine {
         let status = get(&self.core, Register::XPSR);
         put(&mut self.core, Register::APSR_NZCV, status & 0xF000_0000);
         let state = self.core.get_data_mut();
+        let image = state.chip.flash.region(&Region::IMAGE) != saved.chip.flash.region(&Region::IMAGE);
         state.chip = saved.chip.clone();
+        if image {
+            state.chip.flash.changed = Some(0..Region::IMAGE.bytes() as usize);
+        }
         (state.rest, state.resume) = (saved.rest, Some(saved.resume));
         (state.paid, state.asleep, state.locked_up) = (saved.paid, saved.asleep, false);
         (state.fault, state.hung) = (None, None);
@@ -464,11 +472,20 @@ fn put(core: &mut Core<'_>, register: Register, value: u32) {
 
 fn map_memory(core: &mut Core<'_>, options: &Options) -> Result<(), unicorn_engine::uc_error> {
     let image = Rc::clone(&core.get_data().image);
-    core.mem_map(FLASH.into(), FLASH_BYTES as u64, Prot::READ | Prot::EXEC)?;
-    core.mem_write(FLASH.into(), &image.flash)?;
-    // The flash appears at address 0 too.
-    core.mem_map(0, FLASH_BYTES as u64, Prot::READ | Prot::EXEC)?;
-    core.mem_write(0, &image.flash)?;
+    // Sectors 4 and 7 to 11 hold data only; `map_registers` maps them. Sectors 0 to 3 appear at address 0 too.
+    for address in [FLASH, 0] {
+        core.mem_map(address.into(), FIXED_BYTES as u64, Prot::READ | Prot::EXEC)?;
+        core.mem_write(address.into(), &image.flash[..FIXED_BYTES])?;
+    }
+    let (address, bytes) = (Region::IMAGE.address, Region::IMAGE.bytes());
+    core.mem_map(address.into(), bytes.into(), Prot::ALL)?;
+    let flash = &mut core.get_data_mut().chip.flash;
+    for region in [Region::STATE, Region::IMAGE, Region::NEW_IMAGE] {
+        let at = (region.address - FLASH) as usize;
+        flash.region_mut(&region).copy_from_slice(&image.flash[at..at + region.bytes() as usize]);
+    }
+    flash.changed = None;
+    core.mem_write(address.into(), &image.flash[(address - FLASH) as usize..][..bytes as usize])?;
     for (address, bytes) in [(RAM, RAM_BYTES), (CCM, CCM_BYTES)] {
         core.mem_map(address.into(), bytes as u64, Prot::READ | Prot::WRITE)?;
         core.mem_write(address.into(), &vec![0xA5; bytes])?;
@@ -503,15 +520,22 @@ fn map_registers(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
             core.get_data_mut().chip.write_private(offset as u32, size, value as u32);
         }),
     )?;
+    map_data(core, Region::STATE.address, Region::STATE.bytes())?;
+    map_data(core, Region::NEW_IMAGE.address, Region::NEW_IMAGE.bytes() + Region::PARAMETERS.bytes())
+}
+
+/// Maps sectors of the flash from which nothing is executed.
+fn map_data(core: &mut Core<'_>, address: u32, bytes: u32) -> Result<(), unicorn_engine::uc_error> {
+    let first = address - flash::FIRST;
     core.mmio_map(
-        flash::FIRST.into(),
-        Chip::stored_bytes() as u64,
-        Some(|core: &mut Core<'_>, offset: u64, size: usize| {
-            u64::from(core.get_data_mut().chip.load_stored(offset as u32, size))
+        address.into(),
+        bytes.into(),
+        Some(move |core: &mut Core<'_>, offset: u64, size: usize| {
+            u64::from(core.get_data_mut().chip.load_flash(first + offset as u32, size))
         }),
-        Some(|core: &mut Core<'_>, offset: u64, size: usize, value: u64| {
+        Some(move |core: &mut Core<'_>, offset: u64, size: usize, value: u64| {
             let state = core.get_data_mut();
-            state.chip.program_stored(offset as u32, size, value as u32);
+            state.chip.program_flash(first + offset as u32, size, value as u32);
             state.stall();
         }),
     )
@@ -526,6 +550,23 @@ fn add_hooks(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
             core.get_data_mut().chip.event = true;
         })?;
     }
+    // The processor's store follows the hook; `show_changes` then replaces it by what the flash holds.
+    let (first, bytes) = (Region::IMAGE.address, Region::IMAGE.bytes());
+    core.add_mem_hook(
+        HookType::MEM_WRITE,
+        first.into(),
+        u64::from(first + bytes) - 1,
+        |core, _, address, size, value| {
+            let state = core.get_data_mut();
+            let offset = address as u32 - flash::FIRST;
+            state.chip.program_flash(offset, size, value as u32);
+            let at = (address as u32 - Region::IMAGE.address) as usize;
+            let changed = state.chip.flash.changed.get_or_insert(at..at + size);
+            *changed = changed.start.min(at)..changed.end.max(at + size);
+            state.stall();
+            true
+        },
+    )?;
     core.add_mem_hook(HookType::MEM_UNMAPPED | HookType::MEM_PROT, 1, 0, |core, kind, address, _, _| {
         let status = match kind {
             MemType::FETCH_UNMAPPED | MemType::FETCH_PROT => fault::FETCH,
@@ -546,6 +587,10 @@ fn on_block(core: &mut Core<'_>, address: u32, size: u32) {
         state.pay(address, size);
     }
     state.chip.findings.pc = address;
+    if state.chip.flash.changed.is_some() {
+        show_changes(core);
+    }
+    let state = core.get_data_mut();
     if state.chip.now >= state.chip.due {
         state.chip.advance();
     }
@@ -563,6 +608,19 @@ fn on_block(core: &mut Core<'_>, address: u32, size: u32) {
     if state.hung == Some(state.chip.nvic.current()) {
         // A hung level returns to its block and never runs it.
         put(core, Register::PC, address | 1);
+    }
+}
+
+/// Copies changes of the image's sectors to where the processor reads and executes them.
+fn show_changes(core: &mut Core<'_>) {
+    let state = core.get_data_mut();
+    let Some(changed) = state.chip.flash.changed.take() else { return };
+    let bytes = state.chip.flash.region(&Region::IMAGE)[changed.clone()].to_vec();
+    let at = (Region::IMAGE.address - FLASH) as usize + changed.start;
+    Rc::make_mut(&mut state.image).flash[at..at + bytes.len()].copy_from_slice(&bytes);
+    state.blocks[at / 2..(at + bytes.len()).div_ceil(2)].fill((0, 0));
+    if core.mem_write(u64::from(FLASH) + at as u64, &bytes).is_err() {
+        core.get_data_mut().broken = Some("the image's sectors cannot be changed".to_owned());
     }
 }
 

@@ -32,7 +32,8 @@ target_only! {
     pub mod holding_brake;
     pub mod identity;
     pub mod interrupts;
-    pub mod registers;
+    pub mod program;
+    mod registers;
     pub mod start;
     pub mod watchdog;
 }

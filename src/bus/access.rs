@@ -8,6 +8,9 @@ use super::objects::Objects;
 /// First index of the objects that are not held by the node itself.
 pub(super) const PROFILE: u16 = 0x2000;
 
+/// Objects of the program, held by the board.
+const PROGRAM: core::ops::RangeInclusive<u16> = 0x1F50..=0x1F57;
+
 /// Object 603F; repeats the newest entry of 1003.
 const ERROR_CODE: u16 = 0x603F;
 
@@ -42,6 +45,7 @@ impl<O: Objects> Dictionary<'_, O> {
     /// [`Abort`] of the object.
     pub fn value(&self, object: Object) -> Result<u32, Abort> {
         match object.index {
+            index if PROGRAM.contains(&index) => self.objects.read(object),
             ..PROFILE => self.communication.read(object),
             // Newest entry of the error list.
             ERROR_CODE => Ok(self.communication.emergency.newest()),
@@ -67,6 +71,7 @@ impl<O: Objects> Dictionary<'_, O> {
             (0x1010, SAVE) => self.objects.store(false),
             (0x1011, LOAD) => self.objects.store(true),
             (0x1010 | 0x1011, _) => Err(Abort::Store),
+            (index, _) if PROGRAM.contains(&index) => self.objects.write(object, value),
             (..PROFILE, _) => self.communication.write(object, value),
             _ => self.objects.write(object, value),
         }
@@ -79,7 +84,7 @@ impl<O: Objects> Dictionary<'_, O> {
     pub fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
         let row = find(object)?;
         if matches!(row.kind, Type::Text | Type::Domain) {
-            return if object.index < PROFILE {
+            return if object.index < *PROGRAM.start() {
                 self.communication.text(object, offset, into)
             } else {
                 self.objects.bytes(object, offset, into)

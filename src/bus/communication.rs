@@ -26,6 +26,8 @@ pub struct Identity {
     pub revision: u32,
     /// Serial number of the board.
     pub serial: u32,
+    /// Check sum of the running image (1F56); 0 where there is none.
+    pub checksum: u32,
     /// Device name, hardware version, software version.
     pub texts: [&'static str; 3],
 }
@@ -39,6 +41,7 @@ impl Identity {
             product: 1,
             revision: 1 << 16,
             serial,
+            checksum: 0,
             texts: ["Scarab joint drive", hardware, env!("CARGO_PKG_VERSION")],
         }
     }

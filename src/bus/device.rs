@@ -9,6 +9,7 @@
 //! mailbox free             poll(joint, now) -> frame            repeat until there is none
 //! leg has ticked           update(LegStatus), order() -> LegOrder   commands, one request, faults of a host
 //! host wrote 2160:1        take_step()                          once
+//! host wrote 1F51, 1F50    take_program_command(), take_program_byte()
 //! host wrote 1010 or 1011  take_store(into) -> Keeping          then storing(Busy), stored(done, objects)
 //! ```
 //!
@@ -32,6 +33,7 @@ use super::identification::{JointObjects, LegCommand, LegObjects, Results};
 use super::nmt::Reset;
 use super::node::{FrameEffect, Node, Storing};
 use super::node_id::NodeId;
+use super::program::{ProgramCommand, ProgramStatus};
 use super::stored_parameters::StoredNode;
 use crate::hal::{Controller, Frame};
 use crate::leg::{
@@ -190,7 +192,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         Self {
             nodes: own.map(|number| Node::new(number, identity)),
             axes: constants.map(Axis::new),
-            leg: LegObjects::new(plan, seed, 0),
+            leg: LegObjects::new(plan, seed, 0, identity.checksum),
             coupling: Coupling::default(),
             own,
             identity,
@@ -412,6 +414,21 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// Takes the commissioning step that a host asked for.
     pub fn take_step(&mut self) -> Option<CommissioningStep> {
         self.leg.board.take_step()
+    }
+
+    /// Takes over the status of a new image.
+    pub fn update_program(&mut self, status: ProgramStatus) {
+        self.leg.program.update(status);
+    }
+
+    /// Takes the command for the program that a host wrote.
+    pub fn take_program_command(&mut self) -> Option<ProgramCommand> {
+        self.leg.program.take_command()
+    }
+
+    /// Takes the next byte of a new image.
+    pub fn take_program_byte(&mut self) -> Option<u8> {
+        self.leg.program.take_byte()
     }
 
     /// Adds a sample to the log.

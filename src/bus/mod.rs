@@ -12,6 +12,7 @@
 //! | [`identification`] | the leg's identification and its log, as objects of every node |
 //! | [`drive`] | CiA 402 for one joint; coupling of the joints of one leg |
 //! | [`commissioning`] | steps of commissioning and telemetry of the board |
+//! | [`program`] | a new image over the bus |
 //! | [`device`] | one board: nodes, axes, stored parameters, control source of the drive |
 //!
 //! No frame can cause a panic, an endless loop or an allocation. The cost per frame is stated at [`Node`].
@@ -31,6 +32,7 @@ mod node;
 mod node_id;
 mod objects;
 mod pdo;
+pub mod program;
 mod sdo;
 mod silence;
 mod stored_parameters;

@@ -48,6 +48,29 @@ pub trait Objects {
         Err(Abort::NoObject)
     }
 
+    /// Begins to write a domain; `size` is the number of bytes that the host announced.
+    ///
+    /// # Errors
+    /// [`Abort`] if nothing can be written now.
+    fn begin_domain(&mut self, object: Object, size: Option<u32>) -> Result<(), Abort> {
+        let _ = (object, size);
+        Err(Abort::ReadOnly)
+    }
+
+    /// Bytes of a domain that can be taken now. The host's next bytes are asked for when there is space.
+    fn room(&self) -> usize {
+        0
+    }
+
+    /// Takes the next byte of a domain.
+    ///
+    /// # Errors
+    /// [`Abort`] if there is no space.
+    fn push(&mut self, byte: u8) -> Result<(), Abort> {
+        let _ = byte;
+        Err(Abort::ReadOnly)
+    }
+
     /// Handles a lost host, a lost bus or a stop command: the drive stops as its option codes say.
     fn lost(&mut self, why: Lost);
 

@@ -25,6 +25,10 @@ pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x1600, 4, "RPDO mapping parameter", false),
     (0x1800, 4, "TPDO communication parameter", false),
     (0x1A00, 4, "TPDO mapping parameter", false),
+    (0x1F50, 1, "Program data", true),
+    (0x1F51, 1, "Program control", true),
+    (0x1F56, 1, "Program software identification", true),
+    (0x1F57, 1, "Flash status identification", true),
     (0x2020, 1, "Impedance", true),
     (0x2100, 1, "Identification", false),
     (0x2110, 1, "Parameter", true),
@@ -142,6 +146,15 @@ rows! {
     0x1A01, 2, U32, Both, No, 0x606C_0020, "Mapped object";
     0x1A02 x 2, 2, U32, Both, No, 0, "Mapped object";
     0x1A00 x 4, 3 x 6, U32, Both, No, 0, "Mapped object";
+
+    0x1F50, 0, U8, Const, No, 1, "Number of entries";
+    0x1F50, 1, Domain, Both, No, 0, "Program 1";
+    0x1F51, 0, U8, Const, No, 1, "Number of entries";
+    0x1F51, 1, U8, Both, No, 1, "Program 1";
+    0x1F56, 0, U8, Const, No, 1, "Number of entries";
+    0x1F56, 1, U32, Read, No, 0, "Program 1";
+    0x1F57, 0, U8, Const, No, 1, "Number of entries";
+    0x1F57, 1, U32, Read, No, 0, "Program 1";
 
     0x2001, 0, U8, Both, No, 0, "Node-ID after the next start";
     0x2002, 0, U16, Both, No, 1000, "Bit rate after the next start";

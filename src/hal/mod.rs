@@ -11,8 +11,10 @@
 use crate::units::Ampere;
 
 mod can;
+mod program;
 
 pub use can::{Controller, Frame};
+pub use program::ProgramMemory;
 
 /// PWM periods per second; also the rate of samples and commands of one axis.
 pub const CURRENT_RATE_HZ: u32 = 24_000;

@@ -6,7 +6,7 @@
 //! log          all waiting samples
 //! time         timeouts of the host, however full the bus is
 //! store        results and new requests
-//! board        its telemetry; steps of commissioning that a host asked for
+//! board        its telemetry; steps of commissioning that a host asked for; a new image
 //! leg          its report, then its next order; both wait until the leg has taken the previous order, which
 //!             would be overwritten otherwise, and a request with it
 //! mailboxes    [`TxScheduler`]
@@ -23,6 +23,7 @@ use super::signals::Signals;
 use super::token_bucket::TokenBucket;
 use crate::bus::device::{Device, StoreCommand};
 use crate::bus::identification::Results;
+use crate::bus::program::ProgramStatus;
 use crate::bus::{StoredNode, Storing};
 use crate::hal::{Controller, Hardware};
 
@@ -65,6 +66,8 @@ pub struct BusRound {
     whole_us: u64,
     /// Last time without waiting frames.
     watched_us: u64,
+    /// A new image is being received or swapped in.
+    pauses: bool,
 }
 
 impl BusRound {
@@ -80,6 +83,7 @@ impl BusRound {
             waiting: 0,
             whole_us: 0,
             watched_us: 0,
+            pauses: false,
         }
     }
 
@@ -142,11 +146,44 @@ impl BusRound {
             if let Some(step) = device.take_step() {
                 signals.ask(step);
             }
+            self.pass_program(device, ends, signals);
             self.exchange(device, ends, signals);
             self.transmitter.fill(hardware, self.lasting, now_us, device, results);
             self.waiting = hardware.mailboxes_waiting();
         }
         self.tokens.spend(hardware.now_us());
+    }
+
+    /// Passes commands and bytes of a new image on. Hosts hear of a pause of the heartbeats before it, as of
+    /// one for a save.
+    fn pass_program<const N: usize, const LOG: usize>(
+        &mut self,
+        device: &mut Device<N, LOG>,
+        ends: &mut BusEnds<'_, N>,
+        signals: &Signals<N>,
+    ) {
+        while ends.program.ready()
+            && let Some(byte) = device.take_program_byte()
+        {
+            let _ = ends.program.enqueue(byte);
+        }
+        let command = device.take_program_command();
+        if let Some(command) = command {
+            signals.command_program(command);
+        }
+        let status = signals.program_status();
+        device.update_program(status);
+        let pauses = status.0 & (ProgramStatus::UNDER_WAY | ProgramStatus::STOPPED) != 0;
+        if pauses != self.pauses {
+            self.pauses = pauses;
+            device.storing(if pauses {
+                Storing::Busy
+            } else if status.error() == 0 {
+                Storing::Done
+            } else {
+                Storing::Failed
+            });
+        }
     }
 
     /// Takes the leg's report and gives its next order; neither while the leg has not taken the order before.

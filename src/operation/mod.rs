@@ -16,6 +16,7 @@
 //! level 6  Watch                stopped ticks, watchdog
 //! thread   IdentificationLevel  events of the servo -> identification -> findings
 //! thread   Storing              steps around a flash write
+//! thread   Update               a new image over the bus
 //! ```
 //!
 //! An axis switches only with a calibration, or while it is being measured. A target is followed only where
@@ -40,6 +41,7 @@ mod storing;
 #[cfg(test)]
 mod testing;
 mod token_bucket;
+mod update;
 mod watch;
 
 pub use assist::AssistLevel;
@@ -59,6 +61,7 @@ pub use queues::{
 };
 pub use servo::ServoLevel;
 pub use signals::{Inhibit, Signals, Statistics, Word};
-pub use storing::Storing;
+pub use storing::{Purpose, Storing};
 pub use token_bucket::TokenBucket;
+pub use update::{Begun, Update};
 pub use watch::Watch;

@@ -303,6 +303,9 @@ impl<const N: usize> Default for AssistQueues<N> {
     }
 }
 
+/// Capacity for the bytes of a new image: what the flash takes in 2 ms.
+const PROGRAM: usize = 512;
+
 /// Queues of the bus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusQueues<const N: usize> {
@@ -310,6 +313,7 @@ pub struct BusQueues<const N: usize> {
     status: Queue<LegStatus<N>, 2>,
     orders: Queue<LegOrder<N>, 2>,
     logged: Queue<LoggedSample<N>, 8>,
+    program: Queue<u8, PROGRAM>,
 }
 
 /// The servo's ends towards the bus.
@@ -327,24 +331,32 @@ pub struct BusEnds<'a, const N: usize> {
     pub(super) orders: Producer<'a, LegOrder<N>>,
     pub(super) status: Consumer<'a, LegStatus<N>>,
     pub(super) logged: Consumer<'a, LoggedSample<N>>,
+    pub(super) program: Producer<'a, u8>,
 }
 
 impl<const N: usize> BusQueues<N> {
     /// Creates empty queues.
     #[must_use]
     pub const fn new() -> Self {
-        Self { frames: Queue::new(), status: Queue::new(), orders: Queue::new(), logged: Queue::new() }
+        Self {
+            frames: Queue::new(),
+            status: Queue::new(),
+            orders: Queue::new(),
+            logged: Queue::new(),
+            program: Queue::new(),
+        }
     }
 
-    /// Splits every queue; the end of received frames is level 4's.
+    /// Splits every queue; the end of received frames is level 4's, the last one the storage's.
     #[must_use]
-    pub fn split(&mut self) -> (Producer<'_, Frame>, HostEnds<'_, N>, BusEnds<'_, N>) {
+    pub fn split(&mut self) -> (Producer<'_, Frame>, HostEnds<'_, N>, BusEnds<'_, N>, Consumer<'_, u8>) {
         let (frames_in, frames) = self.frames.split();
         let (give_status, status) = self.status.split();
         let (orders, take_order) = self.orders.split();
         let (give_logged, logged) = self.logged.split();
         let servo = HostEnds { orders: take_order, status: give_status, logged: give_logged };
-        (frames_in, servo, BusEnds { frames, orders, status, logged })
+        let (program, bytes) = self.program.split();
+        (frames_in, servo, BusEnds { frames, orders, status, logged, program }, bytes)
     }
 }
 

@@ -6,6 +6,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::bus::commissioning::{BoardState, BoardStatus, CommissioningStep, StepReport, StepResult};
+use crate::bus::program::{ProgramCommand, ProgramStatus};
 use crate::hal::DriveCommand;
 use crate::leg::Permission;
 use crate::motor::{AxisRequest, ElectricalAngle, Phases, Rotating};
@@ -281,6 +282,8 @@ pub struct Signals<const N: usize> {
     /// Step of commissioning that the bus asked for, and the report of the last one.
     asked: Word,
     report: Word,
+    /// Command for the program that the bus passed on, plus one, and the status of a new image.
+    program: [Word; 2],
     forgotten: Word,
 }
 
@@ -307,6 +310,7 @@ impl<const N: usize> Signals<N> {
             board_state: Word::new(0),
             asked: Word::new(0),
             report: Word::new(0),
+            program: [const { Word::new(0) }; 2],
             forgotten: Word::new(0),
         }
     }
@@ -414,6 +418,31 @@ impl<const N: usize> Signals<N> {
         }
         self.set_report(StepReport::of(StepResult::UnderWay));
         CommissioningStep::of(self.asked.swap(0))
+    }
+
+    /// Passes a command for the program on, from the bus.
+    pub fn command_program(&self, command: ProgramCommand) {
+        self.program[0].set(command as u32 + 1);
+    }
+
+    /// Takes the command for the program.
+    pub fn take_program_command(&self) -> Option<ProgramCommand> {
+        if self.program[0].get() == 0 {
+            return None;
+        }
+        ProgramCommand::of(self.program[0].swap(0).wrapping_sub(1))
+    }
+
+    /// Status of a new image; under way while a command waits.
+    #[must_use]
+    pub fn program_status(&self) -> ProgramStatus {
+        let waits = u32::from(self.program[0].get() != 0) * ProgramStatus::UNDER_WAY;
+        ProgramStatus(self.program[1].get() | waits)
+    }
+
+    /// Sets the status of a new image.
+    pub fn set_program_status(&self, status: ProgramStatus) {
+        self.program[1].set(status.0);
     }
 
     /// Sets the report of the step that was taken last.

@@ -4,7 +4,7 @@
 //! Therefore this order:
 //!
 //! ```text
-//! refused         unless the drive is off and no inhibit reason is set
+//! refused         unless the drive is off and no inhibit reason forbids it ([`Purpose`])
 //! interlock       `storing`: the next current tick turns both bridges off, the servo keeps its drive off, a
 //!                calibration ends
 //! hosts           an emergency message (FF0D) announces a pause of the heartbeats; 20 ms to send it
@@ -18,12 +18,13 @@
 //!
 //! Each step takes one millisecond and returns at once; longer waits are several steps.
 //!
-//! While motors brake or any other inhibit reason is set nothing is written: a write would turn them off.
+//! While motors brake nothing is written: a write would turn them off. Parameters are not stored with any other
+//! inhibit reason either; a new image is, since it may be what the board lacks.
 
 use super::signals::Inhibit;
 use crate::hal::Hardware;
 use crate::leg::Permission;
-use crate::safety::InhibitReason;
+use crate::safety::{Bridges, InhibitReason};
 
 /// Time for the announcement, ms: two messages of 135 bits at 125 kbit/s and the frames before them.
 const ANNOUNCED_MS: u32 = 20;
@@ -45,6 +46,25 @@ enum Stage {
     Tightens(u32, bool),
     /// The interlock is cleared next.
     Settles(bool),
+}
+
+/// What the flash is changed for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// Stored parameters; not while any inhibit reason is set.
+    Parameters,
+    /// The program: also on a board that an inhibit reason keeps off, but not while motors brake.
+    Program,
+}
+
+impl Purpose {
+    /// Whether these inhibit reasons, that of the write itself left out, permit the change.
+    const fn permits(self, causes: u32) -> bool {
+        match self {
+            Self::Parameters => causes == 0,
+            Self::Program => !matches!(Bridges::of(causes), Bridges::Brake),
+        }
+    }
 }
 
 /// State between two steps.
@@ -70,30 +90,35 @@ impl Storing {
     }
 
     /// Runs one step of a write. Call it every millisecond until it returns whether the write succeeded.
-    /// `change` is called at most once and returns whether it succeeded; `permission` is the drive's present
-    /// one.
+    /// `change` is called in each step until it returns whether it succeeded; `permission` is the drive's
+    /// present one. `purpose` must not change before the end.
     pub fn step<const N: usize>(
         &mut self,
         inhibit: &Inhibit,
         permission: Permission,
+        purpose: Purpose,
         hardware: &mut impl Hardware<N>,
-        change: impl FnOnce() -> bool,
+        change: impl FnOnce() -> Option<bool>,
     ) -> Option<bool> {
-        let is_off = |causes| permission == Permission::Off && inhibit.causes() == causes;
+        let others = inhibit.causes() & !InhibitReason::Storing.bit();
+        let is_permitted = permission == Permission::Off && purpose.permits(others);
         self.stage = match self.stage {
-            Stage::Idle if self.loose || !is_off(0) => return Some(false),
+            Stage::Idle if self.loose || !is_permitted => return Some(false),
             Stage::Idle => {
                 inhibit.raise(InhibitReason::Storing);
                 Stage::Announced(ANNOUNCED_MS - 1)
             }
             Stage::Announced(left @ 1..) => Stage::Announced(left - 1),
             // A drive that was on when the inhibit word was set is off by now, or still damps.
-            Stage::Announced(0) if !is_off(InhibitReason::Storing.bit()) => Stage::Settles(false),
+            Stage::Announced(0) if !is_permitted => Stage::Settles(false),
             Stage::Announced(0) => {
                 self.loose = true;
                 Stage::Stretches(PATIENCE_MS)
             }
-            Stage::Stretches(_) if hardware.stretch_watchdog() => Stage::Tightens(PATIENCE_MS, change()),
+            Stage::Stretches(_) if hardware.stretch_watchdog() => match change() {
+                Some(changed) => Stage::Tightens(PATIENCE_MS, changed),
+                None => Stage::Stretches(PATIENCE_MS),
+            },
             Stage::Stretches(0) => Stage::Tightens(PATIENCE_MS, false),
             Stage::Stretches(left) => Stage::Stretches(left - 1),
             Stage::Tightens(left, changed) => {

@@ -357,7 +357,7 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
 /// Hardware that receives frames, and the ends of its bus' queues.
 pub(super) fn on_a_bus() -> (TestHardware<2>, HostEnds<'static, 2>, BusEnds<'static, 2>) {
     let queues = Box::leak(Box::new(BusQueues::new()));
-    let (frames, host, bus) = queues.split();
+    let (frames, host, bus, _) = queues.split();
     let mut hardware = TestHardware::new();
     hardware.reception = Some(RefCell::new(Reception::new(frames)));
     (hardware, host, bus)

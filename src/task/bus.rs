@@ -11,6 +11,7 @@
 //! level 4  frames of the controller --queue of 32-->       a frame without space is reported as an overrun
 //! level 1  servo --reports, log--> bus --orders--> servo  one of each in progress; the next has new targets
 //! thread   identification --results--> bus;  bus --data to store--> storage  lent or `Handover`
+//!          bus --bytes of a new image--> storage
 //! ```
 //!
 //! Frames of one node reach the other node when they are given to the controller, which does not
@@ -60,6 +61,8 @@ pub struct StorageEnd {
     pub storage: &'static Handover<StoreJob<JOINTS>>,
     /// Accepted models.
     pub accepted: Consumer<'static, ModelRecord<JOINTS>>,
+    /// Bytes of a new image.
+    pub program: Consumer<'static, u8>,
 }
 
 /// State of level 5.
@@ -99,7 +102,7 @@ impl Memory {
         &'static mut self,
         device: &'static mut BoardDevice,
     ) -> (Producer<'static, Frame>, HostEnds<'static, JOINTS>, ThreadEnd, StorageEnd, BusLoop) {
-        let (frames_in, servo, ends) = self.queues.split();
+        let (frames_in, servo, ends, program) = self.queues.split();
         let ((found_in, fresh), (mut spare, spare_out)) = (self.found.split(), self.spare.split());
         let (accepted_in, accepted) = self.accepted.split();
         let [found, other] = &mut self.results;
@@ -107,7 +110,7 @@ impl Memory {
         let storage: &'static Handover<StoreJob<JOINTS>> = &self.storage;
         let bus = BusLoop { device, fresh, spare, found, round: BusRound::new(), ends, storage };
         let thread = ThreadEnd { found: found_in, spare: spare_out, accepted: accepted_in };
-        (frames_in, servo, thread, StorageEnd { storage, accepted }, bus)
+        (frames_in, servo, thread, StorageEnd { storage, accepted, program }, bus)
     }
 }
 

@@ -13,7 +13,7 @@ use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
-use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, watchdog};
+use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, program, watchdog};
 use crate::board::{stack, windings};
 use crate::bus::drive::AxisConstants;
 use crate::bus::{LONGEST, NodeId, Storing};
@@ -176,7 +176,9 @@ fn join(
         AxisConstants::of(&configuration.joints[joint], motor.counts_per_turn, motor.ratio)
     });
     let [low, middle, high] = identity.unique;
-    let identity = crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6");
+    let checksum = program::checksum();
+    let identity =
+        crate::bus::Identity { checksum, ..crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6") };
     let (plan, seed) = (configuration.plan, configuration.swarm_seed);
     let device = memory::device(|| bus::BoardDevice::new(NODES, identity, constants, plan, seed));
     let mut storage = memory::storage();

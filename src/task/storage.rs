@@ -1,13 +1,11 @@
-//! Thread: persistent storage on the board.
+//! Thread: persistent storage on the board, and a new image.
 //!
-//! Connects flash, watchdog, inhibits and queues to `operation::Storing` and `store::Storage`.
+//! Connects flash, watchdog, inhibits and queues to `operation::Storing`, `operation::Update` and
+//! `store::Storage`.
 //!
 //! During a flash write all software stalls, and with it every clock (`board::odrive_v3_6::flash`). The
 //! current loops do not count the gap while `storing` is raised (`operation::CurrentLoops`). An emergency
 //! stop finds the bridges off; it takes effect after the write.
-
-use core::pin::pin;
-use core::task::{Context, Poll, Waker};
 
 use embassy_time::Timer;
 use heapless::spsc::Consumer;
@@ -15,12 +13,13 @@ use heapless::spsc::Consumer;
 use super::SIGNALS;
 use super::bus::StorageEnd;
 use super::leg::{JOINTS, Leg};
-use crate::board::odrive_v3_6::flash::Flash;
+use crate::board::odrive_v3_6::flash::{LargeSectors, at_once};
 use crate::board::odrive_v3_6::hardware::Odrive;
+use crate::board::odrive_v3_6::program::BoardProgram;
 use crate::bus::device::StoreCommand;
 use crate::bus::{LONGEST, StoredNode};
 use crate::leg::{IdentifiedModel, StoredCalibration, Wearing};
-use crate::operation::{Calibrated, StoreJob, Storing};
+use crate::operation::{Calibrated, Purpose, StoreJob, Storing, Update};
 use crate::store::{self, Key, ModelRecord, Permit, Store};
 
 /// Polling interval of the task, ms.
@@ -41,25 +40,21 @@ pub struct RestoredModel {
 
 /// The store and the ends of its queues.
 pub struct StorageTask {
-    storage: store::Storage<Flash, JOINTS>,
+    storage: store::Storage<LargeSectors, JOINTS>,
     storing: Storing,
+    program: BoardProgram,
+    update: Update,
     ends: Option<(StorageEnd, Consumer<'static, Calibrated>)>,
-}
-
-/// Polls a future that must complete at once: the flash driver never waits.
-fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
-    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
-        Poll::Ready(value) => Some(value),
-        Poll::Pending => None,
-    }
 }
 
 impl StorageTask {
     /// Creates the storage on this flash; `None` where its size is invalid, which no board of this kind has.
     #[must_use]
-    pub fn new(flash: Flash, bytes: u32) -> Option<Self> {
+    pub fn new(flash: LargeSectors, bytes: u32) -> Option<Self> {
         let store = Store::new(flash, 0..bytes).ok()?;
-        Some(Self { storage: store::Storage::new(store), storing: Storing::new(), ends: None })
+        let program = BoardProgram::new();
+        let update = Update::new(program.is_on_trial());
+        Some(Self { storage: store::Storage::new(store), storing: Storing::new(), program, update, ends: None })
     }
 
     /// Sets the sources of requests and of calibrations.
@@ -94,7 +89,7 @@ impl StorageTask {
 
 /// Stores or resets; returns `None` on failure.
 #[inline(never)]
-fn change(storage: &mut store::Storage<Flash, JOINTS>, job: &mut StoreJob<JOINTS>) -> Option<()> {
+fn change(storage: &mut store::Storage<LargeSectors, JOINTS>, job: &mut StoreJob<JOINTS>) -> Option<()> {
     let permit = Permit::under(SIGNALS.permission())?;
     job.generation = match job.what {
         StoreCommand::Defaults => {
@@ -113,7 +108,8 @@ fn change(storage: &mut store::Storage<Flash, JOINTS>, job: &mut StoreJob<JOINTS
 /// Task of the storage.
 #[embassy_executor::task]
 pub async fn run(storage: &'static mut StorageTask) -> ! {
-    let StorageTask { storage, storing, ends } = storage;
+    let StorageTask { storage, storing, program, update, ends } = storage;
+    update.end(true, &SIGNALS);
     loop {
         Timer::after_millis(ROUND_MS).await;
         storing.look_after(&SIGNALS.inhibit, &mut Odrive);
@@ -124,10 +120,20 @@ pub async fn run(storage: &'static mut StorageTask) -> ! {
         while let Some((axis, calibration)) = calibrated.dequeue() {
             storage.calibrated(axis, calibration);
         }
+        if let Some(begun) = SIGNALS.take_program_command().and_then(|command| update.begin(command)) {
+            let done = loop {
+                let change = || update.change(begun, &SIGNALS, &mut end.program, program);
+                match storing.step(&SIGNALS.inhibit, SIGNALS.permission(), Purpose::Program, &mut Odrive, change) {
+                    Some(done) => break done,
+                    None => Timer::after_millis(STEP_MS).await,
+                }
+            };
+            update.end(done, &SIGNALS);
+        }
         let Some(mut job) = end.storage.given() else { continue };
         job.done = loop {
-            let change = || change(storage, &mut job).is_some();
-            match storing.step(&SIGNALS.inhibit, SIGNALS.permission(), &mut Odrive, change) {
+            let change = || Some(change(storage, &mut job).is_some());
+            match storing.step(&SIGNALS.inhibit, SIGNALS.permission(), Purpose::Parameters, &mut Odrive, change) {
                 Some(done) => break done,
                 None => Timer::after_millis(STEP_MS).await,
             }

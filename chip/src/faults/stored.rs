@@ -56,7 +56,7 @@ impl Machines<'_> {
             }
             self.session.store(SAVE.0, SAVE.1, LONGEST_S)?;
         }
-        let mut memory = Memory::new(Some(self.session.machine.chip_mut().flash.cells_mut()));
+        let mut memory = Memory::new(Some(self.session.machine.chip_mut().flash.parameters_mut()));
         let leg = self.session.leg.clone();
         let mut longer = leg.clone();
         longer.joints.iter_mut().for_each(|joint| joint.torque_per_ampere *= 1.1);
@@ -85,7 +85,7 @@ impl Machines<'_> {
 /// Starts a board with this flash.
 fn start(session: &mut Session, booted: &Snapshot, flash: &[u8]) -> Result<Start, ToolError> {
     session.machine.restore(booted)?;
-    session.machine.chip_mut().flash.cells_mut().copy_from_slice(flash);
+    session.machine.chip_mut().flash.parameters_mut().copy_from_slice(flash);
     session.power_up()?;
     session.run(20e-3)?;
     let reports = [1, 2].map(|node: u16| {
@@ -156,13 +156,13 @@ fn armed(
     let moving = machines.moving()?;
     let session = &mut *machines.session;
     begin(session, &moving, random.below(ticks(0.5)))?;
-    let cells = session.machine.chip_mut().flash.cells_mut().to_vec();
+    let cells = session.machine.chip_mut().flash.parameters_mut().to_vec();
     let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), word);
     let node = 1 + random.below(2) as u16;
     let answer = session.ask(node, [0x23, low, high, 1, a, b, c, d], ANSWER_S)?;
     session.run(0.1)?;
     let is_refused = answer[..4] == [0x80, low, high, 1] && answer[4..] == REFUSED;
-    let is_same = session.machine.chip_mut().flash.cells_mut() == cells;
+    let is_same = session.machine.chip_mut().flash.parameters_mut() == cells;
     let switched = session.machine.chip().plant.switchings.iter().flatten().count();
     if !is_refused || !is_same || switched > 0 {
         return Ok(Err(format!("answer {answer:02x?}, flash unchanged {is_same}, {switched} switchings")));

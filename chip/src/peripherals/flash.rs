@@ -1,4 +1,4 @@
-//! Flash interface, and sectors 10 and 11, which hold stored data (RM0090 3.5 to 3.9; times DS8626 table 42).
+//! Flash interface, and sectors 4 to 11: all but the bootloader's (RM0090 3.5 to 3.9; times DS8626 table 42).
 //!
 //! Programming clears bits of one word, erasing sets those of a sector. Both need the keys, the right mode
 //! and a width that matches PSIZE; otherwise an error flag rises and nothing changes. While an operation runs
@@ -6,20 +6,23 @@
 //! any operation: a word is then a random mix of old and new, a sector reads as noise.
 //!
 //! Known limits: contents of the caches are not modelled, except that reading a sector that was erased while
-//! the data cache was on and not reset since is a finding.
+//! the data cache was on and not reset since is a finding; the image's own sectors are not checked for it.
+
+use core::ops::Range;
 
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use scarab_boot::Region;
 
 use crate::findings::{Access, NO_REGISTER};
 use crate::time::{TICK_HZ, Ticks};
 
-/// Address of sector 10.
-pub const FIRST: u32 = 0x080C_0000;
-/// Bytes of a sector.
-pub const SECTOR: usize = 128 * 1024;
-/// Sectors that the model can change: 10 and 11.
-const NUMBERS: [u32; 2] = [10, 11];
+/// Address of sector 4, the first that the model can change.
+pub const FIRST: u32 = Region::STATE.address;
+/// Regions that the model can change, in the order of their addresses.
+const REGIONS: [Region; 4] = [Region::STATE, Region::IMAGE, Region::NEW_IMAGE, Region::PARAMETERS];
+/// Sectors of all regions.
+const SECTORS: usize = 8;
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 const LOCKED: u32 = 1 << 31;
@@ -32,9 +35,11 @@ const PARALLELISM: u32 = 1 << 6;
 const ALIGNMENT: u32 = 1 << 5;
 const PROTECTED: u32 = 1 << 4;
 
-/// Typical durations of a word, and of a sector of 128 KB by the width that is programmed at once (PSIZE).
+/// Typical durations of a word, and of a sector of 64 and 128 KB by the width that is programmed at once (PSIZE).
 const WORD: Ticks = 16 * TICK_HZ / 1_000_000;
-const ERASURES: [Ticks; 4] = [2 * TICK_HZ, 13 * TICK_HZ / 10, TICK_HZ, TICK_HZ];
+const SMALL: [Ticks; 4] =
+    [12 * TICK_HZ / 10, 7 * TICK_HZ / 10, 55 * TICK_HZ / 100, 55 * TICK_HZ / 100];
+const LARGE: [Ticks; 4] = [2 * TICK_HZ, 13 * TICK_HZ / 10, TICK_HZ, TICK_HZ];
 
 /// Power cut within a later operation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +61,7 @@ pub struct Flash {
     refused: bool,
     cells: Vec<u8>,
     /// Sectors erased while the data cache was on and not reset since.
-    stale: [bool; 2],
+    stale: [bool; SECTORS],
     /// Time for which the processor stalls.
     pub stall: Ticks,
     /// Duration of an erasure relative to a typical one: up to 2 (DS8626 table 42).
@@ -65,6 +70,8 @@ pub struct Flash {
     pub words: u64,
     /// Erased sectors so far.
     pub erasures: u64,
+    /// Bytes of the image's sectors, from its first, that changed and that the processor does not see yet.
+    pub changed: Option<Range<usize>>,
     /// Next power cut.
     pub cut: Option<Cut>,
     /// Power was cut.
@@ -82,12 +89,13 @@ impl Flash {
             control: LOCKED,
             keys: [0; 2],
             refused: false,
-            cells: vec![0xFF; NUMBERS.len() * SECTOR],
-            stale: [false; 2],
+            cells: vec![0xFF; REGIONS.iter().map(|region| region.bytes() as usize).sum()],
+            stale: [false; SECTORS],
             stall: 0,
             slowness: 1.0,
             words: 0,
             erasures: 0,
+            changed: None,
             cut: None,
             is_cut: false,
             noise,
@@ -97,12 +105,23 @@ impl Flash {
     /// Resets the registers; cells stay.
     pub fn reset(&mut self) {
         (self.access, self.status, self.control, self.refused) = (0, 0, LOCKED, false);
-        (self.stale, self.stall, self.is_cut, self.cut) = ([false; 2], 0, false, None);
+        (self.stale, self.stall, self.is_cut, self.cut) = ([false; SECTORS], 0, false, None);
     }
 
-    /// Bytes of both sectors.
-    pub fn cells_mut(&mut self) -> &mut [u8] {
-        &mut self.cells
+    /// Bytes of the stored parameters.
+    pub fn parameters_mut(&mut self) -> &mut [u8] {
+        self.region_mut(&Region::PARAMETERS)
+    }
+
+    /// Bytes of a region. Those of the image must not be changed while the machine runs.
+    pub fn region_mut(&mut self, region: &Region) -> &mut [u8] {
+        &mut self.cells[range(region)]
+    }
+
+    /// Bytes of a region.
+    #[must_use]
+    pub fn region(&self, region: &Region) -> &[u8] {
+        &self.cells[range(region)]
     }
 
     /// Checks wait states against the processor's clock (RM0090 table 10, supply of 2.7 V and more).
@@ -146,7 +165,7 @@ impl Flash {
             }
         }
         if value & 1 << 12 != 0 {
-            self.stale = [false; 2];
+            self.stale = [false; SECTORS];
         }
         self.access = value;
     }
@@ -182,20 +201,25 @@ impl Flash {
         if value & (PROGRAM | ERASE | 1 << 2) != ERASE {
             return access.refuse("start without a sector erase", "FLASH_CR");
         }
-        match NUMBERS.iter().position(|&number| number == value >> 3 & 0xF) {
-            Some(sector) => self.erase(sector),
+        let number = value >> 3 & 0xF;
+        match REGIONS.iter().find(|region| number.wrapping_sub(region.sector) < region.sectors) {
+            Some(region) => self.erase(region, number),
             None => {
                 self.status |= PROTECTED;
-                access.refuse("erase of a sector of the image", "FLASH_CR");
+                access.refuse("erase of a sector of the bootloader", "FLASH_CR");
             }
         }
     }
 
-    fn erase(&mut self, sector: usize) {
-        let cells = &mut self.cells[sector * SECTOR..(sector + 1) * SECTOR];
+    fn erase(&mut self, region: &Region, number: u32) {
+        let bytes = region.sector_bytes as usize;
+        let first = range(region).start + (number - region.sector) as usize * bytes;
+        self.note(first..first + bytes);
+        let cells = &mut self.cells[first..first + bytes];
         self.erasures += 1;
-        self.stale[sector] = self.access & 1 << 10 != 0;
-        self.stall += (ERASURES[(self.control >> 8 & 3) as usize] as f64 * self.slowness) as Ticks;
+        self.stale[sector_of(first)] = self.access & 1 << 10 != 0;
+        let durations = if *region == Region::STATE { SMALL } else { LARGE };
+        self.stall += (durations[(self.control >> 8 & 3) as usize] as f64 * self.slowness) as Ticks;
         if let Some(Cut::Erasure(share)) = self.cut {
             self.stall = (self.stall as f64 * share) as Ticks;
             (self.cut, self.is_cut) = (None, true);
@@ -204,10 +228,23 @@ impl Flash {
         cells.fill(0xFF);
     }
 
+    /// Notes a change of the image's sectors.
+    fn note(&mut self, changed: Range<usize>) {
+        let image = range(&Region::IMAGE);
+        if !image.contains(&changed.start) {
+            return;
+        }
+        let changed = changed.start - image.start..changed.end - image.start;
+        self.changed = Some(match self.changed.take() {
+            Some(before) => before.start.min(changed.start)..before.end.max(changed.end),
+            None => changed,
+        });
+    }
+
     /// Reads bytes of the sectors, little-endian.
     pub fn load(&self, offset: u32, size: usize, access: &mut Access<'_>) -> u32 {
         let offset = offset as usize;
-        if self.access & 1 << 10 != 0 && self.stale.get(offset / SECTOR) == Some(&true) {
+        if self.access & 1 << 10 != 0 && self.stale.get(sector_of(offset)) == Some(&true) {
             access.refuse("read of an erased sector through a data cache that was not reset", "FLASH_ACR");
         }
         let bytes = self.cells.get(offset..offset + size).unwrap_or_default();
@@ -229,6 +266,7 @@ impl Flash {
             return access.refuse("flash write is not aligned", "FLASH_SR");
         }
         let range = offset as usize..offset as usize + size;
+        self.note(range.clone());
         let Some(cells) = self.cells.get_mut(range) else { return };
         self.words += 1;
         self.stall += WORD;
@@ -254,6 +292,18 @@ impl Flash {
             (self.cut, self.is_cut) = (None, true);
         }
     }
+}
+
+/// Place of a region's bytes.
+const fn range(region: &Region) -> Range<usize> {
+    let first = (region.address - FIRST) as usize;
+    first..first + region.bytes() as usize
+}
+
+/// Number of the sector at an offset, from sector 4.
+const fn sector_of(offset: usize) -> usize {
+    let small = Region::STATE.bytes() as usize;
+    if offset < small { 0 } else { 1 + (offset - small) / Region::IMAGE.sector_bytes as usize }
 }
 
 #[cfg(test)]
@@ -322,16 +372,24 @@ mod tests {
     #[test]
     fn an_erase_sets_one_sector_and_stalls_one_or_two_seconds() {
         let mut bench = Bench::new();
-        bench.flash.cells_mut().fill(0);
+        bench.flash.cells.fill(0);
         bench.unlock();
+        let (tenth, eleventh) = (0x080C_0000 - FIRST, 0x080E_0000 - FIRST);
         bench.write(0x10, ERASE | 2 << 8 | 11 << 3);
         bench.write(0x10, ERASE | 2 << 8 | 11 << 3 | START);
-        assert_eq!((bench.load(0), bench.load(SECTOR as u32)), (0, u32::MAX));
+        assert_eq!((bench.load(tenth), bench.load(eleventh)), (0, u32::MAX));
         assert_eq!(bench.flash.stall, TICK_HZ);
         bench.write(0x10, ERASE | 11 << 3 | START);
         assert_eq!(bench.flash.stall, 3 * TICK_HZ);
+        assert_eq!(bench.flash.changed, None);
+        bench.write(0x10, ERASE | 2 << 8 | 4 << 3 | START);
+        assert_eq!((bench.load(0), bench.load(0x1_0000)), (u32::MAX, 0));
+        assert_eq!(bench.flash.stall, 3 * TICK_HZ + SMALL[2]);
+        bench.write(0x10, ERASE | 2 << 8 | 6 << 3 | START);
+        assert_eq!(bench.flash.changed, Some(0x2_0000..0x4_0000));
+        assert!(!bench.findings.has("erase of a sector of the bootloader"));
         bench.write(0x10, ERASE | 2 << 8 | 3 << 3 | START);
-        assert!(bench.findings.has("erase of a sector of the image"));
+        assert!(bench.findings.has("erase of a sector of the bootloader"));
     }
 
     #[test]
@@ -345,9 +403,9 @@ mod tests {
         bench.store(4, 4, 0);
         assert!(bench.flash.is_cut && bench.load(0) == 0);
         assert!(bench.load(4) != 0 && bench.load(4) != u32::MAX);
-        bench.write(0x10, ERASE | 2 << 8 | 10 << 3);
+        bench.write(0x10, ERASE | 2 << 8 | 4 << 3);
         bench.flash.cut = Some(Cut::Erasure(0.5));
-        bench.write(0x10, ERASE | 2 << 8 | 10 << 3 | START);
-        assert!(bench.load(0x100) != u32::MAX && bench.load(SECTOR as u32) == u32::MAX);
+        bench.write(0x10, ERASE | 2 << 8 | 4 << 3 | START);
+        assert!(bench.load(0x100) != u32::MAX && bench.load(0x1_0000) == u32::MAX);
     }
 }

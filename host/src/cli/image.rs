@@ -7,7 +7,7 @@ use crate::base::{files, output};
 use crate::cli::arguments::Output;
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
-use crate::image::build::{Options, build, flash};
+use crate::image::build::{Built, Options, build, flash};
 use crate::image::leg_source::{describe, source};
 use crate::image::panics::Panics;
 use crate::image::size::ImageSize;
@@ -79,10 +79,18 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
         files::write(path, source(&description))?;
         return Ok(EXIT_ACCEPTED);
     }
-    let image = build(&options)?;
+    let Built { image, program, bootloader } = build(&options)?;
     let size = ImageSize::of(&image)?;
     let panics = Panics::of(&image)?;
-    output::print(&format!("{}\n\n{}\n{}", image.display(), size.text(), panics.text()))?;
+    let boot = ImageSize::of(&bootloader)?.flash();
+    output::print(&format!(
+        "image                     {}\nprogram for an update     {}\nbootloader, {boot} bytes    {}\n\n{}\n{}",
+        image.display(),
+        program.display(),
+        bootloader.display(),
+        size.text(),
+        panics.text()
+    ))?;
     if let Some(path) = &arguments.json {
         write_json(path, &size)?;
     }
@@ -100,11 +108,11 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
 /// Builds, checks the size, writes the image to the board and prints its records.
 pub fn flash_leg(arguments: &FlashArguments) -> Result<u8, ToolError> {
     arguments.image.leg.require("cargo flash-leg --leg my-leg.toml")?;
-    let image = build(&arguments.image.load()?)?;
-    let missed = ImageSize::of(&image)?.missed();
+    let built = build(&arguments.image.load()?)?;
+    let missed = ImageSize::of(&built.image)?.missed();
     if !missed.is_empty() {
         return Err(ToolError::Refused(format!("the image is too large: {}", missed.join("; "))));
     }
-    flash(&image, &arguments.probe)?;
+    flash(&built, &arguments.probe)?;
     Ok(EXIT_ACCEPTED)
 }

@@ -9,21 +9,14 @@ use crate::base::error::ToolError;
 use crate::base::files;
 use crate::formats::leg_file::LegFile;
 use crate::image::leg_source::{describe, source};
+use crate::image::seal::seal;
 use crate::leg::setup::DEFAULT_SEED;
 
-/// Feature and package of the only board.
-const ARGUMENTS: [&str; 8] = [
-    "--quiet",
-    "--profile",
-    "image",
-    "--package",
-    "scarab",
-    "--bin",
-    "scarab-image",
-    "--features=board-odrive-v3-6",
-];
-/// Path of the image below the target directory.
-const IMAGE: &str = "firmware/thumbv7em-none-eabihf/image/scarab-image";
+/// Image of the only board, and its bootloader.
+const IMAGE: &str = "--quiet --profile image --package scarab --bin scarab-image --features=board-odrive-v3-6";
+const BOOTLOADER: &str = "--quiet --profile image --package scarab-boot --bin scarab-boot --features=bootloader";
+/// Directory of both below the target directory.
+const DIRECTORY: &str = "firmware/thumbv7em-none-eabihf/image";
 /// Name of the microcontroller for `probe-rs`.
 const CHIP: &str = "STM32F405RGTx";
 
@@ -51,13 +44,24 @@ pub fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
 }
 
-/// Builds the image and returns its path.
-pub fn build(options: &Options) -> Result<PathBuf, ToolError> {
+/// What a build leaves.
+#[derive(Clone, Debug)]
+pub struct Built {
+    /// Image with its records' names (ELF).
+    pub image: PathBuf,
+    /// The same as plain bytes, for an update over the bus.
+    pub program: PathBuf,
+    /// Bootloader (ELF).
+    pub bootloader: PathBuf,
+}
+
+/// Builds image and bootloader.
+pub fn build(options: &Options) -> Result<Built, ToolError> {
     let (description, _) = describe(&options.leg, DEFAULT_SEED)?;
     let constant = target_directory().join("firmware").join("leg.rs");
     let constant = write_if_changed(&constant, &source(&description))?;
     let mut command = firmware_build(options.log);
-    command.args(ARGUMENTS).env("SCARAB_LEG", constant);
+    command.args(IMAGE.split(' ')).env("SCARAB_LEG", constant);
     if options.brake_resistor {
         command.env("SCARAB_BRAKE_RESISTOR", "1");
     }
@@ -65,8 +69,11 @@ pub fn build(options: &Options) -> Result<PathBuf, ToolError> {
         command.env("SCARAB_BOARD_VOLTS", volts.to_string());
     }
     run(&mut command, "scripts/firmware-build")?;
-    let image = target_directory().join(IMAGE);
-    Ok(image.canonicalize().unwrap_or(image))
+    run(firmware_build(false).args(BOOTLOADER.split(' ')), "scripts/firmware-build")?;
+    let directory = target_directory().join(DIRECTORY);
+    let directory = directory.canonicalize().unwrap_or(directory);
+    let image = directory.join("scarab-image");
+    Ok(Built { program: seal(&image)?, image, bootloader: directory.join("scarab-boot") })
 }
 
 /// Writes a file unless it is unchanged, to avoid recompilation; returns the whole path.
@@ -97,11 +104,17 @@ pub fn firmware_build(log: bool) -> Command {
     command
 }
 
-/// Writes an image to the board on the probe, starts it and prints its records until interrupted.
-pub fn flash(image: &Path, further: &[String]) -> Result<(), ToolError> {
+/// Writes bootloader and image to the board on the probe, starts it and prints its records until interrupted.
+pub fn flash(built: &Built, further: &[String]) -> Result<(), ToolError> {
+    probe("download", further, &built.bootloader)?;
+    probe("run", further, &built.image)
+}
+
+/// Runs `probe-rs` with a file.
+fn probe(action: &str, further: &[String], file: &Path) -> Result<(), ToolError> {
     let mut command = Command::new("probe-rs");
-    command.args([OsStr::new("run"), OsStr::new("--chip"), OsStr::new(CHIP)]);
-    command.args(further).arg(image);
+    command.args([OsStr::new(action), OsStr::new("--chip"), OsStr::new(CHIP)]);
+    command.args(further).arg(file);
     run(&mut command, "probe-rs").map_err(|error| {
         if error.to_string().contains("cannot be started") {
             ToolError::input(format!("{error}; it is installed by `cargo install probe-rs-tools --locked`"))

@@ -1,4 +1,4 @@
-//! Flash for persistent data, behind `embedded-storage`'s trait.
+//! Flash for persistent data and new images, behind `embedded-storage`'s trait.
 //!
 //! **What a write costs.** The chip has one bank. A write takes 16 us a word (100 at most), an erase 1 s a
 //! sector (2 at most). Every fetch from flash stalls meanwhile: current loops, servo, bus, watchdog. So
@@ -12,17 +12,20 @@
 //!
 //! Source: RM0090 3.6, 3.9; times DS8626 table 42 (words of 32 bits).
 
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+
 use cortex_m::peripheral::DWT;
 use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 
+use scarab_boot::Region;
+
 use super::registers::{copy, load, store};
 use super::settings::CLOCK_HZ;
-use super::settings::flash::{
-    ACR, BUSY, BYTES, CACHE, CR, FIRST, KEYR, KEYS, LOCK, NUMBERS, PROGRAM, SECTOR, SR, START, WRONG, erase,
-};
-use super::{brake, bridge, watchdog};
+use super::settings::flash::{ACR, BUSY, CACHE, CR, KEYR, KEYS, LOCK, PROGRAM, SR, START, WRONG};
+use super::{brake, bridge, settings, watchdog};
 
 /// Longest wait, processor cycles: 5 s for an erased sector, 1 ms for a word.
 const ERASED: u32 = 5 * CLOCK_HZ;
@@ -34,7 +37,7 @@ const COUNTS: u32 = 1;
 /// Reason for which nothing was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
-    /// Range beyond both sectors.
+    /// Range beyond the region.
     OutOfBounds,
     /// Range not in whole words or sectors.
     NotAligned,
@@ -54,100 +57,142 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// Both sectors as one range that begins at 0. Only one instance exists.
-pub struct Flash(());
-
-impl Flash {
-    /// For the owner of the store; two instances would undo each other's writes.
-    pub const fn new() -> Self {
-        Self(())
-    }
-
-    /// Unlocks the flash for one change and locks it again.
-    fn change(
-        &mut self,
-        control: u32,
-        patience: u32,
-        change: impl FnOnce(),
-    ) -> Result<(), FlashError> {
-        if !bridge::are_disabled() || brake::is_on() {
-            return Err(FlashError::Armed);
-        }
-        store(SR, WRONG);
-        for key in KEYS {
-            store(KEYR, key);
-        }
-        store(CR, control);
-        change();
-        cortex_m::asm::dsb();
-        let begun = DWT::cycle_count();
-        while load(SR) & BUSY != 0 && DWT::cycle_count().wrapping_sub(begun) < patience {}
-        let status = load(SR);
-        store(CR, LOCK);
-        if status & (BUSY | WRONG) == 0 { Ok(()) } else { Err(FlashError::Failed) }
+/// Polls a future that must complete at once: the flash driver never waits.
+pub fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(value) => Some(value),
+        Poll::Pending => None,
     }
 }
 
-/// Address of a range, if it lies within both sectors.
-fn place(offset: u32, length: usize) -> Result<u32, FlashError> {
+/// A region of the flash as one range that begins at 0. Each region has one owner; two would undo each
+/// other's writes. All sectors of a region have `SECTOR` bytes.
+pub struct Flash<const SECTOR: usize> {
+    region: Region,
+}
+
+/// Stored parameters, or a new image.
+pub type LargeSectors = Flash<{ Region::PARAMETERS.sector_bytes as usize }>;
+/// State of an update.
+pub type SmallSector = Flash<{ Region::STATE.sector_bytes as usize }>;
+
+impl LargeSectors {
+    /// Stored parameters, for the owner of the store.
+    pub const fn parameters() -> Self {
+        Self { region: Region::PARAMETERS }
+    }
+
+    /// Space of the new image, for the owner of the update.
+    pub const fn new_image() -> Self {
+        Self { region: Region::NEW_IMAGE }
+    }
+}
+
+impl SmallSector {
+    /// State of an update, for its owner.
+    pub const fn state() -> Self {
+        Self { region: Region::STATE }
+    }
+}
+
+/// Copies bytes of a region.
+pub fn read(region: &Region, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+    copy(place(region, offset, bytes.len())?, bytes);
+    Ok(())
+}
+
+/// Unlocks the flash for one change and locks it again.
+#[inline(never)]
+fn change(control: u32, patience: u32, address: u32, value: u32) -> Result<(), FlashError> {
+    if !bridge::are_disabled() || brake::is_on() {
+        return Err(FlashError::Armed);
+    }
+    store(SR, WRONG);
+    for key in KEYS {
+        store(KEYR, key);
+    }
+    store(CR, control);
+    store(address, value);
+    cortex_m::asm::dsb();
+    let begun = DWT::cycle_count();
+    while load(SR) & BUSY != 0 && DWT::cycle_count().wrapping_sub(begun) < patience {}
+    let status = load(SR);
+    store(CR, LOCK);
+    if status & (BUSY | WRONG) == 0 { Ok(()) } else { Err(FlashError::Failed) }
+}
+
+/// Address of a range, if it lies within the region.
+fn place(region: &Region, offset: u32, length: usize) -> Result<u32, FlashError> {
     match offset.checked_add(length as u32) {
-        Some(end) if end <= BYTES => Ok(FIRST + offset),
+        Some(end) if end <= region.bytes() => Ok(region.address + offset),
         _ => Err(FlashError::OutOfBounds),
     }
 }
 
-impl ErrorType for Flash {
+/// Erases the sectors of a range.
+#[inline(never)]
+fn erase(region: &Region, from: u32, to: u32) -> Result<(), FlashError> {
+    let bytes = region.sector_bytes;
+    if from > to || !from.is_multiple_of(bytes) || !to.is_multiple_of(bytes) {
+        return Err(FlashError::NotAligned);
+    }
+    place(region, from, (to - from) as usize)?;
+    for number in region.sector + from / bytes..region.sector + to / bytes {
+        // The stretched watchdog covers the time of one sector, perhaps not of two.
+        watchdog::feed();
+        store(TIM5_CR1, load(TIM5_CR1) & !COUNTS);
+        let chosen = settings::flash::erase(number);
+        let erased = change(chosen, ERASED, CR, chosen | START);
+        store(TIM5_CR1, load(TIM5_CR1) | COUNTS);
+        let [on, emptied] = CACHE;
+        let access = load(ACR) & !(on | emptied);
+        for value in [access, access | emptied, access, access | on] {
+            store(ACR, value);
+        }
+        erased?;
+    }
+    Ok(())
+}
+
+/// Programs whole words.
+#[inline(never)]
+fn write(region: &Region, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+    let first = place(region, offset, bytes.len())?;
+    let (words, rest) = bytes.as_chunks::<4>();
+    if !rest.is_empty() || !first.is_multiple_of(4) {
+        return Err(FlashError::NotAligned);
+    }
+    for (address, word) in (first..).step_by(4).zip(words) {
+        change(PROGRAM, WRITTEN, address, u32::from_le_bytes(*word))?;
+    }
+    Ok(())
+}
+
+impl<const SECTOR: usize> ErrorType for Flash<SECTOR> {
     type Error = FlashError;
 }
 
-impl ReadNorFlash for Flash {
+impl<const SECTOR: usize> ReadNorFlash for Flash<SECTOR> {
     const READ_SIZE: usize = 1;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-        copy(place(offset, bytes.len())?, bytes);
-        Ok(())
+        read(&self.region, offset, bytes)
     }
 
     fn capacity(&self) -> usize {
-        BYTES as usize
+        self.region.bytes() as usize
     }
 }
 
-impl NorFlash for Flash {
+impl<const SECTOR: usize> NorFlash for Flash<SECTOR> {
     const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = SECTOR as usize;
+    const ERASE_SIZE: usize = SECTOR;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-        if from > to || !from.is_multiple_of(SECTOR) || !to.is_multiple_of(SECTOR) {
-            return Err(FlashError::NotAligned);
-        }
-        place(from, (to - from) as usize)?;
-        for number in NUMBERS.into_iter().skip((from / SECTOR) as usize).take(((to - from) / SECTOR) as usize) {
-            // The stretched watchdog covers the time of one sector, perhaps not of two.
-            watchdog::feed();
-            store(TIM5_CR1, load(TIM5_CR1) & !COUNTS);
-            let chosen = erase(number);
-            let erased = self.change(chosen, ERASED, || store(CR, chosen | START));
-            store(TIM5_CR1, load(TIM5_CR1) | COUNTS);
-            let [on, emptied] = CACHE;
-            let access = load(ACR) & !(on | emptied);
-            for value in [access, access | emptied, access, access | on] {
-                store(ACR, value);
-            }
-            erased?;
-        }
-        Ok(())
+        erase(&self.region, from, to)
     }
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-        let first = place(offset, bytes.len())?;
-        let (words, rest) = bytes.as_chunks::<4>();
-        if !rest.is_empty() || !first.is_multiple_of(4) {
-            return Err(FlashError::NotAligned);
-        }
-        for (address, word) in (first..).step_by(4).zip(words) {
-            self.change(PROGRAM, WRITTEN, || store(address, u32::from_le_bytes(*word)))?;
-        }
-        Ok(())
+        write(&self.region, offset, bytes)
     }
 }

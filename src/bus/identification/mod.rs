@@ -7,6 +7,7 @@
 //! 2130   fit of the joint's torque, per motion
 //! 2140   500 Hz log ([`Log`])
 //! 2150   shares of the assistance, per mille
+//! 1F50   the program ([`super::program`])
 //! 2160   the board ([`super::commissioning`]), and 2170
 //! ```
 //!
@@ -26,10 +27,12 @@ use super::commissioning::BoardObjects;
 use super::dictionary::Object;
 use super::drive::Axis;
 use super::objects::{Lost, Objects};
+use super::program::ProgramObjects;
 use crate::leg::{
     Activity, AssistPhase, AssistShares, IdentifyPhase, Parameter, Permission, Plan, Reason, Status, Step,
     Wearing,
 };
+use scarab_boot::Region;
 
 /// Request of a host to the leg, besides power and targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +68,8 @@ pub struct LegObjects<const N: usize, const L: usize> {
     pub wearing: Option<Wearing>,
     /// Commissioning and telemetry of the board.
     pub board: BoardObjects<N>,
+    /// Program of the board.
+    pub program: ProgramObjects,
     /// Shares of the next assistance.
     pub shares: AssistShares,
     /// Last command written.
@@ -75,9 +80,9 @@ pub struct LegObjects<const N: usize, const L: usize> {
 }
 
 impl<const N: usize, const L: usize> LegObjects<N, L> {
-    /// Creates the objects without a request.
+    /// Creates the objects without a request; `checksum` is that of the running image.
     #[must_use]
-    pub const fn new(plan: Plan, seed: u64, generation: u32) -> Self {
+    pub const fn new(plan: Plan, seed: u64, generation: u32, checksum: u32) -> Self {
         Self {
             log: Log::EMPTY,
             activity: Activity::Idle,
@@ -87,6 +92,7 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
             generation,
             wearing: None,
             board: BoardObjects::NEW,
+            program: ProgramObjects::new(checksum),
             shares: AssistShares::GRAVITY_ONLY,
             command: 0,
             requested: None,
@@ -241,6 +247,10 @@ pub struct JointObjects<'a, R, const N: usize, const L: usize> {
 }
 
 impl<R: Results, const N: usize, const L: usize> JointObjects<'_, R, N, L> {
+    fn is_off(&self) -> bool {
+        self.axis.drive().permission() == Permission::Off
+    }
+
     fn found(&self, object: Object) -> Result<u32, Abort> {
         let place = usize::from(object.sub).wrapping_sub(1);
         let number = |value: Option<f32>| value.unwrap_or(f32::NAN).to_bits();
@@ -283,6 +293,7 @@ impl<R: Results, const N: usize, const L: usize> JointObjects<'_, R, N, L> {
 impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R, N, L> {
     fn read(&self, object: Object) -> Result<u32, Abort> {
         match (object.index, object.sub) {
+            (0x1F50..=0x1F57, _) => self.leg.program.read(object.index),
             (0x2100, sub) => self.leg.read(sub, self.results),
             (0x2120, 0) => self.axis.read(object),
             (0x2140, 1) => Ok(self.leg.log.held()),
@@ -298,6 +309,7 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
 
     fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
         match (object.index, object.sub) {
+            (0x1F50..=0x1F57, _) => self.leg.program.command(value, self.is_off()),
             (0x2100, sub) => self.leg.write(sub, value),
             (0x2140, 1) => {
                 self.leg.log.hold(value != 0);
@@ -311,9 +323,26 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
 
     fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
         match (object.index, object.sub) {
+            (0x1F50, _) => Err(Abort::WriteOnly),
             (0x2140, 2) => Ok(self.leg.log.bytes(offset, into)),
             _ => self.axis.bytes(object, offset, into),
         }
+    }
+
+    fn begin_domain(&mut self, object: Object, size: Option<u32>) -> Result<(), Abort> {
+        match object.index {
+            0x1F50 if size.is_some_and(|size| size > Region::IMAGE.bytes()) => Err(Abort::TooLong),
+            0x1F50 => self.leg.program.begin(),
+            _ => Err(Abort::ReadOnly),
+        }
+    }
+
+    fn room(&self) -> usize {
+        self.leg.program.room()
+    }
+
+    fn push(&mut self, byte: u8) -> Result<(), Abort> {
+        self.leg.program.push(byte)
     }
 
     fn lost(&mut self, why: Lost) {
@@ -330,7 +359,7 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
 
     fn store(&mut self, defaults: bool) -> Result<(), Abort> {
         // Not with an active inhibit reason either: the motors may be braking.
-        if self.axis.drive().permission() != Permission::Off || self.axis.is_blocked() {
+        if !self.is_off() || self.axis.is_blocked() {
             return Err(Abort::State);
         }
         self.leg.store = Some(defaults);

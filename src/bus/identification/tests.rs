@@ -53,7 +53,7 @@ impl Results for Numbers {
 const ACCEPTED: Numbers = Numbers(Some(Verdict::ACCEPTED));
 
 fn leg() -> LegObjects<2, 8> {
-    LegObjects::new(Plan::OneTime, 0x1234_5678_9ABC_DEF0, 3)
+    LegObjects::new(Plan::OneTime, 0x1234_5678_9ABC_DEF0, 3, 0)
 }
 
 fn with<T>(

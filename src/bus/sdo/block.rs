@@ -21,11 +21,11 @@ use super::super::abort::Abort;
 use super::super::access::Dictionary;
 use super::super::dictionary::Object;
 use super::super::objects::Objects;
-use super::{Gathered, SEGMENT, Step, Transfer, answer, named, segment, upload};
+use super::{SEGMENT, Sink, Step, Transfer, answer, named, segment, upload};
 
 const CODE: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
-/// Block size of downloads, in segments.
-const BLOCK: u8 = 127;
+/// Largest block, in segments.
+pub(super) const LARGEST: u8 = 127;
 const WITH_CHECKSUM: u8 = 1 << 2;
 const WITH_SIZE: u8 = 1 << 1;
 
@@ -73,7 +73,7 @@ impl BlockUpload {
         if size == 0 {
             return Err(Abort::NoData);
         }
-        if !(1..=BLOCK).contains(&block) {
+        if !(1..=LARGEST).contains(&block) {
             return Err(Abort::BlockSize);
         }
         // The client prefers an expedited or segmented transfer for this size.
@@ -99,7 +99,7 @@ impl BlockUpload {
                 if taken > self.sent {
                     return Err(Abort::Sequence);
                 }
-                if !(1..=BLOCK).contains(&block) {
+                if !(1..=LARGEST).contains(&block) {
                     return Err(Abort::BlockSize);
                 }
                 self.go_on_after(taken, object, dictionary)?;
@@ -163,7 +163,7 @@ impl BlockUpload {
 /// Transfer from the client to the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BlockDownload {
-    gathered: Gathered,
+    sink: Sink,
     /// Number of the last segment received in order.
     taken: u8,
     /// Newest segment. Only the end message says how many of its bytes are valid.
@@ -177,14 +177,13 @@ impl BlockDownload {
     pub(super) fn begin<O: Objects>(
         object: Object,
         request: [u8; 8],
-        dictionary: &Dictionary<'_, O>,
+        dictionary: &mut Dictionary<'_, O>,
     ) -> Result<Step, Abort> {
-        let row = dictionary.writable(object)?;
         let size = u32::from_le_bytes(named(request).1);
-        let gathered = Gathered::new(row, (request[0] & WITH_SIZE != 0).then_some(size))?;
+        let sink = Sink::new(object, (request[0] & WITH_SIZE != 0).then_some(size), dictionary)?;
         let checked = request[0] & WITH_CHECKSUM != 0;
-        let this = Self { gathered, taken: 0, held: None, is_last: false, checked, sum: 0 };
-        let reply = answer(0xA0 | WITH_CHECKSUM, object, u32::from(BLOCK));
+        let this = Self { sink, taken: 0, held: None, is_last: false, checked, sum: 0 };
+        let reply = answer(0xA0 | WITH_CHECKSUM, object, u32::from(sink.block()));
         Ok(Step::Begin(Transfer::BlockDownload(this), reply))
     }
 
@@ -200,22 +199,32 @@ impl BlockDownload {
         }
         let (number, is_last) = (command & 0x7F, command & 0x80 != 0);
         if number == self.taken + 1 {
-            self.let_go(7)?;
+            self.let_go(7, dictionary)?;
             (self.held, self.taken, self.is_last) = (Some(bytes), number, is_last);
         }
-        if !is_last && number != BLOCK {
+        let block = self.sink.block();
+        if !is_last && number != block {
             return Ok(Step::Stay(None));
         }
-        let reply = [0xA2, self.taken, BLOCK, 0, 0, 0, 0, 0];
+        let reply = [0xA2, self.taken, block, 0, 0, 0, 0, 0];
         self.taken = 0;
         Ok(Step::Stay(Some(reply)))
     }
 
     /// Takes over the first `count` bytes of the held segment.
-    fn let_go(&mut self, count: usize) -> Result<(), Abort> {
+    fn let_go<O: Objects>(
+        &mut self,
+        count: usize,
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Result<(), Abort> {
         let Some(bytes) = self.held.take() else { return Ok(()) };
         self.sum = sum(self.sum, bytes.get(..count).unwrap_or(&bytes));
-        self.gathered.put(bytes.into_iter().take(count))
+        self.sink.put(bytes.into_iter().take(count), dictionary)
+    }
+
+    /// Whether a block more does not fit yet.
+    pub(super) fn is_full<O: Objects>(&self, dictionary: &Dictionary<'_, O>) -> bool {
+        self.sink.is_full(self.sink.block(), dictionary)
     }
 
     fn end<O: Objects>(
@@ -228,11 +237,11 @@ impl BlockDownload {
         if command & 0b1110_0011 != 0xC1 {
             return Err(Abort::Command);
         }
-        self.let_go(7 - usize::from(command >> 2 & 7).min(7))?;
+        self.let_go(7 - usize::from(command >> 2 & 7).min(7), dictionary)?;
         if self.checked && self.sum != u16::from_le_bytes([low, high]) {
             return Err(Abort::Checksum);
         }
-        dictionary.write(object, self.gathered.value()?)?;
+        self.sink.end(object, dictionary)?;
         Ok(Step::End(Some([0xA1, 0, 0, 0, 0, 0, 0, 0])))
     }
 }

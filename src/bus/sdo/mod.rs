@@ -2,7 +2,8 @@
 //!
 //! Why three ways: four bytes fit into one exchange. Longer values need segments, each of them acknowledged.
 //! A log of hundreds of kilobytes needs blocks of up to 127 segments with one acknowledgement. Nothing is
-//! buffered: an upload reads the object seven bytes at a time, a download collects one number.
+//! buffered: an upload reads the object seven bytes at a time, a download collects one number or passes the
+//! bytes of a domain on. While a domain has no space, the answer that asks for more waits.
 //!
 //! One transfer at a time; a new request ends the old one. If the client is silent for a second, the server
 //! aborts with 0504 0000. [`Server::poll`] returns the answers. Source: CiA 301, SDO.
@@ -12,8 +13,9 @@ mod segment;
 
 use super::abort::Abort;
 use super::access::Dictionary;
-use super::dictionary::{Object, Row};
+use super::dictionary::{Object, Row, Type};
 use super::objects::Objects;
+use super::program;
 use block::{BlockDownload, BlockUpload};
 use segment::{SegmentDownload, SegmentUpload};
 
@@ -92,6 +94,64 @@ fn segment<O: Objects>(
     }
     let count = (size - offset).min(SEGMENT);
     Ok((bytes, count, offset + count == size))
+}
+
+/// Destination of a download: a number that is gathered, or a domain that takes its bytes at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Sink {
+    Number(Gathered),
+    Domain,
+}
+
+impl Sink {
+    /// Prepares for an object; `declared` is the size stated by the client.
+    fn new<O: Objects>(
+        object: Object,
+        declared: Option<u32>,
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Result<Self, Abort> {
+        let row = dictionary.writable(object)?;
+        if row.kind == Type::Domain {
+            dictionary.objects.begin_domain(object, declared)?;
+            return Ok(Self::Domain);
+        }
+        Gathered::new(row, declared).map(Self::Number)
+    }
+
+    /// Block size that is announced to the client, in segments.
+    const fn block(&self) -> u8 {
+        match self {
+            Self::Number(_) => block::LARGEST,
+            Self::Domain => program::BLOCK,
+        }
+    }
+
+    /// Takes the next bytes.
+    fn put<O: Objects>(
+        &mut self,
+        mut bytes: impl Iterator<Item = u8>,
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Result<(), Abort> {
+        match self {
+            Self::Number(gathered) => gathered.put(bytes),
+            Self::Domain => bytes.try_for_each(|byte| dictionary.objects.push(byte)),
+        }
+    }
+
+    /// Ends the download: a number is written.
+    fn end<O: Objects>(&self, object: Object, dictionary: &mut Dictionary<'_, O>) -> Result<(), Abort> {
+        match self {
+            Self::Number(gathered) => dictionary.write(object, gathered.value()?),
+            Self::Domain => Ok(()),
+        }
+    }
+
+    /// Whether the answer that asks for the next segments, so many, must wait.
+    fn is_full<O: Objects>(&self, segments: u8, dictionary: &Dictionary<'_, O>) -> bool {
+        // One more: the last segment is held back until its length is known.
+        let bytes = SEGMENT as usize * (usize::from(segments) + 1);
+        *self == Self::Domain && dictionary.objects.room() < bytes
+    }
 }
 
 /// A number received piece by piece.
@@ -195,6 +255,15 @@ impl Server {
 
     /// Returns the next answer, the next segment of a block, or the abort after a timeout.
     pub fn poll<O: Objects>(&mut self, now_us: u64, dictionary: &mut Dictionary<'_, O>) -> Option<[u8; 8]> {
+        let is_full = match &self.transfer {
+            Some(Transfer::Download(segments)) => segments.is_full(dictionary),
+            Some(Transfer::BlockDownload(block)) => block.is_full(dictionary),
+            _ => false,
+        };
+        if is_full {
+            self.wait(now_us);
+            return None;
+        }
         let waiting = self.answer.take();
         if waiting.is_some() {
             return waiting;
@@ -228,15 +297,14 @@ fn download<O: Objects>(
     dictionary: &mut Dictionary<'_, O>,
 ) -> Result<Step, Abort> {
     let (_, bytes) = named(request);
-    let row = dictionary.writable(object)?;
     let (is_expedited, has_size) = (request[0] & 2 != 0, request[0] & 1 != 0);
     if !is_expedited {
         let size = has_size.then_some(u32::from_le_bytes(bytes));
-        let segments = SegmentDownload::new(Gathered::new(row, size)?);
+        let segments = SegmentDownload::new(Sink::new(object, size, dictionary)?);
         return Ok(Step::Begin(Transfer::Download(segments), answer(0x60, object, 0)));
     }
     let count = has_size.then_some(u32::from(4 - (request[0] >> 2 & 3)));
-    let mut gathered = Gathered::new(row, count)?;
+    let mut gathered = Gathered::new(dictionary.writable(object)?, count)?;
     gathered.put(bytes.into_iter().take(usize::from(gathered.size)))?;
     dictionary.write(object, gathered.value()?)?;
     Ok(Step::End(Some(answer(0x60, object, 0))))

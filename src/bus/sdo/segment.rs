@@ -10,7 +10,7 @@ use super::super::abort::Abort;
 use super::super::access::Dictionary;
 use super::super::dictionary::Object;
 use super::super::objects::Objects;
-use super::{Gathered, SEGMENT, Step, segment};
+use super::{SEGMENT, Sink, Step, segment};
 
 const TOGGLE: u8 = 1 << 4;
 
@@ -49,13 +49,18 @@ impl SegmentUpload {
 /// Transfer from the client to the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SegmentDownload {
-    gathered: Gathered,
+    sink: Sink,
     toggle: u8,
 }
 
 impl SegmentDownload {
-    pub(super) const fn new(gathered: Gathered) -> Self {
-        Self { gathered, toggle: 0 }
+    pub(super) const fn new(sink: Sink) -> Self {
+        Self { sink, toggle: 0 }
+    }
+
+    /// Whether another segment does not fit yet.
+    pub(super) fn is_full<O: Objects>(&self, dictionary: &Dictionary<'_, O>) -> bool {
+        self.sink.is_full(1, dictionary)
     }
 
     pub(super) fn request<O: Objects>(
@@ -68,13 +73,13 @@ impl SegmentDownload {
             return Err(Abort::Toggle);
         }
         let count = 7 - usize::from(request[0] >> 1 & 7);
-        self.gathered.put(request.into_iter().skip(1).take(count))?;
+        self.sink.put(request.into_iter().skip(1).take(count), dictionary)?;
         let answer = [0x20 | self.toggle, 0, 0, 0, 0, 0, 0, 0];
         if request[0] & 1 == 0 {
             self.toggle ^= TOGGLE;
             return Ok(Step::Stay(Some(answer)));
         }
-        dictionary.write(object, self.gathered.value()?)?;
+        self.sink.end(object, dictionary)?;
         Ok(Step::End(Some(answer)))
     }
 }

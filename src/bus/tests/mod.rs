@@ -31,7 +31,7 @@ pub const LONG_TEXT: &str = match core::str::from_utf8(&BYTES) {
 };
 
 pub const IDENTITY: Identity =
-    Identity { vendor: 0, product: 0x5CA2, revision: 1, serial: 7, texts: ["Scarab", "3.6", LONG_TEXT] };
+    Identity { product: 0x5CA2, revision: 1, texts: ["Scarab", "3.6", LONG_TEXT], ..Identity::scarab(7, "") };
 
 pub fn axis() -> Axis {
     Axis::new(AxisConstants {

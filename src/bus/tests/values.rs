@@ -20,9 +20,10 @@ fn is_live(object: Object) -> bool {
         || object.index == 0x1003 && object.sub > 0
 }
 
-/// Object of the leg, which a joint alone does not have; see `identification::tests`.
+/// Object of the leg or the board, which a joint alone does not have; see `identification::tests`.
 fn is_of_the_leg(object: Object) -> bool {
-    (0x2100..0x219A).contains(&object.index) && object.sub > 0
+    (0x1F50..0x1F58).contains(&object.index) && object.sub > 0
+        || (0x2100..0x219A).contains(&object.index) && object.sub > 0
 }
 
 #[test]

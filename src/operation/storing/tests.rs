@@ -36,9 +36,9 @@ impl Bench {
         bench
     }
 
-    fn step(&mut self, storing: &mut Storing, change: impl FnOnce() -> bool) -> Option<bool> {
+    fn step(&mut self, storing: &mut Storing, change: impl FnOnce() -> Option<bool>) -> Option<bool> {
         let before = self.inhibit.is_storing();
-        let done = storing.step(&self.inhibit, self.permission, &mut self.hardware, change);
+        let done = storing.step(&self.inhibit, self.permission, Purpose::Parameters, &mut self.hardware, change);
         if self.inhibit.is_storing() != before {
             self.storing.push((self.now_ms, !before));
         }
@@ -73,7 +73,7 @@ fn change_with(storing: &mut Storing, bench: &mut Bench, says: bool) -> (bool, u
     for _ in 0..1000 {
         let change = || {
             touched += 1;
-            says
+            Some(says)
         };
         if let Some(done) = bench.step(storing, change) {
             return (done, touched);
@@ -188,4 +188,30 @@ fn the_drive_stays_off_until_the_watchdog_is_tight_again() {
     stuck.hardware.watchdog.pass(u64::MAX);
     stuck.look_after(&mut storing);
     assert_eq!(storing, settled());
+}
+
+#[test]
+fn a_new_image_is_taken_despite_an_inhibit_reason_but_not_while_motors_brake() {
+    for (causes, permitted) in [
+        (0, true),
+        (InhibitReason::EmergencyStop.bit(), true),
+        (InhibitReason::EncoderFrozen.bit(), false),
+        (InhibitReason::EncoderFrozen.bit() | InhibitReason::EmergencyStop.bit(), true),
+    ] {
+        let (mut storing, mut bench) = (settled(), Bench::off());
+        bench.inhibit.raise_bits(causes);
+        let mut steps = 0;
+        let done = (0..1000).find_map(|_| {
+            let change = || {
+                steps += 1;
+                (steps == 5).then_some(true)
+            };
+            let Bench { hardware, inhibit, permission, .. } = &mut bench;
+            let done = storing.step(inhibit, *permission, Purpose::Program, hardware, change);
+            bench.pass();
+            done
+        });
+        assert_eq!((done, steps), (Some(permitted), if permitted { 5 } else { 0 }), "{causes:#x}");
+        assert_eq!(bench.causes(), causes);
+    }
 }

@@ -343,7 +343,7 @@ impl<const N: usize> Levels<N> {
         self.registers.bus_due = false;
         self.registers.set_time(now_ns);
         let BusLevel { queues, round, storage } = &mut **bus;
-        let (_, _, mut ends) = queues.get().split();
+        let (_, _, mut ends, _) = queues.get().split();
         round.round(device, &mut ends, storage, &self.signals, &mut self.registers, results);
     }
 }

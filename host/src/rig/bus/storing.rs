@@ -8,9 +8,10 @@
 //! ```
 
 use scarab::bus::device::StoreCommand;
+use scarab::bus::program::{ProgramError, ProgramStatus};
 use scarab::bus::{Frame, StoredNode};
 use scarab::leg::DriveState;
-use scarab::operation::{Inhibit, Storing};
+use scarab::operation::{Inhibit, Purpose, Storing};
 use scarab::store::{Key, ModelRecord};
 
 use crate::formats::kept_file::memory::{Memory, SECTOR};
@@ -153,6 +154,10 @@ impl<const N: usize> Flashing<N> {
         let (before, state) = (memory.worked(), rig.state());
         let Levels { signals, registers, bus, .. } = &mut *rig.board;
         let inhibit = if self.unannounced { &self.unseen } else { &signals.inhibit };
+        // A simulated board has no program that could be replaced.
+        if signals.take_program_command().is_some() {
+            signals.set_program_status(ProgramStatus((ProgramError::Forbidden as u32) << 1));
+        }
         let Some(storage) = bus.as_ref().map(|bus| &bus.storage) else { return };
         let Some(mut keep) = storage.given() else {
             return self.storing.look_after(inhibit, registers);
@@ -167,9 +172,9 @@ impl<const N: usize> Flashing<N> {
             self.requested = Some(StorageRequest { what: keep.what, objects: keep.objects, models });
         }
         let Some(requested) = &self.requested else { return };
-        let done = self.storing.step(inhibit, signals.permission(), registers, || {
+        let done = self.storing.step(inhibit, signals.permission(), Purpose::Parameters, registers, || {
             self.has_kept = true;
-            requested.change(memory, state)
+            Some(requested.change(memory, state))
         });
         let after = memory.worked();
         let sectors = u64::from(after.1 - before.1);

@@ -1,16 +1,4 @@
-//! The two flash sectors for persistent data, and the registers that change them.
-//!
-//! Sectors 10 and 11, 128 KB each, as ODrive's firmware uses them; the image ends before them (layout.x).
-//! Source: `Drivers/STM32/stm32_nvm.c:9-10`, `Board/v3/STM32F405RGTx_FLASH.ld:47`; registers RM0090 3.9.
-
-/// Address of the first sector.
-pub const FIRST: u32 = 0x080C_0000;
-/// Bytes of a sector.
-pub const SECTOR: u32 = 128 * 1024;
-/// Numbers of the sectors.
-pub const NUMBERS: [u32; 2] = [10, 11];
-/// Bytes of both sectors.
-pub const BYTES: u32 = SECTOR * NUMBERS.len() as u32;
+//! Registers that change the flash (RM0090 3.9). Its sectors: `scarab_boot::Region`.
 
 const FLASH: u32 = 0x4002_3C00;
 /// Access control register with the data cache.
