@@ -48,9 +48,8 @@ fn main() -> ! {
     let regions = Flash::new_blocking(flash).into_blocking_regions();
     let small = Mutex::<NoopRawMutex, _>::new(RefCell::new(regions.bank1_region2));
     let large = Mutex::<NoopRawMutex, _>::new(RefCell::new(regions.bank1_region3));
-    let part = |region: Region| {
-        BlockingPartition::new(&large, region.address - LARGE_SECTORS, region.bytes())
-    };
+    let part =
+        |region: Region| BlockingPartition::new(&large, region.address - LARGE_SECTORS, region.bytes());
     let loader = BootLoader::try_prepare::<_, _, _, BUFFER>(BootLoaderConfig {
         active: part(Region::IMAGE),
         dfu: part(Region::NEW_IMAGE),

@@ -22,7 +22,7 @@ use crate::machine::Options;
 use crate::report::{ChipReport, LEVELS, LoadReport};
 use crate::session::{Session, Step};
 use crate::time::seconds;
-use crate::{drivers, faults, hangs, sampling, serve, situations, stops, store_cuts};
+use crate::{drivers, faults, hangs, sampling, serve, situations, stops, store_cuts, update};
 
 /// Run the flash image on a model of its microcontroller.
 #[derive(Parser, Debug)]
@@ -45,6 +45,8 @@ enum Command {
     Sampling(Common),
     /// Cut the power at every word of a save and within an erase.
     StoreCuts(Common),
+    /// Update the image over the bus: the whole way, damaged images, power cuts.
+    Update(UpdateArguments),
     /// Measure the load in each situation: idle, calibrating, holding, identifying, following a host.
     Load(LoadArguments),
     /// Connect the image to the simulated bus, for existing host software.
@@ -106,6 +108,15 @@ struct RunArguments {
 }
 
 #[derive(Args, Debug)]
+struct UpdateArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Power cuts in each long part of the way.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..))]
+    cuts: u64,
+}
+
+#[derive(Args, Debug)]
 struct AssistArguments {
     /// Shipped leg or leg file with a wearer (`segments`).
     #[arg(long, default_value = DEFAULT_LEG)]
@@ -146,6 +157,9 @@ struct ServeArguments {
     /// commission` asks for.
     #[arg(long)]
     delivered: bool,
+    /// Write a new image for this board here, which differs in its version only, for an update.
+    #[arg(long, value_name = "FILE.bin")]
+    next: Option<PathBuf>,
     /// Simulated time to serve, s; without it until the process ends.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -198,6 +212,7 @@ pub fn main() -> ExitCode {
         Command::Stops(arguments) => run_stops(&arguments),
         Command::Sampling(common) => run_sampling(&common),
         Command::StoreCuts(common) => run_store_cuts(&common),
+        Command::Update(arguments) => run_update(&arguments),
         Command::Load(arguments) => run_load(&arguments),
         Command::Serve(arguments) => run_serve(&arguments),
         Command::Faults(arguments) => run_faults(&arguments),
@@ -444,6 +459,15 @@ fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
     Ok(report.violations.is_empty())
 }
 
+fn run_update(arguments: &UpdateArguments) -> Result<bool, ToolError> {
+    let mut session = arguments.common.session()?;
+    session.boot()?;
+    let report = update::run(&mut session, arguments.cuts)?;
+    print!("{}", report.text());
+    arguments.common.write(&report)?;
+    Ok(report.failed() == 0)
+}
+
 fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
     let mut session = arguments.common.session()?;
     let found = situations::run(&mut session, arguments.profile.is_some())?;
@@ -493,6 +517,10 @@ fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
         }
         // A host enables the drive; the leg is let go at its last position.
         session.hold_switch(true);
+    }
+    if let Some(path) = &arguments.next {
+        let [_, next] = update::programs(&session)?;
+        files::write(path, &next)?;
     }
     session.machine.chip_mut().can.connected = false;
     session.prints = true;

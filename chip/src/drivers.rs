@@ -429,7 +429,8 @@ impl Check {
         self.next(0.1, 0)?;
         self.machine.chip_mut().flash.parameters_mut()[128 * 1024..].fill(0);
         self.next(5.0, 0)?;
-        let blank = self.machine.chip_mut().flash.parameters_mut()[128 * 1024..].iter().all(|cell| *cell == 0xFF);
+        let blank =
+            self.machine.chip_mut().flash.parameters_mut()[128 * 1024..].iter().all(|cell| *cell == 0xFF);
         self.next(0.1, 0)?;
         let [erase, read, write, outcomes] = self.take();
         let cells = &self.machine.chip_mut().flash.parameters_mut()[128 * 1024 + 0x40..][..16];

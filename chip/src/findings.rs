@@ -22,7 +22,7 @@ pub struct Known {
 }
 
 /// Findings that are known and harmless.
-pub const KNOWN: [Known; 2] = [
+pub const KNOWN: [Known; 3] = [
     Known {
         what: "register does not exist on an STM32F405",
         register: "RCC+0x8c",
@@ -34,6 +34,12 @@ pub const KNOWN: [Known; 2] = [
         register: "PWR_CR",
         function: "",
         reason: "embassy_stm32::init writes a voltage scale of two bits; an F405 has the lower one, which is right",
+    },
+    Known {
+        what: "not modelled",
+        register: "0xe000ef50",
+        function: "embassy_boot_stm32::BootLoader",
+        reason: "embassy_boot_stm32 invalidates the instruction cache of larger processors; a Cortex-M4 has none (ICIALLU)",
     },
 ];
 

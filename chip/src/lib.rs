@@ -20,6 +20,7 @@
 //! | [`report`] | results as JSON |
 //! | [`situations`] | the processor's load, from idle to a host at 1 kHz |
 //! | [`stops`], [`sampling`] | emergency stops over the PWM period; sampling instants |
+//! | [`update`] | a new image over the bus, with damaged images and power cuts |
 //! | [`store_cuts`], [`hangs`] | power cuts within flash operations; levels that hang |
 //! | [`faults`] | rows of the fault catalogue |
 //! | [`drivers`] | another project's drivers on the model, against their documentation |
@@ -54,3 +55,4 @@ pub mod stops;
 pub mod store_cuts;
 pub mod system;
 pub mod time;
+pub mod update;

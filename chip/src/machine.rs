@@ -12,13 +12,15 @@
 //! Known limits: the floating-point frame is always stored, never lazily; an entry costs 12 cycles, a return
 //! 10, a tail-chained one 6. Memory protection and the process stack are not modelled.
 
+mod changes;
+
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use scarab_host::base::error::ToolError;
 use scarab_boot::Region;
+use scarab_host::base::error::ToolError;
 use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode, Prot};
-use unicorn_engine::{ArmCpuModel, RegisterARM as Register, Unicorn};
+use unicorn_engine::{ArmCpuModel, RegisterARM as Register, UcHookId, Unicorn};
 
 use crate::chip::Chip;
 use crate::image::{FLASH, FLASH_BYTES, Image};
@@ -77,6 +79,8 @@ struct State {
     hung: Option<u8>,
     broken: Option<String>,
     /// Instructions by exception and block, if they are counted.
+    /// Hooks on the image's SEV instructions, and whether the image has not changed since.
+    events: (Vec<UcHookId>, bool),
     profile: Option<HashMap<(u8, u32), u64>>,
 }
 
@@ -227,6 +231,7 @@ impl Machine {
 
     /// Starts from the reset vector.
     fn start(&mut self) {
+        changes::follow_events(&mut self.core);
         let image = Rc::clone(self.image());
         put(&mut self.core, Register::CONTROL, 0);
         for mask in [Register::PRIMASK, Register::BASEPRI, Register::FAULTMASK] {
@@ -407,6 +412,7 @@ impl State {
             locked_up: false,
             hung: None,
             broken: None,
+            events: (Vec::new(), false),
             profile: None,
         }
     }
@@ -520,53 +526,15 @@ fn map_registers(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
             core.get_data_mut().chip.write_private(offset as u32, size, value as u32);
         }),
     )?;
-    map_data(core, Region::STATE.address, Region::STATE.bytes())?;
-    map_data(core, Region::NEW_IMAGE.address, Region::NEW_IMAGE.bytes() + Region::PARAMETERS.bytes())
-}
-
-/// Maps sectors of the flash from which nothing is executed.
-fn map_data(core: &mut Core<'_>, address: u32, bytes: u32) -> Result<(), unicorn_engine::uc_error> {
-    let first = address - flash::FIRST;
-    core.mmio_map(
-        address.into(),
-        bytes.into(),
-        Some(move |core: &mut Core<'_>, offset: u64, size: usize| {
-            u64::from(core.get_data_mut().chip.load_flash(first + offset as u32, size))
-        }),
-        Some(move |core: &mut Core<'_>, offset: u64, size: usize, value: u64| {
-            let state = core.get_data_mut();
-            state.chip.program_flash(first + offset as u32, size, value as u32);
-            state.stall();
-        }),
-    )
+    changes::map_data(core, Region::STATE.address, Region::STATE.bytes())?;
+    changes::map_data(core, Region::NEW_IMAGE.address, Region::NEW_IMAGE.bytes() + Region::PARAMETERS.bytes())
 }
 
 fn add_hooks(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
     core.add_block_hook(1, 0, |core, address, size| on_block(core, address as u32, size))?;
     core.add_intr_hook(on_interrupt)?;
     core.add_insn_invalid_hook(on_invalid)?;
-    for address in core.get_data().image.find(SEND_EVENT) {
-        core.add_code_hook(address.into(), address.into(), |core, _, _| {
-            core.get_data_mut().chip.event = true;
-        })?;
-    }
-    // The processor's store follows the hook; `show_changes` then replaces it by what the flash holds.
-    let (first, bytes) = (Region::IMAGE.address, Region::IMAGE.bytes());
-    core.add_mem_hook(
-        HookType::MEM_WRITE,
-        first.into(),
-        u64::from(first + bytes) - 1,
-        |core, _, address, size, value| {
-            let state = core.get_data_mut();
-            let offset = address as u32 - flash::FIRST;
-            state.chip.program_flash(offset, size, value as u32);
-            let at = (address as u32 - Region::IMAGE.address) as usize;
-            let changed = state.chip.flash.changed.get_or_insert(at..at + size);
-            *changed = changed.start.min(at)..changed.end.max(at + size);
-            state.stall();
-            true
-        },
-    )?;
+    changes::hook(core)?;
     core.add_mem_hook(HookType::MEM_UNMAPPED | HookType::MEM_PROT, 1, 0, |core, kind, address, _, _| {
         let status = match kind {
             MemType::FETCH_UNMAPPED | MemType::FETCH_PROT => fault::FETCH,
@@ -588,7 +556,7 @@ fn on_block(core: &mut Core<'_>, address: u32, size: u32) {
     }
     state.chip.findings.pc = address;
     if state.chip.flash.changed.is_some() {
-        show_changes(core);
+        changes::show(core);
     }
     let state = core.get_data_mut();
     if state.chip.now >= state.chip.due {
@@ -608,19 +576,6 @@ fn on_block(core: &mut Core<'_>, address: u32, size: u32) {
     if state.hung == Some(state.chip.nvic.current()) {
         // A hung level returns to its block and never runs it.
         put(core, Register::PC, address | 1);
-    }
-}
-
-/// Copies changes of the image's sectors to where the processor reads and executes them.
-fn show_changes(core: &mut Core<'_>) {
-    let state = core.get_data_mut();
-    let Some(changed) = state.chip.flash.changed.take() else { return };
-    let bytes = state.chip.flash.region(&Region::IMAGE)[changed.clone()].to_vec();
-    let at = (Region::IMAGE.address - FLASH) as usize + changed.start;
-    Rc::make_mut(&mut state.image).flash[at..at + bytes.len()].copy_from_slice(&bytes);
-    state.blocks[at / 2..(at + bytes.len()).div_ceil(2)].fill((0, 0));
-    if core.mem_write(u64::from(FLASH) + at as u64, &bytes).is_err() {
-        core.get_data_mut().broken = Some("the image's sectors cannot be changed".to_owned());
     }
 }
 

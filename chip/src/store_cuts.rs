@@ -132,7 +132,7 @@ fn cut_erasures(
     for step in 0..ERASURES {
         session.machine.restore(old)?;
         let share = (f64::from(step) + 0.5) / f64::from(ERASURES);
-        session.machine.chip_mut().flash.cut = Some(Cut::Erasure(share));
+        session.machine.chip_mut().flash.cut = Some(Cut::Erasure(0, share));
         session.store(LOAD.0, LOAD.1, LONGEST_S)?;
         if !session.machine.chip().flash.is_cut {
             report.violations.push(format!("the power was not cut within erase {step}"));

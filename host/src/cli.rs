@@ -28,6 +28,7 @@ mod replay;
 mod serve;
 mod states;
 mod trace;
+mod update;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -45,7 +46,7 @@ use crate::formats::shard::Argument;
 #[command(name = "scarab", version, max_term_width = HELP_WIDTH, after_help = "\
 Options without a command belong to `identify`. `scarab COMMAND --help` has an example of each.
 Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, live, excite, monitor, assist, motor, serve.
-Board: fw, flash-leg, commission, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
+Board: fw, flash-leg, commission, update, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -93,6 +94,9 @@ enum Command {
     /// Commission a board over its bus, step by step: calibrate, reference, identify, store.
     #[command(after_help = "Example: cargo sim commission --slcan /dev/ttyACM0 --out commissioned")]
     Commission(commission::CommissionArguments),
+    /// Bring a new image onto a board over its bus.
+    #[command(after_help = "Example: cargo sim update --slcan /dev/ttyACM0 scarab-image.bin")]
+    Update(update::UpdateArguments),
     /// Export and import the stored data of a board: its flash as TOML, and TOML into a flash.
     #[command(after_help = "Example: cargo sim kept export flash.bin --out kept.toml")]
     Kept(kept::KeptArguments),
@@ -211,6 +215,7 @@ fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
         Command::Eds(arguments) => eds::run(arguments),
         Command::Serve(arguments) => serve::run(arguments),
         Command::Commission(arguments) => commission::run(arguments),
+        Command::Update(arguments) => update::run(arguments),
         Command::Kept(arguments) => kept::run(arguments),
         Command::Monitor(arguments) => monitor::run(arguments),
         Command::Assist(arguments) => assist::run(arguments),

@@ -76,8 +76,8 @@ impl Update {
 
     /// Begins what a command asks for while the program runs, if it needs the flash. `Reset` needs none but
     /// goes the same way, so that hosts hear of the pause.
-    pub fn begin(&mut self, command: ProgramCommand) -> Option<Begun> {
-        match command {
+    pub fn begin<const N: usize>(&mut self, command: ProgramCommand, signals: &Signals<N>) -> Option<Begun> {
+        let begun = match command {
             ProgramCommand::Stop => {
                 // What an update before has left must be cleared first.
                 *self = Self::new(self.is_on_trial);
@@ -86,7 +86,11 @@ impl Update {
             ProgramCommand::Start if self.is_on_trial => Some(Begun::Confirmation),
             ProgramCommand::Reset => Some(Begun::Restart),
             ProgramCommand::Start | ProgramCommand::Clear => None,
+        };
+        if begun.is_some() {
+            signals.set_program_status(self.status(ProgramStatus::UNDER_WAY));
         }
+        begun
     }
 
     /// Runs one step of what has begun, while `Storing` permits changes of the flash; returns whether it

@@ -10,9 +10,9 @@ use super::bus;
 use super::leg::{JOINTS, LEG, Leg, LegIdentification, LegWindow};
 use super::storage::StorageTask;
 use crate::board::odrive_v3_6::flash::LargeSectors;
-use scarab_boot::Region;
 use crate::leg::Filters;
 use crate::operation::EventQueue;
+use scarab_boot::Region;
 
 #[unsafe(link_section = ".ccm.identification")]
 static IDENTIFICATION: StaticCell<LegIdentification> = StaticCell::new();

@@ -54,7 +54,13 @@ impl StorageTask {
         let store = Store::new(flash, 0..bytes).ok()?;
         let program = BoardProgram::new();
         let update = Update::new(program.is_on_trial());
-        Some(Self { storage: store::Storage::new(store), storing: Storing::new(), program, update, ends: None })
+        Some(Self {
+            storage: store::Storage::new(store),
+            storing: Storing::new(),
+            program,
+            update,
+            ends: None,
+        })
     }
 
     /// Sets the sources of requests and of calibrations.
@@ -120,10 +126,18 @@ pub async fn run(storage: &'static mut StorageTask) -> ! {
         while let Some((axis, calibration)) = calibrated.dequeue() {
             storage.calibrated(axis, calibration);
         }
-        if let Some(begun) = SIGNALS.take_program_command().and_then(|command| update.begin(command)) {
+        if let Some(begun) =
+            SIGNALS.take_program_command().and_then(|command| update.begin(command, &SIGNALS))
+        {
             let done = loop {
                 let change = || update.change(begun, &SIGNALS, &mut end.program, program);
-                match storing.step(&SIGNALS.inhibit, SIGNALS.permission(), Purpose::Program, &mut Odrive, change) {
+                match storing.step(
+                    &SIGNALS.inhibit,
+                    SIGNALS.permission(),
+                    Purpose::Program,
+                    &mut Odrive,
+                    change,
+                ) {
                     Some(done) => break done,
                     None => Timer::after_millis(STEP_MS).await,
                 }
@@ -133,7 +147,13 @@ pub async fn run(storage: &'static mut StorageTask) -> ! {
         let Some(mut job) = end.storage.given() else { continue };
         job.done = loop {
             let change = || Some(change(storage, &mut job).is_some());
-            match storing.step(&SIGNALS.inhibit, SIGNALS.permission(), Purpose::Parameters, &mut Odrive, change) {
+            match storing.step(
+                &SIGNALS.inhibit,
+                SIGNALS.permission(),
+                Purpose::Parameters,
+                &mut Odrive,
+                change,
+            ) {
                 Some(done) => break done,
                 None => Timer::after_millis(STEP_MS).await,
             }

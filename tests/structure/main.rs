@@ -69,8 +69,17 @@ const HOST: [(&str, &[&str]); 11] = [
 const OPEN: [&str; 5] = ["units", "real", "place", "checksum", "testing"];
 
 /// Source folders of all crates.
-const SOURCES: [&str; 8] =
-    ["src", "hal-sim/src", "host/src", "paper/src", "emulated/src", "chip/src", "readers/src", "python/src"];
+const SOURCES: [&str; 9] = [
+    "src",
+    "boot/src",
+    "hal-sim/src",
+    "host/src",
+    "paper/src",
+    "emulated/src",
+    "chip/src",
+    "readers/src",
+    "python/src",
+];
 
 /// Firmware modules that the simulated hardware may use. The other crates may use all.
 const PLANT: [&str; 2] = ["hal", "units"];
@@ -80,13 +89,14 @@ const MATHS_MODULES: [&str; 2] = ["src/real.rs", "hal-sim/src/maths.rs"];
 
 /// Files (and folders) that may contain `unsafe`: the hardware square root, in-place construction, the
 /// boards' layers, the flash image's memory sections and interrupt vectors, the two images for the emulator,
-/// and the program that checks the chip model.
-const UNSAFE_ALLOWED: [&str; 9] = [
+/// the bootloader, and the program that checks the chip model.
+const UNSAFE_ALLOWED: [&str; 10] = [
     "src/real.rs",
     "src/place.rs",
     "src/board/",
     "src/task/memory.rs",
     "src/task/vectors.rs",
+    "boot/src/main.rs",
     "emulated/src/bin/count-instructions/counter.rs",
     "emulated/src/bin/drivers/main.rs",
     "emulated/src/bin/drivers/processor.rs",

@@ -37,8 +37,7 @@ const PROTECTED: u32 = 1 << 4;
 
 /// Typical durations of a word, and of a sector of 64 and 128 KB by the width that is programmed at once (PSIZE).
 const WORD: Ticks = 16 * TICK_HZ / 1_000_000;
-const SMALL: [Ticks; 4] =
-    [12 * TICK_HZ / 10, 7 * TICK_HZ / 10, 55 * TICK_HZ / 100, 55 * TICK_HZ / 100];
+const SMALL: [Ticks; 4] = [12 * TICK_HZ / 10, 7 * TICK_HZ / 10, 55 * TICK_HZ / 100, 55 * TICK_HZ / 100];
 const LARGE: [Ticks; 4] = [2 * TICK_HZ, 13 * TICK_HZ / 10, TICK_HZ, TICK_HZ];
 
 /// Power cut within a later operation.
@@ -46,8 +45,8 @@ const LARGE: [Ticks; 4] = [2 * TICK_HZ, 13 * TICK_HZ / 10, TICK_HZ, TICK_HZ];
 pub enum Cut {
     /// While this word is programmed, counted from now.
     Word(u64),
-    /// At this share of the next erasure.
-    Erasure(f64),
+    /// After so many erasures, at this share of the next one.
+    Erasure(u64, f64),
 }
 
 /// State of the flash interface.
@@ -102,10 +101,10 @@ impl Flash {
         }
     }
 
-    /// Resets the registers; cells stay.
+    /// Resets the registers; cells and the next power cut stay.
     pub fn reset(&mut self) {
         (self.access, self.status, self.control, self.refused) = (0, 0, LOCKED, false);
-        (self.stale, self.stall, self.is_cut, self.cut) = ([false; SECTORS], 0, false, None);
+        (self.stale, self.stall, self.is_cut) = ([false; SECTORS], 0, false);
     }
 
     /// Bytes of the stored parameters.
@@ -220,7 +219,9 @@ impl Flash {
         self.stale[sector_of(first)] = self.access & 1 << 10 != 0;
         let durations = if *region == Region::STATE { SMALL } else { LARGE };
         self.stall += (durations[(self.control >> 8 & 3) as usize] as f64 * self.slowness) as Ticks;
-        if let Some(Cut::Erasure(share)) = self.cut {
+        if let Some(Cut::Erasure(left @ 1.., _)) = &mut self.cut {
+            *left -= 1;
+        } else if let Some(Cut::Erasure(0, share)) = self.cut {
             self.stall = (self.stall as f64 * share) as Ticks;
             (self.cut, self.is_cut) = (None, true);
             return self.noise.fill_bytes(cells);
@@ -404,7 +405,7 @@ mod tests {
         assert!(bench.flash.is_cut && bench.load(0) == 0);
         assert!(bench.load(4) != 0 && bench.load(4) != u32::MAX);
         bench.write(0x10, ERASE | 2 << 8 | 4 << 3);
-        bench.flash.cut = Some(Cut::Erasure(0.5));
+        bench.flash.cut = Some(Cut::Erasure(0, 0.5));
         bench.write(0x10, ERASE | 2 << 8 | 4 << 3 | START);
         assert!(bench.load(0x100) != u32::MAX && bench.load(0x1_0000) == u32::MAX);
     }

@@ -5,7 +5,8 @@
 //! | [`adapter`] | line to an adapter |
 //! | [`Client`] | reads and writes objects of nodes, and keeps their emergency messages |
 //!
-//! Source: CiA 301, SDO. Values of up to four bytes are transferred at once, longer ones in segments.
+//! Source: CiA 301, SDO. Values of up to four bytes are transferred at once, longer ones are read in segments
+//! and written in blocks.
 
 pub mod adapter;
 
@@ -15,6 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crc::{CRC_16_XMODEM, Crc};
 use scarab::bus::{Abort, Frame};
 
 use crate::base::error::ToolError;
@@ -27,6 +29,8 @@ const PATIENCE: Duration = Duration::from_secs(6);
 const REPEAT: Duration = Duration::from_secs(1);
 /// Frames between reader and client.
 const MOST_WAITING: usize = 4096;
+/// Bytes of a segment.
+const SEGMENT: usize = 7;
 const REQUEST: u16 = 0x600;
 const ANSWER: u16 = 0x580;
 const EMERGENCY: u16 = 0x80;
@@ -197,6 +201,7 @@ impl Client {
                 let expected = match request[0] >> 5 {
                     3 => 0,
                     2 => 2,
+                    6 => 5,
                     _ => 3,
                 };
                 let answers = kind == Some(4) || kind == Some(expected);
@@ -269,6 +274,53 @@ impl Client {
     pub fn text(&mut self, node: u8, object: Object) -> Result<String, ToolError> {
         let bytes = self.bytes(node, object).map_err(|error| error.of(node, object))?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// Writes bytes by block transfer; `progress` is told how many have arrived.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
+    pub fn download(
+        &mut self,
+        node: u8,
+        object: Object,
+        bytes: &[u8],
+        mut progress: impl FnMut(usize),
+    ) -> Result<(), RequestError> {
+        let Object(index, sub) = object;
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), (bytes.len() as u32).to_le_bytes());
+        let begin = self.ask(node, [0xC6, low, high, sub, a, b, c, d], Some(object))?;
+        let (mut offset, mut block) = (0, usize::from(begin[4]).clamp(1, 127));
+        while offset < bytes.len() {
+            let end = bytes.len().min(offset + SEGMENT * block);
+            for (number, segment) in (1..).zip(bytes[offset..end].chunks(SEGMENT)) {
+                let is_last = offset + SEGMENT * usize::from(number) >= bytes.len();
+                let mut data = [0; 8];
+                data[0] = number | u8::from(is_last) << 7;
+                data[1..=segment.len()].copy_from_slice(segment);
+                self.send(&Frame::new(REQUEST + u16::from(node), &data))?;
+            }
+            let until = Instant::now() + PATIENCE;
+            let Some(frame) = self.receive(until, |frame| {
+                frame.id() == ANSWER + u16::from(node) && matches!(frame.data().first(), Some(0x80 | 0xA2))
+            })?
+            else {
+                return Err(RequestError::Silent);
+            };
+            match *frame.data() {
+                [0xA2, taken, next, ..] => {
+                    // The node asks for the segments after a lost one again.
+                    offset = end.min(offset + SEGMENT * usize::from(taken));
+                    block = usize::from(next).clamp(1, 127);
+                }
+                [.., a, b, c, d] => return Err(RequestError::Aborted(u32::from_le_bytes([a, b, c, d]))),
+                _ => return Err(RequestError::Silent),
+            }
+            progress(offset);
+        }
+        let unused = (bytes.len().next_multiple_of(SEGMENT) - bytes.len()) as u8;
+        let [low, high] = Crc::<u16>::new(&CRC_16_XMODEM).checksum(bytes).to_le_bytes();
+        self.ask(node, [0xC1 | unused << 2, low, high, 0, 0, 0, 0, 0], None).map(drop)
     }
 
     /// Writes a number of `size` bytes.

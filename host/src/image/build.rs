@@ -13,8 +13,10 @@ use crate::image::seal::seal;
 use crate::leg::setup::DEFAULT_SEED;
 
 /// Image of the only board, and its bootloader.
-const IMAGE: &str = "--quiet --profile image --package scarab --bin scarab-image --features=board-odrive-v3-6";
-const BOOTLOADER: &str = "--quiet --profile image --package scarab-boot --bin scarab-boot --features=bootloader";
+const IMAGE: &str =
+    "--quiet --profile image --package scarab --bin scarab-image --features=board-odrive-v3-6";
+const BOOTLOADER: &str =
+    "--quiet --profile image --package scarab-boot --bin scarab-boot --features=bootloader";
 /// Directory of both below the target directory.
 const DIRECTORY: &str = "firmware/thumbv7em-none-eabihf/image";
 /// Name of the microcontroller for `probe-rs`.

@@ -25,4 +25,5 @@ pub mod scale;
 pub mod shaking;
 pub mod simulate;
 pub mod trace;
+pub mod update;
 pub mod watch;

@@ -8,6 +8,7 @@ use crate::bus::drive::Mode;
 use crate::bus::identification::ResultsCopy;
 use crate::units::{Ampere, NewtonMetre};
 
+mod program;
 mod storage;
 
 /// No identification result.

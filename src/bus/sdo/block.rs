@@ -211,12 +211,13 @@ impl BlockDownload {
         Ok(Step::Stay(Some(reply)))
     }
 
+    /// Number of the last segment received in order.
+    pub(super) const fn taken(&self) -> u8 {
+        self.taken
+    }
+
     /// Takes over the first `count` bytes of the held segment.
-    fn let_go<O: Objects>(
-        &mut self,
-        count: usize,
-        dictionary: &mut Dictionary<'_, O>,
-    ) -> Result<(), Abort> {
+    fn let_go<O: Objects>(&mut self, count: usize, dictionary: &mut Dictionary<'_, O>) -> Result<(), Abort> {
         let Some(bytes) = self.held.take() else { return Ok(()) };
         self.sum = sum(self.sum, bytes.get(..count).unwrap_or(&bytes));
         self.sink.put(bytes.into_iter().take(count), dictionary)

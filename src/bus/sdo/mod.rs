@@ -197,7 +197,7 @@ impl Server {
 
     /// Handles a request of the client.
     pub fn request<O: Objects>(&mut self, request: [u8; 8], now_us: u64, dictionary: &mut Dictionary<'_, O>) {
-        self.due_us = now_us + TIMEOUT_US;
+        let due_us = core::mem::replace(&mut self.due_us, now_us + TIMEOUT_US);
         // In a block download the first byte is a segment number, except for 0x80 (abort).
         if request[0] == 0x80 {
             (self.transfer, self.answer) = (None, None);
@@ -205,7 +205,16 @@ impl Server {
         }
         let command = request[0] >> 5;
         let step = match (self.transfer.as_mut(), command) {
-            (Some(Transfer::BlockDownload(block)), _) => block.request(self.object, request, dictionary),
+            (Some(Transfer::BlockDownload(block)), _) => {
+                let taken = block.taken();
+                let step = block.request(self.object, request, dictionary);
+                // Whatever a new host asks for counts as a segment; it must not keep the transfer of the one
+                // before alive.
+                if step == Ok(Step::Stay(None)) && block.taken() == taken {
+                    self.due_us = due_us;
+                }
+                step
+            }
             (Some(Transfer::Download(segments)), 0) => segments.request(self.object, request, dictionary),
             (Some(Transfer::Upload(segments)), 3) => segments.request(self.object, request, dictionary),
             (Some(Transfer::BlockUpload(block)), 5) if request[0] & 3 != 0 => {

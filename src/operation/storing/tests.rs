@@ -38,7 +38,8 @@ impl Bench {
 
     fn step(&mut self, storing: &mut Storing, change: impl FnOnce() -> Option<bool>) -> Option<bool> {
         let before = self.inhibit.is_storing();
-        let done = storing.step(&self.inhibit, self.permission, Purpose::Parameters, &mut self.hardware, change);
+        let done =
+            storing.step(&self.inhibit, self.permission, Purpose::Parameters, &mut self.hardware, change);
         if self.inhibit.is_storing() != before {
             self.storing.push((self.now_ms, !before));
         }

@@ -211,7 +211,7 @@ fn the_program_resumes_where_nothing_was_written() {
     assert!(bench.command(ProgramCommand::Start));
     bench.update.end(true, &bench.signals);
     assert_eq!(bench.signals.program_status(), ProgramStatus(0));
-    assert_eq!(bench.update.begin(ProgramCommand::Stop), Some(Begun::Stopped));
+    assert_eq!(bench.update.begin(ProgramCommand::Stop, &bench.signals), Some(Begun::Stopped));
     assert!(!bench.command(ProgramCommand::Clear));
     assert!(bench.command(ProgramCommand::Start));
     assert_eq!((bench.memory.restarts, bench.memory.swaps), (0, false));
@@ -225,13 +225,14 @@ fn a_trial_ends_with_the_confirmation_and_not_where_the_flash_fails() {
     bench.update = Update::new(true);
     bench.update.end(true, &bench.signals);
     assert!(bench.signals.program_status().has(ProgramStatus::ON_TRIAL));
-    assert_eq!(bench.update.begin(ProgramCommand::Start), Some(Begun::Confirmation));
+    assert_eq!(bench.update.begin(ProgramCommand::Start, &bench.signals), Some(Begun::Confirmation));
+    assert!(bench.signals.program_status().has(ProgramStatus::UNDER_WAY));
     bench.memory.fails = Some(0);
     assert_eq!(bench.change(Begun::Confirmation), Some(false));
-    assert_eq!(bench.update.begin(ProgramCommand::Start), Some(Begun::Confirmation));
+    assert_eq!(bench.update.begin(ProgramCommand::Start, &bench.signals), Some(Begun::Confirmation));
     bench.memory.fails = None;
     assert_eq!(bench.change(Begun::Confirmation), Some(true));
-    assert_eq!(bench.update.begin(ProgramCommand::Start), None);
+    assert_eq!(bench.update.begin(ProgramCommand::Start, &bench.signals), None);
     bench.update.end(true, &bench.signals);
     assert!(!bench.signals.program_status().has(ProgramStatus::ON_TRIAL));
     assert!(bench.memory.confirmed);
