@@ -121,6 +121,12 @@ impl ProgramStatus {
         self.0 & bits == bits
     }
 
+    /// Sets bits if `is_set`.
+    #[must_use]
+    pub const fn with(self, bits: u32, is_set: bool) -> Self {
+        Self(self.0 | if is_set { bits } else { 0 })
+    }
+
     /// Number of the error.
     #[must_use]
     pub const fn error(self) -> u8 {
@@ -162,7 +168,7 @@ impl ProgramObjects {
 
     fn status(&self) -> ProgramStatus {
         let is_under_way = self.asked.is_some() || !self.bytes.is_empty();
-        ProgramStatus(self.status.0 | u32::from(is_under_way) * ProgramStatus::UNDER_WAY)
+        self.status.with(ProgramStatus::UNDER_WAY, is_under_way)
     }
 
     /// Reads a number.

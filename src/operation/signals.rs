@@ -436,8 +436,7 @@ impl<const N: usize> Signals<N> {
     /// Status of a new image; under way while a command waits.
     #[must_use]
     pub fn program_status(&self) -> ProgramStatus {
-        let waits = u32::from(self.program[0].get() != 0) * ProgramStatus::UNDER_WAY;
-        ProgramStatus(self.program[1].get() | waits)
+        ProgramStatus(self.program[1].get()).with(ProgramStatus::UNDER_WAY, self.program[0].get() != 0)
     }
 
     /// Sets the status of a new image.

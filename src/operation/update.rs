@@ -123,11 +123,9 @@ impl Update {
     }
 
     fn status(&self, bits: u32) -> ProgramStatus {
-        let cleared = self.is_cleared && self.received == 0;
-        let bits = bits
-            | u32::from(self.is_on_trial) * ProgramStatus::ON_TRIAL
-            | u32::from(cleared) * ProgramStatus::CLEARED;
         ProgramStatus(bits | (self.error as u32) << 1)
+            .with(ProgramStatus::ON_TRIAL, self.is_on_trial)
+            .with(ProgramStatus::CLEARED, self.is_cleared && self.received == 0)
     }
 
     /// Runs one step while the program is stopped; returns whether it resumes.
@@ -157,8 +155,8 @@ impl Update {
             }
         };
         let under_way = self.stage != Stage::Waits || bytes.ready();
-        let bits = ProgramStatus::STOPPED | u32::from(under_way) * ProgramStatus::UNDER_WAY;
-        signals.set_program_status(self.status(bits));
+        let status = self.status(ProgramStatus::STOPPED).with(ProgramStatus::UNDER_WAY, under_way);
+        signals.set_program_status(status);
         resumes
     }
 

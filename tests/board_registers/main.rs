@@ -14,6 +14,7 @@ use scarab::board::odrive_v3_6::settings::{
     CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, Write, analog, can,
     chopper, converters, external, flash, gate_driver, prepare, timers,
 };
+use scarab_boot::{HEADER_AT, HEADER_BYTES, Region};
 use timer::Timer;
 
 /// Registers by address. Unwritten ones are zero, as after a reset (except the debug pins' modes).
@@ -407,15 +408,29 @@ fn the_bus_has_the_stored_rate_and_receives_every_11_bit_frame() {
 }
 
 #[test]
-fn the_image_ends_before_the_two_sectors_of_the_store() {
-    let layout = include_str!("../../src/board/odrive_v3_6/layout.x");
-    let length = layout.split("FLASH : ORIGIN = 0x08000000, LENGTH = ").nth(1).expect("the flash");
-    let kilobytes: u32 = length.split('K').next().expect("kilobytes").parse().expect("a number");
-    assert_eq!(0x0800_0000 + 1024 * kilobytes, flash::FIRST);
+fn images_are_linked_to_their_sectors_and_the_header_follows_the_vectors() {
+    let image = include_str!("../../src/board/odrive_v3_6/layout.x");
+    let boot = include_str!("../../boot/layout.x");
+    let Region { address, .. } = Region::IMAGE;
+    let kilobytes = Region::IMAGE.bytes() / 1024;
+    assert!(image.contains(&format!("FLASH : ORIGIN = {address:#010x}, LENGTH = {kilobytes}K")));
+    assert!(image.contains(&format!(".image_header ORIGIN(FLASH) + {HEADER_AT:#x} :")));
+    let code = HEADER_AT + HEADER_BYTES as u32;
+    assert!(image.contains(&format!("_stext = ORIGIN(FLASH) + {code:#x};")));
+    assert!(boot.contains("FLASH : ORIGIN = 0x08000000, LENGTH = 32K"));
+    let Region { address, .. } = Region::STATE;
+    assert!(boot.contains(&format!("STATE : ORIGIN = {address:#010x}, LENGTH = 64K")));
     // Four sectors of 16 KB, one of 64 KB, and the rest of 128 KB (RM0090 table 5).
-    for (place, number) in flash::NUMBERS.into_iter().enumerate() {
-        assert_eq!(0x0802_0000 + (number - 5) * flash::SECTOR, flash::FIRST + place as u32 * flash::SECTOR);
-        assert_eq!(flash::erase(number) >> 3 & 0xF, number);
+    assert_eq!((Region::STATE.address, Region::STATE.sector), (0x0801_0000, 4));
+    for region in [Region::IMAGE, Region::NEW_IMAGE, Region::PARAMETERS] {
+        assert_eq!(region.address, 0x0802_0000 + (region.sector - 5) * 128 * 1024);
+        for number in region.sector..region.sector + region.sectors {
+            assert_eq!(flash::erase(number) >> 3 & 0xF, number);
+        }
     }
-    assert_eq!(flash::FIRST + flash::BYTES, 0x0810_0000, "the end of the megabyte");
+    assert_eq!(
+        Region::PARAMETERS.address + Region::PARAMETERS.bytes(),
+        0x0810_0000,
+        "the end of the megabyte"
+    );
 }

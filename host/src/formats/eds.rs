@@ -16,7 +16,7 @@ use scarab::safety::InhibitReason;
 
 /// Date and time of the last change to the dictionary, in the form of CiA 306. Constants instead of a clock:
 /// the data sheets of one version are the same whenever they are written.
-const CHANGED: [&str; 2] = ["11-27-2026", "01:30AM"];
+const CHANGED: [&str; 2] = ["11-27-2026", "05:30AM"];
 
 /// One subindex of an object.
 struct Part {
@@ -95,6 +95,8 @@ fn write_all(out: &mut String, joint: &str) -> fmt::Result {
 /// Numbers, bits and units that the names do not say.
 fn comments() -> Vec<String> {
     let mut lines: Vec<String> = [
+        "1F51:1 write 0 stop, 1 start or confirm, 2 restart, 3 clear; read 0 stopped, 1 running",
+        "1F57:1 bit 0 under way, bits 1 to 7 error, 8 stopped, 9 cleared, 10 on trial (docs/update.md)",
         "2020:1 and :3 stiffness, unit 0.1 N m/rad; :2 and :4 damping, unit 0.01 N m s/rad",
         "2160:2 bits: 0 calibrated, 1 joints have their zeros, 2 calibrating, 3 enabling switch closed",
         "2160:4 axis that the calibration refused, from 1; :5 reason, :6 detail (docs/bus.md)",

@@ -22,8 +22,7 @@ fn is_live(object: Object) -> bool {
 
 /// Object of the leg or the board, which a joint alone does not have; see `identification::tests`.
 fn is_of_the_leg(object: Object) -> bool {
-    (0x1F50..0x1F58).contains(&object.index) && object.sub > 0
-        || (0x2100..0x219A).contains(&object.index) && object.sub > 0
+    matches!(object.index, 0x1F50..0x1F58 | 0x2100..0x219A) && object.sub > 0
 }
 
 #[test]

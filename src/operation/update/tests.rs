@@ -125,7 +125,7 @@ impl Bench {
 }
 
 fn image(length: usize) -> Vec<u8> {
-    let mut image: Vec<u8> = (0..length).map(|place| (place * 13 >> 3) as u8).collect();
+    let mut image: Vec<u8> = (0..length).map(|place| ((place * 13) >> 3) as u8).collect();
     for (place, word) in Header::UNSEALED.into_iter().enumerate() {
         image[HEADER_AT as usize + 4 * place..][..4].copy_from_slice(&word.to_le_bytes());
     }

@@ -1,10 +1,10 @@
 //! A new image by block and by segmented transfer, from an independent client by CiA 301.
 
 use super::*;
-use std::vec;
 use crate::bus::Abort;
 use crate::bus::program::{ProgramCommand, ProgramStatus};
 use crc::{CRC_16_XMODEM, Crc};
+use std::vec;
 
 const CLEARED: ProgramStatus = ProgramStatus(ProgramStatus::STOPPED | ProgramStatus::CLEARED);
 
@@ -57,7 +57,7 @@ impl Receiver {
 }
 
 fn program() -> Vec<u8> {
-    (0..3001_u32).map(|place| (place * 31 >> 2) as u8).collect()
+    (0..3001_u32).map(|place| ((place * 31) >> 2) as u8).collect()
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn blocks_arrive_complete_however_slow_their_consumer_is() {
                 assert_eq!(sent, None, "an answer within a block");
                 let is_last = 7 * block * (place + 1) >= program.len() && number + 1 == count;
                 let mut data = [0; 8];
-                data[0] = number as u8 + 1 | u8::from(is_last) << 7;
+                data[0] = (number as u8 + 1) | (u8::from(is_last) << 7);
                 data[1..=segment.len()].copy_from_slice(segment);
                 sent = receiver.send(&data);
             }
