@@ -478,7 +478,8 @@ fn put(core: &mut Core<'_>, register: Register, value: u32) {
 
 fn map_memory(core: &mut Core<'_>, options: &Options) -> Result<(), unicorn_engine::uc_error> {
     let image = Rc::clone(&core.get_data().image);
-    // Sectors 4 and 7 to 11 hold data only; `map_registers` maps them. Sectors 0 to 3 appear at address 0 too.
+    // Sectors 4 and 7 to 11 hold data only; `map_registers` maps them. Sectors 0 to 3 appear at address 0
+    // too.
     for address in [FLASH, 0] {
         core.mem_map(address.into(), FIXED_BYTES as u64, Prot::READ | Prot::EXEC)?;
         core.mem_write(address.into(), &image.flash[..FIXED_BYTES])?;

@@ -103,7 +103,7 @@ fn checksum(program: &[u8]) -> u32 {
     u32::from_le_bytes([program[at], program[at + 1], program[at + 2], program[at + 3]])
 }
 
-/// The same program with another version text.
+/// Program that differs from this one in its version text.
 fn changed(program: &[u8]) -> Result<Vec<u8>, ToolError> {
     let version = env!("CARGO_PKG_VERSION").as_bytes();
     let mut new = program.to_vec();

@@ -18,8 +18,8 @@
 //!
 //! Each step takes one millisecond and returns at once; longer waits are several steps.
 //!
-//! While motors brake nothing is written: a write would turn them off. Parameters are not stored with any other
-//! inhibit reason either; a new image is, since it may be what the board lacks.
+//! While motors brake nothing is written: a write would turn them off. Parameters are not stored with any
+//! other inhibit reason either; a new image is, since it may be what the board lacks.
 
 use super::signals::Inhibit;
 use crate::hal::Hardware;

@@ -35,7 +35,8 @@ const PARALLELISM: u32 = 1 << 6;
 const ALIGNMENT: u32 = 1 << 5;
 const PROTECTED: u32 = 1 << 4;
 
-/// Typical durations of a word, and of a sector of 64 and 128 KB by the width that is programmed at once (PSIZE).
+/// Typical durations of a word, and of a sector of 64 and 128 KB by the width that is programmed at once
+/// (PSIZE).
 const WORD: Ticks = 16 * TICK_HZ / 1_000_000;
 const SMALL: [Ticks; 4] = [12 * TICK_HZ / 10, 7 * TICK_HZ / 10, 55 * TICK_HZ / 100, 55 * TICK_HZ / 100];
 const LARGE: [Ticks; 4] = [2 * TICK_HZ, 13 * TICK_HZ / 10, TICK_HZ, TICK_HZ];

@@ -51,7 +51,7 @@ pub fn target_directory() -> PathBuf {
 pub struct Built {
     /// Image with its records' names (ELF).
     pub image: PathBuf,
-    /// The same as plain bytes, for an update over the bus.
+    /// Plain bytes of the image, for an update over the bus.
     pub program: PathBuf,
     /// Bootloader (ELF).
     pub bootloader: PathBuf,

@@ -136,7 +136,7 @@ impl Update<'_> {
                         break;
                     }
                 }
-                // It swaps the images.
+                // The board swaps the images.
                 Err(RequestError::Silent) => {}
                 Err(error) => return Err(error.of(self.node, STATUS)),
             }

@@ -59,7 +59,7 @@ impl<'a> Bench<'a> {
         };
         let own = [NodeId::new(1)?, NodeId::new(2)?];
         let device = Device::new(own, Identity::scarab(1, "emulated"), [constants; 2], Plan::OneTime, 1);
-        let (frames, servo, ends) = queues.split();
+        let (frames, servo, ends, _) = queues.split();
         let mut bench = Self {
             device,
             found: ResultsCopy::nothing(),

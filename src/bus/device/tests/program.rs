@@ -141,7 +141,7 @@ fn a_host_that_follows_one_that_left_within_a_block_is_answered() {
     let [a, b, c, d] = 1000_u32.to_le_bytes();
     assert_eq!(receiver.ask(&[0xC6, 0x50, 0x1F, 1, a, b, c, d])[0], 0xA4);
     assert_eq!(receiver.send(&[1; 8]), None);
-    // It asks every 0.3 s; a round takes 0.25 ms.
+    // The new host asks every 0.3 s; a round takes 0.25 ms.
     let read = [0x40, 0x57, 0x1F, 1, 0, 0, 0, 0];
     let answered = (0..6).any(|_| {
         let mut answers = vec![receiver.send(&read)];
