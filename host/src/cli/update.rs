@@ -1,11 +1,12 @@
 //! `update`: a new image for a board, over its bus.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use clap::Args;
 
 use crate::base::error::{EXIT_ACCEPTED, FileError, ToolError};
 use crate::base::output;
+use crate::cli::arguments::Input;
 use crate::cli::serve::bit_rates;
 use crate::client::Client;
 use crate::client::adapter::open;
@@ -25,12 +26,12 @@ pub struct UpdateArguments {
     node: u8,
     /// Program for an update, which `cargo fw` writes (scarab-image.bin).
     #[arg(value_name = "IMAGE.bin")]
-    image: PathBuf,
+    image: Input,
 }
 
 /// Updates; exit code 3 where the board refuses, 2 where file or bus are wrong.
 pub fn run(arguments: &UpdateArguments) -> Result<u8, ToolError> {
-    let path = &arguments.image;
+    let path: &Path = &arguments.image;
     let program = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
     let header = check(&program).map_err(|why| ToolError::input(format!("{}: {why}", path.display())))?;
     let client = Client::new(open(&arguments.slcan, arguments.bit_rate)?)?;
