@@ -296,6 +296,12 @@ impl Bench<'_> {
         let found = self.start_up(Expected::Old);
         self.note("power cut after that", found);
         self.session.machine.restore(trial)?;
+        let refused = [ProgramCommand::Stop, ProgramCommand::Clear]
+            .map(|command| self.session.command(command).is_err());
+        let found = self.start_up(Expected::Old);
+        let found = if refused == [true; 2] { found } else { Err("stopped or cleared".into()) };
+        self.note("another update while on trial is refused; power cut", found);
+        self.session.machine.restore(trial)?;
         let found = self.start_up(Expected::Old);
         self.note("power cut without confirmation", found);
         self.session.machine.restore(trial)?;

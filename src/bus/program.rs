@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! 1F51:1 <- 0   stop the program: the drive stays off      1F51:1 -> 0 stopped, 1 running
+//!               refused while the running image is on trial
 //! 1F51:1 <- 3   clear the space of the new image
 //! 1F50:1 <- ... the new image, a DOMAIN
 //! 1F51:1 <- 1   start: check the new image, swap it in, restart; or resume, if none was written
@@ -185,8 +186,11 @@ impl ProgramObjects {
     pub(super) fn command(&mut self, value: u32, is_off: bool) -> Result<(), Abort> {
         let command = ProgramCommand::of(value).ok_or(Abort::Range)?;
         let is_stopped = self.status.has(ProgramStatus::STOPPED);
+        // While an image is on trial, the space of the new one holds the one that comes back.
+        let is_on_trial = self.status.has(ProgramStatus::ON_TRIAL);
         let is_permitted = match command {
-            ProgramCommand::Stop | ProgramCommand::Reset | ProgramCommand::Start => is_off,
+            ProgramCommand::Stop => is_off && !is_on_trial,
+            ProgramCommand::Reset | ProgramCommand::Start => is_off,
             ProgramCommand::Clear => is_stopped,
         };
         if self.status().has(ProgramStatus::UNDER_WAY) || !is_permitted {
@@ -245,6 +249,9 @@ mod tests {
         assert_eq!(objects.read(0x1F57), Ok(ProgramStatus::UNDER_WAY));
         assert_eq!(objects.command(0, true), Err(Abort::State), "the one before is under way");
         assert_eq!(objects.take_command(), Some(ProgramCommand::Stop));
+        let mut objects = ProgramObjects::new(7);
+        objects.update(ProgramStatus(ProgramStatus::ON_TRIAL));
+        assert_eq!((objects.command(0, true), objects.command(1, true)), (Err(Abort::State), Ok(())));
         let mut objects = stopped();
         assert_eq!((objects.begin(), objects.read(0x1F51)), (Ok(()), Ok(0)));
         assert_eq!(objects.command(3, true), Ok(()));

@@ -78,6 +78,8 @@ impl Update {
     /// goes the same way, so that hosts hear of the pause.
     pub fn begin<const N: usize>(&mut self, command: ProgramCommand, signals: &Signals<N>) -> Option<Begun> {
         let begun = match command {
+            // The space of the new image holds the one that comes back at the next restart.
+            ProgramCommand::Stop if self.is_on_trial => None,
             ProgramCommand::Stop => {
                 // What an update before has left must be cleared first.
                 *self = Self::new(self.is_on_trial);
@@ -87,9 +89,7 @@ impl Update {
             ProgramCommand::Reset => Some(Begun::Restart),
             ProgramCommand::Start | ProgramCommand::Clear => None,
         };
-        if begun.is_some() {
-            signals.set_program_status(self.status(ProgramStatus::UNDER_WAY));
-        }
+        signals.set_program_status(self.status(0).with(ProgramStatus::UNDER_WAY, begun.is_some()));
         begun
     }
 

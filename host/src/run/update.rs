@@ -76,6 +76,13 @@ impl Update<'_> {
         let serial = self.client.read(self.node, Object(0x1018, 4))?;
         (self.say)(&format!("find       serial number {serial:08X}, image {running:08X}"));
         if running != header.checksum {
+            if self.status()?.has(ProgramStatus::ON_TRIAL) {
+                return Err(ToolError::Refused(
+                    "the running image is another one, on trial: send its file to confirm it, or restart the board \
+                     to get the image before back"
+                        .into(),
+                ));
+            }
             self.write(program)?;
             self.restart(header)?;
         }

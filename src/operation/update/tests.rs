@@ -225,6 +225,7 @@ fn a_trial_ends_with_the_confirmation_and_not_where_the_flash_fails() {
     bench.update = Update::new(true);
     bench.update.end(true, &bench.signals);
     assert!(bench.signals.program_status().has(ProgramStatus::ON_TRIAL));
+    assert_eq!(bench.update.begin(ProgramCommand::Stop, &bench.signals), None, "it would erase the way back");
     assert_eq!(bench.update.begin(ProgramCommand::Start, &bench.signals), Some(Begun::Confirmation));
     assert!(bench.signals.program_status().has(ProgramStatus::UNDER_WAY));
     bench.memory.fails = Some(0);
