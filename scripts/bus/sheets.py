@@ -23,7 +23,7 @@ from scarab_bus import connect
 
 # Objects without data yet: the list of errors, and results before the first identification.
 NO_DATA = 0x08000024
-READ_ONLY, NO_OBJECT, NO_SUBINDEX = 0x06010002, 0x06020000, 0x06090011
+WRITE_ONLY, READ_ONLY, NO_OBJECT, NO_SUBINDEX = 0x06010001, 0x06010002, 0x06020000, 0x06090011
 # Indices outside the sheet: neighbours of each object, and ends of the range.
 ELSEWHERE = [0x0001, 0x0FFF, 0x2000, 0x2141, 0x5FFF, 0x6000, 0x6003, 0x67FF, 0x9FFF, 0xFFFF]
 
@@ -75,6 +75,10 @@ def aborts(ask):
 def check(node, variable):
     """Checks one variable of a live node and returns whether it had a value."""
     where = f"{variable.index:04X}:{variable.subindex}"
+    if variable.access_type == "wo":
+        code = aborts(lambda: node.sdo.upload(variable.index, variable.subindex))
+        assert code == WRITE_ONLY, f"{where}, wo in the sheet: reading gave {code}"
+        return False
     try:
         data = node.sdo.upload(variable.index, variable.subindex)
     except SdoAbortedError as error:

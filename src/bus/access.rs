@@ -59,7 +59,7 @@ impl<O: Objects> Dictionary<'_, O> {
     /// [`Abort::ReadOnly`], or the error of an unknown object.
     pub fn writable(&self, object: Object) -> Result<&'static Row, Abort> {
         let row = find(object)?;
-        if row.access == Access::Both { Ok(row) } else { Err(Abort::ReadOnly) }
+        if matches!(row.access, Access::Both | Access::Write) { Ok(row) } else { Err(Abort::ReadOnly) }
     }
 
     /// Writes a number. The object must be writable and the value of the right size.

@@ -70,6 +70,8 @@ pub enum Access {
     Read,
     /// Read and write.
     Both,
+    /// Write-only.
+    Write,
 }
 
 /// PDO directions into which an object may be mapped.

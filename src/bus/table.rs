@@ -148,7 +148,7 @@ rows! {
     0x1A00 x 4, 3 x 6, U32, Both, No, 0, "Mapped object";
 
     0x1F50, 0, U8, Const, No, 1, "Number of entries";
-    0x1F50, 1, Domain, Both, No, 0, "Program 1";
+    0x1F50, 1, Domain, Write, No, 0, "Program 1";
     0x1F51, 0, U8, Const, No, 1, "Number of entries";
     0x1F51, 1, U8, Both, No, 1, "Program 1";
     0x1F56, 0, U8, Const, No, 1, "Number of entries";

@@ -23,7 +23,6 @@ use super::signals::Signals;
 use super::token_bucket::TokenBucket;
 use crate::bus::device::{Device, StoreCommand};
 use crate::bus::identification::Results;
-use crate::bus::program::ProgramStatus;
 use crate::bus::{StoredNode, Storing};
 use crate::hal::{Controller, Hardware};
 
@@ -173,7 +172,7 @@ impl BusRound {
         }
         let status = signals.program_status();
         device.update_program(status);
-        let pauses = status.0 & (ProgramStatus::UNDER_WAY | ProgramStatus::STOPPED) != 0;
+        let pauses = signals.program_pauses();
         if pauses != self.pauses {
             self.pauses = pauses;
             device.storing(if pauses {

@@ -439,6 +439,12 @@ impl<const N: usize> Signals<N> {
         ProgramStatus(self.program[1].get()).with(ProgramStatus::UNDER_WAY, self.program[0].get() != 0)
     }
 
+    /// Whether the flash is or will be changed for a new image.
+    #[must_use]
+    pub fn program_pauses(&self) -> bool {
+        self.program[1].get() & (ProgramStatus::UNDER_WAY | ProgramStatus::STOPPED) != 0
+    }
+
     /// Sets the status of a new image.
     pub fn set_program_status(&self, status: ProgramStatus) {
         self.program[1].set(status.0);

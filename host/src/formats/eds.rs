@@ -148,6 +148,7 @@ fn write_variable(out: &mut String, index: u16, sub: u8, part: &Part, identity: 
         Access::Const => "const",
         Access::Read => "ro",
         Access::Both => "rw",
+        Access::Write => "wo",
     };
     writeln!(out, "ObjectType=0x7\nDataType={:#06X}\nAccessType={access}", row.kind as u8)?;
     let default = match (index, sub) {

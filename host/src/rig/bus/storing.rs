@@ -8,7 +8,7 @@
 //! ```
 
 use scarab::bus::device::StoreCommand;
-use scarab::bus::program::{ProgramError, ProgramStatus};
+use scarab::bus::program::{ProgramCommand, ProgramError, ProgramStatus};
 use scarab::bus::{Frame, StoredNode};
 use scarab::leg::DriveState;
 use scarab::operation::{Inhibit, Purpose, Storing};
@@ -155,8 +155,12 @@ impl<const N: usize> Flashing<N> {
         let Levels { signals, registers, bus, .. } = &mut *rig.board;
         let inhibit = if self.unannounced { &self.unseen } else { &signals.inhibit };
         // A simulated board has no program that could be replaced.
-        if signals.take_program_command().is_some() {
-            signals.set_program_status(ProgramStatus((ProgramError::Forbidden as u32) << 1));
+        if let Some(command) = signals.take_program_command() {
+            let error = match command {
+                ProgramCommand::Start => ProgramError::None,
+                _ => ProgramError::Forbidden,
+            };
+            signals.set_program_status(ProgramStatus((error as u32) << 1));
         }
         let Some(storage) = bus.as_ref().map(|bus| &bus.storage) else { return };
         let Some(mut keep) = storage.given() else {
