@@ -189,5 +189,5 @@ mod tests {
         assert_eq!(format!("{sum:?}"), SUM);
     }
 
-    const SUM: &str = "Checksum(1389419705)";
+    const SUM: &str = "Checksum(812325300)";
 }
