@@ -71,7 +71,7 @@ pub enum ProgramError {
     NotCleared = 4,
     /// The flash did not take a change.
     Write = 5,
-    /// The drive is on, an inhibit reason is set, or the watchdog does not take its longer time.
+    /// The drive is on, motors brake, or the watchdog does not take its longer time.
     Forbidden = 7,
 }
 
@@ -97,7 +97,7 @@ impl ProgramError {
             Self::Checksum => "the image is damaged: its check sum differs",
             Self::NotCleared => "bytes came before the space was cleared, or more than fit",
             Self::Write => "the flash did not take a change",
-            Self::Forbidden => "not now: the drive is on or inhibited",
+            Self::Forbidden => "not now: the drive is on, or motors brake",
         }
     }
 }
@@ -155,6 +155,10 @@ impl ProgramObjects {
     /// Takes over the status.
     pub fn update(&mut self, status: ProgramStatus) {
         self.status = status;
+        if !status.has(ProgramStatus::STOPPED) {
+            // Nobody takes them any more.
+            self.bytes.clear();
+        }
     }
 
     /// Takes the command that a host wrote.
@@ -214,6 +218,9 @@ impl ProgramObjects {
 
     /// Takes a byte of the image.
     pub(super) fn push(&mut self, byte: u8) -> Result<(), Abort> {
+        if !self.status.has(ProgramStatus::STOPPED) {
+            return Err(Abort::State);
+        }
         self.bytes.push_back(byte).map_err(|_| Abort::Sequence)
     }
 }

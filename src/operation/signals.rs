@@ -430,6 +430,8 @@ impl<const N: usize> Signals<N> {
         if self.program[0].get() == 0 {
             return None;
         }
+        // Shown as under way until its outcome is set.
+        self.program[1].set_bits(ProgramStatus::UNDER_WAY);
         ProgramCommand::of(self.program[0].swap(0).wrapping_sub(1))
     }
 

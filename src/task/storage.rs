@@ -65,6 +65,8 @@ impl StorageTask {
 
     /// Sets the sources of requests and of calibrations.
     pub fn serve(&mut self, end: StorageEnd, calibrated: Consumer<'static, Calibrated>) {
+        // Before the bus answers: a host must not take an image on trial for a confirmed one.
+        self.update.end(true, &SIGNALS);
         self.ends = Some((end, calibrated));
     }
 
@@ -115,7 +117,6 @@ fn change(storage: &mut store::Storage<LargeSectors, JOINTS>, job: &mut StoreJob
 #[embassy_executor::task]
 pub async fn run(storage: &'static mut StorageTask) -> ! {
     let StorageTask { storage, storing, program, update, ends } = storage;
-    update.end(true, &SIGNALS);
     loop {
         Timer::after_millis(ROUND_MS).await;
         storing.look_after(&SIGNALS.inhibit, &mut Odrive);

@@ -19,7 +19,7 @@ const STATUS: Object = Object(0x1F57, 1);
 /// Longest clearing: two sectors of 2 s, and the announcement.
 const CLEARING: Duration = Duration::from_secs(10);
 /// Longest restart with both swaps.
-const RESTART: Duration = Duration::from_secs(60);
+const RESTART: Duration = Duration::from_secs(90);
 /// Interval between two looks at the status.
 const POLL: Duration = Duration::from_millis(100);
 
@@ -85,6 +85,15 @@ impl Update<'_> {
             }
             self.write(program)?;
             self.restart(header)?;
+        } else if self.status()?.has(ProgramStatus::STOPPED) {
+            // An update that did not end: without a new image the present one resumes.
+            self.command(ProgramCommand::Clear)?;
+            self.settled()?;
+            self.command(ProgramCommand::Start)?;
+            let status = self.settled()?;
+            if status.has(ProgramStatus::STOPPED) {
+                return Err(refused("to resume", status));
+            }
         }
         if self.status()?.has(ProgramStatus::ON_TRIAL) {
             self.command(ProgramCommand::Start)?;
