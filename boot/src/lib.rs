@@ -10,7 +10,7 @@
 //! 10, 11   080C 0000   256 KB   stored parameters; no update touches them
 //! ```
 //!
-//! A header of 16 bytes follows the image's vector table. Whoever builds an image writes it ([`seal`]); the
+//! A header of 16 bytes follows the image's vector table. The build of an image writes it ([`seal`]); the
 //! image checks a new one before it is swapped in, the bootloader every image before it runs.
 //!
 //! Why no signature: who reaches the bus can move the leg. The check finds damage and images of other boards,

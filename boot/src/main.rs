@@ -4,14 +4,16 @@
 //! ```text
 //! reset --> swap requested?    new image in, one sector after the other; resumes after a power cut
 //!           swapped, not confirmed?    the image before comes back
-//!       --> check the image    differs: reset, which swaps it back; no other image: stop
+//!       --> check the image    differs: reset, which swaps it back; where that one is damaged too: swaps in
+//!                              what lies in the space of the new image, if it is sound; otherwise stop
 //!       --> run it             under the watchdog, as long as it has not confirmed itself
 //! ```
 //!
 //! Everything but the flash controller and the watchdog stays as after the reset: clocks, pins, and the
 //! reason of the reset, which the image reads. All bridges are off: their pins are inputs.
 //!
-//! The swap is `embassy-boot`'s. It takes about 12 s: four sectors are erased and written.
+//! The swap is `embassy-boot`'s. It takes 12 s, at most 30: four sectors are erased eight bits at a
+//! time and written.
 #![no_std]
 #![no_main]
 
@@ -19,7 +21,7 @@ use core::cell::RefCell;
 use core::panic::PanicInfo;
 
 use cortex_m::peripheral::SCB;
-use embassy_boot_stm32::{BootLoader, BootLoaderConfig, State};
+use embassy_boot_stm32::{BlockingFirmwareState, BootLoader, BootLoaderConfig, State};
 use embassy_embedded_hal::flash::partition::BlockingPartition;
 use embassy_stm32::Peri;
 use embassy_stm32::flash::Flash;
@@ -56,8 +58,8 @@ fn main() -> ! {
         state: BlockingPartition::new(&small, 0, Region::STATE.bytes()),
     });
     let is_sound = Check::whole(|offset, into| copy(Region::IMAGE.address + offset, into)).is_ok();
-    // After a failed access to the flash a sound image still runs: it can be replaced.
-    let state = loader.map_or(State::Boot, |loader| loader.state);
+    // A failed access to the flash leaves a swap unfinished: as on trial, and the next start resumes it.
+    let state = loader.map_or(State::Swap, |loader| loader.state);
     match (is_sound, &state) {
         (true, _) => {
             if state == State::Swap {
@@ -67,7 +69,16 @@ fn main() -> ! {
         }
         // The next start swaps back what this one swapped.
         (false, State::Swap) => SCB::sys_reset(),
-        (false, _) => stop(),
+        (false, _) => {
+            let is_sound =
+                Check::whole(|offset, into| copy(Region::NEW_IMAGE.address + offset, into)).is_ok();
+            let mut word = [0; 4];
+            let state = BlockingPartition::new(&small, 0, Region::STATE.bytes());
+            if is_sound && BlockingFirmwareState::new(state, &mut word).mark_updated().is_ok() {
+                SCB::sys_reset()
+            }
+            stop()
+        }
     }
 }
 
@@ -89,7 +100,7 @@ fn run(loader: BootLoader) -> ! {
 #[expect(unsafe_code, reason = "memory by its address")]
 fn copy(address: u32, into: &mut [u8]) -> bool {
     for (place, byte) in into.iter_mut().enumerate() {
-        // SAFETY: `Check` reads within the length of an image, which lies in the flash.
+        // SAFETY: `Check` reads within the length of an image, which lies within its region of the flash.
         *byte = unsafe { core::ptr::read_volatile((address + place as u32) as *const u8) };
     }
     true

@@ -152,13 +152,15 @@ impl ProgramObjects {
         Self { status: ProgramStatus(0), checksum, asked: None, bytes: Deque::new() }
     }
 
-    /// Takes over the status.
-    pub fn update(&mut self, status: ProgramStatus) {
+    /// Takes over the status; returns whether it has changed.
+    pub fn update(&mut self, status: ProgramStatus) -> bool {
+        let changed = self.status != status;
         self.status = status;
         if !status.has(ProgramStatus::STOPPED) {
-            // Nobody takes them any more.
+            // The level below takes them only while the program is stopped.
             self.bytes.clear();
         }
+        changed
     }
 
     /// Takes the command that a host wrote.

@@ -170,18 +170,11 @@ impl BusRound {
         if let Some(command) = command {
             signals.command_program(command);
         }
-        let status = signals.program_status();
-        device.update_program(status);
+        device.update_program(signals.program_status());
         let pauses = signals.program_pauses();
         if pauses != self.pauses {
             self.pauses = pauses;
-            device.storing(if pauses {
-                Storing::Busy
-            } else if status.error() == 0 {
-                Storing::Done
-            } else {
-                Storing::Failed
-            });
+            device.pause(pauses);
         }
     }
 

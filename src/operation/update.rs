@@ -77,6 +77,7 @@ impl Update {
     /// Begins what a command asks for while the program runs, if it needs the flash. `Reset` needs none but
     /// goes the same way, so that hosts hear of the pause.
     pub fn begin<const N: usize>(&mut self, command: ProgramCommand, signals: &Signals<N>) -> Option<Begun> {
+        self.error = ProgramError::None;
         let begun = match command {
             // The space of the new image holds the one that comes back at the next restart.
             ProgramCommand::Stop if self.is_on_trial => None,
@@ -107,6 +108,7 @@ impl Update {
             Begun::Confirmation => {
                 let confirmed = memory.confirm();
                 self.is_on_trial &= !confirmed;
+                self.error = if confirmed { ProgramError::None } else { ProgramError::Write };
                 Some(confirmed)
             }
             Begun::Restart => {
@@ -118,7 +120,11 @@ impl Update {
 
     /// Shows the state after the program resumed; `done`: what a host asked for succeeded.
     pub fn end<const N: usize>(&mut self, done: bool, signals: &Signals<N>) {
-        self.error = if done { ProgramError::None } else { ProgramError::Forbidden };
+        self.error = match self.error {
+            _ if done => ProgramError::None,
+            ProgramError::None => ProgramError::Forbidden,
+            error => error,
+        };
         signals.set_program_status(self.status(0));
     }
 

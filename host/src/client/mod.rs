@@ -276,7 +276,7 @@ impl Client {
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
-    /// Writes bytes by block transfer; `progress` is told how many have arrived.
+    /// Writes bytes by block transfer; `progress` is called with the number that has arrived.
     ///
     /// # Errors
     /// The node refuses or is silent.

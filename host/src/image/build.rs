@@ -108,7 +108,11 @@ pub fn firmware_build(log: bool) -> Command {
 
 /// Writes bootloader and image to the board on the probe, starts it and prints its records until interrupted.
 pub fn flash(built: &Built, further: &[String]) -> Result<(), ToolError> {
-    probe("download", further, &built.bootloader)?;
+    // `download` takes those arguments only that select the probe.
+    let selects = |name: &String| ["--probe", "--protocol", "--speed"].contains(&name.as_str());
+    let pairs = further.windows(2).filter(|pair| selects(&pair[0]));
+    let selection: Vec<String> = pairs.flat_map(<[String]>::to_vec).collect();
+    probe("download", &selection, &built.bootloader)?;
     probe("run", further, &built.image)
 }
 

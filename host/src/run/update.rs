@@ -55,7 +55,7 @@ pub struct Update<'a> {
     pub client: Client,
     /// Either node of the board.
     pub node: u8,
-    /// Is told each step.
+    /// Receives a line for each step.
     pub say: &'a mut dyn FnMut(&str),
 }
 

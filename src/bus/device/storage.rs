@@ -100,6 +100,13 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         self.nodes.iter_mut().for_each(|node| node.on_store(storing));
     }
 
+    /// Announces a pause for a new image to hosts, as one for the store, or its end. The state of the store
+    /// stays.
+    pub fn pause(&mut self, pauses: bool) {
+        let storing = if pauses { Storing::Busy } else { self.storing };
+        self.nodes.iter_mut().for_each(|node| node.on_store(storing));
+    }
+
     /// Returns the stored bit rate, kbit/s.
     #[must_use]
     pub fn bit_rate(&self) -> Option<u16> {

@@ -166,6 +166,8 @@ pub(super) struct BlockDownload {
     sink: Sink,
     /// Number of the last segment received in order.
     taken: u8,
+    /// Number of all segments received in order, wrapping.
+    received: u8,
     /// Newest segment. Only the end message says how many of its bytes are valid.
     held: Option<[u8; 7]>,
     is_last: bool,
@@ -182,7 +184,7 @@ impl BlockDownload {
         let size = u32::from_le_bytes(named(request).1);
         let sink = Sink::new(object, (request[0] & WITH_SIZE != 0).then_some(size), dictionary)?;
         let checked = request[0] & WITH_CHECKSUM != 0;
-        let this = Self { sink, taken: 0, held: None, is_last: false, checked, sum: 0 };
+        let this = Self { sink, taken: 0, received: 0, held: None, is_last: false, checked, sum: 0 };
         let reply = answer(0xA0 | WITH_CHECKSUM, object, u32::from(sink.block()));
         Ok(Step::Begin(Transfer::BlockDownload(this), reply))
     }
@@ -201,6 +203,7 @@ impl BlockDownload {
         if number == self.taken + 1 {
             self.let_go(7, dictionary)?;
             (self.held, self.taken, self.is_last) = (Some(bytes), number, is_last);
+            self.received = self.received.wrapping_add(1);
         }
         let block = self.sink.block();
         if !is_last && number != block {
@@ -211,9 +214,9 @@ impl BlockDownload {
         Ok(Step::Stay(Some(reply)))
     }
 
-    /// Number of the last segment received in order.
-    pub(super) const fn taken(&self) -> u8 {
-        self.taken
+    /// Number of segments received in order, wrapping.
+    pub(super) const fn received(&self) -> u8 {
+        self.received
     }
 
     /// Takes over the first `count` bytes of the held segment.

@@ -206,11 +206,11 @@ impl Server {
         let command = request[0] >> 5;
         let step = match (self.transfer.as_mut(), command) {
             (Some(Transfer::BlockDownload(block)), _) => {
-                let taken = block.taken();
+                let received = block.received();
                 let step = block.request(self.object, request, dictionary);
                 // Whatever a new host asks for counts as a segment; it must not keep the transfer of the one
                 // before alive.
-                if step == Ok(Step::Stay(None)) && block.taken() == taken {
+                if matches!(step, Ok(Step::Stay(_))) && block.received() == received {
                     self.due_us = due_us;
                 }
                 step

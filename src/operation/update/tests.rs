@@ -230,6 +230,8 @@ fn a_trial_ends_with_the_confirmation_and_not_where_the_flash_fails() {
     assert!(bench.signals.program_status().has(ProgramStatus::UNDER_WAY));
     bench.memory.fails = Some(0);
     assert_eq!(bench.change(Begun::Confirmation), Some(false));
+    bench.update.end(false, &bench.signals);
+    assert_eq!(bench.error(), ProgramError::Write as u8);
     assert_eq!(bench.update.begin(ProgramCommand::Start, &bench.signals), Some(Begun::Confirmation));
     bench.memory.fails = None;
     assert_eq!(bench.change(Begun::Confirmation), Some(true));

@@ -143,12 +143,20 @@ fn a_host_that_follows_one_that_left_within_a_block_is_answered() {
     assert_eq!(receiver.send(&[1; 8]), None);
     // The new host asks every 0.3 s; a round takes 0.25 ms.
     let read = [0x40, 0x57, 0x1F, 1, 0, 0, 0, 0];
-    let answered = (0..6).any(|_| {
-        let mut answers = vec![receiver.send(&read)];
-        answers.extend((0..1200).map(|_| receiver.round()));
-        answers.into_iter().flatten().any(|answer| answer[..4] == [0x43, 0x57, 0x1F, 1])
-    });
-    assert!(answered);
+    // A block download, whose first byte counts as the last segment of a block.
+    let begin = [0xC6, 0x50, 0x1F, 1, a, b, c, d];
+    for (request, answer) in [(read, [0x43, 0x57, 0x1F, 1]), (begin, [0xA4, 0x50, 0x1F, 1])] {
+        let answered = (0..6).any(|_| {
+            let mut answers = vec![receiver.send(&request)];
+            answers.extend((0..1200).map(|_| receiver.round()));
+            answers.into_iter().flatten().any(|found| found[..4] == answer)
+        });
+        assert!(answered, "{request:x?}");
+        receiver.send(&[0x80, 0x50, 0x1F, 1, 0, 0, 0, 0]);
+        receiver.bench.device.update_program(CLEARED);
+        assert_eq!(receiver.ask(&begin)[0], 0xA4);
+        assert_eq!(receiver.send(&[1; 8]), None);
+    }
 }
 
 #[test]
