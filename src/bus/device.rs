@@ -416,8 +416,8 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         self.leg.board.take_step()
     }
 
-    /// Takes over the status of a new image. A change may follow an erase, in which nothing was received and a
-    /// board's clock did not advance.
+    /// Takes over the status of a new image. A change may follow an erase, in which nothing was received and
+    /// a board's clock did not advance.
     pub fn update_program(&mut self, status: ProgramStatus) {
         if self.leg.program.update(status) {
             self.nodes.iter_mut().for_each(|node| node.stood_still(self.looked_us));
