@@ -25,7 +25,7 @@ IMPEDANCE, TOLERANCE = -1, 0.05
 LAG_S = 0.002
 # SYNCs around an answer whose targets must be the same; a busy machine drops some.
 CERTAIN = 8
-# Trials of a joint's steps.
+# Trials of the session.
 TRIALS = 5
 
 
@@ -71,24 +71,33 @@ class Session:
         while time.monotonic() < end:
             self.cycle()
 
-    def steps(self, place, begin):
-        """Commands steps of one joint while the other stays; returns the number of SYNCs without an answer."""
-        time.sleep(10 * CYCLE_S)
+    def steps(self, begin):
+        """Enables the drive and commands steps of each joint in turn; returns the SYNCs without an answer."""
         for joint in self.joints:
             joint.at_sync.clear()
             joint.answers.clear()
-        for step in STEPS * STEP_RAD:
-            offset = [step if joint == place else 0.0 for joint in range(len(self.joints))]
-            self.targets = [(start + away, 0.0, *commanded, 0)
-                            for start, away, commanded in zip(begin, offset, COMMANDED)]
-            self.run(0.5)
-        time.sleep(10 * CYCLE_S)
+        self.targets = [(place, 0.0, *commanded, 0) for place, commanded in zip(begin, COMMANDED)]
+        # The targets must be there before the drive is enabled.
+        self.cycle()
+        enable(self.joints)
+        for joint in self.joints:
+            until("impedance mode", lambda: joint.read(0x6061, 0, "<b") == IMPEDANCE)
+        self.run(1.0)
+        for moved in self.joints:
+            moved.first = len(moved.at_sync)
+            for step in STEPS * STEP_RAD:
+                self.targets = [(place + (step if joint is moved else 0.0), 0.0, *commanded, 0)
+                                for joint, place, commanded in zip(self.joints, begin, COMMANDED)]
+                self.run(0.5)
+            moved.last = len(moved.at_sync)
+        for joint in self.joints:
+            joint.write(0x6040, 0, 0, "<H")
         return max(len(joint.at_sync) - len(joint.answers) for joint in self.joints)
 
 
 def samples(joint):
-    """Deviation, its rate and torque of a joint's answers, while its target stays the same."""
-    for number, (place, velocity, torque) in enumerate(joint.answers):
+    """Deviation, its rate and torque of a joint's answers during its steps, while its target stays the same."""
+    for number, (place, velocity, torque) in enumerate(joint.answers[joint.first:joint.last], joint.first):
         targets = set(joint.at_sync[max(number - CERTAIN, 0):number + CERTAIN])
         if len(targets) == 1:
             # Deviation at the time that the low-passed torque shows.
@@ -136,30 +145,21 @@ def main():
         print(f"node {joint.number}: at most {largest[0] * STIFFNESS_UNIT:.0f} N m/rad,",
               f"{largest[1] * DAMPING_UNIT:.0f} N m s/rad")
     begin = [joint.position() for joint in joints]
-    session.targets = [(place, 0.0, *commanded, 0) for place, commanded in zip(begin, COMMANDED)]
     alive = Heartbeat(network)
-    # The targets must be there before the drive is enabled.
-    session.cycle()
-    enable(joints)
-    for joint in joints:
-        until("impedance mode", lambda: joint.read(0x6061, 0, "<b") == IMPEDANCE)
-    session.run(1.0)
-    for place, joint in enumerate(joints):
-        for _ in range(TRIALS):
-            lost = session.steps(place, begin)
-            if lost < CERTAIN:
-                break
-            print(f"node {joint.number}: {lost} SYNCs were not answered on a busy machine; again")
-        else:
-            raise SystemExit(f"node {joint.number}: too many SYNCs were not answered, {TRIALS} times")
+    for _ in range(TRIALS):
+        lost = session.steps(begin)
+        if lost < CERTAIN:
+            break
+        print(f"{lost} SYNCs were not answered on a busy machine; again")
+    else:
+        raise SystemExit(f"too many SYNCs were not answered, {TRIALS} times")
+    for joint, commanded_values in zip(joints, COMMANDED):
         shown = fitted(list(samples(joint)))
         for name, unit, found, commanded in zip(("stiffness", "damping"), ("N m/rad", "N m s/rad"), shown,
-                                                COMMANDED[place]):
+                                                commanded_values):
             print(f"node {joint.number}: {name} {found:.1f} of {commanded:.1f} {unit}")
             assert abs(found / commanded - 1) < TOLERANCE, f"{name}: {100 * (found / commanded - 1):.1f} %"
     telemetry(joints)
-    for joint in joints:
-        joint.write(0x6040, 0, 0, "<H")
     alive.stop()
     network.disconnect()
     print("impedance: ok")
