@@ -204,6 +204,7 @@ impl Subjected {
             leg: self.exoskeleton.clone(),
             log: false,
             brake_resistor: true,
+            status_light: false,
             board_volts: None,
         };
         let image: Rc<Image> = Image::load(&build::build(&build)?.image)?;

@@ -234,8 +234,13 @@ impl Common {
         let leg = LegFile::load_for_image(&self.leg, false)?;
         let leg = if self.absolute_encoders { leg.with_absolute_encoders() } else { leg };
         let leg = if self.thermistors { leg.with_thermistors() } else { leg };
-        let options =
-            build::Options { leg: leg.clone(), log: false, brake_resistor: true, board_volts: None };
+        let options = build::Options {
+            leg: leg.clone(),
+            log: false,
+            brake_resistor: true,
+            status_light: false,
+            board_volts: None,
+        };
         let path = match &self.image {
             Some(path) => path.clone(),
             None => build::build(&options)?.image,

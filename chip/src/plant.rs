@@ -187,10 +187,10 @@ impl Axis {
         self.motor.currents()
     }
 
-    /// Torque of the motor at the joint, mean over the last mechanical step, N m.
+    /// Temperature of the winding, degrees Celsius.
     #[must_use]
-    pub fn joint_torque(&self) -> f64 {
-        self.description.ratio * self.torque
+    pub fn winding_c(&self) -> f64 {
+        self.motor.temperature()
     }
 
     /// Amplitudes of the currents along and across the magnets' axis, A.
@@ -484,6 +484,15 @@ impl Plant {
     #[must_use]
     pub fn velocity(&self) -> [f64; JOINTS] {
         core::array::from_fn(|joint| self.anatomy[joint].flip(self.state.rates[joint]))
+    }
+
+    /// Torques of the motors at the joints, mean over the last mechanical step, N m, anatomical.
+    #[must_use]
+    pub fn torque(&self) -> [f64; JOINTS] {
+        core::array::from_fn(|joint| {
+            let axis = &self.axes[joint];
+            self.anatomy[joint].flip(self.mirrored * axis.description.ratio * axis.torque)
+        })
     }
 
     /// Sets the bus and its source to a voltage at once.

@@ -70,7 +70,9 @@ impl Operator {
             session.hold_switch(true);
             self.opens = Some(now + ticks(STANDS_S));
         }
-        if has(BoardState::REFERENCED) && !self.is_in_range {
+        // The host shows that the reference, which the opened switch began, has ended.
+        let is_taken = sub == 3 && value == StepResult::Done as u8 && self.is_at_zero && self.opens.is_none();
+        if (has(BoardState::REFERENCED) || is_taken) && !self.is_in_range {
             self.is_in_range = true;
             let to = start_position(&session.leg);
             session.machine.chip_mut().plant.move_by_hand(to, now, BY_HAND_S);

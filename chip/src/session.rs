@@ -16,7 +16,7 @@ use crate::chip::{Chip, ENABLING, START};
 use crate::image::Image;
 use crate::machine::{End, Machine, Options, Snapshot};
 use crate::peripherals::rcc::ResetReason;
-use crate::plant::{JOINTS, Plant};
+use crate::plant::{Axis, JOINTS, Plant};
 use crate::rtt::{Probe, field};
 use crate::time::{Ticks, seconds, ticks};
 
@@ -50,6 +50,9 @@ pub enum Step {
     Turn,
     /// Wait until absolute encoders at the joints have set the zeros.
     Zeros,
+    /// Compare position, torque, voltage, currents and temperatures that the bus shows with the plant's own,
+    /// while the leg holds its pose.
+    Telemetry,
     /// Heat the thermistor of the first motor, then break the wire of the second's.
     Thermistors,
 }
@@ -87,6 +90,13 @@ const TIMELINE: [&str; 11] = [
     "axis_fault",
     "calibration",
 ];
+
+/// Telemetry: name, object, unit, tolerance, and the plant's own value.
+type Telemetry<'a> = (&'a str, u16, u8, f64, f64, &'a dyn Fn(&Session) -> f64);
+
+/// Readings of which the mean is compared, and longest wait for one, s.
+const READINGS: u32 = 20;
+const ANSWER_S: f64 = 0.5;
 
 /// Longest write of the flash, s.
 const STORE_S: f64 = 5.0;
@@ -232,6 +242,7 @@ impl Session {
             Step::PowerCycle => self.power_cycle(),
             Step::Turn => self.turn(),
             Step::Zeros => self.zeros(),
+            Step::Telemetry => self.telemetry(),
             Step::Thermistors => self.thermistors(),
         }
     }
@@ -333,6 +344,54 @@ impl Session {
             return Ok(());
         }
         self.wait("request", &words, 2.0).map(drop)
+    }
+
+    fn telemetry(&mut self) -> Result<(), ToolError> {
+        for joint in 0..JOINTS {
+            let node = 1 + joint as u16;
+            let rated = f64::from(self.read_object(node, 0x6076, 0, ANSWER_S)?) * 1e-6;
+            let phase = |place: usize| move |session: &Self| session.axis(joint).currents()[place];
+            let rows: [Telemetry<'_>; 7] = [
+                ("bus voltage, V", 0x6079, 0, 1e-3, 0.5, &|session| session.plant().supply.voltage()),
+                ("position, rad", 0x6064, 0, 1e-6, 1e-3, &|session| session.plant().position()[joint]),
+                ("torque, N m", 0x6077, 0, rated, 0.7, &|session| session.plant().torque()[joint]),
+                ("current of phase A, A", 0x2170, 4, 0.01, 0.3, &phase(0)),
+                ("current of phase B, A", 0x2170, 5, 0.01, 0.3, &phase(1)),
+                ("current of phase C, A", 0x2170, 6, 0.01, 0.3, &phase(2)),
+                ("winding, degrees Celsius", 0x2170, 3, 0.1, f64::INFINITY, &|session| {
+                    session.axis(joint).winding_c()
+                }),
+            ];
+            for (name, index, sub, unit, tolerance, truth) in rows {
+                let (mut shown, mut own) = (0.0, 0.0);
+                for _ in 0..READINGS {
+                    let value = self.read_object(node, index, sub, ANSWER_S)?;
+                    let is_short = index == 0x2170 || index == 0x6077;
+                    let value = if is_short { f64::from(value as i16) } else { f64::from(value as i32) };
+                    shown += unit * value / f64::from(READINGS);
+                    own += truth(self) / f64::from(READINGS);
+                }
+                println!("            node {node}: {name}: {shown:.3}, plant {own:.3}");
+                // A winding may be taken for hotter than it is: after the start it is assumed warm.
+                let is_close =
+                    if tolerance.is_finite() { (shown - own).abs() <= tolerance } else { shown >= own - 1.0 };
+                if !is_close {
+                    let why = format!(
+                        "node {node}: {name}: {shown:.3} on the bus, {own:.3} in the plant, tolerance {tolerance}"
+                    );
+                    return Err(ToolError::Refused(why));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn plant(&self) -> &Plant {
+        &self.machine.chip().plant
+    }
+
+    fn axis(&self, axis: usize) -> &Axis {
+        &self.plant().axes[axis]
     }
 
     fn thermistors(&mut self) -> Result<(), ToolError> {

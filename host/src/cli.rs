@@ -21,6 +21,7 @@ pub mod merge;
 mod model;
 mod monitor;
 mod motor;
+mod node_ids;
 mod noise;
 mod predict;
 mod regressor;
@@ -46,7 +47,7 @@ use crate::formats::shard::Argument;
 #[command(name = "scarab", version, max_term_width = HELP_WIDTH, after_help = "\
 Options without a command belong to `identify`. `scarab COMMAND --help` has an example of each.
 Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, live, excite, monitor, assist, motor, serve.
-Board: fw, flash-leg, commission, update, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
+Board: fw, flash-leg, commission, update, node-ids, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -97,6 +98,9 @@ enum Command {
     /// Bring a new image onto a board over its bus.
     #[command(after_help = "Example: cargo sim update --slcan /dev/ttyACM0 scarab-image.bin")]
     Update(update::UpdateArguments),
+    /// List the boards of a bus, and give boards with equal node-IDs others.
+    #[command(after_help = "Example: cargo sim node-ids --slcan /dev/ttyACM0 --set 0000004D=3,4")]
+    NodeIds(node_ids::NodeIdsArguments),
     /// Export and import the stored data of a board: its flash as TOML, and TOML into a flash.
     #[command(after_help = "Example: cargo sim kept export flash.bin --out kept.toml")]
     Kept(kept::KeptArguments),
@@ -216,6 +220,7 @@ fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
         Command::Serve(arguments) => serve::run(arguments),
         Command::Commission(arguments) => commission::run(arguments),
         Command::Update(arguments) => update::run(arguments),
+        Command::NodeIds(arguments) => node_ids::run(arguments),
         Command::Kept(arguments) => kept::run(arguments),
         Command::Monitor(arguments) => monitor::run(arguments),
         Command::Assist(arguments) => assist::run(arguments),

@@ -35,5 +35,6 @@ target_only! {
     pub mod program;
     mod registers;
     pub mod start;
+    pub mod status_light;
     pub mod watchdog;
 }

@@ -20,7 +20,7 @@ const SENT: [&[u32]; PDOS] = [&[0x6041_0010], &[0x6064_0020, 0x606C_0020], &[0x6
 pub struct Identity {
     /// Vendor-ID assigned by CiA; 0 if there is none.
     pub vendor: u32,
-    /// Product code.
+    /// Product code: 1 for the first joint, 2 for the second.
     pub product: u32,
     /// Revision of the bus behaviour; major number in the upper half.
     pub revision: u32,
@@ -44,6 +44,12 @@ impl Identity {
             checksum: 0,
             texts: ["Scarab joint drive", hardware, env!("CARGO_PKG_VERSION")],
         }
+    }
+
+    /// Identity of a joint's node. The nodes of a board differ in the product code only.
+    #[must_use]
+    pub const fn of(self, joint: usize) -> Self {
+        Self { product: self.product + joint as u32, ..self }
     }
 }
 

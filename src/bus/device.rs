@@ -189,8 +189,9 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         plan: Plan,
         seed: u64,
     ) -> Self {
+        let mut joints = 0..N;
         Self {
-            nodes: own.map(|number| Node::new(number, identity)),
+            nodes: own.map(|number| Node::new(number, identity.of(joints.next().unwrap_or_default()))),
             axes: constants.map(Axis::new),
             leg: LegObjects::new(plan, seed, 0, identity.checksum),
             coupling: Coupling::default(),

@@ -27,6 +27,7 @@ pub mod drive;
 mod emergency;
 mod heartbeat;
 pub mod identification;
+mod lss;
 mod nmt;
 mod node;
 mod node_id;

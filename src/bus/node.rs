@@ -1,21 +1,22 @@
 //! One CANopen node: frames and time in, frames out; no clock and no hardware.
 //!
 //! ```text
-//! on_frame(frame, now_us)  handles NMT, SYNC, SDO, heartbeats of others, received PDOs; sends nothing
+//! on_frame(frame, now_us)  handles NMT, SYNC, SDO, LSS, heartbeats of others, received PDOs; sends nothing
 //! poll(now_us)             returns the next frame to send, until there is none
-//!                          order: boot-up, emergency, heartbeat, PDO, SDO
+//!                          order: boot-up, emergency, heartbeat, LSS, PDO, SDO
 //! ```
 //!
 //! Two nodes run on one board and share only the frames. Cost of one call: an SDO request searches the table
 //! once. A received PDO writes at most eight objects. A poll reads the objects of the PDOs that are due. The
 //! number of iterations never depends on the content of a frame. Memory: docs/results/bus.md.
 //!
-//! Source: CiA 301 version 4.2. Not implemented: RTR, node guarding, TIME, LSS, NMT master, SYNC producer.
+//! Source: CiA 301 version 4.2. Not implemented: RTR, node guarding, TIME, NMT master, SYNC producer.
 
 use super::access::Dictionary;
 use super::communication::{Communication, Identity};
 use super::emergency::{ErrorReport, Source};
 use super::heartbeat::Change;
+use super::lss::{self, Lss, Setting};
 use super::nmt::{self, Command, NmtState, Reset};
 use super::node_id::NodeId;
 use super::objects::{Lost, Objects};
@@ -76,6 +77,7 @@ pub enum FrameEffect {
 pub struct Node {
     communication: Communication,
     server: Server,
+    lss: Lss,
     /// Next PDO to check; round robin, so that no PDO starves.
     next_pdo: usize,
     /// Extent of the reset since the last boot-up message.
@@ -89,6 +91,7 @@ impl Node {
         Self {
             communication: Communication::new(node, identity),
             server: Server::IDLE,
+            lss: Lss::default(),
             next_pdo: 0,
             pending_reset: None,
         }
@@ -128,6 +131,10 @@ impl Node {
                     Some(command) => self.obey(command, objects),
                 }
             }
+            lss::REQUEST => match frame.full() {
+                Some(request) => self.set_layer(request, objects),
+                None => return FrameEffect::Nothing,
+            },
             id if u32::from(id) == self.communication.sync => self.synchronise(frame, now_us, objects),
             id if id == node.on(0x600) => {
                 if let (true, Some(request)) = (self.communication.state.serves(), frame.full()) {
@@ -174,6 +181,9 @@ impl Node {
         if communication.heartbeat.is_due(1000 * u64::from(communication.heartbeat_ms), now_us) {
             return Some(Frame::new(node.on(nmt::HEARTBEAT), &[communication.state as u8]));
         }
+        if let Some(answer) = self.lss.take_answer() {
+            return Some(Frame::new(lss::ANSWER, &answer));
+        }
         let pdo = self.transmit(now_us, objects);
         if pdo.is_some() {
             return pdo;
@@ -209,6 +219,11 @@ impl Node {
     /// Handles a change of the store's state.
     pub fn on_store(&mut self, storing: Storing) {
         self.communication.emergency.set(Source::Store, storing.error());
+    }
+
+    /// Handles the outcome of a store request.
+    pub(super) fn stored(&mut self, is_done: bool) {
+        self.lss.stored(is_done);
     }
 
     /// Restores the board's conditions after a reset, so that hosts receive their messages again.
@@ -247,6 +262,16 @@ impl Node {
                 }
                 self.pending_reset = Some(reset);
             }
+        }
+    }
+
+    /// Handles a request of the layer setting services.
+    fn set_layer<O: Objects>(&mut self, request: [u8; 8], objects: &mut O) {
+        let Communication { node, identity, .. } = &self.communication;
+        match self.lss.request(request, identity, *node) {
+            Some(Setting::Write(object, value)) => self.lss.written(objects.write(object, value).is_ok()),
+            Some(Setting::Store) if objects.store(false).is_err() => self.lss.stored(false),
+            Some(Setting::Store) | None => {}
         }
     }
 

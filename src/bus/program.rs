@@ -97,7 +97,9 @@ impl ProgramError {
             Self::Checksum => "the image is damaged: its check sum differs",
             Self::NotCleared => "bytes came before the space was cleared, or more than fit",
             Self::Write => "the flash did not take a change",
-            Self::Forbidden => "not now: the drive is on, or motors brake",
+            Self::Forbidden => {
+                "not now: the drive is on, motors brake, the watchdog does not take its longer time, or a simulated board"
+            }
         }
     }
 }

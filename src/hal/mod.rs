@@ -142,6 +142,8 @@ pub trait Hardware<const N: usize> {
     fn set_brake(&mut self, duty: f32);
     /// Releases or engages the holding brake; [`Self::disable_all`] engages it too.
     fn set_holding_brake(&mut self, released: bool);
+    /// Switches the status light, if there is one.
+    fn set_status_light(&mut self, is_lit: bool);
     /// Requests the servo's tick, to run as soon as the current tick ends.
     fn pend_servo(&mut self);
     /// Requests a round of the bus, to run as soon as the levels above it are done.

@@ -29,11 +29,13 @@ use super::contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
 use super::encoders::{EncoderCheck, EncoderSettings};
 use super::queues::HousekeepingEnds;
 use super::signals::{I2T_UNIT, Signals};
+use super::status_light::{LightInputs, StatusLight};
 use crate::bus::commissioning::{BoardState, CommissioningStep, StepReport, StepResult};
+use crate::bus::program::ProgramStatus;
 use crate::hal::{AxisSample, Contacts, Hardware};
 use crate::leg::{
     AssistShares, AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Mismatch,
-    MotorFindings, PowerRequest, StoredCalibration,
+    MotorFindings, Permission, PowerRequest, StoredCalibration,
 };
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, EncoderSetting, JointZero};
 use crate::safety::{
@@ -221,6 +223,7 @@ impl<const N: usize> Housekeeper<N> {
         signals.set_permits(self.permits());
         self.report_step(signals);
         signals.set_board_state(self.board_state(signals));
+        hardware.set_status_light(StatusLight::of(&self.light_inputs(signals)).is_lit(self.round));
     }
 
     fn act(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
@@ -258,6 +261,22 @@ impl<const N: usize> Housekeeper<N> {
     /// Returns whether the operator permits enabling, by contact or host; never during a reset.
     fn permits(&self) -> bool {
         self.resetting.is_none() && self.operator.holds()
+    }
+
+    fn light_inputs(&self, signals: &Signals<N>) -> LightInputs {
+        LightInputs {
+            is_on: signals.permission() != Permission::Off,
+            is_calibrating: self.calibrating.is_some(),
+            is_inhibited: self.is_blocked(signals),
+            is_on_trial: signals.program_status().has(ProgramStatus::ON_TRIAL),
+            is_calibrated: self.is_calibrated(),
+            is_referenced: signals.has_begun(),
+        }
+    }
+
+    /// Whether an inhibit reason is set, or the drive has a fault.
+    fn is_blocked(&self, signals: &Signals<N>) -> bool {
+        !signals.inhibit.is_clear() || matches!(self.drive, Some(DriveState::Fault { .. }))
     }
 
     fn board_state(&self, signals: &Signals<N>) -> BoardState {
@@ -309,8 +328,7 @@ impl<const N: usize> Housekeeper<N> {
         Situation {
             enabling,
             start,
-            blocked: !level.signals.inhibit.is_clear()
-                || matches!(self.drive, Some(DriveState::Fault { .. })),
+            blocked: self.is_blocked(level.signals),
             calibrated: self.is_calibrated(),
             calibrating: self.calibrating.is_some(),
             referenced: level.signals.has_begun(),

@@ -37,6 +37,7 @@ mod mailboxes;
 mod queues;
 mod servo;
 mod signals;
+mod status_light;
 mod storing;
 #[cfg(test)]
 mod testing;

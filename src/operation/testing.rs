@@ -135,6 +135,8 @@ pub(super) struct TestHardware<const N: usize> {
     pub brake: f32,
     /// The holding brake is released.
     pub holding_brake_released: bool,
+    /// The status light is lit.
+    pub is_lit: bool,
     pub servo_pended: u32,
     pub bus_pended: u32,
     /// Requests of the assistance.
@@ -180,6 +182,7 @@ impl<const N: usize> TestHardware<N> {
             bridges: [AxisCommand::OFF; N],
             brake: 0.0,
             holding_brake_released: false,
+            is_lit: false,
             servo_pended: 0,
             bus_pended: 0,
             assist_pended: 0,
@@ -279,6 +282,9 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     fn set_holding_brake(&mut self, released: bool) {
         self.access();
         self.holding_brake_released = released;
+    }
+    fn set_status_light(&mut self, is_lit: bool) {
+        self.is_lit = is_lit;
     }
     fn pend_servo(&mut self) {
         self.access();

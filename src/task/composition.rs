@@ -13,7 +13,7 @@ use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
-use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, program, watchdog};
+use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, program, status_light, watchdog};
 use crate::board::{stack, windings};
 use crate::bus::drive::AxisConstants;
 use crate::bus::{LONGEST, NodeId, Storing};
@@ -112,6 +112,7 @@ fn hand_out(
             let level = ServoLevel::new(&control, drives::derating(divider), volt_per_code, following)
                 .with_supply(leg::LEG.supply)
                 .with_holding_brake(leg::LEG.holding_brake);
+            const { assert!(!status_light::HAS_LIGHT || leg::LEG.holding_brake.is_none(), "both use GPIO6") };
             if leg::LEG.holding_brake.is_some() {
                 holding_brake::prepare();
             }

@@ -24,6 +24,9 @@ pub struct ImageOptions {
     /// Use the brake resistor that is connected.
     #[arg(long)]
     brake_resistor: bool,
+    /// Use the status light that is connected to GPIO6.
+    #[arg(long)]
+    status_light: bool,
     /// Voltage of a board without a factory version: 24 or 56. A board with a version keeps its own.
     #[arg(long, value_name = "V", value_parser = board_volts)]
     board_volts: Option<u8>,
@@ -39,10 +42,17 @@ fn board_volts(text: &str) -> Result<u8, String> {
 
 impl ImageOptions {
     fn load(&self) -> Result<Options, ToolError> {
+        let leg = self.leg.load_for_image()?;
+        if self.status_light && leg.brake.is_some() {
+            return Err(ToolError::input(
+                "--status-light: GPIO6 is the pin of the holding brake in the leg file; a leg has one of them",
+            ));
+        }
         Ok(Options {
-            leg: self.leg.load_for_image()?,
+            leg,
             log: self.log,
             brake_resistor: self.brake_resistor,
+            status_light: self.status_light,
             board_volts: self.board_volts,
         })
     }

@@ -24,6 +24,10 @@ pub struct ServeArguments {
     /// Number of boards on the bus, each with this leg.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
     legs: u8,
+    /// All boards have the node-IDs of a new board, as in a box of delivered ones. Otherwise those of the next
+    /// board follow.
+    #[arg(long)]
+    new: bool,
     /// Simulated seconds per second.
     #[arg(long, value_name = "K", default_value_t = 1.0)]
     speed: f64,
@@ -62,6 +66,7 @@ pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
     let options = ServeOptions {
         address: arguments.slcan,
         legs: arguments.legs.into(),
+        are_new: arguments.new,
         speed: arguments.speed,
         flash: arguments.flash.as_deref().map(Path::to_owned),
         seed: arguments.seed,

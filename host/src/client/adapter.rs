@@ -25,7 +25,12 @@ impl Adapter {
                 .map_err(|error| failed(adapter, &error));
         }
         let refused = |error: std::io::Error| {
-            ToolError::input(format!("--slcan: {adapter}: {error}; it must be HOST:PORT or a serial device"))
+            let advice = if adapter.contains(':') {
+                "does a program serve that port?"
+            } else {
+                "it must be HOST:PORT or a serial device"
+            };
+            ToolError::input(format!("--slcan: {adapter}: {error}; {advice}"))
         };
         let stream = TcpStream::connect(adapter).map_err(refused)?;
         stream.set_nodelay(true).map_err(refused)?;

@@ -34,6 +34,8 @@ const SEGMENT: usize = 7;
 const REQUEST: u16 = 0x600;
 const ANSWER: u16 = 0x580;
 const EMERGENCY: u16 = 0x80;
+/// COB-IDs of the layer setting services.
+const LSS: [u16; 2] = [0x7E5, 0x7E4];
 /// Node-ID of this host, and interval of its heartbeats.
 pub const HOST: u8 = 0x70;
 const HEARTBEAT: Duration = Duration::from_millis(100);
@@ -79,16 +81,27 @@ impl RequestError {
         *self == Self::Aborted(abort.code())
     }
 
+    /// Error of the bus as a whole.
+    #[must_use]
+    pub fn of_bus(self) -> ToolError {
+        match self {
+            Self::Adapter(why) => {
+                ToolError::input(format!("--slcan: {why}; run the command again once the board answers"))
+            }
+            Self::Silent | Self::Aborted(_) => ToolError::input("no answer on the bus"),
+        }
+    }
+
     /// Error with the node and the object.
     #[must_use]
     pub fn of(self, node: u8, Object(index, sub): Object) -> ToolError {
         let why = match self {
             Self::Aborted(code) => format!("refused with abort code {code:08X}"),
             Self::Silent => format!(
-                "no answer within {} s: is the board powered, the bit rate right, the bus terminated?",
+                "no answer within {} s: is the board powered, the bit rate right, the bus terminated? `node-ids` lists the boards",
                 PATIENCE.as_secs()
             ),
-            Self::Adapter(why) => why,
+            Self::Adapter(why) => return Self::Adapter(why).of_bus(),
         };
         ToolError::input(format!("node {node}, object {index:04X}:{sub}: {why}"))
     }
@@ -219,6 +232,39 @@ impl Client {
             return Ok(data);
         }
         Err(RequestError::Silent)
+    }
+
+    /// Sends requests of the layer setting services, each a service and its number, and waits for an answer
+    /// with the service `answer`: its number, or `None` if no node answers in time.
+    ///
+    /// # Errors
+    /// The adapter failed.
+    pub fn lss(
+        &mut self,
+        requests: &[(u8, u32)],
+        answer: u8,
+        time: Duration,
+    ) -> Result<Option<u32>, RequestError> {
+        self.receive(Instant::now(), |_| false)?;
+        let [to, from] = LSS;
+        for (service, number) in requests {
+            let [a, b, c, d] = number.to_le_bytes();
+            self.send(&Frame::new(to, &[*service, a, b, c, d, 0, 0, 0]))?;
+        }
+        let answers = |frame: &Frame| frame.id() == from && frame.data().first() == Some(&answer);
+        let found = self.receive(Instant::now() + time, answers)?;
+        Ok(found.and_then(|frame| {
+            let number = frame.data().get(1..5)?.try_into().ok()?;
+            Some(u32::from_le_bytes(number))
+        }))
+    }
+
+    /// Sends a network management command to a node.
+    ///
+    /// # Errors
+    /// The adapter failed.
+    pub fn manage(&mut self, node: u8, command: u8) -> Result<(), RequestError> {
+        self.send(&Frame::new(0, &[command, node]))
     }
 
     /// Reads the bytes of an object.

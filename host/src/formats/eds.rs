@@ -47,7 +47,7 @@ fn objects() -> BTreeMap<u16, BTreeMap<u8, Part>> {
 }
 
 fn write_all(out: &mut String, joint: &str) -> fmt::Result {
-    let (identity, [date, time]) = (Identity::scarab(0, ""), CHANGED);
+    let (identity, [date, time]) = (Identity::scarab(0, "").of(usize::from(joint == "knee")), CHANGED);
     writeln!(
         out,
         "[FileInfo]\nFileName=scarab-{joint}.eds\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0\nDescription=Scarab joint drive, {joint}\n\
@@ -60,7 +60,7 @@ fn write_all(out: &mut String, joint: &str) -> fmt::Result {
         "[DeviceInfo]\nVendorName=Scarab\nVendorNumber={:#010X}\nProductName=Scarab {joint}\nProductNumber={:#010X}\nRevisionNumber={:#010X}\n\
          BaudRate_10=0\nBaudRate_20=0\nBaudRate_50=0\nBaudRate_125=1\nBaudRate_250=1\nBaudRate_500=1\nBaudRate_800=0\nBaudRate_1000=1\n\
          SimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\nDynamicChannelsSupported=0\nGroupMessaging=0\nNrOfRXPDO=4\nNrOfTXPDO=4\n\
-         LSS_Supported=0\n",
+         LSS_Supported=1\n",
         identity.vendor, identity.product, identity.revision
     )?;
     // Dummy entries for received PDOs: INTEGER8 to UNSIGNED32.

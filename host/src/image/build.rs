@@ -31,6 +31,8 @@ pub struct Options {
     pub log: bool,
     /// Whether a brake resistor is connected.
     pub brake_resistor: bool,
+    /// Whether a status light is connected.
+    pub status_light: bool,
     /// Voltage of a board without a factory version.
     pub board_volts: Option<u8>,
 }
@@ -66,6 +68,9 @@ pub fn build(options: &Options) -> Result<Built, ToolError> {
     command.args(IMAGE.split(' ')).env("SCARAB_LEG", constant);
     if options.brake_resistor {
         command.env("SCARAB_BRAKE_RESISTOR", "1");
+    }
+    if options.status_light {
+        command.env("SCARAB_STATUS_LIGHT", "1");
     }
     if let Some(volts) = options.board_volts {
         command.env("SCARAB_BOARD_VOLTS", volts.to_string());

@@ -15,7 +15,7 @@
 use std::time::{Duration, Instant};
 
 use scarab::bus::commissioning::{BoardState, CommissioningStep, StepResult};
-use scarab::bus::{Abort, Frame};
+use scarab::bus::{Abort, Frame, Identity};
 use scarab::leg::{CalibrationRefusal, JOINTS, Parameter, Reason, RefusalReason};
 use scarab::model::planar::BASE;
 use scarab::safety::{InhibitReason, NoticeCode};
@@ -136,10 +136,6 @@ fn refused(words: impl Into<String>) -> ToolError {
     ToolError::Refused(words.into())
 }
 
-fn adapter(error: RequestError) -> ToolError {
-    error.of(0, Object(0, 0))
-}
-
 /// Words of the inhibit reasons in a bit mask.
 fn inhibits(causes: u32) -> String {
     let names = InhibitReason::ALL.into_iter().filter(|cause| causes & cause.bit() != 0);
@@ -219,7 +215,7 @@ impl<'a> Commission<'a> {
     }
 
     fn wait(&mut self, time: Duration) -> Result<(), ToolError> {
-        self.client.wait(time).map_err(adapter)
+        self.client.wait(time).map_err(RequestError::of_bus)
     }
 
     fn has(&mut self, state: u8) -> Result<bool, ToolError> {
@@ -250,13 +246,20 @@ impl<'a> Commission<'a> {
     fn find(&mut self) -> Result<String, ToolError> {
         for node in self.options.nodes {
             // Network management: start the node.
-            self.client.send(&Frame::new(0, &[1, node])).map_err(adapter)?;
+            self.client.send(&Frame::new(0, &[1, node])).map_err(RequestError::of_bus)?;
         }
         let mut serials = Vec::new();
-        for node in self.options.nodes {
+        for (joint, node) in self.options.nodes.into_iter().enumerate() {
             let kind = self.client.read(node, Object(0x1000, 0))?;
             if kind & 0xFFFF != 402 {
                 return Err(refused(format!("node {node} is no drive of CiA 402: device type {kind:08X}")));
+            }
+            let product = self.client.read(node, Object(0x1018, 2))?;
+            if product != Identity::scarab(0, "").of(joint).product {
+                return Err(refused(format!(
+                    "node {node} is not the {}: its product code (1018:2) is {product}; hip has 1, knee 2; --nodes takes the hip's first",
+                    ["hip", "knee"][joint]
+                )));
             }
             serials.push(self.client.read(node, Object(0x1018, 4))?);
             if let Err(error) = self.client.bytes(node, COMMAND) {
@@ -275,14 +278,14 @@ impl<'a> Commission<'a> {
         self.report.serial = serials[0];
         if serials.iter().any(|serial| *serial != serials[0]) {
             return Err(refused(format!(
-                "nodes {:?} are on different boards: serial numbers {serials:08X?}",
-                self.options.nodes
+                "nodes {} and {} are on different boards: serial numbers {:08X} and {:08X}",
+                self.options.nodes[0], self.options.nodes[1], serials[0], serials[1]
             )));
         }
         let CommissionReport { device, firmware, serial, .. } = &self.report;
+        let [hip, knee] = self.options.nodes;
         Ok(format!(
-            "{device}, firmware {firmware}, serial number {serial:08X}, nodes {:?}",
-            self.options.nodes
+            "{device}, firmware {firmware}, serial number {serial:08X}, hip node {hip}, knee node {knee}"
         ))
     }
 
@@ -580,7 +583,9 @@ impl<'a> Commission<'a> {
         self.wait(LOOK)?;
         self.read_results()?;
         match self.report.verdict {
-            Some("accepted") => Ok(format!("accepted; {before} models were accepted on this board before")),
+            Some("accepted") => {
+                Ok(format!("accepted; number of models accepted on this board before: {before}"))
+            }
             Some(_) => {
                 Err(refused(format!("the identification is refused: {}", self.report.reasons.join(", "))))
             }

@@ -16,6 +16,7 @@ pub mod logging_errors;
 pub mod model_choice;
 pub mod monitor;
 pub mod motor;
+pub mod node_ids;
 pub mod predict;
 pub mod regressor;
 pub mod replay;

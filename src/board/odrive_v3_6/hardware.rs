@@ -5,7 +5,7 @@ use spin::Mutex;
 
 use super::gate_driver::GateDrivers;
 use super::settings::analog::temperature_c;
-use super::{brake, bridge, can, contacts, converter, encoder, holding_brake, interrupts, watchdog};
+use super::{brake, bridge, can, contacts, converter, encoder, holding_brake, interrupts, status_light, watchdog};
 use crate::hal::{Contacts, Controller, EncoderPlace, Frame, Hardware};
 
 /// Gate drivers, available after the start; only the housekeeping uses them.
@@ -64,6 +64,10 @@ impl Hardware<2> for Odrive {
 
     fn set_holding_brake(&mut self, released: bool) {
         holding_brake::set(released);
+    }
+
+    fn set_status_light(&mut self, is_lit: bool) {
+        status_light::set(is_lit);
     }
 
     #[inline(always)]

@@ -18,14 +18,30 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         self.recall_reset();
     }
 
-    /// Node-IDs according to these parameters; `None` if two nodes would share one.
-    fn numbers(&self, stored: &[StoredNode; N]) -> Option<[NodeId; N]> {
+    /// Node-IDs according to these parameters.
+    fn numbers(&self, stored: &[StoredNode; N]) -> [NodeId; N] {
         let mut numbers = self.own;
         for (number, stored) in numbers.iter_mut().zip(stored) {
             *number = stored_node_id(stored.bytes()).unwrap_or(*number);
         }
-        let is_other = |place: usize, number| numbers.iter().skip(place + 1).all(|other| other != number);
-        numbers.iter().enumerate().all(|(place, number)| is_other(place, number)).then_some(numbers)
+        numbers
+    }
+
+    /// Node-IDs after the pending resets: of a reset node the stored one, after a communication reset the one
+    /// that a host has set since. The present ones if two nodes would share one.
+    fn numbers_after_reset(&self) -> [NodeId; N] {
+        let present = self.nodes.each_ref().map(Node::id);
+        let mut next = present;
+        let stored = self.numbers(&self.stored);
+        let nodes = next.iter_mut().zip(&self.pending_reset).zip(stored).zip(self.own).zip(&self.axes);
+        for ((((number, reset), stored), own), axis) in nodes {
+            match reset {
+                Some(Reset::Node) => *number = stored,
+                Some(Reset::Communication) => *number = axis.node_id().unwrap_or(own),
+                None => {}
+            }
+        }
+        if are_distinct(&next) { next } else { present }
     }
 
     /// Restarts the nodes that were reset, with their stored parameters.
@@ -33,7 +49,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         if self.pending_reset.iter().all(Option::is_none) {
             return;
         }
-        let numbers = self.numbers(&self.stored).unwrap_or(self.own);
+        let numbers = self.numbers_after_reset();
         for (joint, number) in numbers.into_iter().enumerate() {
             let Some(reset) = self.pending_reset.get_mut(joint).and_then(Option::take) else { continue };
             let (Some(node), Some(axis), Some(stored)) =
@@ -43,7 +59,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             };
             // A reset node already has its initial state, except for its node-ID.
             if node.id() != number || node.state() != NmtState::Initialising {
-                *node = Node::new(number, self.identity);
+                *node = Node::new(number, self.identity.of(joint));
             }
             node.recall(stored.bytes(), reset, axis);
             node.goes_on(self.controller, self.storing);
@@ -74,10 +90,11 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
                 fits &= node.store_into(axis, stored).is_ok();
             }
         }
-        if !fits || self.numbers(into).is_none() {
+        if !fits || !are_distinct(&self.numbers(into)) {
             // All or nothing. The detour by `Busy` reports a repeated failure again.
             self.storing(Storing::Busy);
             self.storing(Storing::Failed);
+            self.nodes.iter_mut().for_each(|node| node.stored(false));
             return None;
         }
         Some(if defaults { StoreCommand::Defaults } else { StoreCommand::All })
@@ -90,7 +107,10 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             self.stored = *objects;
         }
         // No frame was received during the flash write, and a board's clock did not advance.
-        self.nodes.iter_mut().for_each(|node| node.stood_still(self.looked_us));
+        for node in &mut self.nodes {
+            node.stood_still(self.looked_us);
+            node.stored(done);
+        }
         self.storing(if done { Storing::Done } else { Storing::Failed });
     }
 
@@ -112,4 +132,10 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     pub fn bit_rate(&self) -> Option<u16> {
         self.stored.iter().find_map(|stored| stored_bit_rate(stored.bytes()))
     }
+}
+
+/// Whether no two nodes share a node-ID.
+fn are_distinct(numbers: &[NodeId]) -> bool {
+    let is_other = |place: usize, number| numbers.iter().skip(place + 1).all(|other| other != number);
+    numbers.iter().enumerate().all(|(place, number)| is_other(place, number))
 }

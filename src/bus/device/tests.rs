@@ -8,6 +8,7 @@ use crate::bus::drive::Mode;
 use crate::bus::identification::ResultsCopy;
 use crate::units::{Ampere, NewtonMetre};
 
+mod lss;
 mod program;
 mod storage;
 
@@ -33,6 +34,10 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        Self::with(IDENTITY)
+    }
+
+    fn with(identity: Identity) -> Self {
         let constants = AxisConstants {
             rated_torque: NewtonMetre(40.0),
             rated_current: Ampere(20.0),
@@ -40,7 +45,7 @@ impl Bench {
             ..AxisConstants::UNKNOWN
         };
         let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
-        let device = Device::new(own, IDENTITY, [constants; 2], Plan::OneTime, 1);
+        let device = Device::new(own, identity, [constants; 2], Plan::OneTime, 1);
         let mut bench = Self {
             device,
             drive: DriveState::SwitchOnDisabled,

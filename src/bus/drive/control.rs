@@ -30,6 +30,7 @@
 use super::coupling::level;
 use super::{ImpedanceTarget, JointCommand, JointStatus, Mode, SetPoint, Target};
 use crate::bus::emergency::ErrorReport;
+use crate::bus::node_id::NodeId;
 use crate::bus::objects::Lost;
 use crate::leg::{DriveEvent, DriveState, FaultCode, JointConfiguration, PowerRequest, RefusalReason};
 use crate::units::{
@@ -250,6 +251,12 @@ impl Axis {
     /// Takes over the leg's status. Call [`Coupling::power`](super::Coupling::power) afterwards.
     pub fn update(&mut self, status: &JointStatus) {
         self.status = *status;
+    }
+
+    /// Returns object 2001; `None` if it is 0, the board's own.
+    #[must_use]
+    pub const fn node_id(&self) -> Option<NodeId> {
+        NodeId::new(self.settings.node_id)
     }
 
     /// Returns object 2002.

@@ -217,6 +217,27 @@ fn a_stored_calibration_outlives_a_load_or_a_hand() {
 }
 
 #[test]
+fn the_status_light_shows_what_the_board_waits_for() {
+    let flashes = |bench: &mut Bench| {
+        let mut lit = Vec::new();
+        for _ in 0..2 * RATE_HZ {
+            bench.round();
+            lit.push(bench.hardware.is_lit);
+        }
+        // A cycle of the light, from wherever the rounds began.
+        (0..lit.len()).filter(|round| lit[*round] && !lit[(round + lit.len() - 1) % lit.len()]).count()
+    };
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
+    assert_eq!(flashes(&mut bench), 3);
+    let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
+    assert_eq!(flashes(&mut bench), 2);
+    bench.signals.begin_servo();
+    assert_eq!(flashes(&mut bench), 1);
+    bench.signals.inhibit.raise(InhibitReason::EmergencyStop);
+    assert_eq!(flashes(&mut bench), 4);
+}
+
+#[test]
 fn an_erased_or_foreign_calibration_is_not_used() {
     let stored = measured().stored().expect("an index");
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));

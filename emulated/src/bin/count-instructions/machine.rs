@@ -126,6 +126,7 @@ impl Hardware<2> for Machine {
     }
 
     fn set_holding_brake(&mut self, _: bool) {}
+    fn set_status_light(&mut self, _: bool) {}
 
     #[inline(always)]
     fn pend_servo(&mut self) {

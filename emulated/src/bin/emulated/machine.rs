@@ -18,6 +18,7 @@ impl Hardware<JOINTS> for Machine {
     fn enable(&mut self, _: usize) {}
     fn set_brake(&mut self, _: f32) {}
     fn set_holding_brake(&mut self, _: bool) {}
+    fn set_status_light(&mut self, _: bool) {}
     fn pend_servo(&mut self) {
         vectors::pend_servo();
     }

@@ -26,7 +26,7 @@ use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
-use crate::rig::bus::board::Board;
+use crate::rig::bus::board::{Board, Label};
 use crate::rig::bus::host::Host;
 use crate::rig::faulty_board::PERIOD_MS;
 
@@ -81,7 +81,7 @@ fn base(leg: &LegFile, blind: bool) -> Result<Host, ToolError> {
     for motor in believed.joints.iter_mut().filter_map(|joint| joint.motor.as_mut()).filter(|_| blind) {
         (motor.absolute_encoder, motor.joint_encoder) = (false, None);
     }
-    let mut base = Host::new(Board::new(&motors, context(&believed)?, 1, 1, Memory::new(None))?);
+    let mut base = Host::new(Board::new(&motors, context(&believed)?, 1, Label::SINGLE, Memory::new(None))?);
     base.begin()?;
     base.move_leg(leg)?;
     Ok(base)

@@ -16,7 +16,7 @@ use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
-use crate::rig::bus::board::Board;
+use crate::rig::bus::board::{Board, Label};
 use crate::rig::bus::host::Host;
 use crate::rig::faulty_board::Rig;
 use crate::rig::options::{DriveModel, SimulationOptions};
@@ -35,7 +35,7 @@ const BATCH: usize = 64;
 
 /// A board with an operator who holds the switch, alone on its bus.
 pub(super) fn board(leg: &LegFile) -> Result<Board<JOINTS, BASE>, ToolError> {
-    Board::new(leg, context(leg)?, 1, 1, Memory::new(None))
+    Board::new(leg, context(leg)?, 1, Label::SINGLE, Memory::new(None))
 }
 
 /// Context of such a board.

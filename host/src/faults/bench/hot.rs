@@ -39,7 +39,7 @@ use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
-use crate::rig::bus::board::Board;
+use crate::rig::bus::board::{Board, Label};
 use crate::rig::bus::host::{Host, NODES};
 use crate::rig::faulty_board::PERIOD_MS;
 
@@ -119,7 +119,7 @@ fn warmed(leg: &LegFile, kelvin_per_watt: f64, time_s: f64) -> LegFile {
 
 /// A host that moves a leg for some seconds; `believed` is the firmware's leg file, `motors` the plant's.
 fn moving(leg: &LegFile, motors: &LegFile, believed: &LegFile, seconds: f64) -> Result<Host, ToolError> {
-    let mut base = Host::new(Board::new(motors, context(believed)?, 1, 1, Memory::new(None))?);
+    let mut base = Host::new(Board::new(motors, context(believed)?, 1, Label::SINGLE, Memory::new(None))?);
     base.begin()?;
     base.move_leg(leg)?;
     for node in NODES {

@@ -24,7 +24,7 @@ use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
-use crate::rig::bus::board::Board;
+use crate::rig::bus::board::{Board, Label};
 use crate::rig::bus::host::{Host, NODES, Speaks};
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
@@ -62,7 +62,7 @@ fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
             (joint.low, joint.high) = (joint.low - WIDENED, joint.high + WIDENED);
         }
     }
-    let mut base = Host::new(Board::new(leg, context, 1, 1, Memory::new(None))?);
+    let mut base = Host::new(Board::new(leg, context, 1, Label::SINGLE, Memory::new(None))?);
     base.begin()?;
     base.move_leg(leg)?;
     // A returning joint is driven outside its range.

@@ -29,7 +29,7 @@ use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
-use crate::rig::bus::board::Board;
+use crate::rig::bus::board::{Board, Label};
 use crate::rig::bus::host::{Host, NODES};
 
 /// Servo ticks per second, and per millisecond.
@@ -107,7 +107,7 @@ fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
             continue;
         }
         let leg = random_leg(leg, number);
-        let mut base = Host::new(Board::new(&leg, context(&leg)?, 1, 1, Memory::new(None))?);
+        let mut base = Host::new(Board::new(&leg, context(&leg)?, 1, Label::SINGLE, Memory::new(None))?);
         base.begin()?;
         base.move_leg(&leg)?;
         for node in NODES {

@@ -183,6 +183,8 @@ impl<const N: usize> Hardware<N> for Registers<N> {
         self.holding_brake = released;
     }
 
+    fn set_status_light(&mut self, _: bool) {}
+
     fn pend_servo(&mut self) {
         self.servo_due = true;
     }

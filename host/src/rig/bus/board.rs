@@ -61,6 +61,20 @@ fn hold_the_switch<const N: usize, const B: usize>(rig: &mut Rig<N, B>) {
     run(HOLDS, Some(PowerRequest::DisableVoltage));
 }
 
+/// What distinguishes boards that run the same firmware.
+#[derive(Clone, Copy, Debug)]
+pub struct Label {
+    /// Default node-ID of the first node.
+    pub first: u8,
+    /// Serial number.
+    pub serial: u32,
+}
+
+impl Label {
+    /// A single board.
+    pub const SINGLE: Self = Self { first: 1, serial: 1 };
+}
+
 /// Default node-ID of a joint.
 fn own_number(first: u8, joint: usize) -> NodeId {
     const FIRST: NodeId = NodeId::new(1).expect("a number");
@@ -71,7 +85,7 @@ fn own_number(first: u8, joint: usize) -> NodeId {
 fn device<const N: usize, const B: usize>(
     context: &Context<N, B>,
     encoders: &[EncoderFile; N],
-    first: u8,
+    label: Label,
 ) -> Device<N, LOG> {
     let configuration = &context.configuration;
     let constants = core::array::from_fn(|joint| {
@@ -79,8 +93,8 @@ fn device<const N: usize, const B: usize>(
         AxisConstants::of(&configuration.joints[joint], encoder.counts, encoder.ratio as f32)
     });
     Device::new(
-        core::array::from_fn(|joint| own_number(first, joint)),
-        Identity::scarab(u32::from(first), "simulated"),
+        core::array::from_fn(|joint| own_number(label.first, joint)),
+        Identity::scarab(label.serial, "simulated"),
         constants,
         configuration.plan,
         configuration.swarm_seed,
@@ -96,26 +110,25 @@ pub struct Board<const N: usize, const B: usize> {
     memory: Memory,
     context: Context<N, B>,
     flashing: Flashing<N>,
-    /// Default node-ID of the first node.
-    first: u8,
+    label: Label,
     encoders: [EncoderFile; N],
 }
 
 impl<const N: usize, const B: usize> Board<N, B> {
-    /// Creates a board with default node-IDs from `first` on; stored ones have precedence. The operator holds
-    /// the switch.
+    /// Creates a board with the label's default node-IDs; stored ones have precedence. The operator holds the
+    /// switch.
     pub fn new(
         leg: &LegFile,
         context: Context<N, B>,
         seed: u64,
-        first: u8,
+        label: Label,
         memory: Memory,
     ) -> Result<Self, ToolError> {
         let mut rig = Rig::on_a_bus(leg, &context, seed)?;
         hold_the_switch(&mut rig);
         let encoders = core::array::from_fn(|joint| leg.joints[joint].encoder);
-        let device = device(&context, &encoders, first);
-        let mut board = Self { rig, device, memory, context, flashing: Flashing::new(), first, encoders };
+        let device = device(&context, &encoders, label);
+        let mut board = Self { rig, device, memory, context, flashing: Flashing::new(), label, encoders };
         for why in board.recall() {
             eprintln!("warning: {why}");
         }
@@ -125,7 +138,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
     /// Simulates a power cycle: only the content of the flash remains.
     pub fn power_on(&mut self) {
         self.rig.power_on();
-        self.device = device(&self.context, &self.encoders, self.first);
+        self.device = device(&self.context, &self.encoders, self.label);
         self.flashing = Flashing::new();
         self.recall();
     }

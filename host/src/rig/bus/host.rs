@@ -334,7 +334,7 @@ mod tests {
     fn host(leg: &LegFile) -> Host {
         let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
         let context = Context::<JOINTS, BASE>::new(leg, &options).expect("a leg");
-        Host::new(Board::new(leg, context, 1, 1, Memory::new(None)).expect("a board"))
+        Host::new(Board::new(leg, context, 1, Label::SINGLE, Memory::new(None)).expect("a board"))
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::formats::kept_file::memory::{BYTES, Memory};
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::adapter::{Adapter, Dropped, MOST_AGE};
 use crate::rig::bus::alarms::Alarms;
-use crate::rig::bus::board::Board;
+use crate::rig::bus::board::{Board, Label};
 use crate::rig::bus::network::Network;
 use crate::rig::bus::pace::{Pace, judge, reachable};
 use crate::rig::bus::server::{Event, Server, What};
@@ -35,6 +35,8 @@ pub struct ServeOptions {
     pub address: SocketAddr,
     /// Number of boards on the bus, each with a leg.
     pub legs: usize,
+    /// All boards have the node-IDs of a new one.
+    pub are_new: bool,
     /// Simulated seconds per second.
     pub speed: f64,
     /// File of the boards' flash, which persists after the process.
@@ -57,8 +59,9 @@ pub fn network<const N: usize, const B: usize>(
     let mut boards = Vec::new();
     for place in 0..options.legs {
         let memory = Memory::new(flash.and_then(|bytes| bytes.get(place * BYTES..(place + 1) * BYTES)));
-        let (seed, first) = (options.seed + place as u64, (1 + place * N) as u8);
-        boards.push(Board::new(leg, context.clone(), seed, first, memory)?);
+        let first = if options.are_new { 1 } else { 1 + place * N };
+        let label = Label { first: first as u8, serial: 1 + place as u32 };
+        boards.push(Board::new(leg, context.clone(), options.seed + place as u64, label, memory)?);
     }
     Ok(Network::new(boards, options.bits_per_s))
 }

@@ -107,6 +107,9 @@ pub const PINS: [Pin; 32] = [
 /// Driver of the holding brake on GPIO6, initially low: engaged. Only written where there is a brake.
 pub const HOLDING_BRAKE: Pin = pin(b'B', 2, Mode::Output(false));
 
+/// Status light on GPIO6, initially dark. Only written in an image with one, which has no holding brake.
+pub const STATUS_LIGHT: Pin = HOLDING_BRAKE;
+
 /// Thermistors in the motors, on GPIO1 and GPIO2. Only written where there is one.
 pub const MOTOR_THERMISTORS: [Pin; 2] = [pin(b'A', 0, Mode::Analog), pin(b'A', 1, Mode::Analog)];
 
