@@ -204,7 +204,7 @@ impl Subjected {
             leg: self.exoskeleton.clone(),
             log: false,
             brake_resistor: true,
-            status_light: false,
+            status_light: self.exoskeleton.brake.is_none(),
             board_volts: None,
         };
         let image: Rc<Image> = Image::load(&build::build(&build)?.image)?;

@@ -85,6 +85,8 @@ pub const STOP: Pin = ('C', 4);
 pub const ENABLING: Pin = ('A', 2);
 /// Start button.
 pub const START: Pin = ('A', 3);
+/// Status light.
+pub const STATUS_LIGHT: Pin = ('B', 2);
 /// Fault line of both gate drivers, active low.
 pub const GATE_FAULT: Pin = ('D', 2);
 

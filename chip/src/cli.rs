@@ -238,7 +238,7 @@ impl Common {
             leg: leg.clone(),
             log: false,
             brake_resistor: true,
-            status_light: false,
+            status_light: leg.brake.is_none(),
             board_volts: None,
         };
         let path = match &self.image {

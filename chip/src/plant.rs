@@ -491,7 +491,7 @@ impl Plant {
     pub fn torque(&self) -> [f64; JOINTS] {
         core::array::from_fn(|joint| {
             let axis = &self.axes[joint];
-            self.anatomy[joint].flip(self.mirrored * axis.description.ratio * axis.torque)
+            self.mirrored * axis.description.ratio * axis.torque
         })
     }
 

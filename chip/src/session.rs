@@ -7,12 +7,13 @@
 use std::rc::Rc;
 
 use scarab::bus::Frame;
+use scarab::bus::commissioning::BoardState;
 use scarab::safety::NoticeCode;
 use scarab_host::base::error::ToolError;
 use scarab_host::formats::leg_file::LegFile;
 use scarab_host::rig::pair::start_position;
 
-use crate::chip::{Chip, ENABLING, START};
+use crate::chip::{Chip, ENABLING, START, STATUS_LIGHT};
 use crate::image::Image;
 use crate::machine::{End, Machine, Options, Snapshot};
 use crate::peripherals::rcc::ResetReason;
@@ -53,6 +54,8 @@ pub enum Step {
     /// Compare position, torque, voltage, currents and temperatures that the bus shows with the plant's own,
     /// while the leg holds its pose.
     Telemetry,
+    /// Compare the status light with the state of the board that the bus shows.
+    StatusLight,
     /// Heat the thermistor of the first motor, then break the wire of the second's.
     Thermistors,
 }
@@ -93,6 +96,10 @@ const TIMELINE: [&str; 11] = [
 
 /// Telemetry: name, object, unit, tolerance, and the plant's own value.
 type Telemetry<'a> = (&'a str, u16, u8, f64, f64, &'a dyn Fn(&Session) -> f64);
+
+/// Samples of a cycle of the status light, and its length, s.
+const LIGHT_SAMPLES: u32 = 400;
+const LIGHT_CYCLE_S: f64 = 2.0;
 
 /// Readings of which the mean is compared, and longest wait for one, s.
 const READINGS: u32 = 20;
@@ -243,6 +250,7 @@ impl Session {
             Step::Turn => self.turn(),
             Step::Zeros => self.zeros(),
             Step::Telemetry => self.telemetry(),
+            Step::StatusLight => self.status_light(),
             Step::Thermistors => self.thermistors(),
         }
     }
@@ -347,17 +355,24 @@ impl Session {
     }
 
     fn telemetry(&mut self) -> Result<(), ToolError> {
+        let mut wrong = Vec::new();
         for joint in 0..JOINTS {
             let node = 1 + joint as u16;
-            let rated = f64::from(self.read_object(node, 0x6076, 0, ANSWER_S)?) * 1e-6;
+            let [rated_a, rated_nm] =
+                [0x6075, 0x6076].map(|index| self.read_object(node, index, 0, ANSWER_S));
+            let (rated_a, rated_nm) = (f64::from(rated_a?) * 1e-6, f64::from(rated_nm?) * 1e-6);
             let phase = |place: usize| move |session: &Self| session.axis(joint).currents()[place];
-            let rows: [Telemetry<'_>; 7] = [
+            // The plant's torque contains the motor's cogging, which its current does not show.
+            let rows: [Telemetry<'_>; 8] = [
                 ("bus voltage, V", 0x6079, 0, 1e-3, 0.5, &|session| session.plant().supply.voltage()),
                 ("position, rad", 0x6064, 0, 1e-6, 1e-3, &|session| session.plant().position()[joint]),
-                ("torque, N m", 0x6077, 0, rated, 0.7, &|session| session.plant().torque()[joint]),
-                ("current of phase A, A", 0x2170, 4, 0.01, 0.3, &phase(0)),
-                ("current of phase B, A", 0x2170, 5, 0.01, 0.3, &phase(1)),
-                ("current of phase C, A", 0x2170, 6, 0.01, 0.3, &phase(2)),
+                ("torque, N m", 0x6077, 0, rated_nm, 1.5, &|session| session.plant().torque()[joint]),
+                ("current of the motor, A", 0x6078, 0, rated_a, 0.1, &|session| {
+                    session.axis(joint).rotor_currents()[1]
+                }),
+                ("current of phase A, A", 0x2170, 4, 0.01, 0.1, &phase(0)),
+                ("current of phase B, A", 0x2170, 5, 0.01, 0.1, &phase(1)),
+                ("current of phase C, A", 0x2170, 6, 0.01, 0.1, &phase(2)),
                 ("winding, degrees Celsius", 0x2170, 3, 0.1, f64::INFINITY, &|session| {
                     session.axis(joint).winding_c()
                 }),
@@ -366,24 +381,61 @@ impl Session {
                 let (mut shown, mut own) = (0.0, 0.0);
                 for _ in 0..READINGS {
                     let value = self.read_object(node, index, sub, ANSWER_S)?;
-                    let is_short = index == 0x2170 || index == 0x6077;
+                    let is_short = matches!(index, 0x2170 | 0x6077 | 0x6078);
                     let value = if is_short { f64::from(value as i16) } else { f64::from(value as i32) };
                     shown += unit * value / f64::from(READINGS);
                     own += truth(self) / f64::from(READINGS);
                 }
-                println!("            node {node}: {name}: {shown:.3}, plant {own:.3}");
                 // A winding may be taken for hotter than it is: after the start it is assumed warm.
                 let is_close =
                     if tolerance.is_finite() { (shown - own).abs() <= tolerance } else { shown >= own - 1.0 };
+                println!("            node {node}: {name}: {shown:.3}, plant {own:.3}");
                 if !is_close {
-                    let why = format!(
-                        "node {node}: {name}: {shown:.3} on the bus, {own:.3} in the plant, tolerance {tolerance}"
-                    );
-                    return Err(ToolError::Refused(why));
+                    wrong.push(format!("node {node}: {name}: {shown:.3}, plant {own:.3}"));
                 }
             }
         }
-        Ok(())
+        if wrong.is_empty() { Ok(()) } else { Err(ToolError::Refused(wrong.join("; "))) }
+    }
+
+    fn status_light(&mut self) -> Result<(), ToolError> {
+        let state = self.read_object(1, 0x2160, 2, ANSWER_S)? as u8;
+        let is_on = self.read_object(1, 0x6041, 0, ANSWER_S)? & 0x6F == 0x27;
+        let sample = |session: &mut Self| {
+            session.run(LIGHT_CYCLE_S / f64::from(LIGHT_SAMPLES))?;
+            Ok::<_, ToolError>(session.machine.chip().gpio.is_driven_high(STATUS_LIGHT))
+        };
+        // A cycle from the end of a flash on.
+        for wanted in [true, false] {
+            let mut left = 2 * LIGHT_SAMPLES;
+            while left > 0 && sample(self)? != wanted {
+                left -= 1;
+            }
+        }
+        let (mut flashes, mut lit, mut before) = (0, 0, false);
+        for _ in 0..LIGHT_SAMPLES {
+            let now = sample(self)?;
+            flashes += u32::from(now && !before);
+            lit += u32::from(now);
+            before = now;
+        }
+        let expected = match (state & BoardState::CALIBRATED != 0, state & BoardState::REFERENCED != 0) {
+            _ if is_on => 1,
+            (false, _) => 3,
+            (true, false) => 2,
+            (true, true) => 1,
+        };
+        let is_long = 2 * lit > LIGHT_SAMPLES;
+        println!(
+            "            status light: {flashes} flashes in 2 s, lit for {} %",
+            100 * lit / LIGHT_SAMPLES
+        );
+        if flashes == expected && is_long == is_on {
+            return Ok(());
+        }
+        Err(ToolError::Refused(format!(
+            "status light: {flashes} flashes, {lit} of {LIGHT_SAMPLES} samples lit; 2160:2 is {state:02x}, so {expected} were expected"
+        )))
     }
 
     fn plant(&self) -> &Plant {

@@ -1,8 +1,9 @@
-"""Impedance session and telemetry of a leg: `impedance.py HOST:PORT [NODE NODE]`.
+"""Impedance session and telemetry of a leg: `impedance.py HOST:PORT [SLOWER]`.
 
 The drive is enabled, each joint is commanded steps of its position in impedance mode, and stiffness and damping
 are computed from what the joint showed: torque by its currents, position and velocity, all sent at SYNC. Both
-must be within 5 % of the commanded ones. The last line is `impedance: ok`.
+must be within 5 % of the commanded ones. SLOWER stretches all times for a board that is simulated more slowly
+than real time. The last line is `impedance: ok`.
 """
 
 import struct
@@ -32,8 +33,8 @@ TRIALS = 5
 class Session:
     """SYNC, targets and answers of both joints, cycle by cycle."""
 
-    def __init__(self, network, joints):
-        self.network, self.joints = network, joints
+    def __init__(self, network, joints, slower):
+        self.network, self.joints, self.slower = network, joints, slower
         for joint in joints:
             # Position target at each SYNC, and the answers in the same order, however late they come.
             joint.at_sync, joint.answers = [], []
@@ -64,10 +65,10 @@ class Session:
             data = struct.pack("<HHh", round(stiffness / STIFFNESS_UNIT), round(damping / DAMPING_UNIT), torque)
             self.network.send_message(0x400 + node, data)
         self.network.send_message(0x80, b"")
-        time.sleep(CYCLE_S)
+        time.sleep(self.slower * CYCLE_S)
 
     def run(self, seconds):
-        end = time.monotonic() + seconds
+        end = time.monotonic() + self.slower * seconds
         while time.monotonic() < end:
             self.cycle()
 
@@ -129,12 +130,12 @@ def telemetry(joints):
 
 
 def main():
-    numbers = [int(number) for number in sys.argv[2:]] or [1, 2]
+    numbers = [1, 2]
     network = connect(sys.argv[1])
     for number in numbers:
         network.send_message(0, bytes([1, number]))
     joints = [Joint(network, number) for number in numbers]
-    session = Session(network, joints)
+    session = Session(network, joints, float(sys.argv[2]) if len(sys.argv) > 2 else 1.0)
     for joint in joints:
         joint.rated = joint.read(0x6076) * 1e-6
     session.set_up()

@@ -82,6 +82,8 @@ fn hand_out(
     identify::introduce(&introduction(&board), board.clock_hz);
     let built = memory::identification();
     static QUEUES: ConstStaticCell<Queues<JOINTS>> = ConstStaticCell::new(Queues::new());
+    const { assert!(!status_light::HAS_LIGHT || leg::LEG.holding_brake.is_none(), "both use GPIO6") };
+    status_light::prepare();
     let Ends {
         current,
         servo: mut servo_ends,
@@ -112,7 +114,6 @@ fn hand_out(
             let level = ServoLevel::new(&control, drives::derating(divider), volt_per_code, following)
                 .with_supply(leg::LEG.supply)
                 .with_holding_brake(leg::LEG.holding_brake);
-            const { assert!(!status_light::HAS_LIGHT || leg::LEG.holding_brake.is_none(), "both use GPIO6") };
             if leg::LEG.holding_brake.is_some() {
                 holding_brake::prepare();
             }
