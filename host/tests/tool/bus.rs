@@ -21,6 +21,7 @@ impl Bus {
         let options = ServeOptions {
             address: ([127, 0, 0, 1], 0).into(),
             legs: 2,
+            are_new: false,
             speed: 1.0,
             flash: None,
             seed: 1,

@@ -167,6 +167,7 @@ fn a_board_uses_an_imported_flash_but_refuses_another_leg_s_model() {
         let options = ServeOptions {
             address: ([127, 0, 0, 1], 0).into(),
             legs: 1,
+            are_new: false,
             speed: 1.0,
             flash: None,
             seed: 1,

@@ -246,6 +246,7 @@ mod tests {
             let options = ServeOptions {
                 address: ([127, 0, 0, 1], 0).into(),
                 legs: 1,
+                are_new: false,
                 speed: 1.0,
                 flash: None,
                 seed: 1,

@@ -326,6 +326,7 @@ mod tests {
     use super::*;
     use crate::formats::kept_file::memory::Memory;
     use crate::formats::leg_file::DEFAULT_LEG;
+    use crate::rig::bus::board::Label;
     use crate::rig::options::{DriveModel, SimulationOptions};
     use crate::rig::pair::Context;
     use scarab::hal::SERVO_RATE_HZ;
