@@ -24,8 +24,7 @@ pub struct ServeArguments {
     /// Number of boards on the bus, each with this leg.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
     legs: u8,
-    /// All boards have the node-IDs of a new board, as in a box of delivered ones. Otherwise those of the next
-    /// board follow.
+    /// All boards have the node-IDs 1 and 2, as new ones. Otherwise the second has 3 and 4, and so on.
     #[arg(long)]
     new: bool,
     /// Simulated seconds per second.

@@ -16,7 +16,7 @@ use scarab::safety::InhibitReason;
 
 /// Date and time of the last change to the dictionary, in the form of CiA 306. Constants instead of a clock:
 /// the data sheets of one version are the same whenever they are written.
-const CHANGED: [&str; 2] = ["11-27-2026", "05:30AM"];
+const CHANGED: [&str; 2] = ["11-27-2026", "09:40AM"];
 
 /// One subindex of an object.
 struct Part {

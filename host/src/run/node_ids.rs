@@ -127,8 +127,8 @@ impl NodeIds {
         Ok(())
     }
 
-    /// Whether a first node with a serial number of this range answers. Silence counts when it is repeated, and
-    /// the answers of several boards are awaited: a late one would answer the next question.
+    /// Whether a first node with a serial number of this range answers. Silence counts when it is repeated,
+    /// and the answers of several boards are awaited: a late one would answer the next question.
     fn is_any(&mut self, low: u32, high: u32) -> Result<bool, ToolError> {
         let Identity { vendor, product, revision, .. } = self.identity;
         let requests: Vec<_> = (SEARCH..).zip([vendor, product, revision, revision, low, high]).collect();
