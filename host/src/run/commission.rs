@@ -685,7 +685,10 @@ impl<'a> Commission<'a> {
                 if emergency.code == 0 && writes {
                     self.report.stored = true;
                     self.report.generation = self.read(Object(0x2100, 7))?;
-                    return Ok(format!("stored; {} models accepted on this board", self.report.generation));
+                    return Ok(format!(
+                        "stored; number of models accepted on this board: {}",
+                        self.report.generation
+                    ));
                 }
             }
         }
