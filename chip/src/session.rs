@@ -380,16 +380,16 @@ impl Session {
                 }),
             ];
             for (name, index, sub, unit, tolerance, truth) in rows {
+                let is_by_current = matches!(index, 0x2170 | 0x6077 | 0x6078);
                 let (mut shown, mut own) = (0.0, 0.0);
                 for _ in 0..READINGS {
                     let value = self.read_object(node, index, sub, ANSWER_S)?;
-                    let is_short = matches!(index, 0x2170 | 0x6077 | 0x6078);
-                    let value = if is_short { f64::from(value as i16) } else { f64::from(value as i32) };
+                    let value = if is_by_current { f64::from(value as i16) } else { f64::from(value as i32) };
                     shown += unit * value / f64::from(READINGS);
                     own += truth(self) / f64::from(READINGS);
                 }
+                let most = tolerance + if is_by_current { GAIN_ERROR * own.abs() } else { 0.0 };
                 // A winding may be taken for hotter than it is: after the start it is assumed warm.
-                let most = tolerance + GAIN_ERROR * own.abs();
                 let is_close =
                     if most.is_finite() { (shown - own).abs() <= most } else { shown >= own - 1.0 };
                 println!("            node {node}: {name}: {shown:.3}, plant {own:.3}");
