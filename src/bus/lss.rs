@@ -3,13 +3,13 @@
 //!
 //! ```text
 //! request 7E5 and answer 7E4 have eight bytes, numbers little-endian; byte 0 is the service
-//! 04          all nodes: 0 waiting, 1 configuration
+//! 04          all nodes: 0 waiting, 1 configuration (both nodes of a board, so select by identity instead)
 //! 40 to 43    the node with this vendor, product, revision and serial number: configuration; answer 44
 //! 46 to 4B    the same with ranges of revision and serial number (low, high) in any state; answer 4F
 //! in configuration:
 //! 11          node-ID (2001); answer 11 and error
 //! 13          bit rate (2002) as table 0 and its index; answer 13 and error
-//! 17          stores like "save" to 1010; answer 17 and error once the flash is written
+//! 17          stores like "save" to 1010, so all parameters; answer 17 and error once the flash is written
 //! 5A to 5D    identity; 5E: node-ID
 //! ```
 //!
@@ -33,10 +33,11 @@ const STORE: u8 = 0x17;
 const SELECTED: u8 = 0x44;
 const IDENTIFIED: u8 = 0x4F;
 
-/// Error of an answer: done, value out of range, storing failed.
-const DONE: u8 = 0;
-const OUT_OF_RANGE: u8 = 1;
-const NOT_STORED: u8 = 2;
+/// Error of an answer: done, out of range, storing failed; storing refused now (255 and its own number).
+const DONE: u32 = 0;
+const OUT_OF_RANGE: u32 = 1;
+const NOT_STORED: u32 = 2;
+const NOT_NOW: u32 = 255 | 1 << 8;
 
 /// What a request asks of the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,14 +60,24 @@ impl Matched {
     }
 }
 
+/// Request whose result is still awaited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asked {
+    /// An object is written for this service.
+    Write(u8),
+    /// To store; a store that began before does not count.
+    Store,
+    /// The parameters are being stored.
+    Storing,
+}
+
 /// LSS slave of one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lss {
     configures: bool,
     selected: Matched,
     identified: Matched,
-    /// Service whose result is still awaited.
-    asked: Option<u8>,
+    asked: Option<Asked>,
     answer: Option<[u8; 8]>,
 }
 
@@ -78,7 +89,7 @@ impl Lss {
         let Identity { vendor, product, revision, serial, .. } = *identity;
         let values = [vendor, product, revision, serial];
         match service {
-            0x04 => {
+            0x04 if one <= 1 => {
                 self.configures = one == 1;
                 self.asked = None;
             }
@@ -105,16 +116,16 @@ impl Lss {
             }
             _ if !self.configures => {}
             SET_NODE_ID if matches!(one, 1..=127) => {
-                self.asked = Some(service);
+                self.asked = Some(Asked::Write(service));
                 return Some(Setting::Write(NODE_ID, u32::from(one)));
             }
             SET_BIT_RATE if let (0, Some(rate)) = (one, bit_rate(two)) => {
-                self.asked = Some(service);
+                self.asked = Some(Asked::Write(service));
                 return Some(Setting::Write(BIT_RATE, rate));
             }
-            SET_NODE_ID | SET_BIT_RATE => self.answer(service, u32::from(OUT_OF_RANGE)),
+            SET_NODE_ID | SET_BIT_RATE => self.answer(service, OUT_OF_RANGE),
             STORE => {
-                self.asked = Some(service);
+                self.asked = Some(Asked::Store);
                 return Some(Setting::Store);
             }
             0x5A..=0x5D => {
@@ -129,17 +140,35 @@ impl Lss {
 
     /// Answers a [`Setting::Write`].
     pub fn written(&mut self, is_done: bool) {
-        if let Some(service) = self.asked.take() {
-            self.answer(service, u32::from(if is_done { DONE } else { OUT_OF_RANGE }));
+        if let Some(Asked::Write(service)) = self.asked.take() {
+            self.answer(service, if is_done { DONE } else { OUT_OF_RANGE });
         }
     }
 
-    /// Answers a [`Setting::Store`], if one is under way.
-    pub fn stored(&mut self, is_done: bool) {
-        if self.asked == Some(STORE) {
-            self.asked = None;
-            self.answer(STORE, u32::from(if is_done { DONE } else { NOT_STORED }));
+    /// Answers a [`Setting::Store`] that the node refuses now.
+    pub fn refused(&mut self) {
+        self.end_store(NOT_NOW);
+    }
+
+    /// Handles the begin of a store, or of one of the defaults instead.
+    pub fn store_begins(&mut self, of_defaults: bool) {
+        match self.asked {
+            Some(Asked::Store) if of_defaults => self.end_store(NOT_STORED),
+            Some(Asked::Store) => self.asked = Some(Asked::Storing),
+            _ => {}
         }
+    }
+
+    /// Answers a [`Setting::Store`] whose store has begun.
+    pub fn stored(&mut self, is_done: bool) {
+        if self.asked == Some(Asked::Storing) {
+            self.end_store(if is_done { DONE } else { NOT_STORED });
+        }
+    }
+
+    fn end_store(&mut self, error: u32) {
+        self.asked = None;
+        self.answer(STORE, error);
     }
 
     /// Takes the answer to be sent.
@@ -207,6 +236,9 @@ mod tests {
         assert_eq!(select(&mut lss, WHOLE), Some([0x44, 0, 0, 0, 0]));
         assert_eq!(send(&mut lss, 0x5E, 0).1, Some([0x5E, 5, 0, 0, 0]));
         assert_eq!(send(&mut lss, 0x5D, 0).1, Some([0x5D, 0xEF, 0xBE, 0xAD, 0xDE]));
+        // A reserved state changes nothing.
+        send(&mut lss, 0x04, 2);
+        assert_eq!(send(&mut lss, 0x5E, 0).1, Some([0x5E, 5, 0, 0, 0]));
         // Waiting again: no answer.
         send(&mut lss, 0x04, 0);
         assert_eq!(send(&mut lss, 0x5E, 0), (None, None));
@@ -244,9 +276,18 @@ mod tests {
         assert_eq!(send(&mut lss, SET_BIT_RATE, 0x0100), (None, Some([0x13, 1, 0, 0, 0])));
         assert_eq!(send(&mut lss, SET_BIT_RATE, 0x0001), (None, Some([0x13, 1, 0, 0, 0])));
         assert_eq!(send(&mut lss, STORE, 0), (Some(Setting::Store), None));
+        // The end of a store that began before is none of this one.
+        lss.stored(true);
+        assert_eq!(lss.take_answer(), None);
+        lss.store_begins(false);
         lss.stored(false);
         assert_eq!(lss.take_answer().map(|answer| [answer[0], answer[1]]), Some([0x17, 2]));
+        // Defaults were asked for since.
+        assert_eq!(send(&mut lss, STORE, 0), (Some(Setting::Store), None));
+        lss.store_begins(true);
+        assert_eq!(lss.take_answer().map(|answer| [answer[0], answer[1]]), Some([0x17, 2]));
         // A save by 1010 is not answered here.
+        lss.store_begins(false);
         lss.stored(true);
         assert_eq!(lss.take_answer(), None);
     }

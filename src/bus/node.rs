@@ -221,6 +221,11 @@ impl Node {
         self.communication.emergency.set(Source::Store, storing.error());
     }
 
+    /// Handles the begin of a store, or of one of the defaults.
+    pub(super) fn store_begins(&mut self, of_defaults: bool) {
+        self.lss.store_begins(of_defaults);
+    }
+
     /// Handles the outcome of a store request.
     pub(super) fn stored(&mut self, is_done: bool) {
         self.lss.stored(is_done);
@@ -270,7 +275,7 @@ impl Node {
         let Communication { node, identity, .. } = &self.communication;
         match self.lss.request(request, identity, *node) {
             Some(Setting::Write(object, value)) => self.lss.written(objects.write(object, value).is_ok()),
-            Some(Setting::Store) if objects.store(false).is_err() => self.lss.stored(false),
+            Some(Setting::Store) if objects.store(false).is_err() => self.lss.refused(),
             Some(Setting::Store) | None => {}
         }
     }

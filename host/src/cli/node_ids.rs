@@ -37,24 +37,33 @@ fn wanted(text: &str) -> Result<(u32, [u8; 2]), String> {
 pub fn run(arguments: &NodeIdsArguments) -> Result<u8, ToolError> {
     let mut ids = NodeIds::new(Client::new(open(&arguments.slcan, arguments.bit_rate)?)?);
     let mut boards = ids.find()?;
-    for (serial, nodes) in &arguments.set {
-        let board =
-            check(&boards, *serial, *nodes).map_err(|why| ToolError::input(format!("--set: {why}")))?;
-        ids.set(board, *nodes)?;
-        boards.iter_mut().filter(|board| board.serial == *serial).for_each(|board| board.nodes = *nodes);
-    }
     if boards.is_empty() {
         return Err(ToolError::input(
             "no board answers: is one powered, the bit rate right, the bus terminated?".to_owned(),
         ));
     }
+    // All are checked before the first is set.
+    let mut after = boards.clone();
+    for (serial, nodes) in &arguments.set {
+        check(&after, *serial, *nodes).map_err(|why| ToolError::input(format!("--set: {why}")))?;
+        after.iter_mut().filter(|board| board.serial == *serial).for_each(|board| board.nodes = *nodes);
+    }
+    let mut result = Ok(());
+    for (serial, nodes) in &arguments.set {
+        for board in boards.iter_mut().filter(|board| board.serial == *serial) {
+            if result.is_ok() {
+                result = ids.set(*board, *nodes);
+                board.nodes = if result.is_ok() { *nodes } else { board.nodes };
+            }
+        }
+    }
     boards.iter().try_for_each(|board| output::print(&line(board, &boards)))?;
-    Ok(EXIT_ACCEPTED)
+    result.map(|()| EXIT_ACCEPTED)
 }
 
 /// Line of a board, with those that share a node-ID.
 fn line(board: &Board, boards: &[Board]) -> String {
-    let Board { serial, nodes: [hip, knee] } = *board;
+    let Board { serial, nodes: [hip, knee], .. } = *board;
     let shares =
         |other: &&Board| other.serial != serial && other.nodes.iter().any(|node| board.nodes.contains(node));
     let others: Vec<_> = boards.iter().filter(shares).map(|other| format!("{:08X}", other.serial)).collect();

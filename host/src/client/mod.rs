@@ -85,9 +85,9 @@ impl RequestError {
     #[must_use]
     pub fn of_bus(self) -> ToolError {
         match self {
-            Self::Adapter(why) => {
-                ToolError::input(format!("--slcan: {why}; run the command again once the board answers"))
-            }
+            Self::Adapter(why) => ToolError::input(format!(
+                "--slcan: {why}; run the command again once the bus is free and its boards answer"
+            )),
             Self::Silent | Self::Aborted(_) => ToolError::input("no answer on the bus"),
         }
     }

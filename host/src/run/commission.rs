@@ -257,7 +257,7 @@ impl<'a> Commission<'a> {
             let product = self.client.read(node, Object(0x1018, 2))?;
             if product != Identity::scarab(0, "").of(joint).product {
                 return Err(refused(format!(
-                    "node {node} is not the {}: its product code (1018:2) is {product}; hip has 1, knee 2; --nodes takes the hip's first",
+                    "node {node} is not the {}: its product code (1018:2) is {product}; hip has 1, knee 2; --nodes takes hip, then knee",
                     ["hip", "knee"][joint]
                 )));
             }

@@ -23,6 +23,8 @@ const RESET: u8 = 130;
 const ANSWER: Duration = Duration::from_millis(100);
 const LATE: Duration = Duration::from_millis(60);
 const STORING: Duration = Duration::from_secs(8);
+/// All numbers of a range.
+const ALL: [u32; 2] = [0, u32::MAX];
 /// Searches before no board is found: the first questions may fall into the time in which a controller that
 /// was alone on the bus recovers.
 const TRIALS: usize = 5;
@@ -34,6 +36,8 @@ const RESTART: Duration = Duration::from_millis(500);
 pub struct Board {
     /// Serial number.
     pub serial: u32,
+    /// Revision number of its firmware.
+    pub revision: u32,
     /// Node-IDs of hip and knee.
     pub nodes: [u8; 2],
 }
@@ -54,14 +58,21 @@ impl NodeIds {
     /// Finds all boards, in the order of their serial numbers.
     ///
     /// # Errors
-    /// The bus fails, or answers contradict each other.
+    /// The bus fails, or answers are lost again and again.
     pub fn find(&mut self) -> Result<Vec<Board>, ToolError> {
+        let mut is_lost = false;
         for _ in 0..TRIALS {
-            if self.is_any(0, u32::MAX)?
-                && let Some(serials) = self.serials()?
-            {
-                return serials.into_iter().map(|serial| self.board(serial)).collect();
+            if self.is_any(ALL, ALL)? {
+                if let Some(serials) = self.serials()? {
+                    return serials.into_iter().map(|serial| self.board(serial)).collect();
+                }
+                is_lost = true;
             }
+        }
+        if is_lost {
+            return Err(ToolError::input(
+                "boards answer, but some of their answers are lost; stop other programs on the bus",
+            ));
         }
         Ok(Vec::new())
     }
@@ -69,24 +80,36 @@ impl NodeIds {
     /// Searches all serial numbers by halving; `None` if an answer was lost.
     fn serials(&mut self) -> Result<Option<Vec<u32>>, ToolError> {
         let mut serials = Vec::new();
-        let mut ranges = vec![(0, u32::MAX)];
-        while let Some((low, high)) = ranges.pop() {
+        let mut ranges = vec![ALL];
+        while let Some([low, high]) = ranges.pop() {
             if low == high {
-                if !self.is_any(low, high)? {
+                if !self.is_any(ALL, [low, high])? {
                     return Ok(None);
                 }
                 serials.push(low);
                 continue;
             }
             let middle = low + (high - low) / 2;
-            let is_below = self.is_any(low, middle)?;
+            let is_below = self.is_any(ALL, [low, middle])?;
             // One that is not in the lower half is in the upper one; the end of the search checks it.
-            if !is_below || self.is_any(middle + 1, high)? {
-                ranges.push((middle + 1, high));
+            if !is_below || self.is_any(ALL, [middle + 1, high])? {
+                ranges.push([middle + 1, high]);
             }
             if is_below {
-                ranges.push((low, middle));
+                ranges.push([low, middle]);
             }
+        }
+        // No board may answer between those found.
+        let mut next = Some(0);
+        for serial in serials.iter().map(|serial| Some(*serial)).chain([None]) {
+            let last = serial.map_or(Some(u32::MAX), |serial| serial.checked_sub(1));
+            if let (Some(low), Some(high)) = (next, last)
+                && low <= high
+                && self.is_any(ALL, [low, high])?
+            {
+                return Ok(None);
+            }
+            next = serial.and_then(|serial| serial.checked_add(1));
         }
         Ok(Some(serials))
     }
@@ -96,9 +119,9 @@ impl NodeIds {
     /// # Errors
     /// The board refuses, or the bus fails.
     pub fn set(&mut self, board: Board, nodes: [u8; 2]) -> Result<(), ToolError> {
-        let Board { serial, nodes: before } = board;
+        let Board { serial, nodes: before, .. } = board;
         for (joint, number) in nodes.into_iter().enumerate() {
-            self.select(joint, serial)?;
+            self.select(joint, board)?;
             match self.ask(&[(SET, u32::from(number))], SET, ANSWER)? {
                 Some(answer) if answer as u8 == 0 => {}
                 Some(answer) => {
@@ -108,19 +131,27 @@ impl NodeIds {
             }
         }
         // The nodes of a board store together.
-        match self.ask(&[(STORE, 0)], STORE, STORING)? {
-            Some(answer) if answer as u8 == 0 => {}
-            Some(_) => {
-                return Err(refused(serial, "to store: turn its drive off, and end its inhibit reasons"));
+        let answer = self.ask(&[(STORE, 0)], STORE, STORING)?;
+        if answer.map(|answer| answer as u8) != Some(0) {
+            // Otherwise the next reset would apply them.
+            for (joint, number) in before.into_iter().enumerate() {
+                self.select(joint, board)?;
+                self.ask(&[(SET, u32::from(number))], SET, ANSWER)?;
             }
-            None => return Err(silent(serial)),
+            self.wait()?;
+            return Err(match answer {
+                Some(_) => refused(serial, "to store: turn its drive off, and end its inhibit reasons"),
+                None => silent(serial),
+            });
         }
         self.wait()?;
-        for node in before {
+        // A node-ID that the other node still has is free after that node's reset.
+        let order = if nodes[0] == before[1] { [before[1], before[0]] } else { before };
+        for node in order {
             self.client.manage(node, RESET).map_err(RequestError::of_bus)?;
+            self.client.wait(RESTART).map_err(RequestError::of_bus)?;
         }
-        self.client.wait(RESTART).map_err(RequestError::of_bus)?;
-        let Board { nodes: found, .. } = self.board(serial)?;
+        let Board { nodes: found, .. } = self.numbers(board)?;
         if found != nodes {
             return Err(refused(serial, &format!("its node-IDs: they are {} and {}", found[0], found[1])));
         }
@@ -129,9 +160,10 @@ impl NodeIds {
 
     /// Whether a first node with a serial number of this range answers. Silence counts when it is repeated,
     /// and the answers of several boards are awaited: a late one would answer the next question.
-    fn is_any(&mut self, low: u32, high: u32) -> Result<bool, ToolError> {
-        let Identity { vendor, product, revision, .. } = self.identity;
-        let requests: Vec<_> = (SEARCH..).zip([vendor, product, revision, revision, low, high]).collect();
+    fn is_any(&mut self, revisions: [u32; 2], serials: [u32; 2]) -> Result<bool, ToolError> {
+        let Identity { vendor, product, .. } = self.identity;
+        let fields = [vendor, product, revisions[0], revisions[1], serials[0], serials[1]];
+        let requests: Vec<_> = (SEARCH..).zip(fields).collect();
         for _ in 0..2 {
             if self.ask(&requests, FOUND, ANSWER)?.is_some() {
                 self.client.wait(LATE).map_err(RequestError::of_bus)?;
@@ -141,24 +173,35 @@ impl NodeIds {
         Ok(false)
     }
 
-    /// Reads the node-IDs of a board.
+    /// Finds revision and node-IDs of a board.
     fn board(&mut self, serial: u32) -> Result<Board, ToolError> {
+        let own = self.identity.revision;
+        let [mut low, mut high] = if self.is_any([own; 2], [serial; 2])? { [own; 2] } else { ALL };
+        while low < high {
+            let middle = low + (high - low) / 2;
+            if self.is_any([low, middle], [serial; 2])? { high = middle } else { low = middle + 1 }
+        }
+        self.numbers(Board { serial, revision: low, nodes: [0; 2] })
+    }
+
+    /// Reads the node-IDs of a board.
+    fn numbers(&mut self, board: Board) -> Result<Board, ToolError> {
         let mut nodes = [0; 2];
         for (joint, node) in nodes.iter_mut().enumerate() {
-            self.select(joint, serial)?;
+            self.select(joint, board)?;
             let number = self.ask(&[(NODE_ID, 0)], NODE_ID, ANSWER)?;
-            *node = number.ok_or_else(|| silent(serial))? as u8;
+            *node = number.ok_or_else(|| silent(board.serial))? as u8;
         }
         self.wait()?;
-        Ok(Board { serial, nodes })
+        Ok(Board { nodes, ..board })
     }
 
     /// Selects a node alone.
-    fn select(&mut self, joint: usize, serial: u32) -> Result<(), ToolError> {
+    fn select(&mut self, joint: usize, board: Board) -> Result<(), ToolError> {
         self.wait()?;
-        let Identity { vendor, product, revision, .. } = self.identity.of(joint);
-        let requests: Vec<_> = (SELECT..).zip([vendor, product, revision, serial]).collect();
-        self.ask(&requests, SELECTED, ANSWER)?.map(drop).ok_or_else(|| silent(serial))
+        let Identity { vendor, product, .. } = self.identity.of(joint);
+        let requests: Vec<_> = (SELECT..).zip([vendor, product, board.revision, board.serial]).collect();
+        self.ask(&requests, SELECTED, ANSWER)?.map(drop).ok_or_else(|| silent(board.serial))
     }
 
     /// Returns all nodes to the waiting state.
@@ -222,7 +265,7 @@ mod tests {
 
     #[test]
     fn node_ids_of_other_boards_are_refused() {
-        let boards = [Board { serial: 1, nodes: [1, 2] }, Board { serial: 0xAB, nodes: [1, 2] }];
+        let boards = [1, 0xAB].map(|serial| Board { serial, revision: 1, nodes: [1, 2] });
         assert_eq!(check(&boards, 0xAB, [3, 4]), Ok(boards[1]));
         for (serial, nodes, words) in [
             (2, [3, 4], "there is 00000001, 000000AB"),

@@ -83,6 +83,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     pub fn take_store(&mut self, into: &mut [StoredNode; N]) -> Option<StoreCommand> {
         self.recall_reset();
         let defaults = self.leg.take_store()?;
+        self.nodes.iter_mut().for_each(|node| node.store_begins(defaults));
         let mut fits = true;
         for ((node, axis), stored) in self.nodes.iter_mut().zip(&mut self.axes).zip(into.iter_mut()) {
             *stored = StoredNode::NOTHING;

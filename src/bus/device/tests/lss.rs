@@ -79,5 +79,5 @@ fn nothing_is_stored_while_the_drive_is_on() {
     let mut bus = Bus::new();
     bus.0[0].enable();
     bus.select(0, 21);
-    assert_eq!(bus.ask(0x17, 0), [[0x17, 2, 0, 0, 0, 0, 0, 0]]);
+    assert_eq!(bus.ask(0x17, 0), [[0x17, 255, 1, 0, 0, 0, 0, 0]]);
 }
