@@ -182,7 +182,7 @@ mod tests {
     fn the_date_is_that_of_the_last_change_to_the_dictionary() {
         let text = text("hip");
         assert_eq!(text, super::text("hip"));
-        assert!(text.contains("\nCreationDate=11-27-2026\nCreationTime=05:30AM\n"));
+        assert!(text.contains("\nCreationDate=11-27-2026\nCreationTime=09:40AM\n"));
         let objects = text.split_once("[DummyUsage]").expect("its sections").1;
         let sum = objects.bytes().fold(Checksum::EMPTY, |sum, byte| sum.word(u32::from(byte)));
         // Another dictionary: set CHANGED to the day of the change and write its sum here.
