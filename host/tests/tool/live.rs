@@ -371,7 +371,7 @@ fn lines_that_are_no_frames_are_named_and_a_file_without_any_is_refused() {
     let run = scarab("live --once --leg x2-wearer-75kg --nodes 1,2", &[]).ends_with(2);
     assert!(run.errors.contains("required arguments"), "{}", run.errors);
     for (arguments, words) in [
-        ("--slcan 127.0.0.1:1", "it must be HOST:PORT or a serial device"),
+        ("--slcan 127.0.0.1:1", "does a program serve that port?"),
         ("--slcan nowhere", "it must be HOST:PORT or a serial device"),
         ("--slcan /dev/absent", "/dev/absent: No such file"),
         ("--candump - --nodes 1,2,3", "--nodes: 3 node-IDs; x2-wearer-75kg has 2 joints"),
