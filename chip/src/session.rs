@@ -94,8 +94,8 @@ const TIMELINE: [&str; 11] = [
     "calibration",
 ];
 
-/// Telemetry: name, object, unit, tolerance, and the plant's own value.
-type Telemetry<'a> = (&'a str, u16, u8, f64, f64, &'a dyn Fn(&Session) -> f64);
+/// Telemetry: name, object, unit, tolerance (`None`: an upper bound), and the plant's own value.
+type Telemetry<'a> = (&'a str, u16, u8, f64, Option<f64>, &'a dyn Fn(&Session) -> f64);
 
 /// Samples of a cycle of the status light, and its length, s.
 const LIGHT_SAMPLES: u32 = 400;
@@ -366,16 +366,16 @@ impl Session {
             let phase = |place: usize| move |session: &Self| session.axis(joint).currents()[place];
             // The plant's torque contains the motor's cogging, which its current does not show.
             let rows: [Telemetry<'_>; 8] = [
-                ("bus voltage, V", 0x6079, 0, 1e-3, 0.5, &|session| session.plant().supply.voltage()),
-                ("position, rad", 0x6064, 0, 1e-6, 1e-3, &|session| session.plant().position()[joint]),
-                ("torque, N m", 0x6077, 0, rated_nm, 1.5, &|session| session.plant().torque()[joint]),
-                ("current of the motor, A", 0x6078, 0, rated_a, 0.1, &|session| {
+                ("bus voltage, V", 0x6079, 0, 1e-3, Some(0.5), &|session| session.plant().supply.voltage()),
+                ("position, rad", 0x6064, 0, 1e-6, Some(1e-3), &|session| session.plant().position()[joint]),
+                ("torque, N m", 0x6077, 0, rated_nm, Some(1.5), &|session| session.plant().torque()[joint]),
+                ("current of the motor, A", 0x6078, 0, rated_a, Some(0.1), &|session| {
                     session.axis(joint).rotor_currents()[1]
                 }),
-                ("current of phase A, A", 0x2170, 4, 0.01, 0.1, &phase(0)),
-                ("current of phase B, A", 0x2170, 5, 0.01, 0.1, &phase(1)),
-                ("current of phase C, A", 0x2170, 6, 0.01, 0.1, &phase(2)),
-                ("winding, degrees Celsius", 0x2170, 3, 0.1, f64::INFINITY, &|session| {
+                ("current of phase A, A", 0x2170, 4, 0.01, Some(0.1), &phase(0)),
+                ("current of phase B, A", 0x2170, 5, 0.01, Some(0.1), &phase(1)),
+                ("current of phase C, A", 0x2170, 6, 0.01, Some(0.1), &phase(2)),
+                ("winding, degrees Celsius", 0x2170, 3, 0.1, None, &|session| {
                     session.axis(joint).winding_c()
                 }),
             ];
@@ -388,10 +388,12 @@ impl Session {
                     shown += unit * value / f64::from(READINGS);
                     own += truth(self) / f64::from(READINGS);
                 }
-                let most = tolerance + if is_by_current { GAIN_ERROR * own.abs() } else { 0.0 };
+                let by_gain = if is_by_current { GAIN_ERROR * own.abs() } else { 0.0 };
                 // A winding may be taken for hotter than it is: after the start it is assumed warm.
-                let is_close =
-                    if most.is_finite() { (shown - own).abs() <= most } else { shown >= own - 1.0 };
+                let is_close = match tolerance {
+                    Some(tolerance) => (shown - own).abs() <= tolerance + by_gain,
+                    None => shown >= own - 1.0,
+                };
                 println!("            node {node}: {name}: {shown:.3}, plant {own:.3}");
                 if !is_close {
                     wrong.push(format!("node {node}: {name}: {shown:.3}, plant {own:.3}"));

@@ -19,13 +19,11 @@
 use super::communication::Identity;
 use super::dictionary::Object;
 use super::node_id::NodeId;
+use super::stored_parameters::{BIT_RATE, NODE_ID};
 
 /// COB-IDs of requests and answers.
 pub const REQUEST: u16 = 0x7E5;
 pub const ANSWER: u16 = 0x7E4;
-
-const NODE_ID: Object = Object::at(0x2001, 0);
-const BIT_RATE: Object = Object::at(0x2002, 0);
 
 const SET_NODE_ID: u8 = 0x11;
 const SET_BIT_RATE: u8 = 0x13;

@@ -50,8 +50,8 @@ impl StoredNode {
     }
 }
 
-const NODE_ID: Object = Object::at(0x2001, 0);
-const BIT_RATE: Object = Object::at(0x2002, 0);
+pub(super) const NODE_ID: Object = Object::at(0x2001, 0);
+pub(super) const BIT_RATE: Object = Object::at(0x2002, 0);
 /// Bit of a PDO's COB-ID: the PDO does not exist.
 const OFF: u32 = 1 << 31;
 

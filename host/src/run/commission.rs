@@ -15,7 +15,7 @@
 use std::time::{Duration, Instant};
 
 use scarab::bus::commissioning::{BoardState, CommissioningStep, StepResult};
-use scarab::bus::{Abort, Frame, Identity};
+use scarab::bus::{Abort, Identity};
 use scarab::leg::{CalibrationRefusal, JOINTS, Parameter, Reason, RefusalReason};
 use scarab::model::planar::BASE;
 use scarab::safety::{InhibitReason, NoticeCode};
@@ -105,6 +105,8 @@ const LONGEST_STORE_S: f64 = 30.0;
 const SUPPLY_V: [f64; 2] = [20.0, 58.0];
 const TEMPERATURE_C: [f64; 2] = [-20.0, 90.0];
 
+/// NMT command: start of a node.
+const START: u8 = 1;
 const COMMAND: Object = Object(0x2160, 1);
 const STATE: Object = Object(0x2160, 2);
 const RESULT: Object = Object(0x2160, 3);
@@ -245,8 +247,7 @@ impl<'a> Commission<'a> {
 
     fn find(&mut self) -> Result<String, ToolError> {
         for node in self.options.nodes {
-            // Network management: start the node.
-            self.client.send(&Frame::new(0, &[1, node])).map_err(RequestError::of_bus)?;
+            self.client.manage(node, START).map_err(RequestError::of_bus)?;
         }
         let mut serials = Vec::new();
         for (joint, node) in self.options.nodes.into_iter().enumerate() {

@@ -120,29 +120,11 @@ impl NodeIds {
     /// The board refuses, or the bus fails.
     pub fn set(&mut self, board: Board, nodes: [u8; 2]) -> Result<(), ToolError> {
         let Board { serial, nodes: before, .. } = board;
-        for (joint, number) in nodes.into_iter().enumerate() {
-            self.select(joint, board)?;
-            match self.ask(&[(SET, u32::from(number))], SET, ANSWER)? {
-                Some(answer) if answer as u8 == 0 => {}
-                Some(answer) => {
-                    return Err(refused(serial, &format!("node-ID {number} (error {})", answer as u8)));
-                }
-                None => return Err(silent(serial)),
-            }
-        }
-        // The nodes of a board store together.
-        let answer = self.ask(&[(STORE, 0)], STORE, STORING)?;
-        if answer.map(|answer| answer as u8) != Some(0) {
+        if let Err(error) = self.give(board, nodes).and_then(|()| self.store(serial)) {
             // Otherwise the next reset would apply them.
-            for (joint, number) in before.into_iter().enumerate() {
-                self.select(joint, board)?;
-                self.ask(&[(SET, u32::from(number))], SET, ANSWER)?;
-            }
+            self.give(board, before)?;
             self.wait()?;
-            return Err(match answer {
-                Some(_) => refused(serial, "to store: turn its drive off, and end its inhibit reasons"),
-                None => silent(serial),
-            });
+            return Err(error);
         }
         self.wait()?;
         // A node-ID that the other node still has is free after that node's reset.
@@ -156,6 +138,30 @@ impl NodeIds {
             return Err(refused(serial, &format!("its node-IDs: they are {} and {}", found[0], found[1])));
         }
         Ok(())
+    }
+
+    /// Gives a board node-IDs that are not stored yet; its knee stays selected.
+    fn give(&mut self, board: Board, nodes: [u8; 2]) -> Result<(), ToolError> {
+        for (joint, number) in nodes.into_iter().enumerate() {
+            self.select(joint, board)?;
+            match self.ask(&[(SET, u32::from(number))], SET, ANSWER)? {
+                Some(answer) if answer as u8 == 0 => {}
+                Some(answer) => {
+                    return Err(refused(board.serial, &format!("node-ID {number} (error {})", answer as u8)));
+                }
+                None => return Err(silent(board.serial)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Stores by the selected node; the nodes of a board store together.
+    fn store(&mut self, serial: u32) -> Result<(), ToolError> {
+        match self.ask(&[(STORE, 0)], STORE, STORING)? {
+            Some(answer) if answer as u8 == 0 => Ok(()),
+            Some(_) => Err(refused(serial, "to store: turn its drive off, and end its inhibit reasons")),
+            None => Err(silent(serial)),
+        }
     }
 
     /// Whether a first node with a serial number of this range answers. Silence counts when it is repeated,
