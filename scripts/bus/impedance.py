@@ -141,6 +141,7 @@ def main():
     session.set_up()
     for joint in joints:
         joint.write(0x6087, 0, 10_000)
+        joint.mode = joint.read(0x6060, 0, "<b")
         joint.write(0x6060, 0, IMPEDANCE, "<b")
         largest = [joint.read(0x2020, sub, "<H") for sub in (3, 4)]
         print(f"node {joint.number}: at most {largest[0] * STIFFNESS_UNIT:.0f} N m/rad,",
@@ -161,6 +162,8 @@ def main():
             print(f"node {joint.number}: {name} {found:.1f} of {commanded:.1f} {unit}")
             assert abs(found / commanded - 1) < TOLERANCE, f"{name}: {100 * (found / commanded - 1):.1f} %"
     telemetry(joints)
+    for joint in joints:
+        joint.write(0x6060, 0, joint.mode, "<b")
     alive.stop()
     network.disconnect()
     print("impedance: ok")
