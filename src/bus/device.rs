@@ -27,7 +27,7 @@
 
 use super::commissioning::{BoardStatus, CommissioningStep};
 use super::communication::Identity;
-use super::drive::{Axis, AxisConstants, Coupling};
+use super::drive::{Axis, AxisConstants, Coupling, LoopBandwidths};
 use super::emergency::ErrorReport;
 use super::identification::{JointObjects, LegCommand, LegObjects, Results};
 use super::nmt::Reset;
@@ -399,6 +399,12 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             may_return: self.axes.each_ref().map(Axis::may_return),
             refused: self.noted.take(),
         }
+    }
+
+    /// Bandwidths of each joint's loops that a host has set.
+    #[must_use]
+    pub fn bandwidths(&self) -> [LoopBandwidths; N] {
+        self.axes.each_ref().map(Axis::bandwidths)
     }
 
     /// Whether a host controls the drive. The operator's contacts can then only inhibit it.

@@ -21,7 +21,7 @@ use crate::motion::{Motion, MotionState, Periodic, Ramp};
 use crate::real::min;
 use crate::safety::{Derating, DriveState, Fault, LimitCodes, Limits, PowerRequest, RETURN_SPEED};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
-use crate::units::{NewtonMetre, RadianPerSecond, RadianPerSecondSquared};
+use crate::units::{Hertz, NewtonMetre, RadianPerSecond, RadianPerSecondSquared};
 
 /// Rest after a motion before the next step: half a second.
 const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
@@ -170,6 +170,12 @@ impl<const N: usize> Control<N> {
         self.servo.checksum()
     }
 
+    /// Flips a bit of the servo's constants ([`Servo::flip_bit`]). Host only.
+    #[cfg(not(target_os = "none"))]
+    pub fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
+        self.servo.flip_bit(joint, number, bit);
+    }
+
     /// Reports a fault detected by the board, for the next tick.
     pub fn report(&mut self, fault: Fault) {
         self.servo.report(fault);
@@ -178,6 +184,13 @@ impl<const N: usize> Control<N> {
     /// Sets which joints may be enabled outside their range, to return into it.
     pub fn permit_return(&mut self, joints: [bool; N]) {
         self.servo.permit_return(joints);
+    }
+
+    /// Sets the bandwidth of each position loop ([`Servo::set_bandwidths`]).
+    #[cold]
+    #[inline(never)]
+    pub fn set_bandwidths(&mut self, bandwidths: &[Option<Hertz>; N]) {
+        self.servo.set_bandwidths(bandwidths);
     }
 
     /// Sets the derating of each joint's torque cap by temperatures and bus voltage, from the next tick on.

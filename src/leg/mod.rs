@@ -69,7 +69,7 @@ pub use crate::safety::{
     DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,
     NoticeCode, Permission, PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
 };
-pub use crate::servo::{JointConfiguration, LogSample};
+pub use crate::servo::{JointConfiguration, LogSample, POSITION_BANDWIDTHS_HZ};
 
 use crate::hal::Sample;
 use crate::safety::Derating;
@@ -234,7 +234,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     /// Flips a bit of the servo's state, see [`crate::servo::Servo::flip_bit`]. Host only.
     #[cfg(not(target_os = "none"))]
     pub fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
-        self.control.servo.flip_bit(joint, number, bit);
+        self.control.flip_bit(joint, number, bit);
     }
 
     /// Both halves, for callers that run them at separate priorities (`operation`).

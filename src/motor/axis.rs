@@ -56,7 +56,7 @@ use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, Shu
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample, SERVO_RATE_HZ};
 use crate::real::{abs, clamp, is_finite, min};
-use crate::units::{Ampere, RadianPerSecond};
+use crate::units::{Ampere, Hertz, RadianPerSecond};
 
 mod first_motion;
 mod index;
@@ -241,6 +241,18 @@ impl Axis {
         (self.doubtful, self.doubts, self.rejected_step) = (false, 0, false);
         if long && constants.scale.within_turn(1 << 16) != 0 {
             self.found(AxisFault::Encoder);
+        }
+    }
+
+    /// Sets the bandwidth of the current loop. It may follow a current: voltage and integrals stay.
+    #[cold]
+    #[inline(never)]
+    pub fn set_bandwidth(&mut self, bandwidth: Hertz) {
+        // A wrong checksum stays wrong.
+        let is_sound = self.constants.checksum() == self.checksum;
+        self.constants.set_bandwidth(bandwidth);
+        if is_sound {
+            self.checksum = self.constants.checksum();
         }
     }
 

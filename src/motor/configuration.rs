@@ -170,6 +170,8 @@ pub(super) struct Constants {
     pub greatest_step: i32,
     pub gains: CurrentGains,
     pub modulator: Modulator,
+    /// Mean voltage that the dead time takes at the highest bus voltage.
+    pub dead: Volt,
     pub model: ModelLimits,
     /// Target current of a phase beyond which its shunt code must change, A.
     pub stuck_change: f32,
@@ -201,6 +203,13 @@ impl Constants {
             self.brake_speed,
         ];
         words.into_iter().fold(self.gains.add_to(Checksum::EMPTY), Checksum::word).numbers(limits)
+    }
+
+    /// Sets the bandwidth of the current loop, and the change of target current that the watch for stuck
+    /// shunts then needs.
+    pub(super) fn set_bandwidth(&mut self, bandwidth: Hertz) {
+        self.gains.set_bandwidth(bandwidth);
+        self.stuck_change = ShuntWatch::target_change(self.dead, self.gains.least_ohm()).0;
     }
 
     pub(super) fn new(
@@ -239,6 +248,7 @@ impl Constants {
             gains,
             modulator: configuration.modulator()?,
             model: ModelLimits::new(configuration, &motor, scale),
+            dead,
             stuck_change: ShuntWatch::target_change(dead, gains.least_ohm()).0,
             current_limit: configuration.current_limit.0,
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,

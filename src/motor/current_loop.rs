@@ -101,6 +101,14 @@ impl CurrentGains {
         })
     }
 
+    /// Sets another bandwidth, which was checked before.
+    pub(super) fn set_bandwidth(&mut self, bandwidth: Hertz) {
+        let factor = bandwidth.0 / self.bandwidth.0;
+        self.proportional_ohm.d *= factor;
+        self.proportional_ohm.q *= factor;
+        self.bandwidth = bandwidth;
+    }
+
     /// Smaller of both proportional gains, ohm.
     pub(super) fn least_ohm(&self) -> f32 {
         min(self.proportional_ohm.d, self.proportional_ohm.q)
@@ -112,13 +120,13 @@ impl CurrentGains {
         &mut self.proportional_ohm.q
     }
 
-    /// Adds the constants that the tick uses to a checksum.
+    /// Adds all constants to a checksum.
     #[must_use]
     pub(super) fn add_to(&self, sum: Checksum) -> Checksum {
-        let Self { proportional_ohm, renewal, inductance_h, flux_vs, bandwidth: _ } = *self;
+        let Self { proportional_ohm, renewal, inductance_h, flux_vs, bandwidth } = *self;
         sum.numbers([proportional_ohm, renewal, inductance_h].map(|pair| pair.d))
             .numbers([proportional_ohm, renewal, inductance_h].map(|pair| pair.q))
-            .number(flux_vs)
+            .numbers([flux_vs, bandwidth.0])
     }
 
     /// Phase margin of the open loop, degrees.

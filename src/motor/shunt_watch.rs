@@ -9,7 +9,8 @@
 //! **Stuck** (C3). A phase at zero current stays there until its voltage outweighs the dead time's, 4/3 t_d f
 //! V_bus. On the board at its highest bus that is 0.22 V. So the target must change until the loop's
 //! proportional part gives that voltage and a quarter more at once. With K_p = 0.094 ohm of the default leg
-//! that is 2.9 A. (With 1 A, a leg at rest under host control was turned off once in 500 times.)
+//! that is 2.9 A, twice that at half the loop's bandwidth. (With 1 A, a leg at rest under host control was
+//! turned off once in 500 times.)
 //!
 //! After such a change the loop (1 kHz) has moved a code by 17 in its third tick. Codes that agree in all
 //! four ticks do so by noise with a probability below 1e-9 each time. A stuck code with a constant target is

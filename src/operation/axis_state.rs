@@ -7,6 +7,7 @@ use crate::hal::{AxisCommand, AxisSample};
 use crate::leg::{Calibration, CalibrationRefusal};
 use crate::motor::{Axis, AxisFault, AxisRequest, BridgeRequest, CalibrationStep, Calibrator, IndexSearch};
 use crate::safety::Bridges;
+use crate::units::Hertz;
 
 /// Order for an axis, effective from its next tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +22,8 @@ pub enum Order {
     Place(i32),
     /// Count the rotor position as lost: an absolute encoder contradicts it.
     LosePosition,
+    /// Set the bandwidth of the current loop.
+    Bandwidth(Hertz),
     /// Clear a fault.
     ClearFault,
 }
@@ -130,6 +133,11 @@ impl AxisState {
             Order::LosePosition => {
                 if let Some(axis) = self.axis_mut() {
                     axis.lose_position();
+                }
+            }
+            Order::Bandwidth(bandwidth) => {
+                if let Some(axis) = self.axis_mut() {
+                    axis.set_bandwidth(bandwidth);
                 }
             }
             Order::ClearFault => {

@@ -6,7 +6,7 @@
 //! log          all waiting samples
 //! time         timeouts of the host, however full the bus is
 //! store        results and new requests
-//! board        its telemetry; steps of commissioning that a host asked for; a new image
+//! board        its telemetry; steps of commissioning that a host asked for; bandwidths; a new image
 //! leg          its report, then its next order; both wait until the leg has taken the previous order, which
 //!             would be overwritten otherwise, and a request with it
 //! mailboxes    [`TxScheduler`]
@@ -145,6 +145,7 @@ impl BusRound {
             if let Some(step) = device.take_step() {
                 signals.ask(step);
             }
+            signals.set_bandwidths(&device.bandwidths());
             self.pass_program(device, ends, signals);
             self.exchange(device, ends, signals);
             self.transmitter.fill(hardware, self.lasting, now_us, device, results);

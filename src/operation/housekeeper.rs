@@ -42,6 +42,7 @@ use crate::safety::{
     BoardFault, CheckClock, InhibitReason, Thermistor, Winding, WindingRating, of_gate_driver, of_temperature,
 };
 use crate::trace::{Record, words};
+use crate::units::Hertz;
 
 mod thermistors;
 mod zeros;
@@ -103,6 +104,8 @@ impl<const N: usize, H> Level<'_, '_, N, H> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Housekeeper<const N: usize> {
     settings: HousekeepingSettings<N>,
+    /// Bandwidths that the current loops were designed for; the settings hold those in use.
+    designed: [Hertz; N],
     clock: CheckClock,
     operator: Operator,
     calibrated: [bool; N],
@@ -150,6 +153,7 @@ impl<const N: usize> Housekeeper<N> {
     pub fn new(settings: HousekeepingSettings<N>) -> Self {
         Self {
             settings,
+            designed: settings.axes.map(|axis| axis.bandwidth),
             clock: CheckClock::new(RATE_HZ),
             operator: Operator::default(),
             calibrated: [false; N],
@@ -234,6 +238,7 @@ impl<const N: usize> Housekeeper<N> {
             return;
         }
         self.look(level);
+        self.set_bandwidths(level);
         let situation = self.situation(level);
         if let Some(request) = self.operator.tick(&situation) {
             self.accept(request, level);
@@ -241,6 +246,24 @@ impl<const N: usize> Housekeeper<N> {
             self.take_step(&situation, level);
         }
         self.advance_reference(level);
+    }
+
+    /// Sets the bandwidths of the current loops that a host has set, while the drive is off and no axis is
+    /// being calibrated. An axis that is not calibrated gets it with its calibration.
+    fn set_bandwidths(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        if level.signals.permission() != Permission::Off || self.calibrating.is_some() {
+            return;
+        }
+        let wanted = level.signals.current_bandwidths().into_iter().zip(self.designed);
+        for (axis, (wanted, designed)) in wanted.enumerate() {
+            let wanted = wanted.unwrap_or(designed);
+            let runs = self.calibrated.get(axis).is_some_and(|calibrated| *calibrated);
+            let Some(settings) = self.settings.axes.get_mut(axis) else { return };
+            // A full queue: again in the next round.
+            if settings.bandwidth != wanted && (!runs || level.order(axis, Order::Bandwidth(wanted))) {
+                settings.bandwidth = wanted;
+            }
+        }
     }
 
     /// Advances the windings by one round. A late round counts as one, so a winding cools less.

@@ -28,7 +28,7 @@ use crate::safety::{
 };
 use crate::servo::SERVO_RATE_HZ;
 use crate::trace::{Record, words};
-use crate::units::Volt;
+use crate::units::{Hertz, Volt};
 
 /// Ticks between two checksums of gains and limits, less one: 64 ms.
 const CHECKSUM_MASK: u32 = 0xFF;
@@ -44,8 +44,10 @@ pub struct ServoLevel<const N: usize> {
     limits: [LimitCodes; N],
     ticking: bool,
     tick: u32,
-    /// Checksum of gains and limits at creation.
+    /// Checksum of gains and limits at creation, or after the last change of the bandwidths.
     checksum: Checksum,
+    /// Bandwidths of the position loops that a host has set.
+    bandwidths: [Option<Hertz>; N],
     supply: SupplyWatch,
     supply_current: SupplyCurrent,
     holding_brake: Option<HoldingBrake>,
@@ -76,6 +78,7 @@ impl<const N: usize> ServoLevel<N> {
             ticking: false,
             tick: 0,
             checksum: control.checksum(),
+            bandwidths: [None; N],
             supply: SupplyWatch::default(),
             supply_current: SupplyCurrent::new(SupplyLimits::NONE),
             holding_brake: None,
@@ -139,6 +142,7 @@ impl<const N: usize> ServoLevel<N> {
             control.receive_torque(&torque);
         }
         self.look_around(control, signals);
+        self.set_bandwidths(control, signals);
         let request = self.next_request(control, ends, signals, hardware);
         // Until the brake is open the drive holds its pose.
         let waits = self.holding_brake.is_some_and(|brake| !brake.is_open());
@@ -231,6 +235,29 @@ impl<const N: usize> ServoLevel<N> {
         host.held(request, control.state(), signals, hardware)
     }
 
+    /// Applies the bandwidths that a host has set, while the drive is off.
+    fn set_bandwidths(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
+        if control.state().permission() != Permission::Off {
+            return;
+        }
+        let bandwidths = signals.position_bandwidths();
+        if bandwidths != self.bandwidths {
+            self.bandwidths = bandwidths;
+            let is_sound = self.is_sound(control);
+            control.set_bandwidths(&bandwidths);
+            // A wrong checksum stays wrong.
+            if is_sound {
+                self.checksum = control.checksum();
+            }
+        }
+    }
+
+    /// Whether gains and limits have their checksum.
+    #[inline(never)]
+    fn is_sound(&self, control: &Control<N>) -> bool {
+        control.checksum() == self.checksum
+    }
+
     /// Passes faults, bus voltage and temperature from the rest of the board to control.
     fn look_around(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
         for joint in 0..N {
@@ -239,7 +266,7 @@ impl<const N: usize> ServoLevel<N> {
             }
         }
         self.tick = self.tick.wrapping_add(1);
-        if self.tick & CHECKSUM_MASK == 0 && control.checksum() != self.checksum {
+        if self.tick & CHECKSUM_MASK == 0 && !self.is_sound(control) {
             control.report(Fault { code: FaultCode::Parameters, joint: 0 });
         }
         let bus = self.volt_per_code * signals.statistics.bus[0].get() as f32;

@@ -6,13 +6,14 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::bus::commissioning::{BoardState, BoardStatus, CommissioningStep, StepReport, StepResult};
+use crate::bus::drive::LoopBandwidths;
 use crate::bus::program::{ProgramCommand, ProgramStatus};
 use crate::hal::DriveCommand;
 use crate::leg::Permission;
 use crate::motor::{AxisRequest, ElectricalAngle, Phases, Rotating};
 use crate::safety::{BoardFault, InhibitReason, Winding};
 use crate::servo::SERVO_RATE_HZ;
-use crate::units::Ampere;
+use crate::units::{Ampere, Hertz};
 
 /// A word that is read and written atomically.
 #[derive(Debug)]
@@ -247,6 +248,12 @@ const FULL_SHARE: u32 = 1.0_f32.to_bits();
 /// Target bits that turn an axis off: a NaN pattern that no computation produces.
 const OFF: u32 = u32::MAX;
 
+/// Bandwidth in a word; `None` for zero.
+fn bandwidth(word: &Word) -> Option<Hertz> {
+    let bits = word.get();
+    (bits != 0).then(|| Hertz(f32::from_bits(bits)))
+}
+
 /// All words that the levels of a board of `N` axes share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signals<const N: usize> {
@@ -279,6 +286,8 @@ pub struct Signals<const N: usize> {
     hosted: Word,
     permits: Word,
     board_state: Word,
+    /// Bandwidths of position and current loop of each joint that a host has set, Hz, as bits; 0.0 for none.
+    bandwidths: [[Word; 2]; N],
     /// Step of commissioning that the bus asked for, and the report of the last one.
     asked: Word,
     report: Word,
@@ -308,6 +317,7 @@ impl<const N: usize> Signals<N> {
             hosted: Word::new(0),
             permits: Word::new(0),
             board_state: Word::new(0),
+            bandwidths: [const { [const { Word::new(0) }; 2] }; N],
             asked: Word::new(0),
             report: Word::new(0),
             program: [const { Word::new(0) }; 2],
@@ -403,6 +413,27 @@ impl<const N: usize> Signals<N> {
         let angle = ElectricalAngle::from_units(rotor.get().cast_signed());
         let Phases { b, c, .. } = Rotating { d, q }.to_stationary(angle.rotation()).to_phases();
         [b.0, c.0]
+    }
+
+    /// Sets the bandwidths that a host has set.
+    pub fn set_bandwidths(&self, bandwidths: &[LoopBandwidths; N]) {
+        for (words, LoopBandwidths { position, current }) in self.bandwidths.iter().zip(bandwidths) {
+            for (word, bandwidth) in words.iter().zip([position, current]) {
+                word.set(bandwidth.map_or(0, |bandwidth| bandwidth.0.to_bits()));
+            }
+        }
+    }
+
+    /// Bandwidths of the position loops that a host has set.
+    #[must_use]
+    pub fn position_bandwidths(&self) -> [Option<Hertz>; N] {
+        self.bandwidths.each_ref().map(|[position, _]| bandwidth(position))
+    }
+
+    /// Bandwidths of the current loops that a host has set.
+    #[must_use]
+    pub fn current_bandwidths(&self) -> [Option<Hertz>; N] {
+        self.bandwidths.each_ref().map(|[_, current]| bandwidth(current))
     }
 
     /// Asks for a step of commissioning, from the bus.

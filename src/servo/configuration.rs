@@ -4,6 +4,9 @@ use super::{ControllerGains, JointScale};
 use crate::safety::{JointLimits, LimitsError};
 use crate::units::{Ampere, Hertz, KilogramMetreSquared, NewtonMetre, Radian, RadianPerSecond};
 
+/// Least and largest bandwidth of a position loop, Hz.
+pub const POSITION_BANDWIDTHS_HZ: [f32; 2] = [0.5, 8.0];
+
 /// One joint of the servo. Range and signs are those of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointConfiguration {
@@ -69,7 +72,8 @@ impl JointConfiguration {
         if !self.scale.is_sensible() {
             return Err(ServoError::Scale { joint });
         }
-        if !(0.5..=8.0).contains(&self.bandwidth.0) {
+        let [least, largest] = POSITION_BANDWIDTHS_HZ;
+        if !(least..=largest).contains(&self.bandwidth.0) {
             return Err(ServoError::Bandwidth { joint });
         }
         Ok(())

@@ -58,6 +58,13 @@ impl ControllerGains {
         }
     }
 
+    /// Returns the gains of the same joint with another bandwidth.
+    #[must_use]
+    pub fn with_bandwidth(&self, bandwidth: Hertz) -> Self {
+        let inertia = self.damping_nm_s_per_rad / (DAMPING_PER_GAIN * self.position_per_s);
+        Self::new(KilogramMetreSquared(inertia), bandwidth, NewtonMetre(self.cap_nm))
+    }
+
     /// Adds all gains to a checksum.
     #[must_use]
     pub fn add_to(&self, sum: Checksum) -> Checksum {
@@ -136,6 +143,16 @@ mod tests {
 
     fn gains() -> ControllerGains {
         ControllerGains::new(KilogramMetreSquared(2.0), Hertz(6.0), NewtonMetre(100.0))
+    }
+
+    #[test]
+    fn another_bandwidth_gives_the_gains_of_the_same_inertia() {
+        let (inertia, cap) = (KilogramMetreSquared(2.53), NewtonMetre(85.0));
+        let slower = ControllerGains::new(inertia, Hertz(6.0), cap).with_bandwidth(Hertz(1.5));
+        let expected = ControllerGains::new(inertia, Hertz(1.5), cap);
+        assert!((slower.stiffness_nm_per_rad() / expected.stiffness_nm_per_rad() - 1.0).abs() < 1e-5);
+        assert!((slower.damping_nm_s_per_rad() / expected.damping_nm_s_per_rad() - 1.0).abs() < 1e-5);
+        assert!((slower.integral_nm_per_rad_s / expected.integral_nm_per_rad_s - 1.0).abs() < 1e-5);
     }
 
     #[test]

@@ -27,7 +27,7 @@ use crate::safety::{
     Decision, Derating, DriveState, Fault, LimitCodes, Limits, Monitor, Observation, Permission,
     PowerRequest, Reading, Request, StepGate,
 };
-use crate::units::{NewtonMetre, Radian, RadianPerSecond};
+use crate::units::{Hertz, NewtonMetre, Radian, RadianPerSecond};
 
 /// Largest encoder step as a multiple of the speed limit, and extra counts for quantisation.
 const STEP_PER_SPEED: f32 = 2.0;
@@ -98,6 +98,8 @@ struct Joint {
     scale: JointScale,
     count_per_radian: f32,
     controller: ControllerGains,
+    /// Gains at the configuration's bandwidth.
+    configured: ControllerGains,
     largest_acceleration_rad_per_s2: f32,
 }
 
@@ -123,10 +125,12 @@ impl<const N: usize> Servo<N> {
         Ok(Self {
             joints: joints.map(|configuration| {
                 let cap = configuration.limits().torque_cap();
+                let gains = ControllerGains::new(configuration.inertia, configuration.bandwidth, cap);
                 Joint {
                     scale: configuration.scale,
                     count_per_radian: 1.0 / configuration.scale.signed_radian_per_count(),
-                    controller: ControllerGains::new(configuration.inertia, configuration.bandwidth, cap),
+                    controller: gains,
+                    configured: gains,
                     largest_acceleration_rad_per_s2: cap.0 / configuration.inertia.0,
                 }
             }),
@@ -155,14 +159,24 @@ impl<const N: usize> Servo<N> {
         self.monitor.state()
     }
 
-    /// Checksum of gains, scales and limits, which never change.
+    /// Sets the bandwidth of each position loop; `None`: the configuration's. Only with the drive off, since
+    /// other gains are a step of torque.
+    pub fn set_bandwidths(&mut self, bandwidths: &[Option<Hertz>; N]) {
+        for (joint, bandwidth) in self.joints.iter_mut().zip(bandwidths) {
+            let configured = joint.configured;
+            joint.controller = bandwidth.map_or(configured, |bandwidth| configured.with_bandwidth(bandwidth));
+        }
+    }
+
+    /// Checksum of gains, scales and limits. Only [`Self::set_bandwidths`] changes it.
     #[must_use]
     pub fn checksum(&self) -> Checksum {
         self.joints.iter().fold(self.monitor.checksum(), |sum, joint| {
-            let Joint { scale, count_per_radian, controller, largest_acceleration_rad_per_s2 } = joint;
+            let Joint { scale, count_per_radian, controller, configured, largest_acceleration_rad_per_s2 } =
+                joint;
             let signed = [scale.signed_radian_per_count(), scale.signed_torque_per_ampere().0];
-            controller
-                .add_to(sum)
+            configured
+                .add_to(controller.add_to(sum))
                 .numbers(signed)
                 .numbers([*count_per_radian, *largest_acceleration_rad_per_s2])
         })

@@ -175,7 +175,7 @@ fn join(
 ) -> Joined {
     let constants = core::array::from_fn(|joint| {
         let motor = &leg::LEG.joints[joint].motor;
-        AxisConstants::of(&configuration.joints[joint], motor.counts_per_turn, motor.ratio)
+        AxisConstants::of(&configuration.joints[joint], motor.counts_per_turn, motor.ratio, drives::BANDWIDTH)
     });
     let [low, middle, high] = identity.unique;
     let checksum = program::checksum();

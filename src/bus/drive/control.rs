@@ -28,13 +28,16 @@
 //! Source: CiA 402, controlword and statusword; bit 15 is manufacturer-specific.
 
 use super::coupling::level;
-use super::{ImpedanceTarget, JointCommand, JointStatus, Mode, SetPoint, Target};
+use super::{ImpedanceTarget, JointCommand, JointStatus, LoopBandwidths, Mode, SetPoint, Target};
 use crate::bus::emergency::ErrorReport;
 use crate::bus::node_id::NodeId;
 use crate::bus::objects::Lost;
-use crate::leg::{DriveEvent, DriveState, FaultCode, JointConfiguration, PowerRequest, RefusalReason};
+use crate::leg::{
+    DriveEvent, DriveState, FaultCode, JointConfiguration, POSITION_BANDWIDTHS_HZ, PowerRequest,
+    RefusalReason,
+};
 use crate::units::{
-    Ampere, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond, RadianPerSecondSquared, Second,
+    Ampere, Hertz, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond, RadianPerSecondSquared, Second,
 };
 
 const RESET: u16 = 1 << 7;
@@ -62,15 +65,24 @@ pub struct AxisConstants {
     pub counts_per_turn: u32,
     /// Motor revolutions per joint revolution.
     pub ratio: f32,
+    /// Bandwidth that the position loop was designed for, the largest that a host may set.
+    pub position_bandwidth: Hertz,
+    /// Bandwidth that the current loop was designed for, the largest that a host may set.
+    pub current_bandwidth: Hertz,
     /// Largest stiffness (N m/rad) and damping (N m s/rad) of the impedance mode.
     pub impedance: [f32; 2],
 }
 
 impl AxisConstants {
     /// Constants of a joint whose encoder has this many counts per motor revolution, behind this gear ratio.
-    /// All modes are supported.
+    /// `current_bandwidth` is that of its current loop. All modes are supported.
     #[must_use]
-    pub fn of(joint: &JointConfiguration, counts_per_turn: u32, ratio: f32) -> Self {
+    pub fn of(
+        joint: &JointConfiguration,
+        counts_per_turn: u32,
+        ratio: f32,
+        current_bandwidth: Hertz,
+    ) -> Self {
         Self {
             rated_torque: joint.limits().torque_cap(),
             rated_current: joint.current,
@@ -79,8 +91,22 @@ impl AxisConstants {
             speed: joint.speed,
             counts_per_turn,
             ratio,
+            position_bandwidth: joint.bandwidth,
+            current_bandwidth,
             impedance: joint.stiffest_impedance(),
         }
+    }
+
+    /// Least and largest bandwidth of the position loop, unit of 2021.
+    pub(super) fn position_bandwidths(&self) -> [u16; 2] {
+        [POSITION_BANDWIDTHS_HZ[0], self.position_bandwidth.0]
+            .map(|hertz| (hertz / POSITION_BANDWIDTH_UNIT + 0.5) as u16)
+    }
+
+    /// Least and largest bandwidth of the current loop, unit of 2021.
+    pub(super) fn current_bandwidths(&self) -> [u16; 2] {
+        let most = self.current_bandwidth.0;
+        [LEAST_CURRENT_SHARE * most, most].map(|hertz| (hertz + 0.5) as u16)
     }
 
     /// Placeholder of a joint whose constants are unknown.
@@ -92,6 +118,8 @@ impl AxisConstants {
         speed: RadianPerSecond::ZERO,
         counts_per_turn: 0,
         ratio: 0.0,
+        position_bandwidth: Hertz(0.0),
+        current_bandwidth: Hertz(0.0),
         impedance: [0.0; 2],
     };
 }
@@ -99,6 +127,14 @@ impl AxisConstants {
 /// Units of stiffness (N m/rad) and damping (N m s/rad) on the bus.
 pub(super) const STIFFNESS_UNIT: f32 = 0.1;
 pub(super) const DAMPING_UNIT: f32 = 0.01;
+
+/// Unit of the position loop's bandwidth on the bus, Hz. That of the current loop is in Hz.
+const POSITION_BANDWIDTH_UNIT: f32 = 0.01;
+
+/// Least bandwidth of a current loop that a host may set, as a share of the one it was designed for. The lower
+/// it is, the larger a change of the target current must be before a stuck shunt shows (C3 of
+/// docs/safety.md).
+const LEAST_CURRENT_SHARE: f32 = 0.5;
 
 /// No homing method was written; homing then fails.
 const NO_METHOD: i8 = -1;
@@ -132,6 +168,9 @@ pub(super) struct Settings {
     pub target_velocity: i32,
     /// Stiffness and damping, units of 2020.
     pub impedance: [u16; 2],
+    /// Bandwidths of position and current loop, units of 2021; 0: the ones they were designed for.
+    pub position_bandwidth: u16,
+    pub current_bandwidth: u16,
     pub feedforward: bool,
     pub returns: bool,
     pub watches: bool,
@@ -170,6 +209,8 @@ impl Settings {
         outputs: 0,
         target_velocity: 0,
         impedance: [0; 2],
+        position_bandwidth: 0,
+        current_bandwidth: 0,
         feedforward: false,
         returns: true,
         watches: true,
@@ -268,6 +309,16 @@ impl Axis {
     /// Sets object 2002, when it was written at another node of the board.
     pub const fn set_bit_rate(&mut self, kbit_per_s: u16) {
         self.settings.bit_rate = kbit_per_s;
+    }
+
+    /// Returns the bandwidths that a host has set (2021).
+    #[must_use]
+    pub fn bandwidths(&self) -> LoopBandwidths {
+        let set = |value: u16, unit: f32| (value > 0).then(|| Hertz(unit * f32::from(value)));
+        LoopBandwidths {
+            position: set(self.settings.position_bandwidth, POSITION_BANDWIDTH_UNIT),
+            current: set(self.settings.current_bandwidth, 1.0),
+        }
     }
 
     /// Returns object 2012.

@@ -23,5 +23,16 @@ pub(super) use control::USUAL_KBIT;
 pub use control::{Axis, AxisConstants};
 pub use coupling::Coupling;
 
+use crate::units::Hertz;
+
+/// Bandwidths of a joint's control loops that a host has set; `None`: the one a loop was designed for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LoopBandwidths {
+    /// Bandwidth of the position loop.
+    pub position: Option<Hertz>,
+    /// Bandwidth of the current loop.
+    pub current: Option<Hertz>,
+}
+
 #[cfg(test)]
 mod tests;

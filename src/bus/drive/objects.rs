@@ -18,6 +18,11 @@ fn micro(value: f32) -> u32 {
     ((value * 1e6) as i32) as u32
 }
 
+/// Whether a value is 0 or within these limits.
+fn is_default_or_within(value: u32, [least, most]: [u16; 2]) -> bool {
+    value == 0 || (u32::from(least)..=u32::from(most)).contains(&value)
+}
+
 impl Objects for Axis {
     fn read(&self, object: Object) -> Result<u32, Abort> {
         let (settings, status, constants) = (&self.settings, &self.status, &self.constants);
@@ -34,6 +39,12 @@ impl Objects for Axis {
             (0x2020, 2) => u32::from(settings.impedance[1]),
             (0x2020, 3) => u32::from((constants.impedance[0] / STIFFNESS_UNIT) as u16),
             (0x2020, 4) => u32::from((constants.impedance[1] / DAMPING_UNIT) as u16),
+            (0x2021, 1) => u32::from(settings.position_bandwidth),
+            (0x2021, 2) => u32::from(constants.position_bandwidths()[0]),
+            (0x2021, 3) => u32::from(constants.position_bandwidths()[1]),
+            (0x2021, 4) => u32::from(settings.current_bandwidth),
+            (0x2021, 5) => u32::from(constants.current_bandwidths()[0]),
+            (0x2021, 6) => u32::from(constants.current_bandwidths()[1]),
             // Objects of the leg; they are not held here.
             (0x2120, 0) => 13,
             (0x2100..=0x2193, _) => return Err(Abort::NoData),
@@ -94,6 +105,7 @@ impl Objects for Axis {
     }
 
     fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+        let constants = &self.constants;
         let settings = &mut self.settings;
         let is = |allowed: &[i32]| allowed.contains(&i32::from(value as i16));
         match (object.index, object.sub) {
@@ -107,6 +119,12 @@ impl Objects for Axis {
             (0x2013, _) if value <= 1 => settings.watches = value == 1,
             (0x2020, 1) => settings.impedance[0] = value as u16,
             (0x2020, 2) => settings.impedance[1] = value as u16,
+            (0x2021, 1) if is_default_or_within(value, constants.position_bandwidths()) => {
+                settings.position_bandwidth = value as u16;
+            }
+            (0x2021, 4) if is_default_or_within(value, constants.current_bandwidths()) => {
+                settings.current_bandwidth = value as u16;
+            }
             (0x6007, _) if is(&[0, 1, 2, 3]) => settings.connection_option = value as i16,
             (0x6040, _) => self.control(value as u16),
             // Fault reactions are chosen per fault; a halt always slows down along the profile.
@@ -151,6 +169,7 @@ impl Objects for Axis {
                 | 0x2011
                 | 0x2012
                 | 0x2013
+                | 0x2021
                 | 0x6007
                 | 0x605A..=0x605E
                 | 0x6083

@@ -15,6 +15,7 @@ fn objects() -> impl Iterator<Item = (Object, &'static dictionary::Row)> {
 fn is_live(object: Object) -> bool {
     matches!(object.index, 0x1008..=0x100A | 0x1018 | 0x6075 | 0x6076 | 0x607F | 0x6080 | 0x608F | 0x6091 | 0x6502)
         || is_of_the_leg(object)
+        || matches!((object.index, object.sub), (0x2021, 2 | 3 | 5 | 6))
         // Initial state of the drive.
         || matches!(object.index, 0x6041)
         || object.index == 0x1003 && object.sub > 0
@@ -92,7 +93,8 @@ fn objects_of_another_maker_are_accepted() {
 
 #[test]
 fn profile_objects_have_the_units_of_cia_402() {
-    use crate::units::{NewtonMetrePerAmpere, RadianPerSecond, Volt};
+    use crate::bus::drive::LoopBandwidths;
+    use crate::units::{Hertz, NewtonMetrePerAmpere, RadianPerSecond, Volt};
     let constants = AxisConstants {
         rated_torque: NewtonMetre(85.0),
         rated_current: Ampere(50.0),
@@ -101,6 +103,8 @@ fn profile_objects_have_the_units_of_cia_402() {
         counts_per_turn: 8192,
         ratio: 50.0,
         modes: 0,
+        position_bandwidth: Hertz(3.0),
+        current_bandwidth: Hertz(1000.0),
         impedance: [800.0, 31.5],
     };
     let mut axis = Axis::new(constants);
@@ -112,4 +116,14 @@ fn profile_objects_have_the_units_of_cia_402() {
     assert_eq!((read(0x6080, 0), read(0x607F, 0)), (2148, 4_500_000));
     assert_eq!((read(0x608F, 1), read(0x6091, 1)), (8192, 50_000));
     assert_eq!((read(0x2020, 3), read(0x2020, 4)), (8000, 3150));
+    assert_eq!([1, 2, 3, 4, 5, 6].map(|sub| read(0x2021, sub)), [0, 50, 300, 0, 500, 1000]);
+    assert_eq!(axis.bandwidths(), LoopBandwidths::default());
+    for (sub, values) in [(1, [49, 301, 50, 300, 0, 125]), (4, [499, 1001, 500, 1000, 0, 750])] {
+        for (place, value) in values.into_iter().enumerate() {
+            let written = axis.write(Object::at(0x2021, sub), value);
+            assert_eq!(written, if place < 2 { Err(Abort::Range) } else { Ok(()) }, "{value}");
+        }
+    }
+    let set = LoopBandwidths { position: Some(Hertz(1.25)), current: Some(Hertz(750.0)) };
+    assert_eq!(axis.bandwidths(), set);
 }

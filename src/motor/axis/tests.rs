@@ -172,6 +172,38 @@ fn counts_stay_exact_through_many_wraps_of_the_counter() {
 }
 
 #[test]
+fn the_bandwidth_of_a_running_axis_changes_without_a_fault_or_a_jump() {
+    // Current in the tick at which a step of 20 A begins to flow, as a share of it.
+    let begins = |bandwidth: Option<f32>| {
+        let mut bench = Bench::at(0.0, &CONFIGURATION);
+        if let Some(bandwidth) = bandwidth {
+            bench.axis.set_bandwidth(Hertz(bandwidth));
+        }
+        bench.run(ask(20.0), 4);
+        bench.axis.measured().q.0.abs() / 20.0
+    };
+    let shares = [None, Some(1000.0), Some(500.0)].map(begins);
+    assert!((shares[0] - shares[1]).abs() < 1e-3 && shares[2] < 0.6 * shares[0], "{shares:?}");
+    // While a current flows, with all checks, over several checksums.
+    let mut bench = Bench::at(60.0, &CONFIGURATION);
+    for bandwidth in [500.0, 1000.0, 700.0] {
+        bench.run_sampled(ask(15.0), 3000, |_| ());
+        bench.axis.set_bandwidth(Hertz(bandwidth));
+        for _ in 0..100 {
+            bench.tick(ask(15.0));
+            let current = bench.axis.measured().q.0.abs();
+            assert!((current - 15.0).abs() < 1.0, "{current} A at {bandwidth} Hz");
+        }
+    }
+    assert_eq!(bench.axis.fault(), None);
+    // A damaged limit is still found after a change.
+    bench.axis.flip_bit(0, 3);
+    bench.axis.set_bandwidth(Hertz(600.0));
+    bench.run_sampled(ask(15.0), 2000, |_| ());
+    assert_eq!(bench.axis.fault(), Some(AxisFault::Parameters));
+}
+
+#[test]
 fn every_bound_turns_off_until_the_fault_is_cleared() {
     type Inject = fn(&mut AxisSample);
     let injections: [(Inject, AxisFault, usize); 4] = [

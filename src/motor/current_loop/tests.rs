@@ -154,6 +154,16 @@ fn nothing_winds_up_at_the_limit() {
 }
 
 #[test]
+fn another_bandwidth_gives_the_gains_that_were_derived_for_it() {
+    let mut changed = gains(1000.0, true);
+    changed.set_bandwidth(Hertz(500.0));
+    let derived = gains(500.0, true);
+    assert!((changed.least_ohm() / derived.least_ohm() - 1.0).abs() < 1e-6);
+    assert!((changed.proportional_ohm.q / derived.proportional_ohm.q - 1.0).abs() < 1e-6);
+    assert_eq!(changed.phase_margin_deg(), derived.phase_margin_deg());
+}
+
+#[test]
 fn absurd_motors_and_bandwidths_are_refused() {
     let refused = |change: fn(&mut MotorConstants), bandwidth| {
         let mut motor = MOTOR;

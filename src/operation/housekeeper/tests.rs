@@ -17,6 +17,7 @@ use crate::safety::winding::tests::RATING;
 use crate::testing::TestRandom;
 
 mod absolute;
+mod bandwidths;
 mod commissioning;
 mod reports;
 mod second_day;

@@ -17,6 +17,7 @@ use crate::safety::BoardFault;
 use crate::units::Ampere;
 
 mod assist;
+mod bandwidths;
 mod faults;
 mod holding_brake;
 mod reports;
@@ -107,6 +108,13 @@ impl Bench {
     /// The operator requests.
     fn ask(&mut self, request: ControlRequest) {
         assert!(self.ends.housekeeping.requests.enqueue(request).is_ok(), "full");
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        match self.control.state() {
+            DriveState::Fault { fault } | DriveState::FaultReactionActive { fault, .. } => Some(fault),
+            _ => None,
+        }
     }
 
     /// The bus orders.

@@ -3,11 +3,13 @@
 //! A value is accepted if a node in its initial state accepts it, as on a board; this file has no rules of
 //! its own.
 
+use scarab::board::odrive_v3_6::settings::drives;
 use scarab::bus::dictionary::{Object, Type, find};
 use scarab::bus::drive::{Axis, AxisConstants, Mode};
 use scarab::bus::table::{NAMES, ROWS};
 use scarab::bus::{Abort, Identity, LONGEST, Node, NodeId, stored_entries, stored_objects, write_stored};
-use scarab::units::{Ampere, NewtonMetre};
+use scarab::leg::POSITION_BANDWIDTHS_HZ;
+use scarab::units::{Ampere, Hertz, NewtonMetre};
 
 use crate::formats::kept_file::{Joint, ObjectValue};
 
@@ -97,6 +99,8 @@ fn try_on_a_node(bytes: &[u8], joint: Joint) -> Result<(), String> {
         rated_torque: NewtonMetre(1.0),
         rated_current: Ampere(1.0),
         modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+        position_bandwidth: Hertz(POSITION_BANDWIDTHS_HZ[1]),
+        current_bandwidth: drives::BANDWIDTH,
         ..AxisConstants::UNKNOWN
     });
     let refused = node.try_recall(bytes, &mut axis);

@@ -14,6 +14,7 @@
 //! start. The enable request of closing it has ended before the boot-up messages.
 
 use hal_sim::world::periods::PERIODS_PER_TICK;
+use scarab::board::odrive_v3_6::settings::drives;
 use scarab::bus::device::Device;
 use scarab::bus::drive::AxisConstants;
 use scarab::bus::{Frame, Identity, Node, NodeId, Storing};
@@ -90,7 +91,12 @@ fn device<const N: usize, const B: usize>(
     let configuration = &context.configuration;
     let constants = core::array::from_fn(|joint| {
         let encoder = &encoders[joint];
-        AxisConstants::of(&configuration.joints[joint], encoder.counts, encoder.ratio as f32)
+        AxisConstants::of(
+            &configuration.joints[joint],
+            encoder.counts,
+            encoder.ratio as f32,
+            drives::BANDWIDTH,
+        )
     });
     Device::new(
         core::array::from_fn(|joint| own_number(label.first, joint)),

@@ -5,13 +5,6 @@ use crate::safety::Bridges;
 use crate::units::Ohm;
 
 /// The fault for which the leg damps or is off.
-fn fault(bench: &Bench) -> Option<Fault> {
-    match bench.control.state() {
-        DriveState::Fault { fault } | DriveState::FaultReactionActive { fault, .. } => Some(fault),
-        _ => None,
-    }
-}
-
 #[test]
 fn a_fault_from_another_level_reaches_the_leg_with_its_joint() {
     for joint in 0..2 {
@@ -19,7 +12,7 @@ fn a_fault_from_another_level_reaches_the_leg_with_its_joint() {
             let mut bench = Bench::enabled();
             bench.signals.report(seen, joint);
             bench.tick();
-            assert_eq!(fault(&bench), Some(Fault { code: seen.code(), joint: joint as u8 }));
+            assert_eq!(bench.fault(), Some(Fault { code: seen.code(), joint: joint as u8 }));
             assert_eq!(bench.signals.permission(), Permission::Damp);
         }
     }
@@ -29,7 +22,7 @@ fn a_fault_from_another_level_reaches_the_leg_with_its_joint() {
 fn changed_gains_or_limits_are_a_fault_within_64_ms() {
     let mut bench = Bench::enabled();
     bench.run(600);
-    assert_eq!(fault(&bench), None);
+    assert_eq!(bench.fault(), None);
     // The level has the checksum of another limit, as if the limit in memory had changed.
     let mut other = configuration();
     other.joints[1].torque.0 += 1e-5;
@@ -39,9 +32,9 @@ fn changed_gains_or_limits_are_a_fault_within_64_ms() {
     bench.ends.servo.host = None;
     bench.enable();
     bench.run(255 - bench.level.ticks());
-    assert_eq!(fault(&bench), None);
+    assert_eq!(bench.fault(), None);
     bench.tick();
-    assert_eq!(fault(&bench), Some(Fault { code: FaultCode::Parameters, joint: 0 }));
+    assert_eq!(bench.fault(), Some(Fault { code: FaultCode::Parameters, joint: 0 }));
     assert_eq!(bench.signals.permission(), Permission::Off);
 }
 
@@ -51,9 +44,9 @@ fn a_failing_supply_is_a_fault_after_four_ticks() {
     bench.run(40);
     bench.set_bus(Volt(0.75 * 48.0));
     bench.run(3);
-    assert_eq!(fault(&bench), None);
+    assert_eq!(bench.fault(), None);
     bench.tick();
-    assert_eq!(fault(&bench), Some(Fault { code: FaultCode::SupplyLost, joint: 0 }));
+    assert_eq!(bench.fault(), Some(Fault { code: FaultCode::SupplyLost, joint: 0 }));
     assert_eq!(bench.signals.permission(), Permission::Damp);
 }
 
@@ -72,23 +65,23 @@ fn supplied(powers_w: [f32; 2], seconds: f32) -> Bench {
 #[test]
 fn too_much_current_from_the_supply_damps_the_leg() {
     let bench = supplied([400.0, 240.0], 0.19);
-    assert_eq!((fault(&bench), bench.level.supply_shares()[1]), (None, 1.0));
+    assert_eq!((bench.fault(), bench.level.supply_shares()[1]), (None, 1.0));
     assert!(bench.level.supply_shares()[0] < 0.1, "{:?}", bench.level.supply_shares());
     let bench = supplied([400.0, 240.0], 0.22);
-    assert_eq!(fault(&bench), Some(Fault { code: FaultCode::SupplyCurrent, joint: 0 }));
+    assert_eq!(bench.fault(), Some(Fault { code: FaultCode::SupplyCurrent, joint: 0 }));
     assert_eq!((bench.signals.permission(), bench.signals.inhibit.causes()), (Permission::Damp, 0));
     // One joint returns what the other takes.
-    assert_eq!(fault(&supplied([640.0, -600.0], 0.5)), None);
+    assert_eq!(supplied([640.0, -600.0], 0.5).fault(), None);
 }
 
 #[test]
 fn too_much_current_into_the_supply_shorts_the_motors() {
     let bench = supplied([-100.0, -200.0], 0.19);
-    assert_eq!((fault(&bench), bench.level.supply_shares()[0]), (None, 1.0));
+    assert_eq!((bench.fault(), bench.level.supply_shares()[0]), (None, 1.0));
     // 6.25 A, less three quarters of the limit, times 2 ohm over 48 V.
     assert!((bench.signals.wanted_brake() - 0.135).abs() < 1e-3, "{}", bench.signals.wanted_brake());
     let mut bench = supplied([-100.0, -200.0], 0.22);
-    assert_eq!(fault(&bench), Some(Fault { code: FaultCode::ChargeCurrent, joint: 0 }));
+    assert_eq!(bench.fault(), Some(Fault { code: FaultCode::ChargeCurrent, joint: 0 }));
     assert_eq!(Bridges::of(bench.signals.inhibit.causes()), Bridges::Brake);
     assert_eq!(bench.signals.permission(), Permission::Off);
     // Shorted motors take nothing from the bus, whatever the axes last published.
@@ -98,7 +91,7 @@ fn too_much_current_into_the_supply_shorts_the_motors() {
     let mut bench = supplied([-100.0, -200.0], 0.05);
     bench.signals.set_given_brake(bench.signals.wanted_brake());
     bench.run(4000);
-    assert_eq!(fault(&bench), None);
+    assert_eq!(bench.fault(), None);
     bench.signals.end_servo();
     bench.tick();
     assert_eq!(bench.signals.wanted_brake(), 0.0, "without a servo the resistor stays off");
@@ -111,5 +104,5 @@ fn a_lost_host_is_the_fault_of_its_joint() {
     let order = LegOrder { commands: None, request: None, faults, may_return: [true; 2], refused: None };
     assert!(bench.bus.orders.enqueue(order).is_ok());
     bench.tick();
-    assert_eq!(fault(&bench), Some(Fault { code: FaultCode::Heartbeat, joint: 1 }));
+    assert_eq!(bench.fault(), Some(Fault { code: FaultCode::Heartbeat, joint: 1 }));
 }

@@ -1,0 +1,43 @@
+//! Bandwidths of the current loops that a host sets.
+
+use super::*;
+use crate::bus::drive::LoopBandwidths;
+
+const SLOWER: Hertz = Hertz(600.0);
+
+impl Bench {
+    fn set_bandwidths(&self, bandwidths: [Option<Hertz>; 2]) {
+        self.signals.set_bandwidths(&bandwidths.map(|current| LoopBandwidths { position: None, current }));
+    }
+}
+
+#[test]
+fn a_bandwidth_is_ordered_once_and_only_while_the_drive_is_off() {
+    let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
+    assert_eq!(bench.hold(true, false), []);
+    bench.signals.set_permission(Permission::Follow);
+    bench.set_bandwidths([None, Some(SLOWER)]);
+    assert_eq!(bench.hold(true, false), []);
+    bench.signals.set_permission(Permission::Off);
+    assert_eq!(bench.hold(true, false), [(1, Order::Bandwidth(SLOWER))]);
+    bench.set_bandwidths([None; 2]);
+    assert_eq!(bench.hold(true, false), [(1, Order::Bandwidth(CONFIGURATION.bandwidth))]);
+}
+
+#[test]
+fn an_axis_begins_with_the_bandwidth_that_was_set_before_its_calibration() {
+    let calibration = measured();
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
+    bench.set_bandwidths([Some(SLOWER), None]);
+    assert!(matches!(bench.press()[..], [(0, Order::Calibrate(_))]));
+    // A change during the calibration waits for its end.
+    bench.set_bandwidths([Some(SLOWER), Some(SLOWER)]);
+    let slower = AxisConfiguration { bandwidth: SLOWER, ..CONFIGURATION };
+    let of = |configuration| Axis::new(configuration, &calibration, &AxisSample::default()).expect("usual");
+    let orders = bench.ends(0, Outcome::Calibrated(calibration));
+    assert!(matches!(&orders[..], [(0, Order::Run(axis)), (1, Order::Calibrate(_))] if *axis == of(&slower)));
+    let orders = bench.ends(1, Outcome::Calibrated(calibration));
+    assert!(
+        matches!(&orders[..], [(1, Order::Run(axis)), (1, Order::Bandwidth(SLOWER))] if *axis == of(&CONFIGURATION))
+    );
+}
