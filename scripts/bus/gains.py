@@ -1,8 +1,9 @@
-"""Bandwidths of the control loops, changed at run time: `gains.py HOST:PORT`.
+"""Bandwidths of the control loops, changed at run time: `gains.py HOST:PORT [SLOWER]`.
 
 The hip holds a position (mode 8) while a torque offset (60B2) pushes it. Position control answers with a
 stiffness that is proportional to the square of its bandwidth, so half the bandwidth gives four times the
-deviation. Then limits, storing and reset are checked. The last line is `gains: ok`.
+deviation. Then limits, storing and reset are checked. SLOWER stretches all times for a board that is simulated
+more slowly than real time. The last line is `gains: ok`.
 """
 
 import struct
@@ -22,8 +23,8 @@ SAVE, STORES, RANGE = 0x65766173, 0xFF0D, 0x06090030
 class Session:
     """Positions of the hip at SYNC, while both joints hold theirs."""
 
-    def __init__(self, network, joints):
-        self.network, self.joints, self.places = network, joints, []
+    def __init__(self, network, joints, slower):
+        self.network, self.joints, self.slower, self.places = network, joints, slower, []
         hip = joints[0]
         hip.set_up_pdo(0x1801, 0x280 + hip.number, 1, [0x60640020, 0x606C0020])
         network.subscribe(0x280 + hip.number, self.take)
@@ -35,13 +36,13 @@ class Session:
         self.places.append(struct.unpack("<ii", data)[0] * MICRO)
 
     def run(self, seconds):
-        end = time.monotonic() + seconds
+        end = time.monotonic() + self.slower * seconds
         while time.monotonic() < end:
             for joint, place in zip(self.joints, self.held):
                 data = struct.pack("<i", round(place / MICRO))
                 self.network.send_message(0x300 + joint.number, data)
             self.network.send_message(0x80, b"")
-            time.sleep(CYCLE_S)
+            time.sleep(self.slower * CYCLE_S)
 
     def deviation(self, position, current):
         """Largest deviation of the hip under pushes in both directions, rad, at these bandwidths."""
@@ -99,7 +100,7 @@ def main():
         low, high = limits[low - 1], limits[high - 1]
         assert refused(hip, sub, low - 1) and refused(hip, sub, high + 1), (low, high)
     alive = Heartbeat(network)
-    session = Session(network, joints)
+    session = Session(network, joints, float(sys.argv[2]) if len(sys.argv) > 2 else 1.0)
     designed, half = limits[MOST_POSITION - 1], limits[MOST_POSITION - 1] // 2
     slower = limits[LEAST_CURRENT - 1]
     found = {}

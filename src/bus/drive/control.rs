@@ -131,8 +131,8 @@ pub(super) const DAMPING_UNIT: f32 = 0.01;
 /// Unit of the position loop's bandwidth on the bus, Hz. That of the current loop is in Hz.
 const POSITION_BANDWIDTH_UNIT: f32 = 0.01;
 
-/// Least bandwidth of a current loop that a host may set, as a share of the one it was designed for. The lower
-/// it is, the larger a change of the target current must be before a stuck shunt shows (C3 of
+/// Least bandwidth of a current loop that a host may set, as a share of the one it was designed for. The
+/// lower it is, the larger a change of the target current must be before a stuck shunt shows (C3 of
 /// docs/safety.md).
 const LEAST_CURRENT_SHARE: f32 = 0.5;
 
