@@ -18,8 +18,9 @@ use serde::Serialize;
 
 use crate::assist::{self, AssistComparison};
 use crate::image::Image;
+use crate::load::LEVELS;
 use crate::machine::Options;
-use crate::report::{ChipReport, LEVELS, LoadReport};
+use crate::report::{ChipReport, LoadReport};
 use crate::session::{Session, Step};
 use crate::time::seconds;
 use crate::{drivers, faults, hangs, sampling, serve, situations, stops, store_cuts, update};

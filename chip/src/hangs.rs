@@ -8,6 +8,7 @@ use serde::Serialize;
 use scarab::bus::Frame;
 use scarab_host::base::error::ToolError;
 
+use crate::load::{CURRENT_INTERRUPT, SERVO};
 use crate::machine::{End, Snapshot};
 use crate::peripherals::rcc::ResetReason;
 use crate::session::Session;
@@ -15,8 +16,8 @@ use crate::time::{seconds, ticks};
 
 /// Levels that may hang, with their exceptions; 0 is the thread.
 const LEVELS: [(&str, u8); 7] = [
-    ("current interrupt", 16 + 18),
-    ("servo", 16 + 77),
+    ("current interrupt", CURRENT_INTERRUPT),
+    ("servo", SERVO),
     ("clock", 16 + 50),
     ("bus receive", 16 + 20),
     ("bus", 16 + 19),

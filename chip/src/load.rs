@@ -5,6 +5,24 @@
 use crate::nvic::EXCEPTIONS;
 use crate::time::Ticks;
 
+/// Exceptions of the current loops and of the servo.
+pub const CURRENT_INTERRUPT: u8 = 16 + 18;
+pub const SERVO: u8 = 16 + 77;
+
+/// Interrupts of the image: name, exception number.
+pub const LEVELS: [(&str, u8); 10] = [
+    ("stop", 16 + 10),
+    ("current_interrupt", CURRENT_INTERRUPT),
+    ("index_0", 16 + 23),
+    ("index_1", 16 + 40),
+    ("servo", SERVO),
+    ("clock", 16 + 50),
+    ("bus_receive", 16 + 20),
+    ("bus", 16 + 19),
+    ("assist", 16 + 67),
+    ("housekeeping", 16 + 72),
+];
+
 /// Use by one exception; 0 is the thread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Use {

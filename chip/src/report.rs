@@ -12,22 +12,9 @@ use scarab_host::with_leg_size;
 use serde::Serialize;
 
 use crate::findings::Finding;
+use crate::load::LEVELS;
 use crate::session::Session;
 use crate::time::{TICK_HZ, microseconds, seconds};
-
-/// Interrupts of the image: name, exception number.
-pub const LEVELS: [(&str, u8); 10] = [
-    ("stop", 16 + 10),
-    ("current_interrupt", 16 + 18),
-    ("index_0", 16 + 23),
-    ("index_1", 16 + 40),
-    ("servo", 16 + 77),
-    ("clock", 16 + 50),
-    ("bus_receive", 16 + 20),
-    ("bus", 16 + 19),
-    ("assist", 16 + 67),
-    ("housekeeping", 16 + 72),
-];
 
 /// Shares of the processor's time.
 #[derive(Clone, Debug, Serialize)]

@@ -99,6 +99,7 @@ def main():
     for sub, low, high in ((POSITION, LEAST_POSITION, MOST_POSITION), (CURRENT, LEAST_CURRENT, MOST_CURRENT)):
         low, high = limits[low - 1], limits[high - 1]
         assert refused(hip, sub, low - 1) and refused(hip, sub, high + 1), (low, high)
+    modes = [joint.read(0x6060, 0, "<b") for joint in joints]
     alive = Heartbeat(network)
     session = Session(network, joints, float(sys.argv[2]) if len(sys.argv) > 2 else 1.0)
     designed, half = limits[MOST_POSITION - 1], limits[MOST_POSITION - 1] // 2
@@ -114,22 +115,24 @@ def main():
         print(f"current loop {current or limits[MOST_CURRENT - 1]} Hz: half the bandwidth of the position loop,"
               f" {ratio:.2f} times the deviation")
         assert 3.0 < ratio < 5.0, ratio
-    for joint in joints:
+    for joint, mode in zip(joints, modes):
         assert not joint.emergencies, joint.emergencies
-        joint.write(0x6060, 0, 0, "<b")
+        joint.write(0x6060, 0, mode, "<b")
     alive.stop()
     # After a reset of communication the PDOs of this session are not stored.
     for joint in joints:
         network.send_message(0, bytes([0x82, joint.number]))
     hip.write(0x2021, POSITION, half, "<H")
     save(hip)
-    network.send_message(0, bytes([0x81, hip.number]))
-    set_ones = lambda: [hip.read(0x2021, sub, "<H") for sub in (POSITION, CURRENT)]
-    until("the stored bandwidths", lambda: set_ones() == [half, slower])
-    print(f"after a reset of the node: {half / 100:.1f} Hz and {slower} Hz")
-    for sub in (POSITION, CURRENT):
-        hip.write(0x2021, sub, 0, "<H")
-    save(hip)
+    try:
+        network.send_message(0, bytes([0x81, hip.number]))
+        stored = lambda: [hip.read(0x2021, sub, "<H") for sub in (POSITION, CURRENT)]
+        until("the stored bandwidths", lambda: stored() == [half, slower])
+        print(f"after a reset of the node: {half / 100:.1f} Hz and {slower} Hz")
+    finally:
+        for sub in (POSITION, CURRENT):
+            hip.write(0x2021, sub, 0, "<H")
+        save(hip)
     network.disconnect()
     print("gains: ok")
 

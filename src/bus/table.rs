@@ -30,7 +30,7 @@ pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x1F56, 1, "Program software identification", true),
     (0x1F57, 1, "Flash status identification", true),
     (0x2020, 1, "Impedance", true),
-    (0x2021, 1, "Bandwidth", true),
+    (0x2021, 1, "Bandwidths", true),
     (0x2100, 1, "Identification", false),
     (0x2110, 1, "Parameter", true),
     (0x2111, 1, "Parameter standard deviation", true),
@@ -169,12 +169,12 @@ rows! {
     0x2020, 3, U16, Read, No, 0, "Largest stiffness";
     0x2020, 4, U16, Read, No, 0, "Largest damping";
     0x2021, 0, U8, Const, No, 6, "Number of entries";
-    0x2021, 1, U16, Both, No, 0, "Position loop";
-    0x2021, 2, U16, Read, No, 0, "Least of the position loop";
-    0x2021, 3, U16, Read, No, 0, "Largest of the position loop";
-    0x2021, 4, U16, Both, No, 0, "Current loop";
-    0x2021, 5, U16, Read, No, 0, "Least of the current loop";
-    0x2021, 6, U16, Read, No, 0, "Largest of the current loop";
+    0x2021, 1, U16, Both, No, 0, "Bandwidth of the position loop";
+    0x2021, 2, U16, Read, No, 0, "Least bandwidth of the position loop";
+    0x2021, 3, U16, Read, No, 0, "Largest bandwidth of the position loop";
+    0x2021, 4, U16, Both, No, 0, "Bandwidth of the current loop";
+    0x2021, 5, U16, Read, No, 0, "Least bandwidth of the current loop";
+    0x2021, 6, U16, Read, No, 0, "Largest bandwidth of the current loop";
     0x2100, 0, U8, Const, No, 13, "Number of entries";
     0x2100, 1, U8, Both, No, 0, "Command";
     0x2100, 2, U8, Read, Transmit, 0, "State";

@@ -164,7 +164,7 @@ impl<const N: usize> Control<N> {
         self.servo.state()
     }
 
-    /// Checksum over gains, scales and limits, which are constant.
+    /// Checksum over gains, scales and limits; only [`Self::set_bandwidths`] changes it.
     #[must_use]
     pub fn checksum(&self) -> Checksum {
         self.servo.checksum()

@@ -69,7 +69,7 @@ pub use crate::safety::{
     DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,
     NoticeCode, Permission, PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
 };
-pub use crate::servo::{JointConfiguration, LogSample, POSITION_BANDWIDTHS_HZ};
+pub use crate::servo::{JointConfiguration, LogSample};
 
 use crate::hal::Sample;
 use crate::safety::Derating;

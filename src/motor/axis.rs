@@ -7,8 +7,8 @@
 //! ```
 //!
 //! An [`Axis`] requires a [`Calibration`], and a calibration exists only after every wiring check has passed.
-//! So no torque is possible without these checks. The configuration and the constants derived from it never
-//! change; a tick changes only [`Axis`]'s few state words.
+//! So no torque is possible without these checks. A tick changes only [`Axis`]'s few state words, and of the
+//! constants a host may set the current loop's bandwidth.
 //!
 //! **Limits.** These conditions turn the outputs off:
 //!
@@ -154,7 +154,7 @@ pub struct Axis {
     first_motion: FirstMotion,
     /// Greatest quadrature current, A; from the constants, in every check.
     current_limit: f32,
-    /// Checksum of the constants at construction.
+    /// Checksum of the constants at construction, or after the last change of the bandwidth.
     checksum: Checksum,
     /// Calls of [`Axis::check`] since that checksum was compared; wraps at 256.
     unchecked: u8,

@@ -151,7 +151,7 @@ const SQRT_3: f32 = 1.732_050_8;
 /// the board's scale.
 pub const ZERO_SPREAD_CODES: u16 = 150;
 
-/// Values that a tick reads and never writes.
+/// Values that a tick reads and never writes. A host may set the bandwidth between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Constants {
     pub sense: SenseScale,

@@ -67,6 +67,8 @@ pub struct MotorConstants {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentGains {
     proportional_ohm: Rotating<f32>,
+    /// Proportional gains over the bandwidth.
+    ohm_per_hz: Rotating<f32>,
     /// `1 - exp(-R T / L)`.
     renewal: Rotating<f32>,
     inductance_h: Rotating<f32>,
@@ -87,13 +89,15 @@ impl CurrentGains {
             && (1e-6..=1e-2).contains(&inductance_h.q)
             && (0.0..=1.0).contains(&motor.flux.0);
         let period_s = 1.0 / CURRENT_RATE_HZ as f32;
-        let volt_per_ampere = core::f32::consts::TAU * bandwidth.0 * period_s * motor.resistance.0;
+        let per_hz = core::f32::consts::TAU * period_s * motor.resistance.0;
         let renewal =
             |inductance: f32| 1.0 - exp(-motor.resistance.0 / (inductance * CURRENT_RATE_HZ as f32));
         let forward = if feedforward { 1.0 } else { 0.0 };
         let renewal = Rotating { d: renewal(inductance_h.d), q: renewal(inductance_h.q) };
+        let ohm_per_hz = Rotating { d: per_hz / renewal.d, q: per_hz / renewal.q };
         sensible.then(|| Self {
-            proportional_ohm: Rotating { d: volt_per_ampere / renewal.d, q: volt_per_ampere / renewal.q },
+            proportional_ohm: Rotating { d: bandwidth.0 * ohm_per_hz.d, q: bandwidth.0 * ohm_per_hz.q },
+            ohm_per_hz,
             renewal,
             inductance_h: Rotating { d: forward * inductance_h.d, q: forward * inductance_h.q },
             flux_vs: forward * motor.flux.0,
@@ -103,10 +107,9 @@ impl CurrentGains {
 
     /// Sets another bandwidth, which was checked before.
     pub(super) fn set_bandwidth(&mut self, bandwidth: Hertz) {
-        let factor = bandwidth.0 / self.bandwidth.0;
-        self.proportional_ohm.d *= factor;
-        self.proportional_ohm.q *= factor;
         self.bandwidth = bandwidth;
+        let Rotating { d, q } = self.ohm_per_hz;
+        self.proportional_ohm = Rotating { d: bandwidth.0 * d, q: bandwidth.0 * q };
     }
 
     /// Smaller of both proportional gains, ohm.
@@ -123,9 +126,10 @@ impl CurrentGains {
     /// Adds all constants to a checksum.
     #[must_use]
     pub(super) fn add_to(&self, sum: Checksum) -> Checksum {
-        let Self { proportional_ohm, renewal, inductance_h, flux_vs, bandwidth } = *self;
-        sum.numbers([proportional_ohm, renewal, inductance_h].map(|pair| pair.d))
-            .numbers([proportional_ohm, renewal, inductance_h].map(|pair| pair.q))
+        let Self { proportional_ohm, ohm_per_hz, renewal, inductance_h, flux_vs, bandwidth } = *self;
+        let pairs = [proportional_ohm, ohm_per_hz, renewal, inductance_h];
+        sum.numbers(pairs.map(|pair| pair.d))
+            .numbers(pairs.map(|pair| pair.q))
             .numbers([flux_vs, bandwidth.0])
     }
 

@@ -104,8 +104,8 @@ impl<const N: usize, H> Level<'_, '_, N, H> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Housekeeper<const N: usize> {
     settings: HousekeepingSettings<N>,
-    /// Bandwidths that the current loops were designed for; the settings hold those in use.
-    designed: [Hertz; N],
+    /// Bandwidths of the current loops, of which each running axis was informed.
+    bandwidths: [Hertz; N],
     clock: CheckClock,
     operator: Operator,
     calibrated: [bool; N],
@@ -153,7 +153,7 @@ impl<const N: usize> Housekeeper<N> {
     pub fn new(settings: HousekeepingSettings<N>) -> Self {
         Self {
             settings,
-            designed: settings.axes.map(|axis| axis.bandwidth),
+            bandwidths: settings.axes.map(|axis| axis.bandwidth),
             clock: CheckClock::new(RATE_HZ),
             operator: Operator::default(),
             calibrated: [false; N],
@@ -248,20 +248,20 @@ impl<const N: usize> Housekeeper<N> {
         self.advance_reference(level);
     }
 
-    /// Sets the bandwidths of the current loops that a host has set, while the drive is off and no axis is
-    /// being calibrated. An axis that is not calibrated gets it with its calibration.
+    /// Orders the bandwidths of the current loops that a host has set, unless an axis is being calibrated. A
+    /// current may flow. An axis that is not calibrated gets its bandwidth with its calibration.
     fn set_bandwidths(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
-        if level.signals.permission() != Permission::Off || self.calibrating.is_some() {
+        if self.calibrating.is_some() {
             return;
         }
-        let wanted = level.signals.current_bandwidths().into_iter().zip(self.designed);
-        for (axis, (wanted, designed)) in wanted.enumerate() {
-            let wanted = wanted.unwrap_or(designed);
+        for (axis, set) in level.signals.current_bandwidths().into_iter().enumerate() {
+            let Some(settings) = self.settings.axes.get(axis) else { return };
+            let wanted = set.unwrap_or(settings.bandwidth);
             let runs = self.calibrated.get(axis).is_some_and(|calibrated| *calibrated);
-            let Some(settings) = self.settings.axes.get_mut(axis) else { return };
+            let Some(bandwidth) = self.bandwidths.get_mut(axis) else { return };
             // A full queue: again in the next round.
-            if settings.bandwidth != wanted && (!runs || level.order(axis, Order::Bandwidth(wanted))) {
-                settings.bandwidth = wanted;
+            if *bandwidth != wanted && (!runs || level.order(axis, Order::Bandwidth(wanted))) {
+                *bandwidth = wanted;
             }
         }
     }
@@ -572,8 +572,13 @@ impl<const N: usize> Housekeeper<N> {
     ) {
         let encoder_count = level.hardware.encoder_count(axis);
         let sample = AxisSample { encoder_count, ..AxisSample::default() };
-        let running =
-            self.settings.axes.get(axis).and_then(|axis| Axis::new(axis, calibration, &sample).ok());
+        let running = self.settings.axes.get(axis).zip(self.bandwidths.get(axis)).and_then(
+            |(configuration, bandwidth)| {
+                let mut axis = Axis::new(configuration, calibration, &sample).ok()?;
+                axis.set_bandwidth(*bandwidth);
+                Some(axis)
+            },
+        );
         self.set_origin(axis, calibration, encoder_count);
         let (Some(running), Some(calibrated)) = (running, self.calibrated.get_mut(axis)) else {
             self.calibrating = None;

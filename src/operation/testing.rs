@@ -21,7 +21,7 @@ use crate::bus::{Identity, NodeId};
 use crate::hal::{AxisCommand, Contacts, Controller, EncoderPlace, Frame, Hardware};
 use crate::leg::{DriveState, JointCommand, JointStatus, Plan};
 use crate::safety::InhibitReason;
-use crate::units::{Ampere, NewtonMetre};
+use crate::units::{Ampere, Hertz, NewtonMetre};
 
 /// A watchdog whose new period becomes effective after a while. A write during another write is ignored.
 #[derive(Clone, Copy, Debug, Default)]
@@ -383,6 +383,8 @@ pub(super) fn device() -> Device<2, 4> {
         rated_torque: NewtonMetre(40.0),
         rated_current: Ampere(20.0),
         modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+        position_bandwidth: Hertz(6.0),
+        current_bandwidth: Hertz(1000.0),
         ..AxisConstants::UNKNOWN
     };
     let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));

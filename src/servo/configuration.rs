@@ -4,9 +4,6 @@ use super::{ControllerGains, JointScale};
 use crate::safety::{JointLimits, LimitsError};
 use crate::units::{Ampere, Hertz, KilogramMetreSquared, NewtonMetre, Radian, RadianPerSecond};
 
-/// Least and largest bandwidth of a position loop, Hz.
-pub const POSITION_BANDWIDTHS_HZ: [f32; 2] = [0.5, 8.0];
-
 /// One joint of the servo. Range and signs are those of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointConfiguration {
@@ -72,8 +69,7 @@ impl JointConfiguration {
         if !self.scale.is_sensible() {
             return Err(ServoError::Scale { joint });
         }
-        let [least, largest] = POSITION_BANDWIDTHS_HZ;
-        if !(least..=largest).contains(&self.bandwidth.0) {
+        if !(0.5..=8.0).contains(&self.bandwidth.0) {
             return Err(ServoError::Bandwidth { joint });
         }
         Ok(())

@@ -25,7 +25,7 @@ pub mod observer;
 pub mod scale;
 pub mod tick;
 
-pub use configuration::{JointConfiguration, POSITION_BANDWIDTHS_HZ, ServoError};
+pub use configuration::{JointConfiguration, ServoError};
 pub use controller::{Controller, ControllerGains};
 pub use feedforward::{NoModel, TorqueModel, smoothed_sign};
 pub use logging::{LOG_RATE_HZ, LogAverager, LogSample, TICKS_PER_LOG};

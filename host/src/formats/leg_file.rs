@@ -58,6 +58,7 @@ pub use motor::{BrakeFile, JointEncoder, MotorFile, SupplyFile};
 pub use segments::{BodySide, SegmentsFile};
 pub use switch::Switch;
 
+use scarab::units::Hertz;
 use serde::{Deserialize, Serialize};
 
 use crate::base::error::FileError;
@@ -325,6 +326,8 @@ pub const DEFAULT_SPEED_LIMIT: f64 = 180.0;
 pub const DEFAULT_TORQUE_LIMIT: f64 = 100.0;
 /// Torque constant of a joint without `torque_per_ampere`, N m/A, unless its torque needs too much current.
 const DEFAULT_TORQUE_PER_AMPERE: f64 = 1.5;
+/// Bandwidth of the position loop, which no leg file changes.
+pub const POSITION_BANDWIDTH: Hertz = Hertz(6.0);
 
 fn default_speed_limit() -> f64 {
     DEFAULT_SPEED_LIMIT

@@ -17,19 +17,17 @@ use scarab::motion::JointEnvelope;
 use scarab::real::Real;
 use scarab::servo::{JointConfiguration, JointScale};
 use scarab::units::{
-    Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
+    Ampere, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
     RadianPerSecondSquared,
 };
 
 use crate::base::error::FileError;
 use crate::formats::leg_file::geometry::{anatomy, chain};
-use crate::formats::leg_file::{BodySide, JointFile, LegFile, LinkParameters};
+use crate::formats::leg_file::{BodySide, JointFile, LegFile, LinkParameters, POSITION_BANDWIDTH};
 use crate::leg::background::{Background, StribeckTruth};
 use crate::leg::model_choice::{TermSwitches, drive_choice, stribeck_choice};
 use crate::leg::motions::{Motions, motions};
 
-/// Bandwidth of the position loop.
-const POSITION_BANDWIDTH: Hertz = Hertz(6.0);
 /// Default seed.
 pub const DEFAULT_SEED: u64 = 1;
 

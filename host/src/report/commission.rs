@@ -11,6 +11,8 @@ pub struct CommissionReport {
     pub device: String,
     /// Firmware version (100A).
     pub firmware: String,
+    /// Check sum of the image (1F56:1); 0 where there is none.
+    pub image: u32,
     /// Serial number (1018:4).
     pub serial: u32,
     /// Supply voltage, V.

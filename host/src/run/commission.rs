@@ -276,6 +276,7 @@ impl<'a> Commission<'a> {
         let first = self.first();
         self.report.device = self.client.text(first, Object(0x1008, 0))?;
         self.report.firmware = self.client.text(first, Object(0x100A, 0))?;
+        self.report.image = self.client.read(first, Object(0x1F56, 1))?;
         self.report.serial = serials[0];
         if serials.iter().any(|serial| *serial != serials[0]) {
             return Err(refused(format!(

@@ -38,6 +38,16 @@ const STYLE: &str = concat!(include_str!("palette.css"), include_str!("html/styl
 /// Content policy: nothing is fetched or executed, independent of a file's text.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
+/// Current time, UTC, in seconds.
+///
+/// `SOURCE_DATE_EPOCH` (s since 1970) replaces it, for reproducible pages.
+#[must_use]
+pub fn time_utc() -> String {
+    let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
+    let now = stated.and_then(|seconds| Timestamp::from_second(seconds).ok()).unwrap_or_else(Timestamp::now);
+    now.round(Unit::Second).unwrap_or(now).to_string()
+}
+
 /// Circumstances of a run.
 #[derive(Clone, Debug)]
 pub struct Circumstances {
@@ -50,9 +60,7 @@ pub struct Circumstances {
 }
 
 impl Circumstances {
-    /// Command line of this process and the current time.
-    ///
-    /// `SOURCE_DATE_EPOCH` (s since 1970) replaces the time, for reproducible pages.
+    /// Command line of this process and the current time ([`time_utc`]).
     #[must_use]
     pub fn now(leg: &LegFile) -> Self {
         Self::of_command(leg, std::env::args().skip(1).filter(|word| word != BY_CARGO))
@@ -61,12 +69,9 @@ impl Circumstances {
     /// Command line of these words and the current time, as in [`Self::now`].
     #[must_use]
     pub fn of_command(leg: &LegFile, words: impl IntoIterator<Item = String>) -> Self {
-        let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
-        let now =
-            stated.and_then(|seconds| Timestamp::from_second(seconds).ok()).unwrap_or_else(Timestamp::now);
         let words: Vec<String> = words.into_iter().map(|word| quoted(&word)).collect();
         Self {
-            time_utc: now.round(Unit::Second).unwrap_or(now).to_string(),
+            time_utc: time_utc(),
             command: format!("cargo sim {}", words.join(" ")).trim_end().to_owned(),
             leg: leg.clone(),
         }

@@ -32,10 +32,7 @@ use super::{ImpedanceTarget, JointCommand, JointStatus, LoopBandwidths, Mode, Se
 use crate::bus::emergency::ErrorReport;
 use crate::bus::node_id::NodeId;
 use crate::bus::objects::Lost;
-use crate::leg::{
-    DriveEvent, DriveState, FaultCode, JointConfiguration, POSITION_BANDWIDTHS_HZ, PowerRequest,
-    RefusalReason,
-};
+use crate::leg::{DriveEvent, DriveState, FaultCode, JointConfiguration, PowerRequest, RefusalReason};
 use crate::units::{
     Ampere, Hertz, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond, RadianPerSecondSquared, Second,
 };
@@ -97,16 +94,14 @@ impl AxisConstants {
         }
     }
 
-    /// Least and largest bandwidth of the position loop, unit of 2021.
-    pub(super) fn position_bandwidths(&self) -> [u16; 2] {
-        [POSITION_BANDWIDTHS_HZ[0], self.position_bandwidth.0]
-            .map(|hertz| (hertz / POSITION_BANDWIDTH_UNIT + 0.5) as u16)
+    /// Least and largest bandwidth of the position loop that a host may set, unit of 2021.
+    pub(super) fn position_bandwidth_limits(&self) -> [u16; 2] {
+        bandwidth_limits(self.position_bandwidth, POSITION_BANDWIDTH_UNIT)
     }
 
-    /// Least and largest bandwidth of the current loop, unit of 2021.
-    pub(super) fn current_bandwidths(&self) -> [u16; 2] {
-        let most = self.current_bandwidth.0;
-        [LEAST_CURRENT_SHARE * most, most].map(|hertz| (hertz + 0.5) as u16)
+    /// Least and largest bandwidth of the current loop that a host may set, Hz.
+    pub(super) fn current_bandwidth_limits(&self) -> [u16; 2] {
+        bandwidth_limits(self.current_bandwidth, 1.0)
     }
 
     /// Placeholder of a joint whose constants are unknown.
@@ -131,10 +126,17 @@ pub(super) const DAMPING_UNIT: f32 = 0.01;
 /// Unit of the position loop's bandwidth on the bus, Hz. That of the current loop is in Hz.
 const POSITION_BANDWIDTH_UNIT: f32 = 0.01;
 
-/// Least bandwidth of a current loop that a host may set, as a share of the one it was designed for. The
-/// lower it is, the larger a change of the target current must be before a stuck shunt shows (C3 of
-/// docs/safety.md).
-const LEAST_CURRENT_SHARE: f32 = 0.5;
+/// Least bandwidth of a loop that a host may set, as a share of the one it was designed for. With less, a
+/// joint sags under gravity before it is held, and a stuck shunt shows later (C3 of docs/safety.md).
+const LEAST_BANDWIDTH_SHARE: f32 = 0.5;
+
+/// Least and largest bandwidth in this unit, Hz, of a loop that was designed for `designed`.
+fn bandwidth_limits(designed: Hertz, unit: f32) -> [u16; 2] {
+    // A quotient just below a whole number is that number.
+    let most = (designed.0 / unit + 0.01) as u16;
+    let least = (LEAST_BANDWIDTH_SHARE * f32::from(most)) as u16;
+    [least, most]
+}
 
 /// No homing method was written; homing then fails.
 const NO_METHOD: i8 = -1;

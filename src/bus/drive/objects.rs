@@ -40,11 +40,11 @@ impl Objects for Axis {
             (0x2020, 3) => u32::from((constants.impedance[0] / STIFFNESS_UNIT) as u16),
             (0x2020, 4) => u32::from((constants.impedance[1] / DAMPING_UNIT) as u16),
             (0x2021, 1) => u32::from(settings.position_bandwidth),
-            (0x2021, 2) => u32::from(constants.position_bandwidths()[0]),
-            (0x2021, 3) => u32::from(constants.position_bandwidths()[1]),
+            (0x2021, 2) => u32::from(constants.position_bandwidth_limits()[0]),
+            (0x2021, 3) => u32::from(constants.position_bandwidth_limits()[1]),
             (0x2021, 4) => u32::from(settings.current_bandwidth),
-            (0x2021, 5) => u32::from(constants.current_bandwidths()[0]),
-            (0x2021, 6) => u32::from(constants.current_bandwidths()[1]),
+            (0x2021, 5) => u32::from(constants.current_bandwidth_limits()[0]),
+            (0x2021, 6) => u32::from(constants.current_bandwidth_limits()[1]),
             // Objects of the leg; they are not held here.
             (0x2120, 0) => 13,
             (0x2100..=0x2193, _) => return Err(Abort::NoData),
@@ -119,10 +119,10 @@ impl Objects for Axis {
             (0x2013, _) if value <= 1 => settings.watches = value == 1,
             (0x2020, 1) => settings.impedance[0] = value as u16,
             (0x2020, 2) => settings.impedance[1] = value as u16,
-            (0x2021, 1) if is_default_or_within(value, constants.position_bandwidths()) => {
+            (0x2021, 1) if is_default_or_within(value, constants.position_bandwidth_limits()) => {
                 settings.position_bandwidth = value as u16;
             }
-            (0x2021, 4) if is_default_or_within(value, constants.current_bandwidths()) => {
+            (0x2021, 4) if is_default_or_within(value, constants.current_bandwidth_limits()) => {
                 settings.current_bandwidth = value as u16;
             }
             (0x6007, _) if is(&[0, 1, 2, 3]) => settings.connection_option = value as i16,

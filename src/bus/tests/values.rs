@@ -116,14 +116,14 @@ fn profile_objects_have_the_units_of_cia_402() {
     assert_eq!((read(0x6080, 0), read(0x607F, 0)), (2148, 4_500_000));
     assert_eq!((read(0x608F, 1), read(0x6091, 1)), (8192, 50_000));
     assert_eq!((read(0x2020, 3), read(0x2020, 4)), (8000, 3150));
-    assert_eq!([1, 2, 3, 4, 5, 6].map(|sub| read(0x2021, sub)), [0, 50, 300, 0, 500, 1000]);
+    assert_eq!([1, 2, 3, 4, 5, 6].map(|sub| read(0x2021, sub)), [0, 150, 300, 0, 500, 1000]);
     assert_eq!(axis.bandwidths(), LoopBandwidths::default());
-    for (sub, values) in [(1, [49, 301, 50, 300, 0, 125]), (4, [499, 1001, 500, 1000, 0, 750])] {
+    for (sub, values) in [(1, [149, 301, 150, 300, 0, 225]), (4, [499, 1001, 500, 1000, 0, 750])] {
         for (place, value) in values.into_iter().enumerate() {
             let written = axis.write(Object::at(0x2021, sub), value);
             assert_eq!(written, if place < 2 { Err(Abort::Range) } else { Ok(()) }, "{value}");
         }
     }
-    let set = LoopBandwidths { position: Some(Hertz(1.25)), current: Some(Hertz(750.0)) };
+    let set = LoopBandwidths { position: Some(Hertz(2.25)), current: Some(Hertz(750.0)) };
     assert_eq!(axis.bandwidths(), set);
 }

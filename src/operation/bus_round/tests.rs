@@ -9,6 +9,7 @@ use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::Frame;
 use crate::leg::{DriveEvent, DriveState, JointStatus, PowerRequest};
 
+mod bandwidths;
 mod flood;
 
 struct Bench {

@@ -110,6 +110,7 @@ impl Bench {
         assert!(self.ends.housekeeping.requests.enqueue(request).is_ok(), "full");
     }
 
+    /// The fault for which the leg damps or is off.
     fn fault(&self) -> Option<Fault> {
         match self.control.state() {
             DriveState::Fault { fault } | DriveState::FaultReactionActive { fault, .. } => Some(fault),

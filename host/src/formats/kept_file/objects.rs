@@ -8,10 +8,10 @@ use scarab::bus::dictionary::{Object, Type, find};
 use scarab::bus::drive::{Axis, AxisConstants, Mode};
 use scarab::bus::table::{NAMES, ROWS};
 use scarab::bus::{Abort, Identity, LONGEST, Node, NodeId, stored_entries, stored_objects, write_stored};
-use scarab::leg::POSITION_BANDWIDTHS_HZ;
-use scarab::units::{Ampere, Hertz, NewtonMetre};
+use scarab::units::{Ampere, NewtonMetre};
 
 use crate::formats::kept_file::{Joint, ObjectValue};
+use crate::formats::leg_file::POSITION_BANDWIDTH;
 
 const LEAST: Object = Object::at(0x607D, 1);
 const MOST: Object = Object::at(0x607D, 2);
@@ -99,7 +99,7 @@ fn try_on_a_node(bytes: &[u8], joint: Joint) -> Result<(), String> {
         rated_torque: NewtonMetre(1.0),
         rated_current: Ampere(1.0),
         modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
-        position_bandwidth: Hertz(POSITION_BANDWIDTHS_HZ[1]),
+        position_bandwidth: POSITION_BANDWIDTH,
         current_bandwidth: drives::BANDWIDTH,
         ..AxisConstants::UNKNOWN
     });

@@ -5,14 +5,14 @@ use maud::{DOCTYPE, html};
 use crate::base::number::Number;
 use crate::base::table::{Table, cells};
 use crate::report::commission::{CommissionReport, ParameterRead};
-use crate::view::html::page_head;
+use crate::view::html::{page_head, parameters, time_utc};
 
 /// Value with some digits, or a dash.
 fn digits(value: Number, count: usize) -> String {
     value.known().map_or("-".into(), |value| format!("{value:.count$}"))
 }
 
-fn parameters(read: &[ParameterRead]) -> Table {
+fn table(read: &[ParameterRead]) -> Table {
     let mut table = Table::default().label("parameter").numbers(["value", "sigma"]).text(["status"]);
     for parameter in read {
         table.row(cells![
@@ -47,7 +47,7 @@ fn joints(report: &CommissionReport) -> Table {
     table
 }
 
-/// Creates the page.
+/// Creates the page, with the present time.
 #[must_use]
 pub fn page(report: &CommissionReport) -> String {
     let verdict = match (report.verdict, report.stored) {
@@ -69,7 +69,12 @@ pub fn page(report: &CommissionReport) -> String {
                     header {
                         p.over { "Scarab \u{b7} commissioning" }
                         h1 { (report.device) " " (format!("{:08X}", report.serial)) ": " (verdict) }
-                        p.when { "Firmware " (report.firmware) ", supply " (digits(report.supply_v, 1)) " V" }
+                        p.when { (time_utc()) " (UTC)" }
+                        p {
+                            "Firmware " (report.firmware)
+                            @if report.image != 0 { ", image with check sum " (format!("{:08X}", report.image)) }
+                            ", supply " (digits(report.supply_v, 1)) " V"
+                        }
                     }
                     section { h2 { "Steps" } (steps.to_html()) }
                     section { h2 { "Joints" } (joints(report).to_html()) }
@@ -77,10 +82,15 @@ pub fn page(report: &CommissionReport) -> String {
                         section {
                             h2 { "Base parameters" }
                             p { "SI units, as in the leg file. The sums are those that torque determines." }
-                            (parameters(&report.base).to_html())
+                            (table(&report.base).to_html())
                         }
-                        @for (name, joint) in ["hip", "knee"].into_iter().zip(&report.joints) {
-                            section { h2 { "Parameters of the " (name) } (parameters(&joint.parameters).to_html()) }
+                        section {
+                            h2 { "All parameters" }
+                            (parameters::statuses())
+                            @for (name, joint) in ["hip", "knee"].into_iter().zip(&report.joints) {
+                                h3 { "Parameters of the " (name) }
+                                (table(&joint.parameters).to_html())
+                            }
                         }
                         @if !report.reasons.is_empty() { p { "Refused because of: " (report.reasons.join(", ")) } }
                     }

@@ -31,9 +31,7 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
     let joints = run.parameters.iter().map(|parameter| parameter.joint).max().unwrap_or(0);
     html! {
         h3 { "All parameters" }
-        p { span.badge.identified { "identified" } " measured alone. " span.badge.grouped { "grouped" }
-            " only sums with the parameters beside it are measured, the prior splits them. " span.badge.weak { "weak" }
-            " measured, hardly distinguishable from others. " span.badge.prior { "prior" } " does not show in the torque." }
+        (statuses())
         p.note { "Bars, each row on its own scale: dot the value, thick one sigma, thin three; hollow where no sigma is known. "
             span.truth-key { "\u{25c6}" } " truth" @if !truth { " (not known here)" } ", "
             span.prior-key { "\u{25b2}" } " prior, at the edge where it lies beyond. Values have the digits that sigma supports, three without sigma." }
@@ -41,6 +39,15 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
             h4 { "Joint " (joint) @if let Some(file) = leg.joints.get(joint - 1) { ": " (file.name) } }
             (tables::parameters(run.parameters.iter().filter(|parameter| parameter.joint == joint), truth).to_html())
         }
+    }
+}
+
+/// Meaning of each status.
+pub fn statuses() -> Markup {
+    html! {
+        p { (badge("identified")) " measured alone. " (badge("grouped"))
+            " only sums with the parameters beside it are measured, the prior splits them. " (badge("weak"))
+            " measured, hardly distinguishable from others. " (badge("prior")) " does not show in the torque." }
     }
 }
 

@@ -19,12 +19,14 @@ fn a_bandwidth_applies_from_when_the_drive_is_off() {
     bench.set_bandwidths(SLOWER);
     bench.run(1000);
     assert_eq!(bench.control.checksum(), designed);
-    bench.ask(ControlRequest::Power(PowerRequest::DisableVoltage));
-    // Damping, then off.
+    bench.ask(ControlRequest::Power(PowerRequest::QuickStop));
+    bench.run(1000);
+    assert_eq!(bench.control.state().permission(), Permission::Damp);
+    assert_eq!(bench.control.checksum(), designed);
     bench.run(4000);
     assert_eq!(bench.control.state().permission(), Permission::Off);
     assert_ne!(bench.control.checksum(), designed);
-    // 0 in 2021 is the leg file's, to the last bit.
+    // 0 in 2021 is the designed one, to the last bit.
     bench.set_bandwidths(LoopBandwidths::default());
     bench.run(1000);
     assert_eq!(bench.control.checksum(), designed);

@@ -4,7 +4,6 @@ use super::*;
 use crate::safety::Bridges;
 use crate::units::Ohm;
 
-/// The fault for which the leg damps or is off.
 #[test]
 fn a_fault_from_another_level_reaches_the_leg_with_its_joint() {
     for joint in 0..2 {
