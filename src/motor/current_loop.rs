@@ -95,7 +95,7 @@ impl CurrentGains {
         let forward = if feedforward { 1.0 } else { 0.0 };
         let renewal = Rotating { d: renewal(inductance_h.d), q: renewal(inductance_h.q) };
         let ohm_per_hz = Rotating { d: per_hz / renewal.d, q: per_hz / renewal.q };
-        sensible.then(|| Self {
+        sensible.then_some(Self {
             proportional_ohm: Rotating { d: bandwidth.0 * ohm_per_hz.d, q: bandwidth.0 * ohm_per_hz.q },
             ohm_per_hz,
             renewal,
