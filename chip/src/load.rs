@@ -5,8 +5,9 @@
 use crate::nvic::EXCEPTIONS;
 use crate::time::Ticks;
 
-/// Exceptions of the current loops and of the servo.
+/// Exception of the current loops.
 pub const CURRENT_INTERRUPT: u8 = 16 + 18;
+/// Exception of the servo.
 pub const SERVO: u8 = 16 + 77;
 
 /// Interrupts of the image: name, exception number.

@@ -47,8 +47,9 @@ const QUARTER: Ticks = STEP / 4;
 const FREE: [f64; 3] = [1e-4, 0.01, 1e-4];
 /// Conduction time after which an amplifier has settled completely, s.
 const SETTLED: f64 = 1.0;
-/// Temperature of the boards' thermistors, degrees Celsius, and its code.
+/// Temperature of the board's thermistors, degrees Celsius.
 pub const WARM_C: f64 = 38.0;
+/// Code of a thermistor at that temperature.
 const WARM: u16 = 1400;
 /// Number of stored edges of a bridge.
 const REMEMBERED: usize = 16;
