@@ -121,10 +121,12 @@ def main():
         assert set(joint.emergencies) <= {0, UNPLUGGED}, joint.emergencies
         joint.write(0x6060, 0, mode, "<b")
     alive.stop()
-    # After a reset of communication the PDOs of this session are not stored.
+    # After their resets the nodes have the stored objects again, so nothing of a session is stored.
     for joint in joints:
-        network.send_message(0, bytes([0x82, joint.number]))
-    hip.write(0x2021, POSITION, half, "<H")
+        network.send_message(0, bytes([0x81, joint.number]))
+    until("the reset", lambda: hip.read(0x2021, CURRENT, "<H") == 0)
+    for sub, value in ((POSITION, half), (CURRENT, slower)):
+        hip.write(0x2021, sub, value, "<H")
     save(hip)
     try:
         network.send_message(0, bytes([0x81, hip.number]))

@@ -126,6 +126,7 @@ def stop(leg, way):
     for joint in joints:
         until(f"node {joint.number} off after {way}", lambda: joint.read(0x6041, 0, "<H") & 0x4F in (0x40, 0x08), 30)
     off(joints)
+    forget(joints)
     time.sleep(FALL_S)
 
 
@@ -142,6 +143,9 @@ def reason(joints):
     for joint in joints:
         if NOT_ENABLED in joint.emergencies or joint.read(0x603F, 0, "<H") == NOT_ENABLED:
             found.append(f"node {joint.number}: FF0E, 60FD is {joint.read(0x60FD):08X}")
+        # A fault that came during the fall has to be reset first.
+        elif joint.read(0x6041, 0, "<H") & 0x4F == 0x08 and joint.read(0x603F, 0, "<H"):
+            found.append(f"node {joint.number}: fault {joint.read(0x603F, 0, '<H'):04X}")
     return found
 
 
@@ -185,7 +189,6 @@ def main():
         goals = pose(leg.joints, limits, dice)
         way = dice.choice(WAYS)
         stop(leg, way)
-        forget(leg.joints)
         outsiders += bool(outside(leg.joints, limits))
         rests = [joint.position() for joint in leg.joints]
         where = f"pose {number} ({', '.join(f'{goal:.2f}' for goal in goals)}), {way}, rests at {', '.join(f'{rest:.2f}' for rest in rests)}"
