@@ -225,7 +225,7 @@ fn configuration_errors_name_the_key_that_corrects_them() {
             && strong.contains("`speed_limit_deg_s`"),
         "{strong}"
     );
-    let cogging = refusal(&[("cogging_nm = 0.017", "cogging_nm = 0.45")]);
+    let cogging = refusal(&[("cogging_nm = 0.017", "cogging_nm = 0.5")]);
     assert!(
         cogging.contains("did not follow the field evenly") && cogging.contains("cogging_nm"),
         "{cogging}"
