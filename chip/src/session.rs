@@ -382,15 +382,16 @@ impl Session {
                 }),
             ];
             for (name, index, sub, unit, tolerance, truth) in rows {
-                let is_by_current = matches!(index, 0x2170 | 0x6077 | 0x6078);
+                let is_by_current = matches!((index, sub), (0x6077 | 0x6078, _) | (0x2170, 4..=6));
+                let is_short = is_by_current || index == 0x2170;
                 let (mut shown, mut own) = (0.0, 0.0);
                 for _ in 0..READINGS {
                     let value = self.read_object(node, index, sub, ANSWER_S)?;
-                    let value = if is_by_current { f64::from(value as i16) } else { f64::from(value as i32) };
+                    let value = if is_short { f64::from(value as i16) } else { f64::from(value as i32) };
                     shown += unit * value / f64::from(READINGS);
                     own += truth(self) / f64::from(READINGS);
                 }
-                let by_gain = if is_by_current && sub != 2 { GAIN_ERROR * own.abs() } else { 0.0 };
+                let by_gain = if is_by_current { GAIN_ERROR * own.abs() } else { 0.0 };
                 // A winding may be taken for hotter than it is: after the start it is assumed warm.
                 let is_close = match tolerance {
                     Some(tolerance) => (shown - own).abs() <= tolerance + by_gain,

@@ -5,7 +5,7 @@
 //! gate        no tick without calibration and zero of each joint: outputs off, requests dropped
 //! findings    of the identification
 //! faults      reported by the board's other levels; gains and limits (every 64 ms); supply; derating
-//! bandwidths  of the position loops, that a host has set, while the drive is off
+//! bandwidths  of the position loops that a host has set, while the drive is off
 //! request     of the operator, else of a host; filtered by the inhibit word, the enabling switch and the
 //!             holding brake
 //! leg         -> current targets, permission, holding brake; the samples of a session of assistance

@@ -3,6 +3,7 @@ extern crate std;
 use std::boxed::Box;
 use std::vec::Vec;
 
+use super::super::axis_state::Order;
 use super::super::testing::TestHardware;
 use super::super::{Ends, EventQueue, Queues};
 use super::*;
@@ -11,6 +12,7 @@ use crate::leg::AxisFault;
 use crate::motor::calibration::tests::calibrate;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{Axis, AxisConfiguration, SenseScale};
+use crate::units::Hertz;
 
 mod requests;
 mod stop;
@@ -151,6 +153,18 @@ fn an_axis_checks_itself_in_every_servo_period() {
         *axis == 1 && matches!(outcome, Outcome::Fault { fault: AxisFault::Parameters, .. })
     };
     assert!(bench.outcomes.iter().any(is_seen), "{:?}", bench.outcomes);
+}
+
+#[test]
+fn an_ordered_bandwidth_reaches_the_running_axis() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    let state = bench.loops.axis_state_mut(1).expect("two axes");
+    let before = *state.axis_mut().expect("running");
+    let mut expected = before;
+    expected.set_bandwidth(Hertz(600.0));
+    assert_eq!(state.obey(Order::Bandwidth(Hertz(600.0))), None);
+    assert_eq!(state.axis_mut(), Some(&mut expected));
+    assert_ne!(before, expected);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::*;
 use crate::bus::drive::LoopBandwidths;
 use crate::units::Hertz;
 
-const SLOWER: LoopBandwidths = LoopBandwidths { position: Some(Hertz(1.0)), current: None };
+const SLOWER: LoopBandwidths = LoopBandwidths { position: Some(Hertz(3.0)), current: None };
 
 impl Bench {
     fn set_bandwidths(&self, hip: LoopBandwidths) {
@@ -34,7 +34,7 @@ fn a_bandwidth_applies_from_when_the_drive_is_off() {
 }
 
 #[test]
-fn damaged_gains_are_found_although_a_host_changes_the_bandwidth() {
+fn a_damaged_constant_is_found_although_a_host_changes_the_bandwidth() {
     let mut bench = Bench::begun();
     bench.tick();
     bench.control.flip_bit(1, 0, 20);
