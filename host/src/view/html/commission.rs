@@ -81,7 +81,7 @@ pub fn page(report: &CommissionReport) -> String {
                     @if report.verdict.is_some() {
                         section {
                             h2 { "Base parameters" }
-                            p { "SI units, as in the leg file. The sums are those that torque determines." }
+                            p { "SI units, as in the leg file. What torque determines: single parameters, and sums of grouped ones, named after one of them." }
                             (table(&report.base).to_html())
                         }
                         section {
