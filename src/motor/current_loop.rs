@@ -67,8 +67,7 @@ pub struct MotorConstants {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentGains {
     proportional_ohm: Rotating<f32>,
-    /// Proportional gains over the bandwidth.
-    ohm_per_hz: Rotating<f32>,
+    resistance_ohm: f32,
     /// `1 - exp(-R T / L)`.
     renewal: Rotating<f32>,
     inductance_h: Rotating<f32>,
@@ -88,16 +87,13 @@ impl CurrentGains {
             && (1e-6..=1e-2).contains(&inductance_h.d)
             && (1e-6..=1e-2).contains(&inductance_h.q)
             && (0.0..=1.0).contains(&motor.flux.0);
-        let period_s = 1.0 / CURRENT_RATE_HZ as f32;
-        let per_hz = core::f32::consts::TAU * period_s * motor.resistance.0;
         let renewal =
             |inductance: f32| 1.0 - exp(-motor.resistance.0 / (inductance * CURRENT_RATE_HZ as f32));
         let forward = if feedforward { 1.0 } else { 0.0 };
         let renewal = Rotating { d: renewal(inductance_h.d), q: renewal(inductance_h.q) };
-        let ohm_per_hz = Rotating { d: per_hz / renewal.d, q: per_hz / renewal.q };
-        sensible.then_some(Self {
-            proportional_ohm: Rotating { d: bandwidth.0 * ohm_per_hz.d, q: bandwidth.0 * ohm_per_hz.q },
-            ohm_per_hz,
+        sensible.then(|| Self {
+            proportional_ohm: proportional_ohm(bandwidth, motor.resistance.0, renewal),
+            resistance_ohm: motor.resistance.0,
             renewal,
             inductance_h: Rotating { d: forward * inductance_h.d, q: forward * inductance_h.q },
             flux_vs: forward * motor.flux.0,
@@ -108,8 +104,7 @@ impl CurrentGains {
     /// Sets another bandwidth, which was checked before.
     pub(super) fn set_bandwidth(&mut self, bandwidth: Hertz) {
         self.bandwidth = bandwidth;
-        let Rotating { d, q } = self.ohm_per_hz;
-        self.proportional_ohm = Rotating { d: bandwidth.0 * d, q: bandwidth.0 * q };
+        self.proportional_ohm = proportional_ohm(bandwidth, self.resistance_ohm, self.renewal);
     }
 
     /// Smaller of both proportional gains, ohm.
@@ -126,11 +121,13 @@ impl CurrentGains {
     /// Adds all constants to a checksum.
     #[must_use]
     pub(super) fn add_to(&self, sum: Checksum) -> Checksum {
-        let Self { proportional_ohm, ohm_per_hz, renewal, inductance_h, flux_vs, bandwidth } = *self;
-        let pairs = [proportional_ohm, ohm_per_hz, renewal, inductance_h];
-        sum.numbers(pairs.map(|pair| pair.d))
-            .numbers(pairs.map(|pair| pair.q))
-            .numbers([flux_vs, bandwidth.0])
+        let Self { proportional_ohm, resistance_ohm, renewal, inductance_h, flux_vs, bandwidth } = *self;
+        let pairs = [proportional_ohm, renewal, inductance_h];
+        sum.numbers(pairs.map(|pair| pair.d)).numbers(pairs.map(|pair| pair.q)).numbers([
+            resistance_ohm,
+            flux_vs,
+            bandwidth.0,
+        ])
     }
 
     /// Phase margin of the open loop, degrees.
@@ -138,6 +135,13 @@ impl CurrentGains {
     pub fn phase_margin_deg(&self) -> f32 {
         90.0 - 360.0 * DELAY_PERIODS * self.bandwidth.0 / CURRENT_RATE_HZ as f32
     }
+}
+
+/// Proportional gains, `2 pi f T R / (1 - exp(-R T / L))`; `renewal` is the denominator.
+fn proportional_ohm(bandwidth: Hertz, resistance_ohm: f32, renewal: Rotating<f32>) -> Rotating<f32> {
+    let period_s = 1.0 / CURRENT_RATE_HZ as f32;
+    let volt_per_ampere = core::f32::consts::TAU * bandwidth.0 * period_s * resistance_ohm;
+    Rotating { d: volt_per_ampere / renewal.d, q: volt_per_ampere / renewal.q }
 }
 
 /// State of the loop: the integrals.
