@@ -372,8 +372,8 @@ impl Axis {
         }
         let angle = self.angle();
         self.speed.track(angle);
-        // Both rotations of a tick together share the constants of their polynomials.
-        let [rotor, acting] = [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation());
+        let rotor = angle.rotation();
+        let acting = self.speed.ahead(rotor, DELAY_PERIODS);
         let currents = constants.sense.currents(sample.shunt_codes, constants.current_offsets);
         let switching = request != BridgeRequest::Off;
         self.measured = match currents {

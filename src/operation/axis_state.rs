@@ -166,50 +166,58 @@ impl AxisState {
         axis.map(|axis| axis.resume(sample, long)).is_some()
     }
 
-    /// Runs one PWM period. Returns the bridge's command for the next one and an event to report. With a
-    /// fault, the flag states whether the axis was requested to do anything.
+    /// Runs one PWM period. Returns the bridge's command for the next one; `react` gets an event to report and may
+    /// replace the command. With a fault, its flag states whether the axis was requested to do anything.
+    ///
+    /// Why a closure: an outcome is large, and a running axis has none to carry in most ticks.
     #[inline(always)]
     pub fn tick(
         &mut self,
         sample: &AxisSample,
         bridges: Bridges,
         target: AxisRequest,
-    ) -> (AxisCommand, Option<(Outcome, bool)>) {
-        match &mut self.doing {
-            Doing::Nothing => {
-                let came = self.search.follow(sample);
-                (AxisCommand::OFF, came.then_some((Outcome::Index(self.search), false)))
+        react: impl FnOnce(Outcome, bool, AxisCommand) -> AxisCommand,
+    ) -> AxisCommand {
+        let Doing::Running(running) = &mut self.doing else {
+            return match self.tick_before(sample, bridges) {
+                (command, None) => command,
+                (command, Some(outcome)) => react(outcome, false, command),
+            };
+        };
+        let request = match bridges {
+            Bridges::Follow => target.into(),
+            Bridges::Brake => BridgeRequest::Brake,
+            Bridges::Off => BridgeRequest::Off,
+        };
+        let command = running.act(sample, request);
+        match running.fault() {
+            Some(fault) if self.faulted != Some(fault) => {
+                self.faulted = Some(fault);
+                let lost = running.is_lost();
+                react(Outcome::Fault { fault, lost }, request != BridgeRequest::Off, command)
             }
-            Doing::Calibrating(calibrator) => {
-                // An interrupted check at standstill can be repeated at once.
-                self.search.follow(sample);
-                if bridges != Bridges::Follow {
-                    return self.end(Outcome::Interrupted);
-                }
-                match calibrator.tick(sample) {
-                    CalibrationStep::Running(command) => (command, None),
-                    CalibrationStep::Done(calibration) => self.end(Outcome::Calibrated(calibration)),
-                    CalibrationStep::Refused(refusal) => self.end(Outcome::Refused(refusal)),
-                }
-            }
-            Doing::Running(running) => {
-                let request = match bridges {
-                    Bridges::Follow => target.into(),
-                    Bridges::Brake => BridgeRequest::Brake,
-                    Bridges::Off => BridgeRequest::Off,
-                };
-                let command = running.act(sample, request);
-                let event = running.fault().filter(|fault| self.faulted != Some(*fault)).map(|fault| {
-                    self.faulted = Some(fault);
-                    (Outcome::Fault { fault, lost: running.is_lost() }, request != BridgeRequest::Off)
-                });
-                (command, event)
-            }
+            _ => command,
         }
     }
 
-    fn end(&mut self, outcome: Outcome) -> (AxisCommand, Option<(Outcome, bool)>) {
+    /// Runs one PWM period of an axis that does not run yet.
+    #[inline(never)]
+    fn tick_before(&mut self, sample: &AxisSample, bridges: Bridges) -> (AxisCommand, Option<Outcome>) {
+        // An interrupted check at standstill can be repeated at once, so the index is followed there too.
+        let came = self.search.follow(sample);
+        let Doing::Calibrating(calibrator) = &mut self.doing else {
+            return (AxisCommand::OFF, came.then_some(Outcome::Index(self.search)));
+        };
+        let outcome = if bridges == Bridges::Follow {
+            match calibrator.tick(sample) {
+                CalibrationStep::Running(command) => return (command, None),
+                CalibrationStep::Done(calibration) => Outcome::Calibrated(calibration),
+                CalibrationStep::Refused(refusal) => Outcome::Refused(refusal),
+            }
+        } else {
+            Outcome::Interrupted
+        };
         self.doing = Doing::Nothing;
-        (AxisCommand::OFF, Some((outcome, false)))
+        (AxisCommand::OFF, Some(outcome))
     }
 }

@@ -168,10 +168,9 @@ impl<const N: usize> CurrentLoops<N> {
             }
         }
         let target = if all_run { signals.target(axis) } else { AxisRequest::OFF };
-        let (mut command, outcome) = this.stage.tick(&sample, bridges, target);
-        if let Some((outcome, switching)) = outcome {
-            command = react(axis, outcome, switching, command, ends, signals, hardware);
-        }
+        let command = this.stage.tick(&sample, bridges, target, |outcome, switching, command| {
+            react(axis, outcome, switching, command, ends, signals, hardware)
+        });
         apply(axis, &command, signals, hardware);
         this.ticks += 1;
         if this.ticks == TICKS_PER_SERVO / 2

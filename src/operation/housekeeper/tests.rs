@@ -260,8 +260,13 @@ fn carried_out_by(stage: &mut AxisState, motor: &mut TestMotor, order: Order) ->
     stage.obey(order);
     let mut sample = motor.sample();
     for _ in 0..720_000 {
-        let (command, event) = stage.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF);
-        if let Some((outcome, _)) = event {
+        let mut event = None;
+        let target = crate::motor::AxisRequest::OFF;
+        let command = stage.tick(&sample, Bridges::Follow, target, |outcome, _, command| {
+            event = Some(outcome);
+            command
+        });
+        if let Some(outcome) = event {
             motor.period(AxisCommand::OFF);
             return outcome;
         }

@@ -280,7 +280,7 @@ fn a_check_at_standstill_leaves_what_is_stored() {
     (motor.driven, motor.speed) = (true, 60.0);
     for _ in 0..6000 {
         let sample = motor.period(AxisCommand::OFF);
-        state.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF);
+        state.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF, |_, _, command| command);
     }
     (motor.driven, motor.speed) = (false, 0.0);
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
@@ -332,7 +332,7 @@ fn a_stall_or_a_lost_axis_forgets_the_index() {
         (motor.driven, motor.speed) = (true, 60.0);
         for _ in 0..6000 {
             let sample = motor.period(AxisCommand::OFF);
-            state.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF);
+            state.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::OFF, |_, _, command| command);
         }
     };
     for long in [false, true] {
