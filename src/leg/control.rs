@@ -253,7 +253,7 @@ impl<const N: usize> Control<N> {
         request: Option<ControlRequest>,
         gravity: [f32; 3],
     ) -> ControlOutput<N> {
-        self.tick_with(sample, request, gravity, None)
+        self.tick_with(sample, request.as_ref(), gravity, None)
     }
 
     /// Runs one tick, with the commands of a host if there is one.
@@ -261,13 +261,13 @@ impl<const N: usize> Control<N> {
     pub fn tick_with(
         &mut self,
         sample: &Sample<N>,
-        request: Option<ControlRequest>,
+        request: Option<&ControlRequest>,
         gravity: [f32; 3],
         mut host: Option<Host<'_, N>>,
     ) -> ControlOutput<N> {
         self.tick = self.tick.wrapping_add(1);
-        let refused = request.as_ref().is_some_and(|request| !self.may_begin(request, host.as_ref()));
-        if let Some(ControlRequest::Assist(shares)) = request.as_ref().filter(|_| refused) {
+        let refused = request.is_some_and(|request| !self.may_begin(request, host.as_ref()));
+        if let Some(ControlRequest::Assist(shares)) = request.filter(|_| refused) {
             self.note_refusal(shares);
         }
         let took_update = !refused && matches!(request, Some(ControlRequest::TakeUpdate));
@@ -356,8 +356,8 @@ impl<const N: usize> Control<N> {
         self.models.withdraw();
     }
 
-    fn accept(&mut self, request: Option<ControlRequest>, gravity: [f32; 3]) -> Option<PowerRequest> {
-        match request? {
+    fn accept(&mut self, request: Option<&ControlRequest>, gravity: [f32; 3]) -> Option<PowerRequest> {
+        match *request? {
             ControlRequest::Power(power) => return Some(power),
             ControlRequest::Identify => {
                 self.verdict = None;

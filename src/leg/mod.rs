@@ -115,7 +115,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         let (following, cancel) = (&mut self.following, core::mem::take(&mut self.cancel));
         let host = self.commands.as_ref().map(|commands| Host { following, commands, cancel, waits: false });
         self.sample = Some(*sample);
-        let output = self.control.tick_with(sample, request, gravity, host);
+        let output = self.control.tick_with(sample, request.as_ref(), gravity, host);
         if let Some(logged) = &output.logged {
             self.identification.push(logged);
         }

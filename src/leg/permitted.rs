@@ -9,10 +9,10 @@ use crate::safety::{DriveState, FaultCode, PowerRequest};
 /// With an inhibit reason, a drive that is not off is switched off even without a request.
 #[must_use]
 pub fn permitted(
-    request: Option<ControlRequest>,
+    request: Option<&ControlRequest>,
     is_clear: bool,
     state: DriveState,
-) -> Option<ControlRequest> {
+) -> Option<&ControlRequest> {
     use PowerRequest::{DisableOperation, DisableVoltage, QuickStop, ResetFault};
     if is_clear {
         return request;
@@ -26,7 +26,7 @@ pub fn permitted(
             request
         }
         _ if is_off => None,
-        _ => Some(ControlRequest::Power(DisableVoltage)),
+        _ => Some(&ControlRequest::Power(DisableVoltage)),
     }
 }
 
@@ -55,12 +55,13 @@ mod tests {
     fn an_inhibit_reason_prevents_enabling() {
         let enabling = [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation]
             .map(ControlRequest::Power);
-        let off = Some(ControlRequest::Power(PowerRequest::DisableVoltage));
+        let off = Some(&ControlRequest::Power(PowerRequest::DisableVoltage));
         for request in enabling.into_iter().chain([ControlRequest::Identify]) {
-            assert_eq!(permitted(Some(request), true, DriveState::SwitchedOn), Some(request));
-            assert_eq!(permitted(Some(request), false, DriveState::SwitchOnDisabled), None);
+            let request = Some(&request);
+            assert_eq!(permitted(request, true, DriveState::SwitchedOn), request);
+            assert_eq!(permitted(request, false, DriveState::SwitchOnDisabled), None);
             for state in [DriveState::ReadyToSwitchOn, DriveState::SwitchedOn, DriveState::OperationEnabled] {
-                assert_eq!(permitted(Some(request), false, state), off);
+                assert_eq!(permitted(request, false, state), off);
                 assert_eq!(permitted(None, false, state), off);
             }
         }

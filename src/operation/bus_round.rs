@@ -18,7 +18,7 @@
 
 use super::handover::Handover;
 use super::mailboxes::TxScheduler;
-use super::queues::{BusEnds, FRAMES};
+use super::queues::{BusEnds, FRAMES, take_first};
 use super::signals::Signals;
 use super::token_bucket::TokenBucket;
 use crate::bus::device::{Device, StoreCommand};
@@ -189,8 +189,7 @@ impl BusRound {
         if !ends.orders.ready() {
             return;
         }
-        if let Some(status) = ends.status.dequeue() {
-            device.update(&status);
+        if take_first(&mut ends.status, |status| device.update(status)).is_some() {
             signals.set_hosted(device.is_hosted());
             self.due = true;
         }

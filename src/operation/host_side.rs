@@ -4,7 +4,7 @@
 //! Orders are taken in every tick. The servo reports in every second one, once the bus has taken the previous
 //! report.
 
-use super::queues::HostEnds;
+use super::queues::{HostEnds, take_first};
 use super::signals::Signals;
 use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::{Hardware, Sample};
@@ -86,9 +86,7 @@ impl<const N: usize> HostSide<N> {
         signals: &Signals<N>,
         hardware: &mut impl Hardware<N>,
     ) {
-        while let Some(order) = ends.orders.dequeue() {
-            self.note(&order);
-        }
+        while take_first(&mut ends.orders, |order| self.note(order)).is_some() {}
         (self.commands, self.request, self.cancel) = (None, None, false);
         if self.is_due(ends, hardware) {
             let causes = signals.inhibit.causes();
@@ -126,25 +124,27 @@ impl<const N: usize> HostSide<N> {
     /// lost host.
     pub fn receive(&mut self, ends: &mut HostEnds<'_, N>, mut report: impl FnMut(Fault)) {
         while self.request.is_none()
-            && let Some(order) = ends.orders.dequeue()
-        {
-            self.note(&order);
-            self.commands = order.commands;
-            for (joint, code) in order.faults.into_iter().enumerate() {
-                if let Some(code) = code {
-                    report(Fault { code, joint: joint as u8 });
-                }
+            && take_first(&mut ends.orders, |order| self.take(order, &mut report)).is_some()
+        {}
+    }
+
+    fn take(&mut self, order: &LegOrder<N>, report: &mut impl FnMut(Fault)) {
+        self.note(order);
+        self.commands = order.commands;
+        for (joint, code) in order.faults.into_iter().enumerate() {
+            if let Some(code) = code {
+                report(Fault { code, joint: joint as u8 });
             }
-            match order.request {
-                // Without the drive a host cannot stop the joints along its profile, but it can request a
-                // quick stop.
-                Some(LegRequest::Cancel) if order.commands.is_none() => {
-                    self.request = Some(LegRequest::Power(PowerRequest::QuickStop));
-                }
-                Some(LegRequest::Cancel) => self.cancel = true,
-                Some(request) => self.request = Some(request),
-                None => {}
+        }
+        match order.request {
+            // Without the drive a host cannot stop the joints along its profile, but it can request a quick
+            // stop.
+            Some(LegRequest::Cancel) if order.commands.is_none() => {
+                self.request = Some(LegRequest::Power(PowerRequest::QuickStop));
             }
+            Some(LegRequest::Cancel) => self.cancel = true,
+            Some(request) => self.request = Some(request),
+            None => {}
         }
     }
 

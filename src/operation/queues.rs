@@ -62,6 +62,19 @@ pub const FRAMES: usize = 33;
 /// Length of the queue of samples to the assistance: three wait at most.
 pub const SAMPLES: usize = 4;
 
+/// Uses and removes the first item of a queue where it lies: large items are copied three times on their way out.
+pub(super) fn take_first<T, R>(queue: &mut Consumer<'_, T>, take: impl FnOnce(&T) -> R) -> Option<R> {
+    let taken = take(queue.peek()?);
+    drop_first(queue);
+    Some(taken)
+}
+
+/// Not inlined: then no item is returned anywhere, and the copies disappear.
+#[inline(never)]
+fn drop_first<T>(queue: &mut Consumer<'_, T>) {
+    drop(queue.dequeue());
+}
+
 /// Queue from the servo to the identification, separate from [`Queues`] because of its size.
 pub type EventQueue<const N: usize> = Queue<LegEvent<N>, EVENTS>;
 

@@ -281,7 +281,7 @@ impl<const N: usize> Monitor<N> {
         for joint in 0..N {
             let rejected = observation.rejected[joint];
             self.glitches[joint] = (self.glitches[joint] << 1 | u64::from(rejected)) & self.glitch_window;
-            if rejected && self.glitches[joint].count_ones() >= GLITCHES_FOR_FAULT {
+            if rejected && has_too_many(self.glitches[joint]) {
                 found = found.or(fault(FaultCode::EncoderStep, joint));
             }
         }
@@ -354,6 +354,14 @@ impl<const N: usize> Monitor<N> {
         let [low, high] = self.fault_range[joint];
         position >= low && position <= high
     }
+}
+
+/// Whether a window has too many glitches. Not inlined: the processor cannot count bits by one instruction, and the
+/// compiler would count them in every tick.
+#[cold]
+#[inline(never)]
+const fn has_too_many(glitches: u64) -> bool {
+    glitches.count_ones() >= GLITCHES_FOR_FAULT
 }
 
 /// Access for bit flips, host only (row M2 of docs/safety.md).

@@ -51,7 +51,7 @@ pub fn tick(
     request: Option<ControlRequest>,
     host: Option<Host<'_, JOINTS>>,
 ) -> ControlOutput<JOINTS> {
-    control.tick_with(sample, request, GRAVITY, host)
+    control.tick_with(sample, request.as_ref(), GRAVITY, host)
 }
 
 /// Prints the table; adds the bounds to the account. `None` if the leg cannot be built or does not follow.
