@@ -511,7 +511,9 @@ fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
     }
     arguments.common.write(&found)?;
     print_findings(&session);
-    Ok(crate::report::findings(&session).0.is_empty())
+    let missed = situations::missed_goals(&found);
+    missed.iter().for_each(|goal| println!("missed goal: {goal}"));
+    Ok(missed.is_empty() && crate::report::findings(&session).0.is_empty())
 }
 
 fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {

@@ -7,13 +7,15 @@ use crate::time::Ticks;
 
 /// Exception of the current loops.
 pub const CURRENT_INTERRUPT: u8 = 16 + 18;
+/// Name of its interrupt.
+pub const CURRENT: &str = "current_interrupt";
 /// Exception of the servo.
 pub const SERVO: u8 = 16 + 77;
 
 /// Interrupts of the image: name, exception number.
 pub const LEVELS: [(&str, u8); 10] = [
     ("stop", 16 + 10),
-    ("current_interrupt", CURRENT_INTERRUPT),
+    (CURRENT, CURRENT_INTERRUPT),
     ("index_0", 16 + 23),
     ("index_1", 16 + 40),
     ("servo", SERVO),

@@ -12,7 +12,7 @@ use scarab_host::with_leg_size;
 use serde::Serialize;
 
 use crate::findings::Finding;
-use crate::load::LEVELS;
+use crate::load::{CURRENT, LEVELS};
 use crate::session::Session;
 use crate::time::{TICK_HZ, microseconds, seconds};
 
@@ -121,7 +121,7 @@ pub fn load(session: &Session) -> LoadReport {
     };
     LoadReport {
         total: chip.load.awake(chip.now),
-        level0: share(&["stop", "current_interrupt", "index_0", "index_1"]),
+        level0: share(&["stop", CURRENT, "index_0", "index_1"]),
         servo: share(&["servo"]),
         bus: share(&["bus_receive", "bus"]),
         assist: share(&["assist"]),

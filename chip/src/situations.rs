@@ -8,10 +8,19 @@ use scarab_host::base::error::ToolError;
 use scarab_host::rig::bus::host::{TARGETS, compact_mapping};
 use serde::Serialize;
 
+use crate::load::CURRENT;
 use crate::report::{InterruptReport, LoadReport, interrupts, load};
 use crate::session::{Session, Step};
 use crate::time::ticks;
 
+/// Goals: instructions of one current interrupt while both bridges switch, mean and worst.
+const MOST_MEAN: f64 = 850.0;
+const MOST_WORST: u64 = 1250;
+/// Goal: share of the processor's time while the leg holds its pose.
+const MOST_HOLDING: f64 = 0.5;
+/// Situations in which both bridges switch.
+const SWITCHING: [&str; 3] = [HOLDING, "identifying", "following"];
+const HOLDING: &str = "holding";
 /// Duration of a situation that does not end by itself, s.
 const MEASURED_S: f64 = 1.0;
 /// Cycle of the host, s.
@@ -61,7 +70,7 @@ pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, Tool
     session.step(Step::Enable)?;
     begin(session, profiled);
     session.run(MEASURED_S)?;
-    end(session, "holding", &mut found);
+    end(session, HOLDING, &mut found);
 
     begin(session, profiled);
     session.step(Step::Identify)?;
@@ -74,6 +83,26 @@ pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, Tool
     follow(session, start, LEAD..LEAD + (MEASURED_S / CYCLE_S) as u32)?;
     end(session, "following", &mut found);
     Ok(found)
+}
+
+/// Goals that a measurement misses, in words.
+#[must_use]
+pub fn missed_goals(found: &[Situation]) -> Vec<String> {
+    let mut missed = Vec::new();
+    for Situation { name, load, interrupts, .. } in found.iter().filter(|one| SWITCHING.contains(&one.name)) {
+        let InterruptReport { mean_instructions: mean, worst_instructions: worst, .. } = interrupts[CURRENT];
+        if mean > MOST_MEAN || worst > MOST_WORST {
+            missed.push(format!(
+                "{name}: the current interrupt takes {mean:.0} instructions in the mean and {worst} at worst; goals \
+                 {MOST_MEAN} and {MOST_WORST}"
+            ));
+        }
+        if *name == HOLDING && load.total > MOST_HOLDING {
+            let [total, most] = [load.total, MOST_HOLDING].map(|share| 100.0 * share);
+            missed.push(format!("{name}: {total:.1} % of the processor is used; goal {most} %"));
+        }
+    }
+    missed
 }
 
 fn begin(session: &mut Session, profiled: bool) {
@@ -168,4 +197,54 @@ fn follow(session: &mut Session, start: [i32; 2], cycles: Range<u32>) -> Result<
         return Err(ToolError::Refused(format!("{feedback} of {expected} feedback frames arrived")));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn situation(name: &'static str, mean: f64, worst: u64, total: f64) -> Situation {
+        let interrupt = InterruptReport {
+            per_second: 48_000.0,
+            mean_instructions: mean,
+            worst_instructions: worst,
+            worst_latency_us: 0.0,
+            longest_us: 0.0,
+        };
+        let load = LoadReport {
+            total,
+            level0: 0.0,
+            servo: 0.0,
+            bus: 0.0,
+            assist: 0.0,
+            housekeeping: 0.0,
+            thread: 0.0,
+        };
+        Situation { name, load, interrupts: BTreeMap::from([(CURRENT, interrupt)]), profile: Vec::new() }
+    }
+
+    #[test]
+    fn a_missed_goal_is_named_with_its_situation() {
+        // One bridge switches while the other axis is calibrated, and no goal is set for a moving leg's processor.
+        let met = [
+            situation("calibrating", 715.0, 2352, 0.37),
+            situation("holding", 850.0, 1250, 0.5),
+            situation("identifying", 824.0, 1235, 0.57),
+        ];
+        assert_eq!(missed_goals(&met), [""; 0]);
+        let missed = [
+            situation("holding", 851.0, 1250, 0.501),
+            situation("identifying", 824.0, 1251, 0.57),
+            situation("following", 824.0, 1200, 0.6),
+        ];
+        assert_eq!(
+            missed_goals(&missed),
+            [
+                "holding: the current interrupt takes 851 instructions in the mean and 1250 at worst; goals 850 and 1250",
+                "holding: 50.1 % of the processor is used; goal 50 %",
+                "identifying: the current interrupt takes 824 instructions in the mean and 1251 at worst; goals 850 and \
+                 1250",
+            ]
+        );
+    }
 }

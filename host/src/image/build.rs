@@ -102,7 +102,7 @@ pub fn firmware_build(log: bool) -> Command {
     for name in ["RUSTFLAGS", "RUSTC", "RUSTUP_TOOLCHAIN", "CARGO"] {
         command.env_remove(name);
     }
-    for name in ["SCARAB_TRACE_LOG", "SCARAB_BRAKE_RESISTOR", "SCARAB_BOARD_VOLTS"] {
+    for name in ["SCARAB_TRACE_LOG", "SCARAB_BRAKE_RESISTOR", "SCARAB_STATUS_LIGHT", "SCARAB_BOARD_VOLTS"] {
         command.env_remove(name);
     }
     if log {
