@@ -156,7 +156,7 @@ pub struct Axis {
     current_limit: f32,
     /// Checksum of the constants at construction, or after the last change of the bandwidth.
     checksum: Checksum,
-    /// Calls of [`Axis::check`] since that checksum was compared; wraps at 256.
+    /// Calls of [`Axis::check_constants`] since that checksum was compared; wraps at 256.
     unchecked: u8,
     last: AxisCommand,
     doubtful: bool,
@@ -499,17 +499,20 @@ impl Axis {
         JointSample { doubtful: core::mem::take(&mut self.rejected_step), ..sample }
     }
 
-    /// Compares voltages with currents and speed ([`ModelWatch`]), index pulses with the counter, and the
-    /// constants with their checksum. Called once per servo period, halfway between two joint samples, so
-    /// that no tick has both to do. A fault found here acts from the next tick on.
-    pub fn check(&mut self) {
-        let most = self.constants.current_limit * self.first_motion.current_share();
-        self.current_limit = min(self.current_limit + RISE_PER_CHECK * most, most);
-        // Every 64 ms.
+    /// Compares the constants with their checksum in every 256th call, which is every 64 ms. Called once per servo
+    /// period. A fault found here acts from the next tick on.
+    pub fn check_constants(&mut self) {
         self.unchecked = self.unchecked.wrapping_add(1);
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
             self.found(AxisFault::Parameters);
         }
+    }
+
+    /// Compares voltages with currents and speed ([`ModelWatch`]), and index pulses with the counter. Called once
+    /// per servo period, halfway between two joint samples. A fault found here acts from the next tick on.
+    pub fn check(&mut self) {
+        let most = self.constants.current_limit * self.first_motion.current_share();
+        self.current_limit = min(self.current_limit + RISE_PER_CHECK * most, most);
         // Braking needs no rotor position.
         if self.is_off_the_index() && self.fault.is_none() && self.last != AxisCommand::BRAKE {
             self.found(AxisFault::Encoder);

@@ -30,6 +30,9 @@ use crate::units::Volt;
 
 /// Current ticks per servo tick.
 const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
+/// Ticks after a joint sample in which the axis checks its constants, and itself: no tick has two of the three to do.
+const CONSTANTS: u32 = 1;
+const CHECKS: u32 = TICKS_PER_SERVO / 2;
 
 /// Periods without a tick after which the other axes' ticks detect that an axis has stopped.
 const LATE_PERIODS: u32 = 3;
@@ -173,10 +176,10 @@ impl<const N: usize> CurrentLoops<N> {
         });
         apply(axis, &command, signals, hardware);
         this.ticks += 1;
-        if this.ticks == TICKS_PER_SERVO / 2
+        if (this.ticks == CONSTANTS || this.ticks == CHECKS)
             && let Some(running) = this.stage.axis_mut()
         {
-            running.check();
+            if this.ticks == CHECKS { running.check() } else { running.check_constants() }
         }
         if this.ticks >= TICKS_PER_SERVO {
             this.ticks = 0;

@@ -45,6 +45,9 @@ impl Bench {
         for tick in 0..ticks {
             inject(&mut self.sample);
             self.tick(request);
+            if tick % 6 == 0 {
+                self.axis.check_constants();
+            }
             if tick % 6 == 2 {
                 self.axis.check();
             }

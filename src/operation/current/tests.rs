@@ -147,7 +147,7 @@ fn an_axis_checks_itself_in_every_servo_period() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.run(TICKS_PER_SERVO);
     bench.loops.axis_state_mut(1).and_then(AxisState::axis_mut).expect("running").flip_bit(0, 3);
-    // The checksum of the constants is compared in every 256th check.
+    // The checksum of the constants is compared in every 256th servo period.
     bench.run(256 * TICKS_PER_SERVO);
     let is_seen = |(axis, outcome): &(usize, Outcome)| {
         *axis == 1 && matches!(outcome, Outcome::Fault { fault: AxisFault::Parameters, .. })

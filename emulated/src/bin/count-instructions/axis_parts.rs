@@ -16,11 +16,12 @@ use crate::counter::{Tally, count, heading};
 use crate::motor::CONFIGURATION;
 
 /// Parts of a tick, and their number in a tick.
-const PARTS: [(&str, u32); 10] = [
+const PARTS: [(&str, u32); 11] = [
     ("encoder step to place and angle", 1),
     ("speed tracking", 1),
     ("two shunt codes to current vector", 1),
-    ("sine and cosine; twice", 2),
+    ("sine and cosine", 1),
+    ("rotation ahead", 1),
     ("Park", 1),
     ("PI in d and q, feedforward, anti-windup", 1),
     ("Park back; voltage and target", 2),
@@ -39,7 +40,7 @@ pub fn report(whole: &Tally) {
         sum += times * tally.mean();
     }
     let rest = whole.mean().saturating_sub(sum);
-    hprintln!("{:<48} {:>8}", "the rest: borders, window, angle ahead, states", rest);
+    hprintln!("{:<48} {:>8}", "the rest: borders, stuck codes, window, states", rest);
 }
 
 fn parts() -> Option<[Tally; PARTS.len()]> {
@@ -75,6 +76,7 @@ fn parts() -> Option<[Tally; PARTS.len()]> {
         push(instructions);
         let vector = vector.unwrap_or_default();
         push(count(|| black_box(angle).rotation()).0);
+        push(count(|| black_box(&tracker).ahead(black_box(rotor), black_box(1.5))).0);
         let (instructions, measured) = count(|| black_box(vector).to_rotating(black_box(rotor)));
         push(instructions);
         let mut voltage = |target: f32, limit: f32| {

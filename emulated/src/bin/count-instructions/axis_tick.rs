@@ -89,6 +89,9 @@ fn ticks(motor: &mut Motor, configuration: &AxisConfiguration, calibration: &Cal
             let (instructions, command) = count(|| tick(&mut axis, black_box(&sample), black_box(request)));
             tally.push(instructions);
             sample = motor.period(command);
+            if step % 6 == 0 {
+                axis.check_constants();
+            }
             if step % 6 == 2 {
                 check.push(count(|| black_box(&mut axis).check()).0);
             }

@@ -18,8 +18,10 @@ impl Bench {
             for tick in 0..6 {
                 inject(&mut self.sample);
                 self.tick(request);
-                if tick == 2 {
-                    self.axis.check();
+                match tick {
+                    0 => self.axis.check_constants(),
+                    2 => self.axis.check(),
+                    _ => {}
                 }
                 if let Some(fault) = self.axis.fault() {
                     return Some((period, fault));
