@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_missed_goal_is_named_with_its_situation() {
-        // One bridge switches while the other axis is calibrated, and no goal is set for a moving leg's processor.
+        // One bridge switches in a calibration, and only a held leg has a goal for the processor.
         let met = [
             situation("calibrating", 715.0, 2352, 0.37),
             situation("holding", 850.0, 1250, 0.5),

@@ -14,15 +14,16 @@
 //! rad/s, or 0.2 V of back-EMF at 5 mV s. Quantisation: 8,192 counts and 7 pole pairs make 0.31 electrical
 //! degrees per count, uniform to +-0.15. A quadrature current of 1 A then reads as 2.7 mA of direct current.
 //!
-//! Sine and cosine err by up to 1.2e-7; the angle is an integer, so no range reduction remains. A rotation ahead
-//! costs half of a new one: with x the angle ahead, it is turned by
+//! Sine and cosine err by up to 1.2e-7; the angle is an integer, so no range reduction remains. A rotation
+//! ahead follows from the present one, because the angle x between them is small:
 //!
 //! ```text
-//! sin x = x (1 - x^2 / 6);  cos x = 1 - x^2 / 2 + x^4 / 24      errors up to x^5 / 120 and x^6 / 720; length 1 - x^6 / 144
+//! sin x = x (1 - x^2 / 6)                error up to x^5 / 120
+//! cos x = 1 - x^2 / 2 + x^4 / 24         error up to x^6 / 720; length of both 1 - x^6 / 144
 //! ```
 //!
-//! At 5,000 rad/s electrical, 1.5 ticks are 0.31 rad: errors of 3e-5 and 1.3e-6. The angle ahead is limited to an
-//! eighth of a turn, so that no wrong speed lengthens a voltage.
+//! At 5,000 rad/s electrical, 1.5 ticks are 0.31 rad: errors of 3e-5 and 1.3e-6. The angle ahead is limited
+//! to an eighth of a turn, so that no wrong speed lengthens a voltage.
 
 use crate::hal::CURRENT_RATE_HZ;
 use crate::real::sin_cos_of_turns;

@@ -499,8 +499,8 @@ impl Axis {
         JointSample { doubtful: core::mem::take(&mut self.rejected_step), ..sample }
     }
 
-    /// Compares the constants with their checksum in every 256th call, which is every 64 ms. Called once per servo
-    /// period. A fault found here acts from the next tick on.
+    /// Compares the constants with their checksum in every 256th call. Called once per servo period, so every
+    /// 64 ms. A fault found here acts from the next tick on.
     pub fn check_constants(&mut self) {
         self.unchecked = self.unchecked.wrapping_add(1);
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
@@ -508,8 +508,9 @@ impl Axis {
         }
     }
 
-    /// Compares voltages with currents and speed ([`ModelWatch`]), and index pulses with the counter. Called once
-    /// per servo period, halfway between two joint samples. A fault found here acts from the next tick on.
+    /// Compares voltages with currents and speed ([`ModelWatch`]), and index pulses with the counter. Called
+    /// once per servo period, halfway between two joint samples. A fault found here acts from the next tick
+    /// on.
     pub fn check(&mut self) {
         let most = self.constants.current_limit * self.first_motion.current_share();
         self.current_limit = min(self.current_limit + RISE_PER_CHECK * most, most);

@@ -166,8 +166,8 @@ impl AxisState {
         axis.map(|axis| axis.resume(sample, long)).is_some()
     }
 
-    /// Runs one PWM period. Returns the bridge's command for the next one; `react` gets an event to report and may
-    /// replace the command. With a fault, its flag states whether the axis was requested to do anything.
+    /// Runs one PWM period. Returns the bridge's command for the next one; `react` gets an event to report
+    /// and may replace the command. With a fault, its flag states whether the axis was requested to do anything.
     ///
     /// Why a closure: an outcome is large, and a running axis has none to carry in most ticks.
     #[inline(always)]

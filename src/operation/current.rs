@@ -30,7 +30,8 @@ use crate::units::Volt;
 
 /// Current ticks per servo tick.
 const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
-/// Ticks after a joint sample in which the axis checks its constants, and itself: no tick has two of the three to do.
+/// Ticks after a joint sample in which the axis checks its constants, and itself. No tick has two of the
+/// three to do.
 const CONSTANTS: u32 = 1;
 const CHECKS: u32 = TICKS_PER_SERVO / 2;
 

@@ -62,7 +62,8 @@ pub const FRAMES: usize = 33;
 /// Length of the queue of samples to the assistance: three wait at most.
 pub const SAMPLES: usize = 4;
 
-/// Uses and removes the first item of a queue where it lies: large items are copied three times on their way out.
+/// Uses the first item of a queue where it lies, and removes it. A large item that is returned instead is
+/// copied three times.
 pub(super) fn take_first<T, R>(queue: &mut Consumer<'_, T>, take: impl FnOnce(&T) -> R) -> Option<R> {
     let taken = take(queue.peek()?);
     drop_first(queue);

@@ -356,8 +356,8 @@ impl<const N: usize> Monitor<N> {
     }
 }
 
-/// Whether a window has too many glitches. Not inlined: the processor cannot count bits by one instruction, and the
-/// compiler would count them in every tick.
+/// Whether a window has too many glitches. Not inlined: inlined, the bits are counted in every tick, and the
+/// processor has no instruction for that.
 #[cold]
 #[inline(never)]
 const fn has_too_many(glitches: u64) -> bool {
