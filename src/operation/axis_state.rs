@@ -167,7 +167,8 @@ impl AxisState {
     }
 
     /// Runs one PWM period. Returns the bridge's command for the next one; `react` gets an event to report
-    /// and may replace the command. With a fault, its flag states whether the axis was requested to do anything.
+    /// and may replace the command. With a fault, its flag states whether the axis was requested to do
+    /// anything.
     ///
     /// Why a closure: an outcome is large, and a running axis has none to carry in most ticks.
     #[inline(always)]
