@@ -45,14 +45,18 @@ impl PowerUp {
     /// Runs one period of level 0 with a fault injected into the sample.
     fn period(&mut self, request: AxisRequest, inject: impl Fn(&mut AxisSample)) -> Option<Outcome> {
         inject(&mut self.sample);
-        let (command, event) = self.state.tick(&self.sample, Bridges::Follow, request);
+        let mut event = None;
+        let command = self.state.tick(&self.sample, Bridges::Follow, request, |outcome, _, command| {
+            event = Some(outcome);
+            command
+        });
         self.sample = self.stand.period(&command, 0.0);
         self.sample.encoder_count = self.sample.encoder_count.wrapping_sub(self.lost);
         self.sample.index_count = self.sample.index_count.map(|count| count.wrapping_sub(self.lost));
         let [d, q] = self.stand.rotor_currents();
         self.most_ampere = self.most_ampere.max(d.hypot(q));
         // The index is followed in the state itself.
-        event.map(|(outcome, _)| outcome).filter(|outcome| !matches!(outcome, Outcome::Index(_)))
+        event.filter(|outcome| !matches!(outcome, Outcome::Index(_)))
     }
 
     /// A hand turns the rotor by so many turns, back and forth by a tenth of a turn at first, and not evenly.
@@ -146,6 +150,9 @@ impl PowerUp {
             let current = if period < CURRENT_RATE_HZ { first } else { second };
             self.period(AxisRequest { enabled: true, current }, |_| {});
             let axis = self.state.axis_mut().expect("runs");
+            if period % 6 == 0 {
+                axis.check_constants();
+            }
             if period % 6 == 2 {
                 axis.check();
             }
