@@ -115,6 +115,9 @@ struct UpdateArguments {
     /// Power cuts in each long part of the way.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..))]
     cuts: u64,
+    /// Cut the power after every block of the download.
+    #[arg(long)]
+    every_block: bool,
 }
 
 #[derive(Args, Debug)]
@@ -468,7 +471,7 @@ fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
 fn run_update(arguments: &UpdateArguments) -> Result<bool, ToolError> {
     let mut session = arguments.common.session()?;
     session.boot()?;
-    let report = update::run(&mut session, arguments.cuts)?;
+    let report = update::run(&mut session, arguments.cuts, arguments.every_block)?;
     print!("{}", report.text());
     arguments.common.write(&report)?;
     Ok(report.failed() == 0)

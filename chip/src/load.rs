@@ -7,7 +7,7 @@ use crate::time::Ticks;
 
 /// Exception of the current loops.
 pub const CURRENT_INTERRUPT: u8 = 16 + 18;
-/// Name of its interrupt.
+/// Name of the current loops' interrupt in [`LEVELS`].
 pub const CURRENT: &str = "current_interrupt";
 /// Exception of the servo.
 pub const SERVO: u8 = 16 + 77;

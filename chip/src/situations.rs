@@ -19,8 +19,10 @@ const MOST_WORST: u64 = 1250;
 /// Goal: share of the processor's time while the leg holds its pose.
 const MOST_HOLDING: f64 = 0.5;
 /// Situations in which both bridges switch.
-const SWITCHING: [&str; 3] = [HOLDING, "identifying", "following"];
+const SWITCHING: [&str; 3] = [HOLDING, IDENTIFYING, FOLLOWING];
 const HOLDING: &str = "holding";
+const IDENTIFYING: &str = "identifying";
+const FOLLOWING: &str = "following";
 /// Duration of a situation that does not end by itself, s.
 const MEASURED_S: f64 = 1.0;
 /// Cycle of the host, s.
@@ -74,14 +76,14 @@ pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, Tool
 
     begin(session, profiled);
     session.step(Step::Identify)?;
-    end(session, "identifying", &mut found);
+    end(session, IDENTIFYING, &mut found);
 
     let start = take_over(session)?;
     // The first cycles bring the leg into the motion.
     follow(session, start, 0..LEAD)?;
     begin(session, profiled);
     follow(session, start, LEAD..LEAD + (MEASURED_S / CYCLE_S) as u32)?;
-    end(session, "following", &mut found);
+    end(session, FOLLOWING, &mut found);
     Ok(found)
 }
 
@@ -93,13 +95,13 @@ pub fn missed_goals(found: &[Situation]) -> Vec<String> {
         let InterruptReport { mean_instructions: mean, worst_instructions: worst, .. } = interrupts[CURRENT];
         if mean > MOST_MEAN || worst > MOST_WORST {
             missed.push(format!(
-                "{name}: the current interrupt takes {mean:.0} instructions in the mean and {worst} at worst; goals \
+                "{name}: the current interrupt takes {mean:.1} instructions in the mean and {worst} at worst; goals \
                  {MOST_MEAN} and {MOST_WORST}"
             ));
         }
         if *name == HOLDING && load.total > MOST_HOLDING {
             let [total, most] = [load.total, MOST_HOLDING].map(|share| 100.0 * share);
-            missed.push(format!("{name}: {total:.1} % of the processor is used; goal {most} %"));
+            missed.push(format!("{name}: {total:.2} % of the processor is used; goal {most} %"));
         }
     }
     missed
@@ -240,9 +242,9 @@ mod tests {
         assert_eq!(
             missed_goals(&missed),
             [
-                "holding: the current interrupt takes 851 instructions in the mean and 1250 at worst; goals 850 and 1250",
-                "holding: 50.1 % of the processor is used; goal 50 %",
-                "identifying: the current interrupt takes 824 instructions in the mean and 1251 at worst; goals 850 and \
+                "holding: the current interrupt takes 851.0 instructions in the mean and 1250 at worst; goals 850 and 1250",
+                "holding: 50.10 % of the processor is used; goal 50 %",
+                "identifying: the current interrupt takes 824.0 instructions in the mean and 1251 at worst; goals 850 and \
                  1250",
             ]
         );

@@ -2,7 +2,8 @@
 //! cuts at every kind of step.
 //!
 //! The new image is the present one with another version text, sealed again, so that 1F56 and 100A
-//! distinguish both. After every trial the board must run one of the two images, undamaged, and answer.
+//! distinguish both. After every trial the board must run one of the two images, undamaged, and answer; after
+//! the last cut of each part it must take another update.
 
 use std::fmt::Write as _;
 
@@ -407,6 +408,7 @@ impl Bench<'_> {
         );
         let found = if wrong.is_empty() { Ok(found) } else { Err(wrong.join("; ")) };
         self.note(format!("power cuts while the board {name}"), found);
+        self.note_update(&format!("while the board {name}"));
         Ok(())
     }
 
@@ -415,7 +417,7 @@ impl Bench<'_> {
         self.session.machine.restore(cleared)?;
         let program = self.new.clone();
         let blocks = program.len().div_ceil(7 * 32);
-        let every = blocks.div_ceil(points as usize).max(1);
+        let every = (blocks as u64 / points).max(1);
         let (mut count, mut states) = (0, Vec::new());
         self.session.download(&program, |session, _| {
             count += 1;
@@ -431,12 +433,43 @@ impl Bench<'_> {
                 wrong.push(error);
             }
         }
-        let found = format!("{} cuts after {count} blocks; the old image runs after each", states.len());
+        let found = format!("{} cuts in {count} blocks; the old image runs after each", states.len());
         self.note(
             "power cuts between blocks",
             if wrong.is_empty() { Ok(found) } else { Err(wrong.join("; ")) },
         );
+        self.note_update("between blocks");
         Ok(())
+    }
+
+    /// Updates the board once more, from where the last power cut has left it.
+    fn note_update(&mut self, cut: &str) {
+        let found = self.update();
+        self.note(format!("another update after the last power cut {cut}"), found);
+    }
+
+    /// Confirms an image on trial, and brings the other one onto the board.
+    fn update(&mut self) -> Result<String, String> {
+        let words = |error: ToolError| error.to_string();
+        let status = self.session.read_object(NODE, STATUS, 1, 0.5).map_err(words)?;
+        if ProgramStatus(status).has(ProgramStatus::ON_TRIAL) {
+            self.session.command_done(ProgramCommand::Start).map_err(words)?;
+        }
+        let software = self.session.read_object(NODE, SOFTWARE, 1, 0.5).map_err(words)?;
+        let (program, expected) = if software == checksum(&self.new) {
+            (self.old.clone(), Expected::Old)
+        } else {
+            (self.new.clone(), Expected::New)
+        };
+        for command in [ProgramCommand::Stop, ProgramCommand::Clear] {
+            self.session.command_done(command).map_err(words)?;
+        }
+        self.session.download(&program, |_, _| Ok(())).map_err(words)?;
+        self.session.settled().map_err(words)?;
+        self.session.machine.chip_mut().can.sent.clear();
+        self.session.command(ProgramCommand::Start).map_err(words)?;
+        self.session.await_start(SWAPPED_S).map_err(words)?;
+        self.running(expected)
     }
 }
 
@@ -453,11 +486,12 @@ pub fn programs(session: &Session) -> Result<[Vec<u8>; 2], ToolError> {
     Ok([old, new])
 }
 
-/// Tries everything, from a session that was just started. `points` is the number of cuts in each long part.
+/// Tries everything, from a session that was just started. `points` is the least number of cuts in each long
+/// part, as far as it has so many places; in the download there can be one after every block.
 ///
 /// # Errors
 /// The image does not take an update at all.
-pub fn run(session: &mut Session, points: u64) -> Result<UpdateReport, ToolError> {
+pub fn run(session: &mut Session, points: u64, every_block: bool) -> Result<UpdateReport, ToolError> {
     let [old, new] = programs(session)?;
     let report = UpdateReport { bytes: old.len(), ..UpdateReport::default() };
     let mut bench = Bench { session, old, new, report };
@@ -468,7 +502,7 @@ pub fn run(session: &mut Session, points: u64) -> Result<UpdateReport, ToolError
         session.command_done(ProgramCommand::Stop)?;
         session.command_done(ProgramCommand::Clear).map(drop)
     })?;
-    bench.cut_download(&cleared, points)?;
+    bench.cut_download(&cleared, if every_block { u64::MAX } else { points })?;
     bench.cut("swaps the new image in", &written, points, Expected::Either, |session| {
         session.machine.chip_mut().can.sent.clear();
         session.command(ProgramCommand::Start)?;

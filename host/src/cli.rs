@@ -130,7 +130,7 @@ enum Command {
     #[command(after_help = "Example: cargo fw --leg my-leg.toml")]
     Fw(image::FirmwareArguments),
     /// Build the flash image, write it onto a board and print its records (`cargo flash-leg`).
-    #[command(after_help = "Example: cargo flash-leg --leg my-leg.toml -- --probe 0483")]
+    #[command(after_help = "Example: cargo flash-leg --leg my-leg.toml -- --probe 0483:3748")]
     FlashLeg(image::FlashArguments),
 }
 

@@ -23,7 +23,8 @@
 //! ```
 //!
 //! At 5,000 rad/s electrical, 1.5 ticks are 0.31 rad: errors of 3e-5 and 1.3e-6. The angle ahead is limited
-//! to an eighth of a turn, so that no wrong speed lengthens a voltage.
+//! to an eighth of a turn, because the series would lengthen the voltage beyond; a configuration permits only
+//! speeds below that, a twelfth of a turn per tick.
 
 use crate::hal::CURRENT_RATE_HZ;
 use crate::real::sin_cos_of_turns;
@@ -31,7 +32,7 @@ use crate::real::sin_cos_of_turns;
 /// One turn in units of an [`ElectricalAngle`].
 const TURN: f32 = 4_294_967_296.0;
 const RADIAN_PER_UNIT: f32 = core::f32::consts::TAU / TURN;
-/// An eighth of a turn.
+/// An eighth of a turn, units of 2^-32 turns; a power of two is limited by one instruction.
 const MOST_AHEAD: i32 = 1 << 29;
 const TICK_S: f32 = 1.0 / CURRENT_RATE_HZ as f32;
 /// Double pole of the tracking loop, rad/s.
@@ -287,6 +288,7 @@ mod tests {
     #[test]
     fn a_rotation_ahead_is_turned_by_speed_and_ticks() {
         let mut tracker = SpeedTracker::at(ElectricalAngle::ZERO);
+        // The sine's error is 6e-8, 2.5e-5 and 4.8e-4 at 0.09, 0.31 and 0.57 rad; the first one is rounding.
         for (speed, from, error) in [(-0.01, 0.005, 1e-6), (0.033, 0.73, 4e-5), (-0.06, -0.4, 5e-4)] {
             tracker.speed = speed * TURN;
             let ahead = tracker.ahead(ElectricalAngle::from_turns(from).rotation(), 1.5);

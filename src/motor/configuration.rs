@@ -78,8 +78,8 @@ pub enum AxisError {
     Timing,
     /// Counts per turn, pole pairs, or an index beside an absolute encoder.
     Encoder,
-    /// Greatest speed: must be positive, below a quarter of an electrical turn and below 32,767
-    /// counts per tick.
+    /// Greatest speed: must be positive, below a twelfth of an electrical turn and below 32,767 counts per
+    /// tick.
     Speed,
     /// Flux, inductances, resistance or bandwidth.
     Motor,
@@ -135,7 +135,7 @@ impl AxisConfiguration {
     pub(super) fn greatest_step(&self) -> Result<i32, AxisError> {
         let turns = self.greatest_speed.0 / (core::f32::consts::TAU * CURRENT_RATE_HZ as f32);
         let counts = turns * self.counts_per_turn as f32;
-        let sensible = turns > 0.0 && turns * f32::from(self.pole_pairs) < 0.25 && counts < 32_767.0;
+        let sensible = turns > 0.0 && turns * f32::from(self.pole_pairs) < 1.0 / 12.0 && counts < 32_767.0;
         if sensible { Ok(counts as i32 + 2) } else { Err(AxisError::Speed) }
     }
 

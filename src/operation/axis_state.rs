@@ -167,10 +167,10 @@ impl AxisState {
     }
 
     /// Runs one PWM period. Returns the bridge's command for the next one; `react` gets an event to report
-    /// and may replace the command. With a fault, its flag states whether the axis was requested to do
-    /// anything.
+    /// and may replace the command. Its flag states whether the bridge was requested to switch; it is
+    /// `false` without a fault.
     ///
-    /// Why a closure: an outcome is large, and a running axis has none to carry in most ticks.
+    /// Why a closure: a returned outcome, 64 bytes, would be copied in every tick.
     #[inline(always)]
     pub fn tick(
         &mut self,
@@ -201,10 +201,11 @@ impl AxisState {
         }
     }
 
-    /// Runs one PWM period of an axis that does not run yet.
+    /// Runs one PWM period of an axis that is off or under calibration. Not inlined: a running axis never
+    /// needs it.
     #[inline(never)]
     fn tick_before(&mut self, sample: &AxisSample, bridges: Bridges) -> (AxisCommand, Option<Outcome>) {
-        // An interrupted check at standstill can be repeated at once, so the index is followed there too.
+        // Also during a calibration: an interrupted check at standstill can be repeated at once.
         let came = self.search.follow(sample);
         let Doing::Calibrating(calibrator) = &mut self.doing else {
             return (AxisCommand::OFF, came.then_some(Outcome::Index(self.search)));

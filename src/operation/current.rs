@@ -7,7 +7,8 @@
 //! A bridge switches only for an axis with a calibration (or under calibration), with a target of the servo,
 //! while the inhibit word is clear and the servo answers. The stop's interrupt may come between any two
 //! instructions of a tick. So the inhibit word is read again, with interrupts masked, at the moment of
-//! enabling the outputs ([`apply`]). Three ticks after each joint sample an axis checks itself
+//! enabling the outputs ([`apply`]). One tick after each joint sample an axis checks its
+//! constants ([`Axis::check_constants`](crate::motor::Axis::check_constants)), two ticks later itself
 //! ([`Axis::check`](crate::motor::Axis::check)).
 //!
 //! While the flash is written ([`InhibitReason::Storing`]) nothing switches, not even the brake resistor, and
@@ -30,10 +31,10 @@ use crate::units::Volt;
 
 /// Current ticks per servo tick.
 const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
-/// Ticks after a joint sample in which the axis checks its constants, and itself. No tick has two of the
-/// three to do.
-const CONSTANTS: u32 = 1;
-const CHECKS: u32 = TICKS_PER_SERVO / 2;
+/// Tick after a joint sample in which an axis compares its constants with their checksum.
+const CONSTANTS_TICK: u32 = 1;
+/// Tick in which an axis checks itself. Joint sample and both checks lie in different ticks.
+const CHECK_TICK: u32 = TICKS_PER_SERVO / 2;
 
 /// Periods without a tick after which the other axes' ticks detect that an axis has stopped.
 const LATE_PERIODS: u32 = 3;
@@ -177,10 +178,10 @@ impl<const N: usize> CurrentLoops<N> {
         });
         apply(axis, &command, signals, hardware);
         this.ticks += 1;
-        if (this.ticks == CONSTANTS || this.ticks == CHECKS)
+        if (this.ticks == CONSTANTS_TICK || this.ticks == CHECK_TICK)
             && let Some(running) = this.stage.axis_mut()
         {
-            if this.ticks == CHECKS { running.check() } else { running.check_constants() }
+            if this.ticks == CHECK_TICK { running.check() } else { running.check_constants() }
         }
         if this.ticks >= TICKS_PER_SERVO {
             this.ticks = 0;

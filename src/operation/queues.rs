@@ -20,6 +20,8 @@
 //! | bus | servo | [`LegOrder`] |
 //! | servo | bus | [`LegStatus`], logged samples |
 
+use core::sync::atomic::{Ordering, fence};
+
 use heapless::spsc::{Consumer, Producer, Queue};
 
 use super::axis_state::{Order, Outcome};
@@ -63,14 +65,19 @@ pub const FRAMES: usize = 33;
 pub const SAMPLES: usize = 4;
 
 /// Uses the first item of a queue where it lies, and removes it. A large item that is returned instead is
-/// copied three times.
+/// copied three times. The producer sees the slot occupied until `take` returns.
 pub(super) fn take_first<T, R>(queue: &mut Consumer<'_, T>, take: impl FnOnce(&T) -> R) -> Option<R> {
+    if !queue.ready() {
+        return None;
+    }
+    // The queue looks at its indices without ordering there.
+    fence(Ordering::Acquire);
     let taken = take(queue.peek()?);
     drop_first(queue);
     Some(taken)
 }
 
-/// Not inlined: then no item is returned anywhere, and the copies disappear.
+/// Removes the first item. Not inlined, so that the compiler drops the item instead of copying it out.
 #[inline(never)]
 fn drop_first<T>(queue: &mut Consumer<'_, T>) {
     drop(queue.dequeue());

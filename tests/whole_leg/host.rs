@@ -551,6 +551,49 @@ fn impedance(hosted: &mut Hosted, joint: usize, position: f32, stiffness: f32, d
     });
 }
 
+/// Torque demanded beyond that of the spring, N m, once the joint rests.
+fn beyond_the_spring(hosted: &mut Hosted, joint: usize, target: ImpedanceTarget) -> f64 {
+    hosted.commands[joint].target = Target::Impedance(target);
+    hosted.run(2 * SECOND);
+    let spring = f64::from(target.stiffness) * (f64::from(target.position.0) - hosted.truth(joint));
+    f64::from(hosted.status[joint].torque_demand.0) - spring
+}
+
+#[test]
+fn feedforward_torque_and_target_velocity_add_to_the_spring() {
+    for (joint, velocity, torque) in [(0, 0.5, 0.0), (0, 0.0, 12.0), (1, -0.4, 5.0)] {
+        let mut hosted = Hosted::new();
+        hosted.run(SECOND);
+        let (from, damping) = (hosted.position(joint), 16.0);
+        impedance(&mut hosted, joint, from, 200.0, damping);
+        let Target::Impedance(target) = hosted.commands[joint].target else { panic!("impedance") };
+        let alone = beyond_the_spring(&mut hosted, joint, target);
+        let with =
+            ImpedanceTarget { velocity: RadianPerSecond(velocity), torque: NewtonMetre(torque), ..target };
+        let added = beyond_the_spring(&mut hosted, joint, with) - alone;
+        let expected = f64::from(damping * velocity + torque);
+        assert!((added / expected - 1.0).abs() < 0.05, "{joint}: {added} of {expected} N m");
+        assert!(!hosted.status[joint].limited && is_enabled(&hosted.pair));
+    }
+}
+
+#[test]
+fn an_impedance_beyond_its_limits_is_bounded_and_reported() {
+    let [stiffest, strongest] = context().configuration.joints[0].stiffest_impedance();
+    let high = context().configuration.joints[0].high.0;
+    for (position, stiffness, damping) in
+        [(0.0, 2.0 * stiffest, 0.0), (0.0, 100.0, 2.0 * strongest), (2.0 * high, 100.0, 10.0)]
+    {
+        let mut hosted = Hosted::new();
+        hosted.run(SECOND);
+        let place = hosted.position(0) + position;
+        impedance(&mut hosted, 0, place, stiffness, damping);
+        hosted.run(SECOND);
+        assert!(hosted.status[0].limited && is_enabled(&hosted.pair), "{position} {stiffness} {damping}");
+        assert!(hosted.truth(0) < f64::from(high), "{}", hosted.truth(0));
+    }
+}
+
 /// Stiffness and damping that a joint showed: least squares of its torque over deviation and velocity of the
 /// plant, rad and rad/s.
 fn shown(samples: &[[f64; 3]]) -> [f64; 2] {

@@ -12,7 +12,7 @@ pub fn axis_error(error: AxisError) -> String {
             "the encoder needs 16 to 65,536 counts (`encoder.counts`) and more than four per pole pair (`motor.pole_pairs`)"
         }
         AxisError::Speed => {
-            "at twice the speed limit (`speed_limit_deg_s`) the rotor would turn by a quarter of an electrical turn per PWM period"
+            "at twice the speed limit (`speed_limit_deg_s`) the rotor would turn by a twelfth of an electrical turn per PWM period"
         }
         AxisError::Motor => {
             "no current loop can be designed for this flux, resistance or inductance (`torque_per_ampere`, `motor`)"

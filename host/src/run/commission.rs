@@ -1,10 +1,10 @@
 //! Guided commissioning of a board over its bus: from an unknown board to a stored, accepted identification.
 //!
 //! ```text
-//! find        nodes, firmware, serial number            wiring   supply, temperatures, inhibit reasons
+//! find        nodes, firmware, serial number            wiring    supply, temperatures, inhibit reasons
 //! calibrate   2160:1 = 1, switch held                   reference 2160:1 = 2, switch open, joints at zero
-//! enable      controlwords 6, 7, F, switch held         identify  2100:1 = 1
-//! store       controlword 0, 1010:1 = "save"
+//! direction   6064 of both flexed joints is positive    enable    controlwords 6, 7, F, switch held
+//! identify    2100:1 = 1                                store     controlword 0, 1010:1 = "save"
 //! ```
 //!
 //! Nothing is remembered here: each step reads from the board whether it is done already. So an interrupted
@@ -39,6 +39,8 @@ pub enum Step {
     Calibrate,
     /// Take the joints' zero.
     Reference,
+    /// Check by hand that flexed joints have positive angles.
+    Direction,
     /// Enable the drive.
     Enable,
     /// Identify the leg.
@@ -49,11 +51,12 @@ pub enum Step {
 
 impl Step {
     /// All steps.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Find,
         Self::Wiring,
         Self::Calibrate,
         Self::Reference,
+        Self::Direction,
         Self::Enable,
         Self::Identify,
         Self::Store,
@@ -67,6 +70,7 @@ impl Step {
             Self::Wiring => "wiring",
             Self::Calibrate => "calibrate",
             Self::Reference => "reference",
+            Self::Direction => "direction",
             Self::Enable => "enable",
             Self::Identify => "identify",
             Self::Store => "store",
@@ -93,6 +97,8 @@ const LOOK: Duration = Duration::from_millis(100);
 const AGAIN: Duration = Duration::from_millis(400);
 /// Time to read what is asked for, before anything acts.
 const READ_TIME: Duration = Duration::from_secs(2);
+/// Longest wait for a check that an earlier run asked for, s.
+const CHECKED_BEFORE_S: f64 = 10.0;
 /// Longest calibration and reference, s.
 const LONGEST_STEP_S: f64 = 180.0;
 /// Longest identification, s.
@@ -101,9 +107,12 @@ const LONGEST_IDENTIFICATION_S: f64 = 600.0;
 const LONGEST_RETURN_S: f64 = 30.0;
 /// Longest write of the flash, s.
 const LONGEST_STORE_S: f64 = 30.0;
-/// Plausible supply, V, and temperatures, degrees Celsius.
-const SUPPLY_V: [f64; 2] = [20.0, 58.0];
+/// Plausible supply of either board, V, and temperatures, degrees Celsius.
+const SUPPLY_V: [f64; 2] = [12.0, 58.0];
 const TEMPERATURE_C: [f64; 2] = [-20.0, 90.0];
+
+/// Angle from which a joint counts as flexed, rad.
+const FLEXED_RAD: f64 = 5.0 * core::f64::consts::PI / 180.0;
 
 /// NMT command: start of a node.
 const START: u8 = 1;
@@ -129,6 +138,8 @@ pub struct Commission<'a> {
     client: Client,
     options: CommissionOptions,
     say: &'a mut dyn FnMut(&str),
+    /// This run took the joints' reference.
+    has_referenced: bool,
     /// Watched heartbeat and mode of each node before this host.
     before: Option<[[u32; 2]; JOINTS]>,
     report: CommissionReport,
@@ -164,7 +175,7 @@ impl<'a> Commission<'a> {
     pub fn new(client: Client, options: CommissionOptions, say: &'a mut dyn FnMut(&str)) -> Self {
         let joints = options.nodes.map(|node| JointCommissioned { node, ..JointCommissioned::default() });
         let report = CommissionReport { joints: joints.into(), ..CommissionReport::default() };
-        Self { client, options, say, before: None, report }
+        Self { client, options, say, has_referenced: false, before: None, report }
     }
 
     /// Runs all steps up to the last one. The report holds what was reached, also after an error.
@@ -197,6 +208,7 @@ impl<'a> Commission<'a> {
             Step::Wiring => self.check_wiring(),
             Step::Calibrate => self.calibrate(),
             Step::Reference => self.reference(),
+            Step::Direction => self.check_direction(),
             Step::Enable => self.enable(),
             Step::Identify => self.identify(),
             Step::Store => self.store(),
@@ -228,16 +240,25 @@ impl<'a> Commission<'a> {
     fn ask(
         &mut self,
         words: &str,
+        is_done: impl FnMut(&mut Self) -> Result<bool, ToolError>,
+    ) -> Result<(), ToolError> {
+        self.ask_for(self.options.patience_s, words, is_done)
+    }
+
+    /// [`Self::ask`], at most for this time.
+    fn ask_for(
+        &mut self,
+        patience_s: f64,
+        words: &str,
         mut is_done: impl FnMut(&mut Self) -> Result<bool, ToolError>,
     ) -> Result<(), ToolError> {
         self.line(&format!("           please: {words}"));
         self.wait(READ_TIME)?;
         let begun = Instant::now();
         while !is_done(self)? {
-            if begun.elapsed().as_secs_f64() > self.options.patience_s {
+            if begun.elapsed().as_secs_f64() > patience_s {
                 return Err(refused(format!(
-                    "waited {} s for the operator: {words}; start the command again to resume",
-                    self.options.patience_s
+                    "waited {patience_s} s for the operator: {words}; start the command again to resume"
                 )));
             }
             self.wait(AGAIN)?;
@@ -393,7 +414,7 @@ impl<'a> Commission<'a> {
         }
         self.guide(
             CommissioningStep::Calibrate,
-            "open the enabling switch, then hold it until both motors are calibrated; they turn: keep clear",
+            "support both joints, clear of their stops; open the enabling switch, then hold it until both motors are calibrated; they turn, and a lifted joint can fall",
         )?;
         Ok("both axes calibrated".into())
     }
@@ -422,7 +443,47 @@ impl<'a> Commission<'a> {
                 }
             },
         )?;
+        self.has_referenced = true;
         Ok("zeros taken".into())
+    }
+
+    /// Checks by hand what nothing else detects: a joint that counts in the other direction.
+    fn check_direction(&mut self) -> Result<String, ToolError> {
+        if self.is_identified()? {
+            return Ok("not needed: the leg is identified".into());
+        }
+        let words = "bend hip and knee by at least 10 degrees each, as for sitting down";
+        let patience_s = if self.has_referenced { self.options.patience_s } else { CHECKED_BEFORE_S };
+        let mut angles = [0.0; JOINTS];
+        let asked = self.ask_for(patience_s, words, |this| {
+            angles = this.positions()?;
+            Ok(angles.iter().all(|angle| *angle >= FLEXED_RAD))
+        });
+        let joints = ["hip", "knee"].into_iter().zip(angles);
+        let against: Vec<_> =
+            joints.filter(|(_, angle)| *angle <= -FLEXED_RAD).map(|(name, _)| name).collect();
+        let [hip, knee] = angles.map(f64::to_degrees);
+        match asked {
+            Ok(()) => Ok(format!("bent joints have positive angles: hip {hip:.0}, knee {knee:.0} degrees")),
+            Err(error) if !against.is_empty() => Err(refused(format!(
+                "{error}; the angle of the {} is negative: if it is bent as asked, correct its `direction` in the leg file",
+                against.join(" and the ")
+            ))),
+            // A run before this one took the reference and asked for the check.
+            Err(_) if !self.has_referenced => {
+                Ok(format!("not checked in this run: hip {hip:.0}, knee {knee:.0} degrees"))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Angles of the joints, rad.
+    fn positions(&mut self) -> Result<[f64; JOINTS], ToolError> {
+        let mut angles = [0.0; JOINTS];
+        for (angle, node) in angles.iter_mut().zip(self.options.nodes) {
+            *angle = 1e-6 * f64::from(self.client.read(node, Object(0x6064, 0))?.cast_signed());
+        }
+        Ok(angles)
     }
 
     fn states(&mut self) -> Result<[Option<JointState>; JOINTS], ToolError> {
@@ -458,7 +519,7 @@ impl<'a> Commission<'a> {
         self.take_control()?;
         let mut may_reset = true;
         self.ask(
-            "move the leg into its range of motion, open the enabling switch, then hold it; the leg will hold its pose",
+            "support the leg within its range of motion, open the enabling switch, then hold it; support the leg until it holds its pose: only a quarter of the current is there until the motors have moved",
             |this| {
                 let states = this.states()?;
                 if states.iter().all(|state| state.is_some_and(JointState::is_enabled)) {
@@ -488,10 +549,8 @@ impl<'a> Commission<'a> {
             Ok(why) if !why.is_empty() => refused(format!("{error}; the board says: {why}")),
             _ => error,
         })?;
-        let nodes = self.options.nodes;
-        for (joint, node) in nodes.into_iter().enumerate() {
-            let micro = self.client.read(node, Object(0x6064, 0))?.cast_signed();
-            self.report.joints[joint].position_rad = (f64::from(micro) * 1e-6).into();
+        for (joint, angle) in self.positions()?.into_iter().enumerate() {
+            self.report.joints[joint].position_rad = angle.into();
         }
         Ok("enabled; the leg holds its pose".into())
     }
@@ -505,9 +564,12 @@ impl<'a> Commission<'a> {
                     "node {node} would not stop when its host is lost: 6007 is 0; write 3 to it"
                 )));
             }
-            let before = [self.client.read(node, WATCHED)?, self.client.read(node, MODE)?];
-            self.before.get_or_insert([[0; 2]; JOINTS])[place] = before;
-            self.client.write(node, WATCHED, u32::from(HOST) << 16 | WATCHED_MS, 4)?;
+            let ours = u32::from(HOST) << 16 | WATCHED_MS;
+            let (watched, mode) = (self.client.read(node, WATCHED)?, self.client.read(node, MODE)?);
+            // What a killed procedure has left must not be stored.
+            let watched = if watched == ours { 0 } else { watched };
+            self.before.get_or_insert([[0; 2]; JOINTS])[place] = [watched, mode];
+            self.client.write(node, WATCHED, ours, 4)?;
             self.client.write(node, MODE, 0, 1)?;
         }
         Ok(())

@@ -143,7 +143,27 @@ fn tick_at(now: u32, sample: AxisSample) -> Tick {
 }
 
 #[test]
-fn an_axis_checks_itself_in_every_servo_period() {
+fn an_axis_without_index_pulses_finds_its_position_lost() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    bench.motors.iter_mut().for_each(|motor| motor.speed = 60.0);
+    // Three turns.
+    for _ in 0..7800 {
+        bench.now = bench.now.wrapping_add(PERIOD.get());
+        for axis in 0..2 {
+            let sample = AxisSample { index_count: None, ..bench.motors[axis].period(AxisCommand::OFF) };
+            bench.tick_axis(axis, &tick_at(bench.now, sample));
+        }
+    }
+    let lost = |axis| {
+        move |(of, outcome): &(usize, Outcome)| {
+            *of == axis && matches!(outcome, Outcome::Fault { fault: AxisFault::Encoder, lost: true })
+        }
+    };
+    assert!([0, 1].iter().all(|axis| bench.outcomes.iter().any(lost(*axis))), "{:?}", bench.outcomes);
+}
+
+#[test]
+fn an_axis_checks_its_constants_in_every_servo_period() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.run(TICKS_PER_SERVO);
     bench.loops.axis_state_mut(1).and_then(AxisState::axis_mut).expect("running").flip_bit(0, 3);

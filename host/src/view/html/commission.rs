@@ -3,13 +3,20 @@
 use maud::{DOCTYPE, html};
 
 use crate::base::number::Number;
+use crate::base::precision;
 use crate::base::table::{Table, cells};
 use crate::report::commission::{CommissionReport, ParameterRead};
 use crate::view::html::{page_head, parameters, time_utc};
 
-/// Value with some digits, or a dash.
-fn digits(value: Number, count: usize) -> String {
-    value.known().map_or("-".into(), |value| format!("{value:.count$}"))
+/// Value with some decimal places, or a dash. A number that rounds to zero has no sign.
+fn places(value: Number, count: usize) -> String {
+    let Some(value) = value.known() else { return "-".into() };
+    let text = format!("{value:.count$}");
+    if text.contains(|digit| ('1'..='9').contains(&digit)) {
+        text
+    } else {
+        text.trim_start_matches('-').into()
+    }
 }
 
 fn table(read: &[ParameterRead]) -> Table {
@@ -17,8 +24,8 @@ fn table(read: &[ParameterRead]) -> Table {
     for parameter in read {
         table.row(cells![
             &parameter.name,
-            digits(parameter.value, 4),
-            digits(parameter.sigma, 4),
+            precision::value(parameter.value, parameter.sigma),
+            precision::sigma(parameter.sigma),
             parameter.status,
         ]);
     }
@@ -38,10 +45,10 @@ fn joints(report: &CommissionReport) -> Table {
         table.row(cells![
             name,
             joint.node.to_string(),
-            digits(joint.bridge_c, 1),
-            digits(joint.winding_c, 1),
-            digits(joint.position_rad, 3),
-            digits(worst.into(), 2),
+            places(joint.bridge_c, 1),
+            places(joint.winding_c, 1),
+            places(joint.position_rad, 3),
+            places(worst.into(), 2),
         ]);
     }
     table
@@ -73,7 +80,7 @@ pub fn page(report: &CommissionReport) -> String {
                         p {
                             "Firmware " (report.firmware)
                             @if report.image != 0 { ", image with check sum " (format!("{:08X}", report.image)) }
-                            ", supply " (digits(report.supply_v, 1)) " V"
+                            ", supply " (places(report.supply_v, 1)) " V"
                         }
                     }
                     section { h2 { "Steps" } (steps.to_html()) }
@@ -99,4 +106,17 @@ pub fn page(report: &CommissionReport) -> String {
         }
     };
     page.into_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_that_rounds_to_zero_has_no_sign() {
+        let cases = [(-0.0002, 3, "0.000"), (-0.0006, 3, "-0.001"), (f64::NAN, 1, "-"), (-12.26, 1, "-12.3")];
+        for (value, count, expected) in cases {
+            assert_eq!(places(value.into(), count), expected);
+        }
+    }
 }
