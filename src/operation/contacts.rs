@@ -224,7 +224,8 @@ impl Operator {
         }
         if self.start.closed {
             self.pressed = self.pressed.saturating_add(u32::from(self.ready));
-            return (self.pressed == RESET_TICKS).then_some(OperatorRequest::Reset);
+            let permitted = self.refusal(CommissioningStep::Reset, now).is_none();
+            return (self.pressed == RESET_TICKS && permitted).then_some(OperatorRequest::Reset);
         }
         self.ready = true;
         let short = before.1 && self.pressed > 0 && self.pressed < RESET_TICKS;
@@ -405,6 +406,10 @@ mod tests {
                 .eq([OperatorRequest::Reset])
         );
         assert_eq!(requested(&mut operator, stands, RATE_HZ).count(), 0);
+        // A drive that damps keeps its gate drivers.
+        let damps = DriveState::QuickStopActive { remaining_ticks: 1 };
+        let damping = Situation { start: true, drive: Some(damps), ..READY };
+        assert_eq!(requested(&mut operator, damping, 2 * RESET_TICKS).count(), 0);
     }
 
     #[test]
