@@ -166,7 +166,7 @@ fn calibration(axis: u32, reason: u32, detail: u32) -> String {
     let known = CalibrationRefusal::ALL.into_iter().find(|refusal| u32::from(refusal.number()) == reason);
     let word = known.map_or("an unknown reason", words::calibration);
     let detail = if detail == 0 { String::new() } else { format!(" {detail}") };
-    format!("the calibration refused axis {axis}: {word}{detail} (docs/board.md says what to do)")
+    format!("the calibration refused axis {axis}: {word}{detail} (docs/commission.md says what to do)")
 }
 
 impl<'a> Commission<'a> {
