@@ -161,6 +161,17 @@ fn inhibits(causes: u32) -> String {
     words.join(", ")
 }
 
+/// Whether both joints are bent, and count in their direction.
+fn are_bent(angles: [f64; JOINTS]) -> bool {
+    angles.into_iter().all(|angle| angle >= FLEXED_RAD)
+}
+
+/// Joints that are bent and count in the other direction.
+fn bent_against(angles: [f64; JOINTS]) -> Vec<&'static str> {
+    let joints = ["hip", "knee"].into_iter().zip(angles);
+    joints.filter(|(_, angle)| *angle <= -FLEXED_RAD).map(|(name, _)| name).collect()
+}
+
 /// Words of a refused calibration.
 fn calibration(axis: u32, reason: u32, detail: u32) -> String {
     let known = CalibrationRefusal::ALL.into_iter().find(|refusal| u32::from(refusal.number()) == reason);
@@ -457,11 +468,9 @@ impl<'a> Commission<'a> {
         let mut angles = [0.0; JOINTS];
         let asked = self.ask_for(patience_s, words, |this| {
             angles = this.positions()?;
-            Ok(angles.iter().all(|angle| *angle >= FLEXED_RAD))
+            Ok(are_bent(angles))
         });
-        let joints = ["hip", "knee"].into_iter().zip(angles);
-        let against: Vec<_> =
-            joints.filter(|(_, angle)| *angle <= -FLEXED_RAD).map(|(name, _)| name).collect();
+        let against = bent_against(angles);
         let [hip, knee] = angles.map(f64::to_degrees);
         match asked {
             Ok(()) => Ok(format!("bent joints have positive angles: hip {hip:.0}, knee {knee:.0} degrees")),
@@ -757,5 +766,21 @@ impl<'a> Commission<'a> {
             }
         }
         Err(refused(format!("the board has not confirmed its store within {LONGEST_STORE_S} s")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bent_joint_with_a_negative_angle_is_named() {
+        let none: [&str; 0] = [];
+        assert!(are_bent([0.12, 0.27]) && bent_against([0.12, 0.27]) == none);
+        assert!(!are_bent([0.12, 0.0]) && bent_against([0.12, 0.0]) == none);
+        assert!(!are_bent([0.12, -0.27]));
+        assert_eq!(bent_against([0.12, -0.27]), ["knee"]);
+        assert_eq!(bent_against([-0.12, -0.27]), ["hip", "knee"]);
+        assert!(!are_bent([f64::NAN, 0.27]) && bent_against([f64::NAN, 0.27]) == none);
     }
 }
