@@ -1,7 +1,10 @@
 //! Selects the leg of an image and links the flash image: memory layout, vector table, records. Host programs
 //! need none of this.
 
-use std::env;
+use std::path::Path;
+use std::{env, fs};
+
+use scarab_boot::Region;
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
@@ -28,6 +31,11 @@ fn main() {
     if !board {
         return;
     }
+    let written = env::var("OUT_DIR").expect("cargo sets it");
+    let memory =
+        format!("FLASH : ORIGIN = {:#x}, LENGTH = {}\n", Region::IMAGE.address, Region::IMAGE.bytes());
+    fs::write(Path::new(&written).join("flash.x"), memory).expect("cargo's directory is writable");
+    println!("cargo::rustc-link-search={written}");
     println!("cargo::rustc-link-search={}", env!("CARGO_MANIFEST_DIR"));
     println!("cargo::rustc-link-search={}/src/board/odrive_v3_6", env!("CARGO_MANIFEST_DIR"));
     for script in ["link.x", "defmt.x"] {

@@ -2,13 +2,17 @@
 //! and host.
 //!
 //! ```text
-//! sector   address     size
-//! 0 to 3   0800 0000   64 KB    bootloader, at most 32 KB
-//! 4        0801 0000   64 KB    state of an update (embassy-boot)
-//! 5, 6     0802 0000   256 KB   image that runs
-//! 7 to 9   0806 0000   384 KB   new image; after an update the one before
-//! 10, 11   080C 0000   256 KB   stored parameters; no update touches them
+//! sector    address     size
+//! 0         0800 0000   16 KB    bootloader
+//! 1         0800 4000   16 KB    state of an update (embassy-boot)
+//! 2, 3      0800 8000   32 KB    stored parameters; no update touches them
+//! 4         0801 0000   64 KB    event log (reserved)
+//! 5 to 7    0802 0000   384 KB   image that runs
+//! 8 to 11   0808 0000   512 KB   new image; after an update the one before
 //! ```
+//!
+//! embassy-boot needs one sector more for the new image than for the running one, all of equal size: 3 + 4
+//! sectors of 128 KB are the largest pair of an STM32F405.
 //!
 //! A header of 16 bytes follows the image's vector table. The build of an image writes it ([`seal`]); the
 //! image checks a new one before it is swapped in, the bootloader every image before it runs.
@@ -17,6 +21,10 @@
 //! not attackers.
 #![no_std]
 #![forbid(unsafe_code)]
+
+mod region;
+
+pub use region::{FLASH, FLASH_BYTES, Region, SUPPLY_LEVEL};
 
 use crc::{CRC_32_MPEG_2, Crc};
 
@@ -28,37 +36,6 @@ type Lookup = crc::Table<1>;
 /// Check sum: CRC-32/MPEG-2, which continues from its own result.
 const CODE: Crc<u32, Lookup> = Crc::<u32, Lookup>::new(&CRC_32_MPEG_2);
 const START: u32 = u32::MAX;
-
-/// Sectors of the flash with one purpose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Region {
-    /// Address of the first byte.
-    pub address: u32,
-    /// Number of the first sector.
-    pub sector: u32,
-    /// Number of sectors.
-    pub sectors: u32,
-    /// Bytes of each sector.
-    pub sector_bytes: u32,
-}
-
-impl Region {
-    /// State of an update.
-    pub const STATE: Self = Self { address: 0x0801_0000, sector: 4, sectors: 1, sector_bytes: 64 << 10 };
-    /// Image that runs.
-    pub const IMAGE: Self = Self { address: 0x0802_0000, sector: 5, sectors: 2, sector_bytes: 128 << 10 };
-    /// New image, or the one before.
-    pub const NEW_IMAGE: Self = Self { address: 0x0806_0000, sector: 7, sectors: 3, sector_bytes: 128 << 10 };
-    /// Stored parameters.
-    pub const PARAMETERS: Self =
-        Self { address: 0x080C_0000, sector: 10, sectors: 2, sector_bytes: 128 << 10 };
-
-    /// Size in bytes.
-    #[must_use]
-    pub const fn bytes(&self) -> u32 {
-        self.sectors * self.sector_bytes
-    }
-}
 
 /// Place of the header in an image: after 16 exceptions and 82 interrupts.
 pub const HEADER_AT: u32 = (16 + 82) * 4;
@@ -249,12 +226,13 @@ mod tests {
 
     #[test]
     fn regions_follow_each_other_and_fill_the_flash() {
-        let all = [Region::STATE, Region::IMAGE, Region::NEW_IMAGE, Region::PARAMETERS];
-        for pair in all.windows(2) {
+        let [first, .., last] = Region::ALL;
+        assert_eq!((first.address, first.sector), (FLASH, 0));
+        for pair in Region::ALL.windows(2) {
             assert_eq!(pair[0].address + pair[0].bytes(), pair[1].address);
             assert_eq!(pair[0].sector + pair[0].sectors, pair[1].sector);
         }
-        assert_eq!(Region::PARAMETERS.address + Region::PARAMETERS.bytes(), 0x0810_0000);
+        assert_eq!(last.address + last.bytes(), FLASH + FLASH_BYTES);
         // embassy-boot swaps sector by sector and needs one more for the new image.
         assert_eq!(Region::NEW_IMAGE.bytes(), Region::IMAGE.bytes() + Region::IMAGE.sector_bytes);
     }

@@ -749,12 +749,17 @@ impl Chip {
         self.spi.answer(answer);
     }
 
-    /// Reads bytes of the flash from sector 4 on.
+    /// Sets the supply of the processor, V.
+    pub fn set_supply(&mut self, volts: f64) {
+        (self.rcc.supply_v, self.flash.supply_v) = (volts, volts);
+    }
+
+    /// Reads bytes of the flash.
     pub fn load_flash(&mut self, offset: u32, size: usize) -> u32 {
         self.flash.load(offset, size, &mut Access { now: self.now, findings: &mut self.findings })
     }
 
-    /// Programs the flash from sector 4 on.
+    /// Programs the flash.
     pub fn program_flash(&mut self, offset: u32, size: usize, value: u32) {
         self.flash.store(offset, size, value, &mut Access { now: self.now, findings: &mut self.findings });
     }

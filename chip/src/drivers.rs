@@ -13,6 +13,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use scarab::bus::Frame;
+use scarab_boot::Region;
 use scarab_host::base::error::ToolError;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_host::image::build::{firmware_build, run, target_directory};
@@ -38,6 +39,8 @@ const PACKAGE: &str = "--quiet --profile image --package scarab-emulated --bin d
 const IMAGE: &str = "firmware/thumbv7em-none-eabihf/image/drivers";
 const EMULATOR: &str = "qemu-system-arm";
 const MACHINE: &str = "-M netduinoplus2 -display none -serial null -monitor stdio -icount shift=3 -kernel";
+/// Offset of sector 11 in the space of the new image.
+const LAST_SECTOR: usize = 3 * Region::NEW_IMAGE.sector_bytes as usize;
 /// Interval between two polls of the program's step, s.
 const POLL_S: f64 = 1e-5;
 /// Processor clock that the program sets, Hz.
@@ -427,13 +430,13 @@ impl Check {
 
     fn flash(&mut self) -> Result<(), ToolError> {
         self.next(0.1, 0)?;
-        self.machine.chip_mut().flash.parameters_mut()[128 * 1024..].fill(0);
+        self.machine.chip_mut().flash.region_mut(&Region::NEW_IMAGE)[LAST_SECTOR..].fill(0);
         self.next(5.0, 0)?;
         let blank =
-            self.machine.chip_mut().flash.parameters_mut()[128 * 1024..].iter().all(|cell| *cell == 0xFF);
+            self.machine.chip_mut().flash.region_mut(&Region::NEW_IMAGE)[LAST_SECTOR..].iter().all(|cell| *cell == 0xFF);
         self.next(0.1, 0)?;
         let [erase, read, write, outcomes] = self.take();
-        let cells = &self.machine.chip_mut().flash.parameters_mut()[128 * 1024 + 0x40..][..16];
+        let cells = &self.machine.chip_mut().flash.region_mut(&Region::NEW_IMAGE)[LAST_SECTOR + 0x40..][..16];
         let words: Vec<u32> = cells
             .chunks_exact(4)
             .map(|cell| u32::from_le_bytes([cell[0], cell[1], cell[2], cell[3]]))

@@ -6,13 +6,8 @@ use std::rc::Rc;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile32, FileHeader, ProgramHeader};
 use object::{Endianness, Object, ObjectSymbol, SymbolKind};
-use scarab_boot::Region;
+use scarab_boot::{FLASH, FLASH_BYTES, Region};
 use scarab_host::base::error::{FileError, ToolError};
-
-/// Address of the flash, and the size that an image may have; sectors 10 and 11 follow.
-pub const FLASH: u32 = 0x0800_0000;
-/// Size of the flash without the sectors for stored data.
-pub const FLASH_BYTES: usize = 768 * 1024;
 
 /// Name of the bootloader's file.
 const BOOTLOADER: &str = "scarab-boot";
@@ -68,7 +63,7 @@ impl Image {
     /// # Errors
     /// Names the missing part.
     pub fn parse(elf: Vec<u8>) -> Result<Self, String> {
-        let mut flash = vec![0xFF; FLASH_BYTES];
+        let mut flash = vec![0xFF; FLASH_BYTES as usize];
         let (mut functions, mut objects) = (Vec::new(), Vec::new());
         {
             let header = FileHeader32::<Endianness>::parse(&*elf).map_err(|error| error.to_string())?;
@@ -105,7 +100,7 @@ impl Image {
     /// An image without names, from its first bytes.
     #[must_use]
     pub fn of_bytes(bytes: &[u8]) -> Self {
-        let mut flash = vec![0xFF; FLASH_BYTES];
+        let mut flash = vec![0xFF; FLASH_BYTES as usize];
         flash[..bytes.len()].copy_from_slice(bytes);
         Self { elf: Vec::new(), flash, functions: Vec::new(), objects: Vec::new() }
     }

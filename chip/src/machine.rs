@@ -17,16 +17,15 @@ mod changes;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use scarab_boot::Region;
+use scarab_boot::{FLASH, FLASH_BYTES, Region};
 use scarab_host::base::error::ToolError;
 use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode, Prot};
 use unicorn_engine::{ArmCpuModel, RegisterARM as Register, UcHookId, Unicorn};
 
 use crate::chip::Chip;
-use crate::image::{FLASH, FLASH_BYTES, Image};
+use crate::image::Image;
 use crate::nvic::{HARD_FAULT, NMI, SUPERVISOR_CALL};
 use crate::peripherals::debug::{SYSTEM_BYTES, SYSTEM_MEMORY, system_memory};
-use crate::peripherals::flash;
 use crate::peripherals::rcc::ResetReason;
 use crate::system::{PRIVATE, fault};
 use crate::time::{NEVER, Ticks};
@@ -114,8 +113,8 @@ impl Snapshot {
     }
 }
 
-/// Bytes of the sectors that nothing changes: 0 to 3.
-const FIXED_BYTES: usize = (Region::STATE.address - FLASH) as usize;
+/// Bytes of the bootloader, which nothing changes.
+const FIXED_BYTES: usize = Region::BOOTLOADER.bytes() as usize;
 
 /// The microcontroller on its board.
 pub struct Machine {
@@ -399,7 +398,7 @@ impl State {
         Self {
             chip,
             image,
-            blocks: vec![(0, 0); FLASH_BYTES / 2],
+            blocks: vec![(0, 0); FLASH_BYTES as usize / 2],
             cost: 0,
             rest: 0,
             cycle: 0,
@@ -478,8 +477,8 @@ fn put(core: &mut Core<'_>, register: Register, value: u32) {
 
 fn map_memory(core: &mut Core<'_>, options: &Options) -> Result<(), unicorn_engine::uc_error> {
     let image = Rc::clone(&core.get_data().image);
-    // Sectors 4 and 7 to 11 hold data only; `map_registers` maps them. Sectors 0 to 3 appear at address 0
-    // too.
+    // All sectors but the bootloader's and the image's hold data only; `map_registers` maps them. The bootloader
+    // appears at address 0 too.
     for address in [FLASH, 0] {
         core.mem_map(address.into(), FIXED_BYTES as u64, Prot::READ | Prot::EXEC)?;
         core.mem_write(address.into(), &image.flash[..FIXED_BYTES])?;
@@ -487,7 +486,7 @@ fn map_memory(core: &mut Core<'_>, options: &Options) -> Result<(), unicorn_engi
     let (address, bytes) = (Region::IMAGE.address, Region::IMAGE.bytes());
     core.mem_map(address.into(), bytes.into(), Prot::ALL)?;
     let flash = &mut core.get_data_mut().chip.flash;
-    for region in [Region::STATE, Region::IMAGE, Region::NEW_IMAGE] {
+    for region in [Region::STATE, Region::PARAMETERS, Region::LOG, Region::IMAGE, Region::NEW_IMAGE] {
         let at = (region.address - FLASH) as usize;
         flash.region_mut(&region).copy_from_slice(&image.flash[at..at + region.bytes() as usize]);
     }
@@ -527,8 +526,8 @@ fn map_registers(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
             core.get_data_mut().chip.write_private(offset as u32, size, value as u32);
         }),
     )?;
-    changes::map_data(core, Region::STATE.address, Region::STATE.bytes())?;
-    changes::map_data(core, Region::NEW_IMAGE.address, Region::NEW_IMAGE.bytes() + Region::PARAMETERS.bytes())
+    let data = [Region::STATE, Region::PARAMETERS, Region::LOG, Region::NEW_IMAGE];
+    data.iter().try_for_each(|region| changes::map_data(core, region))
 }
 
 fn add_hooks(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {

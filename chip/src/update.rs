@@ -27,7 +27,7 @@ const STATUS: u16 = 0x1F57;
 /// Node through which the image comes.
 const NODE: u16 = 1;
 /// Longest answer while sectors are erased, s.
-const ERASED_S: f64 = 6.0;
+const ERASED_S: f64 = 8.0;
 /// Longest start that swaps both images and swaps them back, s.
 const SWAPPED_S: f64 = 90.0;
 /// Word that requests a swap, as `embassy-boot` writes it.
@@ -332,7 +332,7 @@ impl Bench<'_> {
             ("nothing arrived", Box::new(|image| image.fill(0xFF)), ProgramError::NoProgram),
             ("no magic word", Box::new(flip(header)), ProgramError::NoProgram),
             ("image of another board", Box::new(flip(header + 4)), ProgramError::Format),
-            ("length beyond the sectors", Box::new(resealed(header + 8, 0x4_0004)), ProgramError::Format),
+            ("length beyond the sectors", Box::new(resealed(header + 8, Region::IMAGE.bytes() + 4)), ProgramError::Format),
             ("length not in words", Box::new(resealed(header + 8, 1001)), ProgramError::Format),
             ("length too short", Box::new(resealed(header + 8, 1000)), ProgramError::Checksum),
             ("not sealed", Box::new(resealed(header + 8, u32::MAX)), ProgramError::Format),

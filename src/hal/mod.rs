@@ -183,9 +183,11 @@ pub trait Hardware<const N: usize> {
     /// Aborts the transmission of every frame that waits.
     fn abort_transmission(&mut self);
 
+    /// Whether the processor's supply is too low to change the flash.
+    fn processor_supply_is_low(&self) -> bool;
     /// Restarts the watchdog's count.
     fn feed_watchdog(&mut self);
-    /// Requests the watchdog time for a flash write; returns whether it applies now.
+    /// Requests the watchdog's time for a flash write; returns whether it applies now.
     fn stretch_watchdog(&mut self) -> bool;
     /// Requests the watchdog's normal time; returns whether it applies now.
     fn tighten_watchdog(&mut self) -> bool;

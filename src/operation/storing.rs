@@ -1,16 +1,17 @@
 //! Sequence of a flash write, at thread level.
 //!
-//! The flash has one bank, so writing or erasing stalls every level, for up to two seconds per sector.
-//! Therefore this order:
+//! The flash has one bank, so writing or erasing stalls every level: up to 0.5 s for a sector of stored
+//! parameters, 2 s for one of a new image. Therefore this order:
 //!
 //! ```text
-//! refused         unless the drive is off and no inhibit reason forbids it ([`Purpose`])
+//! refused         unless the drive is off and no inhibit reason forbids it ([`Purpose`]); with a supply of the
+//!                processor that is too low this is an inhibit reason itself
 //! interlock       `storing`: the next current tick turns both bridges off, the servo keeps its drive off, a
 //!                calibration ends
 //! hosts           an emergency message (FF0D) announces a pause of the heartbeats; 20 ms to send it
-//! refused         unless the drive is still off: it may have been enabled between the first check and the
-//!                interlock
-//! watchdog        8 s instead of 16 ms, read back; refused if it does not take them
+//! refused         unless the same still holds: the drive may have been enabled between the first check and
+//!                the interlock
+//! watchdog        4 s instead of 16 ms, read back; refused if it does not take them
 //! flash           written; the write itself checks the bridges' and the brake resistor's registers
 //! watchdog        16 ms, read back; the drive stays off until the watchdog takes them
 //! interlock       cleared a millisecond later, when both current loops have ticked again
@@ -102,6 +103,11 @@ impl Storing {
     ) -> Option<bool> {
         let others = inhibit.causes() & !InhibitReason::Storing.bit();
         let is_permitted = permission == Permission::Off && purpose.permits(others);
+        let is_low = is_permitted && hardware.processor_supply_is_low();
+        if is_low && matches!(self.stage, Stage::Idle | Stage::Announced(0)) {
+            inhibit.raise(InhibitReason::ProcessorSupply);
+        }
+        let is_permitted = is_permitted && !is_low;
         self.stage = match self.stage {
             Stage::Idle if self.loose || !is_permitted => return Some(false),
             Stage::Idle => {

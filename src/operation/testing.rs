@@ -160,6 +160,7 @@ pub(super) struct TestHardware<const N: usize> {
     pub can: TestCan,
     pub reception: Option<RefCell<Reception>>,
     pub watchdog: TestWatchdog,
+    pub processor_supply_is_low: bool,
     pub stop: Option<Stop<N>>,
     /// Accesses that a tick makes, counted for [`Stop`].
     pub accesses: u32,
@@ -200,6 +201,7 @@ impl<const N: usize> TestHardware<N> {
             can,
             reception: None,
             watchdog: TestWatchdog { takes_ms: Some(48), ..TestWatchdog::default() },
+            processor_supply_is_low: false,
             stop: None,
             accesses: 0,
             masked: false,
@@ -348,6 +350,9 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     fn abort_transmission(&mut self) {
         self.can.aborted += 1;
         self.can.waiting.clear();
+    }
+    fn processor_supply_is_low(&self) -> bool {
+        self.processor_supply_is_low
     }
     fn feed_watchdog(&mut self) {
         self.watchdog.fed += 1;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Stop     interlock and watchdog as for a save (`Storing`); both stay until the end
-//! Clear    two sectors, one per step; each stalls the processor for 1 to 2 s
+//! Clear    three sectors, one per step; each stalls the processor for 1 to 2 s
 //! bytes    written word by word, 16 us each; between two words every level runs
 //! Start    header, length and check sum from the flash; then the swap is requested and the board restarts
 //! Start    with nothing written: the present program resumes

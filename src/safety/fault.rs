@@ -107,6 +107,8 @@ faults! {
     /// Bus voltage out of range, two ticks in a row or too often in a short time (3200: voltage inside the
     /// device).
     BusVoltage = 0x3200, "V1", "bus_voltage", Off, "the bus voltage left its range";
+    /// The processor's supply was too low for a flash write (5110: low voltage supply).
+    ProcessorSupply = 0x5110, "F3", "processor_supply", Refuse, "the processor's supply was too low to write the flash";
     /// The supply fails while energy is left (3220: DC link undervoltage).
     SupplyLost = 0x3220, "V2", "supply_lost", Damp, "its supply went away";
     /// More current from the supply than its limit, by the estimate.
@@ -236,6 +238,7 @@ mod tests {
             (FaultCode::GateFault, 0x5410),
             (FaultCode::GateConfiguration, 0x5400),
             (FaultCode::BusVoltage, 0x3200),
+            (FaultCode::ProcessorSupply, 0x5110),
             (FaultCode::SupplyLost, 0x3220),
             (FaultCode::SupplyCurrent, 0xFF10),
             (FaultCode::ChargeCurrent, 0xFF11),

@@ -90,11 +90,13 @@ pub enum InhibitReason {
     Storing,
     /// Too much current into the supply: both axes brake.
     ChargeCurrent,
+    /// The processor's supply was too low for a flash write.
+    ProcessorSupply,
 }
 
 impl InhibitReason {
     /// All reasons, in the order of their bits.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::EmergencyStop,
         Self::GateFault,
         Self::GateConfiguration,
@@ -112,6 +114,7 @@ impl InhibitReason {
         Self::Configuration,
         Self::Storing,
         Self::ChargeCurrent,
+        Self::ProcessorSupply,
     ];
 
     /// Fault that corresponds to the reason. `None` for an axis, which reports its own fault, and for
@@ -134,6 +137,7 @@ impl InhibitReason {
             Self::BoardVersion => FaultCode::BoardVersion,
             Self::Configuration => FaultCode::Configuration,
             Self::ChargeCurrent => FaultCode::ChargeCurrent,
+            Self::ProcessorSupply => FaultCode::ProcessorSupply,
         })
     }
 

@@ -237,7 +237,8 @@ fn take_model(control: &mut Control<JOINTS>, key: Key, restored: &storage::Resto
 fn introduction(board: &Board) -> Introduction {
     let identity = &board.identity;
     let crash = board.crash.map(crashed);
-    Introduction { unique: identity.unique, version: identity.version, reset: identity.reset.name(), crash }
+    let Identity { unique, version, reset, brown_out } = *identity;
+    Introduction { unique, version, brown_out, reset: reset.name(), crash }
 }
 
 /// Raises the inhibit reasons that the start found.

@@ -62,6 +62,8 @@ pub struct Introduction {
     pub unique: [u32; 3],
     /// Factory version: major, minor, voltage; 255 where nothing was written.
     pub version: [u8; 3],
+    /// Brown-out reset level, 0 (off) to 3.
+    pub brown_out: u8,
     /// Reason of the last reset, as in records.
     pub reset: &'static str,
     /// Crash that ended the previous run.
@@ -98,7 +100,7 @@ struct State {
 
 /// Sends the records of the start.
 pub fn introduce(introduction: &Introduction, clock_hz: u32) {
-    let Introduction { unique, version, reset, crash } = introduction;
+    let Introduction { unique, version, brown_out, reset, crash } = introduction;
     let ([uid0, uid1, uid2], [version, version_minor, version_volt]) = (*unique, *version);
     send(&Record::Boot {
         grammar: GRAMMAR,
@@ -110,7 +112,7 @@ pub fn introduce(introduction: &Introduction, clock_hz: u32) {
         log_hz: LOG_RATE_HZ,
         reset,
     });
-    send(&Record::Board { uid0, uid1, uid2, version, version_minor, version_volt, clock_hz });
+    send(&Record::Board { uid0, uid1, uid2, version, version_minor, version_volt, clock_hz, brown_out: *brown_out });
     if let Some(crash) = crash {
         send(crash);
     }

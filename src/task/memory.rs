@@ -9,7 +9,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 use super::bus;
 use super::leg::{JOINTS, LEG, Leg, LegIdentification, LegWindow};
 use super::storage::StorageTask;
-use crate::board::odrive_v3_6::flash::LargeSectors;
+use crate::board::odrive_v3_6::flash::SmallSectors;
 use crate::leg::Filters;
 use crate::operation::EventQueue;
 use scarab_boot::Region;
@@ -60,5 +60,5 @@ pub fn bus() -> &'static mut bus::Memory {
 #[inline(never)]
 pub fn storage() -> Option<&'static mut StorageTask> {
     static STORAGE: StaticCell<StorageTask> = StaticCell::new();
-    Some(STORAGE.init(StorageTask::new(LargeSectors::parameters(), Region::PARAMETERS.bytes())?))
+    Some(STORAGE.init(StorageTask::new(SmallSectors::parameters(), Region::PARAMETERS.bytes())?))
 }

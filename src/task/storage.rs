@@ -13,7 +13,7 @@ use heapless::spsc::Consumer;
 use super::SIGNALS;
 use super::bus::StorageEnd;
 use super::leg::{JOINTS, Leg};
-use crate::board::odrive_v3_6::flash::{LargeSectors, at_once};
+use crate::board::odrive_v3_6::flash::{SmallSectors, at_once};
 use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::board::odrive_v3_6::program::BoardProgram;
 use crate::bus::device::StoreCommand;
@@ -40,7 +40,7 @@ pub struct RestoredModel {
 
 /// The store and the ends of its queues.
 pub struct StorageTask {
-    storage: store::Storage<LargeSectors, JOINTS>,
+    storage: store::Storage<SmallSectors, JOINTS>,
     storing: Storing,
     program: BoardProgram,
     update: Update,
@@ -50,7 +50,7 @@ pub struct StorageTask {
 impl StorageTask {
     /// Creates the storage on this flash; `None` where its size is invalid, which no board of this kind has.
     #[must_use]
-    pub fn new(flash: LargeSectors, bytes: u32) -> Option<Self> {
+    pub fn new(flash: SmallSectors, bytes: u32) -> Option<Self> {
         let store = Store::new(flash, 0..bytes).ok()?;
         let program = BoardProgram::new();
         let update = Update::new(program.is_on_trial());
@@ -97,7 +97,7 @@ impl StorageTask {
 
 /// Stores or resets; returns `None` on failure.
 #[inline(never)]
-fn change(storage: &mut store::Storage<LargeSectors, JOINTS>, job: &mut StoreJob<JOINTS>) -> Option<()> {
+fn change(storage: &mut store::Storage<SmallSectors, JOINTS>, job: &mut StoreJob<JOINTS>) -> Option<()> {
     let permit = Permit::under(SIGNALS.permission())?;
     job.generation = match job.what {
         StoreCommand::Defaults => {

@@ -37,7 +37,7 @@ macro_rules! trace_records {
         reset: &'static str,
     }
     /// Board identity and clock; all zero in the emulator.
-    Board "board n={=u32} uid0={=u32:#x} uid1={=u32:#x} uid2={=u32:#x} version={=u8} version_minor={=u8} version_volt={=u8} clock_hz={=u32}" {
+    Board "board n={=u32} uid0={=u32:#x} uid1={=u32:#x} uid2={=u32:#x} version={=u8} version_minor={=u8} version_volt={=u8} clock_hz={=u32} brown_out={=u8}" {
         /// Lowest word of the chip's unique number.
         uid0: u32,
         /// Middle word of the unique number.
@@ -52,6 +52,9 @@ macro_rules! trace_records {
         version_volt: u8,
         /// Clock of the processor.
         clock_hz: u32,
+    } + {
+        /// Brown-out reset level, 0 (off) to 3.
+        brown_out: u8,
     }
     /// End of the previous image. The drive stays refused until its fault is reset.
     Crash "crash n={=u32} cause={=str} pc={=u32:#x} lr={=u32:#x} status={=u32:#x} address={=u32:#x} line={=u32} file={=str} released={=u32} kept={=u32}" {

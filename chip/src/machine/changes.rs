@@ -4,15 +4,11 @@
 use super::*;
 
 /// Maps sectors of the flash from which nothing is executed.
-pub(super) fn map_data(
-    core: &mut Core<'_>,
-    address: u32,
-    bytes: u32,
-) -> Result<(), unicorn_engine::uc_error> {
-    let first = address - flash::FIRST;
+pub(super) fn map_data(core: &mut Core<'_>, region: &Region) -> Result<(), unicorn_engine::uc_error> {
+    let first = region.address - FLASH;
     core.mmio_map(
-        address.into(),
-        bytes.into(),
+        region.address.into(),
+        region.bytes().into(),
         Some(move |core: &mut Core<'_>, offset: u64, size: usize| {
             u64::from(core.get_data_mut().chip.load_flash(first + offset as u32, size))
         }),
@@ -34,7 +30,7 @@ pub(super) fn hook(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> 
         u64::from(first + bytes) - 1,
         |core, _, address, size, value| {
             let state = core.get_data_mut();
-            let offset = address as u32 - flash::FIRST;
+            let offset = address as u32 - FLASH;
             state.chip.program_flash(offset, size, value as u32);
             let at = (address as u32 - Region::IMAGE.address) as usize;
             let changed = state.chip.flash.changed.get_or_insert(at..at + size);

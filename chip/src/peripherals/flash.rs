@@ -1,28 +1,34 @@
-//! Flash interface, and sectors 4 to 11: all but the bootloader's (RM0090 3.5 to 3.9; times DS8626 table 42).
+//! Flash interface and cells (RM0090 3.5 to 3.9; times DS8626 table 42).
 //!
 //! Programming clears bits of one word, erasing sets those of a sector. Both need the keys, the right mode
 //! and a width that matches PSIZE; otherwise an error flag rises and nothing changes. While an operation runs
 //! the single bank cannot be read: the processor stalls, timers and converters go on. Power can be cut within
-//! any operation: a word is then a random mix of old and new, a sector reads as noise.
+//! any operation: a word is then a random mix of old and new, a sector reads as noise. Words of 32 bits need a
+//! supply of 2.7 V. The bootloader's sector cannot be changed.
 //!
-//! Known limits: contents of the caches are not modelled, except that reading a sector that was erased while
-//! the data cache was on and not reset since is a finding; the image's own sectors are not checked for it.
+//! Known limits: the brown-out reset has a level but does not act. Contents of the caches are not modelled,
+//! except that reading a sector that was erased while the data cache was on and not reset since is a finding;
+//! the image's own sectors are not checked for it.
 
 use core::ops::Range;
 
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab_boot::Region;
+use scarab_boot::{FLASH_BYTES, FLASH, Region};
 
 use crate::findings::{Access, NO_REGISTER};
 use crate::time::{TICK_HZ, Ticks};
 
-/// Address of sector 4, the first that the model can change.
-pub const FIRST: u32 = Region::STATE.address;
-/// Regions that the model can change, in the order of their addresses.
-const REGIONS: [Region; 4] = [Region::STATE, Region::IMAGE, Region::NEW_IMAGE, Region::PARAMETERS];
-/// Sectors of all regions.
-const SECTORS: usize = 8;
+/// Number of sectors.
+const SECTORS: usize = 12;
+const OPTION_KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
+/// Option control register of a chip as delivered: locked, brown-out reset off. Its lock, start and level.
+const OPTIONS: u32 = 0x0FFF_AAED;
+const OPTIONS_LOCKED: u32 = 1;
+const OPTIONS_START: u32 = 1 << 1;
+const OPTIONS_LEVEL: u32 = 0b11 << 2;
+/// Least supply for words of 32 bits, V.
+const WORDS_V: f64 = 2.7;
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 const LOCKED: u32 = 1 << 31;
@@ -35,10 +41,11 @@ const PARALLELISM: u32 = 1 << 6;
 const ALIGNMENT: u32 = 1 << 5;
 const PROTECTED: u32 = 1 << 4;
 
-/// Typical durations of a word, and of a sector of 64 and 128 KB by the width that is programmed at once
+/// Typical durations of a word, and of a sector of 16, 64 and 128 KB by the width that is programmed at once
 /// (PSIZE).
 const WORD: Ticks = 16 * TICK_HZ / 1_000_000;
-const SMALL: [Ticks; 4] = [12 * TICK_HZ / 10, 7 * TICK_HZ / 10, 55 * TICK_HZ / 100, 55 * TICK_HZ / 100];
+const SMALL: [Ticks; 4] = [TICK_HZ * 4 / 10, TICK_HZ * 3 / 10, TICK_HZ / 4, TICK_HZ / 4];
+const MIDDLE: [Ticks; 4] = [12 * TICK_HZ / 10, 7 * TICK_HZ / 10, 55 * TICK_HZ / 100, 55 * TICK_HZ / 100];
 const LARGE: [Ticks; 4] = [2 * TICK_HZ, 13 * TICK_HZ / 10, TICK_HZ, TICK_HZ];
 
 /// Power cut within a later operation.
@@ -64,6 +71,11 @@ pub struct Flash {
     stale: [bool; SECTORS],
     /// Time for which the processor stalls.
     pub stall: Ticks,
+    /// Supply of the processor, V.
+    pub supply_v: f64,
+    /// Option control register; only its level can change.
+    options: u32,
+    option_keys: [u32; 2],
     /// Duration of an erasure relative to a typical one: up to 2 (DS8626 table 42).
     pub slowness: f64,
     /// Words programmed and sectors erased so far.
@@ -89,9 +101,12 @@ impl Flash {
             control: LOCKED,
             keys: [0; 2],
             refused: false,
-            cells: vec![0xFF; REGIONS.iter().map(|region| region.bytes() as usize).sum()],
+            cells: vec![0xFF; FLASH_BYTES as usize],
             stale: [false; SECTORS],
             stall: 0,
+            supply_v: 3.3,
+            options: OPTIONS,
+            option_keys: [0; 2],
             slowness: 1.0,
             words: 0,
             erasures: 0,
@@ -106,6 +121,7 @@ impl Flash {
     pub fn reset(&mut self) {
         (self.access, self.status, self.control, self.refused) = (0, 0, LOCKED, false);
         (self.stale, self.stall, self.is_cut) = ([false; SECTORS], 0, false);
+        self.options |= OPTIONS_LOCKED;
     }
 
     /// Bytes of the stored parameters.
@@ -137,7 +153,7 @@ impl Flash {
             0x00 => self.access,
             0x0C => self.status,
             0x10 => self.control,
-            0x14 => 0x0FFF_AAED,
+            0x14 => self.options,
             0x04 | 0x08 => 0,
             _ => {
                 access.refuse(NO_REGISTER, format!("FLASH+{offset:#x}"));
@@ -153,8 +169,27 @@ impl Flash {
             0x04 => self.write_key(value, access),
             0x0C => self.status &= !(access.implemented(value, 0xF3, "FLASH_SR") & 0xF3),
             0x10 => self.write_control(value, access),
-            0x08 | 0x14 => access.refuse("option bytes written", format!("FLASH+{offset:#x}")),
+            0x08 => {
+                self.option_keys = [self.option_keys[1], value];
+                if self.option_keys == OPTION_KEYS {
+                    self.options &= !OPTIONS_LOCKED;
+                }
+            }
+            0x14 => self.write_options(value, access),
             _ => access.refuse(NO_REGISTER, format!("FLASH+{offset:#x}")),
+        }
+    }
+
+    fn write_options(&mut self, value: u32, access: &mut Access<'_>) {
+        if self.options & OPTIONS_LOCKED != 0 {
+            return access.refuse("option bytes written while locked", "FLASH_OPTCR");
+        }
+        if (value ^ self.options) & !(OPTIONS_LOCKED | OPTIONS_START | OPTIONS_LEVEL) != 0 {
+            return access.refuse("option bytes other than the brown-out level changed", "FLASH_OPTCR");
+        }
+        self.options = value & !OPTIONS_START;
+        if value & OPTIONS_START != 0 {
+            self.stall += SMALL[2];
         }
     }
 
@@ -202,12 +237,20 @@ impl Flash {
             return access.refuse("start without a sector erase", "FLASH_CR");
         }
         let number = value >> 3 & 0xF;
-        match REGIONS.iter().find(|region| number.wrapping_sub(region.sector) < region.sectors) {
+        self.check_supply(access);
+        match Region::ALL[1..].iter().find(|region| number.wrapping_sub(region.sector) < region.sectors) {
             Some(region) => self.erase(region, number),
             None => {
                 self.status |= PROTECTED;
                 access.refuse("erase of a sector of the bootloader", "FLASH_CR");
             }
+        }
+    }
+
+    /// Words of 32 bits need a supply of 2.7 V (DS8626 table 16).
+    fn check_supply(&self, access: &mut Access<'_>) {
+        if self.supply_v < WORDS_V && self.control >> 8 & 3 >= 2 {
+            access.refuse("flash changed by words at a supply below 2.7 V", "FLASH_CR");
         }
     }
 
@@ -218,7 +261,11 @@ impl Flash {
         let cells = &mut self.cells[first..first + bytes];
         self.erasures += 1;
         self.stale[sector_of(first)] = self.access & 1 << 10 != 0;
-        let durations = if *region == Region::STATE { SMALL } else { LARGE };
+        let durations = match region.sector_bytes >> 10 {
+            16 => SMALL,
+            64 => MIDDLE,
+            _ => LARGE,
+        };
         self.stall += (durations[(self.control >> 8 & 3) as usize] as f64 * self.slowness) as Ticks;
         if let Some(Cut::Erasure(left @ 1.., _)) = &mut self.cut {
             *left -= 1;
@@ -269,6 +316,7 @@ impl Flash {
         }
         let range = offset as usize..offset as usize + size;
         self.note(range.clone());
+        self.check_supply(access);
         let Some(cells) = self.cells.get_mut(range) else { return };
         self.words += 1;
         self.stall += WORD;
@@ -298,14 +346,14 @@ impl Flash {
 
 /// Place of a region's bytes.
 const fn range(region: &Region) -> Range<usize> {
-    let first = (region.address - FIRST) as usize;
+    let first = (region.address - FLASH) as usize;
     first..first + region.bytes() as usize
 }
 
-/// Number of the sector at an offset, from sector 4.
-const fn sector_of(offset: usize) -> usize {
-    let small = Region::STATE.bytes() as usize;
-    if offset < small { 0 } else { 1 + (offset - small) / Region::IMAGE.sector_bytes as usize }
+/// Number of the sector at an offset.
+fn sector_of(offset: usize) -> usize {
+    let region = Region::ALL.into_iter().rfind(|region| range(region).start <= offset).unwrap_or(Region::BOOTLOADER);
+    region.sector as usize + (offset - range(&region).start) / region.sector_bytes as usize
 }
 
 #[cfg(test)]
@@ -372,11 +420,11 @@ mod tests {
     }
 
     #[test]
-    fn an_erase_sets_one_sector_and_stalls_one_or_two_seconds() {
+    fn an_erase_sets_one_sector_and_stalls_by_its_size_and_width() {
         let mut bench = Bench::new();
         bench.flash.cells.fill(0);
         bench.unlock();
-        let (tenth, eleventh) = (0x080C_0000 - FIRST, 0x080E_0000 - FIRST);
+        let (tenth, eleventh) = (0x080C_0000 - FLASH, 0x080E_0000 - FLASH);
         bench.write(0x10, ERASE | 2 << 8 | 11 << 3);
         bench.write(0x10, ERASE | 2 << 8 | 11 << 3 | START);
         assert_eq!((bench.load(tenth), bench.load(eleventh)), (0, u32::MAX));
@@ -384,14 +432,42 @@ mod tests {
         bench.write(0x10, ERASE | 11 << 3 | START);
         assert_eq!(bench.flash.stall, 3 * TICK_HZ);
         assert_eq!(bench.flash.changed, None);
-        bench.write(0x10, ERASE | 2 << 8 | 4 << 3 | START);
-        assert_eq!((bench.load(0), bench.load(0x1_0000)), (u32::MAX, 0));
-        assert_eq!(bench.flash.stall, 3 * TICK_HZ + SMALL[2]);
+        for (sector, duration) in [(1, SMALL[2]), (2, SMALL[2]), (4, MIDDLE[2])] {
+            let (stall, region) = (bench.flash.stall, Region::ALL[1..4].iter().find(|one| one.sector == sector));
+            let offset = region.expect("a region").address - FLASH;
+            bench.write(0x10, ERASE | 2 << 8 | sector << 3 | START);
+            assert_eq!((bench.load(offset), bench.flash.stall), (u32::MAX, stall + duration));
+        }
         bench.write(0x10, ERASE | 2 << 8 | 6 << 3 | START);
         assert_eq!(bench.flash.changed, Some(0x2_0000..0x4_0000));
         assert!(!bench.findings.has("erase of a sector of the bootloader"));
-        bench.write(0x10, ERASE | 2 << 8 | 3 << 3 | START);
-        assert!(bench.findings.has("erase of a sector of the bootloader"));
+        bench.write(0x10, ERASE | 2 << 8 | START);
+        assert!(bench.findings.has("erase of a sector of the bootloader") && bench.load(0) == 0);
+    }
+
+    #[test]
+    fn the_brown_out_level_changes_with_its_keys_only() {
+        let mut bench = Bench::new();
+        bench.write(0x14, 0x0FFF_AAE0);
+        assert!(bench.findings.has("option bytes written while locked") && bench.flash.options == OPTIONS);
+        OPTION_KEYS.into_iter().for_each(|key| bench.write(8, key));
+        bench.write(0x14, 0x0FFF_AAE0);
+        bench.write(0x14, 0x0FFF_AAE2);
+        assert_eq!((bench.flash.options, bench.flash.stall), (0x0FFF_AAE0, SMALL[2]));
+        bench.write(0x14, 0x0FFF_55E0);
+        assert!(bench.findings.has("option bytes other than the brown-out level changed"));
+    }
+
+    #[test]
+    fn words_below_2_7_v_are_a_finding() {
+        let mut bench = Bench::new();
+        bench.flash.supply_v = 2.6;
+        bench.unlock();
+        bench.write(0x10, ERASE | 1 << 8 | 11 << 3 | START);
+        assert!(bench.findings.is_empty());
+        bench.write(0x10, PROGRAM | 2 << 8);
+        bench.store(8, 4, 0);
+        assert!(bench.findings.has("flash changed by words at a supply below 2.7 V"));
     }
 
     #[test]
@@ -405,9 +481,10 @@ mod tests {
         bench.store(4, 4, 0);
         assert!(bench.flash.is_cut && bench.load(0) == 0);
         assert!(bench.load(4) != 0 && bench.load(4) != u32::MAX);
-        bench.write(0x10, ERASE | 2 << 8 | 4 << 3);
+        let state = Region::STATE.address - FLASH;
+        bench.write(0x10, ERASE | 2 << 8 | 1 << 3);
         bench.flash.cut = Some(Cut::Erasure(0, 0.5));
-        bench.write(0x10, ERASE | 2 << 8 | 4 << 3 | START);
-        assert!(bench.load(0x100) != u32::MAX && bench.load(0x1_0000) == u32::MAX);
+        bench.write(0x10, ERASE | 2 << 8 | 1 << 3 | START);
+        assert!(bench.load(state + 0x100) != u32::MAX && bench.load(state + 0x4000) == u32::MAX);
     }
 }

@@ -18,6 +18,9 @@ const HSI_HZ: u64 = 16_000_000;
 /// Frequency of the board's crystal, Hz.
 pub const CRYSTAL_HZ: u64 = 8_000_000;
 
+/// Levels of the voltage detector by PLS, V: falling edge, typical (DS8626 table 22).
+const DETECTOR_V: [f64; 8] = [2.04, 2.19, 2.35, 2.51, 2.66, 2.82, 2.92, 3.03];
+
 /// Registers with plain storage: offset, name, implemented bits, value after reset.
 const STORED: [(u32, &str, u32, u32); 15] = [
     (0x10, "RCC_AHB1RSTR", 0x2060_11FF, 0),
@@ -62,6 +65,8 @@ pub struct Rcc {
     backup: u32,
     status: u32,
     power: u32,
+    /// Supply of the processor, V.
+    pub supply_v: f64,
     /// Instants at which crystal, PLL and slow oscillator are ready.
     crystal_ready: Ticks,
     pll_ready: Ticks,
@@ -85,6 +90,7 @@ impl Rcc {
             backup: 0,
             status: 0,
             power: 0x4000,
+            supply_v: 3.3,
             crystal_ready: NEVER,
             pll_ready: NEVER,
             slow_ready: NEVER,
@@ -338,13 +344,18 @@ impl Rcc {
     pub fn read_power(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         match offset {
             0 => self.power,
-            // The regulator's output is ready.
-            4 => 1 << 14,
+            // The regulator's output is ready; the voltage detector.
+            4 => 1 << 14 | u32::from(self.supply_is_low()) << 2,
             _ => {
                 access.refuse(NO_REGISTER, format!("PWR+{offset:#x}"));
                 0
             }
         }
+    }
+
+    /// Whether the voltage detector is on and the supply below its level.
+    fn supply_is_low(&self) -> bool {
+        self.power & 1 << 4 != 0 && self.supply_v < DETECTOR_V[(self.power >> 5 & 7) as usize]
     }
 
     /// Writes a register of the power controller.

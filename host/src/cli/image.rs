@@ -104,6 +104,9 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     if let Some(path) = &arguments.json {
         write_json(path, &size)?;
     }
+    if let Some(warning) = size.warning() {
+        eprintln!("warning: {warning}");
+    }
     let missed = size.missed();
     for goal in &missed {
         eprintln!("too large: {goal}");

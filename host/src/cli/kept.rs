@@ -27,7 +27,7 @@ pub struct KeptArguments {
 enum Way {
     /// Read a board's flash and write its stored data as TOML; exit code 3 if data is damaged.
     Export {
-        /// Flash file of `serve --flash`: 256 KB per board.
+        /// Flash file of `serve --flash`: 32 KB per board.
         flash: Input,
         /// Number of the board in the file, from 1.
         #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]

@@ -23,7 +23,7 @@ use crate::base::error::ToolError;
 use crate::client::adapter::Adapter;
 use crate::formats::slcan;
 
-/// Longest wait for an answer; a board that writes its flash is silent for up to 4 s.
+/// Longest wait for an answer; a board that erases a sector of a new image is silent for up to 2 s.
 const PATIENCE: Duration = Duration::from_secs(6);
 /// Time after which a request is repeated.
 const REPEAT: Duration = Duration::from_secs(1);

@@ -5,12 +5,15 @@ use std::path::Path;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind};
 use serde::Serialize;
 
+use scarab_boot::Region;
+
 use crate::base::error::{FileError, ToolError};
 use crate::base::table::{Table, cells};
 
-/// Flash limit of an image, bytes: a quarter of the chip's. Speed has priority over size
-/// (docs/board.md, section 1).
-pub const FLASH_GOAL: u64 = 256 * 1024;
+/// Flash limit of an image, bytes.
+pub const FLASH_LIMIT: u64 = Region::IMAGE.bytes() as u64;
+/// Share of the limit above which `cargo fw` warns, so that the next change still fits.
+const WARNING: f64 = 0.9;
 /// Memory limit of its variables, bytes: what the stack leaves of 128 KB.
 pub const MEMORY_GOAL: u64 = (128 - 56) * 1024;
 /// Size of the core-coupled memory, bytes.
@@ -122,12 +125,20 @@ impl ImageSize {
     #[must_use]
     pub fn missed(&self) -> Vec<String> {
         let goals = [
-            ("flash", self.flash(), FLASH_GOAL),
+            ("flash", self.flash(), FLASH_LIMIT),
             ("memory", self.memory(), MEMORY_GOAL),
             ("core-coupled memory", self.core_coupled(), CORE_COUPLED),
         ];
         let missed = goals.into_iter().filter(|(_, bytes, goal)| bytes > goal);
         missed.map(|(name, bytes, goal)| format!("{name}: {bytes} bytes, limit {goal}")).collect()
+    }
+
+    /// Warning about little free flash.
+    #[must_use]
+    pub fn warning(&self) -> Option<String> {
+        let share = self.flash() as f64 / FLASH_LIMIT as f64;
+        let free = FLASH_LIMIT.saturating_sub(self.flash());
+        (share > WARNING).then(|| format!("the image fills {:.0} % of its flash: {free} bytes are free", 100.0 * share))
     }
 
     /// Formats the size as tables.
@@ -144,7 +155,7 @@ impl ImageSize {
             ]);
         }
         sections.row(cells!["in all", self.flash(), self.memory(), self.core_coupled()]);
-        sections.row(cells!["at most", FLASH_GOAL, MEMORY_GOAL, CORE_COUPLED]);
+        sections.row(cells!["at most", FLASH_LIMIT, MEMORY_GOAL, CORE_COUPLED]);
         let list = |title: &str, symbols: &[Symbol]| {
             let mut table = Table::default().numbers(["bytes"]).text([title]);
             for symbol in symbols {

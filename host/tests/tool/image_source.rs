@@ -260,8 +260,10 @@ fn an_image_above_a_goal_is_named() {
     let section =
         |flash, memory, core_coupled| Section { name: ".x".into(), bytes: 0, flash, memory, core_coupled };
     let size = |sections| ImageSize { sections, code: Vec::new(), variables: Vec::new(), stack: 0 };
-    assert!(size(vec![section(256 * 1024, 72 * 1024, 64 * 1024)]).missed().is_empty());
-    let missed = size(vec![section(150_000, 70_000, 0), section(120_000, 10_000, 70_000)]).missed();
+    assert!(size(vec![section(384 * 1024, 72 * 1024, 64 * 1024)]).missed().is_empty());
+    let missed = size(vec![section(300_000, 70_000, 0), section(100_000, 10_000, 70_000)]).missed();
     assert_eq!(missed.len(), 3, "{missed:?}");
-    assert!(missed[0].starts_with("flash: 270000 bytes"), "{missed:?}");
+    assert!(missed[0].starts_with("flash: 400000 bytes"), "{missed:?}");
+    let warnings = [353_000, 354_000].map(|bytes| size(vec![section(bytes, 0, 0)]).warning());
+    assert_eq!(warnings.map(|warning| warning.is_some()), [false, true]);
 }

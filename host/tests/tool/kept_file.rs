@@ -344,7 +344,7 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
     // A file of another size is not a flash and stays unchanged.
     fs::write(&flash, [0xFF; 100]).expect("a temporary file");
     let said = import(&folder, &whole, &flash).refusal();
-    assert!(said.contains("100 bytes; the flash of 1 to 4 boards has 262144 each"), "{said}");
+    assert!(said.contains("100 bytes; the flash of 1 to 4 boards has 32768 each"), "{said}");
     assert_eq!(fs::read(&flash).expect("still there"), [0xFF; 100]);
     let said = export(&folder.path("none.bin")).refusal();
     assert!(said.contains("does not exist"), "{said}");

@@ -1,9 +1,9 @@
 //! Flash for persistent data and new images, behind `embedded-storage`'s trait.
 //!
-//! **What a write costs.** The chip has one bank. A write takes 16 us a word (100 at most), an erase 1 s a
-//! sector (2 at most). Every fetch from flash stalls meanwhile: current loops, servo, bus, watchdog. So
-//! nothing is changed unless the registers show both main outputs off and the brake resistor's duty zero. The
-//! caller's word is not enough: a duty would stay on during the stall. `operation::Storing` does the rest: it
+//! **What a write costs.** The chip has one bank. A write takes 16 us a word (100 at most), an erase 0.25 s a
+//! sector of 16 KB (0.5 at most), 1 s one of 128 KB (2 at most). Every fetch from flash stalls meanwhile: current loops, servo, bus, watchdog. So
+//! nothing is changed unless the registers show both main outputs off and the brake resistor's duty zero, and
+//! the voltage detector a supply that words of 32 bits need. The caller's word is not enough: a duty would stay on during the stall. `operation::Storing` does the rest: it
 //! raises the inhibit first, informs hosts and stretches the watchdog.
 //!
 //! An erase stops the executors' timer (TIM5). An overflow missed during the stall would leave the time half
@@ -27,8 +27,8 @@ use super::settings::CLOCK_HZ;
 use super::settings::flash::{ACR, BUSY, CACHE, CR, KEYR, KEYS, LOCK, PROGRAM, SR, START, WRONG};
 use super::{brake, bridge, settings, watchdog};
 
-/// Longest wait, processor cycles: 5 s for an erased sector, 1 ms for a word.
-const ERASED: u32 = 5 * CLOCK_HZ;
+/// Longest wait, processor cycles: 2.5 s for an erased sector, 1 ms for a word.
+const ERASED: u32 = 5 * CLOCK_HZ / 2;
 const WRITTEN: u32 = CLOCK_HZ / 1000;
 /// Control register of the executors' timer, and its enable bit.
 const TIM5_CR1: u32 = 0x4000_0C00;
@@ -43,6 +43,8 @@ pub enum FlashError {
     NotAligned,
     /// A bridge or the brake resistor is on.
     Armed,
+    /// The processor's supply is too low.
+    Supply,
     /// The flash reports an error or does not answer.
     Failed,
 }
@@ -52,7 +54,7 @@ impl NorFlashError for FlashError {
         match self {
             Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
             Self::NotAligned => NorFlashErrorKind::NotAligned,
-            Self::Armed | Self::Failed => NorFlashErrorKind::Other,
+            Self::Armed | Self::Supply | Self::Failed => NorFlashErrorKind::Other,
         }
     }
 }
@@ -71,24 +73,24 @@ pub struct Flash<const SECTOR: usize> {
     region: Region,
 }
 
-/// Stored parameters, or a new image.
-pub type LargeSectors = Flash<{ Region::PARAMETERS.sector_bytes as usize }>;
-/// State of an update.
-pub type SmallSector = Flash<{ Region::STATE.sector_bytes as usize }>;
+/// A new image.
+pub type LargeSectors = Flash<{ Region::NEW_IMAGE.sector_bytes as usize }>;
+/// Stored parameters, or the state of an update.
+pub type SmallSectors = Flash<{ Region::PARAMETERS.sector_bytes as usize }>;
 
 impl LargeSectors {
-    /// Stored parameters, for the owner of the store.
-    pub const fn parameters() -> Self {
-        Self { region: Region::PARAMETERS }
-    }
-
     /// Space of the new image, for the owner of the update.
     pub const fn new_image() -> Self {
         Self { region: Region::NEW_IMAGE }
     }
 }
 
-impl SmallSector {
+impl SmallSectors {
+    /// Stored parameters, for the owner of the store.
+    pub const fn parameters() -> Self {
+        Self { region: Region::PARAMETERS }
+    }
+
     /// State of an update, for its owner.
     pub const fn state() -> Self {
         Self { region: Region::STATE }
@@ -101,11 +103,20 @@ pub fn read(region: &Region, offset: u32, bytes: &mut [u8]) -> Result<(), FlashE
     Ok(())
 }
 
+/// Whether the processor's supply is too low to change the flash.
+pub fn supply_is_low() -> bool {
+    let (register, is_low) = settings::SUPPLY;
+    load(register) & is_low != 0
+}
+
 /// Unlocks the flash for one change and locks it again.
 #[inline(never)]
 fn change(control: u32, patience: u32, address: u32, value: u32) -> Result<(), FlashError> {
     if !bridge::are_disabled() || brake::is_on() {
         return Err(FlashError::Armed);
+    }
+    if supply_is_low() {
+        return Err(FlashError::Supply);
     }
     store(SR, WRONG);
     for key in KEYS {

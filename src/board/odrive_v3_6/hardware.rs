@@ -3,6 +3,7 @@
 use embassy_time::Instant;
 use spin::Mutex;
 
+use super::flash::supply_is_low;
 use super::gate_driver::GateDrivers;
 use super::settings::analog::temperature_c;
 use super::{brake, bridge, can, contacts, converter, encoder, holding_brake, interrupts, status_light, watchdog};
@@ -141,6 +142,10 @@ impl Hardware<2> for Odrive {
 
     fn abort_transmission(&mut self) {
         can::give_up();
+    }
+
+    fn processor_supply_is_low(&self) -> bool {
+        supply_is_low()
     }
 
     fn feed_watchdog(&mut self) {

@@ -3,6 +3,7 @@
 use super::registers::{apply, byte, load};
 use super::settings::RESET_REASONS;
 use super::settings::analog::{BLANK, VERSION_ADDRESS, stated};
+use super::settings::flash::{OPTCR, brown_out_level};
 
 /// Version of a board without a factory entry, as stated when the image was built.
 const STATED: [u8; 3] = stated(option_env!("SCARAB_BOARD_VOLTS"));
@@ -17,6 +18,8 @@ pub struct Identity {
     pub version: [u8; 3],
     /// Reason of the last reset.
     pub reset: Reset,
+    /// Brown-out reset level, 0 (off) to 3.
+    pub brown_out: u8,
 }
 
 /// Reason of a processor reset.
@@ -73,6 +76,6 @@ impl Identity {
         }
         let burnt_in = [0, 1, 2].map(|place| byte(VERSION_ADDRESS + place));
         let version = if burnt_in == [BLANK; 3] { STATED } else { burnt_in };
-        Self { unique, version, reset }
+        Self { unique, version, reset, brown_out: brown_out_level(load(OPTCR)) }
     }
 }

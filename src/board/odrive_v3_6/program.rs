@@ -5,7 +5,7 @@ use embassy_boot::{FirmwareState, State};
 use embedded_storage_async::nor_flash::NorFlash;
 use scarab_boot::{HEADER_AT, HEADER_BYTES, Header, Region};
 
-use super::flash::{LargeSectors, SmallSector, at_once, read};
+use super::flash::{LargeSectors, SmallSectors, at_once, read};
 use super::registers::byte;
 use crate::hal::ProgramMemory;
 
@@ -37,7 +37,7 @@ impl BoardProgram {
     /// Whether the running image is not confirmed: the bootloader has swapped it in.
     pub fn is_on_trial(&self) -> bool {
         let mut word = [0; 4];
-        let state = at_once(FirmwareState::new(SmallSector::state(), &mut word).get_state());
+        let state = at_once(FirmwareState::new(SmallSectors::state(), &mut word).get_state());
         matches!(state, Some(Ok(State::Swap)))
     }
 }
@@ -58,13 +58,13 @@ impl ProgramMemory for BoardProgram {
 
     fn request_swap(&mut self) -> bool {
         let mut word = [0; 4];
-        let mut state = FirmwareState::new(SmallSector::state(), &mut word);
+        let mut state = FirmwareState::new(SmallSectors::state(), &mut word);
         at_once(state.mark_updated()).is_some_and(|done| done.is_ok())
     }
 
     fn confirm(&mut self) -> bool {
         let mut word = [0; 4];
-        let mut state = FirmwareState::new(SmallSector::state(), &mut word);
+        let mut state = FirmwareState::new(SmallSectors::state(), &mut word);
         at_once(state.mark_booted()).is_some_and(|done| done.is_ok())
     }
 

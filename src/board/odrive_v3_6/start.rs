@@ -12,7 +12,8 @@ use super::identity::Identity;
 use super::registers::{apply, load, store};
 use super::settings::timers::{BASES, CNT, CR1, DOWN, SR, TOP};
 use super::settings::{
-    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, converters, external, pins, prepare, timers,
+    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, SUPPLY_DETECTOR, converters, external, pins, prepare,
+    timers,
 };
 use super::{interrupts, watchdog};
 use crate::board::crash::{self, Crash};
@@ -50,7 +51,7 @@ pub fn start() -> Board {
     watchdog::start();
     interrupts::set_levels();
     let peripherals = embassy_stm32::init(configuration());
-    for list in [&CACHES[..], &CLOCK_SECURITY, &DEBUG_FREEZE] {
+    for list in [&CACHES[..], &CLOCK_SECURITY, &DEBUG_FREEZE, &SUPPLY_DETECTOR] {
         apply(list);
     }
     let identity = Identity::read();

@@ -17,11 +17,11 @@ const START: u32 = 0xCCCC;
 /// six cycles of the oscillator behind the divider, 91 ms at the slowest.
 const PATIENCE: u32 = 2_000_000;
 
-/// Starts the watchdog with 4 s: enough for the start and a crystal that does not oscillate.
+/// Starts the watchdog with its long time: enough for the start and a crystal that does not oscillate.
 pub(super) fn start() {
     store(KEY, START);
     // A watchdog that rejects these values runs with half a second, and resets within it.
-    let _ = (0..PATIENCE).any(|_| set(6, 500));
+    let _ = (0..PATIENCE).any(|_| stretch());
 }
 
 /// Sets 16 ms and waits until they apply. Returns whether they do.
@@ -34,10 +34,10 @@ pub fn tighten() -> bool {
     set(0, 127)
 }
 
-/// Requests 8 s (5.4 to 15), longer than the flash may stall. The bridges must be off. Returns whether
-/// they apply, as [`tighten`].
+/// Requests the long time, 4 s (2.7 to 7.5): longer than the erase of a sector, 2 s at most. The bridges must be
+/// off. Returns whether it applies, as [`tighten`].
 pub fn stretch() -> bool {
-    set(6, 1000)
+    set(6, 500)
 }
 
 /// Writes prescaler and reload. While an earlier write is in progress (PVU, RVU) a write is ignored and reads

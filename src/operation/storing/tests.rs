@@ -145,6 +145,34 @@ fn nothing_is_written_while_the_drive_is_on_or_inhibited() {
 }
 
 #[test]
+fn a_low_supply_of_the_processor_inhibits_and_prevents_the_write() {
+    let low = InhibitReason::ProcessorSupply.bit();
+    let mut bench = Bench::off();
+    bench.hardware.processor_supply_is_low = true;
+    assert_eq!(change(&mut settled(), &mut bench), (false, 0));
+    assert_eq!((bench.causes(), bench.storing), (low, Vec::new()));
+    // It falls during the announcement.
+    let (mut storing, mut bench, mut touched) = (settled(), Bench::off(), 0);
+    for _ in 0..1000 {
+        bench.hardware.processor_supply_is_low = bench.now_ms >= 10;
+        let change = || {
+            touched += 1;
+            Some(true)
+        };
+        if let Some(done) = bench.step(&mut storing, change) {
+            assert!(!done);
+            break;
+        }
+        bench.pass();
+    }
+    assert_eq!((touched, bench.causes(), bench.storing), (0, low, std::vec![(0, true), (21, false)]));
+    // A drive that is on is no reason to look at the supply, which would turn it off.
+    let mut bench = Bench { permission: Permission::Follow, ..Bench::off() };
+    bench.hardware.processor_supply_is_low = true;
+    assert_eq!((change(&mut settled(), &mut bench), bench.causes()), ((false, 0), 0));
+}
+
+#[test]
 fn a_drive_enabled_during_the_announcement_prevents_the_write() {
     for later in [(1, Permission::Damp, 0), (20, Permission::Follow, 0), (7, Permission::Off, 1)] {
         let mut bench = Bench { later: Some(later), ..Bench::off() };

@@ -9,7 +9,7 @@
 //! | flash | stall | afterwards |
 //! | --- | --- | --- |
 //! | words only | 16 us for each four bytes | the host enables the leg as before |
-//! | a sector erased | 1 to 2 s more for each | no zeros: enabling requires a new reference |
+//! | a sector erased | 0.25 to 0.5 s more for each | no zeros: enabling requires a new reference |
 //!
 //! Neither is a fault: nothing is reported, and the watchdog does not reset. Hosts receive FF0D before and
 //! 0000 after the write. Hosts that continue to send also receive the loss of frames (8110, 0000). The
@@ -88,7 +88,7 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
             (fork.random.below(2) as usize, fork.random.sign() * fork.random.uniform(0.0, 20.0));
         fork.host.rig().world.push(joint, push, 3.0);
     }
-    let erasing_ns = (fork.random.uniform(1.0, 2.0) * NS_PER_S) as u64;
+    let erasing_ns = (fork.random.uniform(0.25, 0.5) * NS_PER_S) as u64;
     let before = fork.host.board().memory().worked().1;
     let flashing = fork.host.board().flashing();
     (flashing.erasing_ns, flashing.unannounced) = (erasing_ns, blind);

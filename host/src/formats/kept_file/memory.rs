@@ -1,17 +1,18 @@
 //! Persistent memory of a simulated board: `scarab::store` on a simulated flash, optionally saved to a file.
 //!
 //! As on the board, nothing is written unless the drive is off, and a damaged record is reported by name. The
-//! file is an image of the flash: two sectors of 128 KB.
+//! file is an image of the flash: the two sectors of stored parameters.
 
 use embassy_futures::block_on;
 use hal_sim::flash::Flash;
 use scarab::bus::LONGEST;
 use scarab::leg::{DriveState, IdentifiedModel, LegConfiguration};
 use scarab::store::{Key, ModelRecord, Permit, Provenance, Store};
+use scarab_boot::Region;
 
-/// Size and number of the sectors used on the STM32F405.
-pub const SECTOR: usize = 128 * 1024;
-const SECTORS: usize = 2;
+/// Size and number of the sectors on the board.
+pub const SECTOR: usize = Region::PARAMETERS.sector_bytes as usize;
+const SECTORS: usize = Region::PARAMETERS.sectors as usize;
 /// Size of a board's flash.
 pub const BYTES: usize = SECTOR * SECTORS;
 

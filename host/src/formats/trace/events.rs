@@ -133,8 +133,13 @@ pub fn board(board: &Board) -> String {
     } else {
         format!("v{}.{}-{}V", board.version, board.version_minor, board.version_volt)
     };
+    let brown_out = match board.brown_out {
+        None => String::new(),
+        Some(0) => ", brown-out reset off".into(),
+        Some(level) => format!(", brown-out reset level {level}"),
+    };
     format!(
-        "board {:08x}{:08x}{:08x}, {version}, {} MHz",
+        "board {:08x}{:08x}{:08x}, {version}, {} MHz{brown_out}",
         board.uid2,
         board.uid1,
         board.uid0,

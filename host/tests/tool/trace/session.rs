@@ -55,6 +55,7 @@ impl RecordWriter {
             version_minor: 6,
             version_volt: 56,
             clock_hz: 168_000_000,
+            brown_out: 3,
         });
     }
 

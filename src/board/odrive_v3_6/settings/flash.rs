@@ -19,6 +19,17 @@ pub const WRONG: u32 = 1 << 1 | 0b1111 << 4;
 pub const CR: u32 = FLASH + 0x10;
 /// Locked, as after the start.
 pub const LOCK: u32 = 1 << 31;
+/// Option control register, and the lowest bit of its brown-out reset level (BOR_LEV).
+pub const OPTCR: u32 = FLASH + 0x14;
+const BOR_LEV: u32 = 2;
+
+/// Brown-out reset level in a value of the option control register: 3 resets below 2.83 V (typical, DS8626
+/// table 22), 0 is off, as delivered. The bits count the other way.
+#[must_use]
+pub const fn brown_out_level(options: u32) -> u8 {
+    3 - (options >> BOR_LEV & 3) as u8
+}
+
 /// Words of 32 bits (PSIZE), for a supply of 2.7 V and more.
 const WORDS: u32 = 0b10 << 8;
 /// Programming mode (PG): every following store programs a word.

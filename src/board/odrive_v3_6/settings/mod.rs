@@ -16,6 +16,8 @@ pub mod gate_driver;
 pub mod pins;
 pub mod timers;
 
+use scarab_boot::SUPPLY_LEVEL;
+
 /// Write of a register, or of some of its bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Write {
@@ -68,16 +70,17 @@ pub const SLOW_TIMER_HZ: u32 = 84_000_000;
 const RCC: u32 = 0x4002_3800;
 const FLASH: u32 = 0x4002_3C00;
 const DEBUG: u32 = 0xE004_2000;
+const PWR: u32 = 0x4000_7000;
 
 /// Flash prefetch and both caches, which reset and `embassy-stm32` leave off (RM0090 3.9.1:
 /// PRFTEN, ICEN, DCEN).
 pub const CACHES: [Write; 1] = [Write::bits("FLASH_ACR", FLASH, 7 << 8, 7 << 8)];
 
 /// Clock enables of the used peripherals (RM0090 7.3): ports A to D; TIM2, TIM3, TIM4; TIM1, TIM8, ADC1 to
-/// ADC3, SYSCFG.
+/// ADC3, SYSCFG; the power controller.
 pub const CLOCKS: [Write; 3] = [
     Write::bits("RCC_AHB1ENR", RCC + 0x30, 0b1111, 0b1111),
-    Write::bits("RCC_APB1ENR", RCC + 0x40, 0b111, 0b111),
+    Write::bits("RCC_APB1ENR", RCC + 0x40, 1 << 28 | 0b111, 1 << 28 | 0b111),
     Write::bits("RCC_APB2ENR", RCC + 0x44, 0x4703, 0x4703),
 ];
 
@@ -93,6 +96,12 @@ pub const DEBUG_FREEZE: [Write; 2] = [
 /// bridges off. Until then the timers run on, 10.5 times slower. Their break input, which would act in
 /// hardware, needs BKE, and its pins are in use.
 pub const CLOCK_SECURITY: [Write; 1] = [Write::bits("RCC_CR", RCC, 1 << 19, 1 << 19)];
+
+/// Voltage detector of the processor's supply (PWR_CR PVDE, PLS).
+pub const SUPPLY_DETECTOR: [Write; 1] =
+    [Write::bits("PWR_CR", PWR, 0b1111 << 4, (SUPPLY_LEVEL as u32) << 5 | 1 << 4)];
+/// PWR_CSR, and its bit that shows a supply below the detector's level (PVDO).
+pub const SUPPLY: (u32, u32) = (PWR + 0x04, 1 << 2);
 
 /// Clears the interrupt of clock security (RCC_CIR CSSC).
 pub const CLOCK_FAILURE_SEEN: Write = Write::bits("RCC_CIR", RCC + 0x0C, 1 << 23, 1 << 23);
