@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use scarab::leg::{DriveState, Fingerprint};
-use scarab::safety::NoticeCode;
+use scarab::safety::{InhibitReason, NoticeCode};
 use scarab::store::{Key, ModelRecord};
 use scarab_host::base::error::ToolError;
 use scarab_host::base::random::Random;
@@ -22,6 +22,8 @@ const WINDOWS: [u32; 2] = [20_000, 30_000];
 const ANSWER_S: f64 = 0.5;
 /// Number of models accepted so far, in the object dictionary.
 const MODELS: (u16, u8) = (0x2100, 7);
+/// Inhibit reasons.
+const INHIBIT: (u16, u8) = (0x2170, 1);
 /// Ways to corrupt a memory.
 const WAYS: u64 = 6;
 /// Answer to a request that is refused in this state of the drive (CiA 301: 0800 0022).
@@ -137,15 +139,45 @@ pub fn rotten(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErr
 }
 
 /// F3: a request to change the flash while the drive is on is refused and changes nothing; with the drive
-/// off the processor stalls, for up to twice the typical time, and nothing resets it.
+/// off the processor stalls, for up to twice the typical time, and nothing resets it. With a low supply of the
+/// processor it is refused as well, with an inhibit reason.
 pub fn requested(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let mut random = Random::new("F3", seed);
     let request = if random.coin() { SAVE } else { LOAD };
-    if seed.is_multiple_of(2) {
-        armed(machines, request, &mut random)
-    } else {
-        off(machines, request, &mut random)
+    match seed % 3 {
+        0 => armed(machines, request, &mut random),
+        1 => off(machines, request, &mut random),
+        _ => low(machines, request, &mut random),
     }
+}
+
+fn low(
+    machines: &mut Machines<'_>,
+    request: (u16, [u8; 4]),
+    random: &mut Random,
+) -> Result<Verdict, ToolError> {
+    let resting = machines.resting()?;
+    let session = &mut *machines.session;
+    begin(session, &resting, random.below(ticks(10e-3)))?;
+    session.hold_switch(false);
+    session.run(2.0 * DAMP_S)?;
+    let cells = session.machine.chip_mut().flash.parameters_mut().to_vec();
+    for node in [1, 2] {
+        session.write_object(node, OBJECT, 0, WINDOWS[0], ANSWER_S)?;
+    }
+    // Between the supply that words of 32 bits need and the detector's level.
+    session.machine.chip_mut().set_supply(random.uniform(2.7, 2.9));
+    let refused = session.store(request.0, request.1, LONGEST_S);
+    let (index, sub) = INHIBIT;
+    let causes = session.read_object(1, index, sub, ANSWER_S)?;
+    let is_same = session.machine.chip_mut().flash.parameters_mut() == cells;
+    if !matches!(refused, Err(ToolError::Refused(_))) || causes != InhibitReason::ProcessorSupply.bit() || !is_same {
+        return Ok(Err(format!("{refused:?}, inhibit reasons {causes:#x}, flash unchanged {is_same}")));
+    }
+    session.power_up()?;
+    session.run(20e-3)?;
+    session.write_object(1, OBJECT, 0, WINDOWS[0], ANSWER_S)?;
+    Ok(session.store(request.0, request.1, LONGEST_S).map(|()| 0.0).map_err(|error| error.to_string()))
 }
 
 fn armed(

@@ -80,7 +80,7 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
         | Code::ServoTicks
         | Code::Parameters => &["Off"],
         Code::Watchdog | Code::Crash => &["Refuse", "Off"],
-        Code::Timers | Code::BoardVersion | Code::Configuration => &["Refuse"],
+        Code::ProcessorSupply | Code::Timers | Code::BoardVersion | Code::Configuration => &["Refuse"],
     }
 }
 
