@@ -33,6 +33,8 @@ class Session:
         for joint in joints:
             joint.set_up_pdo(0x1401, 0x300 + joint.number, 1, [0x607A0020])
             joint.write(0x6060, 0, CYCLIC_POSITION, "<b")
+            # This host may be slow.
+            joint.write(0x2013, 0, 0, "<B")
 
     def take(self, _, data, when):
         self.places.append(struct.unpack("<ii", data)[0] * MICRO)

@@ -143,6 +143,8 @@ def main():
         joint.write(0x6087, 0, 10_000)
         joint.mode = joint.read(0x6060, 0, "<b")
         joint.write(0x6060, 0, IMPEDANCE, "<b")
+        # This host may be slow.
+        joint.write(0x2013, 0, 0, "<B")
         largest = [joint.read(0x2020, sub, "<H") for sub in (3, 4)]
         print(f"node {joint.number}: at most {largest[0] * STIFFNESS_UNIT:.0f} N m/rad,",
               f"{largest[1] * DAMPING_UNIT:.0f} N m s/rad")
@@ -164,6 +166,7 @@ def main():
     telemetry(joints)
     for joint in joints:
         joint.write(0x6060, 0, joint.mode, "<b")
+        joint.write(0x2013, 0, 1, "<B")
     alive.stop()
     network.disconnect()
     print("impedance: ok")

@@ -24,8 +24,8 @@ STEPS = ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27))
 ENABLE_WITHIN_S, ANSWER_WITHIN_S, BACK_WITHIN_S, FALL_S = 2.0, 10.0, 60.0, 1.5
 # A step towards enabled was refused.
 NOT_ENABLED = 0xFF0E
-# Time to return into the range at 0.1 rad/s from the end stops, 7 degrees outside, and the range's tolerance.
-RETURN_WITHIN_S, TOLERANCE = 20.0, math.radians(0.5)
+# Tolerance of the range.
+TOLERANCE = math.radians(0.5)
 
 
 class Leg:
@@ -101,7 +101,7 @@ def pose(joints, limits, dice):
         for joint in joints:
             joint.write(0x6040, 0, word, "<H")
     until(f"arrival at {', '.join(f'{goal * MICRO:.2f}' for goal in goals)} rad", lambda: all(
-        abs(joint.position() - goal * MICRO) < 0.02 for joint, goal in zip(joints, goals)), 10)
+        abs(joint.position() - goal * MICRO) < 0.02 for joint, goal in zip(joints, goals)))
     return [goal * MICRO for goal in goals]
 
 
@@ -124,7 +124,7 @@ def stop(leg, way):
                 joint.write(0x6040, 0, word, "<H")
     joints = leg.joints
     for joint in joints:
-        until(f"node {joint.number} off after {way}", lambda: joint.read(0x6041, 0, "<H") & 0x4F in (0x40, 0x08), 30)
+        until(f"node {joint.number} off after {way}", lambda: joint.read(0x6041, 0, "<H") & 0x4F in (0x40, 0x08))
     off(joints)
     forget(joints)
     time.sleep(FALL_S)
@@ -166,7 +166,7 @@ def arrive(joints, limits, where):
     for word in (0x0F, 0x3F):
         for joint in joints:
             joint.write(0x6040, 0, word, "<H")
-    until(f"{where}: return into the range", lambda: not outside(joints, limits), RETURN_WITHIN_S)
+    until(f"{where}: return into the range", lambda: not outside(joints, limits))
     off_again = [joint.number for joint in joints if joint.read(0x6041, 0, "<H") & 0x6F != 0x27]
     if off_again:
         raise SystemExit(f"{where}: nodes {off_again} stopped on the way into the range")

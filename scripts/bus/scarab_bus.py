@@ -62,7 +62,7 @@ def holds(condition, longest_s):
         time.sleep(0.002)
 
 
-def until(what, condition, longest_s=20.0):
+def until(what, condition, longest_s=60.0):
     """Waits for a condition and returns its value."""
     value = holds(condition, longest_s)
     if not value:
@@ -70,7 +70,7 @@ def until(what, condition, longest_s=20.0):
     return value
 
 
-def send_until(what, send, condition, longest_s=20.0):
+def send_until(what, send, condition, longest_s=60.0):
     """Sends, and sends again every second, until a condition holds.
 
     On a busy machine `serve` drops SYNC and PDOs that waited for more than 100 ms; no answer shows it.

@@ -4,7 +4,7 @@
 //! constant terminal voltages. The bus voltage is constant within the quarter, the rotor's speed between
 //! calls of [`Axis::set_rotor`]. Compared with steps a hundred times finer, currents differ by 4 mA and the
 //! torque by 4e-5 of its size. Conditions: 50 A, 250 Hz electrical and 48 V. Test:
-//! `cargo test -p hal-sim --test plant edges_alone`. The difference is a tenth of a converter's step.
+//! `cargo test -p hal-sim --test hardware edges_alone`. The difference is a tenth of a converter's step.
 //!
 //! ```text
 //! sample, command acts                                  sample, next command acts

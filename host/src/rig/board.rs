@@ -13,6 +13,7 @@ mod locked;
 pub mod registers;
 
 use core::f64::consts::TAU;
+use std::sync::{Mutex, PoisonError};
 
 use hal_sim::drive::description::{AxisDescription, CompleteDescription, SupplyDescription};
 use hal_sim::drive::stand::{Load, Stand};
@@ -117,6 +118,31 @@ pub fn commission(
     Err(refused("the calibration did not end in time".into()))
 }
 
+/// Everything that a calibration depends on, in the order of [`commission`].
+type Motor = (AxisConfiguration, CalibrationSettings, AxisDescription, SupplyDescription, f64, u64);
+
+/// Calibrations that are remembered.
+const REMEMBERED: usize = 16;
+
+/// Calibrates as [`commission`] does. Boards with equal motors share one calibration, which costs as much as
+/// several seconds of their leg.
+fn commission_once(name: &str, motor: Motor) -> Result<Calibration, ToolError> {
+    static KNOWN: Mutex<Vec<(Motor, Calibration)>> = Mutex::new(Vec::new());
+    let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let found = known().iter().find(|(other, _)| *other == motor).map(|(_, calibration)| *calibration);
+    if let Some(calibration) = found {
+        return Ok(calibration);
+    }
+    let (configuration, settings, axis, supply, angle, seed) = &motor;
+    let calibration = commission(name, configuration, *settings, axis, supply, *angle, *seed)?;
+    let mut known = known();
+    if known.len() == REMEMBERED {
+        known.remove(0);
+    }
+    known.push((motor, calibration));
+    Ok(calibration)
+}
+
 /// Axes and chopper of a ready board: motors calibrated, counters at the initial pose of the simulated leg.
 fn ready<const N: usize>(
     believed: &LegFile,
@@ -139,8 +165,8 @@ fn ready<const N: usize>(
         // The counter wraps at 16 bits, not at whole turns of every encoder: it must start at the
         // leg's count.
         let angle = TAU * f64::from(counts) / simulated.counter.counts;
-        let supply = &description.supply;
-        let calibration = commission(name, &configuration, settings, simulated, supply, angle, seed)?;
+        let supply = description.supply;
+        let calibration = commission_once(name, (configuration, settings, *simulated, supply, angle, seed))?;
         let mut axis = Axis::new(&configuration, &calibration, &samples[index])
             .map_err(|error| ToolError::input(format!("axis `{name}`: {}", words::axis_error(error))))?;
         axis.set_counts(counts);

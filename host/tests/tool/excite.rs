@@ -2,7 +2,7 @@
 //! and rejections.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use crate::command::{Folder, scarab};
@@ -80,6 +80,7 @@ fn a_design_is_far_more_informative_than_300_random_motions() {
 }
 
 #[test]
+#[ignore = "campaign: .ci/full"]
 fn the_expected_sigma_equals_reported_sigma_and_observed_spread() {
     let (folder, report) = designed();
     const SEEDS: u32 = 40;
@@ -275,28 +276,13 @@ fn a_motion_of_another_leg_or_beyond_limits_is_refused() {
 }
 
 #[test]
-fn a_motion_above_the_torque_limit_is_refused_and_never_designed() {
+fn a_motion_above_the_torque_limit_is_refused_and_none_is_designed() {
     let folder = Folder::new();
-    let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
-    let mut frail = leg.clone();
-    for joint in &mut frail.joints {
-        joint.torque_limit_nm = 55.0;
-    }
-    let frail = folder.write("frail.toml", &frail.to_toml());
+    let frail = folder.write("frail.toml", &frail().to_toml());
     let arguments = ["identify --excitation", SHIPPED, "--leg"].join(" ");
     let message = scarab(&arguments, &[&frail]).refusal();
     assert!(message.contains("the motion needs") && message.contains("limit 55.0 N m"), "{message}");
-    // Half the torque limit: the hip of the assumed leg alone needs 53 N m at the end of its range.
-    let json = folder.path("report.json");
-    let arguments = format!("excite {EFFORT} --torque-margin 5 --leg");
-    scarab(&arguments, &[&frail, Path::new("--json"), &json]).ends_with(0);
-    for joint in list(&folder.json("report.json"), "joints") {
-        assert!(value(joint, "torque_with_margin_nm") <= 55.0, "{joint}");
-    }
-    let mut feeble = leg;
-    feeble.joints[0].torque_limit_nm = 5.0;
-    let feeble = folder.write("feeble.toml", &feeble.to_toml());
-    let message = scarab(&format!("excite {EFFORT} --leg"), &[&feeble]).refusal();
+    let message = scarab(&format!("excite {EFFORT} --leg"), &[&feeble(&folder)]).refusal();
     for word in [
         "no exciting motion fits the limits: joint `hip`: ",
         "limit 5.000 N m (`torque_limit_nm`)",
@@ -304,12 +290,43 @@ fn a_motion_above_the_torque_limit_is_refused_and_never_designed() {
     ] {
         assert!(message.contains(word), "{word}: {message}");
     }
-    let checked = scarab("leg --check", &[&feeble]).ends_with(0).printed;
+}
+
+/// Default leg with little torque.
+fn frail() -> LegFile {
+    let mut leg = LegFile::load("x2-wearer-75kg").expect("shipped");
+    for joint in &mut leg.joints {
+        joint.torque_limit_nm = 55.0;
+    }
+    leg
+}
+
+/// File of the default leg with a hip that cannot move it.
+fn feeble(folder: &Folder) -> PathBuf {
+    let mut leg = LegFile::load("x2-wearer-75kg").expect("shipped");
+    leg.joints[0].torque_limit_nm = 5.0;
+    folder.write("feeble.toml", &leg.to_toml())
+}
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn a_design_for_a_leg_with_little_torque_respects_its_limit() {
+    let folder = Folder::new();
+    let frail = folder.write("frail.toml", &frail().to_toml());
+    // Half the torque limit: the hip of the assumed leg alone needs 53 N m at the end of its range.
+    let json = folder.path("report.json");
+    let arguments = format!("excite {EFFORT} --torque-margin 5 --leg");
+    scarab(&arguments, &[&frail, Path::new("--json"), &json]).ends_with(0);
+    for joint in list(&folder.json("report.json"), "joints") {
+        assert!(value(joint, "torque_with_margin_nm") <= 55.0, "{joint}");
+    }
+    let checked = scarab("leg --check", &[&feeble(&folder)]).ends_with(0).printed;
     assert!(checked.contains("\nexcite: not possible: ") && checked.contains("joint `hip`"), "{checked}");
 }
 
 /// The check searches less than the design: only the search for the least torque, equal in both, decides.
 #[test]
+#[ignore = "campaign: .ci/full"]
 fn check_and_design_agree_on_a_leg_with_too_little_torque() {
     let folder = Folder::new();
     let body = "com = [0.15, 0.0, 0.0], inertia_com = [0.002, 0.0, 0.0, 0.01, 0.0, 0.011], rotor_inertia = 0.02, \
@@ -370,6 +387,7 @@ fn description(links: [(f64, f64, f64); 2], length: f64, limits: [&str; 2]) -> S
 }
 
 #[test]
+#[ignore = "campaign: .ci/full"]
 fn converted_robots_without_friction_and_with_wide_limits_get_a_motion() {
     let turn = |range: &str, effort: f64, velocity: f64| {
         let (low, high) = range.split_once("..").expect("two ends");
@@ -422,16 +440,19 @@ fn implausible_options_are_refused_with_a_reason() {
         ("excite --torque-noise-nm -1", "-1 N m is outside 0..1000"),
         ("identify --torque-noise-nm nan", "NaN N m is outside 0..1000"),
         ("identify --torque-noise-nm 1 --torque-noise 7", "cannot be used with"),
-        (
-            "excite --leg paper-chain --evaluations 600",
-            "no exciting motion fits the limits: joint `hip rotation`: ",
-        ),
         ("excite --evaluations 1", "evaluations"),
         ("excite --leg none-such", "none-such"),
     ] {
         let message = scarab(arguments, &[]).refusal();
         assert!(message.contains(reason), "{arguments}: {message}");
     }
+}
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn the_paper_s_chain_has_no_motion_within_its_limits() {
+    let message = scarab("excite --leg paper-chain --evaluations 600", &[]).refusal();
+    assert!(message.contains("no exciting motion fits the limits: joint `hip rotation`: "), "{message}");
 }
 
 #[test]

@@ -151,7 +151,7 @@ fn the_duration_of_a_push_does_not_depend_on_recording_length() {
 }
 
 #[test]
-#[ignore = "takes minutes: cargo test -p scarab-host --test tool forty_minutes -- --ignored"]
+#[ignore = "campaign: .ci/full"]
 fn the_duration_of_a_push_is_right_in_forty_minutes() {
     push_for(&[2, 10, 20, 40, 80]);
 }

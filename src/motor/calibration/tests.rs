@@ -1,5 +1,10 @@
 extern crate std;
 
+use std::collections::BTreeMap;
+use std::format;
+use std::string::String;
+use std::sync::{Mutex, PoisonError};
+
 use super::*;
 use crate::hal::CURRENT_RATE_HZ;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
@@ -51,11 +56,23 @@ fn run(motor: &mut TestMotor, calibrator: Calibrator) -> Result<Calibration, Ref
     run_with(motor, calibrator, |_, _| ())
 }
 
+/// Calibrates a motor. Many tests begin with the same one: it is simulated once, and later calls copy result
+/// and motor.
 pub(crate) fn calibrate(
     motor: &mut TestMotor,
     configuration: &AxisConfiguration,
 ) -> Result<Calibration, Refusal> {
-    run(motor, Calibrator::new(configuration, SETTINGS).expect("usual"))
+    static KNOWN: Mutex<BTreeMap<String, (TestMotor, Result<Calibration, Refusal>)>> =
+        Mutex::new(BTreeMap::new());
+    let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = format!("{motor:?} {configuration:?}");
+    if let Some((after, result)) = known().get(&key).cloned() {
+        *motor = after;
+        return result;
+    }
+    let result = run(motor, Calibrator::new(configuration, SETTINGS).expect("usual"));
+    known().insert(key, (motor.clone(), result));
+    result
 }
 
 /// A calibration as a check at standstill leaves it, with an offset that is so many degrees off.

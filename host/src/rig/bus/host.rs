@@ -520,11 +520,18 @@ mod tests {
     }
 
     #[test]
+    fn a_host_can_enable_the_leg_again_after_each_of_eight_poses() {
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        // Legs must fall out of their range for the test to be valid.
+        assert!(poses(&leg, 1, 8) >= 1);
+    }
+
+    #[test]
+    #[ignore = "campaign: .ci/full"]
     fn a_host_can_enable_the_leg_again_after_each_of_100_poses() {
         use rayon::prelude::*;
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
         let fallen: u32 = (1..=4_u64).into_par_iter().map(|seed| poses(&leg, seed, 25)).sum();
-        // Legs must fall out of their range often enough for the test to be valid.
         assert!(fallen >= 20, "{fallen}");
     }
 }

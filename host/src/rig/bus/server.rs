@@ -367,10 +367,10 @@ mod tests {
         (server, client, now)
     }
 
-    /// Waits until the client's bytes have arrived.
-    fn pending(server: &Server) {
+    /// Waits until this number of the client's bytes has arrived.
+    fn pending(server: &Server, count: usize) {
         let stream = &server.client.as_ref().expect("a client").stream;
-        while stream.peek(&mut [0; 1]).is_err() {
+        while stream.peek(&mut vec![0; count]).ok() != Some(count) {
             std::thread::sleep(MS / 10);
         }
     }
@@ -381,7 +381,7 @@ mod tests {
         let mut ages = Vec::new();
         for round in 1..=10 {
             client.write_all(b"t20120F00\r").expect("a connection");
-            pending(&server);
+            pending(&server, 10);
             let now = begin + round * 30 * MS;
             server.poll(now, |_, since| {
                 ages.push(now - since);
@@ -397,10 +397,9 @@ mod tests {
         let (mut server, mut client, begin) = opened();
         // More than two reads take.
         client.write_all(&b"t20120F00\r".repeat(1000)).expect("a connection");
+        pending(&server, 10_000);
         let mut ages = Vec::new();
         for round in 1..=3 {
-            pending(&server);
-            std::thread::sleep(20 * MS);
             let now = begin + round * 30 * MS;
             server.poll(now, |_, since| {
                 ages.push(now - since);

@@ -1,7 +1,7 @@
 //! Register values of the microcontroller, as plain data.
 //!
-//! A test on the host (`cargo test --test board_registers -- --nocapture`) applies these lists to empty
-//! registers. The test derives frequency, phase, dead time, channels and pins, and prints the table.
+//! A test on the host (`cargo test --test firmware board_registers:: -- --nocapture`) applies these lists to
+//! empty registers. The test derives frequency, phase, dead time, channels and pins, and prints the table.
 
 pub mod absolute_encoders;
 pub mod analog;

@@ -9,10 +9,8 @@ use scarab::ident::{
 };
 use scarab::model::planar::BASE;
 use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
-use testing::TestRandom;
 
-#[path = "../src/testing.rs"]
-mod testing;
+use crate::testing::TestRandom;
 
 type LegRecorder = Recorder<f32, 2, BASE, 256, 26>;
 

@@ -1,6 +1,6 @@
 //! A leg without power falls on its mechanical end stops.
 
-use crate::common::planar_leg;
+use crate::plant::common::planar_leg;
 use hal_sim::mechanism::Mechanism;
 use hal_sim::world::{TICK_S, World};
 use scarab::hal::DriveCommand;

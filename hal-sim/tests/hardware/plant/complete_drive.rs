@@ -1,7 +1,7 @@
 //! Complete drive against closed formulas that hold for every motor, bridge and bus.
 #![expect(clippy::disallowed_methods, reason = "expected values by another library than the plant's")]
 
-use crate::common::worn_leg;
+use crate::plant::common::worn_leg;
 use core::f64::consts::{PI, TAU};
 
 use hal_sim::drive::axis::{Axis, AxisFlow, PERIOD_S};

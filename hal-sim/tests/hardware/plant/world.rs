@@ -1,7 +1,7 @@
 //! Simulated world at its interface to the firmware: sensors, drives, seeds, copies and signs.
 #![expect(clippy::disallowed_methods, reason = "expected values by another library than the plant's")]
 
-use crate::common::{planar_leg, worn_leg};
+use crate::plant::common::{planar_leg, worn_leg};
 use core::f64::consts::TAU;
 use hal_sim::description::{EncoderDescription, EncoderSide, LegDescription, PushDescription};
 use hal_sim::sensors::Encoder;

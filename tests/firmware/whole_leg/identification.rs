@@ -29,7 +29,17 @@ fn errors_in_sigma(report: &RunReport) -> Vec<(String, f64)> {
 
 #[test]
 fn a_leg_is_identified_validated_and_accepted_within_four_sigma() {
-    for seed in [1, 2, 3] {
+    within_four_sigma(&[1]);
+}
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn more_legs_are_identified_validated_and_accepted_within_four_sigma() {
+    within_four_sigma(&[2, 3]);
+}
+
+fn within_four_sigma(seeds: &[u64]) {
+    for &seed in seeds {
         let report = run(seed);
         assert!(report.accepted(), "seed {seed}: {:?}", report.reasons);
         assert_eq!((report.rank, report.base_parameters.len(), report.validation.len()), (13, 13, 6));
@@ -60,12 +70,12 @@ fn text(mut report: RunReport) -> String {
 
 #[test]
 fn equal_seeds_give_equal_reports_and_different_seeds_do_not() {
-    let first = text(run(7));
+    let same_swarm = run(7);
+    let first = text(same_swarm.clone());
     assert_eq!(first, text(run(7)));
     assert_ne!(first, text(run(8)));
     let other_swarm = SimulationOptions { swarm_seed: 8, ..SimulationOptions::of_seed(7) };
     let other_swarm = simulate::<JOINTS, BASE>(&default_leg(), &other_swarm).expect("it runs").report;
-    let same_swarm = run(7);
     // The data are identical; the path of the search differs.
     assert_eq!(same_swarm.least_squares, other_swarm.least_squares);
     assert_ne!(same_swarm.bso.evaluations, other_swarm.bso.evaluations);

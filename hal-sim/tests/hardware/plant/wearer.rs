@@ -1,8 +1,8 @@
 //! Wearer and exoskeleton as two bodies: energies, reaction, a rigid witness, muscles and motions.
 #![expect(clippy::disallowed_methods, reason = "expected values by another library than the plant's")]
 
-use crate::common::{joined, joint, leg, worn_leg};
-use crate::complete_drive::board;
+use crate::plant::common::{joined, joint, leg, worn_leg};
+use crate::plant::complete_drive::board;
 use hal_sim::description::{FrictionDescription, LegDescription, PushDescription};
 use hal_sim::mechanism::Mechanism;
 use hal_sim::wearer::WearerTruth;
@@ -686,7 +686,7 @@ fn legs_and_wearers_that_do_not_fit_are_refused() {
         World::new(&description, 1).wear(&wearer).expect_err("does not fit")
     };
     let one_joint = leg([9.81, 0.0, 0.0], [exoskeleton().joints[0]]);
-    let three_joints = crate::common::spatial_chain();
+    let three_joints = crate::plant::common::spatial_chain();
     for (error, joints) in
         [(World::new(&one_joint, 1).wear(&person()), 1), (World::new(&three_joints, 1).wear(&person()), 3)]
     {

@@ -1,6 +1,6 @@
 //! Rigid bodies against vectors of another library, and against energies and kinematics by hand.
 
-use crate::common::{planar_leg, spatial_chain};
+use crate::plant::common::{planar_leg, spatial_chain};
 use hal_sim::description::LegDescription;
 use hal_sim::mechanism::Mechanism;
 use nalgebra::{Matrix4, Rotation3, Translation3, Vector3};

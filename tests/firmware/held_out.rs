@@ -8,10 +8,8 @@ use scarab::ident::{
 use scarab::model::planar::BASE;
 use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
 use scarab::real::sin_cos;
-use testing::TestRandom;
 
-#[path = "../src/testing.rs"]
-mod testing;
+use crate::testing::TestRandom;
 
 const GRAVITY: Vector3<f64> = Vector3::new(9.81, 0.0, 0.0);
 const LENGTH_M: f64 = 0.42;

@@ -1,7 +1,7 @@
 //! Calibration of many motors and wirings: the firmware's procedure against the simulated hardware.
 //!
 //! Everything varies with the seed: motor, encoder, shunts, friction, cogging, and rotated motor leads.
-//! Figures: `cargo test -p hal-sim --test calibration -- --nocapture`.
+//! Figures: `cargo test -p hal-sim --test hardware calibration:: -- --nocapture`.
 
 mod absolute;
 mod by_hand;
@@ -182,9 +182,8 @@ fn stored(trial: &Trial, seed: u64) -> StoredCalibration {
     found.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{trial:?}")).stored().expect("an index")
 }
 
-#[test]
-fn a_stored_calibration_is_accepted_by_the_same_motor_only() {
-    for seed in 101..=100 + 2 * KINDS {
+fn accepted_by_the_same_motor_only(seeds: core::ops::RangeInclusive<u64>) {
+    for seed in seeds {
         let mut trial = Trial::sound(seed);
         let stored = stored(&trial, seed);
         // The counter has lost its position, and the joint was moved.
@@ -208,9 +207,35 @@ fn a_stored_calibration_is_accepted_by_the_same_motor_only() {
 }
 
 #[test]
+fn a_stored_calibration_is_accepted_by_the_same_motor_only() {
+    accepted_by_the_same_motor_only(101..=106);
+}
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn stored_calibrations_are_accepted_by_the_same_of_36_motors_only() {
+    accepted_by_the_same_motor_only(101..=100 + 2 * KINDS);
+}
+
+#[test]
 fn another_inductance_is_detected_at_the_next_power_up() {
-    for (seed, share, seen) in [(1, 1.3, true), (2, 0.75, true), (3, 1.12, false), (4, 0.88, false)] {
-        for across in [false, true] {
+    another_inductance(&[(1, 1.3, true), (3, 1.12, false)], &[true]);
+    another_inductance(&[(2, 0.75, true)], &[false]);
+}
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn other_inductances_along_and_across_are_detected_at_the_next_power_up() {
+    another_inductance(
+        &[(1, 1.3, true), (2, 0.75, true), (3, 1.12, false), (4, 0.88, false)],
+        &[false, true],
+    );
+}
+
+/// Seeds, shares of the inductance, and whether they are seen; along and across the flux.
+fn another_inductance(cases: &[(u64, f64, bool)], directions: &[bool]) {
+    for &(seed, share, seen) in cases {
+        for &across in directions {
             let mut trial = Trial::sound(seed);
             let stored = stored(&trial, seed);
             let motor = &mut trial.axis.motor;
@@ -252,11 +277,23 @@ fn an_encoder_turned_on_its_shaft_is_detected_at_power_up() {
 
 #[test]
 fn faultless_motors_are_measured_with_the_right_sign_of_torque() {
+    sound(1..=10);
+}
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn a_hundred_faultless_motors_are_measured() {
     sound(1..=100);
 }
 
 #[test]
 fn every_wrong_wiring_is_refused_by_name_without_runaway() {
+    wrong(1..=KINDS);
+}
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn a_hundred_wrong_wirings_are_refused_by_name() {
     wrong(1..=100);
 }
 

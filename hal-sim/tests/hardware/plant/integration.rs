@@ -1,6 +1,6 @@
 //! Time steps: energy, reversibility, order, and their effect on identified parameters.
 
-use crate::common::{planar_leg, worn_leg};
+use crate::plant::common::{planar_leg, worn_leg};
 use hal_sim::description::LegDescription;
 use hal_sim::leg::{Leg, LegState};
 use hal_sim::world::{TICK_S, World};

@@ -1,6 +1,6 @@
 //! Friction: joints stick, break away, slide and drag each other.
 
-use crate::common::{joint, leg, planar_leg, spatial_chain, worn_leg};
+use crate::plant::common::{joint, leg, planar_leg, spatial_chain, worn_leg};
 use hal_sim::description::{FrictionDescription, LegDescription, Stribeck};
 use hal_sim::leg::{Leg, LegState};
 use hal_sim::world::{TICK_S, World};

@@ -1,7 +1,7 @@
 //! The board's registers after the start, from the record of writes, compared with known values of the board.
 //!
-//! `cargo test --test board_registers -- --nocapture` prints the record. The values are those of ODrive's
-//! firmware v0.5.6 (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is RM0090's. The
+//! `cargo test --test firmware board_registers:: -- --nocapture` prints the record. The values are those of
+//! ODrive's firmware v0.5.6 (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is RM0090's. The
 //! silicon's behaviour needs a test on the board.
 
 mod sampling;
@@ -410,7 +410,7 @@ fn the_bus_has_the_stored_rate_and_receives_every_11_bit_frame() {
 #[test]
 fn images_are_linked_to_their_sectors_and_the_header_follows_the_vectors() {
     // The linker scripts take the regions from the build scripts, which write them from `Region`.
-    let image = include_str!("../../src/board/odrive_v3_6/layout.x");
+    let image = include_str!("../../../src/board/odrive_v3_6/layout.x");
     assert!(image.contains(&format!(".image_header ORIGIN(FLASH) + {HEADER_AT:#x} :")));
     let code = HEADER_AT + HEADER_BYTES as u32;
     assert!(image.contains(&format!("_stext = ORIGIN(FLASH) + {code:#x};")));

@@ -1,6 +1,6 @@
 //! Compares `docs/bso.md` with the code's constants and settings, and solves the example's objective.
 
-#[path = "../examples/damped_oscillation/objective.rs"]
+#[path = "../../examples/damped_oscillation/objective.rs"]
 mod objective;
 
 use std::collections::BTreeMap;

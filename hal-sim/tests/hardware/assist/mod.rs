@@ -14,11 +14,9 @@ mod weight;
 
 use hal_sim::wearer::motion::{Gait, IntendedMotion};
 use scarab::leg::AssistShares;
-// The generated leg names modules of the firmware by their path in that crate.
-use scarab::{ident, leg, model, motion, motor, safety, units};
 
 mod x2 {
-    include!("../../../host/legs/x2-wearer-75kg.rs");
+    include!("../../../../host/legs/x2-wearer-75kg.rs");
 }
 
 /// Friction and half of the inertia compensated.

@@ -1,0 +1,15 @@
+//! The firmware's library: whole legs in simulated hardware, identification on synthetic motion, storage,
+//! registers of the board, tables of the swarm. One program, so that the library and the host tool are linked
+//! once.
+
+mod board_registers;
+mod complete_drive;
+mod held_out;
+mod identification;
+mod model_reference;
+mod store;
+mod swarm_document;
+mod swarm_tables;
+#[path = "../../src/testing.rs"]
+mod testing;
+mod whole_leg;
