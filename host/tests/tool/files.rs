@@ -34,7 +34,6 @@ const COMMANDS: [(&str, &[&str], &[&str]); 17] = [
     ("motor", &["--leg"], &["--json", "--figures"]),
     ("faults", &["--leg"], &["--json", "--report", "--docs"]),
     ("merge", &[""], &["--json", "--report", "--figures", "--docs"]),
-    ("emulate", &["--leg"], &["--json", "--trace", "--csv"]),
     ("fw", &["--leg"], &["--json", "--source"]),
     ("serve --slcan 127.0.0.1:0", &["--leg"], &["--flash"]),
     ("kept export", &[""], &["--out"]),
