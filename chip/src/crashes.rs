@@ -25,7 +25,7 @@ use crate::peripherals::rcc::ResetReason;
 use crate::plant::{JOINTS, STEP};
 use crate::rtt::field;
 use crate::session::Session;
-use crate::system::{PRIVATE, fault};
+use crate::system::fault;
 use crate::time::{FULL_SPEED, Ticks, microseconds, ticks};
 
 /// Kinds, as the records name them.
@@ -227,7 +227,8 @@ fn reach(session: &mut Session, kind: CrashKind) -> Result<Ticks, ToolError> {
             }
             session.machine.run(session.now() + 1)?;
         }
-        session.machine.run(due + ticks(0.3e-6))?;
+        let after = (due + ticks(0.3e-6)).max(session.now() + 1);
+        session.machine.run(after)?;
     }
     Err(ToolError::input(format!("no instant for the crash `{}` within {SEARCHED_S} s", kind.name())))
 }

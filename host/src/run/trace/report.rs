@@ -3,7 +3,7 @@
 //! Values, sigma, fits, findings and verdict are the board's own. Names, groups and units come from
 //! the leg file, which must be the one that the image was built from. Joints, base parameters and
 //! their carriers are compared. Values that the board does not send (search costs in double
-//! precision, gains of columns) are unknown. The truth is unknown.
+//! precision, gains of columns) are unknown, and so is the truth.
 
 use scarab::ident::{Estimate, Estimator, Evidence, Plan, Reason, Selection, Status, Test};
 use scarab::model::Parameter;
@@ -84,7 +84,7 @@ fn of_size<const N: usize, const B: usize>(
     records: &ResultRecords,
     leg: &LegFile,
 ) -> Result<RunReport, ToolError> {
-    let background = known::<N, B>(trace, records, leg)?;
+    let background = known::<N, B>(records, leg)?;
     let found = TracedResult { background: &background, leg, records };
     let solver = records.solver.as_ref().ok_or_else(|| ToolError::input("the result has no solver"))?;
     let (estimate, dropped) = found.base(solver)?;
@@ -130,7 +130,6 @@ fn of_size<const N: usize, const B: usize>(
 
 /// Background of the leg; a prior only where the board had one.
 pub(super) fn known<const N: usize, const B: usize>(
-    trace: &Trace,
     records: &ResultRecords,
     leg: &LegFile,
 ) -> Result<Background<N, B>, ToolError> {
