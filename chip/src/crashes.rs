@@ -2,8 +2,8 @@
 //!
 //! Each crash starts from a saved machine that is enabled: holding its pose, or in the motion of an
 //! identification. Its instant is the worst that the kind allows: a current tick falls due while the crash is
-//! handled, or comes just before an overflow, which it would otherwise begin. The processor then runs block by
-//! block, so that every store to the crash record has its time.
+//! handled, or comes just before an overflow, which it would otherwise begin. The processor then runs block
+//! by block, so that every store to the crash record has its time.
 //!
 //! | crash | injected |
 //! | --- | --- |

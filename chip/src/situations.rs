@@ -18,8 +18,9 @@ const MOST_MEAN: f64 = 850.0;
 const MOST_WORST: u64 = 1250;
 /// Goal: share of the processor's time while the leg holds its pose.
 const MOST_HOLDING: f64 = 0.5;
-/// Goals: most instructions of one servo interrupt, which is the leg's tick with its side of the bus. Ticks of an
-/// identification that begin a motion or take a verdict may take more; those of a host have the bus's targets.
+/// Goals: most instructions of one servo interrupt, which is the leg's tick with its side of the bus. Ticks
+/// of an identification that begin a motion or take a verdict may take more; those of a host have the bus's
+/// targets.
 const MOST_SERVO: [(&str, u64); 3] = [(HOLDING, 4000), (IDENTIFYING, 5000), (FOLLOWING, 4400)];
 /// Goal: mean instructions of the servo interrupt.
 const MOST_SERVO_MEAN: f64 = 4000.0;

@@ -88,8 +88,8 @@ const PLANT: [&str; 2] = ["hal", "units"];
 const MATHS_MODULES: [&str; 2] = ["src/real.rs", "hal-sim/src/maths.rs"];
 
 /// Files (and folders) that may contain `unsafe`: the hardware square root, in-place construction, the
-/// boards' layers, the flash image's memory sections and interrupt vectors, the bootloader, and the program that
-/// checks the chip model.
+/// boards' layers, the flash image's memory sections and interrupt vectors, the bootloader, and the program
+/// that checks the chip model.
 const UNSAFE_ALLOWED: [&str; 8] = [
     "src/real.rs",
     "src/place.rs",

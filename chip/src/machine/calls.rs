@@ -1,8 +1,8 @@
 //! Instructions of whole calls of named functions, the functions that they call included.
 //!
-//! A call begins where an exception, or the thread, reaches the function's first block. It ends where the same
-//! exception reaches the return address with the stack pointer of the beginning. Instructions of interrupts that
-//! preempt it do not count.
+//! A call begins where an exception, or the thread, reaches the function's first block. It ends where the
+//! same exception reaches the return address with the stack pointer of the beginning. Instructions of
+//! interrupts that preempt it do not count.
 
 use super::*;
 
