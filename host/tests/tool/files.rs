@@ -10,7 +10,7 @@ use crate::command::{Folder, scarab};
 const CONTENT: &str = "not to be touched";
 
 /// Command with the options of its input files (empty: positional) and of its output files.
-const COMMANDS: [(&str, &[&str], &[&str]); 17] = [
+const COMMANDS: [(&str, &[&str], &[&str]); 16] = [
     (
         "replay",
         &["", "--leg", "--validate", "--compare-model"],
