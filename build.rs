@@ -11,15 +11,12 @@ fn main() {
     println!("cargo::rerun-if-changed=memory.x");
     println!("cargo::rerun-if-changed=src/board/odrive_v3_6/layout.x");
     let target = env::var("CARGO_CFG_TARGET_OS").unwrap_or_default();
-    if target != "none" || env::var_os("CARGO_FEATURE_TASKS").is_none() {
+    if target != "none" || env::var_os("CARGO_FEATURE_BOARD_ODRIVE_V3_6").is_none() {
         return;
     }
-    let board = env::var_os("CARGO_FEATURE_BOARD_ODRIVE_V3_6").is_some();
     // The leg the image is for: a constant that `cargo fw --source` writes from a leg file.
     let leg = env::var("SCARAB_LEG").unwrap_or_else(|_| {
-        if board {
-            println!("cargo::warning=SCARAB_LEG names no leg: the image is for the leg x2-wearer-75kg alone");
-        }
+        println!("cargo::warning=SCARAB_LEG names no leg: the image is for the leg x2-wearer-75kg alone");
         concat!(env!("CARGO_MANIFEST_DIR"), "/host/legs/x2-wearer-75kg.rs").to_owned()
     });
     println!("cargo::rerun-if-env-changed=SCARAB_LEG");
@@ -28,9 +25,6 @@ fn main() {
     println!("cargo::rerun-if-env-changed=SCARAB_BOARD_VOLTS");
     println!("cargo::rerun-if-changed={leg}");
     println!("cargo::rustc-env=SCARAB_LEG_SOURCE={leg}");
-    if !board {
-        return;
-    }
     let written = env::var("OUT_DIR").expect("cargo sets it");
     let memory =
         format!("FLASH : ORIGIN = {:#x}, LENGTH = {}\n", Region::IMAGE.address, Region::IMAGE.bytes());

@@ -19,7 +19,8 @@ fn main() {
         let memory = [("FLASH", Region::BOOTLOADER), ("STATE", Region::STATE)].map(|(name, region)| {
             format!("{name} : ORIGIN = {:#x}, LENGTH = {}\n", region.address, region.bytes())
         });
-        fs::write(Path::new(&written).join("flash.x"), memory.concat()).expect("cargo's directory is writable");
+        fs::write(Path::new(&written).join("flash.x"), memory.concat())
+            .expect("cargo's directory is writable");
         let here = env!("CARGO_MANIFEST_DIR");
         for folder in [written, here.to_owned(), format!("{here}/..")] {
             println!("cargo::rustc-link-search={folder}");

@@ -1,7 +1,7 @@
 //! Scarab: firmware of an exoskeleton leg's joint drive board that identifies the leg it moves.
 //!
-//! All code is `no_std` and without heap. The same crate runs on the board, in the emulator and, against the
-//! simulated hardware of `hal-sim`, on the host.
+//! All code is `no_std` and without heap. The same crate runs on the board and, against the simulated
+//! hardware of `hal-sim`, on the host.
 //!
 //! | module | content |
 //! | --- | --- |
@@ -40,7 +40,7 @@ pub mod safety;
 pub mod servo;
 pub mod store;
 pub mod swarm;
-#[cfg(all(feature = "tasks", target_os = "none"))]
+#[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
 pub mod task;
 #[cfg(test)]
 mod testing;

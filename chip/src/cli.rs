@@ -23,7 +23,7 @@ use crate::machine::Options;
 use crate::report::{ChipReport, LoadReport};
 use crate::session::{Session, Step};
 use crate::time::seconds;
-use crate::{drivers, faults, hangs, sampling, serve, situations, stops, store_cuts, update};
+use crate::{crashes, drivers, faults, hangs, sampling, serve, situations, stops, store_cuts, update};
 
 /// Run the flash image on a model of its microcontroller.
 #[derive(Parser, Debug)]
@@ -56,6 +56,8 @@ enum Command {
     Faults(FaultArguments),
     /// Let each level hang and check the watchdog.
     Hangs(HangArguments),
+    /// Let the image crash and check that bridges are off before the record, and the next start refuses.
+    Crashes(Common),
     /// Check the model by a program that uses embassy-stm32's drivers only.
     Drivers(DriverArguments),
 }
@@ -221,6 +223,7 @@ pub fn main() -> ExitCode {
         Command::Serve(arguments) => run_serve(&arguments),
         Command::Faults(arguments) => run_faults(&arguments),
         Command::Hangs(arguments) => run_hangs(&arguments),
+        Command::Crashes(common) => run_crashes(&common),
         Command::Drivers(arguments) => run_drivers(&arguments),
     };
     match outcome {
@@ -503,6 +506,14 @@ fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
         let cells = found.iter().map(|situation| format!("{:>12.1} %", 100.0 * share(&situation.load)));
         println!("{name:<18}{}", cells.collect::<String>());
     }
+    for situation in &found {
+        for (name, calls) in &situation.calls {
+            println!(
+                "{}: {name}: {} calls, {:.0} instructions in the mean, {} at worst, {:.2} s at 8 ns in all",
+                situation.name, calls.count, calls.mean_instructions, calls.worst_instructions, calls.seconds
+            );
+        }
+    }
     if let Some(path) = &arguments.profile {
         let mut text = String::from("situation,exception,instructions,function\n");
         for situation in &found {
@@ -571,6 +582,28 @@ fn run_hangs(arguments: &HangArguments) -> Result<bool, ToolError> {
     }
     arguments.common.write(&reports)?;
     Ok(reports.iter().all(hangs::HangReport::is_sound))
+}
+
+fn run_crashes(common: &Common) -> Result<bool, ToolError> {
+    let mut session = enabled(common)?;
+    let saved = session.save()?;
+    let reports = crashes::run(&mut session, &saved)?;
+    for report in &reports {
+        let time = |time: Option<f64>| time.map_or("never".to_owned(), |time| format!("after {time:.2} us"));
+        println!(
+            "{:<14} {:<11} bridges off {}, record written {} to {}, reset {}",
+            report.kind,
+            report.situation,
+            time(report.released_us),
+            time(report.stored_us.map(|[first, _]| first)),
+            time(report.stored_us.map(|[_, last]| last)),
+            time(report.reset_us)
+        );
+        println!("    {}", report.record);
+        report.complaints.iter().for_each(|complaint| println!("    FAILED: {complaint}"));
+    }
+    common.write(&reports)?;
+    Ok(reports.iter().all(|report| report.complaints.is_empty()))
 }
 
 fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {

@@ -131,6 +131,16 @@ impl Image {
         all.find(|symbol| symbol.name == name).map(|symbol| symbol.address)
     }
 
+    /// Address of the function whose name contains `within` and ends with `name`.
+    #[must_use]
+    pub fn function_in(&self, within: &str, name: &str) -> Option<u32> {
+        let is_meant = |symbol: &&Symbol| {
+            let full = format!("{:#}", rustc_demangle::demangle(&symbol.name));
+            full.contains(within) && full.ends_with(name)
+        };
+        self.functions.iter().find(is_meant).map(|symbol| symbol.address)
+    }
+
     /// Address and size of the variable whose name ends so, without the crate's hash.
     #[must_use]
     pub fn variable(&self, path: &str) -> Option<(u32, u32)> {

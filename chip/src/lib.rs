@@ -22,6 +22,7 @@
 //! | [`stops`], [`sampling`] | emergency stops over the PWM period; sampling instants |
 //! | [`update`] | a new image over the bus, with damaged images and power cuts |
 //! | [`store_cuts`], [`hangs`] | power cuts within flash operations; levels that hang |
+//! | [`crashes`] | panic, hard fault, stack overflow, unhandled interrupt |
 //! | [`faults`] | rows of the fault catalogue |
 //! | [`drivers`] | another project's drivers on the model, against their documentation |
 //! | [`serve`] | the image on the simulated bus, for existing host software |
@@ -35,6 +36,7 @@
 pub mod assist;
 pub mod chip;
 pub mod cli;
+pub mod crashes;
 pub mod drivers;
 pub mod faults;
 pub mod findings;

@@ -12,13 +12,16 @@ pub const CURRENT: &str = "current_interrupt";
 /// Exception of the servo.
 pub const SERVO: u8 = 16 + 77;
 
+/// Name of the servo's interrupt in [`LEVELS`].
+pub const SERVO_NAME: &str = "servo";
+
 /// Interrupts of the image: name, exception number.
 pub const LEVELS: [(&str, u8); 10] = [
     ("stop", 16 + 10),
     (CURRENT, CURRENT_INTERRUPT),
     ("index_0", 16 + 23),
     ("index_1", 16 + 40),
-    ("servo", SERVO),
+    (SERVO_NAME, SERVO),
     ("clock", 16 + 50),
     ("bus_receive", 16 + 20),
     ("bus", 16 + 19),

@@ -12,6 +12,7 @@
 //! Known limits: the floating-point frame is always stored, never lazily; an entry costs 12 cycles, a return
 //! 10, a tail-chained one 6. Memory protection and the process stack are not modelled.
 
+mod calls;
 mod changes;
 
 use std::collections::HashMap;
@@ -22,9 +23,12 @@ use scarab_host::base::error::ToolError;
 use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode, Prot};
 use unicorn_engine::{ArmCpuModel, RegisterARM as Register, UcHookId, Unicorn};
 
+pub use calls::Calls;
+use calls::Watched;
+
 use crate::chip::Chip;
 use crate::image::Image;
-use crate::nvic::{HARD_FAULT, NMI, SUPERVISOR_CALL};
+use crate::nvic::{EXCEPTIONS, HARD_FAULT, NMI, SUPERVISOR_CALL};
 use crate::peripherals::debug::{SYSTEM_BYTES, SYSTEM_MEMORY, system_memory};
 use crate::peripherals::rcc::ResetReason;
 use crate::system::{PRIVATE, fault};
@@ -77,10 +81,13 @@ struct State {
     /// Exception whose code hangs; 0 is the thread.
     hung: Option<u8>,
     broken: Option<String>,
-    /// Instructions by exception and block, if they are counted.
     /// Hooks on the image's SEV instructions, and whether the image has not changed since.
     events: (Vec<UcHookId>, bool),
+    /// Instructions by exception and block, if they are counted.
     profile: Option<HashMap<(u8, u32), u64>>,
+    /// Functions whose calls are counted; instructions of each exception so far, and of its last block.
+    watched: Vec<Watched>,
+    counted: Vec<[u64; 2]>,
 }
 
 /// Reason why a run ended.
@@ -206,6 +213,17 @@ impl Machine {
         functions
     }
 
+    /// Counts the calls of these functions from now on.
+    pub fn watch(&mut self, entries: &[u32]) {
+        self.core.get_data_mut().watched = entries.iter().copied().map(Watched::new).collect();
+    }
+
+    /// Calls since [`Machine::watch`], in its order.
+    #[must_use]
+    pub fn calls(&self) -> Vec<Calls> {
+        self.core.get_data().watched.iter().map(|watched| watched.calls).collect()
+    }
+
     /// Reads memory of the chip.
     pub fn memory(&self, address: u32, bytes: &mut [u8]) -> bool {
         self.core.mem_read(address.into(), bytes).is_ok()
@@ -226,6 +244,24 @@ impl Machine {
         if self.memory(pointer, &mut used) && self.set_memory(moved, &used) {
             put(&mut self.core, Register::SP, moved);
         }
+    }
+
+    /// Whether the processor sleeps.
+    #[must_use]
+    pub fn is_asleep(&self) -> bool {
+        self.core.get_data().asleep
+    }
+
+    /// Continues at another address of the code, outside conditional blocks, with this value in R0 if any.
+    pub fn jump(&mut self, address: u32, argument: Option<u32>) {
+        let status = get(&self.core, Register::XPSR);
+        put(&mut self.core, Register::XPSR_NZCVQG, status & 0xF80F_01FF | 1 << 24);
+        put(&mut self.core, Register::APSR_NZCV, status & 0xF000_0000);
+        if let Some(argument) = argument {
+            put(&mut self.core, Register::R0, argument);
+        }
+        let state = self.core.get_data_mut();
+        (state.resume, state.paid, state.asleep) = (Some(address & !1), false, false);
     }
 
     /// Starts from the reset vector.
@@ -413,6 +449,8 @@ impl State {
             broken: None,
             events: (Vec::new(), false),
             profile: None,
+            watched: Vec::new(),
+            counted: vec![[0; 2]; EXCEPTIONS],
         }
     }
 
@@ -434,6 +472,8 @@ impl State {
         if let Some(profile) = &mut self.profile {
             *profile.entry((self.chip.nvic.current(), address)).or_default() += instructions;
         }
+        let counted = &mut self.counted[usize::from(self.chip.nvic.current())];
+        *counted = [counted[0] + instructions, instructions];
         let passed = self.rest + instructions * self.cost;
         self.chip.now += passed >> FRACTION;
         self.rest = passed & ((1 << FRACTION) - 1);
@@ -575,7 +615,10 @@ fn on_block(core: &mut Core<'_>, address: u32, size: u32) {
     let state = core.get_data();
     if state.hung == Some(state.chip.nvic.current()) {
         // A hung level returns to its block and never runs it.
-        put(core, Register::PC, address | 1);
+        return put(core, Register::PC, address | 1);
+    }
+    if !state.watched.is_empty() {
+        calls::follow(core, address);
     }
 }
 

@@ -218,6 +218,18 @@ impl Session {
         Ok(())
     }
 
+    /// Resets a fault: the start button is held for more than two seconds, with the switch open.
+    ///
+    /// # Errors
+    /// The model does not support an action of the processor, or no reset is recorded.
+    pub fn reset_fault(&mut self) -> Result<(), ToolError> {
+        self.set(START, true);
+        self.wait("request", &["name=reset", "accepted=true"], 2.5)?;
+        self.set(START, false);
+        // Both contacts must be open once.
+        self.run(0.1)
+    }
+
     /// Starts the board and waits until it has read its contacts as open.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use scarab_host::base::error::ToolError;
 use scarab_host::rig::bus::host::{TARGETS, compact_mapping};
 use serde::Serialize;
 
-use crate::load::CURRENT;
+use crate::load::{CURRENT, SERVO_NAME};
 use crate::report::{InterruptReport, LoadReport, interrupts, load};
 use crate::session::{Session, Step};
 use crate::time::ticks;
@@ -18,6 +18,21 @@ const MOST_MEAN: f64 = 850.0;
 const MOST_WORST: u64 = 1250;
 /// Goal: share of the processor's time while the leg holds its pose.
 const MOST_HOLDING: f64 = 0.5;
+/// Goals: most instructions of one servo interrupt, which is the leg's tick with its side of the bus. Ticks
+/// of an identification that begin a motion or take a verdict may take more; those of a host have the bus's
+/// targets.
+const MOST_SERVO: [(&str, u64); 3] = [(HOLDING, 4000), (IDENTIFYING, 5000), (FOLLOWING, 4400)];
+/// Goal: mean instructions of the servo interrupt.
+const MOST_SERVO_MEAN: f64 = 4000.0;
+/// Goals: instructions of a sample's identification; duration of the search at 8 ns an instruction, s.
+const MOST_SAMPLE: u64 = 30_000;
+const MOST_SEARCH_S: f64 = 0.5;
+const INSTRUCTION_S: f64 = 8e-9;
+/// Functions whose calls are counted: what takes a sample of the log, and a slice of the search.
+const CALLED: [(&str, &str, &str); 2] =
+    [(SAMPLE, "record::recorder::Recorder", "::push"), (SEARCH, "solve::solver::Solver", "::advance")];
+const SAMPLE: &str = "sample";
+const SEARCH: &str = "search";
 /// Situations in which both bridges switch.
 const SWITCHING: [&str; 3] = [HOLDING, IDENTIFYING, FOLLOWING];
 const HOLDING: &str = "holding";
@@ -48,9 +63,24 @@ pub struct Situation {
     pub load: LoadReport,
     /// Use by interrupt.
     pub interrupts: BTreeMap<&'static str, InterruptReport>,
+    /// Calls of the identification's functions.
+    pub calls: BTreeMap<&'static str, CallReport>,
     /// Instructions by exception and function, most first, if counted.
     #[serde(skip)]
     pub profile: Vec<(u8, String, u64)>,
+}
+
+/// Calls of one function, with the functions that it calls.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct CallReport {
+    /// Number of calls.
+    pub count: u64,
+    /// Mean instructions of a call.
+    pub mean_instructions: f64,
+    /// Most instructions of a call.
+    pub worst_instructions: u64,
+    /// Instructions of all calls at 8 ns each, s.
+    pub seconds: f64,
 }
 
 /// Measures idle, calibrating, holding, identifying and following, from a session that was just powered.
@@ -59,29 +89,35 @@ pub struct Situation {
 /// The image does not reach a situation.
 pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, ToolError> {
     let mut found = Vec::new();
+    let image = session.machine.image();
+    let entry = |(_, within, name)| {
+        let missing = || ToolError::input(format!("the image has no function {within}..{name}"));
+        image.function_in(within, name).ok_or_else(missing)
+    };
+    let entries = CALLED.into_iter().map(entry).collect::<Result<Vec<_>, _>>()?;
     session.boot()?;
-    begin(session, profiled);
+    begin(session, &entries, profiled);
     session.run(MEASURED_S)?;
     end(session, "idle", &mut found);
 
-    begin(session, profiled);
+    begin(session, &entries, profiled);
     session.step(Step::Calibrate)?;
     end(session, "calibrating", &mut found);
 
     session.step(Step::Reference)?;
     session.step(Step::Enable)?;
-    begin(session, profiled);
+    begin(session, &entries, profiled);
     session.run(MEASURED_S)?;
     end(session, HOLDING, &mut found);
 
-    begin(session, profiled);
+    begin(session, &entries, profiled);
     session.step(Step::Identify)?;
     end(session, IDENTIFYING, &mut found);
 
     let start = take_over(session)?;
     // The first cycles bring the leg into the motion.
     follow(session, start, 0..LEAD)?;
-    begin(session, profiled);
+    begin(session, &entries, profiled);
     follow(session, start, LEAD..LEAD + (MEASURED_S / CYCLE_S) as u32)?;
     end(session, FOLLOWING, &mut found);
     Ok(found)
@@ -91,13 +127,28 @@ pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, Tool
 #[must_use]
 pub fn missed_goals(found: &[Situation]) -> Vec<String> {
     let mut missed = Vec::new();
-    for Situation { name, load, interrupts, .. } in found.iter().filter(|one| SWITCHING.contains(&one.name)) {
+    for Situation { name, load, interrupts, calls, .. } in
+        found.iter().filter(|one| SWITCHING.contains(&one.name))
+    {
         let InterruptReport { mean_instructions: mean, worst_instructions: worst, .. } = interrupts[CURRENT];
         if mean > MOST_MEAN || worst > MOST_WORST {
             missed.push(format!(
                 "{name}: the current interrupt takes {mean:.1} instructions in the mean and {worst} at worst; goals \
                  {MOST_MEAN} and {MOST_WORST}"
             ));
+        }
+        let InterruptReport { mean_instructions: mean, worst_instructions: worst, .. } =
+            interrupts[SERVO_NAME];
+        let most =
+            MOST_SERVO.into_iter().find(|(situation, _)| situation == name).map_or(0, |(_, most)| most);
+        if mean > MOST_SERVO_MEAN || worst > most {
+            missed.push(format!(
+                "{name}: the servo takes {mean:.1} instructions in the mean and {worst} at worst; goals {MOST_SERVO_MEAN} and \
+                 {most}"
+            ));
+        }
+        if *name == IDENTIFYING {
+            missed.extend(missed_calls(calls));
         }
         if *name == HOLDING && load.total > MOST_HOLDING {
             let [total, most] = [load.total, MOST_HOLDING].map(|share| 100.0 * share);
@@ -107,8 +158,26 @@ pub fn missed_goals(found: &[Situation]) -> Vec<String> {
     missed
 }
 
-fn begin(session: &mut Session, profiled: bool) {
+/// Goals that the identification's functions miss, in words. A function that never ran misses its goal.
+fn missed_calls(calls: &BTreeMap<&'static str, CallReport>) -> Vec<String> {
+    type Goal = (&'static str, &'static str, fn(&CallReport) -> f64, f64);
+    let goals: [Goal; 2] = [
+        (SAMPLE, "instructions at worst", |call| call.worst_instructions as f64, MOST_SAMPLE as f64),
+        (SEARCH, "s at 8 ns an instruction", |call| call.seconds, MOST_SEARCH_S),
+    ];
+    let missed = goals.into_iter().filter_map(|(name, unit, value, goal)| {
+        match calls.get(name).filter(|call| call.count > 0).map(value) {
+            Some(found) if found <= goal => None,
+            Some(found) => Some(format!("{IDENTIFYING}: {name}: {found} {unit}; goal {goal}")),
+            None => Some(format!("{IDENTIFYING}: {name}: never ran")),
+        }
+    });
+    missed.collect()
+}
+
+fn begin(session: &mut Session, entries: &[u32], profiled: bool) {
     session.begin_measurement();
+    session.machine.watch(entries);
     if profiled {
         session.machine.begin_profile();
     }
@@ -119,8 +188,24 @@ fn end(session: &Session, name: &'static str, found: &mut Vec<Situation>) {
         name,
         load: load(session),
         interrupts: interrupts(session),
+        calls: calls(session),
         profile: session.machine.profile(),
     });
+}
+
+/// Calls of the watched functions.
+fn calls(session: &Session) -> BTreeMap<&'static str, CallReport> {
+    let calls = session.machine.calls();
+    let named = CALLED.into_iter().zip(calls).map(|((name, ..), calls)| {
+        let report = CallReport {
+            count: calls.count,
+            mean_instructions: calls.instructions as f64 / calls.count.max(1) as f64,
+            worst_instructions: calls.worst,
+            seconds: calls.instructions as f64 * INSTRUCTION_S,
+        };
+        (name, report)
+    });
+    named.collect()
 }
 
 /// A host with the compact mapping (docs/bus.md) enables both joints; returns their positions.
@@ -206,6 +291,7 @@ mod tests {
     use super::*;
 
     fn situation(name: &'static str, mean: f64, worst: u64, total: f64) -> Situation {
+        let call = CallReport { count: 2, mean_instructions: 0.0, worst_instructions: 4000, seconds: 0.5 };
         let interrupt = InterruptReport {
             per_second: 48_000.0,
             mean_instructions: mean,
@@ -222,7 +308,48 @@ mod tests {
             housekeeping: 0.0,
             thread: 0.0,
         };
-        Situation { name, load, interrupts: BTreeMap::from([(CURRENT, interrupt)]), profile: Vec::new() }
+        let servo =
+            InterruptReport { mean_instructions: 800.0, worst_instructions: 1200, ..interrupt.clone() };
+        Situation {
+            name,
+            load,
+            interrupts: BTreeMap::from([(CURRENT, interrupt), (SERVO_NAME, servo)]),
+            calls: CALLED.map(|(name, ..)| (name, call)).into(),
+            profile: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_missed_goal_of_servo_or_identification_is_named() {
+        let with = |name, change: fn(&mut Situation)| {
+            let mut situation = situation(name, 800.0, 1200, 0.4);
+            change(&mut situation);
+            missed_goals(&[situation]).join("; ")
+        };
+        fn call<'a>(situation: &'a mut Situation, name: &str) -> &'a mut CallReport {
+            situation.calls.get_mut(name).expect("there")
+        }
+        fn servo(situation: &mut Situation) -> &mut InterruptReport {
+            situation.interrupts.get_mut(SERVO_NAME).expect("there")
+        }
+        assert_eq!(with(FOLLOWING, |one| servo(one).worst_instructions = 4400), "");
+        assert_eq!(
+            with(FOLLOWING, |one| servo(one).worst_instructions = 4401),
+            "following: the servo takes 800.0 instructions in the mean and 4401 at worst; goals 4000 and 4400"
+        );
+        assert_eq!(
+            with(HOLDING, |one| servo(one).mean_instructions = 4000.5),
+            "holding: the servo takes 4000.5 instructions in the mean and 1200 at worst; goals 4000 and 4000"
+        );
+        assert_eq!(
+            with(IDENTIFYING, |one| call(one, SAMPLE).worst_instructions = 30_001),
+            "identifying: sample: 30001 instructions at worst; goal 30000"
+        );
+        assert_eq!(
+            with(IDENTIFYING, |one| call(one, SEARCH).seconds = 0.51),
+            "identifying: search: 0.51 s at 8 ns an instruction; goal 0.5"
+        );
+        assert_eq!(with(IDENTIFYING, |one| call(one, SEARCH).count = 0), "identifying: search: never ran");
     }
 
     #[test]

@@ -332,7 +332,11 @@ impl Bench<'_> {
             ("nothing arrived", Box::new(|image| image.fill(0xFF)), ProgramError::NoProgram),
             ("no magic word", Box::new(flip(header)), ProgramError::NoProgram),
             ("image of another board", Box::new(flip(header + 4)), ProgramError::Format),
-            ("length beyond the sectors", Box::new(resealed(header + 8, Region::IMAGE.bytes() + 4)), ProgramError::Format),
+            (
+                "length beyond the sectors",
+                Box::new(resealed(header + 8, Region::IMAGE.bytes() + 4)),
+                ProgramError::Format,
+            ),
             ("length not in words", Box::new(resealed(header + 8, 1001)), ProgramError::Format),
             ("length too short", Box::new(resealed(header + 8, 1000)), ProgramError::Checksum),
             ("not sealed", Box::new(resealed(header + 8, u32::MAX)), ProgramError::Format),

@@ -3,8 +3,8 @@
 //! `cargo run --release --example damped_oscillation -- [seed]`
 //!
 //! The search advances in slices of a few evaluations, as in a task of low priority. It ends when its cost
-//! has reached the noise, when its budget is spent, or when it is cancelled. `scripts/count-instructions`
-//! runs the same objective (objective.rs) on the emulated microcontroller.
+//! has reached the noise, when its budget is spent, or when it is cancelled. The objective
+//! (objective.rs) is generic over the precision.
 
 mod objective;
 

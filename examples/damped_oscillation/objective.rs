@@ -1,7 +1,6 @@
 //! A user's own objective: the five parameters of a damped oscillation, from samples.
 //!
-//! Generic, without `std` and without a heap: the example on the host, a test and the image that counts
-//! instructions on the emulated microcontroller all use this file.
+//! Generic, without `std` and without a heap: the example and a test use this file.
 //!
 //!   y(t) = amplitude exp(-decay t) cos(frequency t + phase) + offset,   cost = mean of (y - sample)^2
 

@@ -1,6 +1,6 @@
 //! Description of a simulated leg as plain numbers, without heap or text.
 //!
-//! A host tool fills these structures from a leg file, an emulated image from constants. Bodies are given as
+//! A host tool fills these structures from a leg file. Bodies are given as
 //! the firmware's users state them, in modified Denavit-Hartenberg frames; `conventions` translates. Nothing
 //! is checked here; readers of external numbers check them (the host's `formats::leg_file` does).
 

@@ -19,13 +19,6 @@
 //! | [`gear`], [`sensors`], [`pushes`] | ratio; encoder and current sensor; pushes of the wearer |
 //! | [`wearer`] | a wearer with a body of their own: limb, cuffs, muscles, intended motions |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
-//!
-//! The plant needs neither `std` nor a heap. Without the feature `wearer`, as in the emulated image, it has
-//! no body of a wearer.
-#![no_std]
-
-#[cfg(test)]
-extern crate std;
 
 pub mod conventions;
 pub mod description;
@@ -42,6 +35,5 @@ mod maths;
 pub mod mechanism;
 pub mod pushes;
 pub mod sensors;
-#[cfg(feature = "wearer")]
 pub mod wearer;
 pub mod world;

@@ -1,7 +1,7 @@
 //! The plant's own access to `libm`, separate from the firmware's.
 //!
-//! Double precision throughout. The functions are identical on the host, in the emulator and without `std`,
-//! so a seed gives identical bits everywhere.
+//! Double precision throughout. The functions are identical on every host, so a seed gives identical bits
+//! everywhere.
 
 /// Sine and cosine of an angle in rad.
 #[expect(clippy::disallowed_methods, reason = "this file is the plant's only access to libm")]

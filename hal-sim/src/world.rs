@@ -21,12 +21,12 @@ use crate::grip::Grip;
 use crate::leg::{Leg, LegState};
 use crate::pushes::Pushes;
 use crate::sensors::{CurrentSensor, Encoder};
+use crate::wearer::Wearer;
 use periods::{Electric, PERIODS_PER_TICK};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, SERVO_RATE_HZ, Sample};
 use scarab::units::Ampere;
-use worn::Wearer;
 
 /// Servo rate, Hz.
 pub const TICK_RATE_HZ: f64 = SERVO_RATE_HZ as f64;

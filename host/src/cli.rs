@@ -6,7 +6,6 @@ mod commission;
 pub mod common;
 mod compare;
 mod eds;
-mod emulate;
 mod excite;
 mod export;
 mod faults;
@@ -47,7 +46,7 @@ use crate::formats::shard::Argument;
 #[command(name = "scarab", version, max_term_width = HELP_WIDTH, after_help = "\
 Options without a command belong to `identify`. `scarab COMMAND --help` has an example of each.
 Your data: leg, replay, predict, compare, export, regressor. Simulation: identify, live, excite, monitor, assist, motor, serve.
-Board: fw, flash-leg, commission, update, node-ids, trace, eds, kept. The project's own checks: faults, emulate. Shards of a campaign: merge.")]
+Board: fw, flash-leg, commission, update, node-ids, trace, eds, kept. The project's own checks: faults. Shards of a campaign: merge.")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -123,9 +122,6 @@ enum Command {
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     #[command(after_help = "Example: cargo sim regressor --leg my-leg.toml --states states.csv")]
     Regressor(regressor::RegressorArguments),
-    /// Run the whole firmware on an emulated microcontroller (`cargo emulate`).
-    #[command(after_help = "Example: cargo emulate --trace run.defmt")]
-    Emulate(emulate::EmulateArguments),
     /// Build the flash image of a leg and print its size (`cargo fw`).
     #[command(after_help = "Example: cargo fw --leg my-leg.toml")]
     Fw(image::FirmwareArguments),
@@ -226,7 +222,6 @@ fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
         Command::Assist(arguments) => assist::run(arguments),
         Command::Motor(arguments) => motor::run(arguments),
         Command::Regressor(arguments) => regressor::run(arguments),
-        Command::Emulate(arguments) => emulate::emulate(arguments),
         Command::Fw(arguments) => image::firmware(arguments),
         Command::FlashLeg(arguments) => image::flash_leg(arguments),
         Command::Identify(arguments) => identify::run(arguments, stated),

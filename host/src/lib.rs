@@ -11,7 +11,7 @@
 //! | [`client`] | CANopen master behind an slcan adapter |
 //! | [`rig`] | firmware and simulated hardware put together, the bus included |
 //! | [`run`] | one experiment each: identify, replay, monitor, design of a motion, motor stand, prediction |
-//! | [`image`] | the flash image, and the whole firmware in the emulator |
+//! | [`image`] | the flash image |
 //! | [`faults`] | the fault catalogue, injected into the whole firmware |
 //! | [`view`] | tables, figures and pages, with the live page's server; runs no experiment |
 //! | [`cli`] | the command line |

@@ -15,7 +15,7 @@
 //! where little of the stack is left. The processor could not store the fault's address. Instead the record
 //! names the caller of the deepest function, found at the bottom of the stack.
 //!
-//! Cost: `cargo emulate --crash`, in docs/board.md.
+//! Cost: `cargo chip crashes`, in docs/results/board.md.
 //! Known limit: after an overflow the caller is the first word at the stack's bottom that may be a return
 //! address. A code address in an array would be mistaken for it.
 #![expect(

@@ -10,7 +10,7 @@
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use cortex_m::peripheral::SCB;
-use cortex_m::peripheral::scb::{Exception, VectActive};
+use cortex_m::peripheral::scb::VectActive;
 use cortex_m::register::{basepri, basepri_max};
 use critical_section::{Impl, RawRestoreState, set_impl};
 
@@ -39,10 +39,7 @@ unsafe impl Impl for Masked {
     }
 }
 
-/// Whether the active vector is never masked: 10, 18, 23, 40, 77 (RM0090 table 61), or the emulator's clock.
+/// Whether the active vector is never masked: 10, 18, 23, 40, 77 (RM0090 table 61).
 fn is_above_the_floor() -> bool {
-    matches!(
-        SCB::vect_active(),
-        VectActive::Interrupt { irqn: 10 | 18 | 23 | 40 | 77 } | VectActive::Exception(Exception::SysTick)
-    )
+    matches!(SCB::vect_active(), VectActive::Interrupt { irqn: 10 | 18 | 23 | 40 | 77 })
 }

@@ -4,12 +4,12 @@
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub mod copy;
-#[cfg(all(feature = "tasks", target_os = "none"))]
+#[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
 pub mod crash;
-#[cfg(all(feature = "tasks", target_os = "none"))]
+#[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
 pub mod critical_section;
 pub mod odrive_v3_6;
-#[cfg(all(feature = "tasks", target_os = "none"))]
+#[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
 pub mod stack;
-#[cfg(all(feature = "tasks", target_os = "none"))]
+#[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
 pub mod windings;

@@ -10,7 +10,7 @@
 //!
 //! The board runs control in an interrupt and identification at the lowest priority, and passes the values
 //! between them. On the host [`Leg`] holds both halves in one value that can be cloned, compared and resumed.
-//! Host tool, emulated image and board run the same code.
+//! Host tool and board run the same code.
 //!
 //! ```text
 //! Idle --identify--> Approach -> Excite -> Settle -> Solve -> Validate (Approach, Run; 3 times) -> Judge

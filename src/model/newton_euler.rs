@@ -18,7 +18,7 @@
 //!
 //! Source: Luh, Walker and Paul 1980; this form W. Khalil and E. Dombre, Modeling, Identification and Control
 //! of Robots, 2002, Eqs (9.86)-(9.94). Cost: about 200 flops per joint; a leg's tick takes 754 instructions
-//! more with the model than without (`scripts/count-instructions`; two joints, friction and fading included).
+//! more with the model than without (docs/results/bus.md; two joints, friction and fading included).
 //! Numbers that are not finite pass through.
 
 use nalgebra::Vector3;

@@ -25,7 +25,7 @@
 //! Source: C. G. Atkeson, C. H. An and J. M. Hollerbach 1986 (linear form); the
 //! axes are the Jacobian's columns.
 //! Cost: about 90 flops per pair (i, j) and 90 per link; 1,550 instructions for two joints in `f32` on a
-//! Cortex-M4F (emulated), 95 for a row times the parameters. Memory: 56 N^2 bytes in `f32`. Numbers that are
+//! Cortex-M4F, 95 for a row times the parameters. Memory: 56 N^2 bytes in `f32`. Numbers that are
 //! not finite pass through.
 
 use nalgebra::Vector3;

@@ -47,7 +47,7 @@
 //! and current both grow with the joint's flexion: [`AxisConfiguration::flexion`] states the
 //! counter's direction then.
 //!
-//! Cost: `scripts/count-instructions`.
+//! Cost: docs/results/motor.md, instructions.
 
 use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;

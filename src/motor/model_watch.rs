@@ -56,7 +56,7 @@
 //! False alarms: those of the simulated hours in docs/results/faults.md. The margin between a healthy motor's
 //! residual and the limits has not been measured on a motor.
 //! Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10.
-//! Cost: `scripts/count-instructions`, checks; 44 bytes.
+//! Cost: docs/results/motor.md, checks; 44 bytes.
 
 use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;

@@ -10,7 +10,7 @@
 //! Currents flow into the motor. `ampere_per_code` is signed, one for each shunt; `zero` is the
 //! current-sensor offset that calibration measures. Source of the board's numbers: ODrive v3.6 firmware (0.5
 //! mOhm, 40 V/V, 3.3 V of 4,096 codes, divider 19).
-//! Cost: 45 instructions, rails included (`scripts/count-instructions`).
+//! Cost: 45 instructions, rails included (docs/results/motor.md).
 
 use super::Stationary;
 use crate::units::{Ampere, Volt};

@@ -278,7 +278,7 @@ impl<const N: usize> Default for Queues<N> {
     }
 }
 
-/// Queues of the assistance, separate from [`Queues`] because the emulated image has none.
+/// Queues of the assistance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssistQueues<const N: usize> {
     sessions: Queue<AssistSession<N>, 2>,

@@ -8,7 +8,7 @@
 //! 3. The monitor decides, last.
 //! 4. The integrals are updated with the applied torque.
 //!
-//! Cost: most of the leg's tick, which `scripts/count-instructions` counts (Cortex-M4F, two joints, enabled).
+//! Cost: most of the leg's tick, which `cargo chip load` counts (Cortex-M4F, two joints, enabled).
 //!
 //! Values that are not finite pass through to the monitor, which switches off in that tick, and enter no
 //! state: observers take only integers and a bounded acceleration, integrals are cleared.

@@ -1,8 +1,8 @@
 //! Test functions with a known minimum, over the boxes for which this module's figures hold.
 //!
-//! Why in the firmware: the tests judge every search on these functions in both precisions, on the host and
-//! in the emulator. Every figure of a search depends on the box, so function and box are one value. Here i
-//! counts from 0 and c_i is the shift of coordinate i.
+//! Why in the firmware: the tests judge every search on these functions in both precisions. Every figure of a
+//! search depends on the box, so function and box are one value. Here i counts from 0 and c_i is the shift of
+//! coordinate i.
 //!
 //! | function | value | box | minimum |
 //! | --- | --- | --- | --- |

@@ -23,9 +23,10 @@ use heapless::spsc::{Consumer, Producer, Queue};
 
 use super::SIGNALS;
 use super::leg::{BASE, JOINTS};
+use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::bus::device::Device;
 use crate::bus::identification::ResultsCopy;
-use crate::hal::{Frame, Hardware};
+use crate::hal::Frame;
 use crate::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, StoreJob};
 use crate::place::{each, fill};
 use crate::store::ModelRecord;
@@ -129,22 +130,22 @@ impl ThreadEnd {
 }
 
 impl BusLoop {
-    fn run(&mut self, hardware: &mut impl Hardware<JOINTS>) {
+    fn run(&mut self) {
         while let Some(fresh) = self.fresh.dequeue() {
             let _ = self.spare.enqueue(core::mem::replace(&mut self.found, fresh));
         }
         self.found.search = SIGNALS.statistics.search.each_ref().map(|count| count.get());
-        self.round.round(self.device, &mut self.ends, self.storage, &SIGNALS, hardware, &*self.found);
+        self.round.round(self.device, &mut self.ends, self.storage, &SIGNALS, &mut Odrive, &*self.found);
     }
 }
 
 /// Interrupt of level 5.
 #[inline(always)]
-pub fn interrupt(hardware: &mut impl Hardware<JOINTS>) {
+pub fn interrupt() {
     if let Some(mut bus) = BUS.try_lock()
         && let Some(bus) = bus.as_mut()
     {
-        bus.run(hardware);
+        bus.run();
     }
 }
 

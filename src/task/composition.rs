@@ -4,17 +4,16 @@ use embassy_executor::Executor;
 use heapless::spsc::{Consumer, Producer};
 use static_cell::{ConstStaticCell, StaticCell};
 
-use super::identify::{BoardFunctions, Introduction, crashed};
 use super::leg::JOINTS;
 use super::{SIGNALS, assist, bus, current, housekeeping, identify, leg, memory, servo, storage, vectors};
 use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::board::odrive_v3_6::identity::{Identity, Reset};
-use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
+use crate::board::odrive_v3_6::settings::analog::HOTTEST_C;
 use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
-use crate::board::odrive_v3_6::{brake, can, converter, holding_brake, program, status_light, watchdog};
-use crate::board::{stack, windings};
+use crate::board::odrive_v3_6::{can, converter, holding_brake, program, status_light, watchdog};
+use crate::board::windings;
 use crate::bus::drive::AxisConstants;
 use crate::bus::{LONGEST, NodeId, Storing};
 use crate::leg::{Control, Following, StoredCalibration};
@@ -26,7 +25,6 @@ use crate::operation::{
 use crate::safety::InhibitReason;
 use crate::store::Key;
 use crate::trace::Record;
-use cortex_m::peripheral::DWT;
 
 /// Arguments of the housekeeping's task.
 type Housekeeping = (Housekeeper<JOINTS>, HousekeepingEnds<'static, JOINTS>, Odrive);
@@ -68,18 +66,8 @@ fn hand_out(
     judge(&board);
     // With the largest divider no voltage reads too low; a board of unknown version enables nothing.
     let divider = analog::divider(board.identity.version).unwrap_or(SenseScale::DIVIDER);
-    let functions = BoardFunctions {
-        clock: DWT::cycle_count,
-        clock_hz: board.clock_hz,
-        stack_used: stack::used,
-        stack_bytes: stack::bytes,
-        volt_per_code: Some(analog::sense(divider).volt_per_code),
-        temperatures_c: || converter::thermistors().map(|code| temperature_c(code).unwrap_or(f32::NAN)),
-        chopper_duty: brake::duty,
-        // The probe reads at its own pace; nothing to do.
-        reported: || (),
-    };
-    identify::introduce(&introduction(&board), board.clock_hz);
+    let volt_per_code = analog::sense(divider).volt_per_code;
+    identify::introduce(&board);
     let built = memory::identification();
     static QUEUES: ConstStaticCell<Queues<JOINTS>> = ConstStaticCell::new(Queues::new());
     const { assert!(!status_light::HAS_LIGHT || leg::LEG.holding_brake.is_none(), "both use GPIO6") };
@@ -110,7 +98,6 @@ fn hand_out(
     servo_ends.host = host;
     match control {
         Some(control) => {
-            let volt_per_code = analog::sense(divider).volt_per_code;
             let level = ServoLevel::new(&control, drives::derating(divider), volt_per_code, following)
                 .with_supply(leg::LEG.supply)
                 .with_holding_brake(leg::LEG.holding_brake);
@@ -118,8 +105,7 @@ fn hand_out(
                 holding_brake::prepare();
             }
             static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
-            let clock = functions.clock;
-            place(&servo::SERVO, SERVO.init(servo::ServoLoop { control, level, ends: servo_ends, clock }));
+            place(&servo::SERVO, SERVO.init(servo::ServoLoop { control, level, ends: servo_ends }));
         }
         None => SIGNALS.inhibit.raise(InhibitReason::Configuration),
     }
@@ -141,7 +127,7 @@ fn hand_out(
     let thread = built.map(|(configuration, built)| identify::Thread {
         identification: built,
         ends: identification,
-        board: functions,
+        volt_per_code,
         bus: results.map(|results| (results, configuration)),
     });
     let gate_drivers = board.gate_drivers.with_encoders(leg::LEG.joints.map(|joint| joint.motor.absolute));
@@ -232,13 +218,6 @@ fn take_model(control: &mut Control<JOINTS>, key: Key, restored: &storage::Resto
     let &storage::RestoredModel { model, wearing, .. } = restored;
     (key != Key::Model || control.adopt(model))
         && wearing.is_none_or(|wearing| control.set_model(wearing, model))
-}
-
-fn introduction(board: &Board) -> Introduction {
-    let identity = &board.identity;
-    let crash = board.crash.map(crashed);
-    let Identity { unique, version, reset, brown_out } = *identity;
-    Introduction { unique, version, brown_out, reset: reset.name(), crash }
 }
 
 /// Raises the inhibit reasons that the start found.

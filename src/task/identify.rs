@@ -10,6 +10,11 @@ use super::SIGNALS;
 use super::bus::ThreadEnd;
 use super::leg::{BASE, JOINTS, LEG, Leg, LegIdentification};
 use crate::board::crash::Crash;
+use crate::board::odrive_v3_6::settings::CLOCK_HZ;
+use crate::board::odrive_v3_6::settings::analog::temperature_c;
+use crate::board::odrive_v3_6::start::Board;
+use crate::board::odrive_v3_6::{brake, converter};
+use crate::board::stack;
 use crate::leg::{Activity, IdentifyPhase, LoggedSample};
 use crate::operation::{IdentificationEnds, IdentificationLevel, Slice};
 use crate::servo::{LOG_RATE_HZ, SERVO_RATE_HZ};
@@ -34,57 +39,14 @@ fn send(record: &Record<JOINTS>) {
     record.emit(NUMBER.fetch_add(1, Ordering::Relaxed));
 }
 
-/// Functions and constants of one board, as values: so the same task runs on the board and in the emulator.
-#[derive(Clone, Copy)]
-pub struct BoardFunctions {
-    /// Clock in processor cycles (instructions in the emulator); wraps.
-    pub clock: fn() -> u32,
-    /// Frequency of that clock, Hz.
-    pub clock_hz: u32,
-    /// Deepest use of the stack so far, bytes.
-    pub stack_used: fn() -> u32,
-    /// Size of the stack, bytes.
-    pub stack_bytes: fn() -> u32,
-    /// Bus voltage per code; `None` where it is not measured.
-    pub volt_per_code: Option<Volt>,
-    /// Temperatures of both bridges and the chopper, degrees Celsius; NaN where not measured.
-    pub temperatures_c: fn() -> [f32; JOINTS + 1],
-    /// Duty of the brake resistor.
-    pub chopper_duty: fn() -> f32,
-    /// Called when a result has been reported completely.
-    pub reported: fn(),
-}
-
-/// Data of the records sent at the start.
-#[derive(Clone, Copy)]
-pub struct Introduction {
-    /// Unique number of the board, lowest word first.
-    pub unique: [u32; 3],
-    /// Factory version: major, minor, voltage; 255 where nothing was written.
-    pub version: [u8; 3],
-    /// Brown-out reset level, 0 (off) to 3.
-    pub brown_out: u8,
-    /// Reason of the last reset, as in records.
-    pub reset: &'static str,
-    /// Crash that ended the previous run.
-    pub crash: Option<Record<JOINTS>>,
-}
-
-/// Converts a crash to its record.
-#[must_use]
-pub fn crashed(crash: &'static Crash) -> Record<JOINTS> {
-    let Crash { pc, lr, status, address, line, released, kept, .. } = *crash;
-    Record::Crash { cause: crash.cause(), pc, lr, status, address, line, file: crash.file(), released, kept }
-}
-
 /// State of the thread.
 pub struct Thread {
     /// Identification half of the leg.
     pub identification: &'static mut LegIdentification,
     /// The thread's ends of the queues.
     pub ends: IdentificationEnds<'static, JOINTS>,
-    /// Access to the board.
-    pub board: BoardFunctions,
+    /// Bus voltage per code.
+    pub volt_per_code: Volt,
     /// Results for the bus, if there is one, and the leg's configuration.
     pub bus: Option<(ThreadEnd, &'static Leg)>,
 }
@@ -99,9 +61,9 @@ struct State {
 }
 
 /// Sends the records of the start.
-pub fn introduce(introduction: &Introduction, clock_hz: u32) {
-    let Introduction { unique, version, brown_out, reset, crash } = introduction;
-    let ([uid0, uid1, uid2], [version, version_minor, version_volt]) = (*unique, *version);
+pub fn introduce(board: &Board) {
+    let [uid0, uid1, uid2] = board.identity.unique;
+    let [version, version_minor, version_volt] = board.identity.version;
     send(&Record::Boot {
         grammar: GRAMMAR,
         version: env!("CARGO_PKG_VERSION"),
@@ -110,11 +72,23 @@ pub fn introduce(introduction: &Introduction, clock_hz: u32) {
         base: BASE as u8,
         servo_hz: SERVO_RATE_HZ,
         log_hz: LOG_RATE_HZ,
-        reset,
+        reset: board.identity.reset.name(),
     });
-    send(&Record::Board { uid0, uid1, uid2, version, version_minor, version_volt, clock_hz, brown_out: *brown_out });
-    if let Some(crash) = crash {
-        send(crash);
+    let clock_hz = CLOCK_HZ;
+    send(&Record::Board {
+        uid0,
+        uid1,
+        uid2,
+        version,
+        version_minor,
+        version_volt,
+        clock_hz,
+        brown_out: board.identity.brown_out,
+    });
+    if let Some(crash) = board.crash {
+        let Crash { pc, lr, status, address, line, released, kept, .. } = *crash;
+        let (cause, file) = (crash.cause(), crash.file());
+        send(&Record::Crash { cause, pc, lr, status, address, line, file, released, kept });
     }
 }
 
@@ -224,7 +198,6 @@ impl Thread {
                 None => {
                     state.report = None;
                     self.send_loops(state);
-                    (self.board.reported)();
                 }
             }
         }
@@ -253,11 +226,10 @@ impl Thread {
     }
 
     fn send_supply(&self, state: &State) {
-        let board = &self.board;
-        let Some(volt_per_code) = board.volt_per_code else { return };
         let [now, low, high] = &SIGNALS.statistics.bus;
-        let volt = |code: u32| volt_per_code.0 * code.min(4095) as f32;
-        let [first, second, chopper] = (board.temperatures_c)();
+        let volt = |code: u32| self.volt_per_code.0 * code.min(4095) as f32;
+        let [first, second, chopper] =
+            converter::thermistors().map(|code| temperature_c(code).unwrap_or(f32::NAN));
         send(&Record::Supply {
             tick: state.level.tick(),
             bus_v: volt(now.get()),
@@ -265,18 +237,17 @@ impl Thread {
             bus_high_v: volt(high.swap(0)),
             bridge_c: [first, second],
             chopper_c: chopper,
-            chopper_duty: (board.chopper_duty)(),
+            chopper_duty: brake::duty(),
             winding_c: core::array::from_fn(|joint| SIGNALS.winding_c(joint)),
         });
     }
 
     fn send_loops(&self, state: &State) {
         let statistics = &SIGNALS.statistics;
-        let board = &self.board;
         let [current_worst, servo_worst] =
             [&statistics.current_worst, &statistics.servo_worst].map(|worst| worst.swap(0));
         for (longest, cycles) in statistics.longest_ns.iter().zip([current_worst, servo_worst]) {
-            longest.set((cycles as f32 * (1e9 / board.clock_hz as f32)) as u32);
+            longest.set((cycles as f32 * (1e9 / CLOCK_HZ as f32)) as u32);
         }
         send(&Record::Loops {
             tick: state.level.tick(),
@@ -284,9 +255,9 @@ impl Thread {
             servo_worst,
             current_missed: statistics.current_missed.get(),
             servo_missed: statistics.servo_missed.get(),
-            cycles_per_tick: board.clock_hz / SERVO_RATE_HZ,
-            stack_used: (board.stack_used)(),
-            stack_bytes: (board.stack_bytes)(),
+            cycles_per_tick: CLOCK_HZ / SERVO_RATE_HZ,
+            stack_used: stack::used(),
+            stack_bytes: stack::bytes(),
             samples_lost: statistics.samples_lost.get(),
             records_lost: statistics.records_lost.get(),
         });

@@ -19,26 +19,18 @@
 use self::leg::JOINTS;
 use crate::operation::Signals;
 
-#[cfg(feature = "board-odrive-v3-6")]
 pub mod assist;
 pub mod bus;
-#[cfg(feature = "board-odrive-v3-6")]
 mod composition;
-#[cfg(feature = "board-odrive-v3-6")]
 pub mod current;
-#[cfg(feature = "board-odrive-v3-6")]
 pub mod housekeeping;
 pub mod identify;
 pub mod leg;
-#[cfg(feature = "board-odrive-v3-6")]
 mod memory;
 pub mod servo;
-#[cfg(feature = "board-odrive-v3-6")]
 pub mod storage;
-#[cfg(feature = "board-odrive-v3-6")]
 mod vectors;
 
-#[cfg(feature = "board-odrive-v3-6")]
 pub use composition::run;
 
 /// Words that all levels share.

@@ -1,8 +1,10 @@
 //! Level 1 on the board: the interrupt around `operation::ServoLevel`.
 
+use cortex_m::peripheral::DWT;
+
 use super::SIGNALS;
 use super::leg::{JOINTS, LEG};
-use crate::hal::Hardware;
+use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::leg::Control;
 use crate::operation::{ServoEnds, ServoLevel};
 
@@ -14,8 +16,6 @@ pub struct ServoLoop {
     pub level: ServoLevel<JOINTS>,
     /// The level's ends of the queues.
     pub ends: ServoEnds<'static, JOINTS>,
-    /// Clock in processor cycles; wraps.
-    pub clock: fn() -> u32,
 }
 
 /// State of level 1, once the start has set it.
@@ -23,14 +23,14 @@ pub static SERVO: spin::Mutex<Option<&'static mut ServoLoop>> = spin::Mutex::new
 
 /// Interrupt of the servo.
 #[inline(always)]
-pub fn interrupt(hardware: &mut impl Hardware<JOINTS>) {
+pub fn interrupt() {
     let statistics = &SIGNALS.statistics;
     if let Some(mut servo) = SERVO.try_lock()
         && let Some(servo) = servo.as_mut()
     {
-        let begun = (servo.clock)();
-        let _ = servo.level.tick(&mut servo.control, LEG.gravity, &mut servo.ends, &SIGNALS, hardware);
-        statistics.servo_worst.raise((servo.clock)().wrapping_sub(begun));
+        let begun = DWT::cycle_count();
+        let _ = servo.level.tick(&mut servo.control, LEG.gravity, &mut servo.ends, &SIGNALS, &mut Odrive);
+        statistics.servo_worst.raise(DWT::cycle_count().wrapping_sub(begun));
     }
     statistics.servo_ticks.add();
 }

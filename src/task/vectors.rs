@@ -7,7 +7,6 @@ use embassy_stm32::interrupt::{
 };
 
 use super::{SIGNALS, assist, bus, current, servo};
-use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::board::odrive_v3_6::{can, contacts, encoder};
 use crate::safety::InhibitReason;
 
@@ -30,7 +29,7 @@ fn ADC() {
 
 #[interrupt]
 fn OTG_HS() {
-    servo::interrupt(&mut Odrive);
+    servo::interrupt();
 }
 
 #[interrupt]
@@ -66,7 +65,7 @@ fn CAN1_RX0() {
 #[interrupt]
 fn CAN1_TX() {
     can::acknowledge();
-    bus::interrupt(&mut Odrive);
+    bus::interrupt();
 }
 
 #[interrupt]

@@ -1,7 +1,8 @@
 //! Trace of a leg: records of one line each, for programs to read.
 //!
-//! Why a separate grammar: the same lines come from the board over a debug probe, from the emulator, and from
-//! a log file a year later. A program cannot read sentences back, and a person cannot read a binary table.
+//! Why a separate grammar: the same lines come from the board over a debug probe, from the model of its
+//! microcontroller, and from a log file a year later. A program cannot read sentences back, and a person
+//! cannot read a binary table.
 //!
 //! ```text
 //! line   = kind *(" " key "=" value)               parameter n=41 joint=2 symbol=ZZ value=0.3127 ...

@@ -36,7 +36,7 @@ macro_rules! trace_records {
         /// Cause of the last reset.
         reset: &'static str,
     }
-    /// Board identity and clock; all zero in the emulator.
+    /// Board identity and clock.
     Board "board n={=u32} uid0={=u32:#x} uid1={=u32:#x} uid2={=u32:#x} version={=u8} version_minor={=u8} version_volt={=u8} clock_hz={=u32} brown_out={=u8}" {
         /// Lowest word of the chip's unique number.
         uid0: u32,
@@ -410,7 +410,7 @@ macro_rules! trace_records {
     Loops "loops n={=u32} tick={=u32} current_worst={=u32} servo_worst={=u32} current_missed={=u32} servo_missed={=u32} cycles_per_tick={=u32} stack_used={=u32} stack_bytes={=u32} samples_lost={=u32} records_lost={=u32}" {
         /// Servo tick.
         tick: u32,
-        /// Longest current tick of either axis, processor cycles (instructions in the emulator).
+        /// Longest current tick of either axis, processor cycles.
         current_worst: u32,
         /// Longest servo tick, processor cycles; includes interruptions by current ticks.
         servo_worst: u32,

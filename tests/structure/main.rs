@@ -75,8 +75,8 @@ const SOURCES: [&str; 9] = [
     "hal-sim/src",
     "host/src",
     "paper/src",
-    "emulated/src",
     "chip/src",
+    "chip/drivers/src",
     "readers/src",
     "python/src",
 ];
@@ -88,19 +88,17 @@ const PLANT: [&str; 2] = ["hal", "units"];
 const MATHS_MODULES: [&str; 2] = ["src/real.rs", "hal-sim/src/maths.rs"];
 
 /// Files (and folders) that may contain `unsafe`: the hardware square root, in-place construction, the
-/// boards' layers, the flash image's memory sections and interrupt vectors, the two images for the emulator,
-/// the bootloader, and the program that checks the chip model.
-const UNSAFE_ALLOWED: [&str; 10] = [
+/// boards' layers, the flash image's memory sections and interrupt vectors, the bootloader, and the program
+/// that checks the chip model.
+const UNSAFE_ALLOWED: [&str; 8] = [
     "src/real.rs",
     "src/place.rs",
     "src/board/",
     "src/task/memory.rs",
     "src/task/vectors.rs",
     "boot/src/main.rs",
-    "emulated/src/bin/count-instructions/counter.rs",
-    "emulated/src/bin/drivers/main.rs",
-    "emulated/src/bin/drivers/processor.rs",
-    "emulated/src/bin/emulated/",
+    "chip/drivers/src/main.rs",
+    "chip/drivers/src/processor.rs",
 ];
 
 /// Absolute folders that exist on one machine only; split, so that this file does not name one itself.
@@ -279,9 +277,7 @@ const LARGEST_COMMENT_WIDTH: usize = 110;
 #[test]
 fn comments_begin_with_their_subject_and_are_at_most_110_columns_wide() {
     let mut offences = Vec::new();
-    for folder in
-        ["src", "hal-sim", "host", "paper", "emulated", "chip", "readers", "python", "tests", "examples"]
-    {
+    for folder in ["src", "hal-sim", "host", "paper", "chip", "readers", "python", "tests", "examples"] {
         for file in source_files(folder) {
             for (number, line) in file.text.lines().enumerate() {
                 if let Some(why) = comment_offence(line) {
@@ -475,7 +471,7 @@ fn source_files(folder: &str) -> Vec<File> {
 /// Files that people read or run: sources, documents, settings and scripts.
 fn text_files() -> Vec<File> {
     let mut files = Vec::new();
-    for folder in ["src", "hal-sim", "host", "paper", "emulated", "tests", "docs", "scripts", ".cargo"] {
+    for folder in ["src", "hal-sim", "host", "paper", "tests", "docs", "scripts", ".cargo"] {
         collect(&workspace().join(folder), &["rs", "md", "toml", "py", "sh", ""], &mut files);
     }
     for name in [

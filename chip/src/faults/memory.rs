@@ -1,4 +1,4 @@
-//! M1, M2: a stack that grows beyond its memory, and bits that flip in gains and limits.
+//! K4, M1, M2: crashes, a stack that grows beyond its memory, and bits that flip in gains and limits.
 //!
 //! Where the constants lie is known from two sides: the ELF names the variable of a level, and the host
 //! computes the same constants from the leg file, or reads them in the calibration's record. A word is
@@ -14,11 +14,12 @@ use scarab_host::rig::board::axis_configuration;
 use scarab_host::rig::options::SimulationOptions;
 use scarab_host::rig::pair::Context;
 
+use crate::crashes::{self, CrashKind};
 use crate::faults::{Expected, Machines, Verdict, begin, judge, watch};
 use crate::plant::JOINTS;
 use crate::rtt::field;
 use crate::session::Session;
-use crate::time::{seconds, ticks};
+use crate::time::ticks;
 
 /// Variables of the current loops and of the servo.
 const LOOPS: &str = "composition::hand_out::LOOPS";
@@ -29,8 +30,6 @@ const BASE: usize = 13;
 const OVERSPEED: f32 = 1.1;
 /// Fewest words that must be found.
 const FEWEST: usize = 16;
-/// Longest time until the stack's end is passed, s: some PWM periods.
-const OVERFLOW_S: f64 = 1e-3;
 /// Bytes that are left of the stack at most.
 const LEFT: u64 = 320;
 
@@ -146,39 +145,27 @@ pub fn upset(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErro
     Ok(verdict.map_err(|complaint| format!("{name}, bit {}: {complaint}", 8 * u64::from(byte) + bit)))
 }
 
-/// M1: the stack is used up in the motion; bridges are off in time after the fault, and the next start says
-/// why and does not enable.
+/// K4: a panic, a hard fault or an unhandled interrupt in the motion.
+pub fn crash(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
+    let kinds = [CrashKind::Interrupt, CrashKind::Panic, CrashKind::HardFault];
+    crashed(machines, kinds[seed as usize % 3], &mut Random::new("K4", seed))
+}
+
+/// M1: the stack is used up in the motion.
 pub fn overflow(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
-    let moving = machines.moving()?;
     let mut random = Random::new("M1", seed);
+    let left = random.below(LEFT) as u32;
+    crashed(machines, CrashKind::StackOverflow(left), &mut random)
+}
+
+/// Time from a crash in the motion until both bridges are off, if nothing else is wrong.
+fn crashed(machines: &mut Machines<'_>, kind: CrashKind, random: &mut Random) -> Result<Verdict, ToolError> {
+    let moving = machines.moving()?;
     let session = &mut *machines.session;
     begin(session, &moving, random.below(ticks(0.5)))?;
-    let (records, resets) = (session.probe.lines.len(), session.resets.len());
-    session.machine.chip_mut().hard_fault = None;
-    session.machine.use_up_stack(random.below(LEFT) as u32);
-    session.run(OVERFLOW_S)?;
-    let Some(fault) = session.machine.chip().hard_fault else {
-        return Ok(Err(format!("no fault within {OVERFLOW_S} s")));
-    };
-    session.run(0.5)?;
-    let switchings = session.machine.chip_mut().plant.switchings.take().unwrap_or_default();
-    let (mut armed, mut released) = ([true; JOINTS], None);
-    for switching in &switchings {
-        armed[switching.axis] = switching.on;
-        released = released.or((armed == [false; JOINTS]).then_some(switching.at));
-        if released.is_some() && switching.on {
-            return Ok(Err("a bridge was on again".into()));
-        }
-    }
-    if session.resets.len() != resets + 1 {
-        return Ok(Err(format!("{} resets", session.resets.len() - resets)));
-    }
-    if session.probe.find(records, "crash", &["cause=stack_overflow"]).is_none() {
-        let crash = session.probe.find(records, "crash", &[]);
-        return Ok(Err(format!("the next start does not report the overflow: {crash:?}")));
-    }
-    Ok(match released {
-        Some(at) => Ok(seconds(at.saturating_sub(fault))),
-        None => Err("bridges stayed on".into()),
+    let report = crashes::crash(session, kind)?;
+    Ok(match (report.complaints.first(), report.released_us) {
+        (None, Some(time)) => Ok(1e-6 * time),
+        (complaint, _) => Err(format!("{}: {complaint:?}", report.kind)),
     })
 }

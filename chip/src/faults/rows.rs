@@ -7,7 +7,6 @@ use scarab::bus::Frame;
 use crate::chip::{GATE_FAULT, LostTriggers, STOP};
 use crate::faults::{Expected, Inject, Injected, JITTER_S, Later, OwnRun, PERIOD_S, Row, Run, Situation};
 use crate::faults::{bus, memory, search, stored, wiring};
-use crate::nvic::HARD_FAULT;
 use crate::plant::{JOINTS, STEP, ShuntFault};
 use crate::time::ticks;
 
@@ -242,10 +241,7 @@ pub(super) const ROWS: &[Row] = &[
             chip.can.go_bus_off(now);
         },
     ),
-    injected("K4", "hard fault", 10e-6, Situation::Motion, Expected::Released, |chip, _| {
-        let now = chip.now;
-        chip.nvic.pend(HARD_FAULT, now);
-    }),
+    own("K4", "panic, hard fault, unhandled interrupt in motion", 10e-6, memory::crash),
     injected("K5", "crystal stops", 50e-6, Situation::Motion, Expected::Released, |chip, _| {
         chip.stop_crystal()
     }),

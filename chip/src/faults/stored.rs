@@ -171,7 +171,10 @@ fn low(
     let (index, sub) = INHIBIT;
     let causes = session.read_object(1, index, sub, ANSWER_S)?;
     let is_same = session.machine.chip_mut().flash.parameters_mut() == cells;
-    if !matches!(refused, Err(ToolError::Refused(_))) || causes != InhibitReason::ProcessorSupply.bit() || !is_same {
+    if !matches!(refused, Err(ToolError::Refused(_)))
+        || causes != InhibitReason::ProcessorSupply.bit()
+        || !is_same
+    {
         return Ok(Err(format!("{refused:?}, inhibit reasons {causes:#x}, flash unchanged {is_same}")));
     }
     session.power_up()?;

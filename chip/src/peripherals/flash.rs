@@ -14,7 +14,7 @@ use core::ops::Range;
 
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab_boot::{FLASH_BYTES, FLASH, Region};
+use scarab_boot::{FLASH, FLASH_BYTES, Region};
 
 use crate::findings::{Access, NO_REGISTER};
 use crate::time::{TICK_HZ, Ticks};
@@ -352,7 +352,8 @@ const fn range(region: &Region) -> Range<usize> {
 
 /// Number of the sector at an offset.
 fn sector_of(offset: usize) -> usize {
-    let region = Region::ALL.into_iter().rfind(|region| range(region).start <= offset).unwrap_or(Region::BOOTLOADER);
+    let region =
+        Region::ALL.into_iter().rfind(|region| range(region).start <= offset).unwrap_or(Region::BOOTLOADER);
     region.sector as usize + (offset - range(&region).start) / region.sector_bytes as usize
 }
 
@@ -433,7 +434,8 @@ mod tests {
         assert_eq!(bench.flash.stall, 3 * TICK_HZ);
         assert_eq!(bench.flash.changed, None);
         for (sector, duration) in [(1, SMALL[2]), (2, SMALL[2]), (4, MIDDLE[2])] {
-            let (stall, region) = (bench.flash.stall, Region::ALL[1..4].iter().find(|one| one.sector == sector));
+            let (stall, region) =
+                (bench.flash.stall, Region::ALL[1..4].iter().find(|one| one.sector == sector));
             let offset = region.expect("a region").address - FLASH;
             bench.write(0x10, ERASE | 2 << 8 | sector << 3 | START);
             assert_eq!((bench.load(offset), bench.flash.stall), (u32::MAX, stall + duration));

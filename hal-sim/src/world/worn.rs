@@ -5,51 +5,12 @@
 
 use super::{TICK_S, World};
 use crate::leg::{Leg, LegState};
-#[cfg(feature = "wearer")]
-pub(super) use crate::wearer::Wearer;
-#[cfg(feature = "wearer")]
 use crate::wearer::{
-    WearerTruth,
+    Wearer, WearerTruth,
     description::{WearerDescription, WearerError},
     muscles::Intention,
 };
-#[cfg(not(feature = "wearer"))]
-pub(super) use absent::Wearer;
 
-/// A wearer that does not exist and takes no memory, in images without the feature `wearer`.
-#[cfg(not(feature = "wearer"))]
-mod absent {
-    use crate::leg::{Leg, LegState};
-
-    #[derive(Clone, Debug, PartialEq)]
-    pub enum Wearer {}
-
-    impl Wearer {
-        pub fn place<const N: usize>(&mut self, _: &LegState<N>, _: f64) {
-            match *self {}
-        }
-
-        pub fn decide(&mut self, _: u64, _: f64) {
-            match *self {}
-        }
-
-        pub fn advance<const N: usize>(
-            &mut self,
-            _: &Leg<N>,
-            _: &mut LegState<N>,
-            _: [&[f64; N]; 2],
-            _: f64,
-        ) {
-            match *self {}
-        }
-
-        pub fn interaction<const N: usize>(&self, _: &LegState<N>) -> [f64; N] {
-            match *self {}
-        }
-    }
-}
-
-#[cfg(feature = "wearer")]
 impl<const N: usize> World<N> {
     /// Puts the exoskeleton on a wearer, who is limp and in its posture. The bodies of this world's leg are
     /// then those of the exoskeleton alone. A second wearer replaces the first.

@@ -12,7 +12,7 @@ use crate::cli::assist::ModeArgument;
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
 use crate::faults::campaign::{CampaignOptions, campaign};
-use crate::faults::entry::{Entry, entries};
+use crate::faults::entry::{Entry, ON_THE_CHIP, entries};
 use crate::faults::hours::hours;
 use crate::faults::report::{CampaignReport, line};
 use crate::faults::results::Campaign;
@@ -88,9 +88,14 @@ pub struct FaultsArguments {
     docs: Option<Updated>,
 }
 
-fn rows(names: &[String], full: bool) -> Result<Vec<Entry>, ToolError> {
+fn rows(names: &[String]) -> Result<Vec<Entry>, ToolError> {
     let all = entries();
     for name in names {
+        if ON_THE_CHIP.iter().any(|(id, _)| id == name) {
+            return Err(ToolError::input(format!(
+                "--fault {name}: needs the processor; run `cargo chip faults --rows {name}`"
+            )));
+        }
         if !all.iter().any(|entry| entry.head().id == name) && !KINDS.contains(&name.as_str()) {
             let mut known: Vec<_> = all.iter().map(|entry| entry.head().id).collect();
             known.dedup();
@@ -99,9 +104,7 @@ fn rows(names: &[String], full: bool) -> Result<Vec<Entry>, ToolError> {
         }
     }
     let is_asked = |entry: &Entry| names.is_empty() || names.iter().any(|name| name == entry.head().id);
-    // Emulated rows need an image to be built: they run only if named, or in the full campaign.
-    let is_meant = |entry: &Entry| full || !names.is_empty() || !matches!(entry, Entry::Emulated(_));
-    Ok(all.into_iter().filter(is_asked).filter(is_meant).collect())
+    Ok(all.into_iter().filter(is_asked).collect())
 }
 
 fn page(whole: &CampaignHeader, report: &CampaignReport, found: &Campaign) -> Result<String, ToolError> {
@@ -150,7 +153,7 @@ impl FaultsArguments {
     }
 
     fn options(&self) -> Result<CampaignOptions, ToolError> {
-        let mut rows = rows(&self.fault, self.full)?;
+        let mut rows = rows(&self.fault)?;
         if self.assist.is_some() {
             rows.retain(|entry| matches!(entry, Entry::Forked(_)));
         }
@@ -246,14 +249,14 @@ pub(super) fn conclude(
     parts: Vec<ShardResults<Campaign>>,
 ) -> Result<u8, ToolError> {
     let options = arguments.options()?;
-    let found = Campaign::joined(parts, &options.rows)?;
+    let found = Campaign::joined(parts, &options.rows);
     let report = CampaignReport::new(&options.rows, &found);
     output::print(&report.table().to_text())?;
     output::print(&report.notes())?;
-    if !found.left_out.is_empty() {
+    if arguments.fault.is_empty() {
+        let rows = ON_THE_CHIP.map(|(id, fault)| format!("{id} ({fault})")).join(", ");
         output::print(&format!(
-            "not run, since there is no emulator (qemu-system-arm): {}\n",
-            found.left_out.join(", ")
+            "not run here, since they need the processor: {rows}; `cargo chip faults` runs them\n"
         ))?;
     }
     if arguments.replay.is_some() {

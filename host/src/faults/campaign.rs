@@ -20,7 +20,6 @@ use crate::faults::bench::offsets::OFFSETS;
 use crate::faults::bounds::bounds;
 use crate::faults::catalogue::stop::ROWS as STOP;
 use crate::faults::detectors::views;
-use crate::faults::emulated::{emulated, emulated_seeds};
 use crate::faults::entry::Entry;
 use crate::faults::operator::begin;
 use crate::faults::results::{Base, Campaign};
@@ -122,13 +121,6 @@ pub fn campaign(leg: &LegFile, whole: &CampaignOptions) -> Result<Campaign, Tool
     let mut campaign = Campaign::default();
     found.into_iter().for_each(|found| campaign.add(found));
     for entry in &options.rows {
-        if let Entry::Emulated(head) = entry {
-            let seeds = part(emulated_seeds(head, &whole.seeds));
-            match emulated(head, leg, &seeds)? {
-                Some(outcomes) => campaign.outcomes.extend(outcomes),
-                None => campaign.left_out.push(head.id),
-            }
-        }
         if let Entry::Bench(bench) = entry {
             let halved = twice(bench.head.id);
             let seeds: Vec<u64> = if options.whole && bench.head.id == "E3" {

@@ -2,7 +2,6 @@
 
 use crate::faults::bench::{BENCHES, Bench};
 use crate::faults::catalogue::rows;
-use crate::faults::emulated::HEADS;
 use crate::faults::scenario::{Head, Row};
 
 /// One way to run a row.
@@ -12,15 +11,21 @@ pub enum Entry {
     Forked(&'static Row),
     /// A separate test bench.
     Bench(&'static Bench),
-    /// The emulated processor.
-    Emulated(&'static Head),
 }
 
+/// Rows that need the processor: the flash image on the model of its microcontroller runs them
+/// (`cargo chip faults`), and `cargo chip crashes` with all that a crash must do.
+pub const ON_THE_CHIP: [(&str, &str); 3] = [
+    ("K2", "search and log beside control"),
+    ("K4", "panic, hard fault, unhandled interrupt"),
+    ("M1", "stack overflow"),
+];
+
 /// Order of the catalogue; other ids come last.
-const ORDER: [&str; 46] = [
+const ORDER: [&str; 43] = [
     "E1", "E2", "E3", "E4", "E5", "C1", "C2", "C3", "C4", "P1", "P2", "V1", "V2", "V3", "V4", "V5", "T1",
-    "T2", "T3", "T4", "N1", "B1", "B2", "B3", "B4", "B5", "X1", "X2", "X3", "K1", "K2", "K3", "K4", "M1",
-    "M2", "F1", "F2", "F3", "J1", "J2", "J3", "H1", "H2", "H4", "H3", "I1",
+    "T2", "T3", "T4", "N1", "B1", "B2", "B3", "B4", "B5", "X1", "X2", "X3", "K1", "K3", "M2", "F1", "F2",
+    "F3", "J1", "J2", "J3", "H1", "H2", "H4", "H3", "I1",
 ];
 
 impl Entry {
@@ -39,7 +44,6 @@ impl Entry {
                 lacking: row.lacking,
             },
             Self::Bench(bench) => bench.head,
-            Self::Emulated(head) => **head,
         }
     }
 }
@@ -52,7 +56,6 @@ impl Entry {
         match self {
             Self::Forked(row) => row.id != "J1",
             Self::Bench(_) => true,
-            Self::Emulated(_) => false,
         }
     }
 }
@@ -88,7 +91,6 @@ pub fn instead(id: &str) -> Option<&'static str> {
 #[must_use]
 pub fn entries() -> Vec<Entry> {
     let mut all: Vec<Entry> = rows().map(Entry::Forked).chain(BENCHES.iter().map(Entry::Bench)).collect();
-    all.extend(HEADS.iter().map(Entry::Emulated));
     let place = |entry: &Entry| ORDER.iter().position(|id| *id == entry.head().id).unwrap_or(ORDER.len());
     all.sort_by_key(place);
     all

@@ -10,7 +10,6 @@
 //! | [`campaign`] | many runs, forked from identifications |
 //! | [`detectors`] | each fault code of the firmware disabled separately |
 //! | [`mod@bench`] | rows that are not forks: components, calibrations, identifications with ideal drives |
-//! | [`emulated`] | rows that require a processor, run on the emulated one |
 //! | [`trial`] | every channel faulted in every form, and two faults at once: no invariant may break |
 //! | [`hours`] | normal motion, in which no fault may be reported |
 //! | [`recording`] | a run's curves |
@@ -26,7 +25,6 @@ pub mod campaign;
 pub mod catalogue;
 pub mod detectors;
 pub mod draw;
-pub mod emulated;
 pub mod entry;
 pub mod event;
 pub mod hours;

@@ -125,7 +125,6 @@ impl CampaignReport {
         let mut heads: Vec<Head> = entries.iter().map(Entry::head).collect();
         // A row that is run in two ways is described as its forks are.
         heads.dedup_by_key(|head| head.id);
-        heads.retain(|head| !campaign.left_out.contains(&head.id));
         let outcomes = &campaign.outcomes;
         let failed = |outcome: &&Outcome| {
             !outcome.detected && !outcome.undetectable || outcome.false_alarm || !outcome.broken.is_empty()

@@ -6,8 +6,6 @@
 use scarab::safety::FaultCode;
 use serde::{Deserialize, Serialize};
 
-use crate::base::error::ToolError;
-use crate::base::words::{Word, words};
 use crate::faults::entry::Entry;
 use crate::faults::hours::Stretch;
 use crate::faults::run::{Blind, Outcome};
@@ -26,9 +24,6 @@ pub struct Campaign {
     pub singly: Vec<(Blind, Outcome)>,
     /// Number of runs with the emergency stop at every tick.
     pub every_tick: usize,
-    /// Rows that were not run because there is no emulator.
-    #[serde(deserialize_with = "words")]
-    pub left_out: Vec<Word>,
     /// Identifications of which the runs are forks.
     pub bases: Vec<Base>,
     /// Stretches of normal motion, where requested.
@@ -57,7 +52,6 @@ impl Campaign {
         self.trials.extend(other.trials);
         self.singly.extend(other.singly);
         self.every_tick += other.every_tick;
-        self.left_out.extend(other.left_out);
         self.bases.extend(other.bases);
         if let Some(hours) = other.hours {
             self.hours.get_or_insert_default().extend(hours);
@@ -65,30 +59,17 @@ impl Campaign {
     }
 
     /// Results of all shards of a campaign of these rows.
-    ///
-    /// # Errors
-    /// Some shards ran rows that others could not run.
-    pub fn joined(parts: Vec<ShardResults<Self>>, rows: &[Entry]) -> Result<Self, ToolError> {
-        let with = |emulator: bool| parts.iter().find(|part| part.results.left_out.is_empty() == emulator);
-        if let (Some(with), Some(without)) = (with(true), with(false)) {
-            return Err(ToolError::input(format!(
-                "{}: {} were not run without the emulator (qemu-system-arm), in {} they were: compute the first again where it is \
-                 installed",
-                without.path.display(),
-                without.results.left_out.join(", "),
-                with.path.display()
-            )));
-        }
+    #[must_use]
+    pub fn joined(parts: Vec<ShardResults<Self>>, rows: &[Entry]) -> Self {
         let mut campaign = Self::default();
         for part in parts {
-            campaign.left_out.clear();
             campaign.add(part.results);
         }
         let place = |id: &str| rows.iter().position(|entry| entry.head().id == id);
         campaign.outcomes.sort_by_key(|outcome| (place(outcome.fault), outcome.seed, outcome.period));
         campaign.trials.sort_by_key(|outcome| (outcome.fault, outcome.seed));
         campaign.join_bases();
-        Ok(campaign)
+        campaign
     }
 
     /// Makes one of the parts of each base: the longest has what all saw, and each has forks of its own.
@@ -174,21 +155,10 @@ mod tests {
             part(vec![base(9, alarm, 2), later.clone()]),
             part(vec![base(9, alarm, 3)]),
         ];
-        let joined = Campaign::joined(parts, &[]).expect("they fit");
+        let joined = Campaign::joined(parts, &[]);
         assert_eq!(joined.bases, [base(9, alarm, 5), later]);
         assert_eq!(joined.base_alarms(), ["base 1, period 9: words; 5 runs not run"]);
         assert_eq!(joined.undisturbed_s(), 9.0 / PERIODS_PER_S as f64 + 5.0 / PERIODS_PER_S as f64);
-    }
-
-    #[test]
-    fn shards_with_and_without_the_emulator_do_not_fit() {
-        let mut without = part(Vec::new());
-        without.results.left_out = vec!["K2"];
-        let refused =
-            Campaign::joined(vec![part(Vec::new()), without.clone()], &[]).expect_err("they differ");
-        assert!(refused.to_string().contains("K2 were not run without the emulator"), "{refused}");
-        let joined = Campaign::joined(vec![without.clone(), without], &[]).expect("they fit");
-        assert_eq!(joined.left_out, ["K2"]);
     }
 
     #[test]

@@ -9,7 +9,6 @@
 //! | [`panics`] | locations at which an image can panic, and those within its interrupts |
 
 pub mod build;
-pub mod emulate;
 pub mod leg_source;
 pub mod panics;
 pub mod seal;

@@ -58,6 +58,10 @@ pub struct Place {
     pub panic: String,
     /// Source file; empty if the image does not contain it.
     pub file: String,
+    /// Line in it.
+    pub line: u32,
+    /// Address of the two instructions before the branch, which load the source location.
+    pub address: u32,
 }
 
 impl Place {
@@ -92,6 +96,7 @@ struct Function {
 /// One branch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Branch {
+    at: u32,
     to: u32,
     /// Value of the first register, loaded by the two instructions before the branch.
     argument: Option<u32>,
@@ -100,9 +105,14 @@ struct Branch {
 impl Panics {
     /// Finds the locations of an image.
     pub fn of(image: &Path) -> Result<Self, ToolError> {
-        let wrong = |error: &dyn std::fmt::Display| FileError::new(image.display(), error);
-        let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
-        let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;
+        let bytes = std::fs::read(image).map_err(|error| FileError::new(image.display(), error))?;
+        Self::parse(&bytes, &image.display())
+    }
+
+    /// Finds the locations of an image in memory; `name` is its name in errors.
+    pub fn parse(bytes: &[u8], name: &dyn std::fmt::Display) -> Result<Self, ToolError> {
+        let wrong = |error: &dyn std::fmt::Display| FileError::new(name, error);
+        let file = object::File::parse(bytes).map_err(|error| wrong(&error))?;
         let text = file.section_by_name(".text").ok_or_else(|| wrong(&"no section .text"))?;
         let code = text.data().map_err(|error| wrong(&error))?;
         let words = Code { base: text.address() as u32, bytes: code, data: data_ranges(&file) };
@@ -121,11 +131,11 @@ impl Panics {
         if VECTORS.iter().any(|vector| functions.values().all(|function| function.name != *vector)) {
             return Err(wrong(&format!("lacks one of the vectors {}", VECTORS.join(", "))).into());
         }
-        Ok(Self::within(&functions, |location| source_file(&file, location)))
+        Ok(Self::within(&functions, |location| source(&file, location)))
     }
 
-    /// Finds the locations among functions; `file_of` returns the file name of a source location.
-    fn within(functions: &BTreeMap<u32, Function>, file_of: impl Fn(u32) -> Option<String>) -> Self {
+    /// Finds the locations among functions; `source` returns file and line of a source location.
+    fn within(functions: &BTreeMap<u32, Function>, source: impl Fn(u32) -> Option<(String, u32)>) -> Self {
         let mut reached: BTreeSet<u32> = BTreeSet::new();
         let mut open: Vec<u32> = functions
             .iter()
@@ -141,10 +151,10 @@ impl Panics {
         let mut panics = Self { reached: reached.len(), ..Self::default() };
         for (begin, function) in functions.iter().filter(|(begin, _)| !is_panic(functions, **begin)) {
             let places = callees(functions, *begin).filter(|(callee, _)| is_panic(functions, *callee));
-            let places = places.map(|(callee, argument)| Place {
-                within: function.name.clone(),
-                panic: functions.get(&callee).map_or_else(String::new, |callee| callee.name.clone()),
-                file: argument.and_then(&file_of).unwrap_or_default(),
+            let places = places.map(|(callee, branch)| {
+                let (file, line) = branch.argument.and_then(&source).unwrap_or_default();
+                let panic = functions.get(&callee).map_or_else(String::new, |callee| callee.name.clone());
+                Place { within: function.name.clone(), panic, file, line, address: branch.at.wrapping_sub(8) }
             });
             let places: Vec<Place> = places.collect();
             if reached.contains(begin) {
@@ -186,26 +196,27 @@ impl Panics {
     }
 }
 
-/// Targets of a function's branches except itself, with the first argument of each; one entry per branch.
-fn callees(functions: &BTreeMap<u32, Function>, begin: u32) -> impl Iterator<Item = (u32, Option<u32>)> {
+/// Targets of a function's branches except itself; one entry per branch.
+fn callees(functions: &BTreeMap<u32, Function>, begin: u32) -> impl Iterator<Item = (u32, Branch)> {
     let function = functions.get(&begin);
     let branches = function.map_or(&[][..], |function| &function.branches);
     let end = function.map_or(begin, |function| function.end);
     branches.iter().filter(move |branch| !(begin..end).contains(&branch.to)).filter_map(|branch| {
         let (callee, function) = functions.range(..=branch.to).next_back()?;
-        (branch.to < function.end).then_some((*callee, branch.argument))
+        (branch.to < function.end).then_some((*callee, *branch))
     })
 }
 
-/// File name of a `core::panic::Location`, which begins with the name's address and length.
-fn source_file(file: &object::File<'_>, location: u32) -> Option<String> {
+/// File name and line of a `core::panic::Location`: the name's address and length, then the line.
+fn source(file: &object::File<'_>, location: u32) -> Option<(String, u32)> {
     let bytes = |address: u32, length: u32| {
         file.sections().find_map(|section| {
             section.data_range(address.into(), length.into()).ok().flatten().map(<[u8]>::to_vec)
         })
     };
     let word = |address| Some(u32::from_le_bytes(bytes(address, 4)?.try_into().ok()?));
-    String::from_utf8(bytes(word(location)?, word(location.checked_add(4)?)?)?).ok()
+    let name = bytes(word(location)?, word(location.checked_add(4)?)?)?;
+    Some((String::from_utf8(name).ok()?, word(location.checked_add(8)?)?))
 }
 
 fn is_panic(functions: &BTreeMap<u32, Function>, begin: u32) -> bool {
@@ -247,8 +258,11 @@ impl Code<'_> {
     fn branches(&self, begin: u32, end: u32) -> (Vec<Branch>, usize) {
         let (mut branches, mut by_pointer, mut place) = (Vec::new(), 0, begin);
         let mut add = |place: u32, way: Option<i32>| {
-            let branch =
-                |way: i32| Branch { to: place.wrapping_add_signed(4 + way), argument: self.argument(place) };
+            let branch = |way: i32| Branch {
+                at: place,
+                to: place.wrapping_add_signed(4 + way),
+                argument: self.argument(place),
+            };
             branches.extend(way.map(branch));
         };
         while place < end {
@@ -360,7 +374,8 @@ mod tests {
     const ELSEWHERE: u32 = 2;
 
     fn function(name: &str, begin: u32, branches: &[(u32, u32)]) -> (u32, Function) {
-        let branches = branches.iter().map(|(to, location)| Branch { to: *to, argument: Some(*location) });
+        let branches =
+            branches.iter().map(|(to, location)| Branch { at: begin, to: *to, argument: Some(*location) });
         let branches = branches.collect();
         (begin, Function { name: name.into(), end: begin + 10, branches, by_pointer: 0 })
     }
@@ -376,15 +391,15 @@ mod tests {
                 function("core::panicking::panic_fmt", 600, &[]),
             ])
         };
-        let file_of = |location: u32| match location {
-            IN_A_QUEUE => Some("heapless-0.9.3/src/spsc.rs".to_owned()),
-            ELSEWHERE => Some("src/motor/axis.rs".to_owned()),
+        let source = |location: u32| match location {
+            IN_A_QUEUE => Some(("heapless-0.9.3/src/spsc.rs".to_owned(), 7)),
+            ELSEWHERE => Some(("src/motor/axis.rs".to_owned(), 7)),
             _ => None,
         };
-        let accepted = Panics::within(&functions(IN_A_QUEUE), file_of);
+        let accepted = Panics::within(&functions(IN_A_QUEUE), source);
         assert_eq!((accepted.all.len(), accepted.interrupts.len(), accepted.reached), (2, 1, 2));
         assert!(accepted.missed().is_empty());
-        let missed = |location| Panics::within(&functions(location), file_of).missed();
+        let missed = |location| Panics::within(&functions(location), source).missed();
         let panic = "an interrupt can panic: core::cell::panic_already_borrowed in loops";
         assert_eq!(missed(ELSEWHERE), [format!("{panic} (src/motor/axis.rs)")]);
         assert_eq!(missed(3), [format!("{panic} ()")]);

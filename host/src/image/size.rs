@@ -138,7 +138,8 @@ impl ImageSize {
     pub fn warning(&self) -> Option<String> {
         let share = self.flash() as f64 / FLASH_LIMIT as f64;
         let free = FLASH_LIMIT.saturating_sub(self.flash());
-        (share > WARNING).then(|| format!("the image fills {:.0} % of its flash: {free} bytes are free", 100.0 * share))
+        (share > WARNING)
+            .then(|| format!("the image fills {:.0} % of its flash: {free} bytes are free", 100.0 * share))
     }
 
     /// Formats the size as tables.

@@ -28,7 +28,7 @@ pub struct TraceReport {
 /// Statistics over all records; counts since a start are summed over the starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LoopReport {
-    /// Longest current tick, processor cycles (instructions in the emulator).
+    /// Longest current tick, processor cycles.
     pub current_worst: u32,
     /// Longest servo tick, processor cycles, including the current ticks that interrupt it.
     pub servo_worst: u32,

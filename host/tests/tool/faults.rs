@@ -168,8 +168,7 @@ fn bad_input_names_the_option() {
         ("--hours=-1", "--hours: -1 is not from 0 to 1000"),
         ("--fault C2 --every-tick", "--every-tick: tests the emergency stop (row X1)"),
         ("--leg mujoco-leg", "has no [joint.motor]"),
-        ("--blind --fault K4", "--blind: some rows of --fault K4 have no detectors"),
-        ("--blind --fault K4 --fault C2", "--blind: some rows of --fault K4 --fault C2 have no detectors"),
+        ("--fault C2 --fault K4", "--fault K4: needs the processor; run `cargo chip faults --rows K4`"),
         (
             "--blind --fault sweep --fault pairs",
             "--blind: some rows of --fault sweep --fault pairs have no detectors",

@@ -10,7 +10,7 @@ use crate::command::{Folder, scarab};
 const CONTENT: &str = "not to be touched";
 
 /// Command with the options of its input files (empty: positional) and of its output files.
-const COMMANDS: [(&str, &[&str], &[&str]); 17] = [
+const COMMANDS: [(&str, &[&str], &[&str]); 16] = [
     (
         "replay",
         &["", "--leg", "--validate", "--compare-model"],
@@ -34,7 +34,6 @@ const COMMANDS: [(&str, &[&str], &[&str]); 17] = [
     ("motor", &["--leg"], &["--json", "--figures"]),
     ("faults", &["--leg"], &["--json", "--report", "--docs"]),
     ("merge", &[""], &["--json", "--report", "--figures", "--docs"]),
-    ("emulate", &["--leg"], &["--json", "--trace", "--csv"]),
     ("fw", &["--leg"], &["--json", "--source"]),
     ("serve --slcan 127.0.0.1:0", &["--leg"], &["--flash"]),
     ("kept export", &[""], &["--out"]),

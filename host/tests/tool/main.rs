@@ -4,8 +4,6 @@
 mod bus;
 mod chain;
 mod command;
-mod crash;
-mod emulation;
 mod excite;
 mod excite_samples;
 mod faults;

@@ -12,8 +12,7 @@ use super::identity::Identity;
 use super::registers::{apply, load, store};
 use super::settings::timers::{BASES, CNT, CR1, DOWN, SR, TOP};
 use super::settings::{
-    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, SUPPLY_DETECTOR, converters, external, pins, prepare,
-    timers,
+    CACHES, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, SUPPLY_DETECTOR, converters, external, pins, prepare, timers,
 };
 use super::{interrupts, watchdog};
 use crate::board::crash::{self, Crash};
@@ -27,8 +26,6 @@ pub struct Board {
     pub identity: Identity,
     /// Crash record of the previous run.
     pub crash: Option<&'static Crash>,
-    /// Clock of the processor, Hz.
-    pub clock_hz: u32,
     /// Whether each axis' gate driver holds its configuration.
     pub gates_configured: [bool; 2],
     /// Whether both bridges' timers run half a period apart and take compare values over at zero.
@@ -78,7 +75,7 @@ pub fn start() -> Board {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
     }
-    Board { gate_drivers, identity, crash, clock_hz: CLOCK_HZ, gates_configured, timers_in_phase }
+    Board { gate_drivers, identity, crash, gates_configured, timers_in_phase }
 }
 
 /// 8 MHz crystal, 168 MHz, buses at 42 and 84 MHz (`Board/v3/Src/main.c:170-197`). Without oscillation the

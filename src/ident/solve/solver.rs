@@ -125,6 +125,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
 
     /// Spends up to `evaluations` of the cost: first on the selection of columns, then on the search, then on
     /// completion steps of equal cost. Any slicing gives the same result.
+    #[inline(never)]
     pub fn advance(&mut self, model: &RowModel<T, N, B>, evaluations: u32) -> SearchState {
         let mut evaluations = evaluations;
         while !self.record.selection.is_made {

@@ -12,7 +12,7 @@
 //! The commands use anatomical angles, the servo those of the model; both are converted only here. Homing
 //! moves a joint's zero. The shift is stored in counts and added to every reading.
 //!
-//! Cost: `scripts/count-instructions`.
+//! Cost: docs/results/bus.md, instructions.
 
 mod command;
 mod joint;

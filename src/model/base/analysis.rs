@@ -18,7 +18,7 @@
 //! then FC FV OFF, then IA, then YY HZ M. A link's XX thereby carries its -YY.
 //!
 //! Source: M. Gautier, Numerical calculation of the base inertial parameters of robots, 1991.
-//! Cost: 64 states; once per leg, gravity and mask. For two joints in `f32` on a Cortex-M4F (emulated): 1.5
+//! Cost: 64 states; once per leg, gravity and mask. For two joints in `f32` on a Cortex-M4F: 1.5
 //! million instructions, 12 ms at 8 ns, and 6.2 kB of stack; the result takes about 60 N B bytes.
 //! Limits: a column that is independent here may still be weak in a given motion; the statistics show that.
 

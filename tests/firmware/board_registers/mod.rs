@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 
 use scarab::board::odrive_v3_6::settings::pins::{GATES_OFF, HOLDING_BRAKE, MOTOR_THERMISTORS, Mode, PINS};
 use scarab::board::odrive_v3_6::settings::{
-    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, SUPPLY_DETECTOR, Write,
-    analog, can, chopper, converters, external, flash, gate_driver, prepare, timers,
+    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, SUPPLY_DETECTOR,
+    Write, analog, can, chopper, converters, external, flash, gate_driver, prepare, timers,
 };
 use scarab_boot::{HEADER_AT, HEADER_BYTES, Region, SUPPLY_LEVEL};
 use timer::Timer;
@@ -424,7 +424,10 @@ fn images_are_linked_to_their_sectors_and_the_header_follows_the_vectors() {
         let before: u32 = (0..region.sector).map(kilobytes).sum();
         assert_eq!(region.address, 0x0800_0000 + (before << 10));
         for number in region.sector..region.sector + region.sectors {
-            assert_eq!((region.sector_bytes, flash::erase(number) >> 3 & 0xF), (kilobytes(number) << 10, number));
+            assert_eq!(
+                (region.sector_bytes, flash::erase(number) >> 3 & 0xF),
+                (kilobytes(number) << 10, number)
+            );
         }
     }
 }

@@ -125,9 +125,6 @@ fn start(boot: &Boot) -> (Weight, String) {
 /// Description of the board.
 #[must_use]
 pub fn board(board: &Board) -> String {
-    if is_emulated(board) {
-        return format!("emulated board, {} MHz", f64::from(board.clock_hz) / 1e6);
-    }
     let version = if board.version == usize::from(u8::MAX) {
         "version not burnt in".into()
     } else {
@@ -145,12 +142,6 @@ pub fn board(board: &Board) -> String {
         board.uid0,
         f64::from(board.clock_hz) / 1e6
     )
-}
-
-/// Returns whether the board is emulated; then its plant is that of the leg file and the truth is known.
-#[must_use]
-pub fn is_emulated(board: &Board) -> bool {
-    (board.uid0, board.uid1, board.uid2) == (0, 0, 0)
 }
 
 fn crashed(crash: &Crash) -> String {

@@ -1,8 +1,8 @@
 //! Records of a board, read back. [`crate::run::trace`] reports them like a simulated run.
 //!
-//! Why: the board identifies on its own and logs the result as records (`scarab::trace`). A
-//! listener may be a debug probe, the emulator, or a file read a year later. Each gets the tables,
-//! JSON, page and exit code of a simulated run.
+//! Why: the board identifies on its own and logs the result as records (`scarab::trace`). A listener may be a
+//! debug probe, the model of the microcontroller, or a file read a year later. Each gets the tables, JSON,
+//! page and exit code of a simulated run.
 //!
 //! ```text
 //! defmt stream + image --decode--> lines --read--> Trace --report--> RunReport: tables, JSON, page

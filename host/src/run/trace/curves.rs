@@ -34,7 +34,7 @@ fn of_size<const N: usize, const B: usize>(
     records: &ResultRecords,
     leg: &LegFile,
 ) -> Result<Series, ToolError> {
-    let mut background = known::<N, B>(trace, records, leg)?;
+    let mut background = known::<N, B>(records, leg)?;
     let Some(solver) = &records.solver else { return Ok(Series::default()) };
     let (estimate, _) = TracedResult { background: &background, leg, records }.base(solver)?;
     let mut stribeck = no_stribeck();

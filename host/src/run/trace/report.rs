@@ -3,7 +3,7 @@
 //! Values, sigma, fits, findings and verdict are the board's own. Names, groups and units come from
 //! the leg file, which must be the one that the image was built from. Joints, base parameters and
 //! their carriers are compared. Values that the board does not send (search costs in double
-//! precision, gains of columns) are unknown. The truth is known for an emulated board only.
+//! precision, gains of columns) are unknown, and so is the truth.
 
 use scarab::ident::{Estimate, Estimator, Evidence, Plan, Reason, Selection, Status, Test};
 use scarab::model::Parameter;
@@ -12,7 +12,6 @@ use crate::base::error::ToolError;
 use crate::base::names::{estimator_name, plan_name};
 use crate::base::number::Number;
 use crate::formats::leg_file::LegFile;
-use crate::formats::trace::events::is_emulated;
 use crate::formats::trace::read::Trace;
 use crate::formats::trace::records::{Finding, Fit, Solver};
 use crate::formats::trace::result_records::ResultRecords;
@@ -85,7 +84,7 @@ fn of_size<const N: usize, const B: usize>(
     records: &ResultRecords,
     leg: &LegFile,
 ) -> Result<RunReport, ToolError> {
-    let background = known::<N, B>(trace, records, leg)?;
+    let background = known::<N, B>(records, leg)?;
     let found = TracedResult { background: &background, leg, records };
     let solver = records.solver.as_ref().ok_or_else(|| ToolError::input("the result has no solver"))?;
     let (estimate, dropped) = found.base(solver)?;
@@ -131,7 +130,6 @@ fn of_size<const N: usize, const B: usize>(
 
 /// Background of the leg; a prior only where the board had one.
 pub(super) fn known<const N: usize, const B: usize>(
-    trace: &Trace,
     records: &ResultRecords,
     leg: &LegFile,
 ) -> Result<Background<N, B>, ToolError> {
@@ -145,10 +143,8 @@ pub(super) fn known<const N: usize, const B: usize>(
         background.prior_name = "unknown".into();
     }
     background.use_estimator(Estimator::default());
-    if !trace.board.as_ref().is_some_and(is_emulated) {
-        background.truth = None;
-        background.stribeck_truth = [None; N];
-    }
+    background.truth = None;
+    background.stribeck_truth = [None; N];
     Ok(background)
 }
 

@@ -2,7 +2,7 @@
 //! records' formats.
 //!
 //! The image is created here: an ELF with symbols only, as a linker would write them for the formats of this
-//! version. The emulator tests cover a real image.
+//! version. `cargo chip run` covers a real image.
 
 use std::path::Path;
 

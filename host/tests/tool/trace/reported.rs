@@ -10,9 +10,10 @@ use super::session::{accepted, default_leg, quiet, read, refused, renumbered, te
 use crate::command::{Folder, base, reasons, scarab};
 
 /// Keys of a run's report that a board does not send: searches in double precision, gains of
-/// columns, the noise's seed, noise-free torques, the Cramer-Rao bound, tracking, constants.
-const NOT_TOLD: [&str; 25] = [
+/// columns, the noise's seed, noise-free torques, the truth, the Cramer-Rao bound, tracking, constants.
+const NOT_TOLD: [&str; 26] = [
     "seed",
+    "truth",
     "cramer_rao",
     "gain_chi2",
     "limit_chi2",
@@ -114,7 +115,10 @@ fn the_log_of_a_trace_equals_the_run_s_and_replay_agrees() {
     let none = scarab("trace --csv-motion 9 --csv", &[&folder.path("none.csv"), &trace]).ends_with(2).errors;
     assert!(none.contains("no log of motion 9, but of 0, 1, 2, 3"), "{none}");
     let page = std::fs::read_to_string(page).expect("written");
-    assert!(page.contains("emulated board") && page.contains("trace of a board"), "not the page of a board");
+    assert!(
+        page.contains("board 000000330000002200000011") && page.contains("trace of a board"),
+        "not the page of a board"
+    );
     for figure in ["motions.svg", "torque-1.svg", "torque-2.svg", "residuals.svg", "base-parameters.svg"] {
         assert!(page.contains(figure), "{figure} is drawn from the log");
     }

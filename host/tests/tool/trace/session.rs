@@ -48,9 +48,9 @@ impl RecordWriter {
             reset: "power_on",
         });
         self.write(&Record::Board {
-            uid0: 0,
-            uid1: 0,
-            uid2: 0,
+            uid0: 0x11,
+            uid1: 0x22,
+            uid2: 0x33,
             version: 3,
             version_minor: 6,
             version_volt: 56,

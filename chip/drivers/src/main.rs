@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | [`contract`] | steps and results; also compiled into the check |
 //! | [`computation`] | arithmetic whose words every machine gives; also compiled into the check |
-//! | [`processor`] | exceptions; compared with the emulator |
+//! | [`processor`] | exceptions; their words are those of another emulator |
 //! | [`steps`] | drivers, one step each |
 #![no_std]
 #![no_main]
@@ -21,7 +21,8 @@ mod steps;
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use contract::WORDS;
+/// Capacity for results.
+const WORDS: usize = 128;
 
 /// Declares a word or words that the check finds by name.
 macro_rules! shared {

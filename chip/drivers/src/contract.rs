@@ -1,11 +1,8 @@
 //! Agreement between the program and its check (`cargo chip drivers`).
 //!
 //! The program counts its steps in `DRIVERS_STEP` and waits at each until `DRIVERS_GO` has the same value.
-//! Results go to `DRIVERS_RESULTS`, their number to `DRIVERS_COUNT`. The first step, that of the processor,
-//! also runs in QEMU.
+//! Results go to `DRIVERS_RESULTS`, their number to `DRIVERS_COUNT`.
 
-/// Capacity for results.
-pub const WORDS: usize = 128;
 /// Added to a release: feed the watchdog once after its start.
 pub const FED: u32 = 0x100;
 /// Words that are written to flash.
