@@ -117,6 +117,7 @@ fn pasted(text: &str, report: &str, section: &str) -> String {
 }
 
 #[test]
+#[ignore = "campaign: .ci/full"]
 fn pasted_lines_make_a_new_leg_ready_for_simulation_and_image() {
     let folder = Folder::new();
     let out = folder.path("arm.toml");
