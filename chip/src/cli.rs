@@ -507,7 +507,7 @@ fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
         println!("{name:<18}{}", cells.collect::<String>());
     }
     for situation in &found {
-        for (name, calls) in &situation.calls {
+        for (name, calls) in situation.calls.iter().filter(|(_, calls)| calls.count > 0) {
             println!(
                 "{}: {name}: {} calls, {:.0} instructions in the mean, {} at worst, {:.2} s at 8 ns in all",
                 situation.name, calls.count, calls.mean_instructions, calls.worst_instructions, calls.seconds

@@ -189,9 +189,14 @@ pub fn crash(session: &mut Session, kind: CrashKind) -> Result<CrashReport, Tool
     }
     session.hold_switch(false);
     let records = session.probe.lines.len();
-    session.run(0.3)?;
+    if seen.reset.is_some() {
+        session.boot()?;
+    }
     seen.record = session.probe.find(records, "crash", &[]).unwrap_or_default().to_owned();
     let mut complaints = judge(kind, &seen);
+    if session.probe.find(records, "refused", &["why=crash"]).is_none() {
+        complaints.push("the next start does not name the crash as a reason to refuse".into());
+    }
     let plant = &session.machine.chip().plant;
     if plant.switchings.iter().flatten().any(|switching| switching.on) {
         complaints.push("a bridge was on after the next start".into());
