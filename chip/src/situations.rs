@@ -18,7 +18,7 @@ const MOST_MEAN: f64 = 850.0;
 const MOST_WORST: u64 = 1250;
 /// Goal: share of the processor's time while the leg holds its pose.
 const MOST_HOLDING: f64 = 0.5;
-/// Goals: mean and most instructions of one servo interrupt: the leg's tick with its side of the bus. The most
+/// Goals: mean and most instructions of a servo interrupt: the leg's tick with its side of the bus. The most
 /// contains ticks that begin a motion or take a verdict, and twice each block that an interrupt preempts.
 const MOST_SERVO: [(&str, f64, u64); 3] =
     [(HOLDING, 4000.0, 4000), (IDENTIFYING, 4000.0, 5500), (FOLLOWING, 4400.0, 5500)];
