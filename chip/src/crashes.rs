@@ -380,7 +380,8 @@ mod tests {
     #[test]
     fn every_violated_requirement_of_a_crash_is_reported() {
         assert_eq!(judge(CrashKind::Panic, &seen()), [""; 0]);
-        let changes: [(fn(&mut Seen), &str); 13] = [
+        type Change = (fn(&mut Seen), &'static str);
+        let changes: [Change; 13] = [
             (|seen| seen.released = None, "bridges off later"),
             (|seen| seen.begun -= ticks(10e-6), "bridges off later"),
             (|seen| seen.on_again = true, "on again"),

@@ -1,8 +1,8 @@
 //! The board's registers after the start, from the record of writes, compared with known values of the board.
 //!
 //! `cargo test --test firmware board_registers:: -- --nocapture` prints the record. The values are those of
-//! ODrive's firmware v0.5.6 (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is RM0090's. The
-//! silicon's behaviour needs a test on the board.
+//! ODrive's firmware v0.5.6 (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is
+//! RM0090's. The silicon's behaviour needs a test on the board.
 
 mod sampling;
 mod timer;
