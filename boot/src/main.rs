@@ -9,15 +9,15 @@
 //!       --> run it             under the watchdog, as long as it has not confirmed itself
 //! ```
 //!
-//! Before, in the first start of a board, the brown-out reset is set to level 3. A chip is delivered without one:
-//! between 2.7 and 1.8 V it would run at 168 MHz and write its flash outside its specification. Why here and
-//! not by the debug probe: no watchdog runs yet that could reset the chip within the change.
+//! Before, in the first start of a board, the brown-out reset is set to level 3. A chip is delivered without
+//! one: between 2.7 and 1.8 V it would run at 168 MHz and write its flash outside its specification. Why here
+//! and not by the debug probe: no watchdog runs yet that could reset the chip within the change.
 //!
-//! Everything but flash controller, voltage detector and watchdog stays as after the reset: clocks, pins, and the
-//! reason of the reset, which the image reads. All bridges are off: their pins are inputs.
+//! Everything but flash controller, voltage detector and watchdog stays as after the reset: clocks, pins, and
+//! the reason of the reset, which the image reads. All bridges are off: their pins are inputs.
 //!
-//! The swap is `embassy-boot`'s: six sectors of 128 KB are erased (1 s each, at most 2) and written (0.5 s each,
-//! at most 3.3). That is 9 s, at most 32 (DS8626 table 42).
+//! The swap is `embassy-boot`'s: six sectors of 128 KB are erased (1 s each, at most 2) and written (0.5 s
+//! each, at most 3.3). That is 9 s, at most 32 (DS8626 table 42).
 //!
 //! Words of 32 bits are erased at once, twice as fast as the bytes of `embassy-stm32`'s driver. This needs a
 //! supply of 2.7 V and more: a swap waits while the voltage detector shows less than 2.9 V.
@@ -97,8 +97,8 @@ fn main() -> ! {
     }
 }
 
-/// Sets brown-out reset level 3 in the option bytes; it acts from the next power-on reset (RM0090 3.6.5). Leaves
-/// them alone where it is set, or where the chip is read-protected.
+/// Sets brown-out reset level 3 in the option bytes; it acts from the next power-on reset (RM0090 3.6.5).
+/// Leaves them alone where it is set, or where the chip is read-protected.
 fn set_brown_out_reset() {
     const UNPROTECTED: u8 = 0xAA;
     const LEVEL_3: u8 = 0;

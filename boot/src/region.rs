@@ -1,4 +1,5 @@
-//! Regions of the flash: the only place that knows a sector. The module documentation of the crate shows them.
+//! Regions of the flash: the only place that knows a sector. The module documentation of the crate shows
+//! them.
 
 /// First address of the flash.
 pub const FLASH: u32 = 0x0800_0000;
@@ -6,7 +7,8 @@ pub const FLASH: u32 = 0x0800_0000;
 pub const FLASH_BYTES: u32 = 1 << 20;
 
 /// Level of the voltage detector (PLS in PWR_CR, RM0090 5.4.1) below which the flash is not changed: 2.92 V
-/// falling, typical (DS8626 table 22). Words of 32 bits need 2.7 V, and brown-out reset level 3 acts at 2.83 V.
+/// falling, typical (DS8626 table 22). Words of 32 bits need 2.7 V, and brown-out reset level 3 acts at 2.83
+/// V.
 pub const SUPPLY_LEVEL: u8 = 6;
 
 /// Sectors of the flash with one purpose.

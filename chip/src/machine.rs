@@ -517,8 +517,8 @@ fn put(core: &mut Core<'_>, register: Register, value: u32) {
 
 fn map_memory(core: &mut Core<'_>, options: &Options) -> Result<(), unicorn_engine::uc_error> {
     let image = Rc::clone(&core.get_data().image);
-    // All sectors but the bootloader's and the image's hold data only; `map_registers` maps them. The bootloader
-    // appears at address 0 too.
+    // All sectors but the bootloader's and the image's hold data only; `map_registers` maps them. The
+    // bootloader appears at address 0 too.
     for address in [FLASH, 0] {
         core.mem_map(address.into(), FIXED_BYTES as u64, Prot::READ | Prot::EXEC)?;
         core.mem_write(address.into(), &image.flash[..FIXED_BYTES])?;

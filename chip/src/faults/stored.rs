@@ -138,8 +138,8 @@ pub fn rotten(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErr
     Ok(Ok(0.0))
 }
 
-/// F3: a request to change the flash while the drive is on is refused and changes nothing; with the drive
-/// off the processor stalls, for up to twice the typical time, and nothing resets it. With a low supply of the
+/// F3: a request to change the flash while the drive is on is refused and changes nothing; with the drive off
+/// the processor stalls, for up to twice the typical time, and nothing resets it. With a low supply of the
 /// processor it is refused as well, with an inhibit reason.
 pub fn requested(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let mut random = Random::new("F3", seed);

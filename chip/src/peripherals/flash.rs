@@ -3,8 +3,8 @@
 //! Programming clears bits of one word, erasing sets those of a sector. Both need the keys, the right mode
 //! and a width that matches PSIZE; otherwise an error flag rises and nothing changes. While an operation runs
 //! the single bank cannot be read: the processor stalls, timers and converters go on. Power can be cut within
-//! any operation: a word is then a random mix of old and new, a sector reads as noise. Words of 32 bits need a
-//! supply of 2.7 V. The bootloader's sector cannot be changed.
+//! any operation: a word is then a random mix of old and new, a sector reads as noise. Words of 32 bits need
+//! a supply of 2.7 V. The bootloader's sector cannot be changed.
 //!
 //! Known limits: the brown-out reset has a level but does not act. Contents of the caches are not modelled,
 //! except that reading a sector that was erased while the data cache was on and not reset since is a finding;
