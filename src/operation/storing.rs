@@ -4,8 +4,8 @@
 //! parameters, 2 s for one of a new image. Therefore this order:
 //!
 //! ```text
-//! refused         unless the drive is off and no inhibit reason forbids it ([`Purpose`]); with a supply of the
-//!                processor that is too low this is an inhibit reason itself
+//! refused         unless the drive is off and no inhibit reason forbids it ([`Purpose`]); a supply of the
+//!                processor that is too low becomes an inhibit reason
 //! interlock       `storing`: the next current tick turns both bridges off, the servo keeps its drive off, a
 //!                calibration ends
 //! hosts           an emergency message (FF0D) announces a pause of the heartbeats; 20 ms to send it

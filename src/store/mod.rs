@@ -17,8 +17,8 @@
 //! | model and where it comes from | 5, of a worn leg 6 | `LegConfiguration::restore`, past the fingerprint |
 //!
 //! **Only with the bridges off.** The STM32F405 has one bank of flash. It stalls while it is written (16 us a
-//! word) or erased (0.25 to 0.5 s for 16 KB), and with it every instruction fetch, including the current loop's.
-//! A write therefore needs a [`Permit`], which only a drive with its outputs off gives.
+//! word) or erased (0.25 to 0.5 s for 16 KB), and with it every instruction fetch, including the current
+//! loop's. A write therefore needs a [`Permit`], which only a drive with its outputs off gives.
 //!
 //! Reading may write as well. The first read that finds a write cut off by a power loss repairs it
 //! (`MapStorage::fetch_item`: a sector is erased, records are copied). A board therefore reads at its start,

@@ -287,8 +287,8 @@ fn stored_objects_and_the_new_node_id_apply_after_a_reset() {
     // Restores the default parameters (object 1011).
     bus.sent.clear();
     bus.write(1, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
-    // Two sectors take a second each. The other leg continues; frames to the stalled one are lost.
-    bus.run(2000);
+    // Two sectors take 0.25 s each. The other leg continues; frames to the stalled one are lost.
+    bus.run(400);
     for _ in 0..5 {
         bus.network.send(Frame::new(0x601, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]));
         bus.run(200);

@@ -4,6 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use scarab_host::formats::kept_file::memory::BYTES;
+
 use crate::command::{Folder, scarab};
 
 /// Content of a file that a command must not modify.
@@ -192,7 +194,7 @@ fn an_output_that_cannot_be_written_is_found_before_the_input_is_read() {
 /// Flash of a board without stored data.
 fn erased_flash(folder: &Folder) -> PathBuf {
     let flash = folder.path("flash.bin");
-    fs::write(&flash, vec![0xFF; 256 * 1024]).expect("a temporary file");
+    fs::write(&flash, vec![0xFF; BYTES]).expect("a temporary file");
     flash
 }
 

@@ -1,10 +1,11 @@
 //! Flash for persistent data and new images, behind `embedded-storage`'s trait.
 //!
 //! **What a write costs.** The chip has one bank. A write takes 16 us a word (100 at most), an erase 0.25 s a
-//! sector of 16 KB (0.5 at most), 1 s one of 128 KB (2 at most). Every fetch from flash stalls meanwhile: current loops, servo, bus, watchdog. So
-//! nothing is changed unless the registers show both main outputs off and the brake resistor's duty zero, and
-//! the voltage detector a supply that words of 32 bits need. The caller's word is not enough: a duty would stay on during the stall. `operation::Storing` does the rest: it
-//! raises the inhibit first, informs hosts and stretches the watchdog.
+//! sector of 16 KB (0.5 at most), 1 s one of 128 KB (2 at most). Every fetch from flash stalls meanwhile:
+//! current loops, servo, bus, watchdog. So nothing is changed unless the registers show both main outputs
+//! off, the brake resistor's duty zero, and a supply that words of 32 bits need. The caller's word is not
+//! enough: a duty would stay on during the stall. `operation::Storing` does the rest: it raises the inhibit
+//! first, informs hosts and stretches the watchdog.
 //!
 //! An erase stops the executors' timer (TIM5). An overflow missed during the stall would leave the time half
 //! a period wrong for ever; with stopped time no deadline passes. The driver also empties the data cache,

@@ -34,8 +34,8 @@ pub fn tighten() -> bool {
     set(0, 127)
 }
 
-/// Requests the long time, 4 s (2.7 to 7.5): longer than the erase of a sector, 2 s at most. The bridges must be
-/// off. Returns whether it applies, as [`tighten`].
+/// Requests the long time, 4 s (2.7 to 7.5): longer than the erase of a sector, 2 s at most. The bridges must
+/// be off. Returns whether it applies, as [`tighten`].
 pub fn stretch() -> bool {
     set(6, 500)
 }

@@ -151,7 +151,7 @@ fn a_low_supply_of_the_processor_inhibits_and_prevents_the_write() {
     bench.hardware.processor_supply_is_low = true;
     assert_eq!(change(&mut settled(), &mut bench), (false, 0));
     assert_eq!((bench.causes(), bench.storing), (low, Vec::new()));
-    // It falls during the announcement.
+    // The supply falls during the announcement.
     let (mut storing, mut bench, mut touched) = (settled(), Bench::off(), 0);
     for _ in 0..1000 {
         bench.hardware.processor_supply_is_low = bench.now_ms >= 10;

@@ -32,7 +32,7 @@ use crate::faults::bench::stall::stall;
 use crate::faults::bench::{Bench, outcome};
 use crate::faults::run::Outcome;
 use crate::faults::scenario::Head;
-use crate::formats::kept_file::memory::Memory;
+use crate::formats::kept_file::memory::{Memory, SECTOR};
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::board::Board;
 use crate::rig::bus::host::Host;
@@ -206,7 +206,7 @@ fn filled(model: &ModelRecord<JOINTS>) -> Vec<Filled> {
             break;
         }
     }
-    let erases: Vec<usize> = (0..all.len()).filter(|place| all[*place].work > 128 * 1024).collect();
+    let erases: Vec<usize> = (0..all.len()).filter(|place| all[*place].work > SECTOR as u64).collect();
     let step = (all.len() / LEVELS as usize).max(1);
     let mut place = 0;
     all.retain(|_| {

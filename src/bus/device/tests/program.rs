@@ -4,6 +4,7 @@ use super::*;
 use crate::bus::Abort;
 use crate::bus::program::{ProgramCommand, ProgramStatus};
 use crc::{CRC_16_XMODEM, Crc};
+use scarab_boot::Region;
 use std::vec;
 
 const CLEARED: ProgramStatus = ProgramStatus(ProgramStatus::STOPPED | ProgramStatus::CLEARED);
@@ -121,7 +122,7 @@ fn an_image_that_does_not_fit_or_comes_at_the_wrong_time_is_refused() {
         [0xC6, 0x50, 0x1F, 1, a, b, c, d]
     };
     let mut receiver = Receiver::new(1);
-    assert_eq!(abort(receiver.ask(&begin(256 * 1024 + 1))), Abort::TooLong.code());
+    assert_eq!(abort(receiver.ask(&begin(Region::IMAGE.bytes() + 1))), Abort::TooLong.code());
     assert_eq!(abort(receiver.ask(&[0x40, 0x50, 0x1F, 1, 0, 0, 0, 0])), Abort::WriteOnly.code());
     for status in [0, ProgramStatus::STOPPED, CLEARED.0 | ProgramStatus::UNDER_WAY] {
         receiver.bench.device.update_program(ProgramStatus(status));
