@@ -62,8 +62,8 @@ pub(crate) fn calibrate(
     motor: &mut TestMotor,
     configuration: &AxisConfiguration,
 ) -> Result<Calibration, Refusal> {
-    static KNOWN: Mutex<BTreeMap<String, (TestMotor, Result<Calibration, Refusal>)>> =
-        Mutex::new(BTreeMap::new());
+    type Calibrated = (TestMotor, Result<Calibration, Refusal>);
+    static KNOWN: Mutex<BTreeMap<String, Calibrated>> = Mutex::new(BTreeMap::new());
     let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
     let key = format!("{motor:?} {configuration:?}");
     if let Some((after, result)) = known().get(&key).cloned() {
