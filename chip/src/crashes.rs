@@ -311,7 +311,7 @@ fn judge(kind: CrashKind, seen: &Seen) -> Vec<String> {
             seen.reset.is_some_and(|(_, reason)| reason == ResetReason::Software),
             "the reset is not the crash's",
         ),
-        (is_due, "no current tick fell due meanwhile"),
+        (is_due, "no current tick fell due while it was handled"),
         (field(&seen.record, "cause") == Some(kind.name()), "the next start reports another cause"),
         (place, "the next start reports another place"),
         (clocks, "the record's clocks are not those of the crash"),

@@ -151,20 +151,26 @@ pub fn requested(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Tool
     }
 }
 
-fn low(
-    machines: &mut Machines<'_>,
-    request: (u16, [u8; 4]),
-    random: &mut Random,
-) -> Result<Verdict, ToolError> {
+/// Turns a resting drive off and changes an object of each node, so that a save has something to write.
+fn drive_off<'a>(machines: &'a mut Machines<'_>, random: &mut Random) -> Result<&'a mut Session, ToolError> {
     let resting = machines.resting()?;
     let session = &mut *machines.session;
     begin(session, &resting, random.below(ticks(10e-3)))?;
     session.hold_switch(false);
     session.run(2.0 * DAMP_S)?;
-    let cells = session.machine.chip_mut().flash.parameters_mut().to_vec();
     for node in [1, 2] {
         session.write_object(node, OBJECT, 0, WINDOWS[0], ANSWER_S)?;
     }
+    Ok(session)
+}
+
+fn low(
+    machines: &mut Machines<'_>,
+    request: (u16, [u8; 4]),
+    random: &mut Random,
+) -> Result<Verdict, ToolError> {
+    let session = drive_off(machines, random)?;
+    let cells = session.machine.chip_mut().flash.parameters_mut().to_vec();
     // Between the supply that words of 32 bits need and the detector's level.
     session.machine.chip_mut().set_supply(random.uniform(2.7, 2.9));
     let refused = session.store(request.0, request.1, LONGEST_S);
@@ -210,11 +216,7 @@ fn off(
     request: (u16, [u8; 4]),
     random: &mut Random,
 ) -> Result<Verdict, ToolError> {
-    let resting = machines.resting()?;
-    let session = &mut *machines.session;
-    begin(session, &resting, random.below(ticks(10e-3)))?;
-    session.hold_switch(false);
-    session.run(2.0 * DAMP_S)?;
+    let session = drive_off(machines, random)?;
     let resets = session.resets.len();
     let chip = session.machine.chip_mut();
     chip.flash.slowness = random.uniform(1.0, 2.0);
@@ -222,9 +224,6 @@ fn off(
     chip.reschedule();
     chip.plant.switchings = Some(Vec::new());
     let erasures = chip.flash.erasures;
-    for node in [1, 2] {
-        session.write_object(node, OBJECT, 0, WINDOWS[0], ANSWER_S)?;
-    }
     // The bus says FF0D before and 0000 afterwards, else this fails.
     if let Err(error) = session.store(request.0, request.1, LONGEST_S) {
         return Ok(Err(error.to_string()));

@@ -1,7 +1,7 @@
 //! Flash for persistent data and new images, behind `embedded-storage`'s trait.
 //!
 //! **What a write costs.** The chip has one bank. A write takes 16 us a word (100 at most), an erase 0.25 s a
-//! sector of 16 KB (0.5 at most), 1 s one of 128 KB (2 at most). Every fetch from flash stalls meanwhile:
+//! sector of 16 KB (0.5 at most), 1 s one of 128 KB (2 at most). Every fetch from flash stalls until then:
 //! current loops, servo, bus, watchdog. So nothing is changed unless the registers show both main outputs
 //! off, the brake resistor's duty zero, and a supply that words of 32 bits need. The caller's word is not
 //! enough: a duty would stay on during the stall. `operation::Storing` does the rest: it raises the inhibit
