@@ -36,6 +36,8 @@ pub enum Abort {
     NoSubindex = 0x0609_0011,
     /// The value is out of the object's range.
     Range = 0x0609_0030,
+    /// The upper limit would be below the lower one.
+    MaximumBelowMinimum = 0x0609_0036,
     /// The parameters cannot be stored.
     Store = 0x0800_0020,
     /// The state of the device does not allow the access.

@@ -303,9 +303,13 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         for ((axis, status), inputs) in self.axes.iter_mut().zip(&status.joints).zip(inputs) {
             axis.update(&JointStatus { inputs, ..*status });
         }
-        let mut rises = false;
+        let (mut rises, mut stops) = (false, false);
         for axis in &mut self.axes {
             rises |= axis.take_rises();
+            stops |= axis.take_stop();
+            if !matches!(status.activity, Activity::Idle | Activity::Follow) {
+                axis.void_targets();
+            }
         }
         (self.leg.activity, self.leg.change) = (status.activity, status.change);
         let commanded = self.axes.iter().any(Axis::is_commanded);
@@ -328,6 +332,9 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
                 None
             }
             (Some(power), _) => Some(LegRequest::Power(power)),
+            (None, _) if stops && !self.hosted && drive.permission() != Permission::Off => {
+                Some(LegRequest::Power(PowerRequest::DisableVoltage))
+            }
             // While the operator controls the leg, a host must not start a motion.
             (None, Some(LegCommand::Identify | LegCommand::TakeUpdate | LegCommand::Assist))
                 if !self.hosted =>

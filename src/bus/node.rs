@@ -333,14 +333,14 @@ impl Node {
         let Some(receive) = self.communication.receive.get(place) else { return };
         let (parameters, data) = (receive.parameters, receive.data());
         let mut bytes = data.into_iter();
-        let mut dictionary = Dictionary { communication: &mut self.communication, objects };
         for mapped in parameters.mapped() {
             let mut value = [0; 4];
             for (place, byte) in value.iter_mut().zip(bytes.by_ref().take(usize::from(mapped.size))) {
                 *place = byte;
             }
             if !mapped.is_dummy() {
-                let _ = dictionary.write(mapped.object, u32::from_le_bytes(value));
+                // The host sees the old value of an object that it maps to be sent.
+                let _ = objects.write_mapped(mapped.object, u32::from_le_bytes(value));
             }
         }
     }

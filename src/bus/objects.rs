@@ -38,6 +38,14 @@ pub trait Objects {
     /// [`Abort`] if the value is not accepted.
     fn write(&mut self, object: Object, value: u32) -> Result<(), Abort>;
 
+    /// Writes an object by a received PDO, which a host may repeat without a change.
+    ///
+    /// # Errors
+    /// [`Abort`] if the value is not accepted.
+    fn write_mapped(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+        self.write(object, value)
+    }
+
     /// Copies the bytes of a text or domain from `offset` on into `into`; returns its total size in bytes.
     /// The content must not change until it has been read to the end.
     ///

@@ -246,6 +246,10 @@ rows! {
     0x6068, 0, U16, Both, No, 10, "Position window time";
     0x606B, 0, I32, Read, Transmit, 0, "Velocity demand value";
     0x606C, 0, I32, Read, Transmit, 0, "Velocity actual value";
+    0x606D, 0, U16, Both, No, 50_000, "Velocity window";
+    0x606E, 0, U16, Both, No, 10, "Velocity window time";
+    0x606F, 0, U16, Both, No, 10_000, "Velocity threshold";
+    0x6070, 0, U16, Both, No, 10, "Velocity threshold time";
     0x6071, 0, I16, Both, Any, 0, "Target torque";
     0x6072, 0, U16, Both, Any, 1000, "Max torque";
     0x6074, 0, I16, Read, Transmit, 0, "Torque demand";

@@ -278,14 +278,13 @@ impl<const N: usize> Control<N> {
             Some(commanded) => commanded.motion,
             None => self.motion.state_at(self.motion_tick),
         };
-        let placed = host.as_ref().map(|host| host.following.placed(sample));
-        let sample = placed.as_ref().unwrap_or(sample);
         let mixed = self.models.advance();
         let feedforward = self.models.faded(mixed.as_ref());
         let feedforward = feedforward.as_ref();
         let efforts = commanded.as_ref().map(|commanded| &commanded.efforts).or(assisted.as_ref());
         let command = ServoCommand { motion, feedforward, power };
         let servo = self.servo.tick_with(sample, &command, efforts, gravity);
+        // In every tick: a host that takes the leg over begins from this state.
         if let Some(host) = &mut host {
             host.following.measure(&servo);
         }

@@ -113,7 +113,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         evaluations: u32,
     ) -> ControlOutput<N> {
         let (following, cancel) = (&mut self.following, core::mem::take(&mut self.cancel));
-        let host = self.commands.as_ref().map(|commands| Host { following, commands, cancel, waits: false });
+        let host = Some(Host { following, commands: self.commands.as_ref(), cancel, waits: false });
         self.sample = Some(*sample);
         let output = self.control.tick_with(sample, request.as_ref(), gravity, host);
         if let Some(logged) = &output.logged {

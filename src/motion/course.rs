@@ -85,11 +85,6 @@ impl Course {
         }
     }
 
-    /// Moves the zero of the position.
-    pub fn shift(&mut self, by: f32) {
-        self.position += by;
-    }
-
     /// Limits the position to at most `window` from `place`.
     pub fn keep_within(&mut self, window: f32, place: f32) {
         self.position = clamp(self.position, place - window, place + window);

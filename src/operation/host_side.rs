@@ -76,7 +76,7 @@ impl<const N: usize> HostSide<N> {
 
     /// Resets after a change of the joints' zeros.
     pub fn begin(&mut self) {
-        self.following.forget_zeros();
+        self.following.restart();
     }
 
     /// Runs instead of a tick while the leg has no zeros: orders are dropped.
@@ -185,11 +185,16 @@ impl<const N: usize> HostSide<N> {
         }
     }
 
-    /// Commands of a host for this tick, while it has the drive; `waits` if they are not followed yet.
-    pub fn commands(&mut self, waits: bool) -> Option<Host<'_, N>> {
+    /// The host's side of this tick; `waits` if its commands are not followed yet.
+    pub fn host(&mut self, waits: bool) -> Host<'_, N> {
         let cancel = core::mem::take(&mut self.cancel);
-        let (following, commands) = (&mut self.following, self.commands.as_ref()?);
-        Some(Host { following, commands, cancel, waits })
+        Host { following: &mut self.following, commands: self.commands.as_ref(), cancel, waits }
+    }
+
+    /// Whether a host has the drive.
+    #[must_use]
+    pub const fn has_drive(&self) -> bool {
+        self.commands.is_some()
     }
 
     /// Reports the tick's results when a report is due.

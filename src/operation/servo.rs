@@ -145,18 +145,20 @@ impl<const N: usize> ServoLevel<N> {
         }
         self.look_around(control, signals);
         self.set_bandwidths(control, signals);
-        let request = self.next_request(control, ends, signals, hardware);
+        let (request, by_hand) = self.next_request(control, ends, signals, hardware);
         // Until the brake is open the drive holds its pose.
         let waits = self.holding_brake.is_some_and(|brake| !brake.is_open());
+        // The start button begins nothing while a host has the drive.
+        let is_hosts = by_hand && self.host.as_ref().is_some_and(HostSide::has_drive);
         let permitted = permitted(request.as_ref(), signals.inhibit.is_clear(), control.state())
-            .filter(|request| !(waits && request.moves()));
+            .filter(|request| !((waits || is_hosts) && request.moves()));
         let sample = Sample { joints: self.sample };
-        let commands = self.host.as_mut().and_then(|host| host.commands(waits));
+        let host = self.host.as_mut().map(|host| host.host(waits));
         if matches!(permitted, Some(ControlRequest::Identify)) && !control.activity().is_identifying() {
             // The statement belongs to this identification alone.
             control.set_wearing(self.prepared.and_then(|prepared| prepared.wearing));
         }
-        let output = control.tick_with(&sample, permitted, gravity, commands);
+        let output = control.tick_with(&sample, permitted, gravity, host);
         if let Some(note) = control.take_assist_note() {
             let ((event, why), tick) = (words::assist(note), self.tick);
             send(LegEvent::Record(Record::Assist { tick, event, why }), ends, signals);
@@ -210,14 +212,14 @@ impl<const N: usize> ServoLevel<N> {
         }
     }
 
-    /// Next request: the operator's before the host's.
+    /// Next request, the operator's before the host's, and whether it is the operator's.
     fn next_request<H: Hardware<N>>(
         &mut self,
         control: &mut Control<N>,
         ends: &mut ServoEnds<'_, N>,
         signals: &Signals<N>,
         hardware: &H,
-    ) -> Option<ControlRequest> {
+    ) -> (Option<ControlRequest>, bool) {
         // The button that began a session ends it.
         let by_hand = match ends.requests.dequeue() {
             Some(ControlRequest::Assist(_)) if control.activity().assists() => {
@@ -226,7 +228,7 @@ impl<const N: usize> ServoLevel<N> {
             request => request,
         };
         let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) else {
-            return by_hand;
+            return (by_hand, true);
         };
         host.receive(ends, |fault| control.report(fault));
         control.permit_return(host.may_return());
@@ -234,7 +236,7 @@ impl<const N: usize> ServoLevel<N> {
         if let Some(prepared) = prepared {
             self.prepared = prepared;
         }
-        host.held(request, control.state(), signals, hardware)
+        (host.held(request, control.state(), signals, hardware), by_hand.is_some())
     }
 
     /// Applies the bandwidths that a host has set, while the drive is off.

@@ -37,13 +37,6 @@ impl StepGate {
         (self.last, self.rejected) = (None, 0);
     }
 
-    /// Shifts the reference: the same position now has a count larger by `counts`.
-    pub const fn shift(&mut self, counts: i32) {
-        if let Some(last) = self.last {
-            self.last = Some(last.wrapping_add(counts));
-        }
-    }
-
     /// Checks one reading; the first is always good.
     #[must_use]
     pub fn judge(&mut self, counts: i32) -> Reading {
@@ -95,16 +88,5 @@ mod tests {
         let readings = [0, 9000, 9001, 9002, 9003].map(|counts| gate.judge(counts));
         use Reading::{Good, Jumped, Rejected};
         assert_eq!(readings, [Good, Rejected, Rejected, Jumped, Good]);
-    }
-
-    #[test]
-    fn a_shifted_zero_is_not_a_step() {
-        for shift in [1_000_000, -1_000_000, i32::MIN] {
-            let mut gate = StepGate::new(100);
-            assert_eq!(gate.judge(50), Reading::Good);
-            gate.shift(shift);
-            assert_eq!(gate.judge(120_i32.wrapping_add(shift)), Reading::Good);
-            assert_eq!(gate.judge(120), Reading::Rejected);
-        }
     }
 }

@@ -85,11 +85,6 @@ impl Observer {
         self.deviation = 0.0;
     }
 
-    /// Renumbers the counts: the position stays, with another count.
-    pub fn shift(&mut self, counts: i32) {
-        self.reading = self.reading.map(|reading| reading.wrapping_add(counts));
-    }
-
     /// Estimated position in counts; exact up to 2^24.
     #[must_use]
     pub fn position_counts(&self) -> f32 {

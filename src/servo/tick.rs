@@ -227,14 +227,6 @@ impl<const N: usize> Servo<N> {
         self.joints.map(|joint| joint.scale)
     }
 
-    /// Adds an offset to each joint's counts: the angle changes, but the joint does not move.
-    pub fn shift(&mut self, counts: &[i32; N]) {
-        for joint in 0..N {
-            self.gates[joint].shift(counts[joint]);
-            self.observers[joint].shift(counts[joint]);
-        }
-    }
-
     /// Runs one tick; `gravity` in the base frame, m/s^2.
     #[must_use]
     pub fn tick<M: TorqueModel<N>>(

@@ -28,6 +28,7 @@ mod model_urdf;
 mod monitor;
 mod motor;
 mod pendulum;
+mod random_hosts;
 mod recordings;
 mod regressor;
 mod replay;

@@ -155,10 +155,10 @@ fn the_operator_controls_the_leg_until_a_host_sends_a_controlword() {
     let mut bench = Bench::new();
     bench.drive = DriveState::OperationEnabled;
     bench.orders.clear();
-    // NMT start, configuration, reads and a controlword of 0 leave control with the operator.
+    // NMT start, configuration, reads and PDOs with a controlword of 0 leave control with the operator.
     bench.send(0, &[1, 0]);
     bench.write(1, 0x6060, 0, 8, 1);
-    bench.write(1, 0x6040, 0, 0, 2);
+    bench.send(0x201, &[0, 0]);
     assert_eq!(bench.read(2, 0x6041) & 0x6F, 0x27);
     assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::OperationEnabled, false));
     assert!(bench.orders.iter().all(|order| order.request.is_none() && order.commands.is_none()));
@@ -168,6 +168,15 @@ fn the_operator_controls_the_leg_until_a_host_sends_a_controlword() {
     bench.write_after_start();
     assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::ReadyToSwitchOn, true));
     assert!(bench.orders.last().is_some_and(|order| order.commands.is_some()));
+}
+
+#[test]
+fn a_host_that_disables_the_operators_leg_stops_it_and_does_not_take_it() {
+    let mut bench = Bench::new();
+    bench.drive = DriveState::OperationEnabled;
+    bench.write(1, 0x6040, 0, 0, 2);
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, false));
+    assert_eq!(bench.read(2, 0x6041) & 0x6F, 0x40);
 }
 
 impl Bench {

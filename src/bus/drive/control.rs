@@ -13,6 +13,13 @@
 //! bit 8         halt
 //! ```
 //!
+//! **Targets end with the session that wrote them.** When the joint is disabled, when the host is lost, or while
+//! another activity has the leg, targets and offsets become void. In a mode whose target is void the joint holds
+//! its pose until the host writes that target again; a void offset is 0. The objects still read as written.
+//!
+//! **Disable voltage from a host that does not control the leg** (0 by SDO, while the operator's contacts have
+//! enabled it) turns the leg off too, and leaves it to the operator. A 0 that a PDO repeats is idle.
+//!
 //! A controlword that asks for a step which does not exist from the present state has no effect, such as 7
 //! or F at switch on disabled, or any step during a quick stop or with bit 7 set. A new word of that kind is
 //! reported (FF0E). A repeated one is not: hosts repeat theirs while the other joint stops the leg.
@@ -20,7 +27,9 @@
 //! ```text
 //! statusword
 //! bits 0-3, 5, 6  state          4 voltage, 9 remote       10 target reached   11 internal limit active
-//! bit 12   profile position: set-point acknowledge; homing: attained; cyclic: the command is followed
+//! bit 10   profile velocity: the measured velocity is in the window (606D, 606E)
+//! bit 12   profile position: set-point acknowledge, set while none can be taken; profile velocity: the joint
+//!          stands (606F, 6070); homing: attained; cyclic and impedance: the target is followed
 //! bit 13   positions: following error; homing: error
 //! bit 15   this joint is enabled, but the leg's bridges are off because another joint is not enabled
 //! ```
@@ -44,6 +53,29 @@ const NEW: u16 = 1 << 4;
 const IMMEDIATELY: u16 = 1 << 5;
 const RELATIVE: u16 = 1 << 6;
 const HALT: u16 = 1 << 8;
+
+/// Targets and offsets that a host has written and that are not void.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Targets {
+    pub position: bool,
+    pub velocity: bool,
+    pub torque: bool,
+    pub velocity_offset: bool,
+    pub torque_offset: bool,
+}
+
+impl Targets {
+    /// Whether the target that a mode needs is there.
+    const fn has(self, mode: Mode) -> bool {
+        match mode {
+            // A start by bit 4 names its values.
+            Mode::ProfilePosition | Mode::Homing => true,
+            Mode::CyclicPosition | Mode::Impedance => self.position,
+            Mode::ProfileVelocity | Mode::CyclicVelocity => self.velocity,
+            Mode::ProfileTorque | Mode::CyclicTorque => self.torque,
+        }
+    }
+}
 
 /// Constants of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,6 +183,10 @@ pub(super) struct Settings {
     pub following_time_ms: u16,
     pub position_window: u32,
     pub position_time_ms: u16,
+    pub velocity_window: u16,
+    pub velocity_time_ms: u16,
+    pub standing_speed: u16,
+    pub standing_time_ms: u16,
     pub target_torque: i16,
     pub largest_torque: u16,
     pub target_position: i32,
@@ -193,6 +229,10 @@ impl Settings {
         following_time_ms: 10,
         position_window: 17_453,
         position_time_ms: 10,
+        velocity_window: 50_000,
+        velocity_time_ms: 10,
+        standing_speed: 10_000,
+        standing_time_ms: 10,
         target_torque: 0,
         largest_torque: 1000,
         target_position: 0,
@@ -233,6 +273,16 @@ pub struct Axis {
     /// A fault reset was requested and not passed on yet.
     pub(super) resets: bool,
     set_point: SetPoint,
+    /// Targets that apply.
+    pub(super) targets: Targets,
+    /// [`Self::is_powered`] at the last update.
+    was_powered: bool,
+    /// A host that does not control the leg has commanded to disable voltage; not processed yet.
+    stops: bool,
+    /// Bit 4 of the last controlword; survives a lost host, so that a bit that stays set is no new request.
+    held: bool,
+    /// Bit 4 has risen and is not accepted yet.
+    asks: bool,
     /// Bit 4 of the present controlword was accepted: set-point acknowledge or start of homing.
     taken: bool,
     /// Counts accepted set-points and starts of homing.
@@ -265,6 +315,10 @@ const fn radian(micro: i32) -> Radian {
     Radian(micro as f32 * 1e-6)
 }
 
+fn milliseconds(time: u16) -> Second {
+    Second(f32::from(time) * 1e-3)
+}
+
 const fn radian_per_second(micro: i32) -> RadianPerSecond {
     RadianPerSecond(micro as f32 * 1e-6)
 }
@@ -281,6 +335,17 @@ impl Axis {
             own: DriveState::NotReadyToSwitchOn,
             resets: false,
             set_point: SetPoint { position: Radian::ZERO, relative: false, immediately: false },
+            targets: Targets {
+                position: false,
+                velocity: false,
+                torque: false,
+                velocity_offset: false,
+                torque_offset: false,
+            },
+            was_powered: false,
+            stops: false,
+            held: false,
+            asks: false,
             taken: false,
             request_count: 0,
             fault: None,
@@ -294,6 +359,21 @@ impl Axis {
     /// Takes over the leg's status. Call [`Coupling::power`](super::Coupling::power) afterwards.
     pub fn update(&mut self, status: &JointStatus) {
         self.status = *status;
+        let is_powered = self.is_powered();
+        if core::mem::replace(&mut self.was_powered, is_powered) && !is_powered {
+            self.void_targets();
+        }
+        self.take_request();
+    }
+
+    /// Makes all targets void until they are written again.
+    pub fn void_targets(&mut self) {
+        self.targets = Targets::default();
+    }
+
+    /// Takes the command to disable voltage of a host that does not control the leg.
+    pub(in crate::bus) fn take_stop(&mut self) -> bool {
+        core::mem::take(&mut self.stops)
     }
 
     /// Returns object 2001; `None` if it is 0, the board's own.
@@ -374,6 +454,7 @@ impl Axis {
         let rising = word & !self.controlword;
         let is_new = (word ^ self.controlword) & COMMAND != 0;
         self.controlword = word;
+        self.stops |= word == 0 && !self.commanded;
         self.commanded |= word != 0;
         if rising & RESET != 0 {
             self.resets = self.own.fault().is_some();
@@ -389,23 +470,39 @@ impl Axis {
             self.request(word);
         }
         self.is_out_of_order = (is_new || self.is_out_of_order) && wanted > level(self.own);
-        self.taken &= word & NEW != 0;
-        if rising & NEW == 0 || !self.is_powered() {
+        let holds = word & NEW != 0;
+        let rises = !core::mem::replace(&mut self.held, holds) && holds;
+        self.taken &= holds;
+        self.asks = holds && (self.asks || rises && self.is_powered());
+        self.take_request();
+    }
+
+    /// Takes a set-point or a start of homing, once the leg is in that mode and can take it.
+    fn take_request(&mut self) {
+        let mode = self.settings.mode;
+        if !self.asks || !self.is_powered() || self.status.mode != mode {
             return;
         }
-        match Mode::of(self.settings.mode) {
+        match Mode::of(mode) {
             Some(Mode::ProfilePosition) => {
-                self.set_point = SetPoint {
-                    position: radian(self.settings.target_position),
-                    relative: word & RELATIVE != 0,
-                    immediately: word & IMMEDIATELY != 0,
-                };
+                let immediately = self.controlword & IMMEDIATELY != 0;
+                if self.is_full() && !immediately {
+                    return;
+                }
+                let relative = self.controlword & RELATIVE != 0;
+                let position = radian(self.settings.target_position);
+                self.set_point = SetPoint { position, relative, immediately };
             }
             Some(Mode::Homing) => {}
             _ => return,
         }
         self.request_count = self.request_count.wrapping_add(1);
-        self.taken = true;
+        (self.asks, self.taken) = (false, true);
+    }
+
+    /// Whether the leg has not taken the last set-point, or can take none after it.
+    const fn is_full(&self) -> bool {
+        self.status.is_full || self.status.requests_seen != self.request_count
     }
 
     fn request(&mut self, word: u16) {
@@ -447,7 +544,8 @@ impl Axis {
         }
         // Bits held down are cleared, so that the next controlword has rising edges.
         (self.controlword, self.is_out_of_order) = (0, false);
-        self.taken = false;
+        (self.asks, self.taken) = (false, false);
+        self.void_targets();
     }
 
     /// Takes the fault of a lost host if 6007 is 1; returned once.
@@ -467,11 +565,14 @@ impl Axis {
         let bit = |is_set: bool, place: u16| u16::from(is_set) << place;
         let is_ready = self.own != DriveState::NotReadyToSwitchOn;
         let (twelve, thirteen) = match Mode::of(self.mode()) {
-            Some(Mode::ProfilePosition) => (self.taken, status.deviates),
+            Some(Mode::ProfilePosition) => {
+                (self.taken || self.is_powered() && self.is_full(), status.deviates)
+            }
+            Some(Mode::ProfileVelocity) => (status.stands, false),
             Some(Mode::Homing) => (status.homed, status.deviates),
-            Some(Mode::CyclicPosition) => (self.is_powered(), status.deviates),
-            Some(Mode::CyclicVelocity | Mode::CyclicTorque | Mode::Impedance) => (self.is_powered(), false),
-            _ => (false, false),
+            Some(Mode::CyclicPosition) => (status.follows, status.deviates),
+            Some(Mode::CyclicVelocity | Mode::CyclicTorque | Mode::Impedance) => (status.follows, false),
+            Some(Mode::ProfileTorque) | None => (false, false),
         };
         let waits = self.own.is_enabled() && !self.is_powered();
         state_bits(self.own)
@@ -492,19 +593,22 @@ impl Axis {
     #[must_use]
     pub fn command(&self) -> JointCommand {
         let settings = &self.settings;
-        let torque_offset = self.torque(i32::from(settings.torque_offset));
-        let target_torque = self.torque(i32::from(settings.target_torque));
-        let velocity_offset = radian_per_second(settings.velocity_offset);
-        let velocity = radian_per_second(settings.target_velocity);
-        let target = match Mode::of(settings.mode).filter(|_| self.is_powered()) {
+        let targets = self.targets;
+        let torque = |is_valid: bool, value: i16| self.torque(if is_valid { i32::from(value) } else { 0 });
+        let torque_offset = torque(targets.torque_offset, settings.torque_offset);
+        let target_torque = torque(targets.torque, settings.target_torque);
+        let speed = |is_valid: bool, value: i32| radian_per_second(if is_valid { value } else { 0 });
+        let velocity_offset = speed(targets.velocity_offset, settings.velocity_offset);
+        let velocity = speed(targets.velocity, settings.target_velocity);
+        let may_home = settings.homing_method != NO_METHOD
+            && (settings.range[0]..=settings.range[1]).contains(&settings.home_offset);
+        let target = match Mode::of(settings.mode).filter(|mode| self.is_powered() && targets.has(*mode)) {
             None => Target::Hold,
             Some(Mode::ProfilePosition) => Target::ProfilePosition(self.set_point),
             Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),
             Some(Mode::ProfileTorque) => Target::ProfileTorque(target_torque),
             // An infinite offset is out of range: homing error.
-            Some(Mode::Homing) if settings.homing_method == NO_METHOD => {
-                Target::Homing { offset: Radian(f32::INFINITY) }
-            }
+            Some(Mode::Homing) if !may_home => Target::Homing { offset: Radian(f32::INFINITY) },
             Some(Mode::Homing) => Target::Homing { offset: radian(settings.home_offset) },
             Some(Mode::CyclicPosition) => Target::CyclicPosition {
                 position: radian(settings.target_position),
@@ -533,12 +637,16 @@ impl Axis {
             acceleration: acceleration(settings.profile_acceleration),
             deceleration: acceleration(settings.profile_deceleration),
             torque_slope_nm_per_s: self.constants.rated_torque.0 * (settings.torque_slope as f32 * 1e-3),
+            velocity_window: radian_per_second(i32::from(settings.velocity_window)),
+            velocity_time: milliseconds(settings.velocity_time_ms),
+            standing_speed: radian_per_second(i32::from(settings.standing_speed)),
+            standing_time: milliseconds(settings.standing_time_ms),
             range: settings.range.map(radian),
             largest_torque: self.torque(i32::from(settings.largest_torque)),
             following_window: Radian(settings.following_window as f32 * 1e-6),
-            following_time: Second(f32::from(settings.following_time_ms) * 1e-3),
+            following_time: milliseconds(settings.following_time_ms),
             position_window: Radian(settings.position_window as f32 * 1e-6),
-            position_time: Second(f32::from(settings.position_time_ms) * 1e-3),
+            position_time: milliseconds(settings.position_time_ms),
             period: self.period(),
         }
     }

@@ -23,6 +23,23 @@ fn is_default_or_within(value: u32, [least, most]: [u16; 2]) -> bool {
     value == 0 || (u32::from(least)..=u32::from(most)).contains(&value)
 }
 
+impl Axis {
+    /// Sets a limit of the position (607D). While the joint is powered, its place must stay within the limits.
+    fn set_range(&mut self, sub: u8, limit: i32) -> Result<(), Abort> {
+        let [low, high] = self.settings.range;
+        let range = if sub == 1 { [limit, high] } else { [low, limit] };
+        if range[0] > range[1] {
+            return Err(Abort::MaximumBelowMinimum);
+        }
+        let place = micro(self.status.position.0) as i32;
+        if self.is_powered() && !(range[0]..=range[1]).contains(&place) {
+            return Err(Abort::State);
+        }
+        self.settings.range = range;
+        Ok(())
+    }
+}
+
 impl Objects for Axis {
     fn read(&self, object: Object) -> Result<u32, Abort> {
         let (settings, status, constants) = (&self.settings, &self.status, &self.constants);
@@ -65,6 +82,10 @@ impl Objects for Axis {
             (0x6068, _) => u32::from(settings.position_time_ms),
             (0x606B, _) => micro(status.velocity_demand.0),
             (0x606C, _) => micro(status.velocity.0),
+            (0x606D, _) => u32::from(settings.velocity_window),
+            (0x606E, _) => u32::from(settings.velocity_time_ms),
+            (0x606F, _) => u32::from(settings.standing_speed),
+            (0x6070, _) => u32::from(settings.standing_time_ms),
             (0x6071, _) => bits!(settings.target_torque),
             (0x6072, _) => u32::from(settings.largest_torque),
             (0x6074, _) => thousandths(status.torque_demand.0),
@@ -143,12 +164,15 @@ impl Objects for Axis {
             (0x6066, _) => settings.following_time_ms = value as u16,
             (0x6067, _) => settings.position_window = value,
             (0x6068, _) => settings.position_time_ms = value as u16,
-            (0x6071, _) => settings.target_torque = value as i16,
+            (0x606D, _) => settings.velocity_window = value as u16,
+            (0x606E, _) => settings.velocity_time_ms = value as u16,
+            (0x606F, _) => settings.standing_speed = value as u16,
+            (0x6070, _) => settings.standing_time_ms = value as u16,
+            (0x6071, _) => (settings.target_torque, self.targets.torque) = (value as i16, true),
             (0x6072, _) => settings.largest_torque = value as u16,
-            (0x607A, _) => settings.target_position = value as i32,
+            (0x607A, _) => (settings.target_position, self.targets.position) = (value as i32, true),
             (0x607C, _) => settings.home_offset = value as i32,
-            (0x607D, 1) => settings.range[0] = value as i32,
-            (0x607D, 2) => settings.range[1] = value as i32,
+            (0x607D, sub) => return self.set_range(sub, value as i32),
             (0x6081, _) => settings.profile_velocity = value,
             (0x6083, _) if value > 0 => settings.profile_acceleration = value,
             (0x6084, _) if value > 0 => settings.profile_deceleration = value,
@@ -156,13 +180,13 @@ impl Objects for Axis {
             (0x6087, _) => settings.torque_slope = value,
             // Methods that take the present position as home.
             (0x6098, _) if matches!(value as i8, 0 | 35 | 37) => settings.homing_method = value as i8,
-            (0x60B1, _) => settings.velocity_offset = value as i32,
-            (0x60B2, _) => settings.torque_offset = value as i16,
+            (0x60B1, _) => (settings.velocity_offset, self.targets.velocity_offset) = (value as i32, true),
+            (0x60B2, _) => (settings.torque_offset, self.targets.torque_offset) = (value as i16, true),
             (0x60C1, 1) => settings.interpolation_data = value as i32,
             (0x60C2, 1) if value > 0 => settings.period = value as u8,
             (0x60C2, 2) if matches!(value as i8, -6..=0) => settings.period_index = value as i8,
             (0x2194 | 0x60FE, _) => settings.outputs = value,
-            (0x60FF, _) => settings.target_velocity = value as i32,
+            (0x60FF, _) => (settings.target_velocity, self.targets.velocity) = (value as i32, true),
             (
                 0x2001
                 | 0x2002
@@ -186,6 +210,15 @@ impl Objects for Axis {
         Ok(())
     }
 
+    /// A 0 that a PDO repeats is idle: it is no command to disable voltage.
+    fn write_mapped(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+        if object.index == 0x6040 && value as u16 == 0 && !self.commanded {
+            Ok(())
+        } else {
+            self.write(object, value)
+        }
+    }
+
     fn lost(&mut self, why: Lost) {
         self.lose(why);
     }
@@ -197,5 +230,6 @@ impl Objects for Axis {
     fn reset(&mut self) {
         self.settings = Settings::NEW;
         self.commanded = false;
+        self.void_targets();
     }
 }

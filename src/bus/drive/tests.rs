@@ -228,6 +228,7 @@ fn a_lost_bus_or_an_nmt_command_stops_the_drive_for_good() {
 fn each_rising_edge_takes_one_set_point() {
     let mut board = Board::enabled();
     let mode = JointStatus { mode: 1, drive: board.drive, ..JointStatus::NONE };
+    let seen = |requests_seen| JointStatus { requests_seen, ..mode };
     let axis = &mut board.axes[0];
     axis.write(Object::at(0x6060, 0), 1).expect("a mode");
     let number = |axis: &Axis| match axis.command().target {
@@ -247,10 +248,75 @@ fn each_rising_edge_takes_one_set_point() {
         axis.write(Object::at(0x607A, 0), 900_000).expect("a target");
         assert_eq!((number(axis), axis.command().request_count), (point, count));
         axis.write(CONTROLWORD, 0x2F).expect("a word");
+        axis.update(&seen(count));
         assert!(axis.statusword() & 1 << 12 == 0);
     }
     axis.write(CONTROLWORD, 0x14F).expect("a word");
     assert!(axis.command().halt);
+}
+
+#[test]
+fn a_set_point_is_acknowledged_only_where_it_can_be_taken() {
+    let mut board = Board::enabled();
+    let mode = JointStatus { mode: 1, drive: board.drive, ..JointStatus::NONE };
+    let axis = &mut board.axes[0];
+    axis.write(Object::at(0x6060, 0), 1).expect("a mode");
+    axis.update(&mode);
+    axis.write(CONTROLWORD, 0x1F).expect("a word");
+    axis.write(CONTROLWORD, 0x0F).expect("a word");
+    // The leg has taken it, and has one that waits: bit 12 stays, and a third one is not taken.
+    axis.update(&JointStatus { requests_seen: 1, is_full: true, ..mode });
+    assert!(axis.statusword() & 1 << 12 != 0);
+    axis.write(CONTROLWORD, 0x1F).expect("a word");
+    assert_eq!(axis.command().request_count, 1);
+    axis.write(CONTROLWORD, 0x0F).expect("a word");
+    axis.update(&JointStatus { requests_seen: 1, ..mode });
+    assert!(axis.statusword() & 1 << 12 == 0);
+    // A lost host does not make a bit that stays set a new request.
+    axis.write(CONTROLWORD, 0x1F).expect("a word");
+    axis.update(&JointStatus { requests_seen: 2, ..mode });
+    axis.write(Object::at(0x6007, 0), 0).expect("no reaction");
+    axis.lost(Lost::Heartbeat);
+    axis.write(CONTROLWORD, 0x1F).expect("a word");
+    assert_eq!(axis.command().request_count, 2);
+}
+
+#[test]
+fn targets_of_an_ended_session_are_void_until_they_are_written_again() {
+    let primary = [(3, 0x60FF), (4, 0x6071), (8, 0x607A), (9, 0x60FF), (10, 0x6071), (-1, 0x607A)];
+    for (mode, index) in primary {
+        let mut board = Board::enabled();
+        let write = |board: &mut Board, value| {
+            board.axes[0].write(Object::at(index, 0), value).expect("a target");
+        };
+        board.axes[0].write(Object::at(0x6060, 0), mode as u32).expect("a mode");
+        assert_eq!(board.axes[0].command().target, Target::Hold, "{mode}");
+        write(&mut board, 100);
+        assert_eq!(board.axes[0].command().target.mode().map(|mode| mode as i32), Some(mode));
+        // Disabled and enabled again; lost, without a reaction.
+        board.control([7; 2]);
+        assert_eq!(board.control([15; 2]), [0x27; 2]);
+        assert_eq!(board.axes[0].command().target, Target::Hold, "{mode}");
+        write(&mut board, 100);
+        board.axes[0].write(Object::at(0x6007, 0), 0).expect("no reaction");
+        board.axes[0].lost(Lost::Heartbeat);
+        assert_eq!(board.axes[0].command().target, Target::Hold, "{mode}");
+        assert_eq!(board.axes[0].read(Object::at(index, 0)), Ok(100));
+    }
+}
+
+#[test]
+fn position_limits_are_checked_as_a_pair_and_against_the_joint() {
+    use crate::bus::Abort::{MaximumBelowMinimum, State};
+    let mut board = Board::started(1);
+    let axis = &mut board.axes[0];
+    assert_eq!(axis.write(Object::at(0x607D, 2), 100), Ok(()));
+    assert_eq!(axis.write(Object::at(0x607D, 1), 200), Err(MaximumBelowMinimum));
+    let mut board = Board::enabled();
+    // The joint is at 0.
+    for (sub, limit, expected) in [(1, 1, Err(State)), (2, -1, Err(State)), (1, -1, Ok(())), (2, 1, Ok(()))] {
+        assert_eq!(board.axes[0].write(Object::at(0x607D, sub), limit as u32), expected, "{sub} {limit}");
+    }
 }
 
 #[test]

@@ -321,6 +321,11 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
         }
     }
 
+    fn write_mapped(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+        // No other object that can be mapped is held here.
+        self.axis.write_mapped(object, value)
+    }
+
     fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
         match (object.index, object.sub) {
             (0x1F50, _) => Err(Abort::WriteOnly),

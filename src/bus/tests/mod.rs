@@ -84,9 +84,11 @@ impl Board {
     pub fn tick(&mut self) -> Vec<Frame> {
         self.now_us += 250;
         self.drive = self.drive.after(DriveEvent::Tick, 4);
-        let status = JointStatus { drive: self.drive, mode: 0, ..JointStatus::NONE };
         for axis in &mut self.axes {
-            axis.update(&status);
+            let command = axis.command();
+            let mode = command.target.mode().map_or(0, |mode| mode as i8);
+            let requests_seen = command.request_count;
+            axis.update(&JointStatus { drive: self.drive, mode, requests_seen, ..JointStatus::NONE });
         }
         let [hip, knee] = &mut self.axes;
         if let Some(request) = self.coupling.power([hip, knee], self.drive, self.refuses) {

@@ -5,13 +5,13 @@ use crate::assist::AssistEnd;
 use crate::leg::follow::{Commanded, Following, JointCommand};
 use crate::motion::{Motion, MotionState};
 
-/// Commands of a host for one tick, and the state of following them.
+/// A host's side of one tick: its commands, if it has the drive, and the state of following them.
 #[derive(Debug)]
 pub struct Host<'a, const N: usize> {
     /// State from tick to tick.
     pub following: &'a mut Following<N>,
-    /// Commands of this tick.
-    pub commands: &'a [JointCommand; N],
+    /// Commands of this tick; `None` while no host has the drive.
+    pub commands: Option<&'a [JointCommand; N]>,
     /// Whether the activity is cancelled: of an identification or a tracked motion the joints slow down to
     /// rest along their profiles, assistance fades out.
     pub cancel: bool,
@@ -23,6 +23,12 @@ impl<const N: usize> Control<N> {
     /// Follows the host's commands if the drive is enabled and no other activity runs.
     pub(super) fn obey(&mut self, host: Option<&mut Host<'_, N>>) -> Option<Commanded<N>> {
         let Host { following, commands, cancel, waits } = host?;
+        let Some(commands) = *commands else {
+            if self.activity.follows_host() {
+                self.activity = Activity::Idle;
+            }
+            return None;
+        };
         if *waits || !self.servo.state().is_enabled() {
             return None;
         }
@@ -47,9 +53,6 @@ impl<const N: usize> Control<N> {
         let commanded = following.follow(commands);
         if let Some(fault) = commanded.fault {
             self.servo.report(fault);
-        }
-        if let Some(shifts) = &commanded.shifts {
-            self.servo.shift(shifts);
         }
         // Start of a possible next activity.
         (self.motion, self.motion_tick) = (Motion::Hold(commanded.motion.position_rad), 0);

@@ -156,6 +156,14 @@ pub struct JointCommand {
     pub deceleration: RadianPerSecondSquared,
     /// Slope of [`Target::ProfileTorque`], N m/s.
     pub torque_slope_nm_per_s: f32,
+    /// A profile velocity is reached after [`Self::velocity_time`] within this distance.
+    pub velocity_window: RadianPerSecond,
+    /// Time within the velocity window.
+    pub velocity_time: Second,
+    /// The joint stands after [`Self::standing_time`] at no more than this speed.
+    pub standing_speed: RadianPerSecond,
+    /// Time at no more than the standing speed.
+    pub standing_time: Second,
     /// Software limits, lowest and highest, in addition to the leg's own.
     pub range: [Radian; 2],
     /// Torque limit, in addition to the leg's own.
@@ -171,6 +179,21 @@ pub struct JointCommand {
     pub position_time: Second,
     /// Period of the targets in the cyclic modes.
     pub period: Second,
+}
+
+impl JointCommand {
+    /// The command with the positions that a host states relative to its zero, relative to the joint's own.
+    #[must_use]
+    pub fn seen_from(mut self, zero: Radian) -> Self {
+        match &mut self.target {
+            Target::ProfilePosition(SetPoint { position, relative: false, .. })
+            | Target::CyclicPosition { position, .. }
+            | Target::Impedance(ImpedanceTarget { position, .. }) => *position = *position - zero,
+            _ => {}
+        }
+        self.range = self.range.map(|end| end - zero);
+        self
+    }
 }
 
 /// Status of one joint at one tick; angles and torques with the anatomical sign.
@@ -192,8 +215,16 @@ pub struct JointStatus {
     pub torque_demand: NewtonMetre,
     /// Active mode (6061); 0 for none.
     pub mode: i8,
+    /// Whether the joint follows its target: no halt, no other activity, and the target can be followed.
+    pub follows: bool,
+    /// Whether no further set-point can be taken.
+    pub is_full: bool,
+    /// [`JointCommand::request_count`] of the last tick in which the joint followed commands.
+    pub requests_seen: u8,
     /// Whether the target is reached, or the joint is at rest after a halt.
     pub reached: bool,
+    /// Whether the joint stands.
+    pub stands: bool,
     /// Whether a limit reduces the command.
     pub limited: bool,
     /// Whether homing has succeeded.
@@ -217,7 +248,11 @@ impl JointStatus {
         velocity_demand: RadianPerSecond::ZERO,
         torque_demand: NewtonMetre::ZERO,
         mode: 0,
+        follows: false,
+        is_full: false,
+        requests_seen: 0,
         reached: false,
+        stands: false,
         limited: false,
         homed: false,
         deviates: false,

@@ -4,16 +4,20 @@
 //! profile position     trajectory to the newest set-point; unless immediate, after the previous one
 //! profile velocity     trajectory to a velocity
 //! profile torque       torque along its slope, no position control; halt ramps it to zero
-//! homing               comes to rest and sets the position to the requested offset
+//! homing               comes to rest and gives the present position the requested value for hosts
 //! cyclic               position or velocity interpolated over the period, or the torque directly
 //! impedance            torque of a spring and a damper around the target
-//! no mode, halt        comes to rest along the profile and holds
+//! no mode, halt        comes to rest along the profile and holds; a halted set-point goes on afterwards
 //! ```
 //!
 //! Nothing jumps: a new mode starts from the joint's present position and torque. A trajectory never leaves
-//! the range or exceeds the speed limit. Fault 8611: the distance to the commanded position exceeds the
-//! window for too long, or a cyclic target is too far away when the mode begins. In velocity modes a blocked
+//! the range or exceeds the speed limit. A cyclic position that is out of the following window when it would
+//! begin to be followed is not followed: the joint holds its pose until one within the window comes. Fault
+//! 8611: the distance to the commanded position exceeds the window for too long. In velocity modes a blocked
 //! joint is not a fault: the commanded position stays within the window around the measured one.
+//!
+//! No setting makes a stop endless: whatever a host has set, a joint slows down from its largest speed, and a
+//! torque fades from its limit, within [`LONGEST_STOP_S`].
 //!
 //! While a joint returns into its range (`safety::Monitor`), every position or velocity mode moves it slowly.
 //! Targets are limited to the range, and the commanded position is never farther out than the joint.
@@ -28,8 +32,13 @@ use crate::units::{NewtonMetre, Radian, RadianPerSecond, Second};
 /// Speed below which a joint is at rest, rad/s: 0.3 degrees per second, ten times the observer's ripple from
 /// the encoder steps of the default leg.
 const STANDING: f32 = 0.005;
+/// Longest time of a stop from the largest speed, or of a fade from the largest torque, s.
+const LONGEST_STOP_S: f32 = 2.0;
 /// Longest period that is interpolated: a quarter of a second.
 const LONGEST_PERIOD: u32 = SERVO_RATE_HZ / 4;
+
+/// Largest angle that homing gives to the present position: a turn.
+const LARGEST_HOME_RAD: f32 = core::f32::consts::TAU;
 
 /// Delay from a motion to the torque that answers it, s: one tick, and the current loop. A spring that acts
 /// so late is like one with a negative damper, stiffness times this delay. So the place is extrapolated over
@@ -79,8 +88,8 @@ pub struct Demand {
     pub largest: f32,
     /// Whether the following error is a fault.
     pub failed: bool,
-    /// Shift of the joint's zero, rad.
-    pub shift: Option<f32>,
+    /// New zero for hosts: what they read where the joint's own angle is zero.
+    pub zero: Option<Radian>,
 }
 
 /// State of one joint.
@@ -96,6 +105,8 @@ pub struct Follower {
     seen: u8,
     /// Profile position: the active set-point.
     goal: Option<f32>,
+    /// Whether the active set-point is reached.
+    arrived: bool,
     /// The next set-point.
     next: Option<SetPoint>,
     /// Cyclic modes: the last target, and the remaining ticks of its period.
@@ -103,12 +114,18 @@ pub struct Follower {
     left: u32,
     /// Cyclic position: distance from target to joint at the start of the mode, reduced to zero over time.
     gap: Course,
+    /// Cyclic position: no target within the window has come yet.
+    waits: bool,
     halted: bool,
     /// Whether the joint returned in the previous tick.
     returned: bool,
     /// Ticks for which the joint has been outside the following window, or inside the position window.
     outside: u32,
     inside: u32,
+    /// Ticks for which the joint has not been faster than the standing speed.
+    still: u32,
+    pub(super) follows: bool,
+    pub(super) stands: bool,
     pub(super) reached: bool,
     pub(super) limited: bool,
     pub(super) homed: bool,
@@ -128,14 +145,19 @@ impl Follower {
         carried: 0.0,
         seen: 0,
         goal: None,
+        arrived: false,
         next: None,
         target: 0.0,
         left: 0,
         gap: Course::at_rest(0.0),
+        waits: false,
         halted: false,
         returned: false,
         outside: 0,
         inside: 0,
+        still: 0,
+        follows: false,
+        stands: false,
         reached: false,
         limited: false,
         homed: false,
@@ -153,6 +175,16 @@ impl Follower {
         self.mode
     }
 
+    /// Whether no further set-point can be taken.
+    pub const fn is_full(&self) -> bool {
+        matches!(self.mode, Some(Mode::ProfilePosition)) && self.next.is_some()
+    }
+
+    /// [`JointCommand::request_count`] of the last tick.
+    pub const fn requests_seen(&self) -> u8 {
+        self.seen
+    }
+
     /// Starts following from `course`. Requests made before are discarded.
     pub fn start(&mut self, command: &JointCommand, course: Course) {
         *self = Self { seen: command.request_count, course, homed: self.homed, ..Self::NEW };
@@ -165,7 +197,18 @@ impl Follower {
             self.begin(command, measured);
         }
         let is_requested = core::mem::replace(&mut self.seen, command.request_count) != command.request_count;
-        let resumes = core::mem::replace(&mut self.halted, command.halt) && !command.halt;
+        let was_halted = core::mem::replace(&mut self.halted, command.halt);
+        let resumes = was_halted && !command.halt;
+        if command.halt && !was_halted {
+            self.brake_from(measured);
+        }
+        self.follows = command.target.mode().is_some() && !command.halt;
+        self.still = if abs(measured.velocity.0) <= command.standing_speed.0 {
+            self.still.saturating_add(1)
+        } else {
+            0
+        };
+        self.stands = self.still > ticks(command.standing_time);
         let returns = measured.returns;
         let ends = core::mem::replace(&mut self.returned, returns) && !returns;
         let slow = Bounds {
@@ -173,13 +216,15 @@ impl Follower {
             torque: RETURN_TORQUE * bounds.torque,
             ..*bounds
         };
+        let gentlest = min(bounds.speed / LONGEST_STOP_S, bounds.acceleration);
+        let least_slope = bounds.torque / LONGEST_STOP_S;
         let bounds = if returns { &slow } else { bounds };
         let [low, high] = bounds.range;
         let range = [max(low, command.range[0].0), min(high, command.range[1].0)];
         let rates = Rates {
             speed: min(command.velocity.0, bounds.speed),
             acceleration: min(command.acceleration.0, bounds.acceleration),
-            deceleration: min(command.deceleration.0, bounds.acceleration),
+            deceleration: clamp(command.deceleration.0, gentlest, bounds.acceleration),
         };
         self.limited = false;
         let largest = min(command.largest_torque.0, bounds.torque);
@@ -190,14 +235,17 @@ impl Follower {
             held: true,
             largest,
             failed: false,
-            shift: None,
+            zero: None,
         };
         let period = ticks(command.period).clamp(1, LONGEST_PERIOD);
-        let mut demand = match command.target {
+        let demand = match command.target {
             Target::ProfileTorque(target) => {
                 let target = if command.halt { 0.0 } else { self.bounded(target.0, -largest, largest) };
-                let most = command.torque_slope_nm_per_s * TICK_S;
-                self.torque += clamp(target - self.torque, -most, most);
+                let change = target - self.torque;
+                let fades = change * self.torque < 0.0;
+                let slope = command.torque_slope_nm_per_s;
+                let most = TICK_S * if fades { max(slope, least_slope) } else { slope };
+                self.torque += clamp(change, -most, most);
                 self.reached = self.torque == target;
                 return self.give(demand, measured);
             }
@@ -206,8 +254,16 @@ impl Follower {
                 self.reached = true;
                 return self.give(demand, measured);
             }
+            Target::ProfilePosition(point) => {
+                self.take(point, is_requested);
+                if command.halt {
+                    self.stop(&rates, bounds, measured);
+                } else {
+                    self.go(command, &rates, range, bounds, measured);
+                }
+                demand
+            }
             _ if command.halt => {
-                (self.goal, self.next) = (None, None);
                 self.close_gap();
                 self.stop(&rates, bounds, measured);
                 demand
@@ -221,42 +277,42 @@ impl Follower {
                 if begins || resumes || ends {
                     self.carried = measured.torque.0 - torque;
                 }
-                let most = command.torque_slope_nm_per_s * TICK_S;
+                let most = max(command.torque_slope_nm_per_s, least_slope) * TICK_S;
                 self.carried -= clamp(self.carried, -most, most);
                 self.torque = self.bounded(torque + self.carried, -largest, largest);
                 let near = abs(target.position.0 - measured.position.0) <= command.position_window.0;
                 self.reach(near, command.position_time);
                 return self.give(demand, measured);
             }
-            Target::ProfilePosition(point) => {
-                self.take(point, is_requested);
-                self.go(command, &rates, range, bounds, measured);
-                demand
-            }
             Target::ProfileVelocity(velocity) => {
                 let wanted = self.bounded(velocity.0, -rates.speed, rates.speed);
                 let rates = Rates { speed: bounds.speed, ..rates };
                 self.course.accelerate(wanted, &rates, range, TICK_S);
                 self.course.keep_within(command.following_window.0, measured.position.0);
-                self.reached = self.course.velocity() == wanted;
+                let near = abs(wanted - measured.velocity.0) <= command.velocity_window.0;
+                self.reach(near, command.velocity_time);
                 demand
             }
             Target::Homing { offset } => {
                 self.stop(&rates, bounds, measured);
-                let shift = if is_requested { self.home(offset, measured, bounds) } else { None };
-                Demand { shift, ..demand }
+                let zero = if is_requested { self.home(offset, measured) } else { None };
+                Demand { zero, ..demand }
             }
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
                 let target = self.bounded(position.0, range[0], range[1]);
                 // For a joint outside its range: the end of the range that it returns to.
                 let place = if returns { clamp(measured.position.0, low, high) } else { measured.position.0 };
                 let is_far = abs(target - place) > command.following_window.0;
-                if begins || resumes || ends {
+                self.waits |= begins || resumes || ends || returns && is_far;
+                if self.waits && is_far {
+                    self.close_gap();
+                    self.stop(&rates, bounds, measured);
+                    (self.follows, self.reached) = (false, false);
+                    return self.conclude(demand, command, measured, bounds.range);
+                }
+                if core::mem::take(&mut self.waits) {
                     self.gap = Course::moving(self.course.position() - target, self.course.velocity());
                     (self.course, self.target) = (Course::at_rest(target), target);
-                }
-                if is_far && (returns || begins || resumes || ends) {
-                    self.outside = u32::MAX - 1;
                 }
                 self.count(target, period);
                 if returns {
@@ -284,27 +340,43 @@ impl Follower {
                 Demand { torque: torque_offset.0, ..demand }
             }
         };
-        if let Some(shift) = demand.shift {
-            self.course.shift(shift);
-        }
-        if returns {
+        self.conclude(demand, command, measured, bounds.range)
+    }
+
+    /// Completes the demand of a mode that holds a position.
+    fn conclude(
+        &mut self,
+        demand: Demand,
+        command: &JointCommand,
+        measured: &Measured,
+        [low, high]: [f32; 2],
+    ) -> Demand {
+        if measured.returns {
             let place = measured.position.0;
             self.course.keep_between(min(low, place), max(high, place));
         }
-        demand.course = self.course();
-        demand.failed = demand.shift.is_none() && self.deviated(command, measured);
-        demand
+        Demand { course: self.course(), failed: self.deviated(command, measured), ..demand }
     }
 
-    /// Starts a new mode from the present position and torque.
+    /// Starts a new mode from the present position, velocity and torque.
     fn begin(&mut self, command: &JointCommand, measured: &Measured) {
         self.mode = command.target.mode();
-        self.close_gap();
+        self.brake_from(measured);
         self.torque = measured.torque.0;
         (self.goal, self.next, self.left) = (None, None, 0);
+        (self.arrived, self.waits) = (false, false);
         (self.outside, self.inside, self.reached, self.deviates) = (0, 0, false, false);
         // NaN: the first target of a cyclic mode always starts a period.
         self.target = f32::NAN;
+    }
+
+    /// Continues with no more than the joint's own velocity. A cyclic target that has jumped leaves the
+    /// course with a velocity that the joint has not reached, and a stop must not drive it up to that.
+    fn brake_from(&mut self, measured: &Measured) {
+        self.close_gap();
+        let velocity = self.course.velocity();
+        let own = clamp(measured.velocity.0, min(velocity, 0.0), max(velocity, 0.0));
+        self.course = Course::moving(self.course.position(), own);
     }
 
     /// Merges the gap into the course.
@@ -356,11 +428,11 @@ impl Follower {
             self.next = Some(point);
         }
         if let Some(point) = self.next
-            && (point.immediately || self.goal.is_none() || self.reached)
+            && (point.immediately || self.goal.is_none() || self.arrived)
         {
             let from = if point.relative { self.course.position() } else { 0.0 };
             (self.goal, self.next) = (Some(from + point.position.0), None);
-            (self.reached, self.inside) = (false, 0);
+            (self.arrived, self.reached, self.inside) = (false, false, 0);
         }
     }
 
@@ -380,6 +452,7 @@ impl Follower {
         let near = self.course == Course::at_rest(goal)
             && abs(goal - measured.position.0) <= command.position_window.0;
         self.reach(near, command.position_time);
+        self.arrived = self.reached;
     }
 
     fn reach(&mut self, near: bool, time: Second) {
@@ -394,23 +467,22 @@ impl Follower {
         }
     }
 
-    fn home(&mut self, offset: Radian, measured: &Measured, bounds: &Bounds) -> Option<f32> {
-        let [low, high] = bounds.range;
-        self.homed = self.reached && offset.0 >= low && offset.0 <= high;
+    fn home(&mut self, offset: Radian, measured: &Measured) -> Option<Radian> {
+        self.homed = self.reached && abs(offset.0) <= LARGEST_HOME_RAD;
         self.deviates = !self.homed;
-        self.homed.then_some(offset.0 - measured.position.0)
+        self.homed.then_some(offset - measured.position)
     }
 
     /// Whether the following error has lasted too long.
     fn deviated(&mut self, command: &JointCommand, measured: &Measured) -> bool {
         let place = match self.mode {
-            Some(Mode::CyclicPosition) if !measured.returns => self.target,
+            Some(Mode::CyclicPosition) if !measured.returns && !self.waits && !self.halted => self.target,
             _ => self.course().position(),
         };
         let is_outside = abs(place - measured.position.0) > command.following_window.0;
         self.outside = if is_outside { self.outside.saturating_add(1) } else { 0 };
         if self.mode != Some(Mode::Homing) {
-            self.deviates = is_outside;
+            self.deviates = is_outside || self.waits;
         }
         self.outside > ticks(command.following_time)
     }

@@ -10,7 +10,9 @@
 //! ```
 //!
 //! The commands use anatomical angles, the servo those of the model; both are converted only here. Homing
-//! moves a joint's zero. The shift is stored in counts and added to every reading.
+//! gives a joint another zero for hosts alone: the offset is added to what they read and subtracted from what
+//! they command. Servo and safety monitor stay with the zero of the operator's reference, because a host must
+//! not move the range that limits it.
 //!
 //! Cost: docs/results/bus.md, instructions.
 
@@ -23,11 +25,10 @@ use joint::{Bounds, Demand, Follower, Measured};
 
 use super::configuration::LegConfiguration;
 use super::control::ControlOutput;
-use crate::hal::Sample;
 use crate::model::AnatomicalJoint;
 use crate::motion::{Course, MotionState};
 use crate::safety::{Fault, FaultCode, RANGE_TOLERANCE, RefusalReason};
-use crate::servo::{Effort, JointScale, ServoOutput};
+use crate::servo::{Effort, ServoOutput};
 use crate::units::{NewtonMetre, Radian, RadianPerSecond, Volt};
 
 /// Command for the servo at one tick, in the model's angles and signs.
@@ -39,8 +40,6 @@ pub struct Commanded<const N: usize> {
     pub efforts: [Effort; N],
     /// Following error of a joint.
     pub fault: Option<Fault>,
-    /// Counts by which homing shifts the joints' zeros in this tick.
-    pub shifts: Option<[i32; N]>,
 }
 
 /// Followers of all joints of a leg.
@@ -49,10 +48,10 @@ pub struct Following<const N: usize> {
     joints: [Follower; N],
     bounds: [Bounds; N],
     anatomy: [AnatomicalJoint<f32>; N],
-    count_per_radian: [f32; N],
     measured: [Measured; N],
     largest: [NewtonMetre; N],
-    zeros: [i32; N],
+    /// Angle that hosts read where the operator's reference is zero; set by homing.
+    zeros: [Radian; N],
 }
 
 impl<const N: usize> Following<N> {
@@ -74,30 +73,17 @@ impl<const N: usize> Following<N> {
                 }
             }),
             anatomy,
-            count_per_radian: configuration.joints.map(|joint| {
-                let JointScale { radian_per_count, mirrored, .. } = joint.scale;
-                if mirrored { -1.0 / radian_per_count.0 } else { 1.0 / radian_per_count.0 }
-            }),
             measured: [Measured::default(); N],
             largest: [NewtonMetre::ZERO; N],
-            zeros: [0; N],
+            zeros: [Radian::ZERO; N],
         }
     }
 
-    /// Returns the sample with the zeros set by homing.
-    #[must_use]
-    pub fn placed(&self, sample: &Sample<N>) -> Sample<N> {
-        let mut placed = *sample;
-        for (joint, zero) in placed.joints.iter_mut().zip(self.zeros) {
-            joint.encoder_counts = joint.encoder_counts.wrapping_add(zero);
-        }
-        placed
-    }
-
-    /// Discards the zeros set by homing; the board's own apply again.
-    pub fn forget_zeros(&mut self) {
-        self.zeros = [0; N];
+    /// Resets after a new reference; the zeros set by homing are discarded.
+    pub fn restart(&mut self) {
+        self.zeros = [Radian::ZERO; N];
         self.joints = [Follower::NEW; N];
+        self.measured = [Measured::default(); N];
     }
 
     /// Starts following from the commanded motion. Requests made before are discarded.
@@ -136,16 +122,13 @@ impl<const N: usize> Following<N> {
 
     /// Runs one tick of all joints.
     pub fn follow(&mut self, commands: &[JointCommand; N]) -> Commanded<N> {
-        let mut commanded = Commanded {
-            motion: MotionState::at_rest([0.0; N]),
-            efforts: [Effort::HELD; N],
-            fault: None,
-            shifts: None,
-        };
-        let mut shifts = [0; N];
+        let mut commanded =
+            Commanded { motion: MotionState::at_rest([0.0; N]), efforts: [Effort::HELD; N], fault: None };
         for joint in 0..N {
-            let Demand { course, velocity_offset, torque, held, largest, failed, shift } =
-                self.joints[joint].follow(&commands[joint], &self.measured[joint], &self.bounds[joint]);
+            let command = commands[joint].seen_from(self.zeros[joint]);
+            let Demand { course, velocity_offset, torque, held, largest, failed, zero } =
+                self.joints[joint].follow(&command, &self.measured[joint], &self.bounds[joint]);
+            self.zeros[joint] = zero.unwrap_or(self.zeros[joint]);
             let anatomy = &self.anatomy[joint];
             let motion = &mut commanded.motion;
             motion.position_rad[joint] = anatomy.angle_to_chain(course.position());
@@ -161,11 +144,6 @@ impl<const N: usize> Following<N> {
             if failed {
                 let fault = Fault { code: FaultCode::FollowingError, joint: joint as u8 };
                 commanded.fault = commanded.fault.or(Some(fault));
-            }
-            if let Some(shift) = shift {
-                shifts[joint] = (shift * self.count_per_radian[joint]) as i32;
-                self.zeros[joint] = self.zeros[joint].wrapping_add(shifts[joint]);
-                commanded.shifts = Some(shifts);
             }
         }
         commanded
@@ -187,18 +165,23 @@ impl<const N: usize> Following<N> {
         let tolerance = RANGE_TOLERANCE.0;
         let is_inside = measured.position.0 >= low - tolerance && measured.position.0 <= high + tolerance;
         let decision = &output.servo.decision;
+        let zero = *self.zeros.get(joint)?;
         Some(JointStatus {
             drive: decision.state,
-            position: measured.position,
+            position: measured.position + zero,
             velocity: measured.velocity,
             torque: NewtonMetre(anatomy.from_chain(torque.0)),
-            position_demand: Radian(anatomy.angle_from_chain(*output.motion.position_rad.get(joint)?)),
+            position_demand: Radian(anatomy.angle_from_chain(*output.motion.position_rad.get(joint)?)) + zero,
             velocity_demand: RadianPerSecond(
                 anatomy.from_chain(*output.motion.velocity_rad_per_s.get(joint)?),
             ),
             torque_demand: measured.torque,
             mode: follower.mode().filter(|_| follows).map_or(0, |mode| mode as i8),
+            follows: follows && follower.follows,
+            is_full: follows && follower.is_full(),
+            requests_seen: follower.requests_seen(),
             reached: follows && follower.reached,
+            stands: follower.stands,
             limited: follows
                 && (follower.limited
                     || output.servo.wanted_torque.get(joint)?.abs() > *self.largest.get(joint)?)

@@ -76,7 +76,8 @@ impl Bench {
 
     /// Commands, and whether the identification is cancelled.
     fn commands(&mut self) -> Option<([JointCommand; 2], bool)> {
-        self.side.commands(false).map(|host| (*host.commands, host.cancel))
+        let host = self.side.host(false);
+        host.commands.map(|commands| (*commands, host.cancel))
     }
 
     fn report(&mut self, control: &Control<2>, output: &ControlOutput<2>) {

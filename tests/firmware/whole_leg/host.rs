@@ -21,6 +21,10 @@ const HOLD: JointCommand = JointCommand {
     following_time: Second(0.01),
     position_window: Radian(0.017),
     position_time: Second(0.01),
+    velocity_window: RadianPerSecond(0.05),
+    velocity_time: Second(0.01),
+    standing_speed: RadianPerSecond(0.01),
+    standing_time: Second(0.01),
     period: Second(0.002),
 };
 
@@ -259,29 +263,29 @@ fn cyclic_positions_of_two_milliseconds_are_followed_by_both_joints() {
 }
 
 #[test]
-fn a_target_beyond_the_window_is_a_fault_without_a_jump() {
-    // Immediately when the mode begins, and after the timeout later.
-    for later in [false, true] {
-        let mut hosted = Hosted::new();
-        let from = hosted.position(0);
-        if later {
-            hosted.cyclic(0, from);
-            hosted.run(100);
-        }
-        hosted.cyclic(0, from + 0.2);
-        let mut ticks = 0;
-        while is_enabled(&hosted.pair) {
-            hosted.run(1);
-            ticks += 1;
-            assert!(ticks < 100, "no fault");
-        }
-        let fault = hosted.pair.leg.control().state().fault();
-        assert_eq!(fault, Some(Fault { code: FaultCode::FollowingError, joint: 0 }));
-        assert!(if later { (38..=44).contains(&ticks) } else { ticks <= 2 }, "{later} {ticks}");
-        hosted.run(SECOND / 10);
-        // 10 ms at the speed limit are 0.045 rad, from rest far less.
-        assert!((hosted.position(0) - from).abs() < 0.03, "{}", hosted.position(0) - from);
+fn a_target_beyond_the_window_is_not_begun_and_a_fault_later() {
+    let mut hosted = Hosted::new();
+    let from = hosted.position(0);
+    hosted.cyclic(0, from + 0.2);
+    hosted.run(SECOND);
+    assert!((hosted.position(0) - from).abs() < 0.01 && is_enabled(&hosted.pair));
+    assert!(hosted.status[0].deviates && !hosted.status[0].follows && !hosted.status[0].reached);
+    hosted.cyclic(0, from);
+    hosted.run(100);
+    assert!(!hosted.status[0].deviates && hosted.status[0].follows);
+    hosted.cyclic(0, from + 0.2);
+    let mut ticks = 0;
+    while is_enabled(&hosted.pair) {
+        hosted.run(1);
+        ticks += 1;
+        assert!(ticks < 100, "no fault");
     }
+    let fault = hosted.pair.leg.control().state().fault();
+    assert_eq!(fault, Some(Fault { code: FaultCode::FollowingError, joint: 0 }));
+    assert!((38..=44).contains(&ticks), "{ticks}");
+    hosted.run(SECOND / 10);
+    // 10 ms at the speed limit are 0.045 rad, from rest far less.
+    assert!((hosted.position(0) - from).abs() < 0.03, "{}", hosted.position(0) - from);
     // A target within the window is approached along the profile.
     let mut hosted = Hosted::new();
     let from = hosted.position(0);
@@ -311,6 +315,112 @@ fn homing_sets_the_position_to_the_offset_without_motion() {
     hosted.run(SECOND / 10);
     assert!(hosted.status[1].deviates && is_enabled(&hosted.pair));
     assert!((hosted.position(1) - place - 0.05).abs() < 0.002);
+}
+
+#[test]
+fn homing_leaves_the_range_that_the_monitor_guards() {
+    // Hosts see a knee 0.4 rad lower than it is, and command it up to what they see as inside the range.
+    let mut hosted = Hosted::new();
+    let place = hosted.position(1);
+    hosted.commands[1].target = Target::Homing { offset: Radian(place - 0.4) };
+    hosted.run(SECOND);
+    hosted.commands[1].request_count += 1;
+    hosted.run(100);
+    assert!(hosted.status[1].homed && (hosted.position(1) - place + 0.4).abs() < 0.002);
+    let high = RANGES[1][1];
+    hosted.point(1, high as f32, true);
+    hosted.run(8 * SECOND);
+    assert!(is_enabled(&hosted.pair) && hosted.status[1].limited);
+    assert!((hosted.truth(1) - high).abs() < 0.01, "{}", hosted.truth(1));
+    assert!((f64::from(hosted.position(1)) + 0.4 - hosted.truth(1)).abs() < 0.003);
+}
+
+#[test]
+fn an_enabled_leg_is_taken_over_without_a_step_in_every_mode() {
+    let zero = (RadianPerSecond::ZERO, NewtonMetre::ZERO);
+    for number in [1, 3, 6, 8, 9, -1] {
+        let mut hosted = Hosted::resting_at([0.5, 0.9]);
+        assert!(hosted.pair.enable(context().gravity));
+        // Long at rest without a host; a wearer has moved the leg since the start.
+        (0..SECOND).for_each(|_| {
+            tick(&mut hosted.pair, None);
+        });
+        let before = tick(&mut hosted.pair, None).servo.decision.torque;
+        let place: [f32; JOINTS] = core::array::from_fn(|joint| hosted.truth(joint) as f32);
+        for joint in 0..JOINTS {
+            let position = Radian(place[joint]);
+            hosted.commands[joint].target = match number {
+                1 => Target::ProfilePosition(SetPoint::default()),
+                3 => Target::ProfileVelocity(zero.0),
+                6 => Target::Homing { offset: position },
+                8 => Target::CyclicPosition { position, velocity_offset: zero.0, torque_offset: zero.1 },
+                9 => Target::CyclicVelocity { velocity: zero.0, torque_offset: zero.1 },
+                _ => Target::Impedance(ImpedanceTarget {
+                    position,
+                    velocity: zero.0,
+                    stiffness: 1e5,
+                    damping: 1e5,
+                    torque: zero.1,
+                }),
+            };
+        }
+        for _ in 0..SECOND {
+            let torque = hosted.tick(None).servo.decision.torque;
+            for joint in 0..JOINTS {
+                let (step, moved) =
+                    (torque[joint].0 - before[joint].0, hosted.truth(joint) as f32 - place[joint]);
+                assert!(step.abs() < 4.0 && moved.abs() < 0.01, "{number} {joint}: {step} N m, {moved} rad");
+            }
+        }
+        assert!(is_enabled(&hosted.pair), "{number}");
+    }
+}
+
+#[test]
+fn a_halt_ends_in_time_whatever_the_host_has_set() {
+    for torque in [false, true] {
+        let mut hosted = Hosted::new();
+        hosted.run(SECOND);
+        let weight = hosted.status[1].torque_demand.0;
+        hosted.commands[1].target = Target::ProfileVelocity(RadianPerSecond(0.3));
+        if torque {
+            hosted.commands[1].target = Target::ProfileTorque(NewtonMetre(weight + 2.0));
+        }
+        hosted.run(SECOND / 4);
+        hosted.commands[1].deceleration = RadianPerSecondSquared(1e-6);
+        hosted.commands[1].torque_slope_nm_per_s = 0.0;
+        hosted.commands[1].halt = true;
+        hosted.run(2 * SECOND);
+        let JointStatus { velocity_demand, torque_demand, .. } = hosted.status[1];
+        assert!(
+            if torque { torque_demand.0 == 0.0 } else { velocity_demand.0 == 0.0 },
+            "{:?}",
+            hosted.status[1]
+        );
+    }
+}
+
+#[test]
+fn a_halted_set_point_goes_on_afterwards() {
+    let mut hosted = Hosted::new();
+    let from = hosted.position(0);
+    hosted.point(0, from + 0.3, false);
+    hosted.run(SECOND / 2);
+    hosted.commands[0].halt = true;
+    hosted.run(SECOND);
+    let stopped = hosted.position(0);
+    assert!(hosted.status[0].reached && !hosted.status[0].follows && stopped < from + 0.25);
+    // One that comes meanwhile waits for its turn.
+    hosted.point(0, from + 0.1, false);
+    hosted.run(SECOND / 2);
+    assert!((hosted.position(0) - stopped).abs() < 0.002 && hosted.status[0].is_full);
+    hosted.commands[0].halt = false;
+    let mut farthest = 0.0_f32;
+    for _ in 0..3 * SECOND {
+        hosted.run(1);
+        farthest = farthest.max(hosted.position(0) - from);
+    }
+    assert!((farthest - 0.3).abs() < 0.01 && (hosted.position(0) - from - 0.1).abs() < 0.01, "{farthest}");
 }
 
 #[test]
