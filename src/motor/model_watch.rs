@@ -12,7 +12,8 @@
 //! |r| > V + 0.35 R I1 + |w| (0.2 flux + 0.3 L I1)       open or frozen: 32 more periods with than without
 //! counts >= 4 a period in one direction, 4 periods in a row; from the next period on within 2 counts for
 //!     32 periods                             frozen
-//! |mean of r in the stator's frame over an electrical turn| > 0.4 V + 0.06 R I    drifted offset
+//! |mean of r in the stator's frame over an electrical turn| > 0.4 V + R max(0.06 I, 0.35/pi range of i_q)
+//!                                           drifted offset
 //! V  = 2 * 4/3 t_d f V_bus                   twice the loss of dead time and switches; 0.44 V on the board
 //! I1 = max(|i_d| + |i_q|, 3/4 of the last period's I1)
 //! ```
@@ -60,20 +61,21 @@
 //!
 //! **Drifted offset** (C1): an offset o of one shunt leaves a residual 2/sqrt(3) |R + j w L| o that rests in
 //! the stator's frame. All errors of resistance, flux and dead time turn with the rotor and vanish from the
-//! mean of a turn. The limit is 6.7 A on the default leg, 12 N m at most. Offsets below 3 A are not detected:
+//! mean of a turn, unless the current changes with the turn: then at most 0.35 R range / pi of a wrong R is
+//! left. With changes below half of the limit, the limit is 6.7 A on the default leg, 12 N m at most. Offsets below 3 A are not detected:
 //! without target currents dead time alone looks like that. Turns longer than 25 ms, shorter than 3 ms or
 //! with a reversal are not evaluated.
 //!
 //! False alarms: those of the simulated hours in docs/results/faults.md. The margin between a healthy motor's
 //! residual and the limits has not been measured on a motor.
 //! Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10.
-//! Cost: docs/results/motor.md, checks; 52 bytes.
+//! Cost: docs/results/motor.md, checks; 60 bytes.
 
 use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;
 use super::{CountScale, CurrentLoop, ElectricalAngle, MotorConstants, Rotating, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::{abs, max, sqrt};
+use crate::real::{abs, max, min, sqrt};
 use crate::units::Ampere;
 
 /// Servo periods by which those with too large a residual must outnumber the others: 8 ms.
@@ -98,9 +100,10 @@ const INDUCTANCE_SHARE: f32 = 0.3;
 /// Share of the greatest current that is left after a servo period.
 const MEMORY: f32 = 0.75;
 /// Limit of the mean over a turn: shares of V, and of R times the greatest current, which changes
-/// within the turn.
+/// within the turn. A larger change counts by its range, as a wrong resistance shows it.
 const MEAN_SHARE: f32 = 0.4;
 const MEAN_RESISTANCE_SHARE: f32 = 0.06;
+const MEAN_RANGE_SHARE: f32 = RESISTANCE_SHARE / core::f32::consts::PI;
 
 /// Expected voltages of an axis, and their tolerances.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,7 +116,9 @@ pub struct ModelLimits {
     volt_per_ampere: f32,
     volt_per_speed: f32,
     volt_per_speed_ampere: f32,
-    mean_square: f32,
+    /// Limit of the mean over a turn without current, V, and the least change of the current that it allows, A.
+    mean_v: f32,
+    mean_range_a: f32,
     /// Square of the back-EMF at the greatest speed.
     back_emf_square: f32,
     scale: CountScale,
@@ -128,8 +133,6 @@ impl ModelLimits {
         let still_v = DEAD_VECTORS * configuration.timing.dead_time.0 * CURRENT_RATE_HZ as f32 * bus.0;
         let resistance_ohm = motor.resistance.0;
         let left = if configuration.feedforward { 0.0 } else { 1.0 };
-        let mean_v =
-            MEAN_SHARE * still_v + MEAN_RESISTANCE_SHARE * resistance_ohm * configuration.current_limit.0;
         let greatest = f32::from(configuration.pole_pairs) * configuration.greatest_speed.0;
         let back_emf = greatest * motor.flux.0;
         Self {
@@ -143,7 +146,8 @@ impl ModelLimits {
             volt_per_ampere: RESISTANCE_SHARE * resistance_ohm,
             volt_per_speed: FLUX_SHARE * motor.flux.0,
             volt_per_speed_ampere: INDUCTANCE_SHARE * motor.quadrature_inductance.0,
-            mean_square: mean_v * mean_v,
+            mean_v: MEAN_SHARE * still_v,
+            mean_range_a: MEAN_RESISTANCE_SHARE / MEAN_RANGE_SHARE * configuration.current_limit.0,
             back_emf_square: back_emf * back_emf,
             scale,
             back_emf_per_speed: motor.flux.0,
@@ -168,6 +172,11 @@ impl ModelLimits {
     /// Back-EMF at the counts' speed, V.
     pub(super) fn back_emf(&self, now: &Shown<'_>) -> f32 {
         self.back_emf_per_speed * abs(now.speed_rad_per_s)
+    }
+
+    /// Greatest mean over a turn in which the quadrature current has changed by so much, V.
+    fn mean(&self, range_a: f32) -> f32 {
+        self.mean_v + MEAN_RANGE_SHARE * self.resistance_ohm * max(range_a, self.mean_range_a)
     }
 
     fn is_still(&self, position: i32, before: i32) -> bool {
@@ -203,6 +212,8 @@ pub struct ModelWatch {
     /// Travel within the current electrical turn, turns, signed.
     way: f32,
     periods: u8,
+    /// Least and greatest quadrature current within that turn, A.
+    range_a: [f32; 2],
     angle: Option<ElectricalAngle>,
     stop: Stop,
     /// Greatest current of the last periods, A.
@@ -258,6 +269,7 @@ impl ModelWatch {
         sum: Stationary { alpha: 0.0, beta: 0.0 },
         way: 0.0,
         periods: 0,
+        range_a: [0.0; 2],
         angle: None,
         stop: Stop { before: 0, run: 0, rests_at: 0, rests: 0 },
         current_a: 0.0,
@@ -323,8 +335,11 @@ impl ModelWatch {
         let step = self.angle.map_or(0.0, |before| now.angle.since(before));
         self.angle = Some(now.angle);
         self.periods += 1;
+        let [least_a, most_a] = self.range_a;
+        self.range_a = [min(least_a, now.current.q.0), max(most_a, now.current.q.0)];
         if step * self.way < 0.0 || self.periods > LONGEST_TURN {
             (self.sum, self.way, self.periods) = (Self::EMPTY.sum, 0.0, 0);
+            self.range_a = [now.current.q.0; 2];
         }
         let seen = residual.to_stationary(now.angle.rotation());
         let left = 1.0 - abs(self.way);
@@ -341,9 +356,10 @@ impl ModelWatch {
         let (alpha, beta) = (add(self.sum.alpha, seen.alpha, left), add(self.sum.beta, seen.beta, left));
         self.way = if step < 0.0 { left - way } else { way - left };
         let is_circle = self.periods >= SHORTEST_TURN;
-        self.periods = 0;
+        let most_v = limits.mean(self.range_a[1] - self.range_a[0]);
+        (self.periods, self.range_a) = (0, [now.current.q.0; 2]);
         self.sum = Stationary { alpha: seen.alpha * (way - left), beta: seen.beta * (way - left) };
-        is_circle && alpha * alpha + beta * beta > limits.mean_square
+        is_circle && alpha * alpha + beta * beta > most_v * most_v
     }
 }
 
@@ -458,7 +474,7 @@ mod tests {
     #[test]
     fn a_drifted_zero_is_seen_after_the_same_turns_in_either_direction() {
         let limits = limits();
-        let size = 1.5 * sqrt(limits.mean_square);
+        let size = 1.5 * limits.mean(0.0);
         // 90 periods at rest, then 40 a turn; the drift begins within the second turn.
         let seen = [1.0_f32, -1.0].map(|sign| {
             let mut watch = ModelWatch::EMPTY;
