@@ -44,8 +44,8 @@
 //! phase. A residual beyond the back-EMF of the greatest speed is never a frozen counter.
 //!
 //! Second sign: a counter that stops as no rotor can. From 4 counts a period (0.25 rad/s of a joint of the
-//! default leg) to rest within 3 + 2 counts takes 390 rad/s^2 of the joint, or 750 N m at its rotor. The drive
-//! makes 85 N m. A stop at the end of the range, behind gears of 1e5 N m/rad, moves a rotor by 70
+//! default leg) to rest within 3 + 2 counts takes 390 rad/s^2 of the joint, or 750 N m at its rotor. The
+//! drive makes 85 N m. A stop at the end of the range, behind gears of 1e5 N m/rad, moves a rotor by 70
 //! counts; this motor alone needs 44 at full current. Then the counter must rest for 8 ms: a rotor that was
 //! struck bounces. One that is clamped at speed, as on a test bench, is reported as a frozen counter. Four
 //! periods exclude wrong readings, which come back, and lost counts, which come once.
@@ -62,9 +62,9 @@
 //! **Drifted offset** (C1): an offset o of one shunt leaves a residual 2/sqrt(3) |R + j w L| o that rests in
 //! the stator's frame. All errors of resistance, flux and dead time turn with the rotor and vanish from the
 //! mean of a turn, unless the current changes with the turn: then at most 0.35 R range / pi of a wrong R is
-//! left. With changes below half of the limit, the limit is 6.7 A on the default leg, 12 N m at most. Offsets below 3 A are not detected:
-//! without target currents dead time alone looks like that. Turns longer than 25 ms, shorter than 3 ms or
-//! with a reversal are not evaluated.
+//! left. With changes below half of the limit, an offset of 6.7 A is detected on the default leg, 12 N m at
+//! most. Offsets below 3 A are not detected: without target currents dead time alone looks like that. Turns
+//! longer than 25 ms, shorter than 3 ms or with a reversal are not evaluated.
 //!
 //! False alarms: those of the simulated hours in docs/results/faults.md. The margin between a healthy motor's
 //! residual and the limits has not been measured on a motor.
@@ -116,7 +116,7 @@ pub struct ModelLimits {
     volt_per_ampere: f32,
     volt_per_speed: f32,
     volt_per_speed_ampere: f32,
-    /// Limit of the mean over a turn without current, V, and the least change of the current that it allows, A.
+    /// Limit of the mean over a turn without current, V, and the least change of current that it allows, A.
     mean_v: f32,
     mean_range_a: f32,
     /// Square of the back-EMF at the greatest speed.
