@@ -12,7 +12,7 @@
 //! |r| > V + 0.35 R I1 + |w| (0.2 flux + 0.3 L I1)       open or frozen: 32 more periods with than without
 //! counts >= 4 a period in one direction, 4 periods in a row; from the next period on within 2 counts for
 //!     32 periods                             frozen
-//! |mean of r in the stator's frame over an electrical turn| > 0.4 V + R max(0.06 I, 0.35/pi range of i_q)
+//! |mean of r in the stator's frame over an electrical turn| > 0.4 V + R max(0.06 I, 0.17 range of i_q)
 //!                                           drifted offset
 //! V  = 2 * 4/3 t_d f V_bus                   twice the loss of dead time and switches; 0.44 V on the board
 //! I1 = max(|i_d| + |i_q|, 3/4 of the last period's I1)
@@ -61,8 +61,8 @@
 //!
 //! **Drifted offset** (C1): an offset o of one shunt leaves a residual 2/sqrt(3) |R + j w L| o that rests in
 //! the stator's frame. All errors of resistance, flux and dead time turn with the rotor and vanish from the
-//! mean of a turn, unless the current changes with the turn: then at most 0.35 R range / pi of a wrong R is
-//! left. With changes below half of the limit, an offset of 6.7 A is detected on the default leg, 12 N m at
+//! mean of a turn, unless the current changes with the turn: then up to 0.35 R range / pi of a wrong R is
+//! left; the limit allows half more, for dead time and steps. With changes below a third of `I`, an offset of 6.7 A is detected on the default leg, 12 N m at
 //! most. Offsets below 3 A are not detected: without target currents dead time alone looks like that. Turns
 //! longer than 25 ms, shorter than 3 ms or with a reversal are not evaluated.
 //!
@@ -103,7 +103,7 @@ const MEMORY: f32 = 0.75;
 /// within the turn. A larger change counts by its range, as a wrong resistance shows it.
 const MEAN_SHARE: f32 = 0.4;
 const MEAN_RESISTANCE_SHARE: f32 = 0.06;
-const MEAN_RANGE_SHARE: f32 = RESISTANCE_SHARE / core::f32::consts::PI;
+const MEAN_RANGE_SHARE: f32 = 1.5 * RESISTANCE_SHARE / core::f32::consts::PI;
 
 /// Expected voltages of an axis, and their tolerances.
 #[derive(Clone, Copy, Debug, PartialEq)]
