@@ -62,9 +62,10 @@
 //! **Drifted offset** (C1): an offset o of one shunt leaves a residual 2/sqrt(3) |R + j w L| o that rests in
 //! the stator's frame. All errors of resistance, flux and dead time turn with the rotor and vanish from the
 //! mean of a turn, unless the current changes with the turn: then up to 0.35 R range / pi of a wrong R is
-//! left; the limit allows half more, for dead time and steps. With changes below a third of `I`, an offset of 6.7 A is detected on the default leg, 12 N m at
-//! most. Offsets below 3 A are not detected: without target currents dead time alone looks like that. Turns
-//! longer than 25 ms, shorter than 3 ms or with a reversal are not evaluated.
+//! left. The limit allows half more, for dead time and steps. With changes below a third of `I`, an offset of
+//! 6.7 A is detected on the default leg, 12 N m at most. Offsets below 3 A are not detected: without target
+//! currents dead time alone looks like that. Turns longer than 25 ms, shorter than 3 ms or with a reversal
+//! are not evaluated.
 //!
 //! False alarms: those of the simulated hours in docs/results/faults.md. The margin between a healthy motor's
 //! residual and the limits has not been measured on a motor.
