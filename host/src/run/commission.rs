@@ -160,8 +160,9 @@ pub struct Commission<'a> {
     /// State of each node before this host.
     before: Vec<Replaced>,
     others: Option<OtherHosts>,
-    /// Last words of the board about a step that it refuses.
+    /// Last words of the board about a step that it refuses, and all that were shown during this wait.
     said: Option<String>,
+    shown: Vec<String>,
     report: CommissionReport,
 }
 
@@ -214,6 +215,7 @@ impl<'a> Commission<'a> {
             before: Vec::new(),
             others: None,
             said: None,
+            shown: Vec::new(),
             report,
         }
     }
@@ -277,12 +279,13 @@ impl<'a> Commission<'a> {
         self.others.as_ref().map_or(Ok(()), |others| others.check(&self.client))
     }
 
-    /// Shows what the board says about a refused step, once.
+    /// Shows what the board says about a refused step, once per wait: both joints may repeat theirs in turn.
     fn show(&mut self, words: String) {
-        if self.said.as_ref() != Some(&words) {
+        if !self.shown.contains(&words) {
             self.line(&format!("           the board says: {words}"));
-            self.said = Some(words);
+            self.shown.push(words.clone());
         }
+        self.said = Some(words);
     }
 
     /// Shows the reasons in the emergency messages since the last call; one that ended is forgotten.
@@ -323,7 +326,7 @@ impl<'a> Commission<'a> {
         self.line(&format!("           please: {words}"));
         self.wait(READ_TIME)?;
         let begun = Instant::now();
-        self.said = None;
+        (self.said, self.shown) = (None, Vec::new());
         loop {
             self.check_alone()?;
             if is_done(self)? {
