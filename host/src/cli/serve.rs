@@ -55,8 +55,8 @@ pub struct ServeArguments {
     new: bool,
     /// Each leg is on a wearer who moves so while it assists, and is limp otherwise. The boards know the models
     /// of the empty and the worn leg.
-    #[arg(long, value_name = "MOTION", value_enum)]
-    wearer: Option<WearerMotion>,
+    #[arg(long, value_enum, help_heading = "Simulated wearer")]
+    motion: Option<WearerMotion>,
     /// The boards are neither calibrated nor have zeros, and the operator's contacts are open. A calibration is
     /// refused, because the legs hang on their motors.
     #[arg(long, conflicts_with = "enabled_by_contacts")]
@@ -112,7 +112,7 @@ pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
             (_, true) => Beginning::EnabledByContacts,
             _ => Beginning::Ready,
         },
-        wearer: arguments.wearer.map(WearerMotion::exercise),
+        wearer: arguments.motion.map(WearerMotion::exercise),
     };
     let (leg, options) = (&leg, &options);
     with_leg_size!(leg, serve(leg, options))?;

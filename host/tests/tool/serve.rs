@@ -427,7 +427,7 @@ fn an_uncalibrated_board_enables_nothing_and_says_why() {
 
 #[test]
 fn a_wearer_kicks_while_the_leg_assists() {
-    let serve = Serve::at("127.0.0.1:0", "--wearer kicking");
+    let serve = Serve::at("127.0.0.1:0", "--motion kicking");
     let mut client = Client::new(&serve);
     let moved = |client: &mut Client, seconds: f64| {
         let begin = Instant::now();
