@@ -136,7 +136,8 @@ fn every_procedure_refuses_beside_another_host_and_names_it() {
             "{procedure}: {all}"
         );
     }
-    host.write(1, 0x6040, 0, 0, 2);
+    // A new connection: the other one has heard the answers to the procedures.
+    Client::at(&wire.address).write(1, 0x6040, 0, 0, 2);
     // Alone, each of them does its work; this board never takes an image.
     let errors = wire.run(&update).ends_with(3).errors;
     assert!(errors.contains("a simulated board (`serve`), which never takes an image"), "{errors}");
@@ -163,23 +164,27 @@ fn a_drive_that_the_contacts_turned_on_is_neither_updated_nor_renumbered() {
 fn a_watch_of_another_host_stays_and_a_free_one_is_given_back() {
     let serve = Serve::new();
     let wire = Wire::new(&serve);
-    let mut host = Client::at(&wire.address);
     let theirs = 0x50 << 16 | 5000;
-    let watches = |host: &mut Client| [1, 2].map(|node| [1, 2].map(|sub| host.read(node, 0x1016, sub)));
-    [1, 2].into_iter().for_each(|node| host.write(node, 0x1016, 1, theirs, 4));
+    // A new connection each time: an older one has heard the answers to the procedure.
+    let host = || Client::at(&wire.address);
+    let watches = || {
+        let mut host = host();
+        [1, 2].map(|node| [1, 2].map(|sub| host.read(node, 0x1016, sub)))
+    };
+    [1, 2].into_iter().for_each(|node| host().write(node, 0x1016, 1, theirs, 4));
     let run = wire.run("commission --until enable").ends_with(0);
     assert!(run.printed.contains("enabled; the leg holds its pose"), "{}", run.printed);
-    assert_eq!(watches(&mut host), [[theirs, 0]; 2]);
+    assert_eq!(watches(), [[theirs, 0]; 2]);
     // This host's watch: node 112, 500 ms.
     let sent = wire.sent.lock().expect("no thread panics").clone();
     for node in [1, 2] {
         assert!(sent.contains(&format!("t60{node}823161002F4017000")), "node {node}");
     }
     // Without a free entry nothing is replaced.
-    [1, 2].into_iter().for_each(|node| host.write(node, 0x1016, 2, 0x51 << 16 | 5000, 4));
+    [1, 2].into_iter().for_each(|node| host().write(node, 0x1016, 2, 0x51 << 16 | 5000, 4));
     let run = wire.run("commission --until enable").ends_with(3);
     assert!(run.printed.contains("node 1 watches the heartbeats of nodes 80 and 81"), "{}", run.printed);
-    assert_eq!(watches(&mut host), [[theirs, 0x51 << 16 | 5000]; 2]);
+    assert_eq!(watches(), [[theirs, 0x51 << 16 | 5000]; 2]);
 }
 
 #[test]
