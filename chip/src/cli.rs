@@ -534,7 +534,10 @@ fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
     let mut session = arguments.common.session()?;
     session.boot()?;
     if !arguments.delivered {
-        for step in [Step::Calibrate, Step::Reference] {
+        for (step, words) in
+            [(Step::Calibrate, "calibrates both motors"), (Step::Reference, "takes the reference")]
+        {
+            eprintln!("the operator {words}; the port opens afterwards");
             session.step(step)?;
         }
         // A host enables the drive; the leg is let go at its last position.

@@ -15,6 +15,19 @@ pub fn print(text: &str) -> Result<(), ToolError> {
     }
 }
 
+/// Text of a node, an adapter or a file as one line of a terminal: control characters are escaped.
+#[must_use]
+pub fn printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '"' | '\'' | '\\' => shown.push(letter),
+            _ => shown.extend(letter.escape_debug()),
+        }
+    }
+    shown
+}
+
 /// `println!` through [`print`]: returns from the function if standard output cannot be written.
 macro_rules! say {
     ($($text:tt)*) => { $crate::base::output::print(&format!("{}\n", format_args!($($text)*)))? };

@@ -46,6 +46,7 @@ pub fn run(arguments: &NodeIdsArguments) -> Result<u8, ToolError> {
     let mut after = boards.clone();
     for (serial, nodes) in &arguments.set {
         check(&after, *serial, *nodes).map_err(|why| ToolError::input(format!("--set: {why}")))?;
+        ids.check_off(*serial, &boards)?;
         after.iter_mut().filter(|board| board.serial == *serial).for_each(|board| board.nodes = *nodes);
     }
     let mut result = Ok(());

@@ -3,15 +3,41 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::Path;
 
-use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 
 use crate::base::error::{EXIT_ACCEPTED, ToolError};
 use crate::cli::arguments::Updated;
 use crate::cli::leg_options::LegOptions;
+use crate::leg::exercise::Exercise;
 use crate::leg::setup::DEFAULT_SEED;
-use crate::rig::bus::serve::{ServeOptions, serve};
+use crate::rig::bus::serve::{Beginning, ServeOptions, serve};
+use crate::rig::worn::CADENCE_HZ;
 use crate::with_leg_size;
+
+/// Motion of a wearer.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum WearerMotion {
+    /// Walks in the air.
+    Gait,
+    /// Kicks with the knee.
+    Kicking,
+    /// Extends the knee slowly, seated.
+    Extension,
+    /// Reaches random postures.
+    Reaching,
+}
+
+impl WearerMotion {
+    fn exercise(self) -> Exercise {
+        match self {
+            Self::Gait => Exercise::Gait(CADENCE_HZ),
+            Self::Kicking => Exercise::Kicking,
+            Self::Extension => Exercise::Extension,
+            Self::Reaching => Exercise::Reaching,
+        }
+    }
+}
 
 /// Legs, address and speed.
 #[derive(Args, Debug)]
@@ -27,6 +53,17 @@ pub struct ServeArguments {
     /// All boards have the node-IDs 1 and 2, as new ones. Otherwise the second has 3 and 4, and so on.
     #[arg(long)]
     new: bool,
+    /// Each leg is on a wearer who moves so while it assists, and is limp otherwise. The boards know the models
+    /// of the empty and the worn leg.
+    #[arg(long, value_enum, help_heading = "Simulated wearer")]
+    motion: Option<WearerMotion>,
+    /// The boards are neither calibrated nor have zeros, and the operator's contacts are open. A calibration is
+    /// refused, because the legs hang on their motors.
+    #[arg(long, conflicts_with = "enabled_by_contacts")]
+    uncalibrated: bool,
+    /// The operator's contacts have enabled the legs before a host comes.
+    #[arg(long)]
+    enabled_by_contacts: bool,
     /// Simulated seconds per second.
     #[arg(long, value_name = "K", default_value_t = 1.0)]
     speed: f64,
@@ -70,6 +107,12 @@ pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
         flash: arguments.flash.as_deref().map(Path::to_owned),
         seed: arguments.seed,
         bits_per_s: 1000 * arguments.bit_rate,
+        beginning: match (arguments.uncalibrated, arguments.enabled_by_contacts) {
+            (true, _) => Beginning::Uncalibrated,
+            (_, true) => Beginning::EnabledByContacts,
+            _ => Beginning::Ready,
+        },
+        wearer: arguments.motion.map(WearerMotion::exercise),
     };
     let (leg, options) = (&leg, &options);
     with_leg_size!(leg, serve(leg, options))?;

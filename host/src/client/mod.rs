@@ -10,7 +10,7 @@
 
 pub mod adapter;
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufReader, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::thread;
@@ -20,8 +20,9 @@ use crc::{CRC_16_XMODEM, Crc};
 use scarab::bus::{Abort, Frame};
 
 use crate::base::error::ToolError;
+use crate::base::output::printable;
 use crate::client::adapter::Adapter;
-use crate::formats::slcan;
+use crate::formats::slcan::{self, BELL, LONGEST_LINE, next_line};
 
 /// Longest wait for an answer; a board that erases a sector of a new image is silent for up to 2 s.
 const PATIENCE: Duration = Duration::from_secs(6);
@@ -29,6 +30,10 @@ const PATIENCE: Duration = Duration::from_secs(6);
 const REPEAT: Duration = Duration::from_secs(1);
 /// Frames between reader and client.
 const MOST_WAITING: usize = 4096;
+/// Longest value that is read, in bytes.
+const MOST_BYTES: usize = 4096;
+/// Number of identifiers.
+const IDENTIFIERS: usize = 0x800;
 /// Bytes of a segment.
 const SEGMENT: usize = 7;
 const REQUEST: u16 = 0x600;
@@ -53,6 +58,8 @@ pub struct Emergency {
     pub node: u8,
     /// Error code; 0 when the error has ended.
     pub code: u16,
+    /// Bytes behind the error register; those of a short message are 0.
+    pub information: [u8; 5],
 }
 
 /// Connection to the nodes of a bus.
@@ -61,6 +68,8 @@ pub struct Client {
     line: Arc<Mutex<Adapter>>,
     frames: Receiver<Result<Frame, String>>,
     emergencies: Vec<Emergency>,
+    /// Identifiers that were received; an adapter does not return this client's own frames.
+    heard: Box<[bool; IDENTIFIERS]>,
 }
 
 /// Why a request failed.
@@ -70,6 +79,8 @@ pub enum RequestError {
     Aborted(u32),
     /// The node did not answer.
     Silent,
+    /// The value has no end.
+    Endless,
     /// The adapter failed.
     Adapter(String),
 }
@@ -88,7 +99,7 @@ impl RequestError {
             Self::Adapter(why) => ToolError::input(format!(
                 "--slcan: {why}; run the command again once the bus is free and its boards answer"
             )),
-            Self::Silent | Self::Aborted(_) => ToolError::input("no answer on the bus"),
+            Self::Silent | Self::Endless | Self::Aborted(_) => ToolError::input("no answer on the bus"),
         }
     }
 
@@ -101,6 +112,9 @@ impl RequestError {
                 "no answer within {} s: is the board powered, the bit rate right, the bus terminated? `node-ids` lists the boards",
                 PATIENCE.as_secs()
             ),
+            Self::Endless => {
+                format!("the value has more than {MOST_BYTES} bytes: this is no node of a Scarab board")
+            }
             Self::Adapter(why) => return Self::Adapter(why).of_bus(),
         };
         ToolError::input(format!("node {node}, object {index:04X}:{sub}: {why}"))
@@ -116,9 +130,13 @@ impl Client {
         let reader = line.try_clone().map_err(|error| ToolError::input(format!("--slcan: {error}")))?;
         let (give, frames) = sync_channel(MOST_WAITING);
         thread::spawn(move || {
-            for text in BufReader::new(reader).split(b'\r') {
-                let decoded = match text {
-                    Ok(text) => slcan::decode(&String::from_utf8_lossy(&text)),
+            let mut reader = BufReader::new(reader);
+            while let Some(line) = next_line(&mut reader, &[b'\r', BELL[0]]).transpose() {
+                let decoded = match line {
+                    Ok(line) if line.len() == LONGEST_LINE => Err(format!(
+                        "the adapter sends a line of {LONGEST_LINE} bytes or more, which is no frame"
+                    )),
+                    Ok(line) => slcan::decode(&String::from_utf8_lossy(&line)),
                     Err(error) => Err(error.to_string()),
                 };
                 let ends = decoded.is_err();
@@ -130,7 +148,14 @@ impl Client {
             }
             let _ = give.send(Err("the adapter closed the connection".into()));
         });
-        Ok(Self { line: Arc::new(Mutex::new(line)), frames, emergencies: Vec::new() })
+        let heard = Box::new([false; IDENTIFIERS]);
+        Ok(Self { line: Arc::new(Mutex::new(line)), frames, emergencies: Vec::new(), heard })
+    }
+
+    /// Whether a frame with this identifier was received.
+    #[must_use]
+    pub fn has_heard(&self, identifier: u16) -> bool {
+        self.heard.get(usize::from(identifier)).is_some_and(|heard| *heard)
     }
 
     /// Sends a frame.
@@ -174,9 +199,16 @@ impl Client {
                     return Err(RequestError::Adapter("the adapter closed the connection".into()));
                 }
             };
-            if let (0x81..=0xFF, [low, high, ..]) = (frame.id(), frame.data()) {
-                let node = (frame.id() - EMERGENCY) as u8;
-                self.emergencies.push(Emergency { node, code: u16::from_le_bytes([*low, *high]) });
+            if let Some(heard) = self.heard.get_mut(usize::from(frame.id())) {
+                *heard = true;
+            }
+            if let (0x81..=0xFF, [low, high, rest @ ..]) = (frame.id(), frame.data()) {
+                let mut information = [0; 5];
+                for (to, from) in information.iter_mut().zip(rest.iter().skip(1)) {
+                    *to = *from;
+                }
+                let (node, code) = ((frame.id() - EMERGENCY) as u8, u16::from_le_bytes([*low, *high]));
+                self.emergencies.push(Emergency { node, code, information });
             }
             if wanted(&frame) {
                 return Ok(Some(frame));
@@ -288,6 +320,9 @@ impl Client {
             if command & 1 != 0 {
                 break;
             }
+            if bytes.len() > MOST_BYTES {
+                return Err(RequestError::Endless);
+            }
         }
         Ok(bytes)
     }
@@ -313,13 +348,13 @@ impl Client {
         self.read(node, object).map(|bits| f64::from(f32::from_bits(bits)))
     }
 
-    /// Reads a text.
+    /// Reads a text; its control characters are escaped.
     ///
     /// # Errors
     /// The node refuses or is silent.
     pub fn text(&mut self, node: u8, object: Object) -> Result<String, ToolError> {
         let bytes = self.bytes(node, object).map_err(|error| error.of(node, object))?;
-        Ok(String::from_utf8_lossy(&bytes).into_owned())
+        Ok(printable(&String::from_utf8_lossy(&bytes)))
     }
 
     /// Writes bytes by block transfer; `progress` is called with the number that has arrived.

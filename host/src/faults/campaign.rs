@@ -21,16 +21,17 @@ use crate::faults::bounds::bounds;
 use crate::faults::catalogue::stop::ROWS as STOP;
 use crate::faults::detectors::views;
 use crate::faults::entry::Entry;
-use crate::faults::operator::begin;
 use crate::faults::results::{Base, Campaign};
 use crate::faults::run::{Manner, Outcome, run};
 use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::faults::trial::Trial;
-use crate::faults::worn::{self, Worn};
 use crate::formats::leg_file::LegFile;
+use crate::leg::exercise::Exercise;
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
+use crate::rig::operator::begin;
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::{Context, Pair};
+use crate::rig::worn::{CADENCE_HZ, Worn};
 use scarab::model::planar::JOINTS;
 
 use scarab::model::planar::BASE;
@@ -40,6 +41,9 @@ const RUNS_PER_BASE: u64 = 256;
 /// Row of the torque caps, and the factor by which they are widened when disabled.
 pub(super) const CAPPED: &str = "H1";
 const WIDENED: f32 = 3.0;
+/// Periods of a session in which faults are injected: the fade-in, the oscillators' learning, and steady
+/// walking.
+const WORN_LENGTH: u64 = 20 * PERIODS_PER_S;
 /// Forks per batch, about 100 KB each.
 const BATCH: usize = 128;
 /// Longest identification, s.
@@ -147,7 +151,9 @@ fn based(
 ) -> Result<Campaign, ToolError> {
     let mut campaign = Campaign::default();
     let every = options.every_tick && base == base_of(1);
-    let worn = Worn::of(leg, base)?;
+    // The leg file's `assist` states the shares, and the start button begins the session.
+    let wearer = Exercise::Gait(CADENCE_HZ);
+    let worn = leg.assist.map(|_| Worn::new::<BASE>(leg, wearer, base)).transpose()?;
     let leg = worn.as_ref().map_or(leg, |worn| &worn.exoskeleton);
     let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
     let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
@@ -156,7 +162,7 @@ fn based(
             (joint.torque, joint.current) = (joint.torque * WIDENED, joint.current * WIDENED);
         }
     }
-    let mut length = if worn.is_some() { worn::LENGTH } else { length(leg, &context, base)? };
+    let mut length = if worn.is_some() { WORN_LENGTH } else { length(leg, &context, base)? };
     if let Some(seconds) = options.seconds {
         length = length.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
     }

@@ -247,8 +247,8 @@ impl Trial {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::faults::operator::begin;
     use crate::formats::leg_file::DEFAULT_LEG;
+    use crate::rig::operator::begin;
     use crate::rig::options::{DriveModel, SimulationOptions};
     use crate::rig::pair::Context;
     use scarab::model::planar::BASE;

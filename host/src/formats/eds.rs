@@ -12,6 +12,7 @@ use scarab::bus::Identity;
 use scarab::bus::commissioning::StepResult;
 use scarab::bus::dictionary::{Access, Mapping, Row, Type};
 use scarab::bus::table::{GROUPS, NAMES, ROWS};
+use scarab::leg::{Parameter, Reason};
 use scarab::safety::InhibitReason;
 
 /// Date and time of the last change to the dictionary, in the form of CiA 306. Constants instead of a clock:
@@ -100,12 +101,31 @@ fn comments() -> Vec<String> {
         "2020:1 and :3 stiffness, unit 0.1 N m/rad; :2 and :4 damping, unit 0.01 N m s/rad",
         "2021:1 to :3 bandwidths of the position loop, unit 0.01 Hz; :4 to :6 of the current loop, Hz",
         "2021:1 and :4 0 selects the largest, :3 and :6",
+        "2100:1 write 1 start, 2 cancel, 3 use the offered update, 4 begin assistance, 5 end it",
+        "2100:2 0 idle, 1 approach, 2 excite, 3 settle, 4 solve, 5 approach of a validation motion, 6 that motion",
+        "2100:2 7 judge, 8 track, 9 follow, 10 to 12 assist: fade in, act, fade out; :3 motion, from 1",
+        "2100:4 plan: 0 one-time, 1 sequential; :7 number of models stored on this board",
+        "2100:8 verdict: 0 none, 1 accepted, 2 refused; :12 1 the model no longer fits, 2 an update is offered",
+        "2100:13 leg of the next identification: 0 unknown, 1 empty, 2 worn",
+        "2110 to 2112 parameters of the joint: value, sigma (kg m^2, kg m, kg, N m, N m s/rad; NaN unknown), status",
+        "2112 0 no result, 1 identified, 2 grouped, 3 weak, 4 prior",
+        "2120 to 2124 base parameters: value, sigma, carrier, flags, least squares; equal at both nodes",
+        "2122 joint << 8 | parameter, both from 1; 2123 bits: 0 known, 1 grouped, 2 dropped",
+        "2130 to 2132 unit N m, 2133 rows; motion 1 identified from, 2 to 4 predicted",
+        "2140:1 write 1 to hold the waiting samples, 0 to release them; read their number",
+        "2140:2 24 bytes a sample: tick, segment (UNSIGNED32), angles (rad), torques (N m) of hip and knee (REAL32)",
+        "2140:2 segment: 0 none, 1 identified from, 2 tracked, 3 to 5 predicted",
+        "2150:1 to :4 per mille; greatest 1000, 800, 1000, 500; :4 from -500 on, negative resists",
         "2160:2 bits: 0 calibrated, 1 joints have their zeros, 2 calibrating, 3 enabling switch closed",
         "2160:4 axis that the calibration refused, from 1; :5 reason, :6 detail (docs/bus.md)",
         "2170:2 and :3 unit 0.1 degrees Celsius, -32768 unknown; :4 to :6 unit 0.01 A; :7 and :8 ns",
     ]
     .map(String::from)
     .into();
+    lines.extend(
+        (1..).zip(Parameter::ALL).map(|(sub, parameter)| format!("2110 to 2112, sub {sub}: {parameter:?}")),
+    );
+    lines.extend((0..).zip(Reason::ALL).map(|(bit, reason)| format!("2100:9 bit {bit}: {}", reason.name())));
     lines.extend(StepResult::ALL.map(|result| format!("2160:3 value {}: {}", result as u8, result.words())));
     lines.extend(InhibitReason::ALL.map(|cause| {
         let words = cause.code().map_or("", |code| code.words());

@@ -12,7 +12,11 @@
 //!
 //! Source: Lawicel CANUSB manual, version 2; the driver `slcan` of Linux; python-can's `slcan` interface.
 
+use std::io::{BufRead, ErrorKind};
+
 use scarab::bus::Frame;
+
+use crate::base::output::printable;
 
 /// A line that the caller must decide and answer. All other lines are answered here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +33,8 @@ pub enum Received {
 
 /// Length of the longest line: a frame with a 29-bit identifier.
 const LONGEST: usize = 1 + 8 + 1 + 16;
+/// Longest line that an adapter or a file of frames may send; longer ones are no frames.
+pub const LONGEST_LINE: usize = 256;
 /// Answer to a line that was refused.
 pub const BELL: &[u8] = b"\x07";
 /// Answer to a frame that was queued.
@@ -103,6 +109,32 @@ fn digit(byte: u8) -> Option<u16> {
     char::from(byte).to_digit(16).map(|digit| digit as u16)
 }
 
+/// Reads the next line without its end, which is one of these bytes; `None` at the end of the input. A bell is
+/// a line of its own where it ends lines. The rest of a line of [`LONGEST_LINE`] bytes is dropped.
+///
+/// # Errors
+/// Those of the input.
+pub fn next_line(input: &mut impl BufRead, ends: &[u8]) -> std::io::Result<Option<Vec<u8>>> {
+    let mut line = Vec::new();
+    loop {
+        let bytes = match input.fill_buf() {
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            bytes => bytes?,
+        };
+        if bytes.is_empty() {
+            return Ok(Some(line).filter(|line| !line.is_empty()));
+        }
+        let end = bytes.iter().position(|byte| ends.contains(byte));
+        let part = &bytes[..end.map_or(bytes.len(), |end| end + usize::from(bytes[end] == BELL[0]))];
+        line.extend(part.iter().take(LONGEST_LINE - line.len()));
+        let used = end.map_or(bytes.len(), |end| end + 1);
+        input.consume(used);
+        if end.is_some() {
+            return Ok(Some(line));
+        }
+    }
+}
+
 /// Decodes a line of an adapter. `None` for an answer to a command, and for frames that this bus does not
 /// carry. A time stamp of four digits at the end is ignored.
 ///
@@ -112,11 +144,11 @@ pub fn decode(line: &str) -> Result<Option<Frame>, String> {
     let line = line.trim_matches(|letter: char| letter.is_ascii_control() || letter == ' ');
     let Some(digits) = line.strip_prefix('t') else {
         let is_answer = line.is_empty() || line.starts_with(['z', 'Z', 'V', 'v', 'N', 'F', 'T', 'r', 'R']);
-        return if is_answer { Ok(None) } else { Err(format!("the adapter says `{line}`")) };
+        return if is_answer { Ok(None) } else { Err(format!("the adapter says `{}`", printable(line))) };
     };
     let stamped = digits.len().checked_sub(4).and_then(|length| digits.get(..length));
     let found = frame(digits.as_bytes()).or_else(|| frame(stamped?.as_bytes()));
-    found.map(Some).ok_or_else(|| format!("`{line}` is not a frame of slcan"))
+    found.map(Some).ok_or_else(|| format!("`{}` is not a frame of slcan", printable(line)))
 }
 
 /// Decodes `IIILDD..`.
@@ -195,6 +227,8 @@ mod tests {
         for line in ["", "\r", "z\r", "V1013", "T000000010", "r1010"] {
             assert_eq!(decode(line), Ok(None), "{line:?}");
         }
+        let hostile = decode("x\u{1b}[2J\u{202e}x").expect_err("no frame");
+        assert_eq!(hostile, "the adapter says `x\\u{1b}[2J\\u{202e}x`");
         for line in ["t18", "t1812370", "t8000", "#refused: 127.0.0.1:9 has the channel", "tä1"] {
             assert!(decode(line).is_err(), "{line:?}");
         }

@@ -4,6 +4,7 @@ pub mod activity_words;
 pub mod axes;
 pub mod background;
 pub mod board_words;
+pub mod exercise;
 pub mod from_robot;
 mod link_body;
 pub mod matching;

@@ -25,7 +25,7 @@ pub struct CommissionReport {
     pub verdict: Option<&'static str>,
     /// Reasons of the verdict.
     pub reasons: Vec<&'static str>,
-    /// Models accepted on this board.
+    /// Models stored on this board.
     pub generation: u32,
     /// Base parameters of the leg.
     pub base: Vec<ParameterRead>,

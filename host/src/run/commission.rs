@@ -10,7 +10,9 @@
 //! Nothing is remembered here: each step reads from the board whether it is done already. So an interrupted
 //! procedure is resumed by starting it again. The operator's part is asked for in words, and the board itself
 //! says when it is done: a step that it refuses because of the switch is asked again until the switch is
-//! right.
+//! right. What the board itself answers meanwhile (FF0E, 2160:3) is shown.
+//!
+//! Another host ends the procedure ([`OtherHosts`]): it would be taken for the operator's hand.
 
 use std::time::{Duration, Instant};
 
@@ -26,7 +28,9 @@ use crate::base::names::parameter_name;
 use crate::base::number::Number;
 use crate::client::{Client, HOST, Object, RequestError};
 use crate::report::commission::{CommissionReport, JointCommissioned, ParameterRead, StepTaken};
+use crate::rig::bus::alarms;
 use crate::run::live::bus::words::JointState;
+use crate::run::other_hosts::{MayBeOn, OtherHosts};
 
 /// A step of the procedure, in its order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
@@ -116,6 +120,9 @@ const FLEXED_RAD: f64 = 5.0 * core::f64::consts::PI / 180.0;
 
 /// NMT command: start of a node.
 const START: u8 = 1;
+/// Node-ID in an entry of 1016: bits 16 to 22; its time: bits 0 to 15.
+const WATCHED_NODE: u32 = 0x7F << 16;
+const WATCHED_TIME: u32 = 0xFFFF;
 const COMMAND: Object = Object(0x2160, 1);
 const STATE: Object = Object(0x2160, 2);
 const RESULT: Object = Object(0x2160, 3);
@@ -127,11 +134,21 @@ const IDENTIFY: Object = Object(0x2100, 1);
 const ACTIVITY: Object = Object(0x2100, 2);
 const VERDICT: Object = Object(0x2100, 8);
 /// Heartbeat that the nodes watch while the drive is on: this host's, within half a second.
-const WATCHED: Object = Object(0x1016, 1);
-const WATCHED_MS: u32 = 500;
+const OURS: u32 = (HOST as u32) << 16 | 500;
+/// Entries of 1016; one that another host uses stays.
+const WATCHES: [Object; 2] = [Object(0x1016, 1), Object(0x1016, 2)];
 const LOST_HOST: Object = Object(0x6007, 0);
 const MODE: Object = Object(0x6060, 0);
 const SAVE: u32 = u32::from_le_bytes(*b"save");
+
+/// What [`Commission::take_control`] has replaced at a node: entry of 1016, its value, and the mode.
+#[derive(Clone, Copy, Debug)]
+struct Replaced {
+    node: u8,
+    entry: Object,
+    watched: u32,
+    mode: u32,
+}
 
 /// The procedure.
 pub struct Commission<'a> {
@@ -140,8 +157,12 @@ pub struct Commission<'a> {
     say: &'a mut dyn FnMut(&str),
     /// This run took the joints' reference.
     has_referenced: bool,
-    /// Watched heartbeat and mode of each node before this host.
-    before: Option<[[u32; 2]; JOINTS]>,
+    /// State of each node before this host.
+    before: Vec<Replaced>,
+    others: Option<OtherHosts>,
+    /// Last words of the board about a step that it refuses, and all that were shown during this wait.
+    said: Option<String>,
+    shown: Vec<String>,
     report: CommissionReport,
 }
 
@@ -186,7 +207,17 @@ impl<'a> Commission<'a> {
     pub fn new(client: Client, options: CommissionOptions, say: &'a mut dyn FnMut(&str)) -> Self {
         let joints = options.nodes.map(|node| JointCommissioned { node, ..JointCommissioned::default() });
         let report = CommissionReport { joints: joints.into(), ..CommissionReport::default() };
-        Self { client, options, say, has_referenced: false, before: None, report }
+        Self {
+            client,
+            options,
+            say,
+            has_referenced: false,
+            before: Vec::new(),
+            others: None,
+            said: None,
+            shown: Vec::new(),
+            report,
+        }
     }
 
     /// Runs all steps up to the last one. The report holds what was reached, also after an error.
@@ -243,6 +274,35 @@ impl<'a> Commission<'a> {
         self.client.wait(time).map_err(RequestError::of_bus)
     }
 
+    /// Refuses if another host was heard.
+    fn check_alone(&self) -> Result<(), ToolError> {
+        self.others.as_ref().map_or(Ok(()), |others| others.check(&self.client))
+    }
+
+    /// Shows what the board says about a refused step, once per wait: both joints may repeat theirs in turn.
+    fn show(&mut self, words: String) {
+        if !self.shown.contains(&words) {
+            self.line(&format!("           the board says: {words}"));
+            self.shown.push(words.clone());
+        }
+        self.said = Some(words);
+    }
+
+    /// Shows the reasons in the emergency messages since the last call; one that ended is forgotten.
+    fn show_emergencies(&mut self) {
+        for emergency in self.client.take_emergencies() {
+            if !self.options.nodes.contains(&emergency.node) {
+                continue;
+            }
+            if emergency.code == 0 {
+                self.said = None;
+            } else {
+                let words = alarms::words(emergency.code, emergency.information);
+                self.show(format!("{words} ({:04X})", emergency.code));
+            }
+        }
+    }
+
     fn has(&mut self, state: u8) -> Result<bool, ToolError> {
         Ok(self.read(STATE)? & u32::from(state) != 0)
     }
@@ -266,18 +326,29 @@ impl<'a> Commission<'a> {
         self.line(&format!("           please: {words}"));
         self.wait(READ_TIME)?;
         let begun = Instant::now();
-        while !is_done(self)? {
+        (self.said, self.shown) = (None, Vec::new());
+        loop {
+            self.check_alone()?;
+            if is_done(self)? {
+                return Ok(());
+            }
+            self.show_emergencies();
             if begun.elapsed().as_secs_f64() > patience_s {
+                let why = match &self.said {
+                    Some(said) => format!("the board says: {said}; asked for: {words}"),
+                    None => format!("for the operator: {words}"),
+                };
                 return Err(refused(format!(
-                    "waited {patience_s} s for the operator: {words}; start the command again to resume"
+                    "waited {patience_s} s, {why}; start the command again to resume"
                 )));
             }
             self.wait(AGAIN)?;
         }
-        Ok(())
     }
 
     fn find(&mut self) -> Result<String, ToolError> {
+        // The operator may hold the switch of a leg that is ready.
+        self.others = Some(OtherHosts::look(&mut self.client, &self.options.nodes, MayBeOn::ByContacts)?);
         for node in self.options.nodes {
             self.client.manage(node, START).map_err(RequestError::of_bus)?;
         }
@@ -397,9 +468,14 @@ impl<'a> Commission<'a> {
     fn guide(&mut self, step: CommissioningStep, words: &str) -> Result<(), ToolError> {
         self.ask(words, |this| match this.perform_step(step, LONGEST_STEP_S)? {
             StepResult::Done | StepResult::AlreadyDone => Ok(true),
-            StepResult::SwitchOpen | StepResult::SwitchClosed | StepResult::ContactsNotOpened => Ok(false),
-            // Another host, or an interrupted procedure, has begun it.
-            StepResult::Calibrating => Ok(false),
+            // An interrupted procedure has begun a calibration that is under way.
+            why @ (StepResult::SwitchOpen
+            | StepResult::SwitchClosed
+            | StepResult::ContactsNotOpened
+            | StepResult::Calibrating) => {
+                this.show(why.words().to_owned());
+                Ok(false)
+            }
             StepResult::CalibrationRefused => {
                 let [axis, reason, detail] = [4, 5, 6].map(|sub| this.read(Object(0x2160, sub)));
                 Err(refused(calibration(axis?, reason?, detail?)))
@@ -555,7 +631,7 @@ impl<'a> Commission<'a> {
             },
         )
         .map_err(|error| match self.why_not_enabled() {
-            Ok(why) if !why.is_empty() => refused(format!("{error}; the board says: {why}")),
+            Ok(why) if !why.is_empty() => refused(format!("{error}; present reasons (60FD): {why}")),
             _ => error,
         })?;
         for (joint, angle) in self.positions()?.into_iter().enumerate() {
@@ -567,29 +643,50 @@ impl<'a> Commission<'a> {
     /// Prepares both nodes for this host: they watch its heartbeat, and hold their pose once enabled.
     fn take_control(&mut self) -> Result<(), ToolError> {
         self.client.begin_heartbeats();
-        for (place, node) in self.options.nodes.into_iter().enumerate() {
+        for node in self.options.nodes {
             if self.client.read(node, LOST_HOST)? == 0 {
                 return Err(refused(format!(
                     "node {node} would not stop when its host is lost: 6007 is 0; write 3 to it"
                 )));
             }
-            let ours = u32::from(HOST) << 16 | WATCHED_MS;
-            let (watched, mode) = (self.client.read(node, WATCHED)?, self.client.read(node, MODE)?);
-            // What a killed procedure has left must not be stored.
-            let watched = if watched == ours { 0 } else { watched };
-            self.before.get_or_insert([[0; 2]; JOINTS])[place] = [watched, mode];
-            self.client.write(node, WATCHED, ours, 4)?;
+            let (entry, watched) = self.free_watch(node)?;
+            let mode = self.client.read(node, MODE)?;
+            self.before.push(Replaced { node, entry, watched, mode });
+            self.client.write(node, entry, OURS, 4)?;
             self.client.write(node, MODE, 0, 1)?;
         }
         Ok(())
     }
 
+    /// Entry of 1016 that no other host uses, and the value to be restored. One that a killed procedure has
+    /// left is taken and freed: it must not be stored.
+    fn free_watch(&mut self, node: u8) -> Result<(Object, u32), ToolError> {
+        let mut watches = Vec::new();
+        for entry in WATCHES {
+            watches.push((entry, self.client.read(node, entry)?));
+        }
+        if let Some((entry, _)) = watches.iter().find(|(_, watched)| *watched == OURS) {
+            return Ok((*entry, 0));
+        }
+        let is_free = |watched: u32| watched & WATCHED_NODE == 0 || watched & WATCHED_TIME == 0;
+        watches.iter().find(|(_, watched)| is_free(*watched)).copied().ok_or_else(|| {
+            let hosts: Vec<_> = watches.iter().map(|(_, watched)| (watched >> 16 & 0x7F).to_string()).collect();
+            refused(format!(
+                "node {node} watches the heartbeats of nodes {}, so no entry of 1016 is free for this host: write 0 to \
+                 1016:1 or 1016:2",
+                hosts.join(" and ")
+            ))
+        })
+    }
+
     /// Turns the drive off, and restores what [`Self::take_control`] has replaced.
     fn give_back(&mut self) -> Result<(), ToolError> {
-        let Some(before) = self.before.take() else { return Ok(()) };
+        if self.before.is_empty() {
+            return Ok(());
+        }
         self.turn_off()?;
-        for (node, [watched, mode]) in self.options.nodes.into_iter().zip(before) {
-            self.client.write(node, WATCHED, watched, 4)?;
+        for Replaced { node, entry, watched, mode } in core::mem::take(&mut self.before) {
+            self.client.write(node, entry, watched, 4)?;
             self.client.write(node, MODE, mode, 1)?;
         }
         Ok(())
@@ -632,6 +729,7 @@ impl<'a> Commission<'a> {
         let begun = Instant::now();
         let mut last = 0;
         loop {
+            self.check_alone()?;
             let (activity, motion) = (self.read(ACTIVITY)?, self.read(Object(0x2100, 3))?);
             if activity != last {
                 let words = crate::run::live::bus::words::doing(Some(activity), Some(motion), &[]);
@@ -657,7 +755,7 @@ impl<'a> Commission<'a> {
         self.read_results()?;
         match self.report.verdict {
             Some("accepted") => {
-                Ok(format!("accepted; number of models accepted on this board before: {before}"))
+                Ok(format!("accepted; number of models stored on this board before: {before}"))
             }
             Some(_) => {
                 Err(refused(format!("the identification is refused: {}", self.report.reasons.join(", "))))
@@ -671,15 +769,19 @@ impl<'a> Commission<'a> {
         let node = self.first();
         let begun = Instant::now();
         while begun.elapsed().as_secs_f64() < LONGEST_RETURN_S {
+            self.check_alone()?;
             self.client.write(node, IDENTIFY, 1, 1)?;
             self.wait(AGAIN)?;
+            self.show_emergencies();
             if (1..=7).contains(&self.read(ACTIVITY)?) {
                 return Ok(());
             }
         }
-        Err(refused(format!(
-            "the leg has not begun within {LONGEST_RETURN_S} s: it does not come to rest, or another host controls it"
-        )))
+        let why = self
+            .said
+            .take()
+            .map_or("it does not come to rest".into(), |said| format!("the board says: {said}"));
+        Err(refused(format!("the leg has not begun within {LONGEST_RETURN_S} s: {why}")))
     }
 
     /// Reads verdict, parameters and fit.
@@ -759,7 +861,7 @@ impl<'a> Commission<'a> {
                     self.report.stored = true;
                     self.report.generation = self.read(Object(0x2100, 7))?;
                     return Ok(format!(
-                        "stored; number of models accepted on this board: {}",
+                        "stored; number of models stored on this board: {}",
                         self.report.generation
                     ));
                 }

@@ -17,6 +17,7 @@ pub mod model_choice;
 pub mod monitor;
 pub mod motor;
 pub mod node_ids;
+pub mod other_hosts;
 pub mod predict;
 pub mod regressor;
 pub mod replay;

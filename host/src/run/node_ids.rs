@@ -7,6 +7,7 @@ use scarab::bus::{Identity, NodeId};
 
 use crate::base::error::ToolError;
 use crate::client::{Client, HOST, RequestError};
+use crate::run::other_hosts::{MayBeOn, OtherHosts};
 
 /// Services: state of all nodes, identity of one, its answer, search, its answer, node-ID, store, question.
 const STATE: u8 = 0x04;
@@ -58,8 +59,9 @@ impl NodeIds {
     /// Finds all boards, in the order of their serial numbers.
     ///
     /// # Errors
-    /// The bus fails, or answers are lost again and again.
+    /// Another host uses the bus, the bus fails, or answers are lost again and again.
     pub fn find(&mut self) -> Result<Vec<Board>, ToolError> {
+        OtherHosts::look(&mut self.client, &[], MayBeOn::No)?;
         let mut is_lost = false;
         for _ in 0..TRIALS {
             if self.is_any(ALL, ALL)? {
@@ -75,6 +77,21 @@ impl NodeIds {
             ));
         }
         Ok(Vec::new())
+    }
+
+    /// Refuses to set a board whose drive is on or has a host. Nodes with a shared node-ID are not asked:
+    /// several boards would answer.
+    ///
+    /// # Errors
+    /// Its drive is on, or another host controls it.
+    pub fn check_off(&mut self, serial: u32, boards: &[Board]) -> Result<(), ToolError> {
+        let is_shared = |node: &u8| boards.iter().filter(|other| other.nodes.contains(node)).count() > 1;
+        let board = boards.iter().filter(|board| board.serial == serial);
+        let own: Vec<u8> = board.flat_map(|board| board.nodes).filter(|node| !is_shared(node)).collect();
+        if own.is_empty() {
+            return Ok(());
+        }
+        OtherHosts::look(&mut self.client, &own, MayBeOn::No).map(drop)
     }
 
     /// Searches all serial numbers by halving; `None` if an answer was lost.

@@ -11,11 +11,15 @@ use scarab_boot::{Check, Header, ImageError};
 
 use crate::base::error::ToolError;
 use crate::client::{Client, Object, RequestError};
+use crate::run::other_hosts::{MayBeOn, OtherHosts};
 
 const DATA: Object = Object(0x1F50, 1);
 const CONTROL: Object = Object(0x1F51, 1);
 const SOFTWARE: Object = Object(0x1F56, 1);
 const STATUS: Object = Object(0x1F57, 1);
+/// Hardware version, and that of a simulated board, which has no program that could be replaced.
+const HARDWARE: Object = Object(0x1009, 0);
+const SIMULATED: &str = "simulated";
 /// Longest clearing: two sectors of 2 s, and the announcement.
 const CLEARING: Duration = Duration::from_secs(10);
 /// Longest restart with both swaps.
@@ -65,6 +69,7 @@ impl Update<'_> {
     /// # Errors
     /// The board refuses, or the bus fails.
     pub fn run(&mut self, program: &[u8], header: &Header) -> Result<(), ToolError> {
+        OtherHosts::look(&mut self.client, &[self.node], MayBeOn::No)?;
         let running = self.client.bytes(self.node, SOFTWARE).map_err(|error| {
             if error.is(Abort::NoObject) {
                 ToolError::Refused("this firmware takes no update over the bus; use a debug probe".into())
@@ -75,6 +80,13 @@ impl Update<'_> {
         let running = running.iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte));
         let serial = self.client.read(self.node, Object(0x1018, 4))?;
         (self.say)(&format!("find       serial number {serial:08X}, image {running:08X}"));
+        if self.client.text(self.node, HARDWARE)? == SIMULATED {
+            return Err(ToolError::Refused(
+                "this is a simulated board (`serve`), which never takes an image; `cargo chip serve --next FILE` runs \
+                 one that does"
+                    .into(),
+            ));
+        }
         if running != header.checksum {
             if self.status()?.has(ProgramStatus::ON_TRIAL) {
                 return Err(ToolError::Refused(

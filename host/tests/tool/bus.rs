@@ -18,17 +18,9 @@ struct Bus {
 
 impl Bus {
     fn new() -> Self {
-        let options = ServeOptions {
-            address: ([127, 0, 0, 1], 0).into(),
-            legs: 2,
-            are_new: false,
-            speed: 1.0,
-            flash: None,
-            seed: 1,
-            bits_per_s: 1_000_000,
-        };
+        let options = ServeOptions::local(2);
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let network = network(&leg, &options, None).expect("the default leg");
+        let network = network(&leg, &options, None, &[]).expect("the default leg");
         let mut bus = Self { network, sent: Vec::new() };
         bus.run(4);
         let boots: Vec<u16> = bus.sent.iter().map(|sent| sent.frame.id()).collect();

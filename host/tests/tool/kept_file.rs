@@ -164,17 +164,9 @@ fn a_board_uses_an_imported_flash_but_refuses_another_leg_s_model() {
     let start = |text: &str, name: &str| {
         let flash = folder.path(name);
         import(&folder, text, &flash).ends_with(0);
-        let options = ServeOptions {
-            address: ([127, 0, 0, 1], 0).into(),
-            legs: 1,
-            are_new: false,
-            speed: 1.0,
-            flash: None,
-            seed: 1,
-            bits_per_s: 1_000_000,
-        };
+        let options = ServeOptions::local(1);
         let bytes = fs::read(&flash).expect("written");
-        let mut network = network::<2, 13>(&leg, &options, Some(&bytes)).expect("the default leg");
+        let mut network = network::<2, 13>(&leg, &options, Some(&bytes), &[]).expect("the default leg");
         let board = &mut network.boards()[0];
         let control = board.rig.leg.control();
         let [empty, worn] = [Wearing::Empty, Wearing::Worn].map(|wearing| control.model_of(wearing).copied());

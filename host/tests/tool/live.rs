@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use scarab::real::sqrt;
 use scarab_host::view::live::hub::MOST_IN_MESSAGE;
-use scarab_host::view::live::server::MOST_PAGES;
+use scarab_host::view::live::server::{MOST_CONNECTIONS, MOST_PAGES};
 use serde_json::Value;
 use socket2::{Domain, SockAddr, Socket, Type};
 
@@ -167,6 +167,23 @@ fn the_page_is_served_with_its_policy_and_nothing_can_be_sent() {
         let answer = live.answer(request);
         assert!(answer.starts_with(&format!("HTTP/1.1 {status} ")), "{request:?}: {answer}");
     }
+}
+
+#[test]
+fn connections_that_never_ask_keep_no_page_out() {
+    let live = Live::new("--speed 1");
+    let mut events = live.events();
+    assert!(events.next().is_some());
+    // Twice as many as can be open, each with half a request.
+    let half: Vec<_> = (0..2 * MOST_CONNECTIONS).map(|_| live.ask("GET / HTTP/1.1\r\n")).collect();
+    let begin = Instant::now();
+    let page = live.answer("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n");
+    assert!(page.starts_with("HTTP/1.1 200 OK\r\n"), "{page}");
+    // Half-open connections end by themselves after 10 s.
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+    // An open page is not displaced.
+    assert!(events.next().is_some());
+    drop(half);
 }
 
 #[test]

@@ -27,6 +27,7 @@ mod model_predict;
 mod model_urdf;
 mod monitor;
 mod motor;
+mod other_hosts;
 mod pendulum;
 mod random_hosts;
 mod recordings;

@@ -47,7 +47,7 @@ impl Serve {
         Self { child, address, errors }
     }
 
-    fn new() -> Self {
+    pub fn new() -> Self {
         Self::at("127.0.0.1:0", "")
     }
 
@@ -86,17 +86,21 @@ pub struct Client {
 }
 
 impl Client {
-    fn silent(serve: &Serve) -> Self {
-        let stream = TcpStream::connect(&serve.address).expect("it listens");
+    fn silent(address: &str) -> Self {
+        let stream = TcpStream::connect(address).expect("it listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
         Self { stream, received: Vec::new() }
     }
 
     pub fn new(serve: &Serve) -> Self {
-        let mut client = Self::silent(serve);
+        Self::at(&serve.address)
+    }
+
+    pub fn at(address: &str) -> Self {
+        let mut client = Self::silent(address);
         client.say("C\rS8\rO\r");
         for _ in 0..3 {
-            assert_eq!(client.line().as_deref(), Some(""), "{}", serve.errors());
+            assert_eq!(client.line().as_deref(), Some(""));
         }
         client
     }
@@ -155,7 +159,7 @@ impl Client {
         self.read(node, 0x6041, 0) & 0x806F
     }
 
-    fn until(&mut self, state: u32) {
+    pub fn until(&mut self, state: u32) {
         for node in [1, 2] {
             let begin = Instant::now();
             loop {
@@ -240,13 +244,13 @@ fn emergencies_are_printed_once_with_their_reason() {
 #[test]
 fn a_second_client_is_refused_a_silent_connection_blocks_no_client() {
     let serve = Serve::at("localhost:0", "");
-    let _silent: Vec<Client> = (0..3).map(|_| Client::silent(&serve)).collect();
-    let mut late = Client::silent(&serve);
+    let _silent: Vec<Client> = (0..3).map(|_| Client::silent(&serve.address)).collect();
+    let mut late = Client::silent(&serve.address);
     let mut client = Client::new(&serve);
     assert_eq!(client.state(1), OFF);
     let peer = client.stream.local_addr().expect("connected");
     // One connects now; the other one was silent before.
-    let mut second = Client::silent(&serve);
+    let mut second = Client::silent(&serve.address);
     second.say("C\rS8\rO\r");
     late.say("O\r");
     for mut refused in [second, late] {
@@ -269,7 +273,7 @@ fn a_second_client_is_refused_a_silent_connection_blocks_no_client() {
 fn a_listener_hears_host_and_boards_and_disturbs_neither() {
     let serve = Serve::new();
     let mut client = Client::new(&serve);
-    let mut listener = Client::silent(&serve);
+    let mut listener = Client::silent(&serve.address);
     listener.say("C\rS8\rL\r");
     for _ in 0..3 {
         assert_eq!(listener.line().as_deref(), Some(""));
@@ -292,7 +296,7 @@ fn a_listener_hears_host_and_boards_and_disturbs_neither() {
 fn a_ninth_listener_is_refused_and_the_others_go_on() {
     let serve = Serve::new();
     let listen = || {
-        let mut listener = Client::silent(&serve);
+        let mut listener = Client::silent(&serve.address);
         listener.say("L\r");
         listener
     };
@@ -393,6 +397,56 @@ fn refusal(command: &mut Command) -> String {
     let errors = String::from_utf8(output.stderr).expect("text");
     assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{errors}");
     errors
+}
+
+#[test]
+fn a_leg_that_the_contacts_have_enabled_has_no_host_yet() {
+    let serve = Serve::at("127.0.0.1:0", "--enabled-by-contacts");
+    let mut client = Client::new(&serve);
+    client.until(ENABLED);
+    for node in [1, 2] {
+        assert_eq!((client.read(node, 0x6040, 0), client.read(node, 0x603F, 0)), (0, 0), "node {node}");
+    }
+    let before = client.read(2, 0x6064, 0) as i32;
+    thread::sleep(300 * MS);
+    assert!((client.read(2, 0x6064, 0) as i32 - before).abs() < 5000, "the leg does not hold its pose");
+    client.until(ENABLED);
+}
+
+#[test]
+fn an_uncalibrated_board_enables_nothing_and_says_why() {
+    let serve = Serve::at("127.0.0.1:0", "--uncalibrated");
+    let mut client = Client::new(&serve);
+    // Neither calibrated nor with zeros, and the switch is open.
+    assert_eq!(client.read(1, 0x2160, 2) & 0b111, 0);
+    [6, 7, 15].into_iter().for_each(|word| client.write(1, 0x6040, 0, word, 2));
+    serve.waits_for("leg 1: emergency FF0E: a step towards enabled is refused: ");
+    assert_ne!(client.state(1), ENABLED);
+    assert_ne!(client.read(1, 0x60FD, 0) & 1 << 19, 0, "not calibrated");
+}
+
+#[test]
+fn a_wearer_kicks_while_the_leg_assists() {
+    let serve = Serve::at("127.0.0.1:0", "--motion kicking");
+    let mut client = Client::new(&serve);
+    let moved = |client: &mut Client, seconds: f64| {
+        let begin = Instant::now();
+        let [mut low, mut high] = [i32::MAX, i32::MIN];
+        while begin.elapsed().as_secs_f64() < seconds {
+            let position = client.read(2, 0x6064, 0) as i32;
+            (low, high) = (low.min(position), high.max(position));
+        }
+        high - low
+    };
+    client.enable(ENABLED);
+    assert!(moved(&mut client, 0.5) < 50_000, "the wearer moves before the session");
+    client.write(1, 0x2150, 1, 500, 2);
+    client.write(1, 0x2100, 1, 4, 1);
+    let begin = Instant::now();
+    while client.read(1, 0x2100, 2) != 11 {
+        assert!(begin.elapsed() < PATIENCE, "no session: {}", serve.errors());
+    }
+    assert!(moved(&mut client, 4.0) > 200_000, "the wearer does not move the knee");
 }
 
 #[test]

@@ -25,13 +25,34 @@ struct Replay {
     emergencies: usize,
 }
 
-fn replay() -> Replay {
+/// The session as CORC of October 2022 to April 2025 has it: RPDO 1 also carries a placeholder of the outputs
+/// (`entry`), so its frames have more bytes.
+fn with_placeholder(entry: u32) -> impl Iterator<Item = (u64, u16, Vec<u8>)> {
+    let length = usize::from(entry as u8 / 8);
+    recorded().flat_map(move |(time, id, mut data)| {
+        let mut frames = Vec::new();
+        match (id, data.as_mut_slice()) {
+            (0x601..=0x604, [0x2F, 0x00, 0x16, 0, count @ 1, ..]) => {
+                *count = 2;
+                let [a, b, c, d] = entry.to_le_bytes();
+                frames.push((time, id, [0x23, 0x00, 0x16, 2, a, b, c, d].to_vec()));
+                frames.push((time, id - 0x80, [0x60, 0x00, 0x16, 2, 0, 0, 0, 0].to_vec()));
+            }
+            (0x201..=0x204, _) => data.extend([0; 4].iter().take(length)),
+            _ => {}
+        }
+        frames.push((time, id, data));
+        frames
+    })
+}
+
+fn replay(session: impl Iterator<Item = (u64, u16, Vec<u8>)>) -> Replay {
     let mut boards = [Board::started(1), Board::started(3)];
     let mut ours: Vec<Frame> = Vec::new();
     let mut result =
         Replay { boards: [Board::new(1), Board::new(3)], answered: 0, unasked: Vec::new(), emergencies: 0 };
     let begin = recorded().next().expect("a session").0;
-    for (time_us, id, data) in recorded() {
+    for (time_us, id, data) in session {
         for board in &mut boards {
             // The leg ticks at least once between two frames; long pauses are shortened to one tick.
             board.now_us = board.now_us.max(time_us - begin);
@@ -61,7 +82,7 @@ fn replay() -> Replay {
 
 #[test]
 fn every_request_of_the_recorded_session_is_answered_as_recorded() {
-    let Replay { answered, unasked, emergencies, .. } = replay();
+    let Replay { answered, unasked, emergencies, .. } = replay(recorded());
     // 211 answers were recorded. The capture lost the request of one of them (node 1, modes of operation) and
     // both frames of another exchange, so one answer has no request.
     assert_eq!((answered, emergencies), (210, 0));
@@ -69,8 +90,25 @@ fn every_request_of_the_recorded_session_is_answered_as_recorded() {
 }
 
 #[test]
+fn all_four_nodes_are_configured_with_a_placeholder_of_either_length() {
+    for entry in [0x2194_0010, 0x2194_0020, 0x60FE_0110, 0x60FE_0120] {
+        let Replay { mut boards, answered, emergencies, .. } = replay(with_placeholder(entry));
+        // One request more per node, each answered as by a node that accepts it.
+        assert_eq!((answered, emergencies), (214, 0), "{entry:x}");
+        for board in &mut boards {
+            let node = u32::from(board.nodes[0].id().number());
+            for (index, sub, value) in
+                [(0x1600, 0, 2), (0x1600, 2, entry), (0x1400, 1, 0x200 + node), (0x1403, 1, 0x500 + node)]
+            {
+                assert_eq!(board.read(index, sub), Ok(value), "{entry:x} {index:x}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_recorded_session_configures_pdos_while_operational() {
-    let Replay { mut boards, .. } = replay();
+    let Replay { mut boards, .. } = replay(recorded());
     for board in &mut boards {
         let node = u32::from(board.nodes[0].id().number());
         assert_eq!(board.nodes[0].state(), NmtState::Operational);
@@ -102,7 +140,7 @@ fn the_recorded_session_configures_pdos_while_operational() {
 
 #[test]
 fn the_recorded_session_enables_one_joint_and_the_leg_waits_for_both() {
-    let Replay { mut boards, .. } = replay();
+    let Replay { mut boards, .. } = replay(recorded());
     for board in &mut boards {
         // Shutdown (6) before enabling is recorded for nodes 1 and 3 only.
         let words = board.axes.map(|axis| axis.statusword());

@@ -70,25 +70,28 @@ fn objects_of_another_maker_are_accepted() {
     assert_eq!(board.write(0x2120, 0, 50_000, 4), Ok(()));
     assert_eq!(board.read(0x2120, 0), Ok(13));
     assert_eq!(board.write(0x2121, 0, 13, 1), Err(0x0601_0002));
-    // Mapped with the controlword by versions of 2022 to 2025.
-    let (set, off) = (0x1400, 0x8000_0201);
-    for (index, sub, value, size) in [
-        (set, 1, off, 4),
-        (0x1600, 0, 0, 1),
-        (0x1600, 1, 0x6040_0010, 4),
-        (0x1600, 2, 0x2194_0020, 4),
-        (0x1600, 0, 2, 1),
-        (set, 1, 0x201, 4),
-    ] {
-        assert_eq!(board.write(index, sub, value, size), Ok(()), "{index:x} {sub}");
+    // Mapped with the controlword by versions of 2022 to 2025, with either length.
+    for (entry, value) in
+        [(0x2194_0020, 0xDDCC_BBAA), (0x2194_0010, 0xBBAA), (0x60FE_0120, 0xDDCC_BBAA), (0x60FE_0110, 0xBBAA)]
+    {
+        let mut board = Board::started(1);
+        let (set, off) = (0x1400, 0x8000_0201);
+        for (index, sub, value, size) in [
+            (set, 1, off, 4),
+            (0x1600, 0, 0, 1),
+            (0x1600, 1, 0x6040_0010, 4),
+            (0x1600, 2, entry, 4),
+            (0x1600, 0, 2, 1),
+            (set, 1, 0x201, 4),
+        ] {
+            assert_eq!(board.write(index, sub, value, size), Ok(()), "{index:x} {sub} {entry:x}");
+        }
+        board.run(1);
+        board.receive(0, &[1, 0]);
+        board.receive(0x201, &[6, 0, 0xAA, 0xBB, 0xCC, 0xDD]);
+        let outputs = [(0x2194, 0), (0x60FE, 1)].map(|(index, sub)| board.read(index, sub));
+        assert_eq!((board.read(0x6040, 0), outputs), (Ok(6), [Ok(value); 2]), "{entry:x}");
     }
-    board.run(1);
-    board.receive(0, &[1, 0]);
-    board.receive(0x201, &[6, 0, 0xAA, 0, 0, 0]);
-    assert_eq!(
-        (board.read(0x6040, 0), board.read(0x2194, 0), board.read(0x60FE, 1)),
-        (Ok(6), Ok(0xAA), Ok(0xAA))
-    );
 }
 
 #[test]

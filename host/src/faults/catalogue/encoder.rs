@@ -105,10 +105,10 @@ mod tests {
     use scarab::safety::DriveState;
 
     use super::*;
-    use crate::faults::operator::begin;
     use crate::faults::run::{Manner, Outcome, run};
     use crate::formats::leg_file::{DEFAULT_LEG, LegFile};
     use crate::rig::faulty_board::Rig;
+    use crate::rig::operator::begin;
     use crate::rig::options::{DriveModel, SimulationOptions};
     use crate::rig::pair::Context;
     use scarab::model::planar::BASE;

@@ -243,17 +243,9 @@ mod tests {
 
     impl Bench {
         fn new() -> Self {
-            let options = ServeOptions {
-                address: ([127, 0, 0, 1], 0).into(),
-                legs: 1,
-                are_new: false,
-                speed: 1.0,
-                flash: None,
-                seed: 1,
-                bits_per_s: 1_000_000,
-            };
+            let options = ServeOptions::local(1);
             let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-            let network = network(&leg, &options, None).expect("the default leg");
+            let network = network(&leg, &options, None, &[]).expect("the default leg");
             let adapter = Adapter::new(1_000_000, 1.0);
             let mut bench = Self { network, adapter, now: Instant::now(), sent: Vec::new() };
             bench.adapter.opened();

@@ -11,7 +11,8 @@
 //! level runs, and the controller holds three received frames.
 //!
 //! The operator's enabling switch is a contact, with or without a bus. A simulated operator holds it from the
-//! start. The enable request of closing it has ended before the boot-up messages.
+//! start. The enable request of closing it has ended before the boot-up messages. [`Board::forget`] and
+//! [`Board::enable_by_contacts`] give other beginnings.
 
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use scarab::board::odrive_v3_6::settings::drives;
@@ -31,6 +32,7 @@ use crate::formats::leg_file::{EncoderFile, LegFile};
 use crate::rig::bus::storing::Flashing;
 use crate::rig::bus::wire::Mailbox;
 use crate::rig::faulty_board::Rig;
+use crate::rig::operator;
 use crate::rig::pair::Context;
 
 /// Length of a servo tick, ns.
@@ -147,6 +149,17 @@ impl<const N: usize, const B: usize> Board<N, B> {
         self.device = device(&self.context, &self.encoders, self.label);
         self.flashing = Flashing::new();
         self.recall();
+    }
+
+    /// Begins as a board that knows neither calibration nor zeros; the operator's contacts are open.
+    pub fn forget(&mut self) {
+        self.rig.hand = Contacts::default();
+        self.power_on();
+    }
+
+    /// Lets the operator's contacts enable the leg; returns whether they do.
+    pub fn enable_by_contacts(&mut self) -> bool {
+        operator::enable(&mut self.rig)
     }
 
     /// Recalls the content of the flash. Invalid or foreign records are skipped and reported to hosts;

@@ -231,17 +231,9 @@ mod tests {
 
     #[test]
     fn the_measured_legs_have_their_drives_on() {
-        let options = ServeOptions {
-            address: ([127, 0, 0, 1], 0).into(),
-            legs: 2,
-            are_new: false,
-            speed: 1.0,
-            flash: None,
-            seed: 1,
-            bits_per_s: 1_000_000,
-        };
+        let options = ServeOptions::local(2);
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let network = network::<2, 13>(&leg, &options, None).expect("the default leg");
+        let network = network::<2, 13>(&leg, &options, None, &[]).expect("the default leg");
         let mut measured = enabled(&network);
         for board in measured.boards() {
             assert_eq!(board.rig.state().permission(), Permission::Follow);

@@ -12,6 +12,7 @@ use crate::base::error::{FileError, ToolError};
 use crate::base::files;
 use crate::formats::kept_file::memory::{BYTES, Memory};
 use crate::formats::leg_file::LegFile;
+use crate::leg::exercise::Exercise;
 use crate::rig::bus::adapter::{Adapter, Dropped, MOST_AGE};
 use crate::rig::bus::alarms::Alarms;
 use crate::rig::bus::board::{Board, Label};
@@ -20,6 +21,7 @@ use crate::rig::bus::pace::{Pace, judge, reachable};
 use crate::rig::bus::server::{Event, Server, What};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::Context;
+use crate::rig::worn::Worn;
 
 /// Ticks between two polls of the port: 1 ms.
 const TICKS_PER_LOOK: u64 = 4;
@@ -27,6 +29,18 @@ const TICKS_PER_LOOK: u64 = 4;
 const MOST_STORING: u64 = 20_000;
 /// Sleep if no tick is due.
 const NAP: Duration = Duration::from_micros(200);
+
+/// State of the boards before a host comes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Beginning {
+    /// Calibrated, with zeros; the drive is off, and the operator holds the enabling switch.
+    #[default]
+    Ready,
+    /// Neither calibrated nor with zeros; the contacts are open.
+    Uncalibrated,
+    /// Ready, and enabled by the operator's contacts.
+    EnabledByContacts,
+}
 
 /// Options of the command.
 #[derive(Clone, Debug)]
@@ -45,14 +59,47 @@ pub struct ServeOptions {
     pub seed: u64,
     /// Bit rate of the bus.
     pub bits_per_s: u64,
+    /// State of the boards before a host comes.
+    pub beginning: Beginning,
+    /// Motion of each leg's wearer during assistance; `None` for legs without a wearer of their own.
+    pub wearer: Option<Exercise>,
 }
 
-/// Creates the bus with the legs, boards started.
+impl ServeOptions {
+    /// Legs in real time at a free port of this machine.
+    #[must_use]
+    pub fn local(legs: usize) -> Self {
+        Self {
+            address: ([127, 0, 0, 1], 0).into(),
+            legs,
+            are_new: false,
+            speed: 1.0,
+            flash: None,
+            seed: 1,
+            bits_per_s: 1_000_000,
+            beginning: Beginning::Ready,
+            wearer: None,
+        }
+    }
+}
+
+/// Creates the wearer of each leg, if any.
+pub fn wearers<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &ServeOptions,
+) -> Result<Vec<Worn<N>>, ToolError> {
+    let worn = |place| Some(Worn::new::<B>(leg, options.wearer?, options.seed + place as u64));
+    (0..options.legs).filter_map(worn).collect()
+}
+
+/// Creates the bus with the legs, boards started. Each leg is on its wearer, if there are any.
 pub fn network<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ServeOptions,
     flash: Option<&[u8]>,
+    wearers: &[Worn<N>],
 ) -> Result<Network<N, B>, ToolError> {
+    let leg = wearers.first().map_or(leg, |worn| &worn.exoskeleton);
     let simulation =
         SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(options.seed) };
     let context = Context::<N, B>::new(leg, &simulation)?;
@@ -61,7 +108,17 @@ pub fn network<const N: usize, const B: usize>(
         let memory = Memory::new(flash.and_then(|bytes| bytes.get(place * BYTES..(place + 1) * BYTES)));
         let first = if options.are_new { 1 } else { 1 + place * N };
         let label = Label { first: first as u8, serial: 1 + place as u32 };
-        boards.push(Board::new(leg, context.clone(), options.seed + place as u64, label, memory)?);
+        let mut board = Board::new(leg, context.clone(), options.seed + place as u64, label, memory)?;
+        if options.beginning == Beginning::Uncalibrated {
+            board.forget();
+        }
+        if let Some(worn) = wearers.get(place) {
+            worn.dress(&mut board.rig)?;
+        }
+        if options.beginning == Beginning::EnabledByContacts && !board.enable_by_contacts() {
+            return Err(leg.error("the operator's contacts do not enable it").into());
+        }
+        boards.push(board);
     }
     Ok(Network::new(boards, options.bits_per_s))
 }
@@ -69,7 +126,8 @@ pub fn network<const N: usize, const B: usize>(
 /// Serves until a termination signal.
 pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptions) -> Result<(), ToolError> {
     let flash = options.flash.as_deref().map(|path| read(path, options.legs)).transpose()?.flatten();
-    let mut network = network::<N, B>(leg, options, flash.as_deref())?;
+    let mut wearers = wearers::<N, B>(leg, options)?;
+    let mut network = network::<N, B>(leg, options, flash.as_deref(), &wearers)?;
     // Written before any client connects, so that a file error appears before a host stores anything.
     write(options.flash.as_deref(), &mut network)?;
     if let Some(warning) =
@@ -101,6 +159,9 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
         report(&events, &mut adapter, network.now_ns());
         let due = pace.due(now, network.now_ns()).min(TICKS_PER_LOOK);
         let mut sent_by_boards = Vec::new();
+        for (board, worn) in network.boards().iter_mut().zip(&mut wearers) {
+            worn.accompany(&mut board.rig)?;
+        }
         for _ in 0..due {
             adapter.tick(&mut network, Instant::now(), |sent| {
                 server.show(&sent.frame);

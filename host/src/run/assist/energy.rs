@@ -20,16 +20,17 @@ use scarab::ident::Estimate;
 use scarab::leg::{AssistShares, IdentifiedModel};
 
 use super::draws;
-use super::motions::{Exercise, hip_and_knee};
-use super::subject::{Models, Subject, certain};
+use super::subject::{Models, Subject};
 use super::trial::{Drives, GivenEnergy, LimbAlone, Stage};
 use crate::base::error::ToolError;
 use crate::base::number::Number;
 use crate::base::random::Random;
 use crate::base::stats::rms;
+use crate::leg::exercise::{Exercise, hip_and_knee};
 use crate::report::assist::EnergyReport;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::Context;
+use crate::rig::worn::certain;
 
 /// Largest payload at the shank, kg.
 const LARGEST_PAYLOAD_KG: f64 = 2.0;

@@ -4,7 +4,6 @@
 //! | --- | --- |
 //! | [`draws`] | random wearers and exoskeletons |
 //! | [`mod@energy`] | energy given to limp and resisting wearers; legs at rest |
-//! | [`motions`] | motions of the wearer within ranges and speed limits |
 //! | [`subject`] | leg, wearer, and the models identified of both |
 //! | [`trial`] | one run of leg and wearer |
 //! | [`study`] | every mode, motion and comparison over all seeds |
@@ -13,7 +12,6 @@
 
 pub mod draws;
 pub mod energy;
-pub mod motions;
 pub mod periodic;
 pub mod stability;
 pub mod study;

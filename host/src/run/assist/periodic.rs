@@ -19,11 +19,11 @@ use hal_sim::wearer::muscles::Intention;
 use hal_sim::world::TICK_S;
 use scarab::leg::AssistShares;
 
-use super::motions::{Exercise, hip_and_knee};
 use super::subject::Subject;
 use super::trial::{Drives, GivenEnergy, LimbAlone, Stage};
 use crate::base::error::ToolError;
 use crate::base::stats::rms;
+use crate::leg::exercise::{Exercise, hip_and_knee};
 use crate::report::assist::PeriodicReport;
 
 /// Time of the change of cadence, its size and duration.

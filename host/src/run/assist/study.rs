@@ -6,7 +6,6 @@ use scarab::assist::energy::BUDGET_J;
 use scarab::leg::AssistShares;
 
 use super::energy::{energy, limit_cycles};
-use super::motions::{Exercise, hip_and_knee};
 use super::periodic::periodic;
 use super::stability::limits;
 use super::subject::{Cuffs, Models, Subject};
@@ -15,6 +14,7 @@ use crate::base::error::ToolError;
 use crate::base::number::Number;
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::assist::AssistFile;
+use crate::leg::exercise::{Exercise, hip_and_knee};
 use crate::leg::setup::base_rank;
 use crate::leg::two_bodies::{MuscleTone, TwoBodies};
 use crate::report::SCHEMA;

@@ -5,8 +5,7 @@
 
 use hal_sim::wearer::description::WearerDescription;
 use scarab::ident::{Estimate, prior_parameters};
-use scarab::leg::{Assured, IdentifiedModel, Wearing};
-use scarab::model::{LegParameters, Parameter};
+use scarab::leg::{IdentifiedModel, Wearing};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
@@ -14,6 +13,7 @@ use crate::leg::two_bodies::{MuscleTone, TwoBodies};
 use crate::report::assist::RefusedReport;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
+use crate::rig::worn::{certain, single};
 use crate::run::identified::identify;
 
 /// Models of one body.
@@ -145,20 +145,4 @@ fn models<const B: usize>(
         prior: background.prior.as_ref().map(|prior| certain(context, &prior_parameters(prior))),
         true_values,
     }))
-}
-
-fn single(parameters: &LegParameters<f64, 2>) -> LegParameters<f32, 2> {
-    parameters.map(|joint| joint.map(|value| value as f32))
-}
-
-/// Model of known parameters, which may be compensated wholly.
-pub fn certain<const B: usize>(
-    context: &Context<2, B>,
-    parameters: &LegParameters<f64, 2>,
-) -> IdentifiedModel<2> {
-    let parameters = single(parameters);
-    let model = &context.configuration.model;
-    let of = |parameter: Parameter| parameters.map(|joint| joint[parameter.index()]);
-    let assured = Assured { coulomb_nm: of(Parameter::FC), viscous: of(Parameter::FV), inertia_share: 1.0 };
-    IdentifiedModel::new(model, &model.base.project(&parameters)).with_assured(assured)
 }

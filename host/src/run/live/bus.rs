@@ -14,7 +14,7 @@ pub mod node;
 pub mod words;
 
 use std::collections::BTreeSet;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufReader, Read};
 use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
@@ -24,10 +24,11 @@ use scarab::bus::Frame;
 use scarab::servo::SERVO_RATE_HZ;
 
 use crate::base::error::ToolError;
+use crate::base::output::printable;
 use crate::formats::candump;
 use crate::formats::leg_file::LegFile;
 use crate::formats::model_file::ModelFile;
-use crate::formats::slcan;
+use crate::formats::slcan::{self, LONGEST_LINE, next_line};
 use crate::report::live::{LegScene, LiveNote, LiveUpdate, Severity};
 use crate::rig::bus::wire::bits;
 use crate::run::live::bus::leg::Leg;
@@ -36,8 +37,6 @@ use crate::run::live::picture::scene;
 
 /// Frames between reader and picture.
 const MOST_WAITING: usize = 1024;
-/// Longest line; longer ones are no frames.
-const LONGEST_LINE: usize = 256;
 /// An slcan adapter refuses a command.
 const BELL: u8 = slcan::BELL[0];
 /// Time stamps may go back by this without a gap, and forward, s.
@@ -59,6 +58,16 @@ pub enum Lines {
     Slcan,
     /// Lines of `candump`, with their own times.
     Candump,
+}
+
+impl Lines {
+    /// Bytes that end a line.
+    const fn ends(self) -> &'static [u8] {
+        match self {
+            Self::Slcan => b"\r\x07",
+            Self::Candump => b"\n",
+        }
+    }
 }
 
 /// Frames of a bus, and its nodes.
@@ -86,40 +95,12 @@ enum Received {
     Bad(String),
 }
 
-/// Reads the next line without its end; `None` at the end of the input. The rest of a line that is too long
-/// is dropped.
-fn next_line(input: &mut impl BufRead, lines: Lines) -> std::io::Result<Option<Vec<u8>>> {
-    let is_end = |byte: &u8| match lines {
-        Lines::Slcan => matches!(*byte, b'\r' | BELL),
-        Lines::Candump => *byte == b'\n',
-    };
-    let mut line = Vec::new();
-    loop {
-        let bytes = match input.fill_buf() {
-            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
-            bytes => bytes?,
-        };
-        if bytes.is_empty() {
-            return Ok(Some(line).filter(|line| !line.is_empty()));
-        }
-        let end = bytes.iter().position(is_end);
-        // A bell is a line of its own.
-        let part = &bytes[..end.map_or(bytes.len(), |end| end + usize::from(bytes[end] == BELL))];
-        line.extend(part.iter().take(LONGEST_LINE - line.len()));
-        let used = end.map_or(bytes.len(), |end| end + 1);
-        input.consume(used);
-        if end.is_some() {
-            return Ok(Some(line));
-        }
-    }
-}
-
 /// Reads the lines to their end, with times in seconds; returns the reason of the end.
 fn read(input: Box<dyn Read + Send>, lines: Lines, received: &SyncSender<Received>) -> String {
     let begin = Instant::now();
     let mut input = BufReader::new(input);
     for number in 1_u64.. {
-        let line = match next_line(&mut input, lines) {
+        let line = match next_line(&mut input, lines.ends()) {
             Ok(Some(line)) => line,
             Ok(None) => break,
             Err(error) => return format!("it cannot be read any further ({error})"),
@@ -132,7 +113,9 @@ fn read(input: Box<dyn Read + Send>, lines: Lines, received: &SyncSender<Receive
             (Lines::Slcan, text) => {
                 slcan::decode(&text).map(|frame| Some((begin.elapsed().as_secs_f64(), frame?)))
             }
-            (Lines::Candump, text) => candump::parse(&text).map_err(|why| format!("line {number}: {why}")),
+            (Lines::Candump, text) => {
+                candump::parse(&text).map_err(|why| format!("line {number}: {}", printable(&why)))
+            }
         };
         let report = match parsed {
             Ok(None) => continue,
@@ -318,7 +301,7 @@ mod tests {
 
     fn split(text: &[u8], lines: Lines) -> Vec<Vec<u8>> {
         let mut input = BufReader::with_capacity(7, text);
-        core::iter::from_fn(|| next_line(&mut input, lines).expect("memory can be read")).collect()
+        core::iter::from_fn(|| next_line(&mut input, lines.ends()).expect("memory can be read")).collect()
     }
 
     #[test]

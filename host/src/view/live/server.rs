@@ -1,14 +1,15 @@
 //! HTTP server of the live page, on one thread.
 //!
-//! Limits: pages, connections, time for a request, time without reading. Memory is bounded: buffers of a
-//! connection have a limit, and messages come from the hub's ring.
+//! Limits: pages, connections, time for a request, time without reading. Beyond the limit of connections the
+//! oldest without a complete request is closed, so connections that never ask keep no page out. Memory is
+//! bounded: buffers of a connection have a limit, and messages come from the hub's ring.
 
 use core::convert::Infallible;
 use core::pin::Pin;
 use core::task::{Context, Poll, ready};
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
@@ -19,6 +20,7 @@ use hyper::{Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use socket2::SockRef;
 use tokio::net::{TcpListener, TcpStream};
+use tokio::task::JoinHandle;
 use tokio::time::{Interval, MissedTickBehavior, interval, sleep, timeout};
 
 use crate::base::error::ToolError;
@@ -28,7 +30,7 @@ use crate::view::live::request::{Access, Answer, POLICY, check_token};
 /// Pages that can be open at once.
 pub const MOST_PAGES: usize = 16;
 /// Connections at once, pages included.
-const MOST_CONNECTIONS: usize = 64;
+pub const MOST_CONNECTIONS: usize = 64;
 /// Time for the head of a request, and for an answer other than the stream.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
 /// A page that reads nothing for this time is disconnected.
@@ -67,12 +69,18 @@ struct Shared {
     begin: Instant,
 }
 
-/// Counted place of a page or connection; freed when dropped.
+/// Connection that is served, and whether its request is complete.
+struct Guest {
+    task: JoinHandle<()>,
+    has_asked: Arc<AtomicBool>,
+}
+
+/// Counted place of a page; freed when dropped.
 struct Place(Arc<AtomicUsize>);
 
 impl Place {
-    fn take(count: &Arc<AtomicUsize>, most: usize) -> Option<Self> {
-        let add = |taken: usize| (taken < most).then_some(taken + 1);
+    fn take(count: &Arc<AtomicUsize>) -> Option<Self> {
+        let add = |taken: usize| (taken < MOST_PAGES).then_some(taken + 1);
         count.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add).ok()?;
         Some(Self(Arc::clone(count)))
     }
@@ -130,29 +138,36 @@ impl Server {
             let listener = TcpListener::from_std(self.listener).map_err(failed)?;
             let pages = Arc::new(AtomicUsize::new(0));
             let shared = Arc::new(Shared { hub, access: self.access, pages, begin: Instant::now() });
-            let connections = Arc::new(AtomicUsize::new(0));
+            let mut guests: Vec<Guest> = Vec::new();
             loop {
                 let Ok((stream, _)) = listener.accept().await else {
                     sleep(PAUSE).await;
                     continue;
                 };
-                // Beyond the limit the connection is closed at once.
-                if let Some(place) = Place::take(&connections, MOST_CONNECTIONS) {
-                    tokio::spawn(connection(stream, Arc::clone(&shared), place));
+                guests.retain(|guest| !guest.task.is_finished());
+                if guests.len() >= MOST_CONNECTIONS {
+                    let idle = guests.iter().position(|guest| !guest.has_asked.load(Ordering::Relaxed));
+                    // If all have asked, the new connection is closed.
+                    let Some(oldest) = idle else { continue };
+                    guests.remove(oldest).task.abort();
                 }
+                let has_asked = Arc::new(AtomicBool::new(false));
+                let task = tokio::spawn(connection(stream, Arc::clone(&shared), Arc::clone(&has_asked)));
+                guests.push(Guest { task, has_asked });
             }
         })
     }
 }
 
 /// Serves one request. A connection that stops reading ends.
-async fn connection(stream: TcpStream, shared: Arc<Shared>, _place: Place) {
+async fn connection(stream: TcpStream, shared: Arc<Shared>, has_asked: Arc<AtomicBool>) {
     let _ = stream.set_nodelay(true);
     let _ = SockRef::from(&stream).set_send_buffer_size(BUFFER);
     let begin = shared.begin;
     let polled = Arc::new(AtomicU64::new(0));
     let seen = Arc::clone(&polled);
     let service = service_fn(move |request: Request<Incoming>| {
+        has_asked.store(true, Ordering::Relaxed);
         let answer = respond(&shared, &request, &polled);
         core::future::ready(Ok::<_, Infallible>(answer))
     });
@@ -179,7 +194,7 @@ fn respond(shared: &Shared, request: &Request<Incoming>, polled: &Arc<AtomicU64>
         Answer::File(kind, text) => response(StatusCode::OK, kind, Content::Text(Some(text))),
         Answer::Refused(status, why) => refusal(status, why),
         Answer::Events(cursor) => {
-            let Some(place) = Place::take(&shared.pages, MOST_PAGES) else {
+            let Some(place) = Place::take(&shared.pages) else {
                 return refusal(
                     StatusCode::SERVICE_UNAVAILABLE,
                     "all 16 places for pages are taken: close another page, this one will try again",

@@ -50,6 +50,15 @@ impl JointState {
         self.place == STATES.len() - 1
     }
 
+    /// Whether the motors may be energised.
+    #[must_use]
+    pub fn is_on(self) -> bool {
+        matches!(
+            self.name(),
+            "fault reaction active" | "quick stop active" | "switched on" | "operation enabled"
+        )
+    }
+
     /// Whether the state is that of a fault.
     #[must_use]
     pub fn has_fault(self) -> bool {
@@ -130,6 +139,7 @@ mod tests {
         assert_eq!(JointState::of(0x0F | 0x40), None);
         let [off, on] = [0x0250, 0x0237].map(|word| JointState::of(word).expect("a state"));
         assert!(off < on && on.is_enabled() && !off.is_enabled());
+        assert!(on.is_on() && !off.is_on());
     }
 
     #[test]

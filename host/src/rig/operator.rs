@@ -1,8 +1,7 @@
-//! The operator who starts an identification, or what else the leg is configured for, by the contacts.
+//! The operator of a simulated leg, who acts by the contacts.
 
 use scarab::hal::Contacts;
 use scarab::leg::Activity;
-use scarab::model::planar::{BASE, JOINTS};
 use scarab::safety::DriveState;
 
 use crate::base::error::ToolError;
@@ -13,9 +12,9 @@ use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 const OPEN: u64 = PERIODS_PER_S / 5;
 const ENABLED: u64 = PERIODS_PER_S;
 
-/// Starts an identification or a session of assistance as an operator does: contacts open, the switch held
-/// until the drive is enabled, the button.
-pub fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError> {
+/// Opens both contacts, then holds the enabling switch until the drive is enabled; returns whether it is.
+pub fn enable<const N: usize, const B: usize>(rig: &mut Rig<N, B>) -> bool {
+    rig.hand = Contacts::default();
     for _ in 0..OPEN {
         rig.advance();
     }
@@ -23,9 +22,16 @@ pub fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError
     for _ in 0..ENABLED {
         rig.advance();
         if rig.state() == DriveState::OperationEnabled {
-            break;
+            return true;
         }
     }
+    false
+}
+
+/// Starts an identification, or what else the leg is configured for, as an operator does: enables the drive,
+/// then presses the button.
+pub fn begin<const N: usize, const B: usize>(leg: &LegFile, rig: &mut Rig<N, B>) -> Result<(), ToolError> {
+    enable(rig);
     rig.hand = Contacts { enabling: true, start: true };
     for _ in 0..ENABLED {
         rig.advance();
