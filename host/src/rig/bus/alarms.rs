@@ -30,6 +30,7 @@ pub fn reason(bit: u8) -> &'static str {
         bit if bit == Reason::NoTransition as u8 => {
             "no such step from this state; send controlword 6 first, without bit 7"
         }
+        bit if bit == Reason::NoAssistance as u8 => "assistance: no fitting model, or the joints move",
         _ => "unknown reason",
     }
 }
