@@ -139,9 +139,9 @@ impl<const N: usize> Control<N> {
         })
     }
 
-    /// Runs instead of a tick while the joints have no valid readings ([`Servo::rest`]).
-    pub fn rest(&mut self, resets: bool) -> Option<Fault> {
-        self.servo.rest(resets)
+    /// Runs instead of a tick while the joints have no valid readings ([`Servo::stand_by`]).
+    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
+        self.servo.stand_by(resets)
     }
 
     /// Resets to the state after the start: drive off, nothing measured, no activity. For joints that have

@@ -218,7 +218,7 @@ impl<const N: usize> ServoLevel<N> {
             resets |= host.rest(control.state(), ends, signals, hardware);
         }
         self.pass_faults(control, signals);
-        let fault = control.rest(resets && may_reset(signals.inhibit.causes()));
+        let fault = control.stand_by(resets && may_reset(signals.inhibit.causes()));
         let state = control.state();
         // Before its first tick a drive is not ready.
         self.state = self.state.or(Some(DriveState::NotReadyToSwitchOn));

@@ -206,7 +206,7 @@ impl<const N: usize> Monitor<N> {
 
     /// Runs instead of [`Self::decide`] while the joints have no valid readings; `resets` requests the reset
     /// of a fault. Returns a new fault.
-    pub fn rest(&mut self, resets: bool) -> Option<Fault> {
+    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
         let fault = self.reported.take();
         self.state = match (fault, self.state.at_rest()) {
             (Some(fault), state) => state.after(Event::Failed(fault), 0),

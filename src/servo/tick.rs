@@ -145,9 +145,9 @@ impl<const N: usize> Servo<N> {
         })
     }
 
-    /// Runs instead of a tick while the joints have no valid readings ([`Monitor::rest`]).
-    pub fn rest(&mut self, resets: bool) -> Option<Fault> {
-        self.monitor.rest(resets)
+    /// Runs instead of a tick while the joints have no valid readings ([`Monitor::stand_by`]).
+    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
+        self.monitor.stand_by(resets)
     }
 
     /// Resets to drive off without readings: for joints whose counts get another meaning. A fault stays.

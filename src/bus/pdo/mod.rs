@@ -129,6 +129,8 @@ impl Parameters {
         match sub {
             1 => return self.set_identifier(value),
             2 if matches!(value, 0..=240 | 254 | 255) => self.kind = value as u8,
+            // Hosts that write the whole configuration write it unchanged.
+            3 if value == u32::from(self.inhibit) => {}
             3 if self.direction == Mapping::Transmit && self.identifier().is_some() => {
                 return Err(Abort::Access);
             }

@@ -50,6 +50,7 @@ fn words(code: u16, information: [u8; 5]) -> String {
         }
         (_, Some(NoticeCode::Overrun)) => "received frames were lost".into(),
         (_, Some(NoticeCode::ShortPdo)) => "a received PDO is shorter than its mapping".into(),
+        (_, Some(NoticeCode::SyncLength)) => "a SYNC has no counter, which 1019 expects".into(),
         (_, Some(NoticeCode::StoreFailed)) => "objects could not be stored or read back".into(),
         (_, Some(NoticeCode::Storing)) => "sends nothing while it writes its flash".into(),
         (None, None) => "unknown code".into(),
