@@ -14,7 +14,7 @@ use scarab::task;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    task::run(start::start())
+    task::run(start::start(task::leg::LEG.joints.map(|joint| joint.motor.absolute)))
 }
 
 #[panic_handler]

@@ -738,6 +738,12 @@ impl Chip {
             self.findings.add("frame sent while the pins are not connected", "SPI3_DR");
             return self.spi.answer(u16::MAX);
         }
+        let lines = (0..JOINTS).flat_map(|axis| [(axis, 0), (axis, 1)]);
+        let encoders = lines.filter(|(axis, line)| self.plant.encoder_at(*axis, *line).is_some());
+        let mut selects = encoders.map(|(axis, line)| ENCODER_SELECTS[axis][line]).chain(SELECTS);
+        if selects.any(|pin| self.gpio.is_floating(pin)) {
+            self.findings.add("frame sent while a device's select line floats", "SPI3_DR");
+        }
         let selected = self.selected();
         let encoder = self.selected_encoder().filter(|_| selected == [false; 2]);
         let angle = encoder.and_then(|(axis, line)| self.plant.encoder_steps(axis, line, self.now));

@@ -1,5 +1,7 @@
 //! Communication objects 1000 to 1FFF, which the node holds itself.
 
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+
 use super::abort::Abort;
 use super::dictionary::{Mapping, Object};
 use super::emergency::{Emergency, Source};
@@ -44,6 +46,14 @@ impl Identity {
             checksum: 0,
             texts: ["Scarab joint drive", hardware, env!("CARGO_PKG_VERSION")],
         }
+    }
+
+    /// Serial number of a board by its processor's 96-bit number: a CRC, so that boards of one wafer differ.
+    #[must_use]
+    pub const fn serial(unique: [u32; 3]) -> u32 {
+        let [[a, b, c, d], [e, f, g, h], [i, j, k, l]] =
+            [unique[0].to_le_bytes(), unique[1].to_le_bytes(), unique[2].to_le_bytes()];
+        Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC).checksum(&[a, b, c, d, e, f, g, h, i, j, k, l])
     }
 
     /// Identity of a joint's node. The nodes of a board differ in the product code only.
@@ -160,7 +170,10 @@ impl Communication {
                 self.emergency.set(Source::Heartbeat(place), None);
             }
             (0x1017, _) => (self.heartbeat_ms, self.heartbeat) = (value as u16, Clock::NEW),
-            (0x1019, _) if matches!(value, 0 | 2..=240) => self.sync_overflow = value as u8,
+            (0x1019, _) if matches!(value, 0 | 2..=240) => {
+                self.sync_overflow = value as u8;
+                self.emergency.set(Source::Sync, None);
+            }
             (0x1029, _) if value <= 2 => self.on_error = value as u8,
             (0x1005 | 0x1014 | 0x1019 | 0x1029, _) => return Err(Abort::Range),
             (0x1400..=0x14FF | 0x1800..=0x18FF, 1) if self.is_message(object, value) => {
@@ -236,5 +249,24 @@ impl Communication {
 
     fn transmitted(&self, pdo: usize) -> Result<&Parameters, Abort> {
         self.transmit.get(pdo).map(|transmit| &transmit.parameters).ok_or(Abort::NoObject)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+
+    #[test]
+    fn neighbouring_processors_have_different_serial_numbers() {
+        // Check value of this CRC, in its first nine bytes.
+        assert_eq!(Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC).checksum(b"123456789"), 0xCBF4_3926);
+        // Same lot, other coordinates on the wafer: the words' XOR would be the same for many.
+        let unique = |x: u32, y: u32| Identity::serial([x | y << 16, 0x3533_510E ^ x, 0x3233_3836 ^ y << 16]);
+        let mut seen = std::collections::BTreeSet::new();
+        for x in 0..64 {
+            assert!((0..64).all(|y| seen.insert(unique(x, y))), "{x}");
+        }
     }
 }

@@ -21,7 +21,8 @@
 //!
 //! **Refusals.** A refused step towards enabled is an error of both nodes (FF0E, with joint, reason and
 //! inhibit reasons). The error begins with the first request and ends when the reason is gone or the leg is
-//! enabled. It is reported once, however often the host asks. The leg's side writes the record.
+//! enabled. It is reported once, however often the host asks, and a next one a second after it at the
+//! earliest. The leg's side writes the record. A refused session of assistance is reported in the same way.
 //!
 //! Cost per tick: two polls of a node and one copy of the leg's values. Measured: docs/results/bus.md.
 
@@ -45,6 +46,8 @@ mod storage;
 
 /// Gap between two calls, us, beyond which the board cannot have received frames.
 const STOOD_US: u64 = 2_000;
+/// Least time between the begins of two reported refusals.
+const REFUSAL_US: u64 = 1_000_000;
 
 /// State of the leg after one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -166,6 +169,9 @@ pub struct Device<const N: usize, const LOG: usize> {
     refused: bool,
     /// Last refusal, while its reason lasts.
     refusal: Option<Refusal>,
+    /// Error report of that refusal, and the time from which it may begin.
+    report: Option<ErrorReport>,
+    report_us: u64,
     /// Refusal to be recorded by the leg's side.
     noted: Option<Refusal>,
     request: Option<LegRequest>,
@@ -201,6 +207,8 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             hosted: false,
             refused: false,
             refusal: None,
+            report: None,
+            report_us: 0,
             noted: None,
             request: None,
             controller: Controller::Active,
@@ -382,18 +390,27 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         let own = status.stands_against().filter(|_| requested && self.hosted);
         let own = own.map(|reason| Refusal { joint: Refusal::LEG, reason });
         self.refusal = status.refused.filter(|_| self.hosted).or(own).or(before).or(order);
-        if self.refusal.is_some() && self.refusal == before {
-            return;
+        if self.refusal.is_none() || self.refusal != before {
+            // The leg records its own refusals.
+            let is_own = |refusal: &Refusal| {
+                let is_leg = refusal.joint == Refusal::LEG && refusal.reason != RefusalReason::NoAssistance;
+                is_leg || Some(*refusal) == order
+            };
+            self.noted = self.refusal.filter(is_own).or(self.noted);
+            self.report = self.refusal.map(|refusal| {
+                let [low, middle, high, _] = status.causes.to_le_bytes();
+                let information = [refusal.number(), refusal.reason as u8, low, middle, high];
+                ErrorReport { code: NoticeCode::NotEnabled.number(), information }
+            });
         }
-        // The leg records its own refusals.
-        let is_own = |refusal: &Refusal| refusal.joint == Refusal::LEG || Some(*refusal) == order;
-        self.noted = self.refusal.filter(is_own).or(self.noted);
-        let report = self.refusal.map(|refusal| {
-            let [low, middle, high, _] = status.causes.to_le_bytes();
-            let information = [refusal.number(), refusal.reason as u8, low, middle, high];
-            ErrorReport { code: NoticeCode::NotEnabled.number(), information }
-        });
-        self.axes.iter_mut().for_each(|axis| axis.refused = report);
+        let reported = self.axes.first().and_then(|axis| axis.refused);
+        let is_due = self.report.is_none() || self.looked_us >= self.report_us;
+        if self.report != reported && is_due {
+            if self.report.is_some() {
+                self.report_us = self.looked_us.saturating_add(REFUSAL_US);
+            }
+            self.axes.iter_mut().for_each(|axis| axis.refused = self.report);
+        }
     }
 
     /// Returns the orders for the leg; targets received since [`Self::update`] are included.

@@ -8,8 +8,9 @@
 //! message = error code, 2 bytes | error register, 1 byte | information, 5 bytes          identifier: 1014
 //! ```
 //!
-//! Source: CiA 301, emergency object. Limits: at most four messages wait; further ones enter only the
-//! history.
+//! Source: CiA 301, emergency object. Limits: at most four messages wait. A further change enters the history;
+//! once the four are sent, its source sends its present state, ended errors first. So the last messages of a
+//! burst say what is the case.
 
 use super::abort::Abort;
 use super::pdo::PDOS;
@@ -19,6 +20,8 @@ use crate::leg::NO_ERROR;
 /// Entries of the error history.
 pub const HISTORY: usize = 8;
 const WAITING: usize = 4;
+/// Default of 1015: 10 ms.
+const INHIBIT: u16 = 100;
 
 /// Source of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,9 +38,11 @@ pub enum Source {
     Store,
     /// Silence of a cyclic host.
     Silence,
+    /// Received SYNC.
+    Sync,
 }
 
-const SOURCES: usize = 6 + PDOS;
+const SOURCES: usize = 7 + PDOS;
 
 impl Source {
     const fn place(self) -> usize {
@@ -48,7 +53,8 @@ impl Source {
             Self::Controller => 3,
             Self::Store => 4,
             Self::Silence => 5,
-            Self::Receive(pdo) => 6 + pdo as usize,
+            Self::Sync => 6,
+            Self::Receive(pdo) => 7 + pdo as usize,
         }
     }
 }
@@ -90,6 +96,8 @@ impl ErrorReport {
 pub struct Emergency {
     active: [Option<ErrorReport>; SOURCES],
     waiting: [Option<[u8; 8]>; WAITING],
+    /// Sources whose last change found no space.
+    unsent: [bool; SOURCES],
     history: [u32; HISTORY],
     recorded: u8,
     /// Object 1014.
@@ -106,10 +114,11 @@ impl Emergency {
         Self {
             active: [None; SOURCES],
             waiting: [None; WAITING],
+            unsent: [false; SOURCES],
             history: [0; HISTORY],
             recorded: 0,
             identifier,
-            inhibit: 0,
+            inhibit: INHIBIT,
             next_us: 0,
         }
     }
@@ -121,19 +130,41 @@ impl Emergency {
             return;
         }
         *place = error;
-        let register = self.register();
-        let ErrorReport { code, information } = error.unwrap_or(ErrorReport::code(NO_ERROR));
-        let [low, high] = code.to_le_bytes();
-        let [a, b, c, d, e] = information;
-        if let Some(free) = self.waiting.iter_mut().find(|message| message.is_none()) {
-            *free = Some([low, high, register, a, b, c, d, e]);
+        let message = self.message(error);
+        // Behind one that waits for space, later changes wait as well.
+        let is_full = self.unsent.contains(&true);
+        match self.waiting.iter_mut().find(|message| message.is_none()).filter(|_| !is_full) {
+            Some(free) => *free = Some(message),
+            None => {
+                if let Some(unsent) = self.unsent.get_mut(source.place()) {
+                    *unsent = true;
+                }
+            }
         }
         if error.is_some() {
+            let [low, high, _, a, b, ..] = message;
             self.history.rotate_right(1);
             // The upper half is manufacturer-specific: the first two bytes of the information.
             self.history[0] = u32::from_le_bytes([low, high, a, b]);
             self.recorded = (self.recorded + 1).min(HISTORY as u8);
         }
+    }
+
+    /// Message of a change, with the present error register.
+    fn message(&self, error: Option<ErrorReport>) -> [u8; 8] {
+        let ErrorReport { code, information } = error.unwrap_or(ErrorReport::code(NO_ERROR));
+        let ([low, high], [a, b, c, d, e]) = (code.to_le_bytes(), information);
+        [low, high, self.register(), a, b, c, d, e]
+    }
+
+    /// Present state of a source whose change found no space.
+    fn take_unsent(&mut self) -> Option<[u8; 8]> {
+        let sources = || self.active.iter().zip(&self.unsent).enumerate().filter(|(_, (_, unsent))| **unsent);
+        let ended = sources().find(|(_, (error, _))| error.is_none());
+        let (place, (error, _)) = ended.or_else(|| sources().next())?;
+        let message = self.message(*error);
+        *self.unsent.get_mut(place)? = false;
+        Some(message)
     }
 
     /// Returns object 1001.
@@ -172,7 +203,10 @@ impl Emergency {
         if now_us < self.next_us {
             return None;
         }
-        let message = self.waiting[0].take()?;
+        let message = match self.waiting[0].take() {
+            Some(message) => message,
+            None => self.take_unsent()?,
+        };
         self.waiting.rotate_left(1);
         self.next_us = now_us + 100 * u64::from(self.inhibit);
         (self.identifier >> 31 == 0).then(|| Frame::new(self.identifier as u16, &message))
@@ -181,6 +215,10 @@ impl Emergency {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
     use super::*;
 
     const HOST_LOST: ErrorReport = ErrorReport::code(0x8130);
@@ -188,7 +226,7 @@ mod tests {
 
     #[test]
     fn an_error_is_reported_once_at_its_begin_and_once_at_its_end() {
-        let mut emergency = Emergency::new(0x85);
+        let mut emergency = Emergency { inhibit: 0, ..Emergency::new(0x85) };
         emergency.set(Source::Heartbeat(0), Some(HOST_LOST));
         emergency.set(Source::Heartbeat(0), Some(HOST_LOST));
         emergency.set(Source::Drive, Some(OVERCURRENT));
@@ -233,15 +271,38 @@ mod tests {
         }
     }
 
+    /// Codes that are sent in a second, one per inhibit time.
+    fn codes(emergency: &mut Emergency) -> Vec<u16> {
+        let mut next_us = 0;
+        let sent = (0..1000).filter_map(|millisecond| {
+            let sent = emergency.poll(1000 * millisecond)?;
+            assert!(millisecond >= next_us, "inhibited");
+            next_us = millisecond + u64::from(emergency.inhibit) / 10;
+            Some(u16::from_le_bytes([sent.data()[0], sent.data()[1]]))
+        });
+        sent.collect()
+    }
+
     #[test]
-    fn the_inhibit_time_limits_messages_and_the_history_keeps_the_rest() {
+    fn the_inhibit_time_limits_messages_and_the_last_is_the_present_state() {
         let mut emergency = Emergency::new(0x81);
-        emergency.inhibit = 10;
         for code in 1..=20 {
             emergency.set(Source::Drive, Some(ErrorReport::code(code)));
         }
-        let sent = (0..10_000).filter(|&now_us| emergency.poll(now_us).is_some()).count();
-        assert_eq!(sent, WAITING);
+        assert_eq!(codes(&mut emergency), [1, 2, 3, 4, 20]);
         assert_eq!((emergency.history(0), emergency.history(1)), (Ok(8), Ok(20)));
+        // Each source ends with its present state, ended errors first.
+        for _ in 0..20 {
+            for source in [Source::Receive(0), Source::Heartbeat(0)] {
+                emergency.set(source, Some(HOST_LOST));
+                emergency.set(source, None);
+            }
+        }
+        emergency.set(Source::Drive, Some(OVERCURRENT));
+        emergency.next_us = 0;
+        assert_eq!(codes(&mut emergency), [0x8130, 0, 0x8130, 0, 0, 0, 0x2310]);
+        emergency.set(Source::Drive, None);
+        emergency.next_us = 0;
+        assert_eq!((codes(&mut emergency), emergency.register()), (Vec::from([0]), 0));
     }
 }

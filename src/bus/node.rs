@@ -294,8 +294,13 @@ impl Node {
         let counter = match (self.communication.sync_overflow, frame.data()) {
             (0, _) => None,
             (overflow, &[counter]) if (1..=overflow).contains(&counter) => Some(counter),
-            _ => return,
+            (_, [_]) => return,
+            _ => {
+                let report = ErrorReport::code(NoticeCode::SyncLength.number());
+                return self.communication.emergency.set(Source::Sync, Some(report));
+            }
         };
+        self.communication.emergency.set(Source::Sync, None);
         for place in 0..PDOS {
             if self.communication.receive.get_mut(place).is_some_and(|receive| receive.at_sync()) {
                 self.write_received(place, objects);

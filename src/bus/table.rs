@@ -95,7 +95,7 @@ rows! {
     0x1011, 0, U8, Const, No, 1, "Number of entries";
     0x1011, 1, U32, Both, No, 1, "Restore all default parameters";
     0x1014, 0, U32, Both, No, 0x80 + node, "COB-ID emergency message";
-    0x1015, 0, U16, Both, No, 0, "Inhibit time emergency message";
+    0x1015, 0, U16, Both, No, 100, "Inhibit time emergency message";
     0x1016, 0, U8, Const, No, 2, "Number of entries";
     0x1016, 1 x 2, U32, Both, No, 0, "Consumer heartbeat time";
     0x1017, 0, U16, Both, No, 0, "Producer heartbeat time";
@@ -126,10 +126,10 @@ rows! {
     0x1603, 1, U32, Both, No, 0x6071_0010, "Mapped object";
     0x1600 x 4, 2 x 7, U32, Both, No, 0, "Mapped object";
     0x1800 x 4, 0, U8, Const, No, 6, "Number of entries";
-    0x1800, 1, U32, Both, No, 0x180 + node, "COB-ID used by TPDO 1";
-    0x1801, 1, U32, Both, No, 0x280 + node, "COB-ID used by TPDO 2";
-    0x1802, 1, U32, Both, No, 0x380 + node, "COB-ID used by TPDO 3";
-    0x1803, 1, U32, Both, No, 0x480 + node, "COB-ID used by TPDO 4";
+    0x1800, 1, U32, Both, No, 0x4000_0180 + node, "COB-ID used by TPDO 1";
+    0x1801, 1, U32, Both, No, 0x4000_0280 + node, "COB-ID used by TPDO 2";
+    0x1802, 1, U32, Both, No, 0x4000_0380 + node, "COB-ID used by TPDO 3";
+    0x1803, 1, U32, Both, No, 0x4000_0480 + node, "COB-ID used by TPDO 4";
     0x1800, 2, U8, Both, No, 255, "Transmission type";
     0x1801 x 3, 2, U8, Both, No, 1, "Transmission type";
     0x1800 x 4, 3, U16, Both, No, 10, "Inhibit time";

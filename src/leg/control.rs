@@ -139,8 +139,13 @@ impl<const N: usize> Control<N> {
         })
     }
 
+    /// Runs instead of a tick while the joints have no valid readings ([`Servo::stand_by`]).
+    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
+        self.servo.stand_by(resets)
+    }
+
     /// Resets to the state after the start: drive off, nothing measured, no activity. For joints that have
-    /// missed ticks, or whose zeros have changed. The model in use stays.
+    /// missed ticks, or whose zeros have changed. The model in use stays, and a fault until its reset.
     pub fn restart(&mut self) {
         self.servo.restart();
         self.averager = LogAverager::EMPTY;

@@ -47,7 +47,7 @@ pub use follow::{Following, ImpedanceTarget, JointCommand, JointStatus, Mode, Se
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
 pub use model_monitor::{ModelMonitor, UPDATE_ROWS};
-pub use permitted::{axis_code, permitted};
+pub use permitted::{axis_code, may_reset, permitted};
 pub use results::{FoundBase, FoundFit, FoundParameter};
 pub use stored::{RestoreError, StoredModel};
 

@@ -2,19 +2,26 @@
 
 use super::control::ControlRequest;
 use crate::motor::AxisFault;
-use crate::safety::{DriveState, FaultCode, PowerRequest};
+use crate::safety::{DriveState, FaultCode, InhibitReason, PowerRequest};
 
-/// Passes every request if there is no inhibit reason, otherwise only those that switch off.
+/// Whether a fault may be reset: no inhibit reason is active but a flash write, which is no fault.
+#[must_use]
+pub const fn may_reset(causes: u32) -> bool {
+    causes & !InhibitReason::Storing.bit() == 0
+}
+
+/// Passes every request if there is no inhibit reason, otherwise only those that switch off, and the reset of
+/// a fault where [`may_reset`] permits it.
 ///
 /// With an inhibit reason, a drive that is not off is switched off even without a request.
 #[must_use]
 pub fn permitted(
     request: Option<&ControlRequest>,
-    is_clear: bool,
+    causes: u32,
     state: DriveState,
 ) -> Option<&ControlRequest> {
     use PowerRequest::{DisableOperation, DisableVoltage, QuickStop, ResetFault};
-    if is_clear {
+    if causes == 0 {
         return request;
     }
     let is_off = matches!(
@@ -22,9 +29,8 @@ pub fn permitted(
         DriveState::NotReadyToSwitchOn | DriveState::SwitchOnDisabled | DriveState::Fault { .. }
     );
     match request {
-        Some(ControlRequest::Power(DisableOperation | QuickStop | DisableVoltage | ResetFault)) if is_off => {
-            request
-        }
+        Some(ControlRequest::Power(DisableOperation | QuickStop | DisableVoltage)) if is_off => request,
+        Some(ControlRequest::Power(ResetFault)) if is_off && may_reset(causes) => request,
         _ if is_off => None,
         _ => Some(&ControlRequest::Power(DisableVoltage)),
     }
@@ -58,12 +64,23 @@ mod tests {
         let off = Some(&ControlRequest::Power(PowerRequest::DisableVoltage));
         for request in enabling.into_iter().chain([ControlRequest::Identify]) {
             let request = Some(&request);
-            assert_eq!(permitted(request, true, DriveState::SwitchedOn), request);
-            assert_eq!(permitted(request, false, DriveState::SwitchOnDisabled), None);
+            assert_eq!(permitted(request, 0, DriveState::SwitchedOn), request);
+            assert_eq!(permitted(request, 1, DriveState::SwitchOnDisabled), None);
             for state in [DriveState::ReadyToSwitchOn, DriveState::SwitchedOn, DriveState::OperationEnabled] {
-                assert_eq!(permitted(request, false, state), off);
-                assert_eq!(permitted(None, false, state), off);
+                assert_eq!(permitted(request, 1, state), off);
+                assert_eq!(permitted(None, 1, state), off);
             }
         }
+    }
+
+    #[test]
+    fn a_fault_is_reset_once_its_reason_is_gone() {
+        let fault = crate::safety::Fault { code: FaultCode::EmergencyStop, joint: 0 };
+        let reset = ControlRequest::Power(PowerRequest::ResetFault);
+        for cause in InhibitReason::ALL {
+            let passes = permitted(Some(&reset), cause.bit(), DriveState::Fault { fault }).is_some();
+            assert_eq!(passes, cause == InhibitReason::Storing, "{cause:?}");
+        }
+        assert!(permitted(Some(&reset), 0, DriveState::Fault { fault }).is_some());
     }
 }

@@ -29,6 +29,7 @@ impl<const N: usize> AssistLevel<N> {
         for _ in 0..super::queues::SAMPLES {
             let Some(sample) = ends.samples.dequeue() else { return };
             if let Some(torque) = self.law.step(&sample) {
+                // Full only while the servo does not tick, and then the session ends.
                 let _ = ends.torques.enqueue(torque);
             }
         }

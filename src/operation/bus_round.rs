@@ -165,6 +165,7 @@ impl BusRound {
         while ends.program.ready()
             && let Some(byte) = device.take_program_byte()
         {
+            // There is space: checked above.
             let _ = ends.program.enqueue(byte);
         }
         let command = device.take_program_command();
@@ -194,6 +195,7 @@ impl BusRound {
             self.due = true;
         }
         if self.due {
+            // There is space: checked above.
             let _ = ends.orders.enqueue(device.order());
             self.due = false;
         }

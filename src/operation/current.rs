@@ -77,6 +77,8 @@ struct AxisLoop {
     watch: TickWatch,
     /// Remaining ticks in which the index is ignored.
     late: u8,
+    /// Outcome that found the queue to the housekeeping full.
+    unsent: Option<Outcome>,
 }
 
 /// State of level 0.
@@ -109,6 +111,7 @@ impl<const N: usize> CurrentLoops<N> {
             last: None,
             watch: TickWatch::default(),
             late: 0,
+            unsent: None,
         });
         let servo = ServoWatch::default();
         Self { axes, period, servo, unconverted: 0, chopper, budget: BrakeBudget::FULL, volt_per_code }
@@ -148,6 +151,9 @@ impl<const N: usize> CurrentLoops<N> {
         let all_run = self.axes.iter().all(|axis| axis.stage.is_running());
         let period = self.period;
         let Some(this) = self.axes.get_mut(axis) else { return };
+        if let Some(outcome) = this.unsent.take() {
+            this.unsent = send(axis, outcome, ends);
+        }
         let mut sample = tick.sample;
         if let Some(stood) = this.look(axis, tick, period, signals) {
             if stood > 0 {
@@ -159,7 +165,7 @@ impl<const N: usize> CurrentLoops<N> {
             }
             let long = stood > CERTAIN_PERIODS;
             if stood > 0 && this.stage.stood_still(&sample, long) && long {
-                report(axis, Outcome::StoodStill, ends, signals);
+                report(axis, Outcome::StoodStill, &mut this.unsent, ends, signals);
             }
         }
         let bridges = Bridges::of(signals.inhibit.causes());
@@ -169,12 +175,14 @@ impl<const N: usize> CurrentLoops<N> {
         if ends.orders.get(axis).is_some_and(|orders| orders.ready()) {
             let order = ends.orders.get_mut(axis).and_then(|orders| orders.dequeue());
             if let Some(outcome) = order.and_then(|order| this.stage.obey(order)) {
-                report(axis, outcome, ends, signals);
+                report(axis, outcome, &mut this.unsent, ends, signals);
             }
         }
         let target = if all_run { signals.target(axis) } else { AxisRequest::OFF };
         let command = this.stage.tick(&sample, bridges, target, |outcome, switching, command| {
-            react(axis, outcome, switching, command, ends, signals, hardware)
+            let command = react(axis, &outcome, switching, command, signals, hardware);
+            report(axis, outcome, &mut this.unsent, ends, signals);
+            command
         });
         apply(axis, &command, signals, hardware);
         this.ticks += 1;
@@ -320,20 +328,21 @@ impl AxisLoop {
     }
 }
 
-/// Reports an outcome of an axis and returns its bridge's command. A fault applies to the other axes at once.
+/// Returns the command of an axis' bridge after an outcome. A fault applies to the other axes at once.
 #[inline(never)]
 fn react<const N: usize, H: Hardware<N>>(
     axis: usize,
-    outcome: Outcome,
+    outcome: &Outcome,
     switching: bool,
     command: AxisCommand,
-    ends: &mut CurrentEnds<'_, N>,
     signals: &Signals<N>,
     hardware: &mut H,
 ) -> AxisCommand {
     let mut command = command;
-    if let Outcome::Fault { fault, .. } = outcome {
-        signals.inhibit.raise(InhibitReason::of_axis(axis, axis_code(fault), switching));
+    if let Outcome::Fault { fault, .. } = *outcome {
+        let code = axis_code(fault);
+        signals.inhibit.raise(InhibitReason::of_axis(axis, code, switching));
+        signals.report_axis(code, axis);
         match Bridges::of(signals.inhibit.causes()) {
             Bridges::Follow => {}
             Bridges::Brake => {
@@ -346,23 +355,33 @@ fn react<const N: usize, H: Hardware<N>>(
             }
         }
     }
-    report(axis, outcome, ends, signals);
     command
 }
 
-/// Sends an outcome to the housekeeping. Without the rotor's position the joints' samples are invalid.
+/// Sends an outcome to the housekeeping. Without the rotor's position the joints' samples are invalid; the
+/// servo reports the axis' fault to the bus all the same.
+#[inline(never)]
 fn report<const N: usize>(
     axis: usize,
     outcome: Outcome,
+    unsent: &mut Option<Outcome>,
     ends: &mut CurrentEnds<'_, N>,
     signals: &Signals<N>,
 ) {
     if matches!(outcome, Outcome::Fault { lost: true, .. } | Outcome::StoodStill) {
         signals.end_servo();
     }
-    if let Some(outcomes) = ends.outcomes.get_mut(axis) {
-        let _ = outcomes.enqueue(outcome);
+    let left = send(axis, outcome, ends);
+    // A later pulse repeats what a lost one says. The other outcomes answer an order, so no two of them wait.
+    if left.is_some_and(|outcome| !matches!(outcome, Outcome::Index(_))) {
+        *unsent = left;
     }
+}
+
+/// Sends an outcome; returns it if its queue is full.
+#[inline(never)]
+fn send<const N: usize>(axis: usize, outcome: Outcome, ends: &mut CurrentEnds<'_, N>) -> Option<Outcome> {
+    ends.outcomes.get_mut(axis)?.enqueue(outcome).err()
 }
 
 #[cfg(test)]

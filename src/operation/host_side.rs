@@ -10,7 +10,7 @@ use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::{Hardware, Sample};
 use crate::leg::{
     Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand, JointStatus,
-    Permission, Plan, PowerRequest, Refusal, Wearing,
+    Permission, Plan, PowerRequest, Refusal, RefusalReason, Wearing,
 };
 use crate::units::{NewtonMetre, Volt};
 
@@ -79,20 +79,31 @@ impl<const N: usize> HostSide<N> {
         self.following.restart();
     }
 
-    /// Runs instead of a tick while the leg has no zeros: orders are dropped.
+    /// Runs instead of a tick while the leg has no zeros: reports the drive's state and drops orders, except
+    /// for the reset of a fault. Returns whether a host requests that. A lost host stops nothing here, and its
+    /// node reports it.
     pub fn rest(
         &mut self,
+        drive: DriveState,
         ends: &mut HostEnds<'_, N>,
         signals: &Signals<N>,
         hardware: &mut impl Hardware<N>,
-    ) {
-        while take_first(&mut ends.orders, |order| self.note(order)).is_some() {}
+    ) -> bool {
+        const RESET: Option<LegRequest> = Some(LegRequest::Power(PowerRequest::ResetFault));
+        let mut resets = self.request == RESET;
+        while take_first(&mut ends.orders, |order| {
+            self.note(order);
+            resets |= order.request == RESET;
+        })
+        .is_some()
+        {}
         (self.commands, self.request, self.cancel) = (None, None, false);
         if self.is_due(ends, hardware) {
             let causes = signals.inhibit.causes();
             let (blocked, calibrated) = (causes != 0, signals.is_calibrated());
             let held = is_held(signals, hardware);
-            let joints = [JointStatus { bus: self.bus(signals), ..JointStatus::NONE }; N];
+            let joints = [JointStatus { drive, bus: self.bus(signals), ..JointStatus::NONE }; N];
+            // There is space: a report is due only then.
             let _ = ends.status.enqueue(LegStatus {
                 joints,
                 blocked,
@@ -102,11 +113,17 @@ impl<const N: usize> HostSide<N> {
                 ..LegStatus::NONE
             });
         }
+        resets
     }
 
     fn note(&mut self, order: &LegOrder<N>) {
         self.may_return = order.may_return;
         self.noted = order.refused.or(self.noted);
+    }
+
+    /// Reports to the bus that a request other than a step was refused.
+    pub fn refuse(&mut self, reason: RefusalReason) {
+        self.refused = Some(Refusal { joint: Refusal::LEG, reason });
     }
 
     /// Takes the refusal by the bus itself, once.
@@ -234,6 +251,7 @@ impl<const N: usize> HostSide<N> {
             calibrated: true,
             rests: false,
         };
+        // There is space: a report is due only then.
         let _ = ends.status.enqueue(status);
     }
 

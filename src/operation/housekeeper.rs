@@ -86,6 +86,11 @@ impl<const N: usize, H> Level<'_, '_, N, H> {
         self.ends.orders.get_mut(axis).is_some_and(|orders| orders.enqueue(order).is_ok())
     }
 
+    /// Whether the queue of every axis has space for an order.
+    fn takes_orders(&self) -> bool {
+        self.ends.orders.iter().all(|orders| orders.ready())
+    }
+
     /// Sends a request to the servo and returns whether the queue took it. While a host has the drive,
     /// closing the enabling switch only permits and requests nothing.
     fn request(&mut self, request: ControlRequest) -> bool {
@@ -119,6 +124,8 @@ pub struct Housekeeper<const N: usize> {
     calibrating: Option<usize>,
     /// Calibration that each axis passed since the start, if it can be stored.
     passed: [Option<StoredCalibration>; N],
+    /// Axes whose passed calibration the storage does not have.
+    unsent: [bool; N],
     /// A reference in progress.
     reference: Option<Reference<N>>,
     /// The zeros were set in the previous round: the servo may begin.
@@ -162,6 +169,7 @@ impl<const N: usize> Housekeeper<N> {
             certain: [false; N],
             calibrating: None,
             passed: [None; N],
+            unsent: [false; N],
             reference: None,
             placed: false,
             checks: [EncoderCheck::default(); N],
@@ -238,6 +246,7 @@ impl<const N: usize> Housekeeper<N> {
             return;
         }
         self.look(level);
+        self.send_passed(level);
         self.set_bandwidths(level);
         let situation = self.situation(level);
         if let Some(request) = self.operator.tick(&situation) {
@@ -394,6 +403,10 @@ impl<const N: usize> Housekeeper<N> {
             (0..N).for_each(|axis| self.check_encoders(axis, level));
         }
         for axis in 0..N {
+            // An outcome may lead to an order for each axis, which must not be lost.
+            if !level.takes_orders() {
+                break;
+            }
             let outcome = level.ends.outcomes.get_mut(axis).and_then(|outcomes| outcomes.dequeue());
             if let Some(outcome) = outcome {
                 self.receive(axis, &outcome, level);
@@ -401,6 +414,7 @@ impl<const N: usize> Housekeeper<N> {
         }
         if level.signals.take_forgotten() {
             (self.stored, self.passed, self.joint_zeros) = ([None; N], [None; N], [None; N]);
+            self.unsent = [false; N];
         }
         self.record_causes(level);
     }
@@ -445,7 +459,7 @@ impl<const N: usize> Housekeeper<N> {
                 } else {
                     before
                 };
-                self.passes(axis, stored, level);
+                self.passes(axis, stored);
                 self.must_turn(axis, false);
                 self.run_axis(axis, calibration, level);
             }
@@ -500,6 +514,7 @@ impl<const N: usize> Housekeeper<N> {
                     }
                     // A braking motor brakes until a reset.
                     if *fault == AxisFault::Parameters {
+                        // There is space: checked for every outcome.
                         level.order(axis, Order::Off);
                     }
                 }
@@ -507,17 +522,18 @@ impl<const N: usize> Housekeeper<N> {
         }
     }
 
-    /// Keeps a passed calibration, and offers it to the storage.
-    fn passes(
-        &mut self,
-        axis: usize,
-        stored: Option<StoredCalibration>,
-        level: &mut Level<'_, '_, N, impl Hardware<N>>,
-    ) {
-        if let Some(passed) = self.passed.get_mut(axis) {
-            *passed = stored;
+    /// Keeps a passed calibration, to be sent to the storage.
+    fn passes(&mut self, axis: usize, stored: Option<StoredCalibration>) {
+        if let Some((passed, unsent)) = self.passed.get_mut(axis).zip(self.unsent.get_mut(axis)) {
+            (*passed, *unsent) = (stored, true);
         }
-        let _ = level.ends.calibrated.enqueue((axis, stored));
+    }
+
+    /// Sends passed calibrations to the storage; again in the next round if its queue is full.
+    fn send_passed(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+        for (axis, (passed, unsent)) in self.passed.iter().zip(&mut self.unsent).enumerate() {
+            *unsent = *unsent && level.ends.calibrated.enqueue((axis, *passed)).is_err();
+        }
     }
 
     /// Temperature of a winding, unless it follows from an assumption.
@@ -589,6 +605,7 @@ impl<const N: usize> Housekeeper<N> {
         self.set_certain(axis, false);
         // Counting restarts without a zero.
         level.signals.end_servo();
+        // There is space: checked for every outcome.
         level.order(axis, Order::Run(running));
         let next = (axis + 1..N).find(|&next| !self.calibrated.get(next).copied().unwrap_or(true));
         self.calibrating = next;
@@ -642,11 +659,14 @@ impl<const N: usize> Housekeeper<N> {
             OperatorRequest::Power(request) => level.request(ControlRequest::Power(request)),
             // The servo records the result.
             OperatorRequest::Begin => {
-                level.request(match self.settings.assist {
+                let request = match self.settings.assist {
                     Some(shares) => ControlRequest::Assist(shares),
                     None => ControlRequest::Identify,
-                });
-                return;
+                };
+                if level.request(request) {
+                    return;
+                }
+                false
             }
             OperatorRequest::Calibrate => {
                 let first = self.calibrated.iter().position(|calibrated| !calibrated);
@@ -669,7 +689,7 @@ impl<const N: usize> Housekeeper<N> {
             OperatorRequest::Reset => {
                 // Braking motors are turned off first, because restarting gate drivers measure currents with
                 // another gain.
-                level.signals.inhibit.raise(InhibitReason::GateConfiguration);
+                level.signals.inhibit.raise(InhibitReason::Resetting);
                 level.hardware.disable_all();
                 level.hardware.switch_gates(false);
                 self.resetting = Some(0);
@@ -682,8 +702,10 @@ impl<const N: usize> Housekeeper<N> {
     /// Continues a reset and returns whether one is under way: gate drivers off and on, then faults cleared.
     fn advance_reset(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
         let Some(rounds) = self.resetting else { return false };
-        let rounds = rounds + 1;
-        self.resetting = Some(rounds).filter(|rounds| *rounds < GATES_READY);
+        let rounds = rounds.saturating_add(1);
+        // At its end the orders and the request must not be lost.
+        let may_end = rounds >= GATES_READY && level.takes_orders() && level.ends.requests.ready();
+        self.resetting = Some(rounds).filter(|_| !may_end);
         if rounds == GATES_ON {
             level.hardware.switch_gates(true);
         }

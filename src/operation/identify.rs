@@ -146,6 +146,10 @@ impl IdentificationLevel {
         W: BorrowMut<MotionWindow<f32, N, B>>,
     {
         use IdentifyPhase::{Judge, Settle, Solve};
+        // A finding that does not fit would leave control waiting for it.
+        if !ends.findings.ready() {
+            return Slice::Idle;
+        }
         if core::mem::take(&mut self.taken)
             && let Some(verdict) = self.verdict.take()
         {
@@ -163,6 +167,7 @@ impl IdentificationLevel {
                     why: "samples_lost",
                     value: signals.statistics.samples_lost.get(),
                 });
+                // There is space: checked above.
                 let _ = ends.findings.enqueue(Finding::Judged { verdict, model: None });
                 self.verdict = Some(verdict);
             }
@@ -191,7 +196,7 @@ impl IdentificationLevel {
                 record(&Record::Update { cause, link, verdict, offered: model.is_some() });
             }
         }
-        // Control takes one finding per tick.
+        // There is space: checked above. Control takes one finding per tick.
         let _ = ends.findings.enqueue(finding);
         Slice::Busy
     }

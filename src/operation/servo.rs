@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! samples     newest of each joint
-//! gate        no tick without calibration and zero of each joint: outputs off, requests dropped
+//! gate        no tick without calibration and zero of each joint: outputs off, requests dropped; faults are
+//!             reported and reset all the same
 //! findings    of the identification
 //! faults      reported by the board's other levels; gains and limits (every 64 ms); supply; derating
 //! bandwidths  of the position loops that a host has set, while the drive is off
@@ -20,8 +21,8 @@ use super::signals::Signals;
 use crate::checksum::Checksum;
 use crate::hal::{Hardware, JointSample, Sample};
 use crate::leg::{
-    Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Refusal,
-    permitted,
+    Activity, AssistNote, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes,
+    Permission, PowerRequest, Refusal, RefusalReason, may_reset, permitted,
 };
 use crate::safety::{
     BrakeDelays, DeratingRamps, Fault, FaultCode, HoldingBrake, InhibitReason, JointShares, SupplyCurrent,
@@ -44,6 +45,10 @@ pub struct ServoLevel<const N: usize> {
     /// Limits already reported in this second.
     limits: [LimitCodes; N],
     ticking: bool,
+    /// Inhibit reasons whose faults were reported to control.
+    causes: u32,
+    /// The housekeeping does not have the drive's newest state.
+    is_state_due: bool,
     tick: u32,
     /// Checksum of gains and limits at creation, or after the last change of the bandwidths.
     checksum: Checksum,
@@ -77,6 +82,8 @@ impl<const N: usize> ServoLevel<N> {
             activity: Activity::Idle,
             limits: [LimitCodes::default(); N],
             ticking: false,
+            causes: 0,
+            is_state_due: false,
             tick: 0,
             checksum: control.checksum(),
             bandwidths: [None; N],
@@ -123,13 +130,15 @@ impl<const N: usize> ServoLevel<N> {
             count.set(sample.encoder_counts.cast_unsigned());
         }
         let begun = signals.has_begun();
-        let begins = !core::mem::replace(&mut self.ticking, begun) && begun;
+        let changes = core::mem::replace(&mut self.ticking, begun) != begun;
+        if changes {
+            control.restart();
+        }
         if !begun {
-            self.rest(ends, signals, hardware);
+            self.rest(control, ends, signals, hardware);
             return None;
         }
-        if begins {
-            control.restart();
+        if changes {
             self.state = None;
             if let Some(host) = &mut self.host {
                 host.begin();
@@ -148,9 +157,9 @@ impl<const N: usize> ServoLevel<N> {
         let (request, by_hand) = self.next_request(control, ends, signals, hardware);
         // Until the brake is open the drive holds its pose.
         let waits = self.holding_brake.is_some_and(|brake| !brake.is_open());
-        // The start button begins nothing while a host has the drive.
+// The start button begins nothing while a host has the drive.
         let is_hosts = by_hand && self.host.as_ref().is_some_and(HostSide::has_drive);
-        let permitted = permitted(request.as_ref(), signals.inhibit.is_clear(), control.state())
+        let permitted = permitted(request.as_ref(), signals.inhibit.causes(), control.state())
             .filter(|request| !((waits || is_hosts) && request.moves()));
         let sample = Sample { joints: self.sample };
         let host = self.host.as_mut().map(|host| host.host(waits));
@@ -160,6 +169,9 @@ impl<const N: usize> ServoLevel<N> {
         }
         let output = control.tick_with(&sample, permitted, gravity, host);
         if let Some(note) = control.take_assist_note() {
+            if let (AssistNote::Refused(_), Some(host)) = (note, &mut self.host) {
+                host.refuse(RefusalReason::NoAssistance);
+            }
             let ((event, why), tick) = (words::assist(note), self.tick);
             send(LegEvent::Record(Record::Assist { tick, event, why }), ends, signals);
         }
@@ -188,16 +200,37 @@ impl<const N: usize> ServoLevel<N> {
         self.tick
     }
 
-    /// Runs instead of a tick while the leg has no zeros: requests are dropped.
-    fn rest<H: Hardware<N>>(&mut self, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>, hardware: &mut H) {
+    /// Runs instead of a tick while the leg has no zeros: requests are dropped, except for the reset of a
+    /// fault. A fault is reported as in a tick, also the one that ended the ticks.
+    #[inline(never)]
+    fn rest<H: Hardware<N>>(
+        &mut self,
+        control: &mut Control<N>,
+        ends: &mut ServoEnds<'_, N>,
+        signals: &Signals<N>,
+        hardware: &mut H,
+    ) {
         signals.disable();
         signals.set_permission(Permission::Off);
         self.hold(DriveState::NotReadyToSwitchOn, signals, hardware);
         signals.set_wanted_brake(0.0);
-        let _ = ends.requests.dequeue();
+        let request = ends.requests.dequeue();
+        let mut resets = request == Some(ControlRequest::Power(PowerRequest::ResetFault));
         if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
-            host.rest(ends, signals, hardware);
+            resets |= host.rest(control.state(), ends, signals, hardware);
         }
+        self.pass_faults(control, signals);
+        let fault = control.stand_by(resets && may_reset(signals.inhibit.causes()));
+        let state = control.state();
+        // Before its first tick a drive is not ready.
+        self.state = self.state.or(Some(DriveState::NotReadyToSwitchOn));
+        if self.has_changed(state) {
+            self.is_state_due = true;
+            self.record_change(state, fault, control.activity(), ends, signals);
+        }
+        self.send_state(state, ends);
+        self.state = Some(state);
+        self.send_activity(control.activity(), ends, signals);
         self.report_noted(ends, signals);
     }
 
@@ -262,13 +295,29 @@ impl<const N: usize> ServoLevel<N> {
         control.checksum() == self.checksum
     }
 
-    /// Passes faults, bus voltage and temperature from the rest of the board to control.
-    fn look_around(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
-        for joint in 0..N {
-            for fault in signals.take_reported(joint) {
-                control.report(Fault { code: fault.code(), joint: joint as u8 });
+    /// Passes the faults of the board's other levels to control: new inhibit reasons, then what names its
+    /// joint.
+    fn pass_faults(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
+        let causes = signals.inhibit.causes();
+        let new = causes & !core::mem::replace(&mut self.causes, causes);
+        if new != 0 {
+            let of = |cause: InhibitReason| cause.code().filter(|_| new & cause.bit() != 0);
+            for code in InhibitReason::ALL.into_iter().filter_map(of) {
+                control.report(Fault { code, joint: 0 });
             }
         }
+        for joint in 0..N {
+            let fault = |code| Fault { code, joint: joint as u8 };
+            signals.take_reported(joint).for_each(|found| control.report(fault(found.code())));
+            if let Some(code) = signals.take_axis_fault(joint) {
+                control.report(fault(code));
+            }
+        }
+    }
+
+    /// Passes faults, bus voltage and temperature from the rest of the board to control.
+    fn look_around(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
+        self.pass_faults(control, signals);
         self.tick = self.tick.wrapping_add(1);
         if self.tick & CHECKSUM_MASK == 0 && !self.is_sound(control) {
             control.report(Fault { code: FaultCode::Parameters, joint: 0 });
@@ -351,31 +400,20 @@ impl<const N: usize> ServoLevel<N> {
             let prepared = self.prepared.map(|prepared| (prepared.plan, prepared.seed));
             send(LegEvent::Begun(prepared, control.wearing()), ends, signals);
         }
-        let mut record = |record| send(LegEvent::Record(record), ends, signals);
         let decision = &output.servo.decision;
         let activity = control.activity();
-        // Comparing words is slow, and the state is mostly the same.
-        let changed = self.state.is_none_or(|before| {
-            before != decision.state && words::drive(before) != words::drive(decision.state)
-        });
-        if changed && let Some(fault) = decision.fault {
-            // The fault is recorded before the resulting state.
-            let (code, name) = (fault.code.number(), words::fault(fault.code));
-            record(Record::Fault { tick, code, name, joint: fault.joint.saturating_add(1) });
-        }
+        let changed = self.has_changed(decision.state);
         let before = self.refused.filter(|_| !changed);
         self.refused = decision.refused.or(before);
         if let Some(refused) = decision.refused.filter(|refused| before != Some(*refused)) {
-            record(not_enabled(tick, refused));
+            send(LegEvent::Record(not_enabled(tick, refused)), ends, signals);
         }
         if changed || activity != self.activity {
-            let (name, phase, motion) = words::activity(activity);
-            let drive = words::drive(decision.state);
-            record(Record::State { tick, drive, activity: name, phase, motion });
+            let fault = decision.fault.filter(|_| changed);
+            self.record_change(decision.state, fault, activity, ends, signals);
         }
-        if changed {
-            let _ = ends.drive.enqueue(decision.state);
-        }
+        self.is_state_due |= changed;
+        self.send_state(decision.state, ends);
         self.state = Some(decision.state);
         if output.took_update {
             send(LegEvent::TookUpdate, ends, signals);
@@ -387,6 +425,42 @@ impl<const N: usize> ServoLevel<N> {
                 signals.statistics.samples_lost.add();
             }
         }
+        self.send_activity(activity, ends, signals);
+    }
+
+    /// Whether the drive's state has another word than at the last report. Comparing words is slow, and the
+    /// state is mostly the same.
+    fn has_changed(&self, state: DriveState) -> bool {
+        self.state.is_none_or(|before| before != state && words::drive(before) != words::drive(state))
+    }
+
+    /// Records a fault and the state or activity that follows from it.
+    fn record_change(
+        &self,
+        state: DriveState,
+        fault: Option<Fault>,
+        activity: Activity,
+        ends: &mut ServoEnds<'_, N>,
+        signals: &Signals<N>,
+    ) {
+        let tick = self.tick;
+        let mut record = |record| send(LegEvent::Record(record), ends, signals);
+        if let Some(fault) = fault {
+            let (code, name) = (fault.code.number(), words::fault(fault.code));
+            record(Record::Fault { tick, code, name, joint: fault.joint.saturating_add(1) });
+        }
+        let (name, phase, motion) = words::activity(activity);
+        record(Record::State { tick, drive: words::drive(state), activity: name, phase, motion });
+    }
+
+    /// Sends the drive's state to the housekeeping; again in the next tick if its queue is full.
+    fn send_state(&mut self, state: DriveState, ends: &mut ServoEnds<'_, N>) {
+        if self.is_state_due {
+            self.is_state_due = ends.drive.enqueue(state).is_err();
+        }
+    }
+
+    fn send_activity(&mut self, activity: Activity, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>) {
         if activity != self.activity {
             self.activity = activity;
             send(LegEvent::Activity(activity), ends, signals);
@@ -407,6 +481,7 @@ fn assist<const N: usize, H: Hardware<N>>(
 ) {
     let Some(ends) = &mut ends.assist else { return };
     if let Some(session) = control.take_session() {
+        // A law that has not taken the session before does not answer, so this session ends.
         let _ = ends.sessions.enqueue(session);
         hardware.pend_assist();
     }

@@ -11,7 +11,7 @@ use crate::bus::program::{ProgramCommand, ProgramStatus};
 use crate::hal::DriveCommand;
 use crate::leg::Permission;
 use crate::motor::{AxisRequest, ElectricalAngle, Phases, Rotating};
-use crate::safety::{BoardFault, InhibitReason, Winding};
+use crate::safety::{BoardFault, FaultCode, InhibitReason, Winding};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::{Ampere, Hertz};
 
@@ -267,6 +267,8 @@ pub struct Signals<const N: usize> {
     begun: Word,
     /// Faults of each joint that the servo has not read yet, one bit per [`BoardFault`].
     reported: [Word; N],
+    /// Fault of each axis that the servo has not read yet: its number, or 0.
+    axis_faults: [Word; N],
     /// Temperature of each bridge, degrees Celsius, as bits.
     bridges_c: [Word; N],
     /// Currents of each motor along and across the flux, A, as bits, and the rotor's electrical angle.
@@ -306,6 +308,7 @@ impl<const N: usize> Signals<N> {
             targets: [const { Word::new(OFF) }; N],
             begun: Word::new(0),
             reported: [const { Word::new(0) }; N],
+            axis_faults: [const { Word::new(0) }; N],
             bridges_c: [const { Word::new(0) }; N],
             rotor_currents: [const { [const { Word::new(0) }; 3] }; N],
             i2t: [const { Word::new(0) }; N],
@@ -378,6 +381,19 @@ impl<const N: usize> Signals<N> {
             .get(joint)
             .map_or(0, |reported| if reported.get() == 0 { 0 } else { reported.swap(0) });
         BoardFault::ALL.into_iter().filter(move |fault| bits & fault.bit() != 0)
+    }
+
+    /// Reports the fault of an axis to the servo's next tick.
+    pub fn report_axis(&self, code: FaultCode, axis: usize) {
+        if let Some(fault) = self.axis_faults.get(axis) {
+            fault.set(code.number().into());
+        }
+    }
+
+    /// Takes the fault of an axis that was reported since the last call.
+    pub fn take_axis_fault(&self, axis: usize) -> Option<FaultCode> {
+        let fault = self.axis_faults.get(axis).filter(|fault| fault.get() != 0)?.swap(0);
+        FaultCode::ALL.into_iter().find(|code| u32::from(code.number()) == fault)
     }
 
     /// Temperature of the hottest bridge, degrees Celsius; NaN, which leaves no torque, if one is unknown.

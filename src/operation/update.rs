@@ -5,7 +5,7 @@
 //! Clear    three sectors, one per step; each stalls the processor for 1 to 2 s
 //! bytes    written word by word, 16 us each; between two words every level runs
 //! Start    header, length and check sum from the flash; then the swap is requested and the board restarts
-//! Start    with nothing written: the present program resumes
+//! Start    with nothing written, or after an error: the present program resumes, and the error stays shown
 //! Reset    the board restarts
 //! ```
 //!
@@ -104,7 +104,7 @@ impl Update {
         memory: &mut impl ProgramMemory,
     ) -> Option<bool> {
         match begun {
-            Begun::Stopped => self.step(signals, bytes, memory).then_some(true),
+            Begun::Stopped => self.step(signals, bytes, memory).then_some(self.error == ProgramError::None),
             Begun::Confirmation => {
                 let confirmed = memory.confirm();
                 self.is_on_trial &= !confirmed;
@@ -174,9 +174,8 @@ impl Update {
                 self.stage = Stage::Clears(0);
             }
             ProgramCommand::Reset => memory.restart(),
-            ProgramCommand::Start if self.received == 0 => return true,
-            // Its bytes are not all in the flash.
-            ProgramCommand::Start if self.error != ProgramError::None => {}
+            // Nothing was written, or not all of it is in the flash, or the check has refused it.
+            ProgramCommand::Start if self.received == 0 || self.error != ProgramError::None => return true,
             ProgramCommand::Start => match Check::begin(|offset, into| memory.read(offset, into)) {
                 Ok(check) => self.stage = Stage::Checks(check),
                 Err(error) => self.refuse(error),

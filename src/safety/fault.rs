@@ -200,6 +200,8 @@ notices! {
     Overrun = 0x8110;
     /// A received PDO was shorter than its mapping (8210: PDO not processed).
     ShortPdo = 0x8210;
+    /// A SYNC had no counter although 1019 expects one (8240: unexpected SYNC data length).
+    SyncLength = 0x8240;
     /// Objects could not be stored or read back (5530: data storage).
     StoreFailed = 0x5530;
     /// A flash write begins: the node may be silent for seconds, heartbeats included.
@@ -269,7 +271,7 @@ mod tests {
         for (code, number) in numbers {
             assert_eq!(code.number(), number, "{code:?}");
         }
-        assert_eq!(NoticeCode::ALL.map(NoticeCode::number), [0x8110, 0x8210, 0x5530, 0xFF0D, 0xFF0E]);
+        assert_eq!(NoticeCode::ALL.map(NoticeCode::number), [0x8110, 0x8210, 0x8240, 0x5530, 0xFF0D, 0xFF0E]);
     }
 
     #[test]

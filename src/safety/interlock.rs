@@ -92,11 +92,13 @@ pub enum InhibitReason {
     ChargeCurrent,
     /// The processor's supply was too low for a flash write.
     ProcessorSupply,
+    /// The operator's reset restarts the gate drivers.
+    Resetting,
 }
 
 impl InhibitReason {
     /// All reasons, in the order of their bits.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::EmergencyStop,
         Self::GateFault,
         Self::GateConfiguration,
@@ -115,17 +117,18 @@ impl InhibitReason {
         Self::Storing,
         Self::ChargeCurrent,
         Self::ProcessorSupply,
+        Self::Resetting,
     ];
 
     /// Fault that corresponds to the reason. `None` for an axis, which reports its own fault, and for
-    /// storing.
+    /// storing and resetting, which were requested.
     #[must_use]
     pub const fn code(self) -> Option<FaultCode> {
         Some(match self {
             Self::EmergencyStop => FaultCode::EmergencyStop,
             Self::GateFault => FaultCode::GateFault,
             Self::GateConfiguration => FaultCode::GateConfiguration,
-            Self::Axis1 | Self::Axis2 | Self::Storing => return None,
+            Self::Axis1 | Self::Axis2 | Self::Storing | Self::Resetting => return None,
             Self::EncoderFrozen => FaultCode::EncoderFrozen,
             Self::EncoderPosition => FaultCode::EncoderPosition,
             Self::CurrentTicks => FaultCode::CurrentTicks,
@@ -148,6 +151,7 @@ impl InhibitReason {
             (Self::Axis1, _) => "axis_1",
             (Self::Axis2, _) => "axis_2",
             (Self::Storing, _) => "storing",
+            (Self::Resetting, _) => "resetting",
             (_, Some(code)) => code.name(),
             (_, None) => "-",
         }

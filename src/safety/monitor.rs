@@ -198,10 +198,22 @@ impl<const N: usize> Monitor<N> {
         &self.limits
     }
 
-    /// Resets to the state after start: drive off, no rejected reading.
+    /// Resets to the state after start: drive off, no rejected reading. A fault stays until its reset.
     pub const fn restart(&mut self) {
-        (self.state, self.glitches) = (DriveState::NotReadyToSwitchOn, [0; N]);
+        (self.state, self.glitches) = (self.state.at_rest(), [0; N]);
         self.returns = [None; N];
+    }
+
+    /// Runs instead of [`Self::decide`] while the joints have no valid readings; `resets` requests the reset
+    /// of a fault. Returns a new fault.
+    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
+        let fault = self.reported.take();
+        self.state = match (fault, self.state.at_rest()) {
+            (Some(fault), state) => state.after(Event::Failed(fault), 0),
+            (None, _) if resets => DriveState::NotReadyToSwitchOn,
+            (None, state) => state,
+        };
+        fault
     }
 
     /// Decides one tick.

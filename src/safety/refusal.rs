@@ -1,4 +1,4 @@
-//! Reasons why enabling is refused: one list for the monitor, the bus and the records.
+//! Reasons why enabling or assistance is refused: one list for the monitor, the bus and the records.
 //!
 //! Why one list: a host that requests a step towards enabled must learn what is missing. Each reason has a
 //! bit of the digital inputs (60FD). Its bit number is also its number in emergency messages (FF0E), and its
@@ -24,7 +24,7 @@ impl Refusal {
     }
 }
 
-/// Reason why enabling is refused; the numbers are the bits of 60FD.
+/// Reason why a request is refused; the numbers are the bits of 60FD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum RefusalReason {
@@ -44,6 +44,8 @@ pub enum RefusalReason {
     Encoder = 22,
     /// CiA 402 has no such step from the joint's state, or bit 7 of the controlword is set.
     NoTransition = 23,
+    /// Assistance: a model that its shares need is missing or no longer fits, or the joints move.
+    NoAssistance = 24,
 }
 
 impl RefusalReason {

@@ -134,6 +134,15 @@ impl DriveState {
         }
     }
 
+    /// State of a drive whose joints have no valid readings: off, and a fault stays until its reset.
+    #[must_use]
+    pub const fn at_rest(self) -> Self {
+        match self.fault() {
+            Some(fault) => Self::Fault { fault },
+            None => Self::NotReadyToSwitchOn,
+        }
+    }
+
     /// The state after an event; damping lasts `damp_ticks`.
     #[must_use]
     pub const fn after(self, event: Event, damp_ticks: u32) -> Self {

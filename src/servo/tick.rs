@@ -145,7 +145,12 @@ impl<const N: usize> Servo<N> {
         })
     }
 
-    /// Resets to drive off without readings: for joints whose counts get another meaning.
+    /// Runs instead of a tick while the joints have no valid readings ([`Monitor::stand_by`]).
+    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
+        self.monitor.stand_by(resets)
+    }
+
+    /// Resets to drive off without readings: for joints whose counts get another meaning. A fault stays.
     pub fn restart(&mut self) {
         self.gates.iter_mut().for_each(StepGate::restart);
         self.observers = [Observer::default(); N];

@@ -107,6 +107,7 @@ impl Memory {
         let ((found_in, fresh), (mut spare, spare_out)) = (self.found.split(), self.spare.split());
         let (accepted_in, accepted) = self.accepted.split();
         let [found, other] = &mut self.results;
+        // There is space: the queue is new.
         let _ = spare.enqueue(other);
         let storage: &'static Handover<StoreJob<JOINTS>> = &self.storage;
         let bus = BusLoop { device, fresh, spare, found, round: BusRound::new(), ends, storage };
@@ -123,8 +124,9 @@ impl ThreadEnd {
         self.found.enqueue(found).is_ok()
     }
 
-    /// Passes on a model that may be stored, replacing one that was not.
+    /// Passes on a model that may be stored.
     pub fn accept(&mut self, model: ModelRecord<JOINTS>) {
+        // There is space: the storage takes a model in each round, and an identification lasts for seconds.
         let _ = self.accepted.enqueue(model);
     }
 }
@@ -132,6 +134,7 @@ impl ThreadEnd {
 impl BusLoop {
     fn run(&mut self) {
         while let Some(fresh) = self.fresh.dequeue() {
+            // There is space: of two buffers one is in use.
             let _ = self.spare.enqueue(core::mem::replace(&mut self.found, fresh));
         }
         self.found.search = SIGNALS.statistics.search.each_ref().map(|count| count.get());

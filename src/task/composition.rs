@@ -130,8 +130,7 @@ fn hand_out(
         volt_per_code,
         bus: results.map(|results| (results, configuration)),
     });
-    let gate_drivers = board.gate_drivers.with_encoders(leg::LEG.joints.map(|joint| joint.motor.absolute));
-    (thread, (housekeeper, housekeeping_ends, Odrive::new(gate_drivers)), storage)
+    (thread, (housekeeper, housekeeping_ends, Odrive::new(board.gate_drivers)), storage)
 }
 
 /// Default node numbers of hip and knee.
@@ -163,10 +162,9 @@ fn join(
         let motor = &leg::LEG.joints[joint].motor;
         AxisConstants::of(&configuration.joints[joint], motor.counts_per_turn, motor.ratio, drives::BANDWIDTH)
     });
-    let [low, middle, high] = identity.unique;
+    let serial = crate::bus::Identity::serial(identity.unique);
     let checksum = program::checksum();
-    let identity =
-        crate::bus::Identity { checksum, ..crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6") };
+    let identity = crate::bus::Identity { checksum, ..crate::bus::Identity::scarab(serial, "ODrive v3.6") };
     let (plan, seed) = (configuration.plan, configuration.swarm_seed);
     let device = memory::device(|| bus::BoardDevice::new(NODES, identity, constants, plan, seed));
     let mut storage = memory::storage();
@@ -198,6 +196,7 @@ fn join(
     // A controller that does not answer stays off (`can::status`): the operator keeps the leg, and a record
     // reports the fault.
     if !can::start(device.bit_rate().unwrap_or(USUAL_KBIT)) {
+        // There is space: the queue is new.
         let _ = notes.enqueue(Record::AxisFault { tick: 0, joint: 0, name: "bus_controller" });
     }
     let (frames, servo, thread, end, bus) = memory::bus().split(device);

@@ -105,6 +105,7 @@ pub const fn refusal(reason: RefusalReason) -> &'static str {
         RefusalReason::Moving => "moving",
         RefusalReason::Encoder => "encoder",
         RefusalReason::NoTransition => "no_transition",
+        RefusalReason::NoAssistance => "no_assistance",
     }
 }
 

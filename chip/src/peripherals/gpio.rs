@@ -106,6 +106,15 @@ impl Gpio {
         self.mode(pin) == Mode::Output && self.ports[index(pin.0)].output >> pin.1 & 1 == 1
     }
 
+    /// Whether neither processor nor board holds a pin's level. JTAG's pins, function 0, are not driven.
+    #[must_use]
+    pub fn is_floating(&self, pin: Pin) -> bool {
+        let port = &self.ports[index(pin.0)];
+        let is_driven = matches!(self.mode(pin), Mode::Output) || port.driven >> pin.1 & 1 == 1;
+        let is_other = matches!(self.mode(pin), Mode::Alternate(function) if function != 0);
+        !is_driven && !is_other && port.pull >> (2 * pin.1) & 3 == 0
+    }
+
     /// Sets the level that the board applies to a pin. Returns whether the pin's level changed, and to what.
     pub fn apply(&mut self, (port, pin): Pin, level: bool) -> Option<bool> {
         let before = self.level((port, pin));

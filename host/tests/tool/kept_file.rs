@@ -17,8 +17,8 @@ const NODES: &str = r#"
 joint = "hip"
 objects = [
   { index = 0x1017, subindex = 0, name = "Producer heartbeat time", value = 50 },
-  { index = 0x1800, subindex = 1, name = "COB-ID used by TPDO 1", value = 0x00000281 },
-  { index = 0x1801, subindex = 1, name = "COB-ID used by TPDO 2", value = 0x80000181 },
+  { index = 0x1800, subindex = 1, name = "COB-ID used by TPDO 1", value = 0x40000281 },
+  { index = 0x1801, subindex = 1, name = "COB-ID used by TPDO 2", value = 0xC0000181 },
   { index = 0x2001, subindex = 0, name = "Node-ID after the next start", value = 9 },
   { index = 0x607D, subindex = 1, name = "Min position limit", value = -500000 },
   { index = 0x607D, subindex = 2, name = "Max position limit", value = 1500000 },
@@ -259,7 +259,7 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
         ("\"Producer heartbeat time\"", "\"Device type\"", "is `Producer heartbeat time`, not `Device type`"),
         ("value = 9", "value = 200", "0x2001:0 (Node-ID after the next start): a node refuses this value"),
         (
-            "value = 0x00000281",
+            "value = 0x40000281",
             "value = 0x40000001",
             "0x1800:1 (COB-ID used by TPDO 1): a node refuses this value",
         ),

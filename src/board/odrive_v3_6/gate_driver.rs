@@ -38,17 +38,19 @@ pub(super) fn configuration() -> Config {
 }
 
 impl GateDrivers {
-    pub(super) fn new(spi: Spi<'static, Blocking, Master>) -> Self {
-        Self { spi, encoders: [AbsoluteEncoders::NONE; 2] }
+    /// Deselects all encoders, before any transfer.
+    pub(super) fn new(spi: Spi<'static, Blocking, Master>, encoders: [AbsoluteEncoders; 2]) -> Self {
+        for (axis, encoders) in encoders.into_iter().enumerate() {
+            absolute_encoders::deselect(axis, encoders, apply);
+        }
+        Self { spi, encoders }
     }
 
-    /// Adds absolute encoders and deselects them.
-    #[must_use]
-    pub fn with_encoders(self, encoders: [AbsoluteEncoders; 2]) -> Self {
-        for (axis, encoders) in encoders.into_iter().enumerate() {
-            absolute_encoders::prepare(axis, encoders, apply);
+    /// Masks the interrupts of index inputs that are no index.
+    pub(super) fn mask_indices(&self) {
+        for (axis, encoders) in self.encoders.into_iter().enumerate() {
+            absolute_encoders::mask_index(axis, encoders, apply);
         }
-        Self { encoders, ..self }
     }
 
     /// Frame with an encoder's angle; all ones without that encoder. After an error the chip's error register

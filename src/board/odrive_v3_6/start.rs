@@ -17,6 +17,7 @@ use super::settings::{
 use super::{interrupts, watchdog};
 use crate::board::crash::{self, Crash};
 use crate::board::stack;
+use crate::leg::AbsoluteEncoders;
 
 /// A started board, all outputs off.
 pub struct Board {
@@ -38,8 +39,9 @@ const PATIENCE: u32 = 100_000;
 /// Readings of the bridges' shift, one of which must be right: an interrupt between the loads falsifies one.
 const SHIFT_READINGS: u32 = 4;
 
-/// Starts everything but the interrupts of the current loops. Call once, before anything else.
-pub fn start() -> Board {
+/// Starts everything but the interrupts of the current loops. Call once, before anything else. `encoders` of
+/// each axis share the gate drivers' bus.
+pub fn start(encoders: [AbsoluteEncoders; 2]) -> Board {
     stack::prepare();
     apply(&CLOCKS);
     for pin in &pins::GATES_OFF {
@@ -63,13 +65,14 @@ pub fn start() -> Board {
         peripherals.PC11,
         gate_driver::configuration(),
     );
-    let mut gate_drivers = GateDrivers::new(spi);
+    let mut gate_drivers = GateDrivers::new(spi, encoders);
     gate_drivers.restart();
     let gates_configured = gate_drivers.configure();
 
     let timers_in_phase = start_timers();
     apply(&converters::TRIGGERED);
     apply(&external::EXTERNAL);
+    gate_drivers.mask_indices();
     let mut core = cortex_m::Peripherals::take();
     if let Some(core) = core.as_mut() {
         core.DCB.enable_trace();

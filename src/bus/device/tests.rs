@@ -495,14 +495,35 @@ fn a_refusal_of_one_tick_is_reported_after_the_bus_was_busy() {
     }
     // The joint comes to rest at once, while every mailbox is occupied.
     (0..4).for_each(|_| bench.tick());
-    let sent: Vec<Frame> = bench.run(1).into_iter().filter(|frame| frame.id() & !3 == 0x80).collect();
+    // The end follows after the inhibit time.
+    let sent: Vec<Frame> = bench.run(50).into_iter().filter(|frame| frame.id() & !3 == 0x80).collect();
     let begin = [0x0E, 0xFF, 0x81, 1, 21, 0, 0, 0];
     assert_eq!(
         sent,
-        [(0x81, begin), (0x81, [0; 8]), (0x82, begin), (0x82, [0; 8])]
+        [(0x81, begin), (0x82, begin), (0x81, [0; 8]), (0x82, [0; 8])]
             .map(|(id, data)| Frame::new(id, &data))
     );
     assert_eq!((bench.read(1, 0x603F), bench.read(2, 0x603F)), (0xFF0E, 0xFF0E));
+}
+
+#[test]
+fn refusals_begin_at_most_once_a_second() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    let mut begins = Vec::new();
+    while bench.now_us < 5 * REFUSAL_US {
+        // A host that repeats words for which there is no step, and takes them back.
+        for word in [15, 0] {
+            let sent = bench.word(word);
+            let is_begin = |frame: &&Frame| frame.data()[0] == 0x0E;
+            begins.extend(sent.iter().filter(is_begin).map(|frame| (frame.id(), bench.now_us)));
+        }
+    }
+    for node in [0x81, 0x82] {
+        let times: Vec<u64> = begins.iter().filter(|(id, _)| *id == node).map(|(_, us)| *us).collect();
+        assert_eq!(times.len(), 5, "{times:?}");
+        assert!(times.windows(2).all(|pair| pair[1] - pair[0] > REFUSAL_US - 10_000), "{times:?}");
+    }
 }
 
 #[test]
@@ -546,7 +567,8 @@ fn a_step_that_does_not_exist_is_reported_until_a_step_is_made() {
         assert_eq!((0..50).flat_map(|_| bench.word(word)).collect::<Vec<_>>(), []);
         let noted: Vec<Refusal> = bench.orders.iter().filter_map(|order| order.refused).collect();
         assert_eq!(noted, [Refusal { joint: 0, reason: RefusalReason::NoTransition }]);
-        // The second joint still has the word when the first one goes on.
+        // The second joint still has the word when the first one goes on, a second later.
+        bench.now_us += REFUSAL_US;
         let sent: Vec<Frame> = [6, 7, 15].into_iter().flat_map(|word| bench.word(word)).collect();
         assert_eq!(sent, [out_of_order(2)[0].to_vec(), ends.to_vec()].concat(), "{word:x}");
         assert_eq!(bench.drive, DriveState::OperationEnabled);
@@ -569,7 +591,7 @@ fn a_step_during_a_quick_stop_is_reported_as_refused() {
         sent.retain(|frame| matches!(frame.id(), 0x81 | 0x82));
         assert_eq!(sent, out_of_order(1)[0], "{word:x}");
         // The word is not carried out later; sent again, a 6 is.
-        bench.run(20);
+        bench.run(40);
         assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
         assert_eq!(bench.word(6), out_of_order(1)[1]);
         assert_eq!(bench.drive, DriveState::ReadyToSwitchOn);

@@ -219,3 +219,32 @@ fn another_pdo_does_not_end_the_error_of_a_late_one() {
     board.receive(0x201, &[0, 0]);
     assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), ([0].into(), Ok(0)));
 }
+
+#[test]
+fn a_sync_without_its_counter_is_an_error_until_a_valid_one() {
+    let mut board = started();
+    assert_eq!(board.write(0x1019, 0, 10, 1), Ok(()));
+    let mut emergency = |data: &[u8]| {
+        board.receive(0x80, data);
+        let sent = board.run(80);
+        let own = sent.into_iter().find(|frame| frame.id() == 0x81);
+        own.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]))
+    };
+    // A counter out of its range has the right length.
+    let expected = [(&[1][..], None), (&[], Some(0x8240)), (&[], None), (&[11], None), (&[2], Some(0))];
+    for (data, code) in expected {
+        assert_eq!(emergency(data), code, "{data:?}");
+    }
+}
+
+#[test]
+fn a_transmitted_pdo_says_no_remote_frames_and_keeps_its_inhibit_time_while_it_exists() {
+    let mut board = started();
+    for (cob, read) in [(0x181, 0x4000_0181), (0x4000_0181, 0x4000_0181), (0x8000_0181, 0xC000_0181)] {
+        assert_eq!(board.write(0x1800, 1, cob, 4), Ok(()), "{cob:x}");
+        assert_eq!(board.read(0x1800, 1), Ok(read));
+        let expected = if cob & 1 << 31 == 0 { Err(Abort::Access as u32) } else { Ok(()) };
+        assert_eq!(board.write(0x1800, 3, 20, 2), expected, "{cob:x}");
+    }
+    assert_eq!(board.read(0x1800, 3), Ok(20));
+}

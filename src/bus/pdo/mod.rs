@@ -29,6 +29,8 @@ pub const MAPPED: usize = 8;
 /// Bit of a COB-ID: the message does not exist.
 pub(super) const ABSENT: u32 = 1 << 31;
 const EXTENDED: u32 = 1 << 29;
+/// A transmitted PDO is not sent on a remote frame.
+const NO_REMOTE: u32 = 1 << 30;
 /// Bits used only by extended identifiers.
 const BEYOND: u32 = 0x1FFF_F800;
 
@@ -115,6 +117,7 @@ impl Parameters {
     /// Reads an object of 1400 or 1800.
     pub(super) fn communication(&self, sub: u8) -> Result<u32, Abort> {
         match sub {
+            1 if self.direction == Mapping::Transmit => Ok(self.identifier | NO_REMOTE),
             1 => Ok(self.identifier),
             2 => Ok(u32::from(self.kind)),
             3 => Ok(u32::from(self.inhibit)),
@@ -130,6 +133,11 @@ impl Parameters {
         match sub {
             1 => return self.set_identifier(value),
             2 if matches!(value, 0..=240 | 254 | 255) => self.kind = value as u8,
+            // Hosts that write the whole configuration write it unchanged.
+            3 if value == u32::from(self.inhibit) => {}
+            3 if self.direction == Mapping::Transmit && self.identifier().is_some() => {
+                return Err(Abort::Access);
+            }
             3 => self.inhibit = value as u16,
             4 if value == 0 => {}
             5 => self.event_ms = value as u16,

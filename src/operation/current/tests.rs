@@ -14,6 +14,7 @@ use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{Axis, AxisConfiguration, SenseScale};
 use crate::units::Hertz;
 
+mod reported;
 mod requests;
 mod stop;
 

@@ -87,7 +87,8 @@ impl Bench {
     }
 
     fn rest(&mut self) {
-        self.side.rest(&mut self.host, &self.signals, &mut self.hardware);
+        let drive = DriveState::NotReadyToSwitchOn;
+        self.side.rest(drive, &mut self.host, &self.signals, &mut self.hardware);
         self.take_report();
     }
 

@@ -140,7 +140,9 @@ impl<const N: usize> Housekeeper<N> {
     /// Discards the joints' zeros, also a reference in progress.
     pub(super) fn forget_zeros(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         level.signals.end_servo();
-        (self.drive, self.reference, self.placed) = (None, None, false);
+        (self.reference, self.placed) = (None, false);
+        // The servo sends the state of a leg that rests; its fault may have come before.
+        self.drive = self.drive.filter(|drive| drive.fault().is_some());
     }
 
     /// Sets the rotor position at count zero of an axis that begins to run at this counter reading.
@@ -181,7 +183,8 @@ impl<const N: usize> Housekeeper<N> {
         self.reference = Some(reference).filter(|_| standing);
         let all = reference.poses.iter().all(|(_, found)| *found);
         let accepted = match (standing, reference.is_absolute) {
-            (true, _) if !all => return,
+            // A position that an axis does not get would be a wrong zero.
+            (true, _) if !all || !level.takes_orders() => return,
             // The encoders need no decision of the operator, so they wait for a leg at rest.
             (false, true) => return,
             (true, true) => {
@@ -240,7 +243,7 @@ impl<const N: usize> Housekeeper<N> {
         if zero.is_some()
             && let Some(passed) = self.passed.get(axis).copied().flatten()
         {
-            self.passes(axis, Some(StoredCalibration { joint_zero: zero, ..passed }), level);
+            self.passes(axis, Some(StoredCalibration { joint_zero: zero, ..passed }));
         }
     }
 
@@ -286,6 +289,7 @@ impl<const N: usize> Housekeeper<N> {
         let Some(origin) = self.origins.get_mut(axis) else { return 0 };
         let rotor = origin.wrapping_add(counts(axis, level));
         *origin = rotor.wrapping_sub(to);
+        // There is space: checked before.
         level.order(axis, Order::Place(to));
         rotor
     }

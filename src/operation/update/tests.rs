@@ -169,6 +169,11 @@ fn a_damaged_or_incomplete_image_is_refused_and_a_sound_one_accepted_afterwards(
         assert!(!bench.command(ProgramCommand::Start));
         assert_eq!((bench.error(), bench.memory.swaps), (error as u8, false));
         assert!(bench.signals.program_status().has(ProgramStatus::STOPPED));
+        // The next start leaves the update, and the error stays shown.
+        let mut leaves = Bench { update: bench.update, ..Bench::new() };
+        assert!(leaves.command(ProgramCommand::Start));
+        leaves.update.end(false, &leaves.signals);
+        assert_eq!(leaves.signals.program_status(), ProgramStatus((error as u32) << 1));
     }
     assert!(!bench.command(ProgramCommand::Clear));
     bench.send(&good);

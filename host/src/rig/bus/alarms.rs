@@ -30,6 +30,7 @@ pub fn reason(bit: u8) -> &'static str {
         bit if bit == Reason::NoTransition as u8 => {
             "no such step from this state; send controlword 6 first, without bit 7"
         }
+        bit if bit == Reason::NoAssistance as u8 => "assistance: no fitting model, or the joints move",
         _ => "unknown reason",
     }
 }
@@ -50,6 +51,7 @@ pub fn words(code: u16, information: [u8; 5]) -> String {
         }
         (_, Some(NoticeCode::Overrun)) => "received frames were lost".into(),
         (_, Some(NoticeCode::ShortPdo)) => "a received PDO is shorter than its mapping".into(),
+        (_, Some(NoticeCode::SyncLength)) => "a SYNC has no counter, which 1019 expects".into(),
         (_, Some(NoticeCode::StoreFailed)) => "objects could not be stored or read back".into(),
         (_, Some(NoticeCode::Storing)) => "sends nothing while it writes its flash".into(),
         (None, None) => "unknown code".into(),

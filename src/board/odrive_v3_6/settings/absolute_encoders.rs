@@ -44,13 +44,17 @@ pub fn select(axis: usize, place: EncoderPlace, encoders: AbsoluteEncoders) -> O
     lines.get(axis).copied()
 }
 
-/// Writes the select lines of an axis' encoders, all deselected. Without an index its interrupt is masked.
-pub fn prepare(axis: usize, encoders: AbsoluteEncoders, mut write: impl FnMut(&[Write])) {
+/// Masks the interrupt of an axis' index where the encoder at its rotor has none.
+pub fn mask_index(axis: usize, encoders: AbsoluteEncoders, mut write: impl FnMut(&[Write])) {
     if encoders.rotor
         && let Some(line) = INDEX_LINES.get(axis)
     {
         write(&[masked(*line)]);
     }
+}
+
+/// Deselects an axis' encoders. Before the first transfer: an encoder whose line floats answers as well.
+pub fn deselect(axis: usize, encoders: AbsoluteEncoders, mut write: impl FnMut(&[Write])) {
     for pin in [EncoderPlace::Rotor, EncoderPlace::Joint]
         .into_iter()
         .filter_map(|place| select(axis, place, encoders))

@@ -77,3 +77,25 @@ fn each_running_axis_sends_one_sample_in_six_periods() {
     }
     assert_eq!(samples, [2, 0]);
 }
+
+#[test]
+fn an_outcome_waits_for_space_in_its_queue() {
+    let search = crate::motor::IndexSearch::EMPTY;
+    let mut bench = Bench::new(&CONFIGURATION);
+    let mut ends = bench.queues.current();
+    while ends.outcomes[1].enqueue(Outcome::Index(search)).is_ok() {}
+    bench.loops.axis_state_mut(1).and_then(AxisState::axis_mut).expect("running").lose_position();
+    bench.outcomes.clear();
+    bench.run(2);
+    let is_fault = |outcome: &&(usize, Outcome)| matches!(outcome, (1, Outcome::Fault { lost: true, .. }));
+    assert_eq!(bench.outcomes.iter().filter(is_fault).count(), 1, "{:?}", bench.outcomes);
+    // Searches are not kept: a later pulse repeats them.
+    let mut unsent = None;
+    let Ends { mut current, .. } = bench.queues.split(&mut bench.events);
+    for _ in 0..8 {
+        report(1, Outcome::Index(search), &mut unsent, &mut current, &bench.signals);
+    }
+    assert_eq!(unsent, None);
+    report(1, Outcome::Interrupted, &mut unsent, &mut current, &bench.signals);
+    assert_eq!(unsent, Some(Outcome::Interrupted));
+}
