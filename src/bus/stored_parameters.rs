@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_node_with_defaults_stores_nothing() {
-        assert_eq!(stored(&mut Board::started(3)), []);
+        assert_eq!(stored(&mut Board::with_defaults(3)), []);
     }
 
     #[test]
