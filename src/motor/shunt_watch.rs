@@ -36,7 +36,7 @@ const BEYOND_DEAD_TIME: f32 = 1.25 * 4.0 / 3.0;
 /// Share of a new sample in the low-pass.
 const ZERO_SHARE: f32 = 1.0 / 64.0;
 /// Longest offset vector at which enabling is allowed, A.
-pub(super) const ZERO_A: f32 = 2.0;
+const ZERO_A: f32 = 2.0;
 
 /// State of one shunt.
 #[derive(Clone, Copy, Debug, PartialEq)]
