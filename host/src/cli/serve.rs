@@ -53,12 +53,12 @@ pub struct ServeArguments {
     /// All boards have the node-IDs 1 and 2, as new ones. Otherwise the second has 3 and 4, and so on.
     #[arg(long)]
     new: bool,
-    /// Each leg is on a wearer who moves so while it assists, and is limp otherwise. The boards know the models
-    /// of the empty and the worn leg.
+    /// Each leg is on a wearer who moves so while it assists, and is limp otherwise. The boards know the
+    /// models of the empty and the worn leg.
     #[arg(long, value_enum, help_heading = "Simulated wearer")]
     motion: Option<WearerMotion>,
-    /// The boards are neither calibrated nor have zeros, and the operator's contacts are open. A calibration is
-    /// refused, because the legs hang on their motors.
+    /// The boards are neither calibrated nor have zeros, and the operator's contacts are open. A calibration
+    /// is refused, because the legs hang on their motors.
     #[arg(long, conflicts_with = "enabled_by_contacts")]
     uncalibrated: bool,
     /// The operator's contacts have enabled the legs before a host comes.

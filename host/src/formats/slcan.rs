@@ -109,8 +109,8 @@ fn digit(byte: u8) -> Option<u16> {
     char::from(byte).to_digit(16).map(|digit| digit as u16)
 }
 
-/// Reads the next line without its end, which is one of these bytes; `None` at the end of the input. A bell is
-/// a line of its own where it ends lines. The rest of a line of [`LONGEST_LINE`] bytes is dropped.
+/// Reads the next line without its end, which is one of these bytes; `None` at the end of the input. A bell
+/// is a line of its own where it ends lines. The rest of a line of [`LONGEST_LINE`] bytes is dropped.
 ///
 /// # Errors
 /// Those of the input.
