@@ -157,7 +157,7 @@ impl<const N: usize> ServoLevel<N> {
         let (request, by_hand) = self.next_request(control, ends, signals, hardware);
         // Until the brake is open the drive holds its pose.
         let waits = self.holding_brake.is_some_and(|brake| !brake.is_open());
-// The start button begins nothing while a host has the drive.
+        // The start button begins nothing while a host has the drive.
         let is_hosts = by_hand && self.host.as_ref().is_some_and(HostSide::has_drive);
         let permitted = permitted(request.as_ref(), signals.inhibit.causes(), control.state())
             .filter(|request| !((waits || is_hosts) && request.moves()));
