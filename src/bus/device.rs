@@ -218,6 +218,13 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         }
     }
 
+    /// Sets the inhibit time of every node's emergency messages, for tests of their order.
+    #[cfg(test)]
+    pub(crate) fn with_emergency_inhibit(mut self, inhibit: u16) -> Self {
+        self.nodes.iter_mut().for_each(|node| node.communication_mut().emergency.inhibit = inhibit);
+        self
+    }
+
     /// Handles a frame for every node but its sender. Returns whether a node may have something to send or
     /// do. A reset node recalls its stored parameters at the next call, once for any number of frames.
     pub fn receive<R: Results>(

@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_node_with_defaults_stores_nothing() {
-        assert_eq!(stored(&mut Board::started(3)), []);
+        assert_eq!(stored(&mut Board::with_defaults(3)), []);
     }
 
     #[test]
@@ -301,7 +301,7 @@ mod tests {
 
     #[test]
     fn a_tool_encodes_like_the_node_and_refusals_name_the_object() {
-        let mut board = Board::started(1);
+        let mut board = Board::with_defaults(1);
         assert_eq!(board.write(0x1017, 0, 50, 2), Ok(()));
         assert_eq!(board.write(0x6007, 0, 1, 2), Ok(()));
         let mut bytes = [0; LONGEST];

@@ -393,7 +393,8 @@ pub(super) fn device() -> Device<2, 4> {
         ..AxisConstants::UNKNOWN
     };
     let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
-    Device::new(own, Identity::scarab(1, "test"), [constants; 2], Plan::OneTime, 1)
+    let identity = Identity::scarab(1, "test");
+    Device::new(own, identity, [constants; 2], Plan::OneTime, 1).with_emergency_inhibit(0)
 }
 
 /// Commands of a host that has the drive.

@@ -169,6 +169,7 @@ fn a_controller_state_becomes_an_emergency_message() {
     let mut node = Node::new(NodeId::new(9).expect("a number"), super::super::tests::IDENTITY);
     let mut axis = axis();
     node.poll(0, &mut axis);
+    node.communication_mut().emergency.inhibit = 0;
     for (state, code) in [
         (Controller::Overrun, 0x8110_u16),
         (Controller::Passive, 0x8120),

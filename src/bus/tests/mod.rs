@@ -66,10 +66,19 @@ impl Board {
         }
     }
 
-    /// Board after the boot-up messages and one tick of the leg.
-    pub fn started(first: u8) -> Self {
+    /// Board after the boot-up messages and one tick of the leg, with the default of every object.
+    pub fn with_defaults(first: u8) -> Self {
         let mut board = Self::new(first);
         assert_eq!(board.tick().len(), 2);
+        board
+    }
+
+    /// The same board whose emergency messages do not wait for each other (1015).
+    pub fn started(first: u8) -> Self {
+        let mut board = Self::with_defaults(first);
+        for node in &mut board.nodes {
+            node.communication_mut().emergency.inhibit = 0;
+        }
         board
     }
 

@@ -75,8 +75,8 @@ fn the_recorded_session_configures_pdos_while_operational() {
         let node = u32::from(board.nodes[0].id().number());
         assert_eq!(board.nodes[0].state(), NmtState::Operational);
         let expected = [
-            (0x1800, 1, 0x180 + node),
-            (0x1801, 1, 0x280 + node),
+            (0x1800, 1, 0x4000_0180 + node),
+            (0x1801, 1, 0x4000_0280 + node),
             (0x1803, 2, 1),
             (0x1A01, 0, 2),
             (0x1A01, 2, 0x606C_0020),

@@ -29,7 +29,7 @@ fn is_of_the_leg(object: Object) -> bool {
 #[test]
 fn every_object_has_the_default_of_the_table() {
     for (object, row) in objects().filter(|(object, _)| !is_live(*object)) {
-        let mut board = Board::started(5);
+        let mut board = Board::with_defaults(5);
         let expected = row.default + if row.plus_node { 5 } else { 0 };
         assert_eq!(board.read(object.index, object.sub), Ok(expected), "{object:x?}");
     }

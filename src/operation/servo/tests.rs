@@ -210,7 +210,7 @@ fn a_restarted_leg_is_off_and_has_no_targets() {
     bench.tick();
     assert_eq!(bench.control.state(), DriveState::SwitchOnDisabled);
     // The state is reported once more.
-    assert_eq!(bench.states, [DriveState::SwitchOnDisabled]);
+    assert_eq!(bench.states, [DriveState::NotReadyToSwitchOn, DriveState::SwitchOnDisabled]);
 }
 
 #[test]
@@ -291,11 +291,20 @@ fn only_requests_that_turn_off_pass_while_inhibited() {
     let mut bench = Bench::enabled();
     bench.signals.inhibit.raise(InhibitReason::EmergencyStop);
     bench.tick();
-    assert_eq!(
-        (bench.control.state(), bench.signals.target(0).enabled),
-        (DriveState::SwitchOnDisabled, false)
-    );
-    bench.ask(ControlRequest::Power(PowerRequest::Shutdown));
+    let state = DriveState::Fault { fault: Fault { code: FaultCode::EmergencyStop, joint: 0 } };
+    assert_eq!((bench.control.state(), bench.signals.target(0).enabled), (state, false));
+    for request in [PowerRequest::Shutdown, PowerRequest::ResetFault] {
+        bench.ask(ControlRequest::Power(request));
+        bench.tick();
+        assert_eq!(bench.control.state(), state);
+    }
+    bench.signals.inhibit.reset();
+    bench.ask(ControlRequest::Power(PowerRequest::ResetFault));
+    bench.tick();
+    assert_eq!(bench.control.state(), DriveState::SwitchOnDisabled);
+    // A flash write that was asked for is no fault.
+    let mut bench = Bench::enabled();
+    bench.signals.inhibit.raise(InhibitReason::Storing);
     bench.tick();
     assert_eq!(bench.control.state(), DriveState::SwitchOnDisabled);
 }

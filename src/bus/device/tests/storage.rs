@@ -155,6 +155,7 @@ fn a_communication_reset_leaves_the_drive_objects_unchanged() {
 #[test]
 fn both_nodes_share_the_bit_rate() {
     let mut bench = Bench::new();
+    bench.device = bench.device.with_emergency_inhibit(100);
     bench.write(2, 0x2002, 0, 500, 2);
     assert_eq!(bench.read(1, 0x2002), 500);
     bench.save(1);
@@ -196,7 +197,8 @@ fn the_controller_state_survives_a_node_reset() {
     assert_eq!(codes_of(&frames).first(), Some(&(0x81, 0x8120)), "{frames:?}");
     assert_eq!(bench.read(1, 0x1001), 0x11);
     bench.device.on_controller(Controller::Active, &NOTHING);
-    assert_eq!(codes_of(&bench.run(4)), [(0x81, 0), (0x82, 0)]);
+    // The reset node has the default inhibit time again.
+    assert_eq!(codes_of(&bench.run(50)), [(0x82, 0), (0x81, 0)]);
 }
 
 #[test]

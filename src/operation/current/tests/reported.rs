@@ -92,6 +92,7 @@ impl Bus {
     fn enabled() -> Self {
         let mut bench = Self::resting();
         bench.signals.begin_servo();
+        bench.run(4);
         [6, 7, 15].into_iter().for_each(|word| bench.word(word));
         assert_eq!(bench.states(), [0x27; 2]);
         bench
@@ -208,6 +209,7 @@ fn reports(mut bench: Bus, code: FaultCode, origin: Origin, case: &str) {
     assert_eq!(bench.emergencies(), [(); 2].map(|()| Vec::from([end])), "{case}: end");
     // No zero of the joints comes back with the reset, and the fault does not.
     bench.signals.begin_servo();
+    bench.run(4);
     [6, 7, 15].into_iter().for_each(|word| bench.word(word));
     assert_eq!(bench.states(), [0x27; 2], "{case}: enabled again");
 }
