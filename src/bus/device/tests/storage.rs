@@ -155,7 +155,6 @@ fn a_communication_reset_leaves_the_drive_objects_unchanged() {
 #[test]
 fn both_nodes_share_the_bit_rate() {
     let mut bench = Bench::new();
-    // The default.
     bench.device = bench.device.with_emergency_inhibit(100);
     bench.write(2, 0x2002, 0, 500, 2);
     assert_eq!(bench.read(1, 0x2002), 500);
