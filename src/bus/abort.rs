@@ -28,6 +28,8 @@ pub enum Abort {
     NotMappable = 0x0604_0041,
     /// The mapped objects exceed the eight bytes of a PDO.
     PdoLength = 0x0604_0042,
+    /// Another parameter stands against the value: both consumers (1016) would watch the same node.
+    Incompatible = 0x0604_0043,
     /// The value has more bytes than the object.
     TooLong = 0x0607_0012,
     /// The value has fewer bytes than the object.

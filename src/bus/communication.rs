@@ -165,6 +165,13 @@ impl Communication {
             (0x1015, _) => self.emergency.inhibit = value as u16,
             (0x1016, 1..) => {
                 let place = sub - 1;
+                let watches = |setting: u32| (setting & 0xFFFF != 0).then_some(setting >> 16);
+                let mut others =
+                    self.consumers.iter().enumerate().filter(|(other, _)| *other != usize::from(place));
+                let is_taken = others.any(|(_, other)| watches(other.setting()) == watches(value));
+                if is_taken && watches(value).is_some() {
+                    return Err(Abort::Incompatible);
+                }
                 self.consumers.get_mut(usize::from(place)).ok_or(Abort::NoSubindex)?.set(value)?;
                 // Monitoring restarts, so an earlier loss is no longer active.
                 self.emergency.set(Source::Heartbeat(place), None);

@@ -7,7 +7,7 @@
 //! ```text
 //! range     an enabled joint is in its range, or no farther out than it can be stopped
 //! cap       no torque above the joint's limit
-//! targets   no commanded motion before a target of this session: none was sent since the leg was last off
+//! targets   no commanded motion before a target of this session: none was sent since the leg was last enabled
 //! steps     no torque grows by a tenth of its limit in a tick unless a target came, or the leg is stopped
 //! faults    the code of a fault is heard from both nodes, if they can send
 //! again     at the end a well-behaved host enables the leg, or a reason is stated
@@ -20,7 +20,7 @@ use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRu
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use scarab::bus::Frame;
 use scarab::hal::{Contacts, SERVO_RATE_HZ};
-use scarab::leg::{Activity, DriveState, Permission};
+use scarab::leg::{Activity, DriveState};
 use scarab::model::planar::{BASE, JOINTS};
 use scarab_host::formats::kept_file::memory::Memory;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
@@ -144,7 +144,7 @@ struct Bench {
     ticks: u64,
     state: DriveState,
     torque: [f32; JOINTS],
-    /// Tick of the last target, and whether one was sent since the leg was last off.
+    /// Tick of the last target, and whether one was sent since the leg was last enabled.
     target: Option<u64>,
     targets: bool,
     /// Code that must be heard from each node, and the tick in which the leg had it.
@@ -226,7 +226,7 @@ impl Bench {
         let decision = &output.servo.decision;
         let before = core::mem::replace(&mut self.state, decision.state);
         let torque = core::mem::replace(&mut self.torque, decision.torque.map(|torque| torque.0));
-        if decision.state.permission() == Permission::Off && before.permission() != Permission::Off {
+        if before.is_enabled() && !decision.state.is_enabled() {
             // A frame that is on its way belongs to the next session.
             self.targets = self.target.is_some_and(|at| ticks - at < 4);
         }

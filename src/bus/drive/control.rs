@@ -13,9 +13,10 @@
 //! bit 8         halt
 //! ```
 //!
-//! **Targets end with the session that wrote them.** When the joint is disabled, when the host is lost, or while
-//! another activity has the leg, targets and offsets become void. In a mode whose target is void the joint holds
-//! its pose until the host writes that target again; a void offset is 0. The objects still read as written.
+//! **Targets end with the session that wrote them.** When the joint is disabled, when the host is lost, or
+//! while another activity has the leg, targets and offsets become void. In a mode whose target is void the
+//! joint holds its pose until the host writes that target again; a void offset is 0. The objects still read
+//! as written.
 //!
 //! **Disable voltage from a host that does not control the leg** (0 by SDO, while the operator's contacts have
 //! enabled it) turns the leg off too, and leaves it to the operator. A 0 that a PDO repeats is idle.

@@ -205,6 +205,23 @@ fn reconfiguring_a_heartbeat_ends_its_error_and_the_next_is_reported() {
 }
 
 #[test]
+fn two_consumers_do_not_watch_the_same_node() {
+    let mut board = started();
+    let watch = |node: u32, time: u32| node << 16 | time;
+    for (sub, setting, expected) in [
+        (1, watch(80, 10), Ok(())),
+        (2, watch(80, 20), Err(Abort::Incompatible as u32)),
+        (2, watch(80, 0), Ok(())),
+        (2, watch(81, 20), Ok(())),
+        (1, watch(80, 30), Ok(())),
+        (1, watch(0, 0), Ok(())),
+        (2, watch(80, 20), Ok(())),
+    ] {
+        assert_eq!(board.write(0x1016, sub, setting, 4), expected, "{sub} {setting:x}");
+    }
+}
+
+#[test]
 fn another_pdo_does_not_end_the_error_of_a_late_one() {
     let mut board = started();
     for (object, value) in [(0x1400, 100), (0x1401, 0)] {
