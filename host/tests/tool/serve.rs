@@ -99,8 +99,9 @@ impl Client {
     pub fn at(address: &str) -> Self {
         let mut client = Self::silent(address);
         client.say("C\rS8\rO\r");
+        // Frames of other participants may come between the three answers.
         for _ in 0..3 {
-            assert_eq!(client.line().as_deref(), Some(""));
+            while client.line().expect("a connection") != "" {}
         }
         client
     }
@@ -419,13 +420,20 @@ fn an_uncalibrated_board_enables_nothing_and_says_why() {
     let mut client = Client::new(&serve);
     // Neither calibrated nor with zeros, and the switch is open.
     assert_eq!(client.read(1, 0x2160, 2) & 0b111, 0);
-    [6, 7, 15].into_iter().for_each(|word| client.write(1, 0x6040, 0, word, 2));
-    serve.waits_for("leg 1: emergency FF0E: a step towards enabled is refused: ");
+    client.frame(0, &[1, 0]);
+    // A frame that comes late enables nothing, so it is repeated.
+    let begin = Instant::now();
+    while !serve.errors().contains("leg 1: emergency FF0E: a step towards enabled is refused: ") {
+        assert!(begin.elapsed() < PATIENCE, "{}", serve.errors());
+        client.frame(0x201, &[6, 0]);
+        thread::sleep(20 * MS);
+    }
     assert_ne!(client.state(1), ENABLED);
     assert_ne!(client.read(1, 0x60FD, 0) & 1 << 19, 0, "not calibrated");
 }
 
 #[test]
+#[ignore = "campaign: .ci/full"]
 fn a_wearer_kicks_while_the_leg_assists() {
     let serve = Serve::at("127.0.0.1:0", "--motion kicking");
     let mut client = Client::new(&serve);
