@@ -364,13 +364,16 @@ fn an_enabled_leg_is_taken_over_without_a_step_in_every_mode() {
                 }),
             };
         }
+        let mut last = before;
         for _ in 0..SECOND {
             let torque = hosted.tick(None).servo.decision.torque;
             for joint in 0..JOINTS {
-                let (step, moved) =
-                    (torque[joint].0 - before[joint].0, hosted.truth(joint) as f32 - place[joint]);
-                assert!(step.abs() < 6.0 && moved.abs() < 0.01, "{number} {joint}: {step} N m, {moved} rad");
+                let moved = hosted.truth(joint) as f32 - place[joint];
+                // The torque that holds the joint within its friction may drift, but does not step.
+                let step = torque[joint].0 - last[joint].0;
+                assert!(step.abs() < 4.0 && moved.abs() < 0.01, "{number} {joint}: {step} N m, {moved} rad");
             }
+            last = torque;
         }
         assert!(is_enabled(&hosted.pair), "{number}");
     }
