@@ -8,7 +8,7 @@
 //! message = error code, 2 bytes | error register, 1 byte | information, 5 bytes          identifier: 1014
 //! ```
 //!
-//! Source: CiA 301, emergency object. Limits: at most four messages wait. A further change enters the history;
+//! Source: CiA 301, emergency object. Limits: at most four messages wait. A further one enters the history;
 //! once the four are sent, its source sends its present state, ended errors first. So the last messages of a
 //! burst say what is the case.
 

@@ -7,7 +7,7 @@
 //! ```text
 //! range     an enabled joint is in its range, or no farther out than it can be stopped
 //! cap       no torque above the joint's limit
-//! targets   no commanded motion before a target of this session: none was sent since the leg was last enabled
+//! targets   no commanded motion before a target of this session: none since the leg was last enabled
 //! steps     no torque grows by a tenth of its limit in a tick unless a target came, or the leg is stopped
 //! faults    the code of a fault is heard from both nodes, if they can send
 //! again     at the end a well-behaved host enables the leg, or a reason is stated

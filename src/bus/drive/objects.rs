@@ -24,7 +24,7 @@ fn is_default_or_within(value: u32, [least, most]: [u16; 2]) -> bool {
 }
 
 impl Axis {
-    /// Sets a limit of the position (607D). While the joint is powered, its place must stay within the limits.
+    /// Sets a limit of the position (607D). A powered joint's place must stay within the limits.
     fn set_range(&mut self, sub: u8, limit: i32) -> Result<(), Abort> {
         let [low, high] = self.settings.range;
         let range = if sub == 1 { [limit, high] } else { [low, limit] };

@@ -73,7 +73,7 @@ impl Board {
         board
     }
 
-    /// The same board whose emergency messages do not wait for each other (1015).
+    /// Started board whose emergency messages do not wait for each other (1015).
     pub fn started(first: u8) -> Self {
         let mut board = Self::with_defaults(first);
         for node in &mut board.nodes {
