@@ -21,7 +21,7 @@ use scarab_host::image::build;
 use scarab_host::leg::two_bodies::MuscleTone;
 use scarab_host::rig::options::{DriveModel, SimulationOptions};
 use scarab_host::rig::pair::{Context, Pair};
-use scarab_host::run::assist::motions::{Exercise, hip_and_knee};
+use scarab_host::leg::exercise::{Exercise, hip_and_knee};
 use scarab_host::run::assist::study::Mode;
 use scarab_host::run::assist::subject::{Cuffs, Subject};
 use serde::Serialize;

@@ -79,8 +79,8 @@ impl<const N: usize> HostSide<N> {
         self.following.restart();
     }
 
-    /// Runs instead of a tick while the leg has no zeros: reports the drive's state and drops orders,
-    /// except for the reset of a fault. Returns whether a host requests that. A lost host stops nothing here, and its
+    /// Runs instead of a tick while the leg has no zeros: reports the drive's state and drops orders, except
+    /// for the reset of a fault. Returns whether a host requests that. A lost host stops nothing here; its
     /// node reports it.
     pub fn rest(
         &mut self,
