@@ -188,7 +188,7 @@ impl JointCommand {
         match &mut self.target {
             Target::ProfilePosition(SetPoint { position, relative: false, .. })
             | Target::CyclicPosition { position, .. }
-            | Target::Impedance(ImpedanceTarget { position, .. }) => *position = *position - zero,
+            | Target::Impedance(ImpedanceTarget { position, .. }) => *position -= zero,
             _ => {}
         }
         self.range = self.range.map(|end| end - zero);
