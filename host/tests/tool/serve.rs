@@ -101,7 +101,7 @@ impl Client {
         client.say("C\rS8\rO\r");
         // Frames of other participants may come between the three answers.
         for _ in 0..3 {
-            while client.line().expect("a connection") != "" {}
+            while !client.line().expect("a connection").is_empty() {}
         }
         client
     }
