@@ -10,7 +10,7 @@
 //! Nothing is remembered here: each step reads from the board whether it is done already. So an interrupted
 //! procedure is resumed by starting it again. The operator's part is asked for in words, and the board itself
 //! says when it is done: a step that it refuses because of the switch is asked again until the switch is
-//! right. What the board itself answers meanwhile (FF0E, 2160:3) is shown.
+//! right. What the board answers (FF0E, 2160:3) is shown.
 //!
 //! Another host ends the procedure ([`OtherHosts`]): it would be taken for the operator's hand.
 

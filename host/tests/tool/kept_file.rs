@@ -321,6 +321,12 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
         );
         assert_eq!(fs::read(&flash).expect("still there"), before, "{new}");
     }
+}
+
+#[test]
+fn too_many_objects_and_a_file_of_another_size_are_refused() {
+    let folder = Folder::new();
+    let flash = folder.path("flash.bin");
     // More than a board stores for a node.
     let many: Vec<String> = (0x1A00..0x1A04)
         .flat_map(|index| {
@@ -335,7 +341,7 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
     assert!(said.contains("more than the 400 bytes that a board stores for a node"), "{said}");
     // A file of another size is not a flash and stays unchanged.
     fs::write(&flash, [0xFF; 100]).expect("a temporary file");
-    let said = import(&folder, &whole, &flash).refusal();
+    let said = import(&folder, &text(), &flash).refusal();
     assert!(said.contains("100 bytes; the flash of 1 to 4 boards has 32768 each"), "{said}");
     assert_eq!(fs::read(&flash).expect("still there"), [0xFF; 100]);
     let said = export(&folder.path("none.bin")).refusal();

@@ -371,7 +371,7 @@ impl Bench {
         }
     }
 
-    /// A well-behaved host enables the leg, or is told why it cannot.
+    /// A well-behaved host enables the leg, or hears why it cannot.
     fn again(&mut self) -> Result<(), String> {
         self.unheard = None;
         self.plugged = true;

@@ -132,6 +132,55 @@ pub struct Follower {
     pub(super) deviates: bool,
 }
 
+/// Commands, measured values and limits of one tick.
+struct Tick<'a> {
+    command: &'a JointCommand,
+    measured: &'a Measured,
+    /// Limits, narrower while the joint returns into its range.
+    bounds: Bounds,
+    /// Range that the host's own limits leave.
+    range: [f32; 2],
+    rates: Rates,
+    /// Torque limit, N m.
+    largest: f32,
+    /// Least slope of a torque that fades, N m/s.
+    least_slope: f32,
+    /// Period of cyclic targets, ticks.
+    period: u32,
+    /// Whether the target begins to apply: new mode, end of a halt or of a return.
+    starts: bool,
+}
+
+impl<'a> Tick<'a> {
+    fn new(command: &'a JointCommand, measured: &'a Measured, whole: &Bounds, starts: bool) -> Self {
+        let slow =
+            Bounds { speed: min(whole.speed, RETURN_SPEED), torque: RETURN_TORQUE * whole.torque, ..*whole };
+        let bounds = if measured.returns { slow } else { *whole };
+        let [low, high] = bounds.range;
+        let gentlest = min(whole.speed / LONGEST_STOP_S, whole.acceleration);
+        Self {
+            command,
+            measured,
+            bounds,
+            range: [max(low, command.range[0].0), min(high, command.range[1].0)],
+            rates: Rates {
+                speed: min(command.velocity.0, bounds.speed),
+                acceleration: min(command.acceleration.0, bounds.acceleration),
+                deceleration: clamp(command.deceleration.0, gentlest, bounds.acceleration),
+            },
+            largest: min(command.largest_torque.0, bounds.torque),
+            least_slope: whole.torque / LONGEST_STOP_S,
+            period: ticks(command.period).clamp(1, LONGEST_PERIOD),
+            starts,
+        }
+    }
+
+    /// Rates with the joint's own speed limit instead of the profile's.
+    fn braking(&self) -> Rates {
+        Rates { speed: self.bounds.speed, ..self.rates }
+    }
+}
+
 fn ticks(time: Second) -> u32 {
     (time.0 * SERVO_RATE_HZ as f32 + 0.5) as u32
 }
@@ -198,161 +247,176 @@ impl Follower {
         }
         let is_requested = core::mem::replace(&mut self.seen, command.request_count) != command.request_count;
         let was_halted = core::mem::replace(&mut self.halted, command.halt);
-        let resumes = was_halted && !command.halt;
         if command.halt && !was_halted {
             self.brake_from(measured);
         }
         self.follows = command.target.mode().is_some() && !command.halt;
-        self.still = if abs(measured.velocity.0) <= command.standing_speed.0 {
-            self.still.saturating_add(1)
-        } else {
-            0
-        };
-        self.stands = self.still > ticks(command.standing_time);
-        let returns = measured.returns;
-        let ends = core::mem::replace(&mut self.returned, returns) && !returns;
-        let slow = Bounds {
-            speed: min(bounds.speed, RETURN_SPEED),
-            torque: RETURN_TORQUE * bounds.torque,
-            ..*bounds
-        };
-        let gentlest = min(bounds.speed / LONGEST_STOP_S, bounds.acceleration);
-        let least_slope = bounds.torque / LONGEST_STOP_S;
-        let bounds = if returns { &slow } else { bounds };
-        let [low, high] = bounds.range;
-        let range = [max(low, command.range[0].0), min(high, command.range[1].0)];
-        let rates = Rates {
-            speed: min(command.velocity.0, bounds.speed),
-            acceleration: min(command.acceleration.0, bounds.acceleration),
-            deceleration: clamp(command.deceleration.0, gentlest, bounds.acceleration),
-        };
+        self.stand(command, measured);
+        let ends = core::mem::replace(&mut self.returned, measured.returns) && !measured.returns;
         self.limited = false;
-        let largest = min(command.largest_torque.0, bounds.torque);
+        let starts = begins || was_halted && !command.halt || ends;
+        let tick = Tick::new(command, measured, bounds, starts);
         let demand = Demand {
             course: self.course,
             velocity_offset: 0.0,
             torque: 0.0,
             held: true,
-            largest,
+            largest: tick.largest,
             failed: false,
             zero: None,
         };
-        let period = ticks(command.period).clamp(1, LONGEST_PERIOD);
         let demand = match command.target {
             Target::ProfileTorque(target) => {
-                let target = if command.halt { 0.0 } else { self.bounded(target.0, -largest, largest) };
-                let change = target - self.torque;
-                let fades = change * self.torque < 0.0;
-                let slope = command.torque_slope_nm_per_s;
-                let most = TICK_S * if fades { max(slope, least_slope) } else { slope };
-                self.torque += clamp(change, -most, most);
-                self.reached = self.torque == target;
+                self.fade(target.0, &tick);
                 return self.give(demand, measured);
             }
             Target::CyclicTorque(target) => {
-                self.torque = if command.halt { 0.0 } else { self.bounded(target.0, -largest, largest) };
+                self.torque = self.torque_target(target.0, &tick);
                 self.reached = true;
                 return self.give(demand, measured);
             }
             Target::ProfilePosition(point) => {
                 self.take(point, is_requested);
                 if command.halt {
-                    self.stop(&rates, bounds, measured);
+                    self.stop(&tick);
                 } else {
-                    self.go(command, &rates, range, bounds, measured);
+                    self.go(&tick);
                 }
                 demand
             }
             _ if command.halt => {
                 self.close_gap();
-                self.stop(&rates, bounds, measured);
+                self.stop(&tick);
                 demand
             }
             Target::Hold => {
-                self.stop(&rates, bounds, measured);
+                self.stop(&tick);
                 demand
             }
             Target::Impedance(target) => {
-                let torque = self.spring(&target, range, bounds, measured);
-                if begins || resumes || ends {
-                    self.carried = measured.torque.0 - torque;
-                }
-                let most = max(command.torque_slope_nm_per_s, least_slope) * TICK_S;
-                self.carried -= clamp(self.carried, -most, most);
-                self.torque = self.bounded(torque + self.carried, -largest, largest);
-                let near = abs(target.position.0 - measured.position.0) <= command.position_window.0;
-                self.reach(near, command.position_time);
+                self.yield_to(&target, &tick);
                 return self.give(demand, measured);
             }
             Target::ProfileVelocity(velocity) => {
-                let wanted = self.bounded(velocity.0, -rates.speed, rates.speed);
-                let rates = Rates { speed: bounds.speed, ..rates };
-                self.course.accelerate(wanted, &rates, range, TICK_S);
-                self.course.keep_within(command.following_window.0, measured.position.0);
-                let near = abs(wanted - measured.velocity.0) <= command.velocity_window.0;
-                self.reach(near, command.velocity_time);
+                self.run(velocity.0, &tick);
                 demand
             }
             Target::Homing { offset } => {
-                self.stop(&rates, bounds, measured);
+                self.stop(&tick);
                 let zero = if is_requested { self.home(offset, measured) } else { None };
                 Demand { zero, ..demand }
             }
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
-                let target = self.bounded(position.0, range[0], range[1]);
-                // For a joint outside its range: the end of the range that it returns to.
-                let place = if returns { clamp(measured.position.0, low, high) } else { measured.position.0 };
-                let is_far = abs(target - place) > command.following_window.0;
-                self.waits |= begins || resumes || ends || returns && is_far;
-                if self.waits && is_far {
-                    self.close_gap();
-                    self.stop(&rates, bounds, measured);
-                    (self.follows, self.reached) = (false, false);
-                    return self.conclude(demand, command, measured, bounds.range);
-                }
-                if core::mem::take(&mut self.waits) {
-                    self.gap = Course::moving(self.course.position() - target, self.course.velocity());
-                    (self.course, self.target) = (Course::at_rest(target), target);
-                }
-                self.count(target, period);
-                if returns {
-                    self.close_gap();
-                    self.course.approach(target, &rates, TICK_S);
+                if self.track_position(position.0, &tick) {
+                    Demand { velocity_offset: velocity_offset.0, torque: torque_offset.0, ..demand }
                 } else {
-                    self.course.interpolate_position(target, self.left, bounds.speed, TICK_S);
+                    demand
                 }
-                self.left = self.left.saturating_sub(1);
-                if self.gap != Course::at_rest(0.0) {
-                    self.gap.approach(0.0, &rates, TICK_S);
-                }
-                let near = abs(target - measured.position.0) <= command.position_window.0;
-                self.reach(near, command.position_time);
-                Demand { velocity_offset: velocity_offset.0, torque: torque_offset.0, ..demand }
             }
             Target::CyclicVelocity { velocity, torque_offset } => {
-                let target = self.bounded(velocity.0, -bounds.speed, bounds.speed);
-                self.count(target, period);
-                let rates = Rates { speed: bounds.speed, ..rates };
-                self.course.interpolate_velocity(target, self.left, &rates, range, TICK_S);
-                self.course.keep_within(command.following_window.0, measured.position.0);
-                self.left = self.left.saturating_sub(1);
-                self.reached = self.course.velocity() == target;
+                self.track_velocity(velocity.0, &tick);
                 Demand { torque: torque_offset.0, ..demand }
             }
         };
-        self.conclude(demand, command, measured, bounds.range)
+        self.conclude(demand, &tick)
+    }
+
+    /// Updates whether the joint stands.
+    fn stand(&mut self, command: &JointCommand, measured: &Measured) {
+        let is_slow = abs(measured.velocity.0) <= command.standing_speed.0;
+        self.still = if is_slow { self.still.saturating_add(1) } else { 0 };
+        self.stands = self.still > ticks(command.standing_time);
+    }
+
+    /// Torque that a torque mode is to give; none in a halt.
+    fn torque_target(&mut self, target: f32, tick: &Tick<'_>) -> f32 {
+        if tick.command.halt { 0.0 } else { self.bounded(target, -tick.largest, tick.largest) }
+    }
+
+    /// Profile torque: changes the torque along its slope.
+    fn fade(&mut self, target: f32, tick: &Tick<'_>) {
+        let target = self.torque_target(target, tick);
+        let change = target - self.torque;
+        let fades = change * self.torque < 0.0;
+        let slope = tick.command.torque_slope_nm_per_s;
+        let most = TICK_S * if fades { max(slope, tick.least_slope) } else { slope };
+        self.torque += clamp(change, -most, most);
+        self.reached = self.torque == target;
+    }
+
+    /// Impedance: spring and damper; the difference to the torque before decays.
+    fn yield_to(&mut self, target: &ImpedanceTarget, tick: &Tick<'_>) {
+        let Tick { command, measured, .. } = tick;
+        let torque = self.spring(target, tick.range, &tick.bounds, measured);
+        if tick.starts {
+            self.carried = measured.torque.0 - torque;
+        }
+        let most = max(command.torque_slope_nm_per_s, tick.least_slope) * TICK_S;
+        self.carried -= clamp(self.carried, -most, most);
+        self.torque = self.bounded(torque + self.carried, -tick.largest, tick.largest);
+        let near = abs(target.position.0 - measured.position.0) <= command.position_window.0;
+        self.reach(near, command.position_time);
+    }
+
+    /// Profile velocity: changes the velocity along its ramp.
+    fn run(&mut self, velocity: f32, tick: &Tick<'_>) {
+        let Tick { command, measured, rates, .. } = tick;
+        let wanted = self.bounded(velocity, -rates.speed, rates.speed);
+        self.course.accelerate(wanted, &tick.braking(), tick.range, TICK_S);
+        self.course.keep_within(command.following_window.0, measured.position.0);
+        let near = abs(wanted - measured.velocity.0) <= command.velocity_window.0;
+        self.reach(near, command.velocity_time);
+    }
+
+    /// Cyclic position: interpolates over the period. Returns whether the target is followed.
+    fn track_position(&mut self, position: f32, tick: &Tick<'_>) -> bool {
+        let Tick { command, measured, bounds, rates, range, .. } = tick;
+        let target = self.bounded(position, range[0], range[1]);
+        let place = measured.position.0;
+        // For a joint outside its range: the end of the range that it returns to.
+        let from = if measured.returns { clamp(place, bounds.range[0], bounds.range[1]) } else { place };
+        let is_far = abs(target - from) > command.following_window.0;
+        self.waits |= tick.starts || measured.returns && is_far;
+        if self.waits && is_far {
+            self.close_gap();
+            self.stop(tick);
+            (self.follows, self.reached) = (false, false);
+            return false;
+        }
+        if core::mem::take(&mut self.waits) {
+            self.gap = Course::moving(self.course.position() - target, self.course.velocity());
+            (self.course, self.target) = (Course::at_rest(target), target);
+        }
+        self.count(target, tick.period);
+        if measured.returns {
+            self.close_gap();
+            self.course.approach(target, rates, TICK_S);
+        } else {
+            self.course.interpolate_position(target, self.left, bounds.speed, TICK_S);
+        }
+        self.left = self.left.saturating_sub(1);
+        if self.gap != Course::at_rest(0.0) {
+            self.gap.approach(0.0, rates, TICK_S);
+        }
+        self.reach(abs(target - place) <= command.position_window.0, command.position_time);
+        true
+    }
+
+    /// Cyclic velocity: interpolates over the period.
+    fn track_velocity(&mut self, velocity: f32, tick: &Tick<'_>) {
+        let target = self.bounded(velocity, -tick.bounds.speed, tick.bounds.speed);
+        self.count(target, tick.period);
+        self.course.interpolate_velocity(target, self.left, &tick.braking(), tick.range, TICK_S);
+        self.course.keep_within(tick.command.following_window.0, tick.measured.position.0);
+        self.left = self.left.saturating_sub(1);
+        self.reached = self.course.velocity() == target;
     }
 
     /// Completes the demand of a mode that holds a position.
-    fn conclude(
-        &mut self,
-        demand: Demand,
-        command: &JointCommand,
-        measured: &Measured,
-        [low, high]: [f32; 2],
-    ) -> Demand {
+    fn conclude(&mut self, demand: Demand, tick: &Tick<'_>) -> Demand {
+        let Tick { command, measured, bounds, .. } = tick;
         if measured.returns {
-            let place = measured.position.0;
+            let ([low, high], place) = (bounds.range, measured.position.0);
             self.course.keep_between(min(low, place), max(high, place));
         }
         Demand { course: self.course(), failed: self.deviated(command, measured), ..demand }
@@ -410,10 +474,9 @@ impl Follower {
     }
 
     /// Slows down to rest along the profile.
-    fn stop(&mut self, rates: &Rates, bounds: &Bounds, measured: &Measured) {
-        let rates = Rates { speed: bounds.speed, ..*rates };
-        self.course.accelerate(0.0, &rates, bounds.range, TICK_S);
-        self.reached = self.course.velocity() == 0.0 && abs(measured.velocity.0) < STANDING;
+    fn stop(&mut self, tick: &Tick<'_>) {
+        self.course.accelerate(0.0, &tick.braking(), tick.bounds.range, TICK_S);
+        self.reached = self.course.velocity() == 0.0 && abs(tick.measured.velocity.0) < STANDING;
     }
 
     /// Clamps a value to bounds and notes if it was outside.
@@ -436,19 +499,13 @@ impl Follower {
         }
     }
 
-    fn go(
-        &mut self,
-        command: &JointCommand,
-        rates: &Rates,
-        [low, high]: [f32; 2],
-        bounds: &Bounds,
-        measured: &Measured,
-    ) {
+    fn go(&mut self, tick: &Tick<'_>) {
         let Some(goal) = self.goal else {
-            return self.stop(rates, bounds, measured);
+            return self.stop(tick);
         };
+        let Tick { command, measured, rates, range: [low, high], .. } = *tick;
         let goal = self.bounded(goal, low, high);
-        self.course.approach(goal, rates, TICK_S);
+        self.course.approach(goal, &rates, TICK_S);
         let near = self.course == Course::at_rest(goal)
             && abs(goal - measured.position.0) <= command.position_window.0;
         self.reach(near, command.position_time);

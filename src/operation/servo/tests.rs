@@ -274,6 +274,26 @@ fn the_operators_request_precedes_the_hosts() {
 }
 
 #[test]
+fn the_start_button_begins_nothing_while_a_host_has_the_drive() {
+    for hosted in [false, true] {
+        let mut bench = Bench::enabled();
+        bench.order(hosted.then(commanded), None);
+        bench.run(2);
+        bench.clear();
+        bench.ask(ControlRequest::Identify);
+        bench.tick();
+        let accepted: Vec<bool> = bench.events.iter().filter_map(accepted).collect();
+        assert_eq!((accepted, bench.control.activity().is_identifying()), ([!hosted].to_vec(), !hosted));
+    }
+}
+
+/// Whether a request was accepted, by its record.
+fn accepted(event: &LegEvent<2>) -> Option<bool> {
+    let LegEvent::Record(Record::Request { accepted, .. }) = event else { return None };
+    Some(*accepted)
+}
+
+#[test]
 fn an_open_enabling_switch_stops_an_enabled_leg() {
     for [enabling, permits] in [[false, true], [true, false]] {
         let mut bench = Bench::enabled();

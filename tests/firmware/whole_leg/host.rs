@@ -413,7 +413,7 @@ fn a_halted_set_point_goes_on_afterwards() {
     hosted.run(SECOND);
     let stopped = hosted.position(0);
     assert!(hosted.status[0].reached && !hosted.status[0].follows && stopped < from + 0.25);
-    // One that comes meanwhile waits for its turn.
+    // One that comes during the halt waits for its turn.
     hosted.point(0, from + 0.1, false);
     hosted.run(SECOND / 2);
     assert!((hosted.position(0) - stopped).abs() < 0.002 && hosted.status[0].is_full);
