@@ -234,6 +234,8 @@ rows! {
     0x6040, 0, U16, Both, Any, 0, "Controlword";
     0x6041, 0, U16, Read, Transmit, 0, "Statusword";
     0x605A, 0, I16, Both, No, 2, "Quick stop option code";
+    0x605B, 0, I16, Both, No, 0, "Shutdown option code";
+    0x605C, 0, I16, Both, No, 0, "Disable operation option code";
     0x605D, 0, I16, Both, No, 1, "Halt option code";
     0x605E, 0, I16, Both, No, 2, "Fault reaction option code";
     0x6060, 0, I8, Both, Any, 0, "Modes of operation";
@@ -263,6 +265,7 @@ rows! {
     0x607D, 0, U8, Const, No, 2, "Number of entries";
     0x607D, 1, I32, Both, No, 0x8000_0000, "Min position limit";
     0x607D, 2, I32, Both, No, 0x7FFF_FFFF, "Max position limit";
+    0x607E, 0, U8, Both, No, 0, "Polarity";
     0x607F, 0, U32, Read, No, 0, "Max profile velocity";
     0x6080, 0, U32, Read, No, 0, "Max motor speed";
     0x6081, 0, U32, Both, Any, 500_000, "Profile velocity";
@@ -287,6 +290,7 @@ rows! {
     0x60C2, 0, U8, Const, No, 2, "Number of entries";
     0x60C2, 1, U8, Both, No, 2, "Interpolation time period";
     0x60C2, 2, I8, Both, No, 0xFD, "Interpolation time index";
+    0x60F2, 0, U16, Both, No, 0, "Positioning option code";
     0x60F4, 0, I32, Read, Transmit, 0, "Following error actual value";
     0x60FD, 0, U32, Read, Transmit, 0, "Digital inputs";
     0x60FE, 0, U8, Const, No, 1, "Number of entries";

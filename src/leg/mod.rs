@@ -43,7 +43,9 @@ pub use control::{
 pub use description::{
     DescriptionError, JointDescription, LegDescription, LinkDescription, MotorDescription,
 };
-pub use follow::{Following, ImpedanceTarget, JointCommand, JointStatus, Mode, SetPoint, Target};
+pub use follow::{
+    Following, ImpedanceTarget, JointCommand, JointStatus, LONGEST_PERIOD, Mode, Reference, SetPoint, Target,
+};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
 pub use model_monitor::{ModelMonitor, UPDATE_ROWS};

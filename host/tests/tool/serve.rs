@@ -112,14 +112,21 @@ impl Client {
 
     /// The next line without its line ending; `None` at the end of the connection.
     fn line(&mut self) -> Option<String> {
+        self.stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
+        self.try_line().expect("an answer")
+    }
+
+    /// Like [`Self::line`], with an error after the socket's time limit.
+    fn try_line(&mut self) -> std::io::Result<Option<String>> {
         loop {
             if let Some(end) = self.received.iter().position(|byte| *byte == b'\r' || *byte == 7) {
                 let line: Vec<u8> = self.received.drain(..=end).collect();
-                return Some(String::from_utf8(line).expect("ASCII").trim_end_matches('\r').to_owned());
+                let line = String::from_utf8(line).expect("ASCII");
+                return Ok(Some(line.trim_end_matches('\r').to_owned()));
             }
             let mut bytes = [0; 4096];
-            match self.stream.read(&mut bytes).expect("an answer") {
-                0 => return None,
+            match self.stream.read(&mut bytes)? {
+                0 => return Ok(None),
                 count => self.received.extend(&bytes[..count]),
             }
         }
@@ -130,17 +137,35 @@ impl Client {
         self.say(&format!("t{id:03X}{}{bytes}\r", data.len()));
     }
 
+    /// Sends an SDO request until it is answered: a busy machine drops a late one that could enable the leg.
     fn request(&mut self, node: u16, request: [u8; 8]) -> [u8; 8] {
-        self.frame(0x600 + node, &request);
-        let begin = format!("t{:03X}8", 0x580 + node);
+        let begin = Instant::now();
         loop {
-            let line = self.line().expect("an answer");
-            if let Some(data) = line.strip_prefix(&begin) {
-                return core::array::from_fn(|place| {
-                    u8::from_str_radix(&data[2 * place..2 * place + 2], 16).expect("a digit")
-                });
+            self.frame(0x600 + node, &request);
+            if let Some(answer) = self.answer(node, &request[1..4]) {
+                return answer;
+            }
+            assert!(begin.elapsed() < PATIENCE, "no answer to {request:02X?}");
+        }
+    }
+
+    /// Answer of an object within a second.
+    fn answer(&mut self, node: u16, object: &[u8]) -> Option<[u8; 8]> {
+        let (begin, limit) = (Instant::now(), Duration::from_secs(1));
+        let prefix = format!("t{:03X}8", 0x580 + node);
+        self.stream.set_read_timeout(Some(limit)).expect("a socket");
+        while begin.elapsed() < limit {
+            let Ok(line) = self.try_line() else { break };
+            let line = line.expect("a connection");
+            let Some(data) = line.strip_prefix(&prefix) else { continue };
+            let digits = |place: usize| data[2 * place..2 * place + 2].to_owned();
+            let answer: [u8; 8] =
+                core::array::from_fn(|place| u8::from_str_radix(&digits(place), 16).expect("a digit"));
+            if &answer[1..4] == object {
+                return Some(answer);
             }
         }
+        None
     }
 
     pub fn read(&mut self, node: u16, index: u16, sub: u8) -> u32 {

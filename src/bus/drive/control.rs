@@ -38,7 +38,11 @@
 //! Source: CiA 402, controlword and statusword; bit 15 is manufacturer-specific.
 
 use super::coupling::level;
-use super::{ImpedanceTarget, JointCommand, JointStatus, LoopBandwidths, Mode, SetPoint, Target};
+use super::{
+    ImpedanceTarget, JointCommand, JointStatus, LONGEST_PERIOD, LoopBandwidths, Mode, Reference, SetPoint,
+    Target,
+};
+use crate::bus::abort::Abort;
 use crate::bus::emergency::ErrorReport;
 use crate::bus::node_id::NodeId;
 use crate::bus::objects::Lost;
@@ -201,6 +205,7 @@ pub(super) struct Settings {
     pub velocity_offset: i32,
     pub torque_offset: i16,
     pub interpolation_data: i32,
+    pub positioning_option: u16,
     pub period: u8,
     pub period_index: i8,
     pub outputs: u32,
@@ -247,6 +252,7 @@ impl Settings {
         velocity_offset: 0,
         torque_offset: 0,
         interpolation_data: 0,
+        positioning_option: 0,
         period: 2,
         period_index: -3,
         outputs: 0,
@@ -260,6 +266,30 @@ impl Settings {
         node_id: 0,
         bit_rate: USUAL_KBIT,
     };
+
+    /// Period of 60C2, µs: a multiple of 10^index seconds, index from -6 to 0.
+    const fn period_us(&self) -> u32 {
+        (self.period as u32).saturating_mul(10_u32.saturating_pow((self.period_index + 6) as u32))
+    }
+
+    /// Changes the period (60C2:1, 2) if it stays within what is interpolated.
+    pub(super) fn set_period(&mut self, period: u8, index: i8) -> Result<(), Abort> {
+        let new = Self { period, period_index: index, ..*self };
+        if period == 0 || !(-6..=0).contains(&index) || new.period_us() as f32 > LONGEST_PERIOD.0 * 1e6 {
+            return Err(Abort::Range);
+        }
+        *self = new;
+        Ok(())
+    }
+
+    /// What relative set-points are relative to (60F2).
+    fn relative_to(&self) -> Reference {
+        match self.positioning_option {
+            1 => Reference::Demand,
+            2 => Reference::Actual,
+            _ => Reference::Target,
+        }
+    }
 }
 
 /// CiA 402 state machine and settings of one joint.
@@ -335,7 +365,7 @@ impl Axis {
             controlword: 0,
             own: DriveState::NotReadyToSwitchOn,
             resets: false,
-            set_point: SetPoint { position: Radian::ZERO, relative: false, immediately: false },
+            set_point: SetPoint { position: Radian::ZERO, relative_to: None, immediately: false },
             targets: Targets {
                 position: false,
                 velocity: false,
@@ -490,9 +520,9 @@ impl Axis {
                 if self.is_full() && !immediately {
                     return;
                 }
-                let relative = self.controlword & RELATIVE != 0;
+                let relative_to = (self.controlword & RELATIVE != 0).then(|| self.settings.relative_to());
                 let position = radian(self.settings.target_position);
-                self.set_point = SetPoint { position, relative, immediately };
+                self.set_point = SetPoint { position, relative_to, immediately };
             }
             Some(Mode::Homing) => {}
             _ => return,
@@ -648,17 +678,8 @@ impl Axis {
             following_time: milliseconds(settings.following_time_ms),
             position_window: Radian(settings.position_window as f32 * 1e-6),
             position_time: milliseconds(settings.position_time_ms),
-            period: self.period(),
+            period: Second(settings.period_us() as f32 * 1e-6),
         }
-    }
-
-    /// Period of 60C2: a multiple of 10^index seconds.
-    fn period(&self) -> Second {
-        let mut unit = 1.0;
-        for _ in self.settings.period_index..0 {
-            unit *= 0.1;
-        }
-        Second(f32::from(self.settings.period) * unit)
     }
 }
 

@@ -18,7 +18,9 @@ mod control;
 mod coupling;
 mod objects;
 
-pub use crate::leg::{ImpedanceTarget, JointCommand, JointStatus, Mode, SetPoint, Target};
+pub use crate::leg::{
+    ImpedanceTarget, JointCommand, JointStatus, LONGEST_PERIOD, Mode, Reference, SetPoint, Target,
+};
 pub(super) use control::USUAL_KBIT;
 pub use control::{Axis, AxisConstants};
 pub use coupling::Coupling;

@@ -70,6 +70,7 @@ impl Objects for Axis {
             (0x6040, _) => u32::from(self.controlword),
             (0x6041, _) => u32::from(self.statusword()),
             (0x605A, _) => bits!(settings.quick_stop_option),
+            (0x605B | 0x605C | 0x607E, _) => 0,
             (0x605D, _) => 1,
             (0x605E, _) => 2,
             (0x6060, _) => bits!(settings.mode),
@@ -117,6 +118,7 @@ impl Objects for Axis {
             (0x60C1, 1) => settings.interpolation_data as u32,
             (0x60C2, 1) => u32::from(settings.period),
             (0x60C2, 2) => bits!(settings.period_index),
+            (0x60F2, _) => u32::from(settings.positioning_option),
             (0x60F4, _) => micro((status.position_demand - status.position).0),
             (0x2194 | 0x60FE, _) => settings.outputs,
             (0x60FF, _) => settings.target_velocity as u32,
@@ -150,6 +152,7 @@ impl Objects for Axis {
             (0x6040, _) => self.control(value as u16),
             // Fault reactions are chosen per fault; a halt always slows down along the profile.
             (0x605A, _) if is(&[0, 2]) => settings.quick_stop_option = value as i16,
+            (0x605B | 0x605C | 0x607E, _) if is(&[0]) => {}
             (0x605D, _) if is(&[1]) => {}
             (0x605E, _) if is(&[2]) => {}
             (0x6060, _) => {
@@ -183,8 +186,9 @@ impl Objects for Axis {
             (0x60B1, _) => (settings.velocity_offset, self.targets.velocity_offset) = (value as i32, true),
             (0x60B2, _) => (settings.torque_offset, self.targets.torque_offset) = (value as i16, true),
             (0x60C1, 1) => settings.interpolation_data = value as i32,
-            (0x60C2, 1) if value > 0 => settings.period = value as u8,
-            (0x60C2, 2) if matches!(value as i8, -6..=0) => settings.period_index = value as i8,
+            (0x60C2, 1) => settings.set_period(value as u8, settings.period_index)?,
+            (0x60C2, 2) => settings.set_period(settings.period, value as i8)?,
+            (0x60F2, _) if value <= 2 => settings.positioning_option = value as u16,
             (0x2194 | 0x60FE, _) => settings.outputs = value,
             (0x60FF, _) => (settings.target_velocity, self.targets.velocity) = (value as i32, true),
             (
@@ -196,11 +200,12 @@ impl Objects for Axis {
                 | 0x2021
                 | 0x6007
                 | 0x605A..=0x605E
+                | 0x607E
                 | 0x6083
                 | 0x6084
                 | 0x6086
                 | 0x6098
-                | 0x60C2,
+                | 0x60F2,
                 _,
             ) => {
                 return Err(Abort::Range);

@@ -101,10 +101,50 @@ fn the_quick_stop_option_chooses_between_damping_and_off() {
     board.axes[0].write(CONTROLWORD, 2).expect("a word");
     board.tick();
     assert_eq!(board.drive, DriveState::SwitchOnDisabled);
-    for (object, value) in [(0x605A, 1), (0x605D, 2), (0x605E, 1), (0x6007, 4), (0x6086, 1), (0x6098, 1)] {
-        let refused = board.axes[0].write(Object::at(object, 0), value);
-        assert_eq!(refused, Err(crate::bus::Abort::Range), "{object:x}");
+}
+
+#[test]
+fn options_that_would_not_be_carried_out_are_refused() {
+    use crate::bus::Abort::{NoObject, Range};
+    let mut axis = axis();
+    let mut write = |index, sub, value: i32| axis.write(Object::at(index, sub), value as u32);
+    for (index, value) in [
+        (0x605A, 1),
+        (0x605A, 5),
+        (0x605A, 6),
+        (0x605B, 1),
+        (0x605C, 1),
+        (0x605D, 2),
+        (0x605E, 1),
+        (0x6007, 4),
+        (0x607E, 0x80),
+        (0x6086, 1),
+        (0x6098, 1),
+        (0x60F2, 3),
+    ] {
+        assert_eq!(write(index, 0, value), Err(Range), "{index:x}");
     }
+    for index in [0x6085, 0x60C5, 0x60C6] {
+        assert_eq!(write(index, 0, 1_000_000), Err(NoObject), "{index:x}");
+    }
+    // 60C2: 255 ms is the longest period, in any order of writing.
+    for (sub, value, wanted) in [
+        (1, 255, Ok(())),
+        (2, -2, Err(Range)),
+        (2, -4, Ok(())),
+        (1, 20, Ok(())),
+        (2, -2, Ok(())),
+        (1, 26, Err(Range)),
+        (1, 0, Err(Range)),
+        (2, -7, Err(Range)),
+        (2, 1, Err(Range)),
+    ] {
+        assert_eq!(write(0x60C2, sub, value), wanted, "60C2:{sub} {value}");
+    }
+    assert_eq!(
+        (axis.read(Object::at(0x60C2, 1)), axis.read(Object::at(0x60C2, 2))),
+        (Ok(20), Ok(0xFFFF_FFFE))
+    );
 }
 
 #[test]
@@ -242,7 +282,7 @@ fn each_rising_edge_takes_one_set_point() {
         assert!(axis.statusword() & 1 << 12 != 0);
         axis.write(CONTROLWORD, 0x3F).expect("a word");
         let point = number(axis);
-        assert_eq!((axis.command().request_count, point.immediately, point.relative), (count, true, false));
+        assert_eq!((axis.command().request_count, point.immediately, point.relative_to), (count, true, None));
         assert!((point.position.0 - position as f32 * 1e-6).abs() < 1e-7);
         // A new target without a rising edge moves nothing.
         axis.write(Object::at(0x607A, 0), 900_000).expect("a target");

@@ -54,13 +54,27 @@ impl Mode {
     }
 }
 
+/// Longest period of cyclic targets: the largest value of 60C2:1 in milliseconds.
+pub const LONGEST_PERIOD: Second = Second(0.255);
+
+/// What a relative set-point is relative to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// The set-point before it; without one the commanded position.
+    Target,
+    /// The commanded position.
+    Demand,
+    /// The measured position.
+    Actual,
+}
+
 /// Set-point of [`Mode::ProfilePosition`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetPoint {
     /// Target position, absolute or relative.
     pub position: Radian,
-    /// Whether the position is relative to the commanded one.
-    pub relative: bool,
+    /// What the position is relative to; `None` for an absolute one.
+    pub relative_to: Option<Reference>,
     /// Whether it replaces the active set-point at once.
     pub immediately: bool,
 }
@@ -186,7 +200,7 @@ impl JointCommand {
     #[must_use]
     pub fn seen_from(mut self, zero: Radian) -> Self {
         match &mut self.target {
-            Target::ProfilePosition(SetPoint { position, relative: false, .. })
+            Target::ProfilePosition(SetPoint { position, relative_to: None, .. })
             | Target::CyclicPosition { position, .. }
             | Target::Impedance(ImpedanceTarget { position, .. }) => *position -= zero,
             _ => {}

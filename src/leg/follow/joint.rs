@@ -22,7 +22,7 @@
 //! While a joint returns into its range (`safety::Monitor`), every position or velocity mode moves it slowly.
 //! Targets are limited to the range, and the commanded position is never farther out than the joint.
 
-use super::command::{ImpedanceTarget, JointCommand, Mode, SetPoint, Target};
+use super::command::{ImpedanceTarget, JointCommand, LONGEST_PERIOD, Mode, Reference, SetPoint, Target};
 use crate::motion::{Course, Rates};
 use crate::real::{abs, clamp, max, min};
 use crate::safety::{RETURN_SPEED, RETURN_TORQUE};
@@ -34,9 +34,6 @@ use crate::units::{NewtonMetre, Radian, RadianPerSecond, Second};
 const STANDING: f32 = 0.005;
 /// Longest time of a stop from the largest speed, or of a fade from the largest torque, s.
 const LONGEST_STOP_S: f32 = 2.0;
-/// Longest period that is interpolated: a quarter of a second.
-const LONGEST_PERIOD: u32 = SERVO_RATE_HZ / 4;
-
 /// Largest angle that homing gives to the present position: a turn.
 const LARGEST_HOME_RAD: f32 = core::f32::consts::TAU;
 
@@ -170,7 +167,7 @@ impl<'a> Tick<'a> {
             },
             largest: min(command.largest_torque.0, bounds.torque),
             least_slope: whole.torque / LONGEST_STOP_S,
-            period: ticks(command.period).clamp(1, LONGEST_PERIOD),
+            period: ticks(command.period).clamp(1, ticks(LONGEST_PERIOD)),
             starts,
         }
     }
@@ -276,7 +273,7 @@ impl Follower {
                 return self.give(demand, measured);
             }
             Target::ProfilePosition(point) => {
-                self.take(point, is_requested);
+                self.take(point, is_requested, &tick);
                 if command.halt {
                     self.stop(&tick);
                 } else {
@@ -486,14 +483,20 @@ impl Follower {
         held
     }
 
-    fn take(&mut self, point: SetPoint, is_requested: bool) {
+    fn take(&mut self, point: SetPoint, is_requested: bool, tick: &Tick<'_>) {
         if is_requested {
             self.next = Some(point);
         }
         if let Some(point) = self.next
             && (point.immediately || self.goal.is_none() || self.arrived)
         {
-            let from = if point.relative { self.course.position() } else { 0.0 };
+            let (demand, [low, high]) = (self.course.position(), tick.range);
+            let from = match point.relative_to {
+                None => 0.0,
+                Some(Reference::Target) => self.goal.map_or(demand, |goal| clamp(goal, low, high)),
+                Some(Reference::Demand) => demand,
+                Some(Reference::Actual) => tick.measured.position.0,
+            };
             (self.goal, self.next) = (Some(from + point.position.0), None);
             (self.arrived, self.reached, self.inside) = (false, false, 0);
         }

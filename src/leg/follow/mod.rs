@@ -19,7 +19,9 @@
 mod command;
 mod joint;
 
-pub use command::{ImpedanceTarget, JointCommand, JointStatus, Mode, SetPoint, Target};
+pub use command::{
+    ImpedanceTarget, JointCommand, JointStatus, LONGEST_PERIOD, Mode, Reference, SetPoint, Target,
+};
 
 use joint::{Bounds, Demand, Follower, Measured};
 

@@ -1,6 +1,8 @@
 //! A leg under tick-by-tick host control, in every supported mode of CiA 402.
 
-use scarab::leg::{Fault, FaultCode, ImpedanceTarget, JointCommand, JointStatus, SetPoint, Target};
+use scarab::leg::{
+    Fault, FaultCode, ImpedanceTarget, JointCommand, JointStatus, Reference, SetPoint, Target,
+};
 use scarab::safety::PowerRequest;
 use scarab::units::{NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
 
@@ -77,7 +79,7 @@ impl Hosted {
 
     fn point(&mut self, joint: usize, position: f32, immediately: bool) {
         let command = &mut self.commands[joint];
-        let point = SetPoint { position: Radian(position), relative: false, immediately };
+        let point = SetPoint { position: Radian(position), relative_to: None, immediately };
         (command.target, command.request_count) =
             (Target::ProfilePosition(point), command.request_count.wrapping_add(1));
     }
@@ -424,6 +426,29 @@ fn a_halted_set_point_goes_on_afterwards() {
         farthest = farthest.max(hosted.position(0) - from);
     }
     assert!((farthest - 0.3).abs() < 0.01 && (hosted.position(0) - from - 0.1).abs() < 0.01, "{farthest}");
+}
+
+#[test]
+fn relative_set_points_add_to_what_the_host_has_chosen() {
+    // A second one half way: from the target before it, from the commanded place, from the measured place.
+    for (reference, ends) in [(Reference::Target, 0.2), (Reference::Demand, 0.15), (Reference::Actual, 0.15)]
+    {
+        let mut hosted = Hosted::new();
+        let from = hosted.position(1);
+        let mut ask = |hosted: &mut Hosted| {
+            let point = SetPoint { position: Radian(0.1), relative_to: Some(reference), immediately: true };
+            hosted.commands[1].target = Target::ProfilePosition(point);
+            hosted.commands[1].request_count += 1;
+        };
+        ask(&mut hosted);
+        while hosted.status[1].position_demand.0 < from + 0.05 {
+            hosted.run(1);
+        }
+        ask(&mut hosted);
+        hosted.run(3 * SECOND);
+        let moved = hosted.position(1) - from;
+        assert!((moved - ends).abs() < 0.01, "{reference:?}: {moved} rad");
+    }
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::rig::bus::adapter::{Adapter, Dropped, MOST_AGE};
 use crate::rig::bus::alarms::Alarms;
 use crate::rig::bus::board::{Board, Label};
 use crate::rig::bus::network::Network;
-use crate::rig::bus::pace::{Pace, judge, reachable};
+use crate::rig::bus::pace::{Pace, STEP_TICKS, judge, reachable};
 use crate::rig::bus::server::{Event, Server, What};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::Context;
@@ -92,7 +92,7 @@ pub fn wearers<const N: usize, const B: usize>(
     (0..options.legs).filter_map(worn).collect()
 }
 
-/// Creates the bus with the legs, boards started. Each leg is on its wearer, if there are any.
+/// Creates the bus with the legs; all nodes have sent their boot-up messages. Each leg is on its wearer, if there are any.
 pub fn network<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ServeOptions,
@@ -120,7 +120,10 @@ pub fn network<const N: usize, const B: usize>(
         }
         boards.push(board);
     }
-    Ok(Network::new(boards, options.bits_per_s))
+    let mut network = Network::new(boards, options.bits_per_s);
+    // A node ignores every frame until it has sent its boot-up message.
+    (0..STEP_TICKS).for_each(|_| network.tick(|_| {}));
+    Ok(network)
 }
 
 /// Serves until a termination signal.
