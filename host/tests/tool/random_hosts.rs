@@ -1,14 +1,17 @@
 //! Hosts without manners: random sessions on the bus of a whole leg, in simulated time.
 //!
-//! A session is a list of steps: objects with values inside and outside their ranges, controlwords in any
-//! order, modes, SYNC, NMT, homing, set-points, identification, the operator's contacts, the plug. Some hosts
-//! come to a leg that the operator has enabled. After every tick:
+//! A session is a list of steps, as several hosts may send them in turn: objects with values inside and
+//! outside their ranges, controlwords in any order, modes, PDOs, SYNC, NMT, LSS, heartbeats, saving and
+//! loading, homing, set-points, identification, the operator's contacts, the plug. Some hosts come to a leg
+//! that the operator has enabled. After every tick:
 //!
 //! ```text
 //! range     an enabled joint is in its range, or no farther out than it can be stopped
 //! cap       no torque above the joint's limit
 //! targets   no commanded motion before a target of this session: none since the leg was last enabled
-//! steps     no torque grows by a tenth of its limit in a tick unless a target came, or the leg is stopped
+//! steps     no torque grows by a tenth of its limit in a tick, unless the host has just asked for it in the
+//!           joint's mode (`asks_for_a_step`), or the leg is stopped
+//! words     the statusword is that of the leg, and bit 12 of a cyclic mode means a target of this session
 //! faults    the code of a fault is heard from both nodes, if they can send
 //! again     at the end a well-behaved host enables the leg, or a reason is stated
 //! ```
@@ -37,11 +40,12 @@ const BEYOND: f64 = 0.1;
 const MILLISECOND: u32 = SERVO_RATE_HZ / 1000;
 /// Time in which a fault must be heard, ticks.
 const HEARD: u64 = 200 * MILLISECOND as u64;
-/// Time for which a target explains a step of the torque, ticks.
-const AFTER_TARGET: u64 = 500 * MILLISECOND as u64;
+/// Time for which a new value explains a step of the torque, ticks: a cyclic target that has jumped is
+/// interpolated over its period, and the joint then follows.
+const AFTER_VALUE: u64 = 500 * MILLISECOND as u64;
 
 /// Objects that hosts write: index, subindex, bytes, whether it is a target or offset.
-const OBJECTS: [(u16, u8, u8, bool); 33] = [
+const OBJECTS: [(u16, u8, u8, bool); 37] = [
     (0x6071, 0, 2, true),
     (0x607A, 0, 4, true),
     (0x60B1, 0, 4, true),
@@ -75,7 +79,30 @@ const OBJECTS: [(u16, u8, u8, bool); 33] = [
     (0x1017, 0, 2, false),
     (0x2100, 1, 1, true),
     (0x2160, 1, 1, false),
+    (0x60F2, 0, 2, false),
+    (0x1010, 1, 4, false),
+    (0x1011, 1, 4, false),
+    (0x1029, 1, 1, false),
 ];
+/// Values that begin a storing and a loading.
+const SIGNATURES: [(u16, i32); 2] = [(0x1010, 0x6576_6173), (0x1011, 0x6461_6F6C)];
+
+/// Whether a new value of an object may change the torque at once in a mode. Profiles, homing, a new mode
+/// and a halt may not: they start from the joint's place, velocity and torque.
+const fn asks_for_a_step(mode: i8, index: u16) -> bool {
+    match index {
+        0x607A | 0x607D => matches!(mode, 8 | -1),
+        0x60FF => matches!(mode, 9 | -1),
+        // 6087 may be as steep as a host wants.
+        0x6071 | 0x6087 => matches!(mode, 4 | 10 | -1),
+        0x60B1 => matches!(mode, 8 | 9),
+        0x60B2 => matches!(mode, 8..=10),
+        0x2020 => mode == -1,
+        0x6072 => true,
+        _ => false,
+    }
+}
+
 const MODES: [i8; 9] = [0, 1, 3, 4, 6, 8, 9, 10, -1];
 const WORDS: [u16; 14] = [0, 2, 6, 7, 0xB, 0xF, 0x1F, 0x3F, 0x5F, 0x7F, 0x10F, 0x11F, 0x80, 0x8F];
 
@@ -92,11 +119,15 @@ enum Step {
     Near(usize, i32),
     /// Homing to this offset, micro-radian.
     Home(usize, i32),
-    /// First received PDO, controlword first, with these bytes.
-    Pdo(usize, u16, [u8; 6]),
+    /// A received PDO, from 1, with these bytes.
+    Pdo(usize, u16, [u8; 4]),
     /// SYNCs at this distance, ticks.
     Sync(u8, u8),
     Nmt(u8, u8),
+    /// LSS service, with its first byte of data.
+    Lss(u8, u8),
+    /// A host's heartbeat, after its time in milliseconds was written to the node.
+    Watch(usize, u8),
     Contacts(bool, bool),
     Plug(bool),
     Wait(u16),
@@ -122,7 +153,10 @@ fn step() -> impl Strategy<Value = Step> {
         4 => (any_or_both, prop::sample::select(MODES.to_vec())).prop_map(|(joint, mode)| Step::Mode(joint, mode)),
         3 => (joint.clone(), -60_000..60_000_i32).prop_map(|(joint, by)| Step::Near(joint, by)),
         1 => (joint.clone(), value()).prop_map(|(joint, offset)| Step::Home(joint, offset)),
-        2 => (joint, word(), any::<[u8; 6]>()).prop_map(|(joint, word, bytes)| Step::Pdo(joint, word, bytes)),
+        2 => (joint.clone(), 1..5_u16, any::<[u8; 4]>()).prop_map(|(joint, pdo, bytes)| Step::Pdo(joint, pdo, bytes)),
+        1 => (prop::sample::select(vec![0x04, 0x04, 0x13, 0x40, 0x46, 0x5A, 0x5E]), 0..2_u8)
+            .prop_map(|(service, byte)| Step::Lss(service, byte)),
+        1 => (joint, 0..250_u8).prop_map(|(joint, time)| Step::Watch(joint, time)),
         1 => (1..40_u8, 1..20_u8).prop_map(|(count, apart)| Step::Sync(count, apart)),
         1 => (prop::sample::select(vec![1, 1, 1, 2, 128, 129, 130]), 0..3_u8)
             .prop_map(|(command, node)| Step::Nmt(command, node)),
@@ -147,6 +181,10 @@ struct Bench {
     /// Tick of the last target, and whether one was sent since the leg was last enabled.
     target: Option<u64>,
     targets: bool,
+    /// Mode that was last requested of each joint, and the tick until which a step of its torque is explained.
+    modes: [i8; JOINTS],
+    explained: [u64; JOINTS],
+    returns: [bool; JOINTS],
     /// Code that must be heard from each node, and the tick in which the leg had it.
     unheard: Option<(u16, u64)>,
     /// Code of each node's last emergency message, and its tick.
@@ -168,6 +206,9 @@ impl Bench {
             torque: [0.0; JOINTS],
             target: None,
             targets: false,
+            modes: [0; JOINTS],
+            explained: [0; JOINTS],
+            returns: [false; JOINTS],
             unheard: None,
             heard: [(0, 0); JOINTS],
             plugged: true,
@@ -252,7 +293,9 @@ impl Bench {
             }
             let grows =
                 now.abs() - torque[joint].abs() > 0.1 * cap || now * torque[joint] < -0.01 * cap * cap;
-            let explained = self.target.is_some_and(|at| ticks - at < AFTER_TARGET) || foreign;
+            // A joint that returns has less torque.
+            let returns = core::mem::replace(&mut self.returns[joint], decision.returns[joint]);
+            let explained = ticks < self.explained[joint] || foreign || returns != decision.returns[joint];
             if grows && !explained {
                 return Err(format!("steps: joint {joint} from {} to {now} N m", torque[joint]));
             }
@@ -303,6 +346,36 @@ impl Bench {
         (self.target, self.targets) = (Some(self.ticks), true);
     }
 
+    /// A new value of an object is on its way to a joint.
+    fn expect(&mut self, joint: usize, index: u16) {
+        if asks_for_a_step(self.modes[joint], index) {
+            self.explained[joint] = self.ticks + AFTER_VALUE;
+        }
+    }
+
+    /// Compares the statuswords with the leg.
+    fn words(&mut self) -> Result<(), String> {
+        for joint in 0..JOINTS {
+            let before = self.state;
+            let Some(word) = self.read(joint, 0x6041)? else { continue };
+            if before != self.state {
+                continue;
+            }
+            let (state, word) = (self.state, word as u16);
+            let powered = word & 0x806F == 0x27;
+            let failed = matches!(word & 0x4F, 0x08 | 0x0F);
+            let mode = self.read(joint, 0x6061)?.unwrap_or(0) as i8;
+            let follows = powered && matches!(mode, -1 | 8..=10) && word & 0x1000 != 0;
+            if powered != state.is_enabled()
+                || failed != state.fault().is_some()
+                || follows && !self.targets && before == self.state
+            {
+                return Err(format!("words: joint {joint} {word:04X} in mode {mode}, {state:?}"));
+            }
+        }
+        Ok(())
+    }
+
     fn step(&mut self, step: &Step) -> Result<(), String> {
         match *step {
             Step::Write(joint, place, value) => {
@@ -310,7 +383,9 @@ impl Bench {
                 if is_target {
                     self.aim();
                 }
-                self.write(joint, (index, sub, bytes), value)
+                self.expect(joint, index);
+                let signature = SIGNATURES.iter().find(|(object, _)| *object == index && value % 2 == 0);
+                self.write(joint, (index, sub, bytes), signature.map_or(value, |(_, text)| *text))
             }
             Step::Word(joint, word) => self.word(joint, word),
             Step::Enable => [6, 7, 0xF].into_iter().try_for_each(|word| {
@@ -318,20 +393,23 @@ impl Bench {
                 self.run(8)
             }),
             Step::Mode(joint, mode) => {
-                // A mode of direct torque or of a spring uses the targets that are there.
-                if self.targets {
-                    self.target = Some(self.ticks);
-                }
-                (0..JOINTS)
-                    .filter(|place| joint == JOINTS || *place == joint)
-                    .try_for_each(|joint| self.write(joint, (0x6060, 0, 1), i32::from(mode)))
+                (0..JOINTS).filter(|place| joint == JOINTS || *place == joint).try_for_each(|joint| {
+                    self.modes[joint] = mode;
+                    // A mode of velocity or torque uses the target that is there at once.
+                    if self.targets && matches!(mode, 4 | 9 | 10) {
+                        self.explained[joint] = self.ticks + AFTER_VALUE;
+                    }
+                    self.write(joint, (0x6060, 0, 1), i32::from(mode))
+                })
             }
             Step::Near(joint, by) => {
                 let Some(place) = self.read(joint, 0x6064)? else { return Ok(()) };
                 self.aim();
+                self.expect(joint, 0x607A);
                 self.write(joint, (0x607A, 0, 4), place.wrapping_add(by))
             }
             Step::Home(joint, offset) => {
+                self.modes[joint] = 6;
                 self.write(joint, (0x6060, 0, 1), 6)?;
                 self.write(joint, (0x6098, 0, 1), 37)?;
                 self.write(joint, (0x607C, 0, 4), offset)?;
@@ -339,10 +417,12 @@ impl Bench {
                 self.write(joint, (0x6040, 0, 2), 0x1F)?;
                 self.write(joint, (0x6040, 0, 2), 0x0F)
             }
-            Step::Pdo(joint, word, [a, b, c, d, e, f]) => {
+            Step::Pdo(joint, number, bytes) => {
+                let (index, length) =
+                    [(0x6040, 2), (0x607A, 4), (0x60FF, 4), (0x6071, 2)][usize::from(number) - 1];
                 self.aim();
-                let [low, high] = word.to_le_bytes();
-                self.send(0x200 + NODES[joint], &[low, high, a, b, c, d, e, f]);
+                self.expect(joint, index);
+                self.send(0x100 + 0x100 * number + NODES[joint], &bytes[..length]);
                 self.run(2)
             }
             Step::Sync(count, apart) => (0..count).try_for_each(|_| {
@@ -354,6 +434,15 @@ impl Bench {
                 self.unheard = None;
                 self.send(0, &[command, node]);
                 self.run(8)
+            }
+            Step::Lss(service, byte) => {
+                self.send(0x7E5, &[service, byte, 0, 0, 0, 0, 0, 0]);
+                self.run(8)
+            }
+            Step::Watch(joint, time) => {
+                self.write(joint, (0x1016, 1, 4), 0x7F << 16 | i32::from(time))?;
+                self.send(0x77F, &[5]);
+                self.run(2)
             }
             Step::Contacts(enabling, start) => {
                 self.hand(enabling, start);
@@ -367,7 +456,10 @@ impl Bench {
                 self.network.set_plugged(plugged);
                 self.run(8)
             }
-            Step::Wait(ticks) => self.run(u32::from(ticks)),
+            Step::Wait(ticks) => {
+                self.run(u32::from(ticks))?;
+                self.words()
+            }
         }
     }
 
@@ -377,6 +469,7 @@ impl Bench {
         self.plugged = true;
         self.network.set_plugged(true);
         self.hand(true, false);
+        self.send(0x7E5, &[4, 0, 0, 0, 0, 0, 0, 0]);
         self.send(0, &[129, 0]);
         self.run(SERVO_RATE_HZ * 3 / 5)?;
         self.send(0, &[1, 0]);
