@@ -38,10 +38,10 @@
 //! overcurrent fault where that exceeds the overcurrent bound, or where the measured current does. On the
 //! default leg the first happens above 2.5 rad/s of the joint.
 //!
-//! **Known limit.** Below the speed that [`ModelWatch`] derives, at nearly constant current, a counter that
-//! stops looks like a held rotor. The torque falls with the cosine of the missed angle, and the rotor comes
-//! to rest a quarter of an electrical turn further. The index shows it where too few counts are left between
-//! pulses. Without an index, lost counts are not detected.
+//! **Known limit.** Below the speed that [`ModelWatch`] derives, a counter that stops looks like a held
+//! rotor. The torque falls with the cosine of the missed angle, and the rotor comes to rest a quarter of an
+//! electrical turn further. The index shows it where too few counts are left between pulses. Without an
+//! index, lost counts are not detected.
 //!
 //! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts
 //! and current both grow with the joint's flexion: [`AxisConfiguration::flexion`] states the
@@ -538,7 +538,8 @@ impl Axis {
             let mut found = self.model_watch.look(&self.constants.model, &shown);
             if self.first_motion.is_limited() {
                 let model = &self.constants.model;
-                let volts = [model.back_emf(&shown), self.model_watch.residual(), model.tolerance(&shown)];
+                let watch = &self.model_watch;
+                let volts = [model.back_emf(&shown), watch.residual(), watch.tolerance()];
                 self.first_motion.look(&self.constants.scale, self.counts, volts);
                 let greatest = SPEED_SHARE * model.frozen_speed(Ampere(self.current_limit));
                 // A wrong angle looks like an open phase.

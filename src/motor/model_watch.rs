@@ -9,39 +9,51 @@
 //!
 //! ```text
 //! r = s - R i - (coupling and back-EMF, where they are not fed forward)          d and q, each servo period
-//! |r| > V + 0.35 R |i| + |w| (0.2 flux + 0.3 L |i|)       open or frozen: 32 more periods with than without
-//! |mean of r in the stator's frame over an electrical turn| > 0.4 V + 0.06 R I    drifted offset
-//! range of q, sustained extremes and now, > I / 2, while the counter moved by at most 2 counts,
-//!     without the first 12 periods there        frozen: 64 more periods with than without
-//! V = 2 * 4/3 t_d f V_bus                    twice the loss of dead time and switches; 0.44 V on the board
+//! |r| > V + 0.35 R I1 + |w| (0.2 flux + 0.3 L I1)       open or frozen: 32 more periods with than without
+//! counts >= 4 a period in one direction, 4 periods in a row; from the next period on within 2 counts for
+//!     32 periods                             frozen
+//! |mean of r in the stator's frame over an electrical turn| > 0.4 V + R max(0.06 I, 0.17 range of i_q)
+//!                                           drifted offset
+//! V  = 2 * 4/3 t_d f V_bus                   twice the loss of dead time and switches; 0.44 V on the board
+//! I1 = max(|i_d| + |i_q|, 3/4 of the last period's I1)
 //! ```
 //!
-//! `i` measured current as |d| + |q|, `I` the axis' current limit, `w` electrical speed of the counts.
-//! Shares: 0.35 for copper 90 K warmer than at the calibration; 0.2 for magnets 80 K warmer and the
-//! nameplate's error; 0.3 for iron that saturates.
+//! `i` measured current, `I` the axis' current limit, `w` electrical speed of the counts. Shares: 0.35 for
+//! copper 90 K warmer than at the calibration; 0.2 for magnets 80 K warmer and the nameplate's error; 0.3 for
+//! iron that saturates. `I1` forgets a current within 1 ms: errors of R and L reach the integral with the
+//! delay L/R.
 //!
-//! **Frozen counter** (E1): r is the whole back-EMF, detected where `w flux > V + 0.35 R |i|`
-//! ([`ModelLimits::frozen_speed`]). On the default leg that is 0.44 rad/s of the joint without current, 1.3
-//! rad/s with the greatest current. Detection takes 8 ms after the loop's speed has followed the counts to
-//! zero (1 ms). Counts at rest distinguish this fault from an open phase. A residual beyond the back-EMF of
-//! the greatest speed is never a frozen counter.
+//! **Why no current alone decides.** A rotor that is held, or that a fast torque only shakes, obeys
 //!
-//! **Slower, or at rest**: a controller whose measured position no longer changes pulls harder and harder. A
-//! change of the current by half of its limit moves a rotor by more than 2 counts within 16 ms. On the
-//! default leg these are 28 A (42 N m) and 0.03 mrad of the joint. Exceptions:
+//! ```text
+//! v = R i + L di/dt,   so r = 0 within the errors of R, L and dead time, whatever the current does
+//! ```
 //!
-//! - An inertia above 100 kg m^2.
-//! - Friction that takes more than 42 N m from one side to the other (9 here).
-//! - A constraint stiffer than 1e6 N m/rad (gears have 1e4 to 1e5, a hand 2e3).
-//! - A push that grows as the torque does, to within friction. With a third of the limit and 8 ms that
-//!   happened once in 75 pushes of up to 70 N m.
+//! Its counter rests rightly: torque of +-22 N m with half waves of 4 ms moves a joint by a count or two.
 //!
-//! Up to that change, and so up to a torque that is wrong by 42 N m, a frozen counter is not detected. A
-//! current that falls within the first 3 ms at rest does not count: a joint that comes to rest loses its
-//! braking current then. Otherwise a hard-damped leg would show a frozen counter. A short pulse of current,
-//! as a late target makes it, moves a joint by less than 2 counts, and stiction holds it there. The extremes
-//! therefore follow the current by at most 1/64 of the limit per period. A rotor that is itself clamped, as
-//! on a test bench, is reported as a frozen counter.
+//! **Frozen counter** (E1), first sign: voltages and currents are seen in the frame of the counter. If the
+//! rotor is ahead of it by an angle e, the residual is the back-EMF,
+//!
+//! ```text
+//! r_d = -w flux sin e        r_q = w flux cos e
+//! ```
+//!
+//! detected where `w flux > V + 0.35 R I1` ([`ModelLimits::frozen_speed`]). On the default leg that is 0.44
+//! rad/s of the joint without current, 1.3 rad/s with the greatest current. Detection takes 8 ms after the
+//! loop's speed has followed the counts to zero (1 ms). Counts at rest distinguish this fault from an open
+//! phase. A residual beyond the back-EMF of the greatest speed is never a frozen counter.
+//!
+//! Second sign: a counter that stops as no rotor can. From 4 counts a period (0.25 rad/s of a joint of the
+//! default leg) to rest within 3 + 2 counts takes 390 rad/s^2 of the joint, or 750 N m at its rotor. The
+//! drive makes 85 N m. A stop at the end of the range, behind gears of 1e5 N m/rad, moves a rotor by 70
+//! counts; this motor alone needs 44 at full current. Then the counter must rest for 8 ms: a rotor that was
+//! struck bounces. One that is clamped at speed, as on a test bench, is reported as a frozen counter. Four
+//! periods exclude wrong readings, which come back, and lost counts, which come once.
+//!
+//! **Slower, or at rest**, a frozen counter is not detected: it looks like a rotor that is held. The current
+//! then stands still in the stator, and holds the rotor like a detent within half an electrical turn (0.5
+//! degrees of the joint), against up to the current limit. What turns the joint against it moves the rotor
+//! from pole to pole, with the back-EMF of such jumps. An absolute encoder shows a loss of 14 counts.
 //!
 //! **Open phase** (P1): the open phase's target current cannot flow, so the integral grows past any limit.
 //! Without a target current nothing is detected. At rest the fault may be reported as a frozen counter: two
@@ -49,20 +61,22 @@
 //!
 //! **Drifted offset** (C1): an offset o of one shunt leaves a residual 2/sqrt(3) |R + j w L| o that rests in
 //! the stator's frame. All errors of resistance, flux and dead time turn with the rotor and vanish from the
-//! mean of a turn. The limit is 6.7 A on the default leg, 12 N m at most. Offsets below 3 A are not detected:
-//! without target currents dead time alone looks like that. Turns longer than 25 ms, shorter than 3 ms or
-//! with a reversal are not evaluated.
+//! mean of a turn, unless the current changes with the turn: then up to 0.35 R range / pi of a wrong R is
+//! left. The limit allows half more, for dead time and steps. With changes below a third of `I`, an offset of
+//! 6.7 A is detected on the default leg, 12 N m at most. Offsets below 3 A are not detected: without target
+//! currents dead time alone looks like that. Turns longer than 25 ms, shorter than 3 ms or with a reversal
+//! are not evaluated.
 //!
 //! False alarms: those of the simulated hours in docs/results/faults.md. The margin between a healthy motor's
 //! residual and the limits has not been measured on a motor.
 //! Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10.
-//! Cost: docs/results/motor.md, checks; 44 bytes.
+//! Cost: docs/results/motor.md, checks; 60 bytes.
 
 use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;
 use super::{CountScale, CurrentLoop, ElectricalAngle, MotorConstants, Rotating, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::{abs, clamp, max, min, sqrt};
+use crate::real::{abs, max, min, sqrt};
 use crate::units::Ampere;
 
 /// Servo periods by which those with too large a residual must outnumber the others: 8 ms.
@@ -74,23 +88,23 @@ const LONGEST_TURN: u8 = 100;
 const SHORTEST_TURN: u8 = 12;
 /// Counts within which a counter counts as standing still: an edge on which a sensor rests.
 const STANDSTILL: i32 = 2;
-/// Share of the greatest current whose change moves any rotor, and periods until it has moved: 16 ms.
-const SWING_SHARE: f32 = 0.5;
-const SWING_PATIENCE: u8 = 64;
-/// Periods in which the sustained extremes of the current follow a change by that share: 8 ms.
-const SWING_FOLLOWS: f32 = 32.0;
-/// Periods in which a joint that came to rest loses its braking current: 3 ms.
-const SETTLED: u8 = 12;
+/// Counts per servo period from which a rotor cannot come to rest within [`STANDSTILL`], and periods for
+/// which it must have moved so.
+const MOVING: i32 = 4;
+const RUN: i8 = 4;
 /// Length of the vector that dead time makes (4/3), with a margin of two.
 const DEAD_VECTORS: f32 = 2.0 * 4.0 / 3.0;
 /// Uncertainty of the constants, as shares.
 const RESISTANCE_SHARE: f32 = 0.35;
 const FLUX_SHARE: f32 = 0.2;
 const INDUCTANCE_SHARE: f32 = 0.3;
+/// Share of the greatest current that is left after a servo period.
+const MEMORY: f32 = 0.75;
 /// Limit of the mean over a turn: shares of V, and of R times the greatest current, which changes
-/// within the turn.
+/// within the turn. A larger change counts by its range, as a wrong resistance shows it.
 const MEAN_SHARE: f32 = 0.4;
 const MEAN_RESISTANCE_SHARE: f32 = 0.06;
+const MEAN_RANGE_SHARE: f32 = 1.5 * RESISTANCE_SHARE / core::f32::consts::PI;
 
 /// Expected voltages of an axis, and their tolerances.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,12 +117,13 @@ pub struct ModelLimits {
     volt_per_ampere: f32,
     volt_per_speed: f32,
     volt_per_speed_ampere: f32,
-    mean_square: f32,
+    /// Limit of the mean over a turn without current, V, and the least change of current that it allows, A.
+    mean_v: f32,
+    mean_range_a: f32,
     /// Square of the back-EMF at the greatest speed.
     back_emf_square: f32,
     scale: CountScale,
     back_emf_per_speed: f32,
-    swing_a: f32,
 }
 
 impl ModelLimits {
@@ -119,8 +134,6 @@ impl ModelLimits {
         let still_v = DEAD_VECTORS * configuration.timing.dead_time.0 * CURRENT_RATE_HZ as f32 * bus.0;
         let resistance_ohm = motor.resistance.0;
         let left = if configuration.feedforward { 0.0 } else { 1.0 };
-        let mean_v =
-            MEAN_SHARE * still_v + MEAN_RESISTANCE_SHARE * resistance_ohm * configuration.current_limit.0;
         let greatest = f32::from(configuration.pole_pairs) * configuration.greatest_speed.0;
         let back_emf = greatest * motor.flux.0;
         Self {
@@ -134,11 +147,11 @@ impl ModelLimits {
             volt_per_ampere: RESISTANCE_SHARE * resistance_ohm,
             volt_per_speed: FLUX_SHARE * motor.flux.0,
             volt_per_speed_ampere: INDUCTANCE_SHARE * motor.quadrature_inductance.0,
-            mean_square: mean_v * mean_v,
+            mean_v: MEAN_SHARE * still_v,
+            mean_range_a: MEAN_RESISTANCE_SHARE / MEAN_RANGE_SHARE * configuration.current_limit.0,
             back_emf_square: back_emf * back_emf,
             scale,
             back_emf_per_speed: motor.flux.0,
-            swing_a: SWING_SHARE * configuration.current_limit.0,
         }
     }
 
@@ -148,25 +161,23 @@ impl ModelLimits {
         (self.still_v + self.volt_per_ampere * current.0) / self.back_emf_per_speed
     }
 
-    /// Change of the current above which a frozen counter is detected at any speed.
-    #[must_use]
-    pub fn frozen_swing(&self) -> Ampere {
-        Ampere(self.swing_a)
-    }
-
     /// Greatest residual of a sound axis, V.
     #[inline(always)]
-    pub(super) fn tolerance(&self, now: &Shown<'_>) -> f32 {
-        let speed = abs(now.speed_rad_per_s);
-        let current = abs(now.current.d.0) + abs(now.current.q.0);
+    fn tolerance(&self, current_a: f32, speed_rad_per_s: f32) -> f32 {
+        let speed = abs(speed_rad_per_s);
         self.still_v
-            + current * (self.volt_per_ampere + self.volt_per_speed_ampere * speed)
+            + current_a * (self.volt_per_ampere + self.volt_per_speed_ampere * speed)
             + self.volt_per_speed * speed
     }
 
     /// Back-EMF at the counts' speed, V.
     pub(super) fn back_emf(&self, now: &Shown<'_>) -> f32 {
         self.back_emf_per_speed * abs(now.speed_rad_per_s)
+    }
+
+    /// Greatest mean over a turn in which the quadrature current has changed by so much, V.
+    fn mean(&self, range_a: f32) -> f32 {
+        self.mean_v + MEAN_RANGE_SHARE * self.resistance_ohm * max(range_a, self.mean_range_a)
     }
 
     fn is_still(&self, position: i32, before: i32) -> bool {
@@ -202,56 +213,52 @@ pub struct ModelWatch {
     /// Travel within the current electrical turn, turns, signed.
     way: f32,
     periods: u8,
+    /// Least and greatest quadrature current within that turn, A.
+    range_a: [f32; 2],
     angle: Option<ElectricalAngle>,
-    still: Still,
-    /// Square of the last period's residual, V^2.
+    stop: Stop,
+    /// Greatest current of the last periods, A.
+    current_a: f32,
+    /// Square of the last period's residual, V^2, and its tolerance, V.
     square: f32,
+    tolerance: f32,
 }
 
-/// A counter at rest, and the sustained range of currents since then.
+/// A counter that moves, and how it comes to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Still {
-    position: i32,
-    /// Periods at that position, capped at the settling time.
-    periods: u8,
-    least_a: f32,
-    most_a: f32,
-    /// Periods with a current far from an extreme, less those near both.
-    overdue: u8,
+struct Stop {
+    /// Position in the last period.
+    before: i32,
+    /// Periods of fast motion in one direction, signed.
+    run: i8,
+    /// Position one period after them, and periods there.
+    rests_at: i32,
+    rests: u8,
 }
 
-impl Still {
-    const fn at(position: i32, current_a: f32) -> Self {
-        Self { position, periods: 0, least_a: current_a, most_a: current_a, overdue: 0 }
-    }
-
-    /// Runs one servo period; returns whether the counter should have moved but did not.
-    fn look(&mut self, limits: &ModelLimits, position: i32, current_a: f32) -> bool {
-        if !limits.is_still(position, self.position) {
-            *self = Self::at(position, current_a);
-        }
-        if self.periods < SETTLED {
-            self.periods += 1;
-            // Least current, by magnitude, since the counter came to rest.
-            let least_a = if self.least_a < 0.0 {
-                clamp(current_a, self.least_a, 0.0)
-            } else {
-                clamp(current_a, 0.0, self.least_a)
-            };
-            (self.least_a, self.most_a) = (least_a, least_a);
+impl Stop {
+    /// Runs one servo period; returns whether the counter has stopped as no rotor can.
+    fn look(&mut self, limits: &ModelLimits, position: i32) -> bool {
+        let turn = limits.scale.counts_per_turn();
+        let way = limits.scale.within_turn(position - self.before);
+        let step = if 2 * way > turn { way - turn } else { way };
+        self.before = position;
+        if step.abs() >= MOVING {
+            let sign = if step > 0 { 1 } else { -1 };
+            self.run = if self.run * sign > 0 { (self.run + sign).clamp(-RUN, RUN) } else { sign };
+            self.rests = 0;
             return false;
         }
-        let step = limits.swing_a / SWING_FOLLOWS;
-        self.least_a = min(self.least_a, max(current_a, self.least_a - step));
-        self.most_a = max(self.most_a, min(current_a, self.most_a + step));
-        // The largest of three distances: between the extremes, and from the current to either.
-        let range_a = max(self.most_a, current_a) - min(self.least_a, current_a);
-        if range_a > limits.swing_a {
-            self.overdue += 1;
-        } else {
-            self.overdue = self.overdue.saturating_sub(1);
+        if self.rests == 0 {
+            // The counter may have stopped within this period.
+            self.rests_at = position;
         }
-        self.overdue >= SWING_PATIENCE
+        if self.run.abs() < RUN || !limits.is_still(position, self.rests_at) {
+            (self.run, self.rests) = (0, 0);
+            return false;
+        }
+        self.rests += 1;
+        self.rests > PATIENCE
     }
 }
 
@@ -263,9 +270,12 @@ impl ModelWatch {
         sum: Stationary { alpha: 0.0, beta: 0.0 },
         way: 0.0,
         periods: 0,
+        range_a: [0.0; 2],
         angle: None,
-        still: Still::at(0, 0.0),
+        stop: Stop { before: 0, run: 0, rests_at: 0, rests: 0 },
+        current_a: 0.0,
         square: 0.0,
+        tolerance: 0.0,
     };
 
     /// Whether the counter has stood still since voltages and currents began to disagree. Any fault found
@@ -280,6 +290,11 @@ impl ModelWatch {
         sqrt(self.square)
     }
 
+    /// Greatest residual of a sound axis in the last period, V.
+    pub(super) fn tolerance(&self) -> f32 {
+        self.tolerance
+    }
+
     /// Electrical speed whose back-EMF equals the last period's residual, rad/s.
     #[must_use]
     pub fn uncounted(&self, limits: &ModelLimits) -> f32 {
@@ -292,7 +307,9 @@ impl ModelWatch {
         let residual = residual(limits, now);
         let square = residual.d * residual.d + residual.q * residual.q;
         self.square = square;
-        let limit = limits.tolerance(now);
+        self.current_a = max(abs(now.current.d.0) + abs(now.current.q.0), MEMORY * self.current_a);
+        let limit = limits.tolerance(self.current_a, now.speed_rad_per_s);
+        self.tolerance = limit;
         if self.suspicion == 0 {
             self.position = now.position;
         }
@@ -307,7 +324,8 @@ impl ModelWatch {
                 return Some(if frozen { AxisFault::EncoderFrozen } else { AxisFault::OpenPhase });
             }
         }
-        if self.still.look(limits, now.position, now.current.q.0) {
+        if self.stop.look(limits, now.position) {
+            self.stop = Self::EMPTY.stop;
             return Some(AxisFault::EncoderFrozen);
         }
         self.turn(limits, now, residual).then_some(AxisFault::CurrentOffset)
@@ -318,8 +336,11 @@ impl ModelWatch {
         let step = self.angle.map_or(0.0, |before| now.angle.since(before));
         self.angle = Some(now.angle);
         self.periods += 1;
+        let [least_a, most_a] = self.range_a;
+        self.range_a = [min(least_a, now.current.q.0), max(most_a, now.current.q.0)];
         if step * self.way < 0.0 || self.periods > LONGEST_TURN {
             (self.sum, self.way, self.periods) = (Self::EMPTY.sum, 0.0, 0);
+            self.range_a = [now.current.q.0; 2];
         }
         let seen = residual.to_stationary(now.angle.rotation());
         let left = 1.0 - abs(self.way);
@@ -336,9 +357,10 @@ impl ModelWatch {
         let (alpha, beta) = (add(self.sum.alpha, seen.alpha, left), add(self.sum.beta, seen.beta, left));
         self.way = if step < 0.0 { left - way } else { way - left };
         let is_circle = self.periods >= SHORTEST_TURN;
-        self.periods = 0;
+        let most_v = limits.mean(self.range_a[1] - self.range_a[0]);
+        (self.periods, self.range_a) = (0, [now.current.q.0; 2]);
         self.sum = Stationary { alpha: seen.alpha * (way - left), beta: seen.beta * (way - left) };
-        is_circle && alpha * alpha + beta * beta > limits.mean_square
+        is_circle && alpha * alpha + beta * beta > most_v * most_v
     }
 }
 
@@ -404,46 +426,35 @@ mod tests {
         }
     }
 
-    /// Servo period in which a counter at rest is reported as frozen, of 400, for the current in each.
-    fn frozen_after(current_a: impl Fn(u32) -> f32) -> Option<u32> {
+    #[test]
+    fn only_a_counter_that_stops_at_once_from_motion_is_frozen_before_voltages_show_it() {
+        type Way = fn(i32) -> i32;
         let limits = limits();
-        let mut still = Still::at(0, current_a(0));
-        (0..400).find(|period| still.look(&limits, 0, current_a(*period)))
-    }
-
-    #[test]
-    fn a_sustained_change_of_the_current_at_a_standing_counter_is_a_frozen_one() {
-        let swing = limits().swing_a;
-        let begin = u32::from(SETTLED) + 8;
-        let step = |period: u32| if period < begin { 0.0 } else { -1.1 * swing };
-        assert_eq!(frozen_after(step), Some(begin + u32::from(SWING_PATIENCE) - 1));
-        // First to one side, then to the other: the range counts, not the distance from the first current.
-        let there_and_back = |period: u32| match period {
-            0..20 => 0.0,
-            20..100 => 0.7 * swing,
-            _ => -0.7 * swing,
-        };
-        assert_eq!(frozen_after(there_and_back), Some(100 + u32::from(SWING_PATIENCE) - 1));
-        // A slow swing that exceeds the limit at its peak only.
-        let slow = |period: u32| match period {
-            0..20 => 0.0,
-            20..160 => (period - 20) as f32 * 1.05 / 140.0 * swing,
-            _ => (300 - period.min(300)) as f32 * 1.05 / 140.0 * swing,
-        };
-        assert!(frozen_after(slow).is_some_and(|period| period < 160 + u32::from(SWING_PATIENCE)));
-        assert_eq!(frozen_after(|period| if period < begin { 0.0 } else { 0.9 * swing }), None);
-    }
-
-    #[test]
-    fn short_pulses_of_the_current_that_a_sticking_joint_survives_show_no_frozen_counter() {
-        let swing = limits().swing_a;
-        // Full current for 2 ms in each direction, every 50 ms: targets that were late.
-        let pulses = |period: u32| match period % 200 {
-            40..48 => 2.0 * swing,
-            48..56 => -2.0 * swing,
-            _ => 0.1 * swing,
-        };
-        assert_eq!(frozen_after(pulses), None);
+        // Positions by servo period; the motion ends at 20.
+        let cases: [(Way, Option<i32>); 9] = [
+            (|period| 4 * period.min(20), Some(53)),
+            (|period| -40 * period.min(20), Some(53)),
+            // It stops within a period, rests on an edge, or wraps.
+            (|period| 5 * period.min(20) + if period > 20 { 2 + period % 2 } else { 0 }, Some(53)),
+            (|period| 8192 - 50 + 5 * period.min(20), Some(53)),
+            (|period| 3 * period.min(20), None),
+            // Braked with 250 rad/s^2 of the joint, a count a period less in each; a rotor that creeps on.
+            (
+                |period| {
+                    8 * period.min(20) + (0..(period - 20).clamp(0, 8)).map(|done| 7 - done).sum::<i32>()
+                },
+                None,
+            ),
+            (|period| 4 * period.min(20) + (period - 20).max(0) / 5, None),
+            // Counts that are lost, a wrong reading, and a shake.
+            (|period| if period < 20 { 0 } else { 26 }, None),
+            (|period| if period == 20 { 26 } else { 5 * (period & 1) }, None),
+        ];
+        for (case, (way, expected)) in cases.into_iter().enumerate() {
+            let mut stop = ModelWatch::EMPTY.stop;
+            let seen = (1..400).find(|period| stop.look(&limits, 8191 & way(*period)));
+            assert_eq!(seen, expected, "case {case}");
+        }
     }
 
     #[test]
@@ -464,7 +475,7 @@ mod tests {
     #[test]
     fn a_drifted_zero_is_seen_after_the_same_turns_in_either_direction() {
         let limits = limits();
-        let size = 1.5 * sqrt(limits.mean_square);
+        let size = 1.5 * limits.mean(0.0);
         // 90 periods at rest, then 40 a turn; the drift begins within the second turn.
         let seen = [1.0_f32, -1.0].map(|sign| {
             let mut watch = ModelWatch::EMPTY;

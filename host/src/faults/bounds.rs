@@ -23,7 +23,6 @@ fn voltages(bounds: &mut Bounds, joint: &JointFile, motor: &MotorFile, configura
     let per_joint = f64::from(configuration.pole_pairs) * joint.encoder.ratio;
     let frozen = [still, 0.35 * resistance].map(|volts| volts / f64::from(configuration.flux.0) / per_joint);
     bounds.frozen_speed = core::array::from_fn(|part| bounds.frozen_speed[part].max(frozen[part]));
-    bounds.frozen_swing_a = bounds.frozen_swing_a.max(current / 2.0);
     bounds.judged_speed = bounds.judged_speed.max(TAU / 0.025 / per_joint);
     // 2 * 4/3 of the dead time's voltage is `still`. The gain of so fast a loop is that of its inductance.
     let inductance = 1e-6 * motor.inductance_d_uh.min(motor.inductance_q_uh);
@@ -45,7 +44,6 @@ pub(super) fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
         overcurrent_a: 0.0,
         bus_v: [0.0; 2],
         frozen_speed: [0.0; 2],
-        frozen_swing_a: 0.0,
         judged_speed: 0.0,
         stuck_a: 1.0,
         smallest_offset_a: 0.0,

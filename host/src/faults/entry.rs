@@ -72,8 +72,8 @@ pub fn instead(id: &str) -> Option<&'static str> {
         // Push and foot contact: the result is refused if the disturbed rows cannot be excluded.
         "H2" => Some("refused"),
         "H4" => Some("Limit, refused"),
-        // A kick that holds the other joint while its torque grows looks like a frozen counter.
-        "J2" => Some("Short, Off"),
+        // A kick may also drive current or bus voltage beyond their bounds.
+        "J2" => Some("Off"),
         // Damping requires the rotor angle; otherwise as E1.
         "E4" => Some("Short, Off"),
         // While a joint hardly moves, a wrong or missing current looks like a frozen counter. The motors are

@@ -26,9 +26,6 @@ mod keep;
 const AFTERWARDS: u64 = PERIODS_PER_S / 50;
 /// Periods for which a restarted machine is watched, with the switch opened and closed.
 const REFUSED: u64 = PERIODS_PER_S / 2;
-/// Periods after the injection in which a falling current does not count as a swing: 3 ms from when the
-/// frozen counter becomes visible.
-const SETTLED: u64 = PERIODS_PER_S * 36 / 10_000;
 /// Periods of random contacts.
 const HANDS: u64 = 6 * PERIODS_PER_S;
 
@@ -84,8 +81,6 @@ struct Watched<'a, const B: usize> {
     before: [f64; 2],
     /// Largest change of them within a period since then, A.
     steepest: [f64; 2],
-    /// Smallest and largest requested current of the joint since the injection, A.
-    swing: [f64; 2],
     hold: Hold,
     recording: Option<FaultCurves>,
     brief: bool,
@@ -148,7 +143,6 @@ impl<'a, const B: usize> Watched<'a, B> {
             requested: requested(&rig, scenario.injections[0].map_or(0, |injection| injection.joint)),
             before: [f64::NAN; 2],
             steepest: [0.0; 2],
-            swing: [f64::INFINITY, f64::NEG_INFINITY],
             hold: Hold::default(),
             recording: manner.recorded.then(FaultCurves::default),
             brief: manner.brief,
@@ -172,14 +166,6 @@ impl<'a, const B: usize> Watched<'a, B> {
         let phases = self.requested();
         let step = |shunt: usize| self.steepest[shunt].max((phases[shunt] - self.before[shunt]).abs());
         (self.steepest, self.before) = ([0, 1].map(step), phases);
-        let requested = self.rig.requested(self.joint());
-        self.swing = if self.rig.period > self.begun + SETTLED {
-            [self.swing[0].min(requested), self.swing[1].max(requested)]
-        } else {
-            // The braking current of a joint that comes to rest vanishes, which is not a swing.
-            let before = if self.swing[0].is_finite() { self.swing[0] } else { requested };
-            [requested.clamp(before.min(0.0), before.max(0.0)); 2]
-        };
         match (self.onset, self.has_begun()) {
             (None, true) => self.onset = Some(self.rig.period),
             // A fault under a condition that no longer holds.
@@ -189,10 +175,7 @@ impl<'a, const B: usize> Watched<'a, B> {
     }
 
     fn has_begun(&self) -> bool {
-        let lasts = matches!(
-            self.scenario.onset,
-            Onset::Driven { .. } | Onset::Uncounted { .. } | Onset::Requested(_)
-        );
+        let lasts = matches!(self.scenario.onset, Onset::Driven { .. } | Onset::Requested(_));
         if self.onset.is_some() && !lasts {
             return true;
         }
@@ -204,9 +187,6 @@ impl<'a, const B: usize> Watched<'a, B> {
             Onset::BusBelow(volts) => bus() < volts,
             Onset::Driven { speed, per_ampere, current } => {
                 self.turns(joint, speed, per_ampere) && self.rig.requested(joint).abs() > current
-            }
-            Onset::Uncounted { speed, per_ampere, swing } => {
-                self.turns(joint, speed, per_ampere) || self.swing[1] - self.swing[0] > swing
             }
             Onset::Requested(amperes) => {
                 let requested = self.requested();
@@ -316,7 +296,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         let own = alarm.is_none_or(|code| self.row.codes.contains(&code));
         let early = onset.is_none() && !own;
         let elsewhere = !early && seen.is_some_and(|state| !self.leads_to(state));
-        false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !self.is_caused_by_a_push(code));
+        false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !Self::is_caused_by_a_push(code));
         let alarm = alarm.map(FaultCode::name);
         let begun = onset.map_or(safe, |onset| onset.min(safe));
         let after_ms = seen.map(|_| (safe - begun) as f64 * PERIOD_MS);

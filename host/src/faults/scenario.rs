@@ -79,16 +79,6 @@ pub enum Onset {
         /// Requested current, A.
         current: f64,
     },
-    /// While the joint of the first injection turns faster than a speed, or once its requested current has
-    /// varied enough.
-    Uncounted {
-        /// Speed, rad/s.
-        speed: f64,
-        /// Increase of the speed per requested ampere, rad/s.
-        per_ampere: f64,
-        /// Difference of largest and smallest requested current since the injection, A.
-        swing: f64,
-    },
     /// While the requested current of the phase with the faulted shunt differs from that at the injection by
     /// more than this, A.
     Requested(f64),
@@ -191,8 +181,6 @@ pub struct Bounds {
     /// Joint speed, rad/s, and its increase per ampere, above which back-EMF exceeds dead time and warm
     /// copper; the higher of both joints.
     pub frozen_speed: [f64; 2],
-    /// Change of current that moves every rotor, A; the higher of both joints.
-    pub frozen_swing_a: f64,
     /// Joint speed at which an electrical turn takes 25 ms, rad/s.
     pub judged_speed: f64,
     /// Phase-current change, A, that may leave the code unchanged, because dead time outweighs the current

@@ -17,14 +17,12 @@ pub static ROWS: [Row; 3] = [
     Row {
         id: "E1",
         fault: "encoder frozen while moving",
-        detector: "back-EMF against counts, or constant counts while the current changes by half of its limit; 8 and 16 ms",
+        detector: "back-EMF against counts, or counts that stop within a period; 8 ms",
         state: "Short",
         codes: &[FaultCode::EncoderFrozen],
         deadline_ms: 20.0,
         unit: "",
-        lacking: Some(
-            "so slow that dead time and resistance hide the back-EMF, while the current changes by less than half of its limit",
-        ),
+        lacking: Some("at rest, or so slow that dead time and resistance hide the back-EMF"),
         draw: frozen,
     },
     Row {
@@ -68,8 +66,8 @@ fn frozen(random: &mut Random, bounds: &Bounds) -> Scenario {
     let index = at(Channel::Index, joint, Form::Off, Timing::from(0));
     Scenario {
         injections: [Some(counter), Some(index)],
-        // The measured current follows its target to 5 %.
-        onset: Onset::Uncounted { speed, per_ampere, swing: 1.05 * bounds.frozen_swing_a + 0.5 },
+        // Any current.
+        onset: Onset::Driven { speed, per_ampere, current: -1.0 },
         patience: PERIODS_PER_S,
         ..one(counter, Expected::Brake)
     }

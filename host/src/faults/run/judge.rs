@@ -21,19 +21,17 @@ impl<const B: usize> Watched<'_, B> {
         matches!(self.scenario.event, Event::Kick(..) | Event::Push(..) | Event::Hold(..) | Event::Touch(_))
     }
 
-    /// Returns whether a push alone may cause this code; other codes report a healthy part as broken. A kick
-    /// that holds the other joint while its torque grows looks like a frozen counter.
-    pub(super) fn is_caused_by_a_push(&self, code: FaultCode) -> bool {
+    /// Returns whether a push alone may cause this code; other codes report a healthy part as broken.
+    pub(super) fn is_caused_by_a_push(code: FaultCode) -> bool {
         use FaultCode as Code;
-        match code {
+        matches!(
+            code,
             Code::PositionLimit
-            | Code::Overspeed
-            | Code::Overcurrent
-            | Code::BusVoltage
-            | Code::FollowingError => true,
-            Code::EncoderFrozen => matches!(self.scenario.event, Event::Kick(..)),
-            _ => false,
-        }
+                | Code::Overspeed
+                | Code::Overcurrent
+                | Code::BusVoltage
+                | Code::FollowingError
+        )
     }
 
     /// Safe state of the machine, if it is in one.
