@@ -131,17 +131,20 @@ impl Course {
         self.advance(velocity, tick_s);
     }
 
-    /// Moves one tick of the `left` ticks that lead to a velocity; stops at the ends of a range.
+    /// Moves one tick of the `left` ticks that lead to a velocity, with an acceleration of `most` at most;
+    /// stops at the ends of a range by the rates.
     pub fn interpolate_velocity(
         &mut self,
         target: f32,
         left: u32,
+        most: f32,
         rates: &Rates,
         range: [f32; 2],
         tick_s: f32,
     ) {
         let before = self.velocity;
-        let next = before + (target - before) / left.max(1) as f32;
+        let change = (target - before) / left.max(1) as f32;
+        let next = before + clamp(change, -most * tick_s, most * tick_s);
         let velocity = self.within(clamp(next, -rates.speed, rates.speed), rates, range, tick_s);
         self.acceleration = (velocity - before) / tick_s;
         self.advance(velocity, tick_s);
@@ -282,8 +285,14 @@ mod tests {
     fn an_interpolated_velocity_is_met_at_the_end_of_its_period() {
         let mut course = Course::at_rest(0.0);
         for left in (1..=8).rev() {
-            course.interpolate_velocity(0.4, left, &RATES, [-1.0, 1.0], TICK_S);
+            course.interpolate_velocity(0.4, left, 250.0, &RATES, [-1.0, 1.0], TICK_S);
         }
         assert!((course.velocity() - 0.4).abs() < 1e-6 && (course.acceleration() - 200.0).abs() < 0.1);
+        // A target that jumps farther is met later.
+        for left in (0..16).rev() {
+            course.interpolate_velocity(-0.4, left.max(8) - 8, 200.0, &RATES, [-1.0, 1.0], TICK_S);
+            assert!(course.acceleration() >= -200.1);
+        }
+        assert!((course.velocity() + 0.4).abs() < 1e-6);
     }
 }

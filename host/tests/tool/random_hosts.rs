@@ -92,7 +92,7 @@ const SIGNATURES: [(u16, i32); 2] = [(0x1010, 0x6576_6173), (0x1011, 0x6461_6F6C
 const fn asks_for_a_step(mode: i8, index: u16) -> bool {
     match index {
         0x607A | 0x607D => matches!(mode, 8 | -1),
-        0x60FF => matches!(mode, 9 | -1),
+        0x60FF => mode == -1,
         // 6087 may be as steep as a host wants.
         0x6071 | 0x6087 => matches!(mode, 4 | 10 | -1),
         0x60B1 => matches!(mode, 8 | 9),
@@ -395,8 +395,8 @@ impl Bench {
             Step::Mode(joint, mode) => {
                 (0..JOINTS).filter(|place| joint == JOINTS || *place == joint).try_for_each(|joint| {
                     self.modes[joint] = mode;
-                    // A mode of velocity or torque uses the target that is there at once.
-                    if self.targets && matches!(mode, 4 | 9 | 10) {
+                    // A mode of torque uses the target that is there at once.
+                    if self.targets && matches!(mode, 4 | 10) {
                         self.explained[joint] = self.ticks + AFTER_VALUE;
                     }
                     self.write(joint, (0x6060, 0, 1), i32::from(mode))

@@ -403,7 +403,8 @@ impl Follower {
     fn track_velocity(&mut self, velocity: f32, tick: &Tick<'_>) {
         let target = self.bounded(velocity, -tick.bounds.speed, tick.bounds.speed);
         self.count(target, tick.period);
-        self.course.interpolate_velocity(target, self.left, &tick.braking(), tick.range, TICK_S);
+        let (most, rates) = (tick.bounds.acceleration, tick.braking());
+        self.course.interpolate_velocity(target, self.left, most, &rates, tick.range, TICK_S);
         self.course.keep_within(tick.command.following_window.0, tick.measured.position.0);
         self.left = self.left.saturating_sub(1);
         self.reached = self.course.velocity() == target;
