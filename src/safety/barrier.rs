@@ -145,6 +145,13 @@ impl Barrier {
         (NewtonMetre(torque).limited(NewtonMetre(cap)), limited)
     }
 
+    /// Whether a joint stops before a fault of its range: `margin` beyond its ends, at its present velocity.
+    #[must_use]
+    pub fn stops_in_range(&self, position: Radian, velocity: RadianPerSecond, margin: Radian) -> bool {
+        let most = |end_is_at: f32| self.approach_speed(end_is_at + margin.0).0;
+        velocity.0 <= most(self.high_rad - position.0) && -velocity.0 <= most(position.0 - self.low_rad)
+    }
+
     /// Adds all values to a checksum, except those that derating changes.
     #[must_use]
     pub fn add_to(&self, sum: Checksum) -> Checksum {

@@ -7,7 +7,7 @@
 //!    finite; three encoder readings rejected in 10 ms. While the drive is on also 1.1 times the speed limit,
 //!    and 0.5 degrees beyond the range.
 //! 2. Update the state ([`DriveState::after`]): a fault, or the tick and then the operator's request.
-//!    Enabling requires the joints to be within range and speed; otherwise the request is refused with its
+//!    Enabling requires the joints to be within range, and slow enough to stop there; otherwise the request is refused with its
 //!    reason ([`RefusalReason`]).
 //! 3. Apply the state's permission: off, damp, or the requested torque within the bounds of [`Barrier`].
 //! 4. Convert torque to current. A current that is not finite turns the bridges off.
@@ -321,11 +321,16 @@ impl<const N: usize> Monitor<N> {
     fn refusal(&self, observation: &Observation<N>) -> Option<Refusal> {
         (0..N).find_map(|joint| {
             let is_inside = self.in_range(joint, observation.position[joint]);
-            let speed = if is_inside { self.limits.joints()[joint].speed.0 } else { RETURN_SPEED };
+            let (position, velocity) = (observation.position[joint], observation.velocity[joint]);
+            let is_slow = if is_inside {
+                self.barriers[joint].stops_in_range(position, velocity, RANGE_TOLERANCE)
+            } else {
+                velocity.abs().0 <= RETURN_SPEED
+            };
             let reason = if !(is_inside || self.may_return[joint] && self.is_within_reach(joint, observation))
             {
                 RefusalReason::OutOfRange
-            } else if observation.velocity[joint].abs().0 > speed {
+            } else if !is_slow {
                 RefusalReason::Moving
             } else if observation.rejected[joint] {
                 RefusalReason::Encoder

@@ -38,7 +38,7 @@ pub enum RefusalReason {
     NotCalibrated = 19,
     /// The joint is more than 0.5 degrees out of its range, and returning is not permitted.
     OutOfRange = 20,
-    /// The joint is faster than its limit, or faster than 0.1 rad/s outside its range.
+    /// The joint is too fast to stop within its range, or faster than 0.1 rad/s outside it.
     Moving = 21,
     /// The encoder reading of this tick was rejected.
     Encoder = 22,

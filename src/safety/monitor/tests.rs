@@ -162,6 +162,15 @@ fn a_refused_enabling_names_joint_and_reason() {
             Observation { velocity: [RadianPerSecond::ZERO, RadianPerSecond(3.2)], ..STANDING },
             RefusalReason::Moving,
         ),
+        // One that falls towards the end of its range: 0.5 rad/s 10 mrad before it.
+        (
+            Observation {
+                position: [MIDDLE[0], KNEE.low + Radian(0.01)],
+                velocity: [RadianPerSecond::ZERO, RadianPerSecond(-0.5)],
+                ..STANDING
+            },
+            RefusalReason::Moving,
+        ),
         (Observation { rejected: [false, true], ..STANDING }, RefusalReason::Encoder),
     ];
     for (observation, reason) in cases {
