@@ -35,13 +35,6 @@ impl Activity {
         matches!(self, Self::Identify(_))
     }
 
-    /// Whether the leg runs a proved motion, so that a joint that does not follow is a fault.
-    #[must_use]
-    #[inline]
-    pub const fn runs_a_motion(self) -> bool {
-        matches!(self, Self::Identify(_) | Self::Track(_))
-    }
-
     /// Whether the leg gives torque from the identified model and holds no position.
     #[must_use]
     #[inline]

@@ -18,17 +18,13 @@ use crate::checksum::Checksum;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
-use crate::real::{abs, min};
-use crate::safety::{Derating, DriveState, Fault, FaultCode, LimitCodes, Limits, PowerRequest, RETURN_SPEED};
+use crate::real::min;
+use crate::safety::{Derating, DriveState, Fault, LimitCodes, Limits, PowerRequest, RETURN_SPEED};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
-use crate::units::{Hertz, NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared};
+use crate::units::{Hertz, NewtonMetre, RadianPerSecond, RadianPerSecondSquared};
 
 /// Rest after a motion before the next step: half a second.
 const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
-/// Distance from a joint to its proved motion, and ticks of a larger one, after which it does not follow:
-/// 5 degrees and 10 ms, the defaults of a host (6065, 6066).
-const FOLLOWING_WINDOW: Radian = Radian(0.087_266);
-const FOLLOWING_TICKS: u32 = SERVO_RATE_HZ / 100;
 
 /// Request of an operator, valid for one tick. `Identify`, `Track` and `Assist` are refused unless the drive
 /// is enabled and the commanded motion is at rest. To stop a moving leg, request a quick stop or wait for the
@@ -98,8 +94,6 @@ pub struct Control<const N: usize> {
     segment: Option<Segment>,
     motion: Motion<N>,
     motion_tick: u32,
-    /// Ticks for which a joint has been outside [`FOLLOWING_WINDOW`].
-    outside: u32,
     tracked: Option<Periodic<N>>,
     excitation: Periodic<N>,
     validation: [Periodic<N>; VALIDATION_MOTIONS],
@@ -132,7 +126,6 @@ impl<const N: usize> Control<N> {
             segment: None,
             motion: Motion::Hold([0.0; N]),
             motion_tick: 0,
-            outside: 0,
             tracked: None,
             excitation: configuration.excitation,
             validation: configuration.validation,
@@ -323,7 +316,6 @@ impl<const N: usize> Control<N> {
             self.hold(servo.position.map(|angle| angle.0));
             self.end_assist();
         } else {
-            self.supervise(&servo, &motion);
             self.proceed();
         }
         self.assistance.measure(&servo);
@@ -339,18 +331,6 @@ impl<const N: usize> Control<N> {
             LoggedSample { sample, segment }
         });
         ControlOutput { servo, motion, logged, refused, took_update }
-    }
-
-    /// Reports a joint that does not follow a proved motion: it is blocked, or its encoder stands still while
-    /// the motor holds it. What a host commands is supervised by its own window (6065).
-    fn supervise(&mut self, servo: &ServoOutput<N>, motion: &MotionState<N>) {
-        let is_outside =
-            |joint: &usize| abs(motion.position_rad[*joint] - servo.position[*joint].0) > FOLLOWING_WINDOW.0;
-        let joint = if self.activity.runs_a_motion() { (0..N).find(is_outside) } else { None };
-        self.outside = if joint.is_some() { self.outside.saturating_add(1) } else { 0 };
-        if let Some(joint) = joint.filter(|_| self.outside > FOLLOWING_TICKS) {
-            self.servo.report(Fault { code: FaultCode::FollowingError, joint: joint as u8 });
-        }
     }
 
     /// Whether the request is permitted. A new activity starts only from rest, because its approach does.

@@ -434,7 +434,7 @@ mod tests {
         let cases: [(Way, Option<i32>); 9] = [
             (|period| 4 * period.min(20), Some(53)),
             (|period| -40 * period.min(20), Some(53)),
-            // It stops within a period, rests on an edge, or wraps.
+            // Stops within a period, rests on an edge, or wraps.
             (|period| 5 * period.min(20) + if period > 20 { 2 + period % 2 } else { 0 }, Some(53)),
             (|period| 8192 - 50 + 5 * period.min(20), Some(53)),
             (|period| 3 * period.min(20), None),

@@ -7,8 +7,8 @@
 //!    finite; three encoder readings rejected in 10 ms. While the drive is on also 1.1 times the speed limit,
 //!    and 0.5 degrees beyond the range.
 //! 2. Update the state ([`DriveState::after`]): a fault, or the tick and then the operator's request.
-//!    Enabling requires the joints to be within range, and slow enough to stop there; otherwise the request is refused with its
-//!    reason ([`RefusalReason`]).
+//!    Enabling requires the joints to be within range, and slow enough to stop there; otherwise the request
+//!    is refused with its reason ([`RefusalReason`]).
 //! 3. Apply the state's permission: off, damp, or the requested torque within the bounds of [`Barrier`].
 //! 4. Convert torque to current. A current that is not finite turns the bridges off.
 //!

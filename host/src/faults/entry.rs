@@ -67,8 +67,8 @@ pub fn instead(id: &str) -> Option<&'static str> {
     match id {
         // A host whose frames are blocked by others counts as lost.
         "B4" => Some("Damp"),
-        // A motor too fast for a short circuit is turned off. At rest only the following error shows it.
-        "E1" => Some("Off, Damp"),
+        // A motor too fast for a short circuit is turned off.
+        "E1" => Some("Off"),
         // Push and foot contact: the result is refused if the disturbed rows cannot be excluded.
         "H2" => Some("refused"),
         "H4" => Some("Limit, refused"),

@@ -211,5 +211,5 @@ mod tests {
         assert_eq!(format!("{sum:?}"), SUM);
     }
 
-    const SUM: &str = "Checksum(2467682954)";
+    const SUM: &str = "Checksum(1988092911)";
 }

@@ -181,7 +181,7 @@ struct Bench {
     /// Tick of the last target, and whether one was sent since the leg was last enabled.
     target: Option<u64>,
     targets: bool,
-    /// Mode that was last requested of each joint, and the tick until which a step of its torque is explained.
+    /// Mode last requested of each joint, and the tick until which a step of its torque is explained.
     modes: [i8; JOINTS],
     explained: [u64; JOINTS],
     /// Whether a torque was written for it since the leg was last enabled.
@@ -361,6 +361,11 @@ impl Bench {
         }
     }
 
+    /// A reset is on its way: 6072 is whole again, in the ticks until the leg is stopped too.
+    fn expect_defaults(&mut self) {
+        (0..JOINTS).for_each(|joint| self.expect(joint, 0x6072));
+    }
+
     /// A torque that was written before begins to act: the leg is enabled, or the mode is new.
     fn explain_torques(&mut self, joints: impl Iterator<Item = usize>) {
         for joint in joints.filter(|joint| self.torques[*joint] && matches!(self.modes[*joint], 4 | 8..=10)) {
@@ -444,6 +449,9 @@ impl Bench {
             Step::Nmt(command, node) => {
                 // A node that resets or stops says nothing of an earlier fault.
                 self.unheard = None;
+                if command == 129 {
+                    self.expect_defaults();
+                }
                 self.send(0, &[command, node]);
                 self.run(8)
             }
@@ -482,6 +490,7 @@ impl Bench {
         self.network.set_plugged(true);
         self.hand(true, false);
         self.send(0x7E5, &[4, 0, 0, 0, 0, 0, 0, 0]);
+        self.expect_defaults();
         self.send(0, &[129, 0]);
         self.run(SERVO_RATE_HZ * 3 / 5)?;
         self.send(0, &[1, 0]);

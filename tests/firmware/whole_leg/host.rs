@@ -435,7 +435,7 @@ fn relative_set_points_add_to_what_the_host_has_chosen() {
     {
         let mut hosted = Hosted::new();
         let from = hosted.position(1);
-        let mut ask = |hosted: &mut Hosted| {
+        let ask = |hosted: &mut Hosted| {
             let point = SetPoint { position: Radian(0.1), relative_to: Some(reference), immediately: true };
             hosted.commands[1].target = Target::ProfilePosition(point);
             hosted.commands[1].request_count += 1;

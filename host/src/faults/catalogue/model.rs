@@ -17,12 +17,12 @@ pub static ROWS: [Row; 3] = [
     Row {
         id: "E1",
         fault: "encoder frozen while moving",
-        detector: "back-EMF against counts, or counts that stop within a period, 8 ms; or the motion's following error",
+        detector: "back-EMF against counts, or counts that stop within a period, 8 ms",
         state: "Short",
-        codes: &[FaultCode::EncoderFrozen, FaultCode::FollowingError],
+        codes: &[FaultCode::EncoderFrozen],
         deadline_ms: 20.0,
         unit: "",
-        lacking: Some("at rest, until the motion has gone 5 degrees on"),
+        lacking: Some("at rest, or so slow that dead time and resistance hide the back-EMF"),
         draw: frozen,
     },
     Row {
@@ -68,7 +68,7 @@ fn frozen(random: &mut Random, bounds: &Bounds) -> Scenario {
         injections: [Some(counter), Some(index)],
         // Any current.
         onset: Onset::Driven { speed, per_ampere, current: -1.0 },
-        patience: 4 * PERIODS_PER_S,
+        patience: PERIODS_PER_S,
         ..one(counter, Expected::Brake)
     }
 }

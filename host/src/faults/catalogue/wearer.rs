@@ -12,9 +12,9 @@ use scarab::model::planar::JOINTS;
 pub static ROWS: [Row; 1] = [Row {
     id: "H1",
     fault: "wearer holds or pushes the leg",
-    detector: "torque cap; speed; following error of the motion",
-    state: "Limit, Damp",
-    codes: &[FaultCode::Overspeed, FaultCode::FollowingError],
+    detector: "torque cap; speed",
+    state: "Limit",
+    codes: &[FaultCode::Overspeed],
     // Duration of torque above the cap, without interruption.
     deadline_ms: 50.0,
     unit: "N m",

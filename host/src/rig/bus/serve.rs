@@ -92,7 +92,8 @@ pub fn wearers<const N: usize, const B: usize>(
     (0..options.legs).filter_map(worn).collect()
 }
 
-/// Creates the bus with the legs; all nodes have sent their boot-up messages. Each leg is on its wearer, if there are any.
+/// Creates the bus with the legs, each on its wearer if there are any. All nodes have sent their boot-up
+/// messages.
 pub fn network<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ServeOptions,
