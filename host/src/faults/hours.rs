@@ -1,18 +1,26 @@
 //! Hours of normal motion in which no fault may be reported: a false alarm can drop a wearer, as a missed
 //! fault can.
 //!
-//! Complete drives, all noise, a wearer who pushes. Each stretch is a machine with its own seed. The operator
-//! enables it, it identifies, then repeats the gaits with the resulting model.
+//! Complete drives, all noise. Each stretch is a machine with its own seed. With an odd one the operator
+//! enables it, it identifies, then repeats the gaits with the resulting model, and a wearer pushes. With an
+//! even one a host shakes it in cyclic torque: a wave of 1 to 500 Hz for each joint, another one each second.
+
+use core::f64::consts::TAU;
 
 use hal_sim::description::PushDescription;
 use rayon::prelude::*;
+use scarab::bus::Frame;
 use scarab::leg::{Activity, ControlRequest};
 use serde::{Deserialize, Serialize};
 
 use crate::base::error::ToolError;
 use crate::base::number::Number;
+use crate::base::random::Random;
 use crate::base::shard::Shard;
+use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
+use crate::rig::bus::board::{Board, Label, TICK_NS};
+use crate::rig::bus::host::{Host, NODES};
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 use crate::rig::operator::begin;
 use crate::rig::options::{DriveModel, SimulationOptions};
@@ -22,6 +30,14 @@ use scarab::model::planar::JOINTS;
 
 /// Duration of one stretch, s.
 const STRETCH_S: u64 = 180;
+/// Received PDO of the target torque, without the node-ID; servo ticks per cycle of the host, and cycles per
+/// wave.
+const TORQUES: u16 = 0x500;
+const CYCLE: u64 = 4;
+const WAVE: u64 = 1000;
+/// Frequencies of the waves, Hz, and amplitudes, thousandths of the torque cap.
+const FREQUENCIES: [f64; 2] = [1.0, 500.0];
+const AMPLITUDES: [f64; 2] = [20.0, 1000.0];
 /// Pushes of a wearer who leans and kicks: up to a fifth of the torque cap.
 const PUSHES: PushDescription = PushDescription { rate: 0.5, torque: 20.0, duration: 0.4 };
 
@@ -32,6 +48,8 @@ pub struct HoursReport {
     pub hours: Number,
     /// Number of machines; seeds from 1.
     pub stretches: usize,
+    /// Those of them that a host shakes by torque.
+    pub shaken: usize,
     /// Largest push of the wearer, N m.
     pub greatest_push_nm: f64,
     /// Mean number of pushes per minute.
@@ -45,6 +63,8 @@ pub struct HoursReport {
 pub struct Stretch {
     /// Periods of the motion.
     pub periods: u64,
+    /// Whether a host shakes the machine by torque.
+    pub is_shaken: bool,
     /// Reported fault, which ends it: code and time.
     pub alarm: Option<String>,
 }
@@ -57,6 +77,7 @@ impl HoursReport {
         Self {
             hours: (periods as f64 / PERIODS_PER_S as f64 / 3600.0).into(),
             stretches: stretches.len(),
+            shaken: stretches.iter().filter(|stretch| stretch.is_shaken).count(),
             greatest_push_nm: PUSHES.torque,
             pushes_per_minute: 60.0 * PUSHES.rate,
             false_alarms: stretches.iter().filter_map(|stretch| stretch.alarm.clone()).collect(),
@@ -68,8 +89,10 @@ impl HoursReport {
     pub fn lines(&self) -> String {
         let hours = self.hours.known().unwrap_or(0.0);
         let mut text = format!(
-            "normal motion: {hours:.2} hours in {} stretches, pushes of up to {} N m, {} per minute; false alarms: {}\n",
+            "normal motion: {hours:.2} hours in {} stretches, {} of them shaken by a host, the others with pushes of up to {} N m, {} per minute; \
+             false alarms: {}\n",
             self.stretches,
+            self.shaken,
             self.greatest_push_nm,
             self.pushes_per_minute,
             self.false_alarms.len()
@@ -81,16 +104,81 @@ impl HoursReport {
 
 /// Simulates the shard's stretches of the hours.
 pub fn hours(leg: &LegFile, hours: f64, shard: Shard) -> Result<Vec<Stretch>, ToolError> {
-    let stretches = ((3600.0 * hours / STRETCH_S as f64).ceil() as u64).max(1);
+    let stretches = ((3600.0 * hours / STRETCH_S as f64).ceil() as u64).max(2);
     let length = (3600.0 * hours * PERIODS_PER_S as f64 / stretches as f64) as u64;
     let seeds: Vec<u64> = (1..=stretches).collect();
-    shard.part(&seeds).par_iter().map(|seed| stretch(leg, *seed, length)).collect()
+    shard
+        .part(&seeds)
+        .par_iter()
+        .map(|seed| if seed % 2 == 0 { shaken(leg, *seed, length) } else { pushed(leg, *seed, length) })
+        .collect()
 }
 
-/// Runs one stretch.
-fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
-    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(seed) };
-    let context = Context::<JOINTS, BASE>::new(leg, &options)?;
+fn context(leg: &LegFile, seed: u64) -> Result<Context<JOINTS, BASE>, ToolError> {
+    Context::new(leg, &SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(seed) })
+}
+
+/// Text of the fault that ends a stretch, if there is one.
+fn alarm(rig: &Rig<JOINTS, BASE>, seed: u64, from: u64) -> Option<String> {
+    let at = (rig.period - from) as f64 / PERIODS_PER_S as f64;
+    rig.alarm().map(|code| format!("seed {seed}, {at:.3} s: {}: {:?}", code.words(), rig.state()))
+}
+
+/// Torque of a host for one joint, thousandths of the cap.
+struct Wave {
+    frequency_hz: f64,
+    amplitude: f64,
+    is_square: bool,
+}
+
+impl Wave {
+    fn new(random: &mut Random) -> Self {
+        let [lowest, highest] = FREQUENCIES;
+        let [least, most] = AMPLITUDES;
+        Self {
+            frequency_hz: random.logarithmic(lowest, highest),
+            amplitude: random.logarithmic(least, most),
+            is_square: random.coin(),
+        }
+    }
+
+    fn at(&self, seconds: f64) -> i16 {
+        let sine = (TAU * self.frequency_hz * seconds + 1e-6).sin();
+        (self.amplitude * if self.is_square { sine.signum() } else { sine }) as i16
+    }
+}
+
+/// Runs a stretch with a host that shakes the leg.
+fn shaken(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
+    let mut host = Host::new(Board::new(leg, context(leg, seed)?, seed, Label::SINGLE, Memory::new(None))?);
+    host.begin()?;
+    host.move_leg(leg)?;
+    host.speaks.targets = false;
+    for node in NODES {
+        host.write(node, 0x6060, 0, 10, 1)?;
+    }
+    let mut random = Random::new("shaken", seed);
+    let mut waves = [0; JOINTS].map(|_| Wave::new(&mut random));
+    let (from, mut cycle) = (host.rig().period, 0);
+    let mut found = None;
+    while host.rig().period - from < length && found.is_none() {
+        if cycle % WAVE == 0 {
+            waves = waves.map(|_| Wave::new(&mut random));
+        }
+        let seconds = (cycle * CYCLE * TICK_NS) as f64 * 1e-9;
+        for (node, wave) in NODES.into_iter().zip(&waves) {
+            host.network.send(Frame::new(TORQUES + node, &wave.at(seconds).to_le_bytes()));
+        }
+        host.run(CYCLE);
+        cycle += 1;
+        found = alarm(host.rig(), seed, from);
+    }
+    Ok(Stretch { periods: host.rig().period - from, is_shaken: true, alarm: found })
+}
+
+/// Runs a stretch with a wearer who pushes.
+fn pushed(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
+    let context = context(leg, seed)?;
     let mut rig = Rig::new(leg, &context, seed)?;
     begin(leg, &mut rig)?;
     rig.world.set_pushes(Some(PUSHES));
@@ -98,10 +186,9 @@ fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> 
     let (from, mut next) = (rig.period, 0_usize);
     while rig.period - from < length {
         rig.advance();
-        if let Some(code) = rig.alarm() {
-            let at = (rig.period - from) as f64 / PERIODS_PER_S as f64;
-            let alarm_text = format!("seed {seed}, {at:.3} s: {}: {:?}", code.words(), rig.state());
-            return Ok(Stretch { periods: rig.period - from, alarm: Some(alarm_text) });
+        let found = alarm(&rig, seed, from);
+        if found.is_some() {
+            return Ok(Stretch { periods: rig.period - from, is_shaken: false, alarm: found });
         }
         if rig.leg.control().activity() == Activity::Idle && !rig.is_requested() {
             if let Some(motion) = gaits.get(next % gaits.len()).copied().flatten()
@@ -112,5 +199,5 @@ fn stretch(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> 
             next += 1;
         }
     }
-    Ok(Stretch { periods: rig.period - from, alarm: None })
+    Ok(Stretch { periods: rig.period - from, is_shaken: false, alarm: None })
 }
