@@ -51,9 +51,10 @@
 //! periods exclude wrong readings, which come back, and lost counts, which come once.
 //!
 //! **Slower, or at rest**, a frozen counter is not detected: it looks like a rotor that is held. The current
-//! then stands still in the stator, and holds the rotor like a detent within half an electrical turn (0.5
-//! degrees of the joint), against up to the current limit. What turns the joint against it moves the rotor
-//! from pole to pole, with the back-EMF of such jumps. An absolute encoder shows a loss of 14 counts.
+//! then stands still in the stator, and holds the rotor like a detent in each electrical turn (1.0 degrees of
+//! the joint), against the torque that is asked for. What turns the joint against it, as gravity while that
+//! torque changes its sign, moves the rotor from pole to pole, with the back-EMF of such jumps. An absolute
+//! encoder shows a loss of 14 counts.
 //!
 //! **Open phase** (P1): the open phase's target current cannot flow, so the integral grows past any limit.
 //! Without a target current nothing is detected. At rest the fault may be reported as a frozen counter: two

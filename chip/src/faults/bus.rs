@@ -1,8 +1,9 @@
-//! B1, B3: a host that falls silent, and hostile frames.
+//! B1, B3, B6: a host that falls silent, hostile frames, and a host that takes over an enabled leg.
 
 use std::rc::Rc;
 
 use scarab::bus::Frame;
+use scarab::leg::Mode;
 use scarab::safety::FaultCode;
 use scarab_host::base::error::ToolError;
 use scarab_host::base::random::Random;
@@ -28,6 +29,11 @@ const FLOOD: u32 = 100;
 const LATE_S: f64 = 20e-3;
 /// Frames that wait for the wire while it is flooded.
 const WAITING: usize = 12;
+/// Largest change of a torque when a host takes over, N m: a tenth of the default leg's cap; largest motion, rad;
+/// and cycles for which both are watched.
+const TAKEN_NM: f64 = 8.5;
+const TAKEN_RAD: f64 = 0.01;
+const TAKEN: u32 = 1500;
 /// Difference of a motion because frames wait for others, rad.
 const OFF_RAD: f64 = 2e-3;
 /// Device type of a servo drive with CiA 402's profile.
@@ -263,4 +269,51 @@ fn moved_on(machines: &mut Machines<'_>, random: &mut Random) -> Result<Result<(
         Ok(Some(_)) => Err("malformed frames stopped the leg".into()),
         Err(complaint) => Err(complaint),
     })
+}
+
+/// B6: a host comes to a leg that its operator has enabled, commands it to stand still in one of the modes, and
+/// writes its first controlword. The leg goes on holding its pose.
+pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
+    let resting = machines.resting()?;
+    let mut random = Random::new("B6", seed);
+    let session = &mut *machines.session;
+    begin(session, &resting, ticks(random.uniform(0.0, 0.5)))?;
+    let mode = Mode::ALL[seed as usize % Mode::ALL.len()];
+    send(session, Frame::new(0, &[1, 0]));
+    session.run(0.1)?;
+    for node in NODES {
+        let place = session.read_object(node, 0x6064, 0, ANSWER_S)?;
+        let mut write =
+            |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
+        write(0x6060, 0, u32::from((mode as i8).cast_unsigned()), 1)?;
+        write(0x607A, 0, place, 4)?;
+        write(0x60FF, 0, 0, 4)?;
+        write(0x2020, 1, 0xFFFF, 2)?;
+        write(0x2020, 2, 0xFFFF, 2)?;
+    }
+    let plant = &session.machine.chip().plant;
+    let (torque, place) = (plant.torque(), plant.position());
+    session.machine.chip_mut().can.sent.clear();
+    for node in NODES {
+        session.write_sized(node, 0x6040, 0, 0xF, 2, ANSWER_S)?;
+    }
+    for _ in 0..TAKEN {
+        session.run(CYCLE_S)?;
+        let plant = &session.machine.chip().plant;
+        for joint in 0..JOINTS {
+            let change = plant.torque()[joint] - torque[joint];
+            let moved = plant.position()[joint] - place[joint];
+            if change.abs() > TAKEN_NM || moved.abs() > TAKEN_RAD {
+                return Ok(Err(format!("{mode:?}, joint {joint}: {change:.1} N m, {moved:.3} rad")));
+            }
+        }
+    }
+    for node in NODES {
+        let word = session.read_object(node, 0x6041, 0, ANSWER_S)?;
+        let codes = emergencies(session, node);
+        if word & 0x806F != 0x27 || !codes.is_empty() {
+            return Ok(Err(format!("{mode:?}, node {node}: statusword {word:04X}, emergencies {codes:X?}")));
+        }
+    }
+    Ok(Ok(0.0))
 }

@@ -245,6 +245,7 @@ pub(super) const ROWS: &[Row] = &[
     injected("K5", "crystal stops", 50e-6, Situation::Motion, Expected::Released, |chip, _| {
         chip.stop_crystal()
     }),
+    own("B6", "a host takes over an enabled leg, in each mode", 0.0, bus::taken_over),
     own("B3", "malformed and hostile frames", JITTER_S, bus::hostile),
     injected(
         "B4",

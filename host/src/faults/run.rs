@@ -301,11 +301,8 @@ impl<'a, const B: usize> Watched<'a, B> {
         let begun = onset.map_or(safe, |onset| onset.min(safe));
         let after_ms = seen.map(|_| (safe - begun) as f64 * PERIOD_MS);
         let in_time = after_ms.is_some_and(|after| after <= self.deadline_ms() + 1e-9);
-        // A frozen counter that nothing shows must hold its joint.
-        let has_turned = self.has_turned();
-        let slipped = self.scenario.expected == Expected::Brake && has_turned;
-        let nothing_came = onset.is_none() && (seen.is_none() || early) && !slipped;
-        let stood = self.row.deadline_ms.is_infinite() && !has_turned;
+        let nothing_came = onset.is_none() && (seen.is_none() || early);
+        let stood = self.row.deadline_ms.is_infinite() && !self.has_turned();
         let in_time = in_time && !early && !elsewhere;
         let undetectable = !in_time && !elsewhere && (self.scenario.by_design || nothing_came || stood);
         Outcome {

@@ -139,7 +139,7 @@ pub struct Scenario {
     pub patience: u64,
     /// Replaces the row's deadline, ms.
     pub within_ms: Option<f64>,
-    /// Rotor turns within which a wrong rotor position is detected, where it has no deadline or does not show.
+    /// Rotor turns within which the fault is detected, for a row without a deadline.
     pub turns: f64,
 }
 
