@@ -29,8 +29,8 @@ const FLOOD: u32 = 100;
 const LATE_S: f64 = 20e-3;
 /// Frames that wait for the wire while it is flooded.
 const WAITING: usize = 12;
-/// Largest change of a torque when a host takes over, N m: a tenth of the default leg's cap; largest motion, rad;
-/// and cycles for which both are watched.
+/// Largest change of a torque when a host takes over, N m: a tenth of the default leg's cap; largest motion,
+/// rad; and cycles for which both are watched.
 const TAKEN_NM: f64 = 8.5;
 const TAKEN_RAD: f64 = 0.01;
 const TAKEN: u32 = 1500;
@@ -271,8 +271,8 @@ fn moved_on(machines: &mut Machines<'_>, random: &mut Random) -> Result<Result<(
     })
 }
 
-/// B6: a host comes to a leg that its operator has enabled, commands it to stand still in one of the modes, and
-/// writes its first controlword. The leg goes on holding its pose.
+/// B6: a host comes to a leg that its operator has enabled, commands it to stand still in one of the modes,
+/// and writes its first controlword. The leg goes on holding its pose.
 pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let resting = machines.resting()?;
     let mut random = Random::new("B6", seed);

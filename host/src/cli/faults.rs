@@ -52,8 +52,8 @@ pub struct FaultsArguments {
     /// Runs of two random faults within 50 ms; no invariant may be violated.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
     pairs: Option<u64>,
-    /// Simulated hours of normal motion with noise, a pushing wearer, and a host that shakes the leg; no fault
-    /// may be raised.
+    /// Simulated hours of normal motion with noise, a pushing wearer, or a host that shakes the leg; no
+    /// fault may be raised.
     #[arg(long, value_name = "H", default_value_t = 0.0)]
     hours: f64,
     /// The full campaign: 1,000 runs of each fault, every tick, a sweep of 8,000, 10,000 pairs, 10 hours;

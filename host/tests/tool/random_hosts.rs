@@ -37,6 +37,8 @@ const NODES: [u16; JOINTS] = [1, 2];
 const RANGES: [[f64; 2]; JOINTS] = [[0.037_873, 0.875_806], [0.119_555, 1.667_313]];
 /// How far beyond its range an enabled joint may come until the monitor has stopped it, rad.
 const BEYOND: f64 = 0.1;
+/// Speed of a joint that creeps within its friction, rad/s: a joint that is held comes to rest from it.
+const CREEP: f32 = 5e-3;
 const MILLISECOND: u32 = SERVO_RATE_HZ / 1000;
 /// Time in which a fault must be heard, ticks.
 const HEARD: u64 = 200 * MILLISECOND as u64;
@@ -292,7 +294,7 @@ impl Bench {
                 return Err(format!("range: joint {joint} at {} rad", truth[joint]));
             }
             let speed = output.motion.velocity_rad_per_s[joint];
-            if !self.targets && !foreign && !decision.returns[joint] && speed.abs() > 1e-3 {
+            if !self.targets && !foreign && !decision.returns[joint] && speed.abs() > CREEP {
                 return Err(format!("targets: joint {joint} commanded at {speed} rad/s"));
             }
             let grows =
