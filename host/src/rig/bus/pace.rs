@@ -107,6 +107,8 @@ fn enabled<const N: usize, const B: usize>(network: &Network<N, B>) -> Network<N
         .iter()
         .flat_map(|board| board.nodes().iter().map(|node| u16::from(node.id().number())))
         .collect();
+    // The boot-up messages first.
+    (0..STEP_TICKS).for_each(|_| network.tick(|_| {}));
     for word in [6, 7, 15] {
         for node in &nodes {
             let controlword = [0x2B, 0x40, 0x60, 0, word, 0, 0, 0];

@@ -92,8 +92,7 @@ pub fn wearers<const N: usize, const B: usize>(
     (0..options.legs).filter_map(worn).collect()
 }
 
-/// Creates the bus with the legs, each on its wearer if there are any. All nodes have sent their boot-up
-/// messages.
+/// Creates the bus with the legs, boards started. Each leg is on its wearer, if there are any.
 pub fn network<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ServeOptions,
@@ -121,10 +120,7 @@ pub fn network<const N: usize, const B: usize>(
         }
         boards.push(board);
     }
-    let mut network = Network::new(boards, options.bits_per_s);
-    // A node ignores every frame until it has sent its boot-up message.
-    (0..STEP_TICKS).for_each(|_| network.tick(|_| {}));
-    Ok(network)
+    Ok(Network::new(boards, options.bits_per_s))
 }
 
 /// Serves until a termination signal.
@@ -132,6 +128,8 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     let flash = options.flash.as_deref().map(|path| read(path, options.legs)).transpose()?.flatten();
     let mut wearers = wearers::<N, B>(leg, options)?;
     let mut network = network::<N, B>(leg, options, flash.as_deref(), &wearers)?;
+    // A node ignores every frame until it has sent its boot-up message.
+    (0..STEP_TICKS).for_each(|_| network.tick(|_| {}));
     // Written before any client connects, so that a file error appears before a host stores anything.
     write(options.flash.as_deref(), &mut network)?;
     if let Some(warning) =
