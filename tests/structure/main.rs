@@ -345,6 +345,30 @@ fn sentences_in_documents_have_at_most_35_words() {
     assert_none(&offences);
 }
 
+/// The pages of bus and safety name tests in backticks: five or more words joined by underscores.
+#[test]
+fn tests_of_promises_exist() {
+    let mut documents = Vec::new();
+    for name in ["docs/bus.md", "docs/safety.md"] {
+        read(&workspace().join(name), &mut documents);
+    }
+    let sources: Vec<File> = ["src", "tests", "host"].into_iter().flat_map(source_files).collect();
+    let is_test = |name: &&str| {
+        name.matches('_').count() > 3
+            && name.chars().all(|letter| letter == '_' || letter.is_ascii_lowercase())
+    };
+    let mut named = 0;
+    for document in &documents {
+        for name in document.text.split('`').filter(is_test) {
+            named += 1;
+            let head = format!("fn {name}(");
+            let exists = sources.iter().any(|source| source.text.contains(&head));
+            assert!(exists, "{} names `{name}`, which does not exist", document.path);
+        }
+    }
+    assert!(named > 10, "{named} tests named");
+}
+
 /// First line of the paragraph and word count of each sentence that is too long. Tables, headings and code
 /// are skipped.
 fn long_sentences(text: &str) -> Vec<(usize, usize)> {
