@@ -142,6 +142,7 @@ def lose_the_host(network, joints):
         heartbeat = Heartbeat(network)
         for joint in joints:
             joint.write(0x6007, 0, option, "<h")
+            assert joint.read(0x1016, 1) == 0, "another host watches this leg"
             joint.write(0x1016, 1, HOST << 16 | 1000)
             joint.emergencies.clear()
         time.sleep(0.5)
