@@ -186,8 +186,8 @@ struct Bench {
     /// Mode last requested of each joint, and the tick until which a step of its torque is explained.
     modes: [i8; JOINTS],
     explained: [u64; JOINTS],
-    /// Whether a torque was written for it since the leg was last enabled.
-    torques: [bool; JOINTS],
+    /// Whether a torque or an offset was written for it since the leg was last enabled.
+    pending: [bool; JOINTS],
     returns: [bool; JOINTS],
     /// Code that must be heard from each node, and the tick in which the leg had it.
     unheard: Option<(u16, u64)>,
@@ -212,7 +212,7 @@ impl Bench {
             targets: false,
             modes: [0; JOINTS],
             explained: [0; JOINTS],
-            torques: [false; JOINTS],
+            pending: [false; JOINTS],
             returns: [false; JOINTS],
             unheard: None,
             heard: [(0, 0); JOINTS],
@@ -275,7 +275,7 @@ impl Bench {
         if before.is_enabled() && !decision.state.is_enabled() {
             // A frame that is on its way belongs to the next session.
             self.targets = self.target.is_some_and(|at| ticks - at < 4);
-            self.torques = self.torques.map(|written| written && self.targets);
+            self.pending = self.pending.map(|written| written && self.targets);
         }
         let foreign = !matches!(rig.leg.control().activity(), Activity::Idle | Activity::Follow);
         let truth = rig.world.anatomical_position();
@@ -312,7 +312,7 @@ impl Bench {
             self.unheard = Some((fault.code.number(), ticks));
         }
         if self.state.is_enabled() && !before.is_enabled() {
-            self.explain_torques(0..JOINTS);
+            self.explain_pending(0..JOINTS);
         }
         let Some((code, since)) = self.unheard else { return Ok(()) };
         let is_heard = |heard: &(u16, u64)| heard.0 == code && heard.1 >= since;
@@ -357,7 +357,7 @@ impl Bench {
 
     /// A new value of an object is on its way to a joint.
     fn expect(&mut self, joint: usize, index: u16) {
-        self.torques[joint] |= matches!(index, 0x6071 | 0x60B2);
+        self.pending[joint] |= matches!(index, 0x6071 | 0x60B1 | 0x60B2);
         if asks_for_a_step(self.modes[joint], index) {
             self.explained[joint] = self.ticks + AFTER_VALUE;
         }
@@ -368,9 +368,9 @@ impl Bench {
         (0..JOINTS).for_each(|joint| self.expect(joint, 0x6072));
     }
 
-    /// A torque that was written before begins to act: the leg is enabled, or the mode is new.
-    fn explain_torques(&mut self, joints: impl Iterator<Item = usize>) {
-        for joint in joints.filter(|joint| self.torques[*joint] && matches!(self.modes[*joint], 4 | 8..=10)) {
+    /// What was written before begins to act: the leg is enabled, or the mode is new.
+    fn explain_pending(&mut self, joints: impl Iterator<Item = usize>) {
+        for joint in joints.filter(|joint| self.pending[*joint] && matches!(self.modes[*joint], 4 | 8..=10)) {
             self.explained[joint] = self.ticks + AFTER_VALUE;
         }
     }
@@ -417,7 +417,7 @@ impl Bench {
             Step::Mode(joint, mode) => {
                 (0..JOINTS).filter(|place| joint == JOINTS || *place == joint).try_for_each(|joint| {
                     self.modes[joint] = mode;
-                    self.explain_torques(joint..joint + 1);
+                    self.explain_pending(joint..joint + 1);
                     self.write(joint, (0x6060, 0, 1), i32::from(mode))
                 })
             }
