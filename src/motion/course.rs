@@ -143,9 +143,9 @@ impl Course {
         tick_s: f32,
     ) {
         let before = self.velocity;
-        let change = (target - before) / left.max(1) as f32;
-        let next = before + clamp(change, -most * tick_s, most * tick_s);
-        let velocity = self.within(clamp(next, -rates.speed, rates.speed), rates, range, tick_s);
+        let next = before + (target - before) / left.max(1) as f32;
+        let wanted = self.within(clamp(next, -rates.speed, rates.speed), rates, range, tick_s);
+        let velocity = before + clamp(wanted - before, -most * tick_s, most * tick_s);
         self.acceleration = (velocity - before) / tick_s;
         self.advance(velocity, tick_s);
     }
@@ -294,5 +294,8 @@ mod tests {
             assert!(course.acceleration() >= -200.1);
         }
         assert!((course.velocity() + 0.4).abs() < 1e-6);
+        // So is an end of the range that the host moves to the joint.
+        course.interpolate_velocity(-0.4, 1, 200.0, &RATES, [course.position(), 1.0], TICK_S);
+        assert!((course.velocity() + 0.35).abs() < 1e-6, "{}", course.velocity());
     }
 }

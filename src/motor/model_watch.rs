@@ -20,7 +20,7 @@
 //!
 //! `i` measured current, `I` the axis' current limit, `w` electrical speed of the counts. Shares: 0.35 for
 //! copper 90 K warmer than at the calibration; 0.2 for magnets 80 K warmer and the nameplate's error; 0.3 for
-//! iron that saturates. `I1` forgets a current within 1 ms: errors of R and L reach the integral with the
+//! iron that saturates. `I1` falls to a third within 1 ms: errors of R and L reach the integral with the
 //! delay L/R.
 //!
 //! **Why no current alone decides.** A rotor that is held, or that a fast torque only shakes, obeys
@@ -92,6 +92,8 @@ const STANDSTILL: i32 = 2;
 /// Counts per servo period from which a rotor cannot come to rest within [`STANDSTILL`], and periods for
 /// which it must have moved so.
 const MOVING: i32 = 4;
+/// Counts per turn for each count of [`MOVING`]: finer encoders need as many more, for the same speed.
+const FINE: i32 = 2048;
 const RUN: i8 = 4;
 /// Length of the vector that dead time makes (4/3), with a margin of two.
 const DEAD_VECTORS: f32 = 2.0 * 4.0 / 3.0;
@@ -244,7 +246,7 @@ impl Stop {
         let way = limits.scale.within_turn(position - self.before);
         let step = if 2 * way > turn { way - turn } else { way };
         self.before = position;
-        if step.abs() >= MOVING {
+        if step.abs() >= (turn / FINE).max(MOVING) {
             let sign = if step > 0 { 1 } else { -1 };
             self.run = if self.run * sign > 0 { (self.run + sign).clamp(-RUN, RUN) } else { sign };
             self.rests = 0;

@@ -271,8 +271,9 @@ fn moved_on(machines: &mut Machines<'_>, random: &mut Random) -> Result<Result<(
     })
 }
 
-/// B6: a host comes to a leg that its operator has enabled, commands it to stand still in one of the modes,
-/// and writes its first controlword. The leg goes on holding its pose.
+/// B6: a host comes to a leg that its operator has enabled, commands it to stand still in one of the modes
+/// (by the present torque in modes of torque), and writes its first controlword. The leg goes on holding its
+/// pose.
 pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let resting = machines.resting()?;
     let mut random = Random::new("B6", seed);
@@ -283,11 +284,15 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     session.run(0.1)?;
     for node in NODES {
         let place = session.read_object(node, 0x6064, 0, ANSWER_S)?;
+        let torque = session.read_object(node, 0x6077, 0, ANSWER_S)?;
         let mut write =
             |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
         write(0x6060, 0, u32::from((mode as i8).cast_unsigned()), 1)?;
         write(0x607A, 0, place, 4)?;
         write(0x60FF, 0, 0, 4)?;
+        if matches!(mode, Mode::ProfileTorque | Mode::CyclicTorque) {
+            write(0x6071, 0, torque, 2)?;
+        }
         write(0x2020, 1, 0xFFFF, 2)?;
         write(0x2020, 2, 0xFFFF, 2)?;
     }
@@ -310,9 +315,17 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     }
     for node in NODES {
         let word = session.read_object(node, 0x6041, 0, ANSWER_S)?;
+        let shown = session.read_object(node, 0x6061, 0, ANSWER_S)?;
         let codes = emergencies(session, node);
-        if word & 0x806F != 0x27 || !codes.is_empty() {
-            return Ok(Err(format!("{mode:?}, node {node}: statusword {word:04X}, emergencies {codes:X?}")));
+        let ignores = matches!(mode as i8, -1 | 8..=10) && word & 1 << 12 == 0;
+        if word & 0x806F != 0x27
+            || ignores
+            || shown as u8 != (mode as i8).cast_unsigned()
+            || !codes.is_empty()
+        {
+            return Ok(Err(format!(
+                "{mode:?}, node {node}: {word:04X}, 6061 {shown:X}, emergencies {codes:X?}"
+            )));
         }
     }
     Ok(Ok(0.0))

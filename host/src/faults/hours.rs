@@ -38,6 +38,8 @@ const WAVE: u64 = 1000;
 /// Frequencies of the waves, Hz, and amplitudes, thousandths of the torque cap.
 const FREQUENCIES: [f64; 2] = [1.0, 500.0];
 const AMPLITUDES: [f64; 2] = [20.0, 1000.0];
+/// Torque that a shaken leg reaches at least, N m.
+const LEAST_NM: f32 = 1.0;
 /// Pushes of a wearer who leans and kicks: up to a fifth of the torque cap.
 const PUSHES: PushDescription = PushDescription { rate: 0.5, torque: 20.0, duration: 0.4 };
 
@@ -160,7 +162,7 @@ fn shaken(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
     let mut random = Random::new("shaken", seed);
     let mut waves = [0; JOINTS].map(|_| Wave::new(&mut random));
     let (from, mut cycle) = (host.rig().period, 0);
-    let mut found = None;
+    let (mut found, mut greatest) = (None, 0.0_f32);
     while host.rig().period - from < length && found.is_none() {
         if cycle % WAVE == 0 {
             waves = waves.map(|_| Wave::new(&mut random));
@@ -172,6 +174,14 @@ fn shaken(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
         host.run(CYCLE);
         cycle += 1;
         found = alarm(host.rig(), seed, from);
+        if found.is_none() && !host.is_enabled() {
+            found = Some(format!("seed {seed}: no longer enabled: {:?}", host.rig().state()));
+        }
+        let torque = host.rig().output.as_ref().map_or(0.0, |output| output.servo.decision.torque[0].0);
+        greatest = torque.abs().max(greatest);
+    }
+    if found.is_none() && greatest < LEAST_NM {
+        found = Some(format!("seed {seed}: hardly shaken, by {greatest} N m"));
     }
     Ok(Stretch { periods: host.rig().period - from, is_shaken: true, alarm: found })
 }

@@ -37,6 +37,9 @@ const NODES: [u16; JOINTS] = [1, 2];
 const RANGES: [[f64; 2]; JOINTS] = [[0.037_873, 0.875_806], [0.119_555, 1.667_313]];
 /// How far beyond its range an enabled joint may come until the monitor has stopped it, rad.
 const BEYOND: f64 = 0.1;
+/// Bits of 60FD that say why a leg is not enabled: an inhibit reason, no zeros, no calibration, a joint that
+/// is outside its range, moves, or has no reading.
+const REASONS: i32 = 0x7E_0000;
 /// Speed of a joint that creeps within its friction, rad/s: a joint that is held comes to rest from it.
 const CREEP: f32 = 5e-3;
 const MILLISECOND: u32 = SERVO_RATE_HZ / 1000;
@@ -505,9 +508,8 @@ impl Bench {
         if self.state.is_enabled() {
             return Ok(());
         }
-        let inhibits = self.network.boards()[0].rig.board.signals.inhibit.causes();
-        let inputs = self.read(0, 0x60FD)?;
-        if inhibits != 0 || inputs.is_some_and(|inputs| inputs & 0x7FFF_0000 != 0) {
+        let inputs = [self.read(0, 0x60FD)?, self.read(1, 0x60FD)?];
+        if inputs.iter().flatten().any(|inputs| inputs & REASONS != 0) {
             return Ok(());
         }
         Err(format!("again: {:?}, 60FD {inputs:X?}", self.state))

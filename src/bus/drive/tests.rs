@@ -127,7 +127,7 @@ fn options_that_would_not_be_carried_out_are_refused() {
     for index in [0x6085, 0x60C5, 0x60C6] {
         assert_eq!(write(index, 0, 1_000_000), Err(NoObject), "{index:x}");
     }
-    // 60C2: 255 ms is the longest period, in any order of writing.
+    // 60C2: 255 ms is the longest period at any time, so the smaller value is written first.
     for (sub, value, wanted) in [
         (1, 255, Ok(())),
         (2, -2, Err(Range)),
@@ -290,6 +290,16 @@ fn each_rising_edge_takes_one_set_point() {
         axis.write(CONTROLWORD, 0x2F).expect("a word");
         axis.update(&seen(count));
         assert!(axis.statusword() & 1 << 12 == 0);
+    }
+    // A relative one, by 60F2.
+    for (count, (option, reference)) in
+        (3..).zip([(0, Reference::Target), (1, Reference::Demand), (2, Reference::Actual)])
+    {
+        axis.write(Object::at(0x60F2, 0), option).expect("an option");
+        axis.write(CONTROLWORD, 0x7F).expect("a word");
+        assert_eq!((number(axis).relative_to, axis.command().request_count), (Some(reference), count));
+        axis.write(CONTROLWORD, 0x6F).expect("a word");
+        axis.update(&seen(count));
     }
     axis.write(CONTROLWORD, 0x14F).expect("a word");
     assert!(axis.command().halt);

@@ -17,7 +17,9 @@ const SECOND: Duration = Duration::from_secs(1);
 const CHUNKS: u32 = 20;
 const CHUNK_TICKS: u32 = 40;
 /// Ticks for each step of enabling before it.
-pub const STEP_TICKS: u32 = 20;
+const STEP_TICKS: u32 = 20;
+/// Ticks after which all nodes have sent their boot-up messages.
+pub const BOOT_TICKS: u32 = 20;
 
 /// Figures of one second.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,8 +109,7 @@ fn enabled<const N: usize, const B: usize>(network: &Network<N, B>) -> Network<N
         .iter()
         .flat_map(|board| board.nodes().iter().map(|node| u16::from(node.id().number())))
         .collect();
-    // The boot-up messages first.
-    (0..STEP_TICKS).for_each(|_| network.tick(|_| {}));
+    (0..BOOT_TICKS).for_each(|_| network.tick(|_| {}));
     for word in [6, 7, 15] {
         for node in &nodes {
             let controlword = [0x2B, 0x40, 0x60, 0, word, 0, 0, 0];

@@ -17,7 +17,7 @@ use crate::rig::bus::adapter::{Adapter, Dropped, MOST_AGE};
 use crate::rig::bus::alarms::Alarms;
 use crate::rig::bus::board::{Board, Label};
 use crate::rig::bus::network::Network;
-use crate::rig::bus::pace::{Pace, STEP_TICKS, judge, reachable};
+use crate::rig::bus::pace::{BOOT_TICKS, Pace, judge, reachable};
 use crate::rig::bus::server::{Event, Server, What};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::Context;
@@ -129,7 +129,7 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     let mut wearers = wearers::<N, B>(leg, options)?;
     let mut network = network::<N, B>(leg, options, flash.as_deref(), &wearers)?;
     // A node ignores every frame until it has sent its boot-up message.
-    (0..STEP_TICKS).for_each(|_| network.tick(|_| {}));
+    (0..BOOT_TICKS).for_each(|_| network.tick(|_| {}));
     // Written before any client connects, so that a file error appears before a host stores anything.
     write(options.flash.as_deref(), &mut network)?;
     if let Some(warning) =
