@@ -8,6 +8,7 @@ use std::rc::Rc;
 
 use scarab::bus::Frame;
 use scarab::bus::commissioning::BoardState;
+use scarab::hal::Contacts;
 use scarab::safety::NoticeCode;
 use scarab_host::base::error::ToolError;
 use scarab_host::formats::leg_file::LegFile;
@@ -196,6 +197,12 @@ impl Session {
             "no record `{kind} {wanted}` within {longest} s at {:.3} s; the last ones: {last:#?}",
             seconds(self.now())
         )))
+    }
+
+    /// Sets the operator's contacts.
+    pub fn hold(&mut self, contacts: Contacts) {
+        self.set(ENABLING, contacts.enabling);
+        self.set(START, contacts.start);
     }
 
     fn set(&mut self, pin: (char, u32), level: bool) {

@@ -127,7 +127,7 @@ impl LimitCodes {
             .with(limited.range, LimitCode::Position)
             .with(limited.derated && derating.bridge < 1.0, LimitCode::Temperature)
             .with(limited.derated && derating.of_joint(joint).winding < 1.0, LimitCode::Winding)
-            .with(limited.derated && derating.of_joint(joint).first_motion < 1.0, LimitCode::FirstMotion)
+            .with(limited.derated && derating.first_motion(joint) < 1.0, LimitCode::FirstMotion)
             .with(limited.derated && derating.low < 1.0, LimitCode::BusLow)
             .with(limited.derated && derating.high < 1.0, LimitCode::BusHigh)
             .with(limited.derated && derating.supply[0] < 1.0, LimitCode::SupplyCurrent)
@@ -179,6 +179,12 @@ impl<const N: usize> Derating<N> {
         let both = self.bridge * winding * first_motion;
         let [draw, charge] = self.supply;
         [both * self.low * draw, both * self.high * charge]
+    }
+
+    /// Share of a joint's current until its rotor angle is proven.
+    #[must_use]
+    pub fn first_motion(&self, joint: usize) -> f32 {
+        self.of_joint(joint).first_motion
     }
 
     fn of_joint(&self, joint: usize) -> JointShares {
@@ -278,11 +284,11 @@ impl SupplyWatch {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::super::limits::tests::HIP;
     use super::*;
 
-    const RAMPS: DeratingRamps = DeratingRamps {
+    pub(crate) const RAMPS: DeratingRamps = DeratingRamps {
         temperature_c: Ramp::new(80.0, 100.0),
         low: Ramp::new(24.0, 21.0),
         high: Ramp::new(55.0, 57.5),

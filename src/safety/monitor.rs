@@ -323,7 +323,8 @@ impl<const N: usize> Monitor<N> {
             let is_inside = self.in_range(joint, observation.position[joint]);
             let (position, velocity) = (observation.position[joint], observation.velocity[joint]);
             let is_slow = if is_inside {
-                self.barriers[joint].stops_in_range(position, velocity, RANGE_TOLERANCE)
+                let share = self.derating.first_motion(joint);
+                self.barriers[joint].stops_in_range(position, velocity, RANGE_TOLERANCE, share)
             } else {
                 velocity.abs().0 <= RETURN_SPEED
             };

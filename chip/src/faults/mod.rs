@@ -10,6 +10,7 @@ mod memory;
 mod rows;
 mod search;
 mod stored;
+mod unruly;
 mod wiring;
 
 use std::rc::Rc;

@@ -3,6 +3,7 @@
 use core::f64::consts::TAU;
 
 use hal_sim::drive::description::BridgeDescription;
+use scarab::hal::SERVO_RATE_HZ;
 use scarab::motor::AxisConfiguration;
 
 use crate::base::error::ToolError;
@@ -23,6 +24,10 @@ fn voltages(bounds: &mut Bounds, joint: &JointFile, motor: &MotorFile, configura
     let per_joint = f64::from(configuration.pole_pairs) * joint.encoder.ratio;
     let frozen = [still, 0.35 * resistance].map(|volts| volts / f64::from(configuration.flux.0) / per_joint);
     bounds.frozen_speed = core::array::from_fn(|part| bounds.frozen_speed[part].max(frozen[part]));
+    // Counts a servo period from which no rotor stops within the next one.
+    let counts = (configuration.counts_per_turn / 2048).max(4);
+    let turns = f64::from(counts) / f64::from(configuration.counts_per_turn) * f64::from(SERVO_RATE_HZ);
+    bounds.stopped_speed = bounds.stopped_speed.max(TAU * turns / joint.encoder.ratio);
     bounds.judged_speed = bounds.judged_speed.max(TAU / 0.025 / per_joint);
     // 2 * 4/3 of the dead time's voltage is `still`. The gain of so fast a loop is that of its inductance.
     let inductance = 1e-6 * motor.inductance_d_uh.min(motor.inductance_q_uh);
@@ -44,6 +49,7 @@ pub(super) fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
         overcurrent_a: 0.0,
         bus_v: [0.0; 2],
         frozen_speed: [0.0; 2],
+        stopped_speed: 0.0,
         judged_speed: 0.0,
         stuck_a: 1.0,
         smallest_offset_a: 0.0,

@@ -22,10 +22,10 @@ pub const ON_THE_CHIP: [(&str, &str); 3] = [
 ];
 
 /// Order of the catalogue; other ids come last.
-const ORDER: [&str; 43] = [
+const ORDER: [&str; 44] = [
     "E1", "E2", "E3", "E4", "E5", "C1", "C2", "C3", "C4", "P1", "P2", "V1", "V2", "V3", "V4", "V5", "T1",
-    "T2", "T3", "T4", "N1", "B1", "B2", "B3", "B4", "B5", "X1", "X2", "X3", "K1", "K3", "M2", "F1", "F2",
-    "F3", "J1", "J2", "J3", "H1", "H2", "H4", "H3", "I1",
+    "T2", "T3", "T4", "N1", "B1", "B2", "B3", "B4", "B5", "B7", "X1", "X2", "X3", "K1", "K3", "M2", "F1",
+    "F2", "F3", "J1", "J2", "J3", "H1", "H2", "H4", "H3", "I1",
 ];
 
 impl Entry {
@@ -50,12 +50,13 @@ impl Entry {
 
 impl Entry {
     /// Returns whether the row's detector is disabled in a blind campaign: the codes of a fork, the caps of
-    /// H1, the switch of each bench. The range of J1 is widened on its bench only, not in its forks.
+    /// H1, the switch of each bench. The range of J1 is widened on its bench only, not in its forks. B7 has no
+    /// single detector.
     #[must_use]
     pub fn can_be_blind(&self) -> bool {
         match self {
             Self::Forked(row) => row.id != "J1",
-            Self::Bench(_) => true,
+            Self::Bench(bench) => bench.head.id != "B7",
         }
     }
 }

@@ -10,6 +10,7 @@
 //! | [`campaign`] | many runs, forked from identifications |
 //! | [`detectors`] | each fault code of the firmware disabled separately |
 //! | [`mod@bench`] | rows that are not forks: components, calibrations, identifications with ideal drives |
+//! | [`random_hosts`] | random sessions of hosts, and what must hold in them |
 //! | [`trial`] | every channel faulted in every form, and two faults at once: no invariant may break |
 //! | [`hours`] | normal motion, in which no fault may be reported |
 //! | [`recording`] | a run's curves |
@@ -30,6 +31,7 @@ pub mod event;
 pub mod hours;
 pub mod invariants;
 pub mod outcome;
+pub mod random_hosts;
 pub mod recording;
 pub mod report;
 pub mod results;

@@ -76,6 +76,8 @@ struct Watched<'a, const B: usize> {
     onset: Option<u64>,
     /// Angles of the joints at the injection, anatomical, rad.
     angles: [f64; JOINTS],
+    /// Speed of the faulted joint at the injection, rad/s.
+    speed: f64,
     /// Requested currents of the phases with shunts at the injection, and in the previous period, A.
     requested: [f64; 2],
     before: [f64; 2],
@@ -131,6 +133,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             Onset::After(periods) => Some(begun + periods),
             _ => None,
         };
+        let joint = scenario.injections[0].map_or(0, |injection| injection.joint);
         Self {
             row,
             scenario,
@@ -140,7 +143,8 @@ impl<'a, const B: usize> Watched<'a, B> {
             begun,
             onset,
             angles: rig.world.anatomical_position(),
-            requested: requested(&rig, scenario.injections[0].map_or(0, |injection| injection.joint)),
+            speed: rig.world.velocity()[joint].abs(),
+            requested: requested(&rig, joint),
             before: [f64::NAN; 2],
             steepest: [0.0; 2],
             hold: Hold::default(),
@@ -185,8 +189,9 @@ impl<'a, const B: usize> Watched<'a, B> {
             Onset::Injection | Onset::ServoTick | Onset::After(_) => true,
             Onset::BusAbove(volts) => bus() > volts,
             Onset::BusBelow(volts) => bus() < volts,
-            Onset::Driven { speed, per_ampere, current } => {
-                self.turns(joint, speed, per_ampere) && self.rig.requested(joint).abs() > current
+            Onset::Driven { speed, per_ampere, current, sudden } => {
+                self.speed > sudden
+                    || self.turns(joint, speed, per_ampere) && self.rig.requested(joint).abs() > current
             }
             Onset::Requested(amperes) => {
                 let requested = self.requested();

@@ -78,6 +78,8 @@ pub enum Onset {
         per_ampere: f64,
         /// Requested current, A.
         current: f64,
+        /// Speed at the injection from which on the fault shows at once, whatever follows, rad/s.
+        sudden: f64,
     },
     /// While the requested current of the phase with the faulted shunt differs from that at the injection by
     /// more than this, A.
@@ -181,6 +183,8 @@ pub struct Bounds {
     /// Joint speed, rad/s, and its increase per ampere, above which back-EMF exceeds dead time and warm
     /// copper; the higher of both joints.
     pub frozen_speed: [f64; 2],
+    /// Joint speed from which a counter that stops at once shows, rad/s; the higher of both joints.
+    pub stopped_speed: f64,
     /// Joint speed at which an electrical turn takes 25 ms, rad/s.
     pub judged_speed: f64,
     /// Phase-current change, A, that may leave the code unchanged, because dead time outweighs the current

@@ -104,7 +104,7 @@ const READ_TIME: Duration = Duration::from_secs(2);
 /// Longest wait for a check that an earlier run asked for, s.
 const CHECKED_BEFORE_S: f64 = 10.0;
 /// Longest calibration and reference, s.
-const LONGEST_STEP_S: f64 = 180.0;
+const LONGEST_STEP_S: f64 = 600.0;
 /// Longest identification, s.
 const LONGEST_IDENTIFICATION_S: f64 = 600.0;
 /// Longest return into the range before an identification, s.

@@ -29,7 +29,6 @@ mod monitor;
 mod motor;
 mod other_hosts;
 mod pendulum;
-mod random_hosts;
 mod recordings;
 mod regressor;
 mod replay;

@@ -2,8 +2,11 @@
 
 use super::*;
 use crate::hal::SERVO_RATE_HZ;
+use crate::safety::derating::JointShares;
+use crate::safety::derating::tests::RAMPS;
 use crate::safety::limits::tests::{HIP, KNEE};
 use crate::testing::TestRandom;
+use crate::units::Volt;
 
 const MIDDLE: [Radian; 2] = [Radian(0.45), Radian(-0.9)];
 const STANDING: Observation<2> = Observation {
@@ -181,6 +184,24 @@ fn a_refused_enabling_names_joint_and_reason() {
         let decision = monitor.decide(&observation, &ask(PowerRequest::EnableOperation));
         assert_eq!(decision.refused, Some(Refusal { joint: 1, reason }));
         assert_eq!((decision.state, decision.command.enabled), (DriveState::SwitchedOn, false));
+    }
+}
+
+#[test]
+fn a_falling_joint_is_enabled_only_if_its_current_stops_it() {
+    let falling = Observation {
+        position: [MIDDLE[0], KNEE.low + Radian(0.1)],
+        velocity: [RadianPerSecond::ZERO, RadianPerSecond(-1.0)],
+        ..STANDING
+    };
+    for (first_motion, stops) in [(1.0, true), (0.25, false)] {
+        let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
+        let joints = [JointShares { first_motion, ..JointShares::ALL }; 2];
+        monitor.derate(&RAMPS.at(25.0, Volt(48.0), joints));
+        let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
+        let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
+        let decision = monitor.decide(&falling, &ask(PowerRequest::EnableOperation));
+        assert_eq!(decision.refused.is_none(), stops, "{first_motion} of the current");
     }
 }
 

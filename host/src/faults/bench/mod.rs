@@ -22,6 +22,7 @@ mod stall;
 mod start;
 mod stopped;
 mod supply;
+mod unruly;
 
 use scarab::safety::FaultCode;
 
@@ -43,7 +44,7 @@ pub struct Bench {
 }
 
 /// All benches.
-pub static BENCHES: [Bench; 27] = [
+pub static BENCHES: [Bench; 28] = [
     absolute::SILENT,
     absolute::CONTRADICTION,
     offsets::BENCH,
@@ -67,6 +68,7 @@ pub static BENCHES: [Bench; 27] = [
     outside::BENCH,
     hostile::FRAMES_BENCH,
     hostile::BABBLE,
+    unruly::BENCH,
     cut::BENCH,
     kept::CUT,
     kept::ROT,

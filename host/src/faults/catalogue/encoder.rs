@@ -168,7 +168,7 @@ mod tests {
             }
         };
         let scenario = |patience| Scenario {
-            onset: Onset::Driven { speed: fast - 0.01, per_ampere: 0.0, current: 0.0 },
+            onset: Onset::Driven { speed: fast - 0.01, per_ampere: 0.0, current: 0.0, sudden: f64::INFINITY },
             patience,
             ..one(at(Channel::Index, 0, Form::Off, Timing::from(u64::MAX)), Expected::Brake)
         };

@@ -61,13 +61,13 @@ const PATIENCE: u64 = PERIODS_PER_S / 2;
 fn frozen(random: &mut Random, bounds: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let counter = at(Channel::Counter, joint, Form::Stuck, Timing::from(0));
-    // Ten percent margin: the speed estimate has lag and ripple.
+    // Ten percent margin: the speed estimate has lag and ripple. Counts come in whole numbers: 4 or 5 a period.
     let [speed, per_ampere] = bounds.frozen_speed.map(|speed| 1.1 * speed);
     let index = at(Channel::Index, joint, Form::Off, Timing::from(0));
     Scenario {
         injections: [Some(counter), Some(index)],
         // Any current.
-        onset: Onset::Driven { speed, per_ampere, current: -1.0 },
+        onset: Onset::Driven { speed, per_ampere, current: -1.0, sudden: 1.25 * bounds.stopped_speed },
         patience: PERIODS_PER_S,
         ..one(counter, Expected::Brake)
     }
@@ -82,7 +82,12 @@ fn drift(random: &mut Random, bounds: &Bounds) -> Scenario {
     let offset = at(channel, joint, form, Timing::from(0));
     Scenario {
         // An electrical turn within half of the deadline: 0.9 rotor turns per second.
-        onset: Onset::Driven { speed: bounds.judged_speed, per_ampere: 0.0, current: 0.0 },
+        onset: Onset::Driven {
+            speed: bounds.judged_speed,
+            per_ampere: 0.0,
+            current: 0.0,
+            sudden: f64::INFINITY,
+        },
         magnitude: Some(size),
         by_design: size <= bounds.smallest_offset_a,
         patience: PATIENCE,
@@ -98,7 +103,7 @@ fn open_phase(random: &mut Random, _: &Bounds) -> Scenario {
     let nothing = at(Channel::Index, joint, Form::Off, Timing::from(u64::MAX));
     Scenario {
         event: Event::OpenPhase(joint, output),
-        onset: Onset::Driven { speed: 0.2, per_ampere: 0.0, current: 3.0 },
+        onset: Onset::Driven { speed: 0.2, per_ampere: 0.0, current: 3.0, sudden: f64::INFINITY },
         patience: PATIENCE,
         ..one(nothing, Expected::Off)
     }

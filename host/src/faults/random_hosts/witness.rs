@@ -1,9 +1,4 @@
-//! Hosts without manners: random sessions on the bus of a whole leg, in simulated time.
-//!
-//! A session is a list of steps, as several hosts may send them in turn: objects with values inside and
-//! outside their ranges, controlwords in any order, modes, PDOs, SYNC, NMT, LSS, heartbeats, saving and
-//! loading, homing, set-points, identification, the operator's contacts, the plug. Some hosts come to a leg
-//! that the operator has enabled. After every tick:
+//! What must hold on a leg whose hosts send a random session.
 //!
 //! ```text
 //! range     an enabled joint is in its range, or no farther out than it can be stopped
@@ -15,26 +10,18 @@
 //! faults    the code of a fault is heard from both nodes, if they can send
 //! again     at the end a well-behaved host enables the leg, or a reason is stated
 //! ```
-//!
-//! A failing session is reduced to the fewest steps. `SCARAB_SESSIONS` requests another number of sessions.
 
-use proptest::prelude::*;
-use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
-use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use scarab::bus::Frame;
 use scarab::hal::{Contacts, SERVO_RATE_HZ};
-use scarab::leg::{Activity, DriveState};
 use scarab::model::planar::{BASE, JOINTS};
-use scarab_host::formats::kept_file::memory::Memory;
-use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
-use scarab_host::rig::bus::board::{Board, Label};
-use scarab_host::rig::bus::network::Network;
-use scarab_host::rig::options::{DriveModel, SimulationOptions};
-use scarab_host::rig::pair::Context;
+
+use super::{OBJECTS, Session, Step};
+use crate::base::error::ToolError;
+use crate::formats::leg_file::LegFile;
+use crate::rig::options::SimulationOptions;
+use crate::rig::pair::Context;
 
 const NODES: [u16; JOINTS] = [1, 2];
-/// Ranges of the default leg, rad.
-const RANGES: [[f64; 2]; JOINTS] = [[0.037_873, 0.875_806], [0.119_555, 1.667_313]];
 /// How far beyond its range an enabled joint may come until the monitor has stopped it, rad.
 const BEYOND: f64 = 0.1;
 /// Bits of 60FD that say why a leg is not enabled: an inhibit reason, no zeros, no calibration, a joint that
@@ -48,47 +35,8 @@ const HEARD: u64 = 200 * MILLISECOND as u64;
 /// Time for which a new value explains a step of the torque, ticks: a cyclic target that has jumped is
 /// interpolated over its period, and the joint then follows.
 const AFTER_VALUE: u64 = 500 * MILLISECOND as u64;
-
-/// Objects that hosts write: index, subindex, bytes, whether it is a target or offset.
-const OBJECTS: [(u16, u8, u8, bool); 37] = [
-    (0x6071, 0, 2, true),
-    (0x607A, 0, 4, true),
-    (0x60B1, 0, 4, true),
-    (0x60B2, 0, 2, true),
-    (0x60FF, 0, 4, true),
-    (0x6072, 0, 2, true),
-    (0x2020, 1, 2, true),
-    (0x2020, 2, 2, true),
-    (0x6007, 0, 2, false),
-    (0x605A, 0, 2, false),
-    (0x6065, 0, 4, false),
-    (0x6066, 0, 2, false),
-    (0x6067, 0, 4, false),
-    (0x6068, 0, 2, false),
-    (0x606D, 0, 2, false),
-    (0x606F, 0, 2, false),
-    (0x607C, 0, 4, false),
-    (0x607D, 1, 4, true),
-    (0x607D, 2, 4, true),
-    (0x6081, 0, 4, false),
-    (0x6083, 0, 4, false),
-    (0x6084, 0, 4, false),
-    (0x6087, 0, 4, false),
-    (0x6098, 0, 1, false),
-    (0x60C2, 1, 1, false),
-    (0x60C2, 2, 1, false),
-    (0x2011, 0, 1, false),
-    (0x2012, 0, 1, false),
-    (0x2013, 0, 1, false),
-    (0x2021, 1, 2, false),
-    (0x1017, 0, 2, false),
-    (0x2100, 1, 1, true),
-    (0x2160, 1, 1, false),
-    (0x60F2, 0, 2, false),
-    (0x1010, 1, 4, false),
-    (0x1011, 1, 4, false),
-    (0x1029, 1, 1, false),
-];
+/// Ticks within which the leg's state is seen, before or after its effects.
+pub const SETTLED: u32 = 8;
 /// Values that begin a storing and a loading.
 const SIGNATURES: [(u16, i32); 2] = [(0x1010, 0x6576_6173), (0x1011, 0x6461_6F6C)];
 
@@ -108,81 +56,77 @@ const fn asks_for_a_step(mode: i8, index: u16) -> bool {
     }
 }
 
-const MODES: [i8; 9] = [0, 1, 3, 4, 6, 8, 9, 10, -1];
-const WORDS: [u16; 14] = [0, 2, 6, 7, 0xB, 0xF, 0x1F, 0x3F, 0x5F, 0x7F, 0x10F, 0x11F, 0x80, 0x8F];
-
-#[derive(Clone, Debug)]
-enum Step {
-    /// SDO write to a node: place in [`OBJECTS`], value.
-    Write(usize, usize, i32),
-    /// Controlword by SDO, to one node or both.
-    Word(usize, u16),
-    /// 6, 7, F to both nodes.
-    Enable,
-    Mode(usize, i8),
-    /// Target position near the joint: micro-radian from its actual position.
-    Near(usize, i32),
-    /// Homing to this offset, micro-radian.
-    Home(usize, i32),
-    /// A received PDO, from 1, with these bytes.
-    Pdo(usize, u16, [u8; 4]),
-    /// SYNCs at this distance, ticks.
-    Sync(u8, u8),
-    Nmt(u8, u8),
-    /// LSS service, with its first byte of data.
-    Lss(u8, u8),
-    /// A host's heartbeat, after its time in milliseconds was written to the node.
-    Watch(usize, u8),
-    Contacts(bool, bool),
-    Plug(bool),
-    Wait(u16),
+/// Limits of a joint.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// Ends of its range, anatomical, rad.
+    range: [f64; 2],
+    /// Greatest torque, N m.
+    cap: f64,
 }
 
-fn value() -> impl Strategy<Value = i32> {
-    prop_oneof![
-        4 => -400_000..1_500_000_i32,
-        3 => -300..300_i32,
-        1 => any::<i32>(),
-        1 => prop::sample::select(vec![0, 1, -1, i32::MIN, i32::MAX, 0x7FFF, 0xFFFF]),
-    ]
+impl Bounds {
+    /// Limits of this leg's joints.
+    ///
+    /// # Errors
+    /// The firmware cannot move this leg.
+    pub fn of(leg: &LegFile) -> Result<[Self; JOINTS], ToolError> {
+        let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
+        Ok(core::array::from_fn(|joint| Self {
+            range: leg.joints[joint].range_deg.map(f64::to_radians),
+            cap: context.configuration.joints[joint].limits().torque_cap().0.into(),
+        }))
+    }
 }
 
-fn step() -> impl Strategy<Value = Step> {
-    let joint = 0..JOINTS;
-    let any_or_both = 0..=JOINTS;
-    let word = || prop_oneof![9 => prop::sample::select(WORDS.to_vec()), 1 => any::<u16>()];
-    prop_oneof![
-        8 => (joint.clone(), 0..OBJECTS.len(), value()).prop_map(|(joint, place, value)| Step::Write(joint, place, value)),
-        5 => (any_or_both.clone(), word()).prop_map(|(joint, word)| Step::Word(joint, word)),
-        3 => Just(Step::Enable),
-        4 => (any_or_both, prop::sample::select(MODES.to_vec())).prop_map(|(joint, mode)| Step::Mode(joint, mode)),
-        3 => (joint.clone(), -60_000..60_000_i32).prop_map(|(joint, by)| Step::Near(joint, by)),
-        1 => (joint.clone(), value()).prop_map(|(joint, offset)| Step::Home(joint, offset)),
-        2 => (joint.clone(), 1..5_u16, any::<[u8; 4]>()).prop_map(|(joint, pdo, bytes)| Step::Pdo(joint, pdo, bytes)),
-        1 => (prop::sample::select(vec![0x04, 0x04, 0x13, 0x40, 0x46, 0x5A, 0x5E]), 0..2_u8)
-            .prop_map(|(service, byte)| Step::Lss(service, byte)),
-        1 => (joint, 0..250_u8).prop_map(|(joint, time)| Step::Watch(joint, time)),
-        1 => (1..40_u8, 1..20_u8).prop_map(|(count, apart)| Step::Sync(count, apart)),
-        1 => (prop::sample::select(vec![1, 1, 1, 2, 128, 129, 130]), 0..3_u8)
-            .prop_map(|(command, node)| Step::Nmt(command, node)),
-        1 => (any::<bool>(), any::<bool>()).prop_map(|(enabling, start)| Step::Contacts(enabling, start)),
-        1 => any::<bool>().prop_map(Step::Plug),
-        4 => (1..1200_u16).prop_map(Step::Wait),
-    ]
+/// State of a leg in a servo tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Whether it follows its commands.
+    pub is_enabled: bool,
+    /// Code of its fault, until reset.
+    pub fault: Option<u16>,
+    /// Torque of each joint, N m.
+    pub torque: [f64; JOINTS],
+    /// Angle of each joint, anatomical, rad.
+    pub position: [f64; JOINTS],
+    /// Commanded speed of each joint, rad/s; zero where the leg does not show it.
+    pub speed: [f32; JOINTS],
+    /// Joints that return into their range.
+    pub returns: [bool; JOINTS],
+    /// Whether an identification or a session of assistance moves it.
+    pub moves_itself: bool,
 }
 
-/// Steps, and whether the operator's contacts have enabled the leg before.
-fn session() -> impl Strategy<Value = (bool, Vec<Step>)> {
-    (any::<bool>(), prop::collection::vec(step(), 1..40))
+/// A leg with its bus and its operator.
+pub trait HostedLeg {
+    /// Multiple of its limit that a torque may reach: overshoot of a current loop.
+    const OVERSHOOT: f64;
+
+    /// Sends a host's frame.
+    fn send(&mut self, frame: Frame);
+
+    /// Sets the operator's contacts.
+    fn hold(&mut self, contacts: Contacts);
+
+    /// Connects the bus plug, or pulls it.
+    fn plug(&mut self, plugged: bool);
+
+    /// Runs a servo tick, with each frame that the leg sends. `None` before its first tick.
+    ///
+    /// # Errors
+    /// The leg cannot be run on.
+    fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<Seen>, String>;
 }
 
-/// A leg on its bus, and what was seen of it.
-#[derive(Clone)]
-struct Bench {
-    network: Network<JOINTS, BASE>,
+/// A leg, and what was seen of it.
+struct Play<L> {
+    leg: L,
+    bounds: [Bounds; JOINTS],
     ticks: u64,
-    state: DriveState,
-    torque: [f32; JOINTS],
+    is_enabled: bool,
+    fault: Option<u16>,
+    torque: [f64; JOINTS],
     /// Tick of the last target, and whether one was sent since the leg was last enabled.
     target: Option<u64>,
     targets: bool,
@@ -200,16 +144,14 @@ struct Bench {
     answer: Option<[u8; 8]>,
 }
 
-impl Bench {
-    fn new() -> Self {
-        let leg = LegFile::load(DEFAULT_LEG).expect("a shipped leg");
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
-        let context = Context::<JOINTS, BASE>::new(&leg, &options).expect("a leg");
-        let board = Board::new(&leg, context, 1, Label::SINGLE, Memory::new(None)).expect("a board");
-        let mut bench = Self {
-            network: Network::new(vec![board], 1_000_000),
+impl<L: HostedLeg> Play<L> {
+    fn new(leg: L, bounds: [Bounds; JOINTS]) -> Self {
+        Self {
+            leg,
+            bounds,
             ticks: 0,
-            state: DriveState::NotReadyToSwitchOn,
+            is_enabled: false,
+            fault: None,
             torque: [0.0; JOINTS],
             target: None,
             targets: false,
@@ -221,27 +163,15 @@ impl Bench {
             heard: [(0, 0); JOINTS],
             plugged: true,
             answer: None,
-        };
-        bench.send(0, &[1, 0]);
-        bench.run(40).expect("a start without a host");
-        bench
+        }
     }
 
     fn send(&mut self, id: u16, data: &[u8]) {
-        self.network.send(Frame::new(id, data));
+        self.leg.send(Frame::new(id, data));
     }
 
     fn hand(&mut self, enabling: bool, start: bool) {
-        self.network.boards()[0].rig.hand = Contacts { enabling, start };
-    }
-
-    /// Enables the leg by the operator's contacts.
-    fn enable_by_hand(&mut self) -> Result<(), String> {
-        for enabling in [false, true] {
-            self.hand(enabling, false);
-            self.run(SERVO_RATE_HZ / 5)?;
-        }
-        if self.state.is_enabled() { Ok(()) } else { Err(format!("contacts: {:?}", self.state)) }
+        self.leg.hold(Contacts { enabling, start });
     }
 
     fn run(&mut self, ticks: u32) -> Result<(), String> {
@@ -251,77 +181,72 @@ impl Bench {
     fn tick(&mut self) -> Result<(), String> {
         self.ticks += 1;
         let (heard, answer, ticks) = (&mut self.heard, &mut self.answer, self.ticks);
-        self.network.tick(|sent| {
-            let (id, data) = (sent.frame.id(), sent.frame.data());
-            if sent.sender == 0 {
-                return;
-            }
+        let seen = self.leg.tick(&mut |frame| {
+            let (id, data) = (frame.id(), frame.data());
             if (0x581..=0x582).contains(&id) {
-                *answer = sent.frame.full();
+                *answer = frame.full();
             }
             if let Some(node) = NODES.iter().position(|node| id == 0x80 + node)
                 && let [low, high, _, _, _, _, _, _] = *data
             {
                 heard[node] = (u16::from_le_bytes([low, high]), ticks);
             }
-        });
-        self.look()
+        })?;
+        let Some(seen) = seen else { return Ok(()) };
+        let was_enabled = core::mem::replace(&mut self.is_enabled, seen.is_enabled);
+        self.look_at_the_joints(&seen, was_enabled)?;
+        self.look_at_the_fault(seen.fault)?;
+        if seen.is_enabled && !was_enabled {
+            self.explain_pending(0..JOINTS);
+        }
+        Ok(())
     }
 
-    fn look(&mut self) -> Result<(), String> {
+    fn look_at_the_joints(&mut self, seen: &Seen, was_enabled: bool) -> Result<(), String> {
         let ticks = self.ticks;
-        let rig = &self.network.boards()[0].rig;
-        let Some(output) = &rig.output else { return Ok(()) };
-        let decision = &output.servo.decision;
-        let before = core::mem::replace(&mut self.state, decision.state);
-        let torque = core::mem::replace(&mut self.torque, decision.torque.map(|torque| torque.0));
-        if before.is_enabled() && !decision.state.is_enabled() {
+        let torque = core::mem::replace(&mut self.torque, seen.torque);
+        if was_enabled && !seen.is_enabled {
             // A frame that is on its way belongs to the next session.
             self.targets = self.target.is_some_and(|at| ticks - at < 4);
             self.pending = self.pending.map(|written| written && self.targets);
         }
-        let foreign = !matches!(rig.leg.control().activity(), Activity::Idle | Activity::Follow);
-        let truth = rig.world.anatomical_position();
-        let limits = rig.leg.control().limits();
         for joint in 0..JOINTS {
-            let cap = limits.joints()[joint].torque_cap().0;
-            let now = self.torque[joint];
-            if now.abs() > 1.001 * cap {
+            let Bounds { range: [low, high], cap } = self.bounds[joint];
+            let (before, now) = (torque[joint], seen.torque[joint]);
+            if now.abs() > L::OVERSHOOT * cap {
                 return Err(format!("cap: joint {joint} {now} of {cap} N m"));
             }
-            if !decision.state.is_enabled() || !before.is_enabled() {
+            if !seen.is_enabled || !was_enabled {
                 continue;
             }
-            let [low, high] = RANGES[joint];
-            if truth[joint] < low - BEYOND || truth[joint] > high + BEYOND {
-                return Err(format!("range: joint {joint} at {} rad", truth[joint]));
+            let out = (low - seen.position[joint]).max(seen.position[joint] - high);
+            if out > BEYOND {
+                return Err(format!("range: joint {joint} at {} rad", seen.position[joint]));
             }
-            let speed = output.motion.velocity_rad_per_s[joint];
-            if !self.targets && !foreign && !decision.returns[joint] && speed.abs() > CREEP {
+            let (speed, returns) = (seen.speed[joint], seen.returns[joint]);
+            if !self.targets && !seen.moves_itself && !returns && speed.abs() > CREEP {
                 return Err(format!("targets: joint {joint} commanded at {speed} rad/s"));
             }
-            let grows =
-                now.abs() - torque[joint].abs() > 0.1 * cap || now * torque[joint] < -0.01 * cap * cap;
+            let grows = now.abs() - before.abs() > 0.1 * cap || now * before < -0.01 * cap * cap;
             // A joint that returns has less torque.
-            let returns = core::mem::replace(&mut self.returns[joint], decision.returns[joint]);
-            let explained = ticks < self.explained[joint] || foreign || returns != decision.returns[joint];
+            let returned = core::mem::replace(&mut self.returns[joint], returns);
+            let explained = ticks < self.explained[joint] || seen.moves_itself || returned != returns;
             if grows && !explained {
-                return Err(format!("steps: joint {joint} from {} to {now} N m", torque[joint]));
+                return Err(format!("steps: joint {joint} from {before} to {now} N m"));
             }
         }
-        if let Some(fault) =
-            decision.state.fault().filter(|fault| before.fault() != Some(*fault) && self.plugged)
-        {
-            self.unheard = Some((fault.code.number(), ticks));
-        }
-        if self.state.is_enabled() && !before.is_enabled() {
-            self.explain_pending(0..JOINTS);
+        Ok(())
+    }
+
+    fn look_at_the_fault(&mut self, fault: Option<u16>) -> Result<(), String> {
+        let before = core::mem::replace(&mut self.fault, fault);
+        if let Some(fault) = fault.filter(|fault| before != Some(*fault) && self.plugged) {
+            self.unheard = Some((fault, self.ticks));
         }
         let Some((code, since)) = self.unheard else { return Ok(()) };
-        let is_heard = |heard: &(u16, u64)| heard.0 == code && heard.1 >= since;
-        if self.heard.iter().all(is_heard) {
+        if self.heard.iter().all(|heard| heard.0 == code && heard.1 + u64::from(SETTLED) >= since) {
             self.unheard = None;
-        } else if ticks > since + HEARD {
+        } else if self.ticks > since + HEARD {
             return Err(format!("faults: {code:04X} of tick {since}, heard {:04X?}", self.heard));
         }
         Ok(())
@@ -381,21 +306,19 @@ impl Bench {
     /// Compares the statuswords with the leg.
     fn words(&mut self) -> Result<(), String> {
         for joint in 0..JOINTS {
-            let before = self.state;
+            let before = (self.is_enabled, self.fault);
             let Some(word) = self.read(joint, 0x6041)? else { continue };
-            if before != self.state {
+            let Some(mode) = self.read(joint, 0x6061)? else { continue };
+            self.run(SETTLED)?;
+            if before != (self.is_enabled, self.fault) {
                 continue;
             }
-            let (state, word) = (self.state, word as u16);
+            let (word, mode) = (word as u16, mode as i8);
             let powered = word & 0x806F == 0x27;
             let failed = matches!(word & 0x4F, 0x08 | 0x0F);
-            let mode = self.read(joint, 0x6061)?.unwrap_or(0) as i8;
             let follows = powered && matches!(mode, -1 | 8..=10) && word & 0x1000 != 0;
-            if powered != state.is_enabled()
-                || failed != state.fault().is_some()
-                || follows && !self.targets && before == self.state
-            {
-                return Err(format!("words: joint {joint} {word:04X} in mode {mode}, {state:?}"));
+            if powered != self.is_enabled || failed != self.fault.is_some() || follows && !self.targets {
+                return Err(format!("words: joint {joint} {word:04X} in mode {mode}, {before:?}"));
             }
         }
         Ok(())
@@ -478,7 +401,7 @@ impl Bench {
             }
             Step::Plug(plugged) => {
                 (self.plugged, self.unheard) = (plugged, None);
-                self.network.set_plugged(plugged);
+                self.leg.plug(plugged);
                 self.run(8)
             }
             Step::Wait(ticks) => {
@@ -492,7 +415,7 @@ impl Bench {
     fn again(&mut self) -> Result<(), String> {
         self.unheard = None;
         self.plugged = true;
-        self.network.set_plugged(true);
+        self.leg.plug(true);
         self.hand(true, false);
         self.send(0x7E5, &[4, 0, 0, 0, 0, 0, 0, 0]);
         self.expect_defaults();
@@ -505,47 +428,23 @@ impl Bench {
             // A reset takes 24 ms, and a brake its time.
             self.run(SERVO_RATE_HZ / 20)?;
         }
-        if self.state.is_enabled() {
+        if self.is_enabled {
             return Ok(());
         }
         let inputs = [self.read(0, 0x60FD)?, self.read(1, 0x60FD)?];
         if inputs.iter().flatten().any(|inputs| inputs & REASONS != 0) {
             return Ok(());
         }
-        Err(format!("again: {:?}, 60FD {inputs:X?}", self.state))
+        Err(format!("again: {:?}, 60FD {inputs:X?}", self.fault))
     }
 }
 
-fn judge(base: &[Bench; 2], (by_hand, steps): &(bool, Vec<Step>)) -> Result<(), String> {
-    let mut bench = base[usize::from(*by_hand)].clone();
-    steps.iter().try_for_each(|step| bench.step(step))?;
-    bench.again()
-}
-
-fn sessions(count: u32, seed: u8) {
-    let mut by_hand = Bench::new();
-    let base = [by_hand.clone(), {
-        by_hand.enable_by_hand().expect("a leg that the contacts enable");
-        by_hand
-    }];
-    let count = std::env::var("SCARAB_SESSIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(count);
-    let config =
-        Config { cases: count, max_shrink_iters: 400, failure_persistence: None, ..Config::default() };
-    let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32]);
-    let found = TestRunner::new_with_rng(config, rng)
-        .run(&session(), |session| judge(&base, &session).map_err(TestCaseError::fail));
-    if let Err(why) = found {
-        panic!("{why}");
-    }
-}
-
-#[test]
-fn no_random_session_breaks_an_invariant() {
-    sessions(200, 44);
-}
-
-#[test]
-#[ignore = "campaign: .ci/full"]
-fn twenty_thousand_random_sessions_break_no_invariant() {
-    (45..53).into_par_iter().for_each(|seed| sessions(2_500, seed));
+/// Plays a session on a leg.
+///
+/// # Errors
+/// What did not hold.
+pub fn judge<L: HostedLeg>(leg: L, bounds: [Bounds; JOINTS], session: &Session) -> Result<(), String> {
+    let mut play = Play::new(leg, bounds);
+    session.steps.iter().try_for_each(|step| play.step(step))?;
+    play.again()
 }
