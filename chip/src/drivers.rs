@@ -185,7 +185,11 @@ impl Check {
             }
         }
         self.note_findings("last step");
-        Err(ToolError::input(format!("step {} was not reached within {longest} s", self.step + 1)))
+        let results = self.word(self.symbols.count);
+        Err(ToolError::input(format!(
+            "step {} was not reached within {longest} s, after {results} results",
+            self.step + 1
+        )))
     }
 
     /// Runs for a time, s.

@@ -35,6 +35,9 @@ def main():
             joint.node.sdo.download(index, sub, data)
         for (index, sub), data in {(index, sub): data for index, sub, data in written}.items():
             found = joint.node.sdo.upload(index, sub)
+            if 0x1800 <= index < 0x1A00 and sub == 1:
+                # No remote requests are answered, so bit 30 of a COB-ID always reads 1.
+                data = struct.pack("<I", struct.unpack("<I", data)[0] | 1 << 30)
             assert found == data, f"node {number}, {index:04X}:{sub}: {found.hex()}, written was {data.hex()}"
         print(f"node {number}: {len(written)} objects written and read back")
     network.disconnect()

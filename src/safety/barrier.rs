@@ -145,23 +145,10 @@ impl Barrier {
         (NewtonMetre(torque).limited(NewtonMetre(cap)), limited)
     }
 
-    /// Whether a joint with a share of its current stops before a fault of its range: `margin` beyond its
-    /// ends, at its present velocity.
+    /// Whether a joint stops before a fault of its range: `margin` beyond its ends, at its present velocity.
     #[must_use]
-    pub fn stops_in_range(
-        &self,
-        position: Radian,
-        velocity: RadianPerSecond,
-        margin: Radian,
-        share: f32,
-    ) -> bool {
-        let available = Self {
-            twice_braking_rad_per_s2: share * self.twice_braking_rad_per_s2,
-            lead_rad_per_s: share * self.lead_rad_per_s,
-            lead_square: share * share * self.lead_square,
-            ..*self
-        };
-        let most = |end_is_at: f32| available.approach_speed(end_is_at + margin.0).0;
+    pub fn stops_in_range(&self, position: Radian, velocity: RadianPerSecond, margin: Radian) -> bool {
+        let most = |end_is_at: f32| self.approach_speed(end_is_at + margin.0).0;
         velocity.0 <= most(self.high_rad - position.0) && -velocity.0 <= most(position.0 - self.low_rad)
     }
 
@@ -349,26 +336,6 @@ mod tests {
             let cap = NewtonMetre(sign * barrier.cap_nm);
             let (torque, limited) = barrier.bound(Radian::ZERO, RadianPerSecond::ZERO, cap, false);
             assert_eq!((torque, limited), (cap, Limited::default()));
-        }
-    }
-
-    #[test]
-    fn a_joint_with_less_current_needs_more_way_to_stop() {
-        let barrier = Barrier::new(&HIP);
-        for share in [1.0, 0.5, 0.25] {
-            let braking = share * HIP.braking_acceleration().0;
-            for speed in [0.2, 0.5, 1.0_f32] {
-                let way = 0.5 * speed * speed / braking + speed * REACTION_S;
-                for (more, stops) in [(1.02, true), (0.98, false)] {
-                    let high = Radian(HIP.high.0 - more * way);
-                    let low = Radian(HIP.low.0 + more * way);
-                    for (position, velocity) in [(high, speed), (low, -speed)] {
-                        let found =
-                            barrier.stops_in_range(position, RadianPerSecond(velocity), Radian::ZERO, share);
-                        assert_eq!(found, stops, "{share} of the current, {velocity} rad/s");
-                    }
-                }
-            }
         }
     }
 

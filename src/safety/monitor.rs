@@ -322,12 +322,9 @@ impl<const N: usize> Monitor<N> {
         (0..N).find_map(|joint| {
             let is_inside = self.in_range(joint, observation.position[joint]);
             let (position, velocity) = (observation.position[joint], observation.velocity[joint]);
-            let is_slow = if is_inside {
-                let share = self.derating.first_motion(joint);
-                self.barriers[joint].stops_in_range(position, velocity, RANGE_TOLERANCE, share)
-            } else {
-                velocity.abs().0 <= RETURN_SPEED
-            };
+            let may_move = is_inside && self.derating.first_motion(joint) >= 1.0;
+            let is_slow = (may_move || velocity.abs().0 <= RETURN_SPEED)
+                && (!is_inside || self.barriers[joint].stops_in_range(position, velocity, RANGE_TOLERANCE));
             let reason = if !(is_inside || self.may_return[joint] && self.is_within_reach(joint, observation))
             {
                 RefusalReason::OutOfRange

@@ -7,10 +7,10 @@
 
 mod bus;
 mod memory;
+mod random_sessions;
 mod rows;
 mod search;
 mod stored;
-mod unruly;
 mod wiring;
 
 use std::rc::Rc;

@@ -6,7 +6,7 @@ use scarab::bus::Frame;
 
 use crate::chip::{GATE_FAULT, LostTriggers, STOP};
 use crate::faults::{Expected, Inject, Injected, JITTER_S, Later, OwnRun, PERIOD_S, Row, Run, Situation};
-use crate::faults::{bus, memory, search, stored, unruly, wiring};
+use crate::faults::{bus, memory, random_sessions, search, stored, wiring};
 use crate::plant::{JOINTS, STEP, ShuntFault};
 use crate::time::ticks;
 
@@ -246,7 +246,7 @@ pub(super) const ROWS: &[Row] = &[
         chip.stop_crystal()
     }),
     own("B6", "a host takes over an enabled leg, in each mode", 0.0, bus::taken_over),
-    own("B7", "hosts without manners: random sessions", 0.0, unruly::played),
+    own("B7", "random host sessions", 0.0, random_sessions::played),
     own("B3", "malformed and hostile frames", JITTER_S, bus::hostile),
     injected(
         "B4",

@@ -217,6 +217,36 @@ fn a_reset_of_all_nodes_stops_the_leg_and_ends_host_control() {
 }
 
 #[test]
+fn a_zero_in_a_pdo_disables_a_leg_that_a_reset_left_enabled() {
+    let mut bench = Bench::new();
+    bench.enable();
+    [1, 2].into_iter().for_each(|node| bench.write(node, 0x6007, 0, 0, 2));
+    bench.send(0, &[129, 0]);
+    bench.send(0, &[1, 0]);
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::OperationEnabled, true));
+    bench.send(0x201, &[0, 0]);
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, false));
+}
+
+#[test]
+fn a_cancel_that_waits_for_the_leg_is_not_replaced() {
+    let mut bench = Bench::new();
+    bench.enable();
+    for command in [0, 1, 3] {
+        bench.orders.clear();
+        for (node, command) in [(0x601, 2), (0x602, command)] {
+            let frame = Frame::new(node, &[0x2F, 0x00, 0x21, 1, command, 0, 0, 0]);
+            bench.device.receive(&frame, bench.now_us, None, &NOTHING);
+            bench.device.poll(0, bench.now_us, &NOTHING);
+        }
+        bench.run(8);
+        let requests: Vec<LegRequest> = bench.orders.iter().filter_map(|order| order.request).collect();
+        assert_eq!(requests, [LegRequest::Cancel], "{command}");
+        bench.enable();
+    }
+}
+
+#[test]
 fn an_open_switch_or_an_inhibit_reason_stops_every_step_up() {
     for (held, blocked) in [(false, false), (true, true), (false, true)] {
         let mut bench = Bench::new();

@@ -67,6 +67,7 @@ pub(super) struct Targets {
     pub torque: bool,
     pub velocity_offset: bool,
     pub torque_offset: bool,
+    pub impedance: [bool; 2],
 }
 
 impl Targets {
@@ -322,6 +323,8 @@ pub struct Axis {
     fault: Option<FaultCode>,
     /// A host has sent a controlword other than 0.
     pub(super) commanded: bool,
+    /// Whether a host has the leg. After a node reset it has the enabled leg still.
+    pub(in crate::bus) hosted: bool,
     /// A step towards enabled was requested and not processed yet.
     rises: bool,
     /// The present controlword requested a step that does not exist.
@@ -372,6 +375,7 @@ impl Axis {
                 torque: false,
                 velocity_offset: false,
                 torque_offset: false,
+                impedance: [false; 2],
             },
             was_powered: false,
             stops: false,
@@ -381,6 +385,7 @@ impl Axis {
             request_count: 0,
             fault: None,
             commanded: false,
+            hosted: false,
             rises: false,
             is_out_of_order: false,
             refused: None,
@@ -527,6 +532,10 @@ impl Axis {
             Some(Mode::Homing) => {}
             _ => return,
         }
+        if mode == Mode::Homing as i8 {
+            // They would name other places.
+            self.void_targets();
+        }
         self.request_count = self.request_count.wrapping_add(1);
         (self.asks, self.taken) = (false, true);
     }
@@ -573,8 +582,8 @@ impl Axis {
             3 => self.stop(),
             _ => {}
         }
-        // Bits held down are cleared, so that the next controlword has rising edges.
-        (self.controlword, self.is_out_of_order) = (0, false);
+        // Bits held down are cleared, so that the next controlword has rising edges. A halt goes on.
+        (self.controlword, self.is_out_of_order) = (self.controlword & HALT, false);
         (self.asks, self.taken) = (false, false);
         self.void_targets();
     }
@@ -631,6 +640,9 @@ impl Axis {
         let speed = |is_valid: bool, value: i32| radian_per_second(if is_valid { value } else { 0 });
         let velocity_offset = speed(targets.velocity_offset, settings.velocity_offset);
         let velocity = speed(targets.velocity, settings.target_velocity);
+        let impedance = |part: usize, unit: f32| {
+            if targets.impedance[part] { f32::from(settings.impedance[part]) * unit } else { 0.0 }
+        };
         let may_home = settings.homing_method != NO_METHOD
             && (settings.range[0]..=settings.range[1]).contains(&settings.home_offset);
         let target = match Mode::of(settings.mode).filter(|mode| self.is_powered() && targets.has(*mode)) {
@@ -653,8 +665,8 @@ impl Axis {
             Some(Mode::Impedance) => Target::Impedance(ImpedanceTarget {
                 position: radian(settings.target_position),
                 velocity,
-                stiffness: f32::from(settings.impedance[0]) * STIFFNESS_UNIT,
-                damping: f32::from(settings.impedance[1]) * DAMPING_UNIT,
+                stiffness: impedance(0, STIFFNESS_UNIT),
+                damping: impedance(1, DAMPING_UNIT),
                 torque: target_torque,
             }),
         };

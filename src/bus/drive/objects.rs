@@ -140,8 +140,8 @@ impl Objects for Axis {
             (0x2011, _) if value <= 1 => settings.feedforward = value == 1,
             (0x2012, _) if value <= 1 => settings.returns = value == 1,
             (0x2013, _) if value <= 1 => settings.watches = value == 1,
-            (0x2020, 1) => settings.impedance[0] = value as u16,
-            (0x2020, 2) => settings.impedance[1] = value as u16,
+            (0x2020, 1) => (settings.impedance[0], self.targets.impedance[0]) = (value as u16, true),
+            (0x2020, 2) => (settings.impedance[1], self.targets.impedance[1]) = (value as u16, true),
             (0x2021, 1) if is_default_or_within(value, constants.position_bandwidth_limits()) => {
                 settings.position_bandwidth = value as u16;
             }
@@ -217,7 +217,7 @@ impl Objects for Axis {
 
     /// A 0 that a PDO repeats is idle: it is no command to disable voltage.
     fn write_mapped(&mut self, object: Object, value: u32) -> Result<(), Abort> {
-        if object.index == 0x6040 && value as u16 == 0 && !self.commanded {
+        if object.index == 0x6040 && value as u16 == 0 && !self.commanded && !self.hosted {
             Ok(())
         } else {
             self.write(object, value)

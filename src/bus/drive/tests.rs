@@ -209,6 +209,52 @@ fn a_lost_host_stops_the_drive_by_its_option() {
 }
 
 #[test]
+fn a_halt_outlasts_a_lost_host() {
+    let mut board = Board::enabled();
+    board.axes[0].write(Object::at(0x6007, 0), 0).expect("no reaction");
+    board.control([0x11F, 15]);
+    board.axes[0].lost(Lost::Heartbeat);
+    assert!(board.axes[0].command().halt);
+    board.control([15; 2]);
+    assert!(!board.axes[0].command().halt);
+}
+
+#[test]
+fn homing_makes_targets_void() {
+    let mut board = Board::enabled();
+    for (index, value) in [(0x6060, 6), (0x607A, 100), (0x607C, 0), (0x6098, 37)] {
+        board.axes[0].write(Object::at(index, 0), value).expect("a value");
+    }
+    board.run(4);
+    board.control([0x1F, 15]);
+    board.axes[0].write(Object::at(0x6060, 0), 8).expect("a mode");
+    assert_eq!(board.axes[0].command().target, Target::Hold);
+}
+
+#[test]
+fn stiffness_and_damping_end_with_their_session() {
+    let mut board = Board::enabled();
+    let shown = |board: &Board| match board.axes[0].command().target {
+        Target::Impedance(target) => [target.stiffness > 0.0, target.damping > 0.0],
+        other => panic!("{other:?}"),
+    };
+    let write = |board: &mut Board, index, sub, value| {
+        board.axes[0].write(Object::at(index, sub), value).expect("a value");
+    };
+    write(&mut board, 0x6060, 0, u32::MAX);
+    for (sub, value) in [(1, 100), (2, 100)] {
+        write(&mut board, 0x2020, sub, value);
+    }
+    write(&mut board, 0x607A, 0, 100);
+    assert_eq!(shown(&board), [true; 2]);
+    board.axes[0].void_targets();
+    write(&mut board, 0x607A, 0, 100);
+    assert_eq!(shown(&board), [false; 2]);
+    write(&mut board, 0x2020, 2, 100);
+    assert_eq!(shown(&board), [false, true]);
+}
+
+#[test]
 fn a_lost_host_is_a_fault_with_option_1() {
     type Loss = fn(&mut Board);
     let lose: [(Loss, FaultCode); 3] = [

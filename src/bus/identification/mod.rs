@@ -151,7 +151,10 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
         let is_identifying = matches!(self.activity, Activity::Identify(_));
         match (sub, value) {
             (1, 0..=5) => {
+                // A cancel that the leg has not taken yet stays.
+                let is_cancelled = self.requested == Some(LegCommand::Cancel);
                 self.requested = match value {
+                    _ if is_cancelled => Some(LegCommand::Cancel),
                     1 => Some(LegCommand::Identify),
                     2 => Some(LegCommand::Cancel),
                     3 => Some(LegCommand::TakeUpdate),

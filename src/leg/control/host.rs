@@ -3,7 +3,7 @@
 use super::{Activity, Control};
 use crate::assist::AssistEnd;
 use crate::leg::follow::{Commanded, Following, JointCommand};
-use crate::motion::{Motion, MotionState};
+use crate::motion::Motion;
 
 /// A host's side of one tick: its commands, if it has the drive, and the state of following them.
 #[derive(Debug)]
@@ -29,21 +29,23 @@ impl<const N: usize> Control<N> {
             }
             return None;
         };
+        // A halt ends another activity too.
+        let cancel = *cancel || commands.iter().any(|command| command.halt);
         if *waits || !self.servo.state().is_enabled() {
             return None;
         }
         if self.activity.assists() {
-            if *cancel {
+            if cancel {
                 self.assistance.leave(AssistEnd::Requested);
             }
             return None;
         }
-        if *cancel && !self.activity.follows_host() {
+        if cancel && !self.activity.follows_host() {
             following.begin(commands, &self.motion.state_at(self.motion_tick));
             self.activity = Activity::Follow;
         }
         if self.activity == Activity::Idle {
-            following.begin(commands, &MotionState::at_rest(self.motion.end_rad()));
+            following.begin_held(commands, self.motion.end_rad());
             self.activity = Activity::Follow;
         }
         if !self.activity.follows_host() {

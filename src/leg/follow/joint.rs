@@ -34,6 +34,11 @@ use crate::units::{NewtonMetre, Radian, RadianPerSecond, Second};
 const STANDING: f32 = 0.005;
 /// Longest time of a stop from the largest speed, or of a fade from the largest torque, s.
 const LONGEST_STOP_S: f32 = 2.0;
+/// Least torque that a host leaves a joint to stop and to hold with, as a share of its limit.
+const LEAST_TORQUE: f32 = 0.1;
+/// Deceleration of a joint that moved when it was enabled, as a share of its acceleration: as the safety
+/// barrier's, it leaves half of the torque for gravity.
+const CAUGHT: f32 = 0.5;
 /// Largest angle that homing gives to the present position: a turn.
 const LARGEST_HOME_RAD: f32 = core::f32::consts::TAU;
 
@@ -114,6 +119,8 @@ pub struct Follower {
     /// Cyclic position: no target within the window has come yet.
     waits: bool,
     halted: bool,
+    /// Whether a joint that moved when it was enabled has not come to rest yet.
+    is_caught: bool,
     /// Whether the joint returned in the previous tick.
     returned: bool,
     /// Ticks for which the joint has been outside the following window, or inside the position window.
@@ -154,6 +161,8 @@ impl<'a> Tick<'a> {
             Bounds { speed: min(whole.speed, RETURN_SPEED), torque: RETURN_TORQUE * whole.torque, ..*whole };
         let bounds = if measured.returns { slow } else { *whole };
         let [low, high] = bounds.range;
+        let stops = command.halt || command.target == Target::Hold;
+        let least = if stops { LEAST_TORQUE * bounds.torque } else { 0.0 };
         let gentlest = min(whole.speed / LONGEST_STOP_S, whole.acceleration);
         Self {
             command,
@@ -165,7 +174,7 @@ impl<'a> Tick<'a> {
                 acceleration: min(command.acceleration.0, bounds.acceleration),
                 deceleration: clamp(command.deceleration.0, gentlest, bounds.acceleration),
             },
-            largest: min(command.largest_torque.0, bounds.torque),
+            largest: clamp(command.largest_torque.0, least, bounds.torque),
             least_slope: whole.torque / LONGEST_STOP_S,
             period: ticks(command.period).clamp(1, ticks(LONGEST_PERIOD)),
             starts,
@@ -198,6 +207,7 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
+        is_caught: false,
         returned: false,
         outside: 0,
         inside: 0,
@@ -236,6 +246,14 @@ impl Follower {
         *self = Self { seen: command.request_count, course, homed: self.homed, ..Self::NEW };
     }
 
+    /// Gives the course the velocity of a joint that moves too fast to be held at once.
+    pub fn begin_moving(&mut self, measured: &Measured) {
+        if abs(measured.velocity.0) > RETURN_SPEED {
+            self.course = Course::moving(self.course.position(), measured.velocity.0);
+            self.is_caught = true;
+        }
+    }
+
     /// Runs one tick.
     pub fn follow(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) -> Demand {
         let begins = command.target.mode() != self.mode;
@@ -267,7 +285,7 @@ impl Follower {
                 self.fade(target.0, &tick);
                 return self.give(demand, measured);
             }
-            Target::CyclicTorque(target) => {
+            Target::CyclicTorque(target) if !command.halt => {
                 self.torque = self.torque_target(target.0, &tick);
                 self.reached = true;
                 return self.give(demand, measured);
@@ -286,7 +304,7 @@ impl Follower {
                 self.stop(&tick);
                 demand
             }
-            Target::Hold => {
+            Target::Hold | Target::CyclicTorque(_) => {
                 self.stop(&tick);
                 demand
             }
@@ -459,6 +477,8 @@ impl Follower {
         let stiffness = self.bounded(target.stiffness, 0.0, stiffest);
         let damping = self.bounded(target.damping, DELAY_S * stiffness, strongest);
         let place = measured.position.0 + DELAY_S * measured.velocity.0;
+        // A joint outside the host's range is not drawn into it, only kept from going on.
+        let (low, high) = (min(low, measured.position.0), max(high, measured.position.0));
         let position = self.bounded(target.position.0, low, high);
         let velocity = self.bounded(target.velocity.0, -bounds.speed, bounds.speed);
         stiffness * (position - place) + damping * (velocity - measured.velocity.0) + target.torque.0
@@ -471,9 +491,13 @@ impl Follower {
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 
-    /// Slows down to rest along the profile.
+    /// Slows down to rest along the profile; a joint that moved when it was enabled by [`CAUGHT`].
     fn stop(&mut self, tick: &Tick<'_>) {
-        self.course.accelerate(0.0, &tick.braking(), tick.bounds.range, TICK_S);
+        let caught = CAUGHT * tick.bounds.acceleration;
+        let deceleration = if self.is_caught { caught } else { tick.rates.deceleration };
+        let rates = Rates { deceleration, ..tick.braking() };
+        self.course.accelerate(0.0, &rates, tick.bounds.range, TICK_S);
+        self.is_caught &= self.course.velocity() != 0.0;
         self.reached = self.course.velocity() == 0.0 && abs(tick.measured.velocity.0) < STANDING;
     }
 

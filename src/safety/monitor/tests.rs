@@ -188,20 +188,23 @@ fn a_refused_enabling_names_joint_and_reason() {
 }
 
 #[test]
-fn a_falling_joint_is_enabled_only_if_its_current_stops_it() {
-    let falling = Observation {
-        position: [MIDDLE[0], KNEE.low + Radian(0.1)],
-        velocity: [RadianPerSecond::ZERO, RadianPerSecond(-1.0)],
-        ..STANDING
-    };
-    for (first_motion, stops) in [(1.0, true), (0.25, false)] {
+fn a_joint_whose_angle_is_not_proven_is_enabled_at_rest_only() {
+    for (first_motion, speed, is_enabled) in
+        [(1.0, -1.0, true), (0.25, -1.0, false), (0.9, -0.11, false), (0.25, -0.09, true)]
+    {
+        let moving = Observation {
+            position: [MIDDLE[0], KNEE.low + Radian(0.1)],
+            velocity: [RadianPerSecond::ZERO, RadianPerSecond(speed)],
+            ..STANDING
+        };
         let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
         let joints = [JointShares { first_motion, ..JointShares::ALL }; 2];
         monitor.derate(&RAMPS.at(25.0, Volt(48.0), joints));
         let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
         let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
-        let decision = monitor.decide(&falling, &ask(PowerRequest::EnableOperation));
-        assert_eq!(decision.refused.is_none(), stops, "{first_motion} of the current");
+        let decision = monitor.decide(&moving, &ask(PowerRequest::EnableOperation));
+        let refused = (!is_enabled).then_some(Refusal { joint: 1, reason: RefusalReason::Moving });
+        assert_eq!(decision.refused, refused, "{first_motion} of the current, {speed} rad/s");
     }
 }
 

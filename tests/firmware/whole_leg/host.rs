@@ -30,6 +30,7 @@ const HOLD: JointCommand = JointCommand {
     period: Second(0.002),
 };
 
+#[derive(Clone)]
 struct Hosted {
     pair: Pair,
     commands: [JointCommand; JOINTS],
@@ -383,26 +384,67 @@ fn an_enabled_leg_is_taken_over_without_a_step_in_every_mode() {
 
 #[test]
 fn a_halt_ends_in_time_whatever_the_host_has_set() {
-    for torque in [false, true] {
+    for mode in [3, 4, 10] {
         let mut hosted = Hosted::new();
         hosted.run(SECOND);
-        let weight = hosted.status[1].torque_demand.0;
-        hosted.commands[1].target = Target::ProfileVelocity(RadianPerSecond(0.3));
-        if torque {
-            hosted.commands[1].target = Target::ProfileTorque(NewtonMetre(weight + 2.0));
-        }
+        let weight = hosted.status[1].torque_demand;
+        let more = weight + NewtonMetre(2.0);
+        hosted.commands[1].target = match mode {
+            3 => Target::ProfileVelocity(RadianPerSecond(0.3)),
+            4 => Target::ProfileTorque(more),
+            _ => Target::CyclicTorque(more),
+        };
         hosted.run(SECOND / 4);
-        hosted.commands[1].deceleration = RadianPerSecondSquared(1e-6);
-        hosted.commands[1].torque_slope_nm_per_s = 0.0;
-        hosted.commands[1].halt = true;
+        let command = &mut hosted.commands[1];
+        command.deceleration = RadianPerSecondSquared(1e-6);
+        command.torque_slope_nm_per_s = 0.0;
+        command.halt = true;
+        if mode != 4 {
+            command.largest_torque = NewtonMetre::ZERO;
+            command.following_window = Radian(10.0);
+        }
         hosted.run(2 * SECOND);
+        let place = hosted.truth(1);
+        hosted.run(SECOND);
         let JointStatus { velocity_demand, torque_demand, .. } = hosted.status[1];
+        let moved = (hosted.truth(1) - place).abs();
+        let has_stopped = velocity_demand.0 == 0.0 && moved < 1e-3;
         assert!(
-            if torque { torque_demand.0 == 0.0 } else { velocity_demand.0 == 0.0 },
-            "{:?}",
+            if mode == 4 { torque_demand.0 == 0.0 } else { has_stopped && torque_demand.0 != 0.0 },
+            "{mode}: {moved} rad, {:?}",
             hosted.status[1]
         );
     }
+}
+
+#[test]
+fn a_leg_that_is_enabled_while_it_falls_is_caught() {
+    let mut hosted = Hosted::enabled_at([0.5, 1.5]);
+    hosted.tick(Some(ControlRequest::Power(PowerRequest::DisableVoltage)));
+    hosted.pair.world.push(1, -215.0, 0.05);
+    hosted.run(SECOND / 20);
+    let speed = hosted.status[1].velocity.0;
+    assert!(speed < -2.5 && hosted.truth(1) > 1.0, "{speed} rad/s, {} rad", hosted.truth(1));
+    for request in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
+        hosted.tick(Some(ControlRequest::Power(request)));
+    }
+    hosted.run(SECOND);
+    assert!(is_enabled(&hosted.pair), "{:?}", hosted.status[1]);
+}
+
+#[test]
+fn an_impedance_does_not_draw_a_joint_into_the_host_s_range() {
+    let mut hosted = Hosted::new();
+    hosted.run(SECOND);
+    let place = hosted.position(1);
+    hosted.commands[1].range = [Radian(place + 0.3), Radian(place + 0.6)];
+    impedance(&mut hosted, 1, place, 500.0, 30.0);
+    hosted.run(SECOND);
+    assert!((hosted.position(1) - place).abs() < 0.02, "from {place} to {} rad", hosted.position(1));
+    // Nor does a target draw it farther out.
+    impedance(&mut hosted, 1, place - 0.3, 500.0, 30.0);
+    hosted.run(SECOND);
+    assert!((hosted.position(1) - place).abs() < 0.05, "from {place} to {} rad", hosted.position(1));
 }
 
 #[test]
@@ -492,17 +534,24 @@ fn an_identification_starts_at_rest_and_returns_the_leg_to_the_host() {
     hosted.run(SECOND);
     assert!(matches!(activity(&hosted.pair), Activity::Identify(_)));
     assert_eq!(hosted.status[0].mode, 0);
-    // An identification cancelled in motion comes to rest along the profile.
+    // One that is cancelled or halted in motion comes to rest along the profile.
     hosted.run(3 * SECOND);
     assert!(matches!(activity(&hosted.pair), Activity::Identify(_)));
-    let before = hosted.status[1].velocity_demand.0;
-    hosted.pair.leg.cancel();
-    hosted.run(1);
-    assert_eq!(activity(&hosted.pair), Activity::Follow);
-    assert!((hosted.status[1].velocity_demand.0 - before).abs() < 0.01);
-    hosted.run(2 * SECOND);
-    assert!(is_enabled(&hosted.pair) && hosted.status[1].velocity_demand.0 == 0.0);
-    assert_eq!(hosted.pair.leg.control().verdict(), None);
+    for halt in [false, true] {
+        let mut hosted = hosted.clone();
+        let before = hosted.status[1].velocity_demand.0;
+        if halt {
+            hosted.commands[0].halt = true;
+        } else {
+            hosted.pair.leg.cancel();
+        }
+        hosted.run(1);
+        assert_eq!(activity(&hosted.pair), Activity::Follow);
+        assert!((hosted.status[1].velocity_demand.0 - before).abs() < 0.01);
+        hosted.run(2 * SECOND);
+        assert!(is_enabled(&hosted.pair) && hosted.status[1].velocity_demand.0 == 0.0);
+        assert_eq!(hosted.pair.leg.control().verdict(), None);
+    }
 }
 
 /// Ranges of the default leg, rad.

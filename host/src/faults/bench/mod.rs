@@ -16,13 +16,13 @@ mod lost;
 pub mod offsets;
 mod outside;
 mod parts;
+mod random_sessions;
 mod search;
 mod silent;
 mod stall;
 mod start;
 mod stopped;
 mod supply;
-mod unruly;
 
 use scarab::safety::FaultCode;
 
@@ -68,7 +68,7 @@ pub static BENCHES: [Bench; 28] = [
     outside::BENCH,
     hostile::FRAMES_BENCH,
     hostile::BABBLE,
-    unruly::BENCH,
+    random_sessions::BENCH,
     cut::BENCH,
     kept::CUT,
     kept::ROT,

@@ -1,61 +1,98 @@
-//! Hosts without manners: random sessions on the bus of a leg.
+//! Random sessions of hosts on the bus of a leg.
 //!
 //! A session is a list of steps, as several hosts may send them in turn: objects with values inside and
 //! outside their ranges, controlwords in any order, modes, PDOs, SYNC, NMT, LSS, heartbeats, saving and
-//! loading, homing, set-points, identification, the operator's contacts, the plug. [`judge`] plays it on a leg
-//! and checks what must hold after every tick; [`Session::reduced`] finds the fewest steps that fail.
+//! loading, homing, set-points, identification, the operator's contacts, the plug. [`check_session`] plays it on a leg
+//! and checks what must hold after every tick; [`HostSession::reduced`] finds the fewest steps that fail.
 
 mod witness;
+
+use std::fmt;
 
 use scarab::model::planar::JOINTS;
 
 use crate::base::random::Random;
 
-pub use witness::{Bounds, HostedLeg, SETTLED, Seen, judge};
+pub use witness::{HostedLeg, JointBounds, LegState, check_session, is_like};
 
 /// Most steps of a session.
 const MOST_STEPS: u64 = 40;
 
-/// Objects that hosts write: index, subindex, bytes, whether it is a target or offset.
-const OBJECTS: [(u16, u8, u8, bool); 38] = [
-    (0x6071, 0, 2, true),
-    (0x607A, 0, 4, true),
-    (0x60B1, 0, 4, true),
-    (0x60B2, 0, 2, true),
-    (0x60FF, 0, 4, true),
-    (0x6072, 0, 2, true),
-    (0x2020, 1, 2, true),
-    (0x2020, 2, 2, true),
-    (0x6007, 0, 2, false),
-    (0x605A, 0, 2, false),
-    (0x6065, 0, 4, false),
-    (0x6066, 0, 2, false),
-    (0x6067, 0, 4, false),
-    (0x6068, 0, 2, false),
-    (0x606D, 0, 2, false),
-    (0x606F, 0, 2, false),
-    (0x607C, 0, 4, false),
-    (0x607D, 1, 4, true),
-    (0x607D, 2, 4, true),
-    (0x6081, 0, 4, false),
-    (0x6083, 0, 4, false),
-    (0x6084, 0, 4, false),
-    (0x6087, 0, 4, false),
-    (0x6098, 0, 1, false),
-    (0x60C2, 1, 1, false),
-    (0x60C2, 2, 1, false),
-    (0x2011, 0, 1, false),
-    (0x2012, 0, 1, false),
-    (0x2013, 0, 1, false),
-    (0x2021, 1, 2, false),
-    (0x1017, 0, 2, false),
-    (0x2100, 1, 1, true),
-    (0x2160, 1, 1, false),
-    (0x60F2, 0, 2, false),
-    (0x1010, 1, 4, false),
-    (0x1011, 1, 4, false),
-    (0x1029, 1, 1, false),
-    (0x1F51, 1, 1, false),
+/// Object that hosts write: index, subindex, bytes, whether it is a target or an offset.
+#[derive(Clone, Copy)]
+struct Object(u16, u8, u8, bool);
+
+impl fmt::Debug for Object {
+    fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(text, "{:04X}:{}", self.0, self.1)
+    }
+}
+
+impl Object {
+    /// A value that has an effect, where few have one.
+    fn sensible(&self, value: i32) -> i32 {
+        let pair = match self.0 {
+            // "save", "load".
+            0x1010 => [0x6576_6173, value],
+            0x1011 => [0x6461_6F6C, value],
+            // By the next SYNC, and at once.
+            0x1400..=0x1403 => [1, 255],
+            // Stop, clear. Others may restart the board.
+            0x1F51 => [0, 3],
+            _ => [value; 2],
+        };
+        pair[value.rem_euclid(2) as usize]
+    }
+}
+
+/// Objects with values inside and outside their ranges.
+const OBJECTS: [Object; 46] = [
+    Object(0x6071, 0, 2, true),
+    Object(0x607A, 0, 4, true),
+    Object(0x60B1, 0, 4, true),
+    Object(0x60B2, 0, 2, true),
+    Object(0x60FF, 0, 4, true),
+    Object(0x6072, 0, 2, true),
+    Object(0x2020, 1, 2, true),
+    Object(0x2020, 2, 2, true),
+    Object(0x6007, 0, 2, false),
+    Object(0x605A, 0, 2, false),
+    Object(0x6065, 0, 4, false),
+    Object(0x6066, 0, 2, false),
+    Object(0x6067, 0, 4, false),
+    Object(0x6068, 0, 2, false),
+    Object(0x606D, 0, 2, false),
+    Object(0x606F, 0, 2, false),
+    Object(0x607C, 0, 4, false),
+    Object(0x607D, 1, 4, true),
+    Object(0x607D, 2, 4, true),
+    Object(0x6081, 0, 4, false),
+    Object(0x6083, 0, 4, false),
+    Object(0x6084, 0, 4, false),
+    Object(0x6087, 0, 4, false),
+    Object(0x6098, 0, 1, false),
+    Object(0x60C2, 1, 1, false),
+    Object(0x60C2, 2, 1, false),
+    Object(0x2011, 0, 1, false),
+    Object(0x2012, 0, 1, false),
+    Object(0x2013, 0, 1, false),
+    Object(0x2021, 1, 2, false),
+    Object(0x1017, 0, 2, false),
+    Object(0x2100, 1, 1, true),
+    Object(0x2160, 1, 1, false),
+    Object(0x60F2, 0, 2, false),
+    Object(0x1010, 1, 4, false),
+    Object(0x1011, 1, 4, false),
+    Object(0x1029, 1, 1, false),
+    Object(0x1F51, 1, 1, false),
+    Object(0x606E, 0, 2, false),
+    Object(0x6070, 0, 2, false),
+    Object(0x2021, 4, 2, false),
+    Object(0x2150, 1, 2, false),
+    Object(0x1400, 2, 1, false),
+    Object(0x1401, 2, 1, false),
+    Object(0x1402, 2, 1, false),
+    Object(0x1403, 2, 1, false),
 ];
 const MODES: [i8; 9] = [0, 1, 3, 4, 6, 8, 9, 10, -1];
 const WORDS: [u16; 14] = [0, 2, 6, 7, 0xB, 0xF, 0x1F, 0x3F, 0x5F, 0x7F, 0x10F, 0x11F, 0x80, 0x8F];
@@ -66,8 +103,8 @@ const VALUES: [i32; 7] = [0, 1, -1, i32::MIN, i32::MAX, 0x7FFF, 0xFFFF];
 /// One step. A joint of [`JOINTS`] means every joint.
 #[derive(Clone, Copy, Debug)]
 enum Step {
-    /// SDO write to a node: place in [`OBJECTS`], value.
-    Write(usize, usize, i32),
+    /// SDO write to a node.
+    Write(usize, Object, i32),
     /// Controlword by SDO.
     Word(usize, u16),
     /// 6, 7, F to both nodes.
@@ -116,7 +153,10 @@ impl Step {
         let some = random.below(JOINTS as u64 + 1) as usize;
         let byte = |random: &mut Random| random.below(256) as u8;
         match random.below(37) {
-            0..8 => Self::Write(joint, random.below(OBJECTS.len() as u64) as usize, value(random)),
+            0..8 => {
+                let object = any_of(random, &OBJECTS);
+                Self::Write(joint, object, object.sensible(value(random)))
+            }
             8 => Self::Word(some, random.below(1 << 16) as u16),
             9..13 => Self::Word(some, any_of(random, &WORDS)),
             13..16 => Self::Enable,
@@ -137,24 +177,24 @@ impl Step {
 
 /// Steps, and whether the operator's contacts have enabled the leg before.
 #[derive(Clone, Debug)]
-pub struct Session {
+pub struct HostSession {
     /// Whether the operator's contacts have enabled the leg before.
     pub by_hand: bool,
     steps: Vec<Step>,
 }
 
-impl Session {
+impl HostSession {
     /// Draws a session.
     #[must_use]
     pub fn draw(random: &mut Random) -> Self {
-        let (by_hand, count) = (random.coin(), 1 + random.below(MOST_STEPS - 1));
+        let (by_hand, count) = (random.coin(), 1 + random.below(MOST_STEPS));
         Self { by_hand, steps: (0..count).map(|_| Step::draw(random)).collect() }
     }
 
-    /// Leaves out all steps without which the session still fails, within a number of runs.
+    /// Removes the steps without which the session still fails, within a number of runs.
     #[must_use]
     pub fn reduced(mut self, most_runs: u32, mut fails: impl FnMut(&Self) -> bool) -> Self {
-        let (mut length, mut runs) = (self.steps.len() / 2, 0);
+        let (mut length, mut runs) = (self.steps.len().div_ceil(2), 0);
         while length > 0 {
             let (mut begin, before) = (0, self.steps.len());
             while begin < self.steps.len() && runs < most_runs {
@@ -183,10 +223,10 @@ mod tests {
     #[test]
     fn a_failing_session_is_reduced_to_the_steps_that_make_it_fail() {
         for seed in 0..50 {
-            let mut session = Session::draw(&mut Random::new("reduced", seed));
+            let mut session = HostSession::draw(&mut Random::new("reduced", seed));
             session.steps.insert(session.steps.len() / 3, Step::Home(0, 77));
             session.steps.push(Step::Home(1, 77));
-            let fails = |session: &Session| {
+            let fails = |session: &HostSession| {
                 let joints: Vec<usize> = session
                     .steps
                     .iter()

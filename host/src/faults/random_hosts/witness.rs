@@ -4,7 +4,7 @@
 //! range     an enabled joint is in its range, or no farther out than it can be stopped
 //! cap       no torque above the joint's limit
 //! targets   no commanded motion before a target of this session: none since the leg was last enabled
-//! steps     no torque grows by a tenth of its limit in a tick, unless the host has just asked for it in the
+//! steps     no torque changes by a tenth of its limit in a tick, unless the host has just asked for it in the
 //!           joint's mode (`asks_for_a_step`), or the leg is stopped
 //! words     the statusword is that of the leg, and bit 12 of a cyclic mode means a target of this session
 //! faults    the code of a fault is heard from both nodes, if they can send
@@ -15,7 +15,7 @@ use scarab::bus::Frame;
 use scarab::hal::{Contacts, SERVO_RATE_HZ};
 use scarab::model::planar::{BASE, JOINTS};
 
-use super::{OBJECTS, Session, Step};
+use super::{HostSession, Object, Step};
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::rig::options::SimulationOptions;
@@ -27,6 +27,13 @@ const BEYOND: f64 = 0.1;
 /// Bits of 60FD that say why a leg is not enabled: an inhibit reason, no zeros, no calibration, a joint that
 /// is outside its range, moves, or has no reading.
 const REASONS: i32 = 0x7E_0000;
+/// Largest motion of a joint that is held, rad, and the time after which it has come to rest, ticks.
+const HELD: f64 = 0.01;
+const COMES_TO_REST: u64 = 500 * MILLISECOND as u64;
+/// Time in which a host takes over a leg that has just been enabled, or a new word or mode acts, ticks.
+const TAKES_OVER: u64 = 5 * MILLISECOND as u64;
+/// Ticks until the nodes have started.
+const START: u32 = 40;
 /// Speed of a joint that creeps within its friction, rad/s: a joint that is held comes to rest from it.
 const CREEP: f32 = 5e-3;
 const MILLISECOND: u32 = SERVO_RATE_HZ / 1000;
@@ -35,10 +42,6 @@ const HEARD: u64 = 200 * MILLISECOND as u64;
 /// Time for which a new value explains a step of the torque, ticks: a cyclic target that has jumped is
 /// interpolated over its period, and the joint then follows.
 const AFTER_VALUE: u64 = 500 * MILLISECOND as u64;
-/// Ticks within which the leg's state is seen, before or after its effects.
-pub const SETTLED: u32 = 8;
-/// Values that begin a storing and a loading.
-const SIGNATURES: [(u16, i32); 2] = [(0x1010, 0x6576_6173), (0x1011, 0x6461_6F6C)];
 
 /// Whether a new value of an object may change the torque at once in a mode. Profiles, homing, a new mode
 /// and a halt may not: they start from the joint's place, velocity and torque.
@@ -58,14 +61,14 @@ const fn asks_for_a_step(mode: i8, index: u16) -> bool {
 
 /// Limits of a joint.
 #[derive(Clone, Copy, Debug)]
-pub struct Bounds {
+pub struct JointBounds {
     /// Ends of its range, anatomical, rad.
     range: [f64; 2],
     /// Greatest torque, N m.
     cap: f64,
 }
 
-impl Bounds {
+impl JointBounds {
     /// Limits of this leg's joints.
     ///
     /// # Errors
@@ -81,7 +84,7 @@ impl Bounds {
 
 /// State of a leg in a servo tick.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct LegState {
     /// Whether it follows its commands.
     pub is_enabled: bool,
     /// Code of its fault, until reset.
@@ -94,12 +97,17 @@ pub struct Seen {
     pub speed: [f32; JOINTS],
     /// Joints that return into their range.
     pub returns: [bool; JOINTS],
+    /// Joints whose torque the safety monitor bounds, by range or speed.
+    pub bounded: [bool; JOINTS],
     /// Whether an identification or a session of assistance moves it.
     pub moves_itself: bool,
 }
 
 /// A leg with its bus and its operator.
 pub trait HostedLeg {
+    /// Longest delay between a state and its record or message, ticks.
+    const DELAY: u32;
+
     /// Multiple of its limit that a torque may reach: overshoot of a current loop.
     const OVERSHOOT: f64;
 
@@ -116,13 +124,13 @@ pub trait HostedLeg {
     ///
     /// # Errors
     /// The leg cannot be run on.
-    fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<Seen>, String>;
+    fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<LegState>, String>;
 }
 
 /// A leg, and what was seen of it.
 struct Play<L> {
     leg: L,
-    bounds: [Bounds; JOINTS],
+    bounds: [JointBounds; JOINTS],
     ticks: u64,
     is_enabled: bool,
     fault: Option<u16>,
@@ -136,6 +144,17 @@ struct Play<L> {
     /// Whether a torque or an offset was written for it since the leg was last enabled.
     pending: [bool; JOINTS],
     returns: [bool; JOINTS],
+    bounded: [bool; JOINTS],
+    /// Tick until which a new mode or a controlword may stop a joint.
+    stops: [u64; JOINTS],
+    /// Tick from which a joint must be at rest but for [`COMES_TO_REST`], and its position then.
+    pose: [(u64, f64); JOINTS],
+    /// Tick before the leg was enabled.
+    enabled_at: u64,
+    /// Least commanded speed since then, rad/s: a joint that moved only slows down.
+    slows: [f32; JOINTS],
+    /// Object of the last PDO to each joint, which the next SYNC may make effective.
+    waits: [Option<u16>; JOINTS],
     /// Code that must be heard from each node, and the tick in which the leg had it.
     unheard: Option<(u16, u64)>,
     /// Code of each node's last emergency message, and its tick.
@@ -145,7 +164,7 @@ struct Play<L> {
 }
 
 impl<L: HostedLeg> Play<L> {
-    fn new(leg: L, bounds: [Bounds; JOINTS]) -> Self {
+    fn new(leg: L, bounds: [JointBounds; JOINTS]) -> Self {
         Self {
             leg,
             bounds,
@@ -159,6 +178,12 @@ impl<L: HostedLeg> Play<L> {
             explained: [0; JOINTS],
             pending: [false; JOINTS],
             returns: [false; JOINTS],
+            bounded: [false; JOINTS],
+            stops: [0; JOINTS],
+            pose: [(0, 0.0); JOINTS],
+            enabled_at: 0,
+            slows: [f32::INFINITY; JOINTS],
+            waits: [None; JOINTS],
             unheard: None,
             heard: [(0, 0); JOINTS],
             plugged: true,
@@ -194,15 +219,15 @@ impl<L: HostedLeg> Play<L> {
         })?;
         let Some(seen) = seen else { return Ok(()) };
         let was_enabled = core::mem::replace(&mut self.is_enabled, seen.is_enabled);
-        self.look_at_the_joints(&seen, was_enabled)?;
-        self.look_at_the_fault(seen.fault)?;
+        self.check_joints(&seen, was_enabled)?;
+        self.check_fault(seen.fault)?;
         if seen.is_enabled && !was_enabled {
             self.explain_pending(0..JOINTS);
         }
         Ok(())
     }
 
-    fn look_at_the_joints(&mut self, seen: &Seen, was_enabled: bool) -> Result<(), String> {
+    fn check_joints(&mut self, seen: &LegState, was_enabled: bool) -> Result<(), String> {
         let ticks = self.ticks;
         let torque = core::mem::replace(&mut self.torque, seen.torque);
         if was_enabled && !seen.is_enabled {
@@ -211,40 +236,68 @@ impl<L: HostedLeg> Play<L> {
             self.pending = self.pending.map(|written| written && self.targets);
         }
         for joint in 0..JOINTS {
-            let Bounds { range: [low, high], cap } = self.bounds[joint];
+            let JointBounds { range: [low, high], cap } = self.bounds[joint];
             let (before, now) = (torque[joint], seen.torque[joint]);
             if now.abs() > L::OVERSHOOT * cap {
                 return Err(format!("cap: joint {joint} {now} of {cap} N m"));
             }
             if !seen.is_enabled || !was_enabled {
+                (self.pose[joint].0, self.enabled_at) = (ticks, ticks);
                 continue;
+            }
+            // A joint that moves when it is enabled is braked, then slows down along its profile.
+            let is_fresh = ticks < self.enabled_at + TAKES_OVER;
+            if is_fresh {
+                self.slows[joint] = f32::INFINITY;
             }
             let out = (low - seen.position[joint]).max(seen.position[joint] - high);
             if out > BEYOND {
                 return Err(format!("range: joint {joint} at {} rad", seen.position[joint]));
             }
             let (speed, returns) = (seen.speed[joint], seen.returns[joint]);
-            if !self.targets && !seen.moves_itself && !returns && speed.abs() > CREEP {
+            let is_held = !self.targets && !seen.moves_itself && !returns;
+            if is_held && speed.abs() > CREEP && speed.abs() > self.slows[joint] {
                 return Err(format!("targets: joint {joint} commanded at {speed} rad/s"));
             }
-            let grows = now.abs() - before.abs() > 0.1 * cap || now * before < -0.01 * cap * cap;
+            let (since, from) = &mut self.pose[joint];
+            if !is_held {
+                *since = ticks;
+            }
+            if ticks < *since + COMES_TO_REST {
+                *from = seen.position[joint];
+            } else if (seen.position[joint] - *from).abs() > HELD {
+                return Err(format!(
+                    "targets: joint {joint} went from {from} to {} rad",
+                    seen.position[joint]
+                ));
+            }
+            let steps = (now - before).abs() > 0.1 * cap;
             // A joint that returns has less torque.
             let returned = core::mem::replace(&mut self.returns[joint], returns);
-            let explained = ticks < self.explained[joint] || seen.moves_itself || returned != returns;
-            if grows && !explained {
+            // A monitor that acts or ends takes torque away, and so does a stop of a joint that a host drives.
+            let bounded = core::mem::replace(&mut self.bounded[joint], seen.bounded[joint]);
+            let takes = bounded || seen.bounded[joint] || ticks < self.stops[joint];
+            let is_less = takes && now.abs() < before.abs() && now * before >= -0.01 * cap * cap;
+            let explained = ticks < self.explained[joint]
+                || seen.moves_itself
+                || returned != returns
+                || is_less
+                || is_fresh;
+            if steps && !explained {
                 return Err(format!("steps: joint {joint} from {before} to {now} N m"));
             }
+            self.slows[joint] = self.slows[joint].min(speed.abs());
         }
         Ok(())
     }
 
-    fn look_at_the_fault(&mut self, fault: Option<u16>) -> Result<(), String> {
+    fn check_fault(&mut self, fault: Option<u16>) -> Result<(), String> {
         let before = core::mem::replace(&mut self.fault, fault);
         if let Some(fault) = fault.filter(|fault| before != Some(*fault) && self.plugged) {
             self.unheard = Some((fault, self.ticks));
         }
         let Some((code, since)) = self.unheard else { return Ok(()) };
-        if self.heard.iter().all(|heard| heard.0 == code && heard.1 + u64::from(SETTLED) >= since) {
+        if self.heard.iter().all(|heard| heard.0 == code && heard.1 + u64::from(L::DELAY) >= since) {
             self.unheard = None;
         } else if self.ticks > since + HEARD {
             return Err(format!("faults: {code:04X} of tick {since}, heard {:04X?}", self.heard));
@@ -254,6 +307,9 @@ impl<L: HostedLeg> Play<L> {
 
     /// Writes an object by SDO; the answer comes within a few ticks.
     fn write(&mut self, joint: usize, (index, sub, bytes): (u16, u8, u8), value: i32) -> Result<(), String> {
+        if matches!(index, 0x6040 | 0x6060) {
+            self.stops = [self.ticks + TAKES_OVER; JOINTS];
+        }
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
         let mut data = [0x23 | (4 - bytes) << 2, low, high, sub, a, b, c, d];
         data[4 + usize::from(bytes)..].fill(0);
@@ -309,7 +365,7 @@ impl<L: HostedLeg> Play<L> {
             let before = (self.is_enabled, self.fault);
             let Some(word) = self.read(joint, 0x6041)? else { continue };
             let Some(mode) = self.read(joint, 0x6061)? else { continue };
-            self.run(SETTLED)?;
+            self.run(L::DELAY)?;
             if before != (self.is_enabled, self.fault) {
                 continue;
             }
@@ -326,14 +382,12 @@ impl<L: HostedLeg> Play<L> {
 
     fn step(&mut self, step: &Step) -> Result<(), String> {
         match *step {
-            Step::Write(joint, place, value) => {
-                let (index, sub, bytes, is_target) = OBJECTS[place];
+            Step::Write(joint, Object(index, sub, bytes, is_target), value) => {
                 if is_target {
                     self.aim();
                 }
                 self.expect(joint, index);
-                let signature = SIGNATURES.iter().find(|(object, _)| *object == index && value % 2 == 0);
-                self.write(joint, (index, sub, bytes), signature.map_or(value, |(_, text)| *text))
+                self.write(joint, (index, sub, bytes), value)
             }
             Step::Word(joint, word) => self.word(joint, word),
             Step::Enable => [6, 7, 0xF].into_iter().try_for_each(|word| {
@@ -367,13 +421,21 @@ impl<L: HostedLeg> Play<L> {
                     [(0x6040, 2), (0x607A, 4), (0x60FF, 4), (0x6071, 2)][usize::from(number) - 1];
                 self.aim();
                 self.expect(joint, index);
+                self.waits[joint] = Some(index);
                 self.send(0x100 + 0x100 * number + NODES[joint], &bytes[..length]);
                 self.run(2)
             }
-            Step::Sync(count, apart) => (0..count).try_for_each(|_| {
-                self.send(0x80, &[]);
-                self.run(u32::from(apart))
-            }),
+            Step::Sync(count, apart) => {
+                for joint in 0..JOINTS {
+                    if let Some(index) = self.waits[joint].take() {
+                        self.expect(joint, index);
+                    }
+                }
+                (0..count).try_for_each(|_| {
+                    self.send(0x80, &[]);
+                    self.run(u32::from(apart))
+                })
+            }
             Step::Nmt(command, node) => {
                 // A node that resets or stops says nothing of an earlier fault.
                 self.unheard = None;
@@ -443,8 +505,20 @@ impl<L: HostedLeg> Play<L> {
 ///
 /// # Errors
 /// What did not hold.
-pub fn judge<L: HostedLeg>(leg: L, bounds: [Bounds; JOINTS], session: &Session) -> Result<(), String> {
+pub fn check_session<L: HostedLeg>(
+    leg: L,
+    bounds: [JointBounds; JOINTS],
+    session: &HostSession,
+) -> Result<(), String> {
     let mut play = Play::new(leg, bounds);
+    play.send(0, &[1, 0]);
+    play.run(START)?;
     session.steps.iter().try_for_each(|step| play.step(step))?;
     play.again()
+}
+
+/// Whether two complaints are of the same kind.
+#[must_use]
+pub fn is_like(why: &str, other: &str) -> bool {
+    why.split(':').next() == other.split(':').next()
 }

@@ -1,4 +1,4 @@
-//! B7: hosts without manners. Each run is a random session on a whole leg (`random_hosts`); half of them come
+//! B7: random host sessions. Each run is one on a whole leg (`random_hosts`); half of them come
 //! to a leg that its operator has enabled.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,7 +14,7 @@ use crate::base::random::Random;
 use crate::faults::bench::hosted::board;
 use crate::faults::bench::{Bench, outcome};
 use crate::faults::outcome::Outcome;
-use crate::faults::random_hosts::{Bounds, HostedLeg, Seen, Session, judge};
+use crate::faults::random_hosts::{HostSession, HostedLeg, JointBounds, LegState, check_session, is_like};
 use crate::faults::scenario::Head;
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::network::Network;
@@ -22,9 +22,9 @@ use crate::rig::bus::network::Network;
 pub(super) const BENCH: Bench = Bench {
     head: Head {
         id: "B7",
-        fault: "hosts without manners: random sessions",
+        fault: "random host sessions",
         detector: "limits, and targets that are void until written again",
-        state: "as told, or safe",
+        state: "as commanded, or safe",
         deadline_ms: f64::INFINITY,
         unit: "",
         codes: &[],
@@ -35,19 +35,15 @@ pub(super) const BENCH: Bench = Bench {
 
 /// Runs that reducing a session may take.
 const MOST_RUNS: u32 = 400;
-/// Servo ticks until the nodes have started.
-const START: u32 = 40;
 
 /// A simulated leg on its bus.
 #[derive(Clone)]
 struct SimulatedLeg(Network<JOINTS, BASE>);
 
 impl SimulatedLeg {
-    /// Legs that nobody and that its operator has enabled.
+    /// A leg that is off, and one that its operator has enabled.
     fn both(leg: &LegFile) -> Result<[Self; 2], ToolError> {
-        let mut off = Self(Network::new(vec![board(leg)?], 1_000_000));
-        off.send(Frame::new(0, &[1, 0]));
-        (0..START).for_each(|_| off.0.tick(|_| {}));
+        let off = Self(Network::new(vec![board(leg)?], 1_000_000));
         let mut by_hand = off.clone();
         if !by_hand.0.boards()[0].enable_by_contacts() {
             return Err(ToolError::Refused("the operator's contacts do not enable the leg".into()));
@@ -57,6 +53,7 @@ impl SimulatedLeg {
 }
 
 impl HostedLeg for SimulatedLeg {
+    const DELAY: u32 = 0;
     const OVERSHOOT: f64 = 1.001;
 
     fn send(&mut self, frame: Frame) {
@@ -71,36 +68,38 @@ impl HostedLeg for SimulatedLeg {
         self.0.set_plugged(plugged);
     }
 
-    fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<Seen>, String> {
+    fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<LegState>, String> {
         self.0.tick(|sent| {
             if sent.sender != 0 {
                 heard(&sent.frame);
             }
         });
         let rig = &self.0.boards()[0].rig;
-        Ok(rig.output.as_ref().map(|output| Seen {
+        Ok(rig.output.as_ref().map(|output| LegState {
             is_enabled: output.servo.decision.state.is_enabled(),
             fault: output.servo.decision.state.fault().map(|fault| fault.code.number()),
             torque: output.servo.decision.torque.map(|torque| torque.0.into()),
             position: rig.world.anatomical_position(),
             speed: output.motion.velocity_rad_per_s,
             returns: output.servo.decision.returns,
+            bounded: output.servo.decision.limited.map(|limited| limited.range || limited.speed),
             moves_itself: !matches!(rig.leg.control().activity(), Activity::Idle | Activity::Follow),
         }))
     }
 }
 
 fn sessions(head: &Head, leg: &LegFile, seeds: &[u64], _: bool) -> Result<Vec<Outcome>, ToolError> {
-    let (legs, bounds) = (SimulatedLeg::both(leg)?, Bounds::of(leg)?);
-    let judged = |session: &Session| {
+    let (legs, bounds) = (SimulatedLeg::both(leg)?, JointBounds::of(leg)?);
+    let judged = |session: &HostSession| {
         let leg = legs[usize::from(session.by_hand)].clone();
-        catch_unwind(AssertUnwindSafe(|| judge(leg, bounds, session)))
+        catch_unwind(AssertUnwindSafe(|| check_session(leg, bounds, session)))
             .unwrap_or_else(|_| Err("a panic".into()))
     };
     let one = |seed: &u64| {
-        let session = Session::draw(&mut Random::new(head.id, *seed));
+        let session = HostSession::draw(&mut Random::new(head.id, *seed));
         let Err(first) = judged(&session) else { return outcome(head, *seed, Some(head.state)) };
-        let reduced = session.reduced(MOST_RUNS, |session| judged(session).is_err());
+        let reduced =
+            session.reduced(MOST_RUNS, |session| judged(session).is_err_and(|why| is_like(&why, &first)));
         let why = judged(&reduced).err().unwrap_or(first);
         Outcome { broken: vec![format!("{why}; {reduced:?}")], ..outcome(head, *seed, None) }
     };
