@@ -522,3 +522,80 @@ pub fn check_session<L: HostedLeg>(
 pub fn is_like(why: &str, other: &str) -> bool {
     why.split(':').next() == other.split(':').next()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::leg_file::DEFAULT_LEG;
+
+    /// Tick in which a fake leg begins to err.
+    const ERRS: u64 = 5000;
+
+    /// An enabled leg at rest that errs from a tick on, and answers reads of its statusword and mode.
+    struct FakeLeg {
+        ticks: u64,
+        errs: fn(&mut LegState),
+        answer: Option<Frame>,
+    }
+
+    impl HostedLeg for FakeLeg {
+        const DELAY: u32 = 0;
+        const OVERSHOOT: f64 = 1.0;
+
+        fn send(&mut self, frame: Frame) {
+            if let [0x40, low, high, ..] = *frame.data() {
+                let value = if low == 0x41 { 0x27 } else { 0 };
+                self.answer = Some(Frame::new(frame.id() - 0x80, &[0x4B, low, high, 0, value, 0, 0, 0]));
+            }
+        }
+
+        fn hold(&mut self, _: Contacts) {}
+
+        fn plug(&mut self, _: bool) {}
+
+        fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<LegState>, String> {
+            self.ticks += 1;
+            self.answer.take().iter().for_each(heard);
+            let mut state = LegState {
+                is_enabled: true,
+                fault: None,
+                torque: [20.0; JOINTS],
+                position: [0.5; JOINTS],
+                speed: [0.0; JOINTS],
+                returns: [false; JOINTS],
+                bounded: [false; JOINTS],
+                moves_itself: false,
+            };
+            if self.ticks >= ERRS {
+                (self.errs)(&mut state);
+            }
+            Ok(Some(state))
+        }
+    }
+
+    #[test]
+    fn each_check_of_a_session_can_fail() {
+        let errs: [(&str, fn(&mut LegState)); 8] = [
+            ("", |_| {}),
+            ("cap", |state| state.torque[1] = -1000.0),
+            ("range", |state| state.position[0] = 2.0),
+            ("targets", |state| state.speed[1] = 0.1),
+            ("targets", |state| state.position[1] = 0.52),
+            ("steps", |state| state.torque[0] = 5.0),
+            ("faults", |state| state.fault = Some(0x8611)),
+            ("words", |state| state.is_enabled = false),
+        ];
+        let leg = LegFile::load(DEFAULT_LEG).expect("a shipped leg");
+        let bounds = JointBounds::of(&leg).expect("a leg that can be moved");
+        for (kind, errs) in errs {
+            let leg = FakeLeg { ticks: 0, errs, answer: None };
+            let steps = vec![Step::Wait(4900), Step::Wait(1000)];
+            let found = check_session(leg, bounds, &HostSession { by_hand: true, steps });
+            assert_eq!(found.err().as_deref().unwrap_or("").split(':').next(), Some(kind));
+        }
+        // A leg that no host can enable, without a reason.
+        let leg = FakeLeg { ticks: ERRS, errs: |state| state.is_enabled = false, answer: None };
+        let found = check_session(leg, bounds, &HostSession { by_hand: true, steps: Vec::new() });
+        assert!(found.is_err_and(|why| why.starts_with("again:")));
+    }
+}
