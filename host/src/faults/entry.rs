@@ -50,8 +50,8 @@ impl Entry {
 
 impl Entry {
     /// Returns whether the row's detector is disabled in a blind campaign: the codes of a fork, the caps of
-    /// H1, the switch of each bench. The range of J1 is widened on its bench only, not in its forks. B7 has no
-    /// single detector.
+    /// H1, the switch of each bench. The range of J1 is widened on its bench only, not in its forks. B7 has
+    /// no single detector.
     #[must_use]
     pub fn can_be_blind(&self) -> bool {
         match self {

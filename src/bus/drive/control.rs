@@ -533,7 +533,7 @@ impl Axis {
             _ => return,
         }
         if mode == Mode::Homing as i8 {
-            // They would name other places.
+            // Targets would name other positions.
             self.void_targets();
         }
         self.request_count = self.request_count.wrapping_add(1);

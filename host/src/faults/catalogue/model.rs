@@ -63,7 +63,8 @@ const PATIENCE: u64 = PERIODS_PER_S / 2;
 fn frozen(random: &mut Random, bounds: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let counter = at(Channel::Counter, joint, Form::Stuck, Timing::from(0));
-    // Ten percent margin: the speed estimate has lag and ripple. Counts come in whole numbers: 4 or 5 a period.
+    // Ten percent margin: the speed estimate has lag and ripple. Counts come in whole numbers: 4 or 5 a
+    // period.
     let [speed, per_ampere] = bounds.frozen_speed.map(|speed| 1.1 * speed);
     let index = at(Channel::Index, joint, Form::Off, Timing::from(0));
     Scenario {

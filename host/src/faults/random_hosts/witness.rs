@@ -4,8 +4,8 @@
 //! range     an enabled joint is in its range, or no farther out than it can be stopped
 //! cap       no torque above the joint's limit
 //! targets   no commanded motion before a target of this session: none since the leg was last enabled
-//! steps     no torque changes by a tenth of its limit in a tick, unless the host has just asked for it in the
-//!           joint's mode (`asks_for_a_step`), or the leg is stopped
+//! steps     no torque changes by a tenth of its limit in a tick, unless the host has just asked for it in
+//!           the joint's mode (`asks_for_a_step`), or a stop or the monitor takes it away
 //! words     the statusword is that of the leg, and bit 12 of a cyclic mode means a target of this session
 //! faults    the code of a fault is heard from both nodes, if they can send
 //! again     at the end a well-behaved host enables the leg, or a reason is stated
@@ -274,7 +274,7 @@ impl<L: HostedLeg> Play<L> {
             let steps = (now - before).abs() > 0.1 * cap;
             // A joint that returns has less torque.
             let returned = core::mem::replace(&mut self.returns[joint], returns);
-            // A monitor that acts or ends takes torque away, and so does a stop of a joint that a host drives.
+            // A monitor that acts or ends takes torque away, and so does a stop of a driven joint.
             let bounded = core::mem::replace(&mut self.bounded[joint], seen.bounded[joint]);
             let takes = bounded || seen.bounded[joint] || ticks < self.stops[joint];
             let is_less = takes && now.abs() < before.abs() && now * before >= -0.01 * cap * cap;
@@ -531,10 +531,12 @@ mod tests {
     /// Tick in which a fake leg begins to err.
     const ERRS: u64 = 5000;
 
+    type Errs = fn(&mut LegState);
+
     /// An enabled leg at rest that errs from a tick on, and answers reads of its statusword and mode.
     struct FakeLeg {
         ticks: u64,
-        errs: fn(&mut LegState),
+        errs: Errs,
         answer: Option<Frame>,
     }
 
@@ -575,7 +577,7 @@ mod tests {
 
     #[test]
     fn each_check_of_a_session_can_fail() {
-        let errs: [(&str, fn(&mut LegState)); 8] = [
+        let errs: [(&str, Errs); 8] = [
             ("", |_| {}),
             ("cap", |state| state.torque[1] = -1000.0),
             ("range", |state| state.position[0] = 2.0),
