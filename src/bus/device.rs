@@ -330,7 +330,6 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         let commanded = self.axes.iter().any(Axis::is_commanded);
         self.hosted = commanded || self.hosted && drive.permission() != Permission::Off;
         let refused = core::mem::take(&mut self.refused) || status.refused.is_some();
-        self.axes.iter_mut().for_each(|axis| axis.hosted = self.hosted);
         if !self.hosted {
             self.coupling.look_on(self.axes.each_mut(), drive);
         }

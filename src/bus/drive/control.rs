@@ -76,7 +76,8 @@ impl Targets {
         match mode {
             // A start by bit 4 names its values.
             Mode::ProfilePosition | Mode::Homing => true,
-            Mode::CyclicPosition | Mode::Impedance => self.position,
+            Mode::CyclicPosition => self.position,
+            Mode::Impedance => self.position && self.impedance[0] && self.impedance[1],
             Mode::ProfileVelocity | Mode::CyclicVelocity => self.velocity,
             Mode::ProfileTorque | Mode::CyclicTorque => self.torque,
         }
@@ -323,8 +324,6 @@ pub struct Axis {
     fault: Option<FaultCode>,
     /// A host has sent a controlword other than 0.
     pub(super) commanded: bool,
-    /// Whether a host has the leg. After a node reset it has the enabled leg still.
-    pub(in crate::bus) hosted: bool,
     /// A step towards enabled was requested and not processed yet.
     rises: bool,
     /// The present controlword requested a step that does not exist.
@@ -385,7 +384,6 @@ impl Axis {
             request_count: 0,
             fault: None,
             commanded: false,
-            hosted: false,
             rises: false,
             is_out_of_order: false,
             refused: None,
@@ -582,8 +580,10 @@ impl Axis {
             3 => self.stop(),
             _ => {}
         }
-        // Bits held down are cleared, so that the next controlword has rising edges. A halt goes on.
-        (self.controlword, self.is_out_of_order) = (self.controlword & HALT, false);
+        // Bits held down are cleared, so that the next controlword has rising edges. A halt
+        // of an enabled joint goes on.
+        let halt = if self.own.is_enabled() { HALT } else { 0 };
+        (self.controlword, self.is_out_of_order) = (self.controlword & halt, false);
         (self.asks, self.taken) = (false, false);
         self.void_targets();
     }
@@ -640,9 +640,6 @@ impl Axis {
         let speed = |is_valid: bool, value: i32| radian_per_second(if is_valid { value } else { 0 });
         let velocity_offset = speed(targets.velocity_offset, settings.velocity_offset);
         let velocity = speed(targets.velocity, settings.target_velocity);
-        let impedance = |part: usize, unit: f32| {
-            if targets.impedance[part] { f32::from(settings.impedance[part]) * unit } else { 0.0 }
-        };
         let may_home = settings.homing_method != NO_METHOD
             && (settings.range[0]..=settings.range[1]).contains(&settings.home_offset);
         let target = match Mode::of(settings.mode).filter(|mode| self.is_powered() && targets.has(*mode)) {
@@ -665,8 +662,8 @@ impl Axis {
             Some(Mode::Impedance) => Target::Impedance(ImpedanceTarget {
                 position: radian(settings.target_position),
                 velocity,
-                stiffness: impedance(0, STIFFNESS_UNIT),
-                damping: impedance(1, DAMPING_UNIT),
+                stiffness: f32::from(settings.impedance[0]) * STIFFNESS_UNIT,
+                damping: f32::from(settings.impedance[1]) * DAMPING_UNIT,
                 torque: target_torque,
             }),
         };

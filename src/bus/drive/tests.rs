@@ -234,24 +234,19 @@ fn homing_makes_targets_void() {
 #[test]
 fn stiffness_and_damping_end_with_their_session() {
     let mut board = Board::enabled();
-    let shown = |board: &Board| match board.axes[0].command().target {
-        Target::Impedance(target) => [target.stiffness > 0.0, target.damping > 0.0],
-        other => panic!("{other:?}"),
-    };
     let write = |board: &mut Board, index, sub, value| {
         board.axes[0].write(Object::at(index, sub), value).expect("a value");
+        board.axes[0].command().target != Target::Hold
     };
     write(&mut board, 0x6060, 0, u32::MAX);
-    for (sub, value) in [(1, 100), (2, 100)] {
-        write(&mut board, 0x2020, sub, value);
+    for _ in 0..2 {
+        // The joint holds its pose until all three are written.
+        let follows =
+            [(0x607A, 0), (0x2020, 1), (0x2020, 2)].map(|(index, sub)| write(&mut board, index, sub, 100));
+        assert_eq!(follows, [false, false, true]);
+        board.axes[0].void_targets();
+        assert_eq!(board.axes[0].command().target, Target::Hold);
     }
-    write(&mut board, 0x607A, 0, 100);
-    assert_eq!(shown(&board), [true; 2]);
-    board.axes[0].void_targets();
-    write(&mut board, 0x607A, 0, 100);
-    assert_eq!(shown(&board), [false; 2]);
-    write(&mut board, 0x2020, 2, 100);
-    assert_eq!(shown(&board), [false, true]);
 }
 
 #[test]
@@ -384,6 +379,8 @@ fn targets_of_an_ended_session_are_void_until_they_are_written_again() {
         let mut board = Board::enabled();
         let write = |board: &mut Board, value| {
             board.axes[0].write(Object::at(index, 0), value).expect("a target");
+            [1, 2]
+                .map(|sub| board.axes[0].write(Object::at(0x2020, sub), 100).expect("stiffness or damping"));
         };
         board.axes[0].write(Object::at(0x6060, 0), mode as u32).expect("a mode");
         assert_eq!(board.axes[0].command().target, Target::Hold, "{mode}");

@@ -3,7 +3,7 @@
 use super::{Activity, Control};
 use crate::assist::AssistEnd;
 use crate::leg::follow::{Commanded, Following, JointCommand};
-use crate::motion::Motion;
+use crate::motion::{Motion, MotionState};
 
 /// A host's side of one tick: its commands, if it has the drive, and the state of following them.
 #[derive(Debug)]
@@ -45,7 +45,7 @@ impl<const N: usize> Control<N> {
             self.activity = Activity::Follow;
         }
         if self.activity == Activity::Idle {
-            following.begin_held(commands, self.motion.end_rad());
+            following.begin(commands, &MotionState::at_rest(self.motion.end_rad()));
             self.activity = Activity::Follow;
         }
         if !self.activity.follows_host() {

@@ -36,9 +36,6 @@ const STANDING: f32 = 0.005;
 const LONGEST_STOP_S: f32 = 2.0;
 /// Least torque that a host leaves a joint to stop and to hold with, as a share of its limit.
 const LEAST_TORQUE: f32 = 0.1;
-/// Deceleration of a joint that moved when it was enabled, as a share of its acceleration: as the safety
-/// barrier's, it leaves half of the torque for gravity.
-const CAUGHT: f32 = 0.5;
 /// Largest angle that homing gives to the present position: a turn.
 const LARGEST_HOME_RAD: f32 = core::f32::consts::TAU;
 
@@ -119,8 +116,6 @@ pub struct Follower {
     /// Cyclic position: no target within the window has come yet.
     waits: bool,
     halted: bool,
-    /// Whether a joint that moved when it was enabled has not come to rest yet.
-    is_caught: bool,
     /// Whether the joint returned in the previous tick.
     returned: bool,
     /// Ticks for which the joint has been outside the following window, or inside the position window.
@@ -207,7 +202,6 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
-        is_caught: false,
         returned: false,
         outside: 0,
         inside: 0,
@@ -244,14 +238,6 @@ impl Follower {
     /// Starts following from `course`. Requests made before are discarded.
     pub fn start(&mut self, command: &JointCommand, course: Course) {
         *self = Self { seen: command.request_count, course, homed: self.homed, ..Self::NEW };
-    }
-
-    /// Gives the course the velocity of a joint that moves too fast to be held at once.
-    pub fn begin_moving(&mut self, measured: &Measured) {
-        if abs(measured.velocity.0) > RETURN_SPEED {
-            self.course = Course::moving(self.course.position(), measured.velocity.0);
-            self.is_caught = true;
-        }
     }
 
     /// Runs one tick.
@@ -477,8 +463,6 @@ impl Follower {
         let stiffness = self.bounded(target.stiffness, 0.0, stiffest);
         let damping = self.bounded(target.damping, DELAY_S * stiffness, strongest);
         let place = measured.position.0 + DELAY_S * measured.velocity.0;
-        // A joint outside the host's range is not drawn into it, only kept from going on.
-        let (low, high) = (min(low, measured.position.0), max(high, measured.position.0));
         let position = self.bounded(target.position.0, low, high);
         let velocity = self.bounded(target.velocity.0, -bounds.speed, bounds.speed);
         stiffness * (position - place) + damping * (velocity - measured.velocity.0) + target.torque.0
@@ -491,13 +475,9 @@ impl Follower {
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 
-    /// Slows down to rest along the profile; a joint that moved when it was enabled by [`CAUGHT`].
+    /// Slows down to rest along the profile.
     fn stop(&mut self, tick: &Tick<'_>) {
-        let caught = CAUGHT * tick.bounds.acceleration;
-        let deceleration = if self.is_caught { caught } else { tick.rates.deceleration };
-        let rates = Rates { deceleration, ..tick.braking() };
-        self.course.accelerate(0.0, &rates, tick.bounds.range, TICK_S);
-        self.is_caught &= self.course.velocity() != 0.0;
+        self.course.accelerate(0.0, &tick.braking(), tick.bounds.range, TICK_S);
         self.reached = self.course.velocity() == 0.0 && abs(tick.measured.velocity.0) < STANDING;
     }
 

@@ -98,15 +98,6 @@ impl<const N: usize> Following<N> {
         }
     }
 
-    /// Starts following from a pose that is held. A joint that still moves slows down with
-    /// half of its acceleration.
-    pub fn begin_held(&mut self, commands: &[JointCommand; N], pose_rad: [f32; N]) {
-        self.begin(commands, &MotionState::at_rest(pose_rad));
-        for (follower, measured) in self.joints.iter_mut().zip(&self.measured) {
-            follower.begin_moving(measured);
-        }
-    }
-
     /// Whether all joints are commanded to be at rest.
     #[must_use]
     pub fn is_still(&self) -> bool {

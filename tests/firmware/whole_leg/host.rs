@@ -418,36 +418,6 @@ fn a_halt_ends_in_time_whatever_the_host_has_set() {
 }
 
 #[test]
-fn a_leg_that_is_enabled_while_it_falls_is_caught() {
-    let mut hosted = Hosted::enabled_at([0.5, 1.5]);
-    hosted.tick(Some(ControlRequest::Power(PowerRequest::DisableVoltage)));
-    hosted.pair.world.push(1, -215.0, 0.05);
-    hosted.run(SECOND / 20);
-    let speed = hosted.status[1].velocity.0;
-    assert!(speed < -2.5 && hosted.truth(1) > 1.0, "{speed} rad/s, {} rad", hosted.truth(1));
-    for request in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
-        hosted.tick(Some(ControlRequest::Power(request)));
-    }
-    hosted.run(SECOND);
-    assert!(is_enabled(&hosted.pair), "{:?}", hosted.status[1]);
-}
-
-#[test]
-fn an_impedance_does_not_draw_a_joint_into_the_host_s_range() {
-    let mut hosted = Hosted::new();
-    hosted.run(SECOND);
-    let place = hosted.position(1);
-    hosted.commands[1].range = [Radian(place + 0.3), Radian(place + 0.6)];
-    impedance(&mut hosted, 1, place, 500.0, 30.0);
-    hosted.run(SECOND);
-    assert!((hosted.position(1) - place).abs() < 0.02, "from {place} to {} rad", hosted.position(1));
-    // Nor does a target draw it farther out.
-    impedance(&mut hosted, 1, place - 0.3, 500.0, 30.0);
-    hosted.run(SECOND);
-    assert!((hosted.position(1) - place).abs() < 0.05, "from {place} to {} rad", hosted.position(1));
-}
-
-#[test]
 fn a_halted_set_point_goes_on_afterwards() {
     let mut hosted = Hosted::new();
     let from = hosted.position(0);
