@@ -379,8 +379,9 @@ fn targets_of_an_ended_session_are_void_until_they_are_written_again() {
         let mut board = Board::enabled();
         let write = |board: &mut Board, value| {
             board.axes[0].write(Object::at(index, 0), value).expect("a target");
-            [1, 2]
-                .map(|sub| board.axes[0].write(Object::at(0x2020, sub), 100).expect("stiffness or damping"));
+            for sub in [1, 2] {
+                board.axes[0].write(Object::at(0x2020, sub), 100).expect("stiffness or damping");
+            }
         };
         board.axes[0].write(Object::at(0x6060, 0), mode as u32).expect("a mode");
         assert_eq!(board.axes[0].command().target, Target::Hold, "{mode}");
