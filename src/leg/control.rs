@@ -339,7 +339,10 @@ impl<const N: usize> Control<N> {
             Some(host) if self.activity.follows_host() => host.following.is_still(),
             _ => self.motion.state_at(self.motion_tick).velocity_rad_per_s.iter().all(|&speed| speed == 0.0),
         };
-        let enabled = self.servo.state().is_enabled();
+        let halts = host
+            .and_then(|host| host.commands)
+            .is_some_and(|commands| commands.iter().any(|command| command.halt));
+        let enabled = self.servo.state().is_enabled() && !halts;
         match request {
             ControlRequest::Power(_) => true,
             ControlRequest::TakeUpdate => self.is_update_offered(),

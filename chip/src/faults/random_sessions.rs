@@ -43,19 +43,9 @@ struct ChipLeg<'a> {
 impl<'a> ChipLeg<'a> {
     fn new(session: &'a mut Session, saved: &Snapshot, delay: f64) -> Result<Self, ToolError> {
         begin(session, saved, ticks(delay))?;
-        let state = LegState {
-            is_enabled: true,
-            fault: None,
-            torque: [0.0; JOINTS],
-            position: [0.0; JOINTS],
-            speed: [0.0; JOINTS],
-            returns: [false; JOINTS],
-            bounded: [false; JOINTS],
-            moves_itself: false,
-        };
         let range = core::array::from_fn(|joint| session.leg.joints[joint].range_deg.map(f64::to_radians));
         let records = session.probe.lines.len();
-        Ok(Self { session, range, waiting: VecDeque::new(), records, state, code: None })
+        Ok(Self { session, range, waiting: VecDeque::new(), records, state: LegState::AT_REST, code: None })
     }
 
     fn read_records(&mut self) {

@@ -475,9 +475,14 @@ impl Follower {
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 
-    /// Slows down to rest along the profile.
+    /// Slows down to rest along the profile, faster where the range ends before.
     fn stop(&mut self, tick: &Tick<'_>) {
-        self.course.accelerate(0.0, &tick.braking(), tick.bounds.range, TICK_S);
+        let (velocity, [low, high]) = (self.course.velocity(), tick.bounds.range);
+        let left = if velocity > 0.0 { high - self.course.position() } else { self.course.position() - low };
+        let most = tick.bounds.acceleration;
+        let needed = if left > 0.0 { 0.5 * velocity * velocity / left } else { most };
+        let rates = Rates { deceleration: min(max(tick.rates.deceleration, needed), most), ..tick.braking() };
+        self.course.accelerate(0.0, &rates, tick.bounds.range, TICK_S);
         self.reached = self.course.velocity() == 0.0 && abs(tick.measured.velocity.0) < STANDING;
     }
 

@@ -418,6 +418,35 @@ fn a_halt_ends_in_time_whatever_the_host_has_set() {
 }
 
 #[test]
+fn a_halt_ends_before_the_range_does() {
+    let mut hosted = Hosted::enabled_at([0.5, 0.6]);
+    hosted.commands[1].velocity = RadianPerSecond(2.0);
+    hosted.commands[1].acceleration = RadianPerSecondSquared(10.0);
+    hosted.commands[1].deceleration = RadianPerSecondSquared(10.0);
+    hosted.commands[1].target = Target::ProfileVelocity(RadianPerSecond(1.6));
+    while hosted.truth(1) < 1.3 {
+        hosted.run(1);
+    }
+    hosted.commands[1].deceleration = RadianPerSecondSquared(0.1);
+    hosted.commands[1].halt = true;
+    hosted.run(2 * SECOND);
+    let demand = hosted.status[1].position_demand.0;
+    assert!(is_enabled(&hosted.pair) && beyond(1, demand.into()) < 1e-3, "{:?}", hosted.status[1]);
+}
+
+#[test]
+fn a_halted_host_begins_no_identification() {
+    let mut hosted = Hosted::new();
+    hosted.run(SECOND);
+    hosted.commands[0].halt = true;
+    hosted.run(10);
+    assert!(hosted.tick(Some(ControlRequest::Identify)).refused);
+    hosted.commands[0].halt = false;
+    hosted.run(10);
+    assert!(!hosted.tick(Some(ControlRequest::Identify)).refused);
+}
+
+#[test]
 fn a_halted_set_point_goes_on_afterwards() {
     let mut hosted = Hosted::new();
     let from = hosted.position(0);

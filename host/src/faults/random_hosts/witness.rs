@@ -103,6 +103,20 @@ pub struct LegState {
     pub moves_itself: bool,
 }
 
+impl LegState {
+    /// An enabled leg that holds its pose without torque.
+    pub const AT_REST: Self = Self {
+        is_enabled: true,
+        fault: None,
+        torque: [0.0; JOINTS],
+        position: [0.0; JOINTS],
+        speed: [0.0; JOINTS],
+        returns: [false; JOINTS],
+        bounded: [false; JOINTS],
+        moves_itself: false,
+    };
+}
+
 /// A leg with its bus and its operator.
 pub trait HostedLeg {
     /// Longest delay between a state and its record or message, ticks.
@@ -558,16 +572,7 @@ mod tests {
         fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<LegState>, String> {
             self.ticks += 1;
             self.answer.take().iter().for_each(heard);
-            let mut state = LegState {
-                is_enabled: true,
-                fault: None,
-                torque: [20.0; JOINTS],
-                position: [0.5; JOINTS],
-                speed: [0.0; JOINTS],
-                returns: [false; JOINTS],
-                bounded: [false; JOINTS],
-                moves_itself: false,
-            };
+            let mut state = LegState { torque: [20.0; JOINTS], position: [0.5; JOINTS], ..LegState::AT_REST };
             if self.ticks >= ERRS {
                 (self.errs)(&mut state);
             }
