@@ -330,6 +330,9 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         let commanded = self.axes.iter().any(Axis::is_commanded);
         self.hosted = commanded || self.hosted && drive.permission() != Permission::Off;
         let refused = core::mem::take(&mut self.refused) || status.refused.is_some();
+        for axis in &mut self.axes {
+            axis.hosted = self.hosted && (axis.is_commanded() || axis.hosted);
+        }
         if !self.hosted {
             self.coupling.look_on(self.axes.each_mut(), drive);
         }

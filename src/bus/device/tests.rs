@@ -217,6 +217,37 @@ fn a_reset_of_all_nodes_stops_the_leg_and_ends_host_control() {
 }
 
 #[test]
+fn a_zero_in_a_pdo_disables_a_leg_that_a_reset_left_enabled() {
+    let mut bench = Bench::new();
+    bench.enable();
+    [1, 2].into_iter().for_each(|node| bench.write(node, 0x6007, 0, 0, 2));
+    bench.send(0, &[129, 0]);
+    bench.send(0, &[1, 0]);
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::OperationEnabled, true));
+    bench.send(0x201, &[0, 0]);
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, false));
+}
+
+#[test]
+fn a_leg_that_is_taken_over_node_by_node_stays_enabled() {
+    let mut bench = Bench::new();
+    bench.drive = DriveState::OperationEnabled;
+    bench.send(0, &[1, 0]);
+    // The host's PDO to the other node still has its first content.
+    for frames in [[0x202, 0x201], [0x201, 0x202]] {
+        for _ in 0..3 {
+            for id in frames {
+                bench.send(id, &[if id == 0x201 { 0xF } else { 0 }, 0]);
+            }
+        }
+    }
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::OperationEnabled, true));
+    bench.send(0x202, &[0xF, 0]);
+    bench.send(0x202, &[0, 0]);
+    assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+}
+
+#[test]
 fn a_cancel_that_waits_for_the_leg_is_not_replaced() {
     let mut bench = Bench::new();
     bench.enable();

@@ -324,6 +324,8 @@ pub struct Axis {
     fault: Option<FaultCode>,
     /// A host has sent a controlword other than 0.
     pub(super) commanded: bool,
+    /// Whether a host has commanded this node since the leg is its; a node reset does not end that.
+    pub(in crate::bus) hosted: bool,
     /// A step towards enabled was requested and not processed yet.
     rises: bool,
     /// The present controlword requested a step that does not exist.
@@ -384,6 +386,7 @@ impl Axis {
             request_count: 0,
             fault: None,
             commanded: false,
+            hosted: false,
             rises: false,
             is_out_of_order: false,
             refused: None,

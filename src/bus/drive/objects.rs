@@ -217,7 +217,7 @@ impl Objects for Axis {
 
     /// A 0 that a PDO repeats is idle: it is no command to disable voltage.
     fn write_mapped(&mut self, object: Object, value: u32) -> Result<(), Abort> {
-        if object.index == 0x6040 && value as u16 == 0 && !self.commanded {
+        if object.index == 0x6040 && value as u16 == 0 && !self.commanded && !self.hosted {
             Ok(())
         } else {
             self.write(object, value)

@@ -45,7 +45,12 @@ impl<const N: usize> Control<N> {
             self.activity = Activity::Follow;
         }
         if self.activity == Activity::Idle {
-            following.begin(commands, &MotionState::at_rest(self.motion.end_rad()));
+            // A leg that moves when it is enabled first comes to rest: no following error, no step of torque.
+            let pose = self.motion.end_rad();
+            if !following.has_settled(&pose) {
+                return None;
+            }
+            following.begin(commands, &MotionState::at_rest(pose));
             self.activity = Activity::Follow;
         }
         if !self.activity.follows_host() {

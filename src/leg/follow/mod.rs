@@ -29,9 +29,14 @@ use super::configuration::LegConfiguration;
 use super::control::ControlOutput;
 use crate::model::AnatomicalJoint;
 use crate::motion::{Course, MotionState};
+use crate::real::abs;
 use crate::safety::{Fault, FaultCode, RANGE_TOLERANCE, RefusalReason};
 use crate::servo::{Effort, ServoOutput};
 use crate::units::{NewtonMetre, Radian, RadianPerSecond, Volt};
+
+/// Speed and distance from its commanded pose up to which a joint follows a host, rad/s and rad: far below
+/// the default following window of 0.087 rad, above what holding against the leg's weight needs.
+const SETTLED: (f32, f32) = (0.5, 0.03);
 
 /// Command for the servo at one tick, in the model's angles and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,6 +101,16 @@ impl<const N: usize> Following<N> {
             let velocity = anatomy.from_chain(motion.velocity_rad_per_s[joint]);
             self.joints[joint].start(&commands[joint], Course::moving(place, velocity));
         }
+    }
+
+    /// Whether each joint holds this pose, rad in the model's angles.
+    #[must_use]
+    pub fn has_settled(&self, pose: &[f32; N]) -> bool {
+        let (speed, distance) = SETTLED;
+        self.measured.iter().zip(&self.anatomy).zip(pose).all(|((measured, anatomy), &pose)| {
+            abs(measured.velocity.0) <= speed
+                && abs(measured.position.0 - anatomy.angle_from_chain(pose)) <= distance
+        })
     }
 
     /// Whether all joints are commanded to be at rest.

@@ -418,6 +418,22 @@ fn a_halt_ends_in_time_whatever_the_host_has_set() {
 }
 
 #[test]
+fn a_leg_that_is_enabled_while_it_falls_is_caught() {
+    let mut hosted = Hosted::enabled_at([0.5, 1.5]);
+    hosted.tick(Some(ControlRequest::Power(PowerRequest::DisableVoltage)));
+    hosted.pair.world.push(1, -215.0, 0.05);
+    hosted.run(SECOND / 20);
+    let speed = hosted.status[1].velocity.0;
+    assert!(speed < -2.5 && hosted.truth(1) > 1.0, "{speed} rad/s, {} rad", hosted.truth(1));
+    for request in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
+        hosted.tick(Some(ControlRequest::Power(request)));
+    }
+    hosted.run(SECOND);
+    assert!(is_enabled(&hosted.pair), "{:?}", hosted.status[1]);
+    assert_eq!(activity(&hosted.pair), Activity::Follow);
+}
+
+#[test]
 fn a_halt_ends_before_the_range_does() {
     let mut hosted = Hosted::enabled_at([0.5, 0.6]);
     hosted.commands[1].velocity = RadianPerSecond(2.0);
