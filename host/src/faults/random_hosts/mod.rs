@@ -1,7 +1,7 @@
 //! Random sessions of hosts on the bus of a leg.
 //!
 //! A session is a list of steps, as several hosts may send them in turn: objects with values inside and
-//! outside their ranges, controlwords in any order, modes, PDOs, SYNC, NMT, LSS, heartbeats, saving and
+//! outside their ranges, controlwords in any order, modes, PDOs and their mapping, SYNC, NMT, LSS, heartbeats, saving and
 //! loading, homing, set-points, identification, the operator's contacts, the plug. [`check_session`] plays it
 //! on a leg and checks what must hold after every tick; [`HostSession::reduced`] finds the steps that fail.
 
@@ -94,6 +94,19 @@ const OBJECTS: [Object; 46] = [
     Object(0x1402, 2, 1, false),
     Object(0x1403, 2, 1, false),
 ];
+/// Objects that hosts map into received PDOs.
+const MAPPED: [Object; 10] = [
+    Object(0x6040, 0, 2, false),
+    Object(0x6060, 0, 1, false),
+    Object(0x607A, 0, 4, true),
+    Object(0x60FF, 0, 4, true),
+    Object(0x6071, 0, 2, true),
+    Object(0x6072, 0, 2, true),
+    Object(0x60B1, 0, 4, true),
+    Object(0x60B2, 0, 2, true),
+    Object(0x2020, 1, 2, true),
+    Object(0x2020, 2, 2, true),
+];
 const MODES: [i8; 9] = [0, 1, 3, 4, 6, 8, 9, 10, -1];
 const WORDS: [u16; 14] = [0, 2, 6, 7, 0xB, 0xF, 0x1F, 0x3F, 0x5F, 0x7F, 0x10F, 0x11F, 0x80, 0x8F];
 const LSS_SERVICES: [u8; 7] = [0x04, 0x04, 0x13, 0x40, 0x46, 0x5A, 0x5E];
@@ -115,7 +128,11 @@ enum Step {
     /// Homing to this offset, micro-radian.
     Home(usize, i32),
     /// A received PDO, from 1, with these bytes.
-    Pdo(usize, u16, [u8; 4]),
+    Pdo(usize, u16, [u8; 8]),
+    /// Objects of a received PDO, from 1.
+    Map(usize, u16, [Object; 2]),
+    /// The first PDO to every node with a controlword for each, so many times at this distance, ticks.
+    Cycle([u16; JOINTS], u8, u8),
     /// SYNCs at this distance, ticks.
     Sync(u8, u8),
     Nmt(u8, u8),
@@ -152,7 +169,7 @@ impl Step {
         let joint = random.below(JOINTS as u64) as usize;
         let some = random.below(JOINTS as u64 + 1) as usize;
         let byte = |random: &mut Random| random.below(256) as u8;
-        match random.below(37) {
+        match random.below(40) {
             0..8 => {
                 let object = any_of(random, &OBJECTS);
                 Self::Write(joint, object, object.sensible(value(random)))
@@ -163,13 +180,18 @@ impl Step {
             16..20 => Self::Mode(some, any_of(random, &MODES)),
             20..23 => Self::Near(joint, between(random, -60_000, 60_000)),
             23 => Self::Home(joint, value(random)),
-            24..26 => Self::Pdo(joint, 1 + random.below(4) as u16, [(); 4].map(|()| byte(random))),
+            24..26 => Self::Pdo(joint, 1 + random.below(4) as u16, [(); 8].map(|()| byte(random))),
             26 => Self::Lss(any_of(random, &LSS_SERVICES), random.below(2) as u8),
             27 => Self::Watch(joint, random.below(250) as u8),
             28 => Self::Sync(1 + random.below(39) as u8, 1 + random.below(19) as u8),
             29 => Self::Nmt(any_of(random, &NMT_COMMANDS), random.below(3) as u8),
             30 => Self::Contacts(random.coin(), random.coin()),
             31 => Self::Plug(random.coin()),
+            32 => Self::Map(joint, 1 + random.below(4) as u16, [(); 2].map(|()| any_of(random, &MAPPED))),
+            33..35 => {
+                let words = [(); JOINTS].map(|()| any_of(random, &WORDS));
+                Self::Cycle(words, 1 + random.below(30) as u8, 1 + random.below(19) as u8)
+            }
             _ => Self::Wait(1 + random.below(1199) as u16),
         }
     }

@@ -6,6 +6,7 @@
 //! targets   no commanded motion before a target of this session: none since the leg was last enabled
 //! steps     no torque changes by a tenth of its limit in a tick, unless the host has just asked for it in
 //!           the joint's mode (`asks_for_a_step`), or a stop or the monitor takes it away
+//! stops     a 0 in the controlword by SDO turns the leg off
 //! words     the statusword is that of the leg, and bit 12 of a cyclic mode means a target of this session
 //! faults    the code of a fault is heard from both nodes, if they can send
 //! again     at the end a well-behaved host enables the leg, or a reason is stated
@@ -22,6 +23,8 @@ use crate::rig::options::SimulationOptions;
 use crate::rig::pair::Context;
 
 const NODES: [u16; JOINTS] = [1, 2];
+/// Received PDOs of a node.
+const PDOS: usize = 4;
 /// How far beyond its range an enabled joint may come until the monitor has stopped it, rad.
 const BEYOND: f64 = 0.1;
 /// Bits of 60FD that say why a leg is not enabled: an inhibit reason, no zeros, no calibration, a joint that
@@ -167,8 +170,10 @@ struct Play<L> {
     enabled_at: u64,
     /// Least commanded speed since then, rad/s: a joint that moved only slows down.
     slows: [f32; JOINTS],
-    /// Object of the last PDO to each joint, which the next SYNC may make effective.
-    waits: [Option<u16>; JOINTS],
+    /// Objects that each received PDO of a joint may hold: also those of a mapping that was refused or replaced.
+    maps: [[Vec<u16>; PDOS]; JOINTS],
+    /// The last PDO to each joint, which the next SYNC may make effective.
+    waits: [Option<usize>; JOINTS],
     /// Code that must be heard from each node, and the tick in which the leg had it.
     unheard: Option<(u16, u64)>,
     /// Code of each node's last emergency message, and its tick.
@@ -197,6 +202,7 @@ impl<L: HostedLeg> Play<L> {
             pose: [(0, 0.0); JOINTS],
             enabled_at: 0,
             slows: [f32::INFINITY; JOINTS],
+            maps: core::array::from_fn(|_| [0x6040, 0x607A, 0x60FF, 0x6071].map(|index| vec![index])),
             waits: [None; JOINTS],
             unheard: None,
             heard: [(0, 0); JOINTS],
@@ -361,6 +367,56 @@ impl<L: HostedLeg> Play<L> {
         }
     }
 
+    /// Objects of a PDO are on their way to a joint.
+    fn expect_pdo(&mut self, joint: usize, pdo: usize) {
+        let objects = core::mem::take(&mut self.maps[joint][pdo]);
+        objects.iter().for_each(|index| self.expect(joint, *index));
+        if objects.iter().any(|index| matches!(index, 0x6040 | 0x6060)) {
+            self.stops = [self.ticks + TAKES_OVER; JOINTS];
+        }
+        if objects.contains(&0x6060) {
+            self.explained[joint] = self.ticks + AFTER_VALUE;
+        }
+        self.maps[joint][pdo] = objects;
+    }
+
+    /// Sends a received PDO, numbered from 1.
+    fn pdo(&mut self, joint: usize, number: u16, bytes: &[u8]) {
+        let pdo = usize::from(number) - 1;
+        self.aim();
+        self.expect_pdo(joint, pdo);
+        self.waits[joint] = Some(pdo);
+        self.send(0x100 + 0x100 * number + NODES[joint], bytes);
+    }
+
+    fn map(&mut self, joint: usize, number: u16, objects: [Object; 2]) -> Result<(), String> {
+        let pdo = number - 1;
+        let cob = i32::from(0x100 + 0x100 * number + NODES[joint]);
+        let entries = objects.map(|Object(index, sub, bytes, _)| {
+            i32::from(index) << 16 | i32::from(sub) << 8 | i32::from(8 * bytes)
+        });
+        self.maps[joint][usize::from(pdo)].extend(objects.map(|object| object.0));
+        self.write(joint, (0x1400 + pdo, 1, 4), cob | i32::MIN)?;
+        self.write(joint, (0x1600 + pdo, 0, 1), 0)?;
+        self.write(joint, (0x1600 + pdo, 1, 4), entries[0])?;
+        self.write(joint, (0x1600 + pdo, 2, 4), entries[1])?;
+        self.write(joint, (0x1600 + pdo, 0, 1), 2)?;
+        self.write(joint, (0x1400 + pdo, 1, 4), cob)
+    }
+
+    /// Reads the modes of joints whose mode a PDO may have changed.
+    fn learn_modes(&mut self) -> Result<(), String> {
+        for joint in 0..JOINTS {
+            if self.maps[joint].iter().flatten().any(|index| *index == 0x6060)
+                && let Some(mode) = self.read(joint, 0x6060)?
+            {
+                self.modes[joint] = mode as i8;
+                self.explain_pending(joint..joint + 1);
+            }
+        }
+        Ok(())
+    }
+
     /// A reset is on its way: 6072 is whole again, in the ticks until the leg is stopped too.
     fn expect_defaults(&mut self) {
         (0..JOINTS).for_each(|joint| self.expect(joint, 0x6072));
@@ -403,7 +459,16 @@ impl<L: HostedLeg> Play<L> {
                 self.expect(joint, index);
                 self.write(joint, (index, sub, bytes), value)
             }
-            Step::Word(joint, word) => self.word(joint, word),
+            Step::Word(joint, word) => {
+                self.answer = None;
+                self.word(joint, word)?;
+                self.run(if word == 0 { TAKES_OVER as u32 + L::DELAY } else { 0 })?;
+                let confirmed = self.answer.is_some_and(|answer| answer[0] == 0x60);
+                if word == 0 && confirmed && self.is_enabled {
+                    return Err("stops: a 0 is confirmed, and the leg stays enabled".into());
+                }
+                Ok(())
+            }
             Step::Enable => [6, 7, 0xF].into_iter().try_for_each(|word| {
                 self.word(JOINTS, word)?;
                 self.run(8)
@@ -431,24 +496,32 @@ impl<L: HostedLeg> Play<L> {
                 self.write(joint, (0x6040, 0, 2), 0x0F)
             }
             Step::Pdo(joint, number, bytes) => {
-                let (index, length) =
-                    [(0x6040, 2), (0x607A, 4), (0x60FF, 4), (0x6071, 2)][usize::from(number) - 1];
-                self.aim();
-                self.expect(joint, index);
-                self.waits[joint] = Some(index);
-                self.send(0x100 + 0x100 * number + NODES[joint], &bytes[..length]);
-                self.run(2)
+                self.pdo(joint, number, &bytes);
+                self.run(2)?;
+                self.learn_modes()
+            }
+            Step::Map(joint, number, objects) => self.map(joint, number, objects),
+            Step::Cycle(words, count, apart) => {
+                for _ in 0..count {
+                    for (joint, word) in words.into_iter().enumerate() {
+                        let [low, high] = word.to_le_bytes();
+                        self.pdo(joint, 1, &[low, high, 0, 0, 0, 0, 0, 0]);
+                    }
+                    self.run(u32::from(apart))?;
+                }
+                self.learn_modes()
             }
             Step::Sync(count, apart) => {
                 for joint in 0..JOINTS {
-                    if let Some(index) = self.waits[joint].take() {
-                        self.expect(joint, index);
+                    if let Some(pdo) = self.waits[joint].take() {
+                        self.expect_pdo(joint, pdo);
                     }
                 }
-                (0..count).try_for_each(|_| {
+                for _ in 0..count {
                     self.send(0x80, &[]);
-                    self.run(u32::from(apart))
-                })
+                    self.run(u32::from(apart))?;
+                }
+                self.learn_modes()
             }
             Step::Nmt(command, node) => {
                 // A node that resets or stops says nothing of an earlier fault.
@@ -559,9 +632,10 @@ mod tests {
         const OVERSHOOT: f64 = 1.0;
 
         fn send(&mut self, frame: Frame) {
-            if let [0x40, low, high, ..] = *frame.data() {
+            if let [service, low, high, ..] = *frame.data() {
                 let value = if low == 0x41 { 0x27 } else { 0 };
-                self.answer = Some(Frame::new(frame.id() - 0x80, &[0x4B, low, high, 0, value, 0, 0, 0]));
+                let answer = [if service == 0x40 { 0x4B } else { 0x60 }, low, high, 0, value, 0, 0, 0];
+                self.answer = Some(Frame::new(frame.id() - 0x80, &answer));
             }
         }
 
@@ -600,6 +674,10 @@ mod tests {
             let found = check_session(leg, bounds, &HostSession { by_hand: true, steps });
             assert_eq!(found.err().as_deref().unwrap_or("").split(':').next(), Some(kind));
         }
+        // A leg that no stop turns off.
+        let leg = FakeLeg { ticks: 0, errs: |_| {}, answer: None };
+        let found = check_session(leg, bounds, &HostSession { by_hand: true, steps: vec![Step::Word(1, 0)] });
+        assert!(found.is_err_and(|why| why.starts_with("stops:")));
         // A leg that no host can enable, without a reason.
         let leg = FakeLeg { ticks: ERRS, errs: |state| state.is_enabled = false, answer: None };
         let found = check_session(leg, bounds, &HostSession { by_hand: true, steps: Vec::new() });
