@@ -1,9 +1,10 @@
 //! Random sessions of hosts on the bus of a leg.
 //!
 //! A session is a list of steps, as several hosts may send them in turn: objects with values inside and
-//! outside their ranges, controlwords in any order, modes, PDOs and their mapping, SYNC, NMT, LSS, heartbeats, saving and
-//! loading, homing, set-points, identification, the operator's contacts, the plug. [`check_session`] plays it
-//! on a leg and checks what must hold after every tick; [`HostSession::reduced`] finds the steps that fail.
+//! outside their ranges, controlwords in any order, modes, PDOs and their mapping, SYNC, NMT, LSS,
+//! saving and loading, heartbeats, homing, set-points, identification, the operator's contacts, the plug.
+//! [`check_session`] plays it on a leg and checks what must hold after every tick; [`HostSession::reduced`]
+//! finds the steps that fail.
 
 mod witness;
 

@@ -170,7 +170,7 @@ struct Play<L> {
     enabled_at: u64,
     /// Least commanded speed since then, rad/s: a joint that moved only slows down.
     slows: [f32; JOINTS],
-    /// Objects that each received PDO of a joint may hold: also those of a mapping that was refused or replaced.
+    /// Objects that each received PDO of a joint may hold, by its present mapping or an earlier one.
     maps: [[Vec<u16>; PDOS]; JOINTS],
     /// The last PDO to each joint, which the next SYNC may make effective.
     waits: [Option<usize>; JOINTS],
