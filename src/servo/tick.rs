@@ -22,7 +22,7 @@ use super::{SERVO_RATE_HZ, TICK_S};
 use crate::checksum::Checksum;
 use crate::hal::{DriveCommand, Sample};
 use crate::motion::MotionState;
-use crate::real::{clamp, is_finite};
+use crate::real::{clamp, is_finite, max, min};
 use crate::safety::{
     Decision, Derating, DriveState, Fault, LimitCodes, Limits, Monitor, Observation, Permission,
     PowerRequest, Reading, Request, StepGate,
@@ -80,6 +80,9 @@ pub struct ServoOutput<const N: usize> {
     pub tracking_error: [Radian; N],
     /// Torques of feedforward and feedback before the monitor.
     pub wanted_torque: [NewtonMetre; N],
+    /// Torques that hold the joints: those applied, without what only brakes a joint that is not as fast as
+    /// commanded.
+    pub holding_torque: [NewtonMetre; N],
     /// Decision of the monitor; its command is for the drives.
     pub decision: Decision<N>,
 }
@@ -309,7 +312,23 @@ impl<const N: usize> Servo<N> {
                 self.controllers[joint].preset(&self.joints[joint].controller, preset);
             }
         }
-        ServoOutput { position, velocity, accepted_counts, tracking_error, wanted_torque, decision }
+        let holding_torque = core::array::from_fn(|joint| {
+            let NewtonMetre(applied) = decision.torque[joint];
+            let error = RadianPerSecond(motion.velocity_rad_per_s[joint]) - velocity[joint];
+            let braking = self.damped(joint, 1.0, error);
+            let is_held = efforts.is_none_or(|efforts| efforts[joint].held);
+            let rest = if is_held { (wanted_torque[joint] - braking).0 } else { applied };
+            NewtonMetre(clamp(rest, min(applied, 0.0), max(applied, 0.0)))
+        });
+        ServoOutput {
+            position,
+            velocity,
+            accepted_counts,
+            tracking_error,
+            wanted_torque,
+            holding_torque,
+            decision,
+        }
     }
 
     /// Torque of a share of the controller's damping.

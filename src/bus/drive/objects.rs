@@ -217,7 +217,7 @@ impl Objects for Axis {
 
     /// A 0 that a PDO repeats is idle: it is no command to disable voltage.
     fn write_mapped(&mut self, object: Object, value: u32) -> Result<(), Abort> {
-        if object.index == 0x6040 && value as u16 == 0 && !self.commanded && !self.hosted {
+        if object.index == 0x6040 && value as u16 == 0 && !self.commanded {
             Ok(())
         } else {
             self.write(object, value)
@@ -229,7 +229,7 @@ impl Objects for Axis {
     }
 
     fn misses_host(&self) -> bool {
-        self.settings.watches && self.commanded && self.own.is_enabled()
+        self.settings.watches && (self.commanded || self.hosted) && self.own.is_enabled()
     }
 
     fn reset(&mut self) {

@@ -45,12 +45,7 @@ impl<const N: usize> Control<N> {
             self.activity = Activity::Follow;
         }
         if self.activity == Activity::Idle {
-            // A leg that moves when it is enabled first comes to rest: no following error, no step of torque.
-            let pose = self.motion.end_rad();
-            if !following.has_settled(&pose) {
-                return None;
-            }
-            following.begin(commands, &MotionState::at_rest(pose));
+            following.begin(commands, &MotionState::at_rest(self.motion.end_rad()));
             self.activity = Activity::Follow;
         }
         if !self.activity.follows_host() {

@@ -66,7 +66,7 @@ pub struct Measured {
     pub position: Radian,
     /// Joint velocity.
     pub velocity: RadianPerSecond,
-    /// Torque applied.
+    /// Torque that holds the joint ([`ServoOutput::holding_torque`](crate::servo::ServoOutput)).
     pub torque: NewtonMetre,
     /// Whether the joint returns into its range.
     pub returns: bool,

@@ -29,14 +29,9 @@ use super::configuration::LegConfiguration;
 use super::control::ControlOutput;
 use crate::model::AnatomicalJoint;
 use crate::motion::{Course, MotionState};
-use crate::real::abs;
 use crate::safety::{Fault, FaultCode, RANGE_TOLERANCE, RefusalReason};
 use crate::servo::{Effort, ServoOutput};
 use crate::units::{NewtonMetre, Radian, RadianPerSecond, Volt};
-
-/// Speed and distance from its commanded pose up to which a joint follows a host, rad/s and rad: far below
-/// the default following window of 0.087 rad, above what holding against the leg's weight needs.
-const SETTLED: (f32, f32) = (0.5, 0.03);
 
 /// Command for the servo at one tick, in the model's angles and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,16 +98,6 @@ impl<const N: usize> Following<N> {
         }
     }
 
-    /// Whether each joint holds this pose, rad in the model's angles.
-    #[must_use]
-    pub fn has_settled(&self, pose: &[f32; N]) -> bool {
-        let (speed, distance) = SETTLED;
-        self.measured.iter().zip(&self.anatomy).zip(pose).all(|((measured, anatomy), &pose)| {
-            abs(measured.velocity.0) <= speed
-                && abs(measured.position.0 - anatomy.angle_from_chain(pose)) <= distance
-        })
-    }
-
     /// Whether all joints are commanded to be at rest.
     #[must_use]
     pub fn is_still(&self) -> bool {
@@ -132,7 +117,7 @@ impl<const N: usize> Following<N> {
         Some(Measured {
             position: Radian(anatomy.angle_from_chain(output.position.get(joint)?.0)),
             velocity: RadianPerSecond(anatomy.from_chain(output.velocity.get(joint)?.0)),
-            torque: NewtonMetre(anatomy.from_chain(output.decision.torque.get(joint)?.0)),
+            torque: NewtonMetre(anatomy.from_chain(output.holding_torque.get(joint)?.0)),
             returns: *output.decision.returns.get(joint)?,
         })
     }
@@ -192,7 +177,7 @@ impl<const N: usize> Following<N> {
             velocity_demand: RadianPerSecond(
                 anatomy.from_chain(*output.motion.velocity_rad_per_s.get(joint)?),
             ),
-            torque_demand: measured.torque,
+            torque_demand: NewtonMetre(anatomy.from_chain(decision.torque.get(joint)?.0)),
             mode: follower.mode().filter(|_| follows).map_or(0, |mode| mode as i8),
             follows: follows && follower.follows,
             is_full: follows && follower.is_full(),

@@ -9,7 +9,7 @@
 //! stops     a 0 in the controlword by SDO turns the leg off
 //! words     the statusword is that of the leg, and bit 12 of a cyclic mode means a target of this session
 //! faults    the code of a fault is heard from both nodes, if they can send
-//! again     at the end a well-behaved host enables the leg, or a reason is stated
+//! again     at the end a well-behaved host enables and moves the leg, or a reason is stated
 //! ```
 
 use scarab::bus::Frame;
@@ -33,6 +33,10 @@ const REASONS: i32 = 0x7E_0000;
 /// Largest motion of a joint that is held, rad, and the time after which it has come to rest, ticks.
 const HELD: f64 = 0.01;
 const COMES_TO_REST: u64 = 500 * MILLISECOND as u64;
+/// Speed that an enabled leg must follow, micro-radian/s.
+const FOLLOWED: i32 = 50_000;
+/// Limit beyond those of every leg, micro-radian, also per second.
+const TURNS: i32 = 20_000_000;
 /// Time in which a host takes over a leg that has just been enabled, or a new word or mode acts, ticks.
 const TAKES_OVER: u64 = 5 * MILLISECOND as u64;
 /// Ticks until the nodes have started.
@@ -152,6 +156,7 @@ struct Play<L> {
     is_enabled: bool,
     fault: Option<u16>,
     torque: [f64; JOINTS],
+    position: [f64; JOINTS],
     /// Tick of the last target, and whether one was sent since the leg was last enabled.
     target: Option<u64>,
     targets: bool,
@@ -191,6 +196,7 @@ impl<L: HostedLeg> Play<L> {
             is_enabled: false,
             fault: None,
             torque: [0.0; JOINTS],
+            position: [0.0; JOINTS],
             target: None,
             targets: false,
             modes: [0; JOINTS],
@@ -250,6 +256,7 @@ impl<L: HostedLeg> Play<L> {
     fn check_joints(&mut self, seen: &LegState, was_enabled: bool) -> Result<(), String> {
         let ticks = self.ticks;
         let torque = core::mem::replace(&mut self.torque, seen.torque);
+        self.position = seen.position;
         if was_enabled && !seen.is_enabled {
             // A frame that is on its way belongs to the next session.
             self.targets = self.target.is_some_and(|at| ticks - at < 4);
@@ -381,9 +388,13 @@ impl<L: HostedLeg> Play<L> {
     }
 
     /// Sends a received PDO, numbered from 1.
-    fn pdo(&mut self, joint: usize, number: u16, bytes: &[u8]) {
+    fn pdo(&mut self, joint: usize, number: u16, bytes: &[u8; 8]) {
         let pdo = usize::from(number) - 1;
-        self.aim();
+        // A word that begins a motion: set-point, homing, a velocity after a halt.
+        let begins = bytes.windows(2).any(|word| word[0] & 0x10 != 0 || word[1] & 1 != 0);
+        if begins || self.maps[joint][pdo].iter().any(|index| !matches!(index, 0x6040 | 0x6060)) {
+            self.aim();
+        }
         self.expect_pdo(joint, pdo);
         self.waits[joint] = Some(pdo);
         self.send(0x100 + 0x100 * number + NODES[joint], bytes);
@@ -410,8 +421,10 @@ impl<L: HostedLeg> Play<L> {
             if self.maps[joint].iter().flatten().any(|index| *index == 0x6060)
                 && let Some(mode) = self.read(joint, 0x6060)?
             {
-                self.modes[joint] = mode as i8;
-                self.explain_pending(joint..joint + 1);
+                let before = core::mem::replace(&mut self.modes[joint], mode as i8);
+                if before != mode as i8 {
+                    self.explain_pending(joint..joint + 1);
+                }
             }
         }
         Ok(())
@@ -463,7 +476,7 @@ impl<L: HostedLeg> Play<L> {
                 self.answer = None;
                 self.word(joint, word)?;
                 self.run(if word == 0 { TAKES_OVER as u32 + L::DELAY } else { 0 })?;
-                let confirmed = self.answer.is_some_and(|answer| answer[0] == 0x60);
+                let confirmed = self.answer.is_some_and(|answer| answer[..3] == [0x60, 0x40, 0x60]);
                 if word == 0 && confirmed && self.is_enabled {
                     return Err("stops: a 0 is confirmed, and the leg stays enabled".into());
                 }
@@ -560,6 +573,33 @@ impl<L: HostedLeg> Play<L> {
         }
     }
 
+    /// The enabled leg moves when a well-behaved host commands a velocity, towards the middle of its range.
+    fn follows(&mut self) -> Result<(), String> {
+        // A joint that moves when it is enabled first comes to rest.
+        self.run(COMES_TO_REST as u32)?;
+        let before = self.position;
+        for joint in 0..JOINTS {
+            self.modes[joint] = 3;
+            self.write(joint, (0x6060, 0, 1), 3)?;
+            // Limits that another host may have saved.
+            for (index, sub, value) in
+                [(0x607D, 1, -TURNS), (0x607D, 2, TURNS), (0x6081, 0, TURNS), (0x6083, 0, TURNS)]
+            {
+                self.write(joint, (index, sub, 4), value)?;
+            }
+            let [low, high] = self.bounds[joint].range;
+            let speed = if before[joint] < (low + high) / 2.0 { FOLLOWED } else { -FOLLOWED };
+            self.aim();
+            self.write(joint, (0x60FF, 0, 4), speed)?;
+        }
+        self.run(SERVO_RATE_HZ)?;
+        let moved: Vec<f64> = self.position.iter().zip(before).map(|(now, before)| now - before).collect();
+        if self.is_enabled && moved.iter().any(|moved| moved.abs() < HELD) {
+            return Err(format!("again: enabled, moves from {before:?} to {:?} rad", self.position));
+        }
+        Ok(())
+    }
+
     /// A well-behaved host enables the leg, or hears why it cannot.
     fn again(&mut self) -> Result<(), String> {
         self.unheard = None;
@@ -578,7 +618,7 @@ impl<L: HostedLeg> Play<L> {
             self.run(SERVO_RATE_HZ / 20)?;
         }
         if self.is_enabled {
-            return Ok(());
+            return self.follows();
         }
         let inputs = [self.read(0, 0x60FD)?, self.read(1, 0x60FD)?];
         if inputs.iter().flatten().any(|inputs| inputs & REASONS != 0) {
