@@ -80,8 +80,7 @@ pub struct ServoOutput<const N: usize> {
     pub tracking_error: [Radian; N],
     /// Torques of feedforward and feedback before the monitor.
     pub wanted_torque: [NewtonMetre; N],
-    /// Torques that hold the joints: those applied, without what only brakes a joint that is not as fast as
-    /// commanded.
+    /// Torques that hold the joints: those applied, without the damping that brakes a moving joint.
     pub holding_torque: [NewtonMetre; N],
     /// Decision of the monitor; its command is for the drives.
     pub decision: Decision<N>,
@@ -314,11 +313,14 @@ impl<const N: usize> Servo<N> {
         }
         let holding_torque = core::array::from_fn(|joint| {
             let NewtonMetre(applied) = decision.torque[joint];
+            if efforts.is_some_and(|efforts| !efforts[joint].held) {
+                return NewtonMetre(applied);
+            }
             let error = RadianPerSecond(motion.velocity_rad_per_s[joint]) - velocity[joint];
-            let braking = self.damped(joint, 1.0, error);
-            let is_held = efforts.is_none_or(|efforts| efforts[joint].held);
-            let rest = if is_held { (wanted_torque[joint] - braking).0 } else { applied };
-            NewtonMetre(clamp(rest, min(applied, 0.0), max(applied, 0.0)))
+            // No more than what opposes the joint's own velocity: the rest of it may carry a load.
+            let NewtonMetre(whole) = self.damped(joint, 1.0, -velocity[joint]);
+            let braking = clamp(self.damped(joint, 1.0, error).0, min(whole, 0.0), max(whole, 0.0));
+            NewtonMetre(clamp(wanted_torque[joint].0 - braking, min(applied, 0.0), max(applied, 0.0)))
         });
         ServoOutput {
             position,

@@ -36,6 +36,8 @@ const STANDING: f32 = 0.005;
 const LONGEST_STOP_S: f32 = 2.0;
 /// Least torque that a host leaves a joint to stop and to hold with, as a share of its limit.
 const LEAST_TORQUE: f32 = 0.1;
+/// Limit of an impedance's damper that never acts, N m.
+const LARGEST_DAMPER_NM: f32 = 1e6;
 /// Largest angle that homing gives to the present position: a turn.
 const LARGEST_HOME_RAD: f32 = core::f32::consts::TAU;
 
@@ -68,6 +70,8 @@ pub struct Measured {
     pub velocity: RadianPerSecond,
     /// Torque that holds the joint ([`ServoOutput::holding_torque`](crate::servo::ServoOutput)).
     pub torque: NewtonMetre,
+    /// Torque that brakes the joint besides.
+    pub braking: NewtonMetre,
     /// Whether the joint returns into its range.
     pub returns: bool,
 }
@@ -98,8 +102,10 @@ pub struct Follower {
     course: Course,
     /// Torque of the torque modes and of the impedance, N m.
     torque: f32,
-    /// Impedance: difference to the torque before the mode, which decays, N m.
+    /// Impedance: difference of the spring to the torque before the mode, which decays, N m.
     carried: f32,
+    /// Impedance: limit of the damper, N m, which grows from the braking torque before the mode.
+    damper: f32,
     /// [`JointCommand::is_requested`] of the previous tick.
     seen: u8,
     /// Profile position: the active set-point.
@@ -193,6 +199,7 @@ impl Follower {
         course: Course::at_rest(0.0),
         torque: 0.0,
         carried: 0.0,
+        damper: 0.0,
         seen: 0,
         goal: None,
         arrived: false,
@@ -348,13 +355,16 @@ impl Follower {
     /// Impedance: spring and damper; the difference to the torque before decays.
     fn yield_to(&mut self, target: &ImpedanceTarget, tick: &Tick<'_>) {
         let Tick { command, measured, .. } = tick;
-        let torque = self.spring(target, tick.range, &tick.bounds, measured);
+        let (spring, damper) = self.spring(target, tick.range, &tick.bounds, measured);
         if tick.starts {
-            self.carried = measured.torque.0 - torque;
+            (self.carried, self.damper) = (measured.torque.0 - spring, abs(measured.braking.0));
         }
         let most = max(command.torque_slope_nm_per_s, tick.least_slope) * TICK_S;
         self.carried -= clamp(self.carried, -most, most);
-        self.torque = self.bounded(torque + self.carried, -tick.largest, tick.largest);
+        // A damper whose difference was carried would push the joint on once it is slow.
+        let damper = clamp(damper, -self.damper, self.damper);
+        self.damper = min(self.damper + most, LARGEST_DAMPER_NM);
+        self.torque = self.bounded(spring + damper + self.carried, -tick.largest, tick.largest);
         let near = abs(target.position.0 - measured.position.0) <= command.position_window.0;
         self.reach(near, command.position_time);
     }
@@ -451,21 +461,22 @@ impl Follower {
         self.gap = Course::at_rest(0.0);
     }
 
-    /// Torque of spring and damper at the joint's present place, each within its limits.
+    /// Torques of spring and damper at the joint's present place, each within its limits.
     fn spring(
         &mut self,
         target: &ImpedanceTarget,
         [low, high]: [f32; 2],
         bounds: &Bounds,
         measured: &Measured,
-    ) -> f32 {
+    ) -> (f32, f32) {
         let [stiffest, strongest] = bounds.impedance;
         let stiffness = self.bounded(target.stiffness, 0.0, stiffest);
         let damping = self.bounded(target.damping, DELAY_S * stiffness, strongest);
         let place = measured.position.0 + DELAY_S * measured.velocity.0;
         let position = self.bounded(target.position.0, low, high);
         let velocity = self.bounded(target.velocity.0, -bounds.speed, bounds.speed);
-        stiffness * (position - place) + damping * (velocity - measured.velocity.0) + target.torque.0
+        let spring = stiffness * (position - place) + target.torque.0;
+        (spring, damping * (velocity - measured.velocity.0))
     }
 
     /// Torque only, without position control.

@@ -419,17 +419,16 @@ fn a_halt_ends_in_time_whatever_the_host_has_set() {
 
 #[test]
 fn a_leg_that_is_enabled_while_it_falls_is_not_driven_back_by_its_brake() {
-    let targets = [
-        Target::ProfileTorque(NewtonMetre::ZERO),
+    let impedance = |damping| {
         Target::Impedance(ImpedanceTarget {
             position: Radian(1.5),
             velocity: RadianPerSecond::ZERO,
             stiffness: 0.0,
-            damping: 0.0,
+            damping,
             torque: NewtonMetre::ZERO,
-        }),
-    ];
-    for target in targets {
+        })
+    };
+    for target in [Target::ProfileTorque(NewtonMetre::ZERO), impedance(0.0), impedance(50.0)] {
         let mut hosted = Hosted::enabled_at([0.5, 1.5]);
         hosted.tick(Some(ControlRequest::Power(PowerRequest::DisableVoltage)));
         hosted.commands[1].target = target;

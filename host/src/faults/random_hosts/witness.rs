@@ -34,7 +34,7 @@ const REASONS: i32 = 0x7E_0000;
 const HELD: f64 = 0.01;
 const COMES_TO_REST: u64 = 500 * MILLISECOND as u64;
 /// Speed that an enabled leg must follow, micro-radian/s.
-const FOLLOWED: i32 = 50_000;
+const FOLLOWED: i32 = 100_000;
 /// Limit beyond those of every leg, micro-radian, also per second.
 const TURNS: i32 = 20_000_000;
 /// Time in which a host takes over a leg that has just been enabled, or a new word or mode acts, ticks.
@@ -576,25 +576,33 @@ impl<L: HostedLeg> Play<L> {
     /// The enabled leg moves when a well-behaved host commands a velocity, towards the middle of its range.
     fn follows(&mut self) -> Result<(), String> {
         // A joint that moves when it is enabled first comes to rest.
-        self.run(COMES_TO_REST as u32)?;
+        self.run(COMES_TO_REST as u32 / 2)?;
         let before = self.position;
+        let sign: [i32; JOINTS] = core::array::from_fn(|joint| {
+            let [low, high] = self.bounds[joint].range;
+            if before[joint] < (low + high) / 2.0 { 1 } else { -1 }
+        });
         for joint in 0..JOINTS {
             self.modes[joint] = 3;
             self.write(joint, (0x6060, 0, 1), 3)?;
             // Limits that another host may have saved.
-            for (index, sub, value) in
-                [(0x607D, 1, -TURNS), (0x607D, 2, TURNS), (0x6081, 0, TURNS), (0x6083, 0, TURNS)]
-            {
+            for (index, sub, value) in [
+                (0x607D, 1, -TURNS),
+                (0x607D, 2, TURNS),
+                (0x607D, 1, -TURNS),
+                (0x6081, 0, TURNS),
+                (0x6083, 0, TURNS),
+            ] {
                 self.write(joint, (index, sub, 4), value)?;
             }
-            let [low, high] = self.bounds[joint].range;
-            let speed = if before[joint] < (low + high) / 2.0 { FOLLOWED } else { -FOLLOWED };
+            self.expect(joint, 0x6072);
+            self.write(joint, (0x6072, 0, 2), 1000)?;
             self.aim();
-            self.write(joint, (0x60FF, 0, 4), speed)?;
+            self.write(joint, (0x60FF, 0, 4), FOLLOWED * sign[joint])?;
         }
-        self.run(SERVO_RATE_HZ)?;
-        let moved: Vec<f64> = self.position.iter().zip(before).map(|(now, before)| now - before).collect();
-        if self.is_enabled && moved.iter().any(|moved| moved.abs() < HELD) {
+        self.run(SERVO_RATE_HZ / 4)?;
+        let moves = |joint: usize| f64::from(sign[joint]) * (self.position[joint] - before[joint]) > HELD;
+        if self.is_enabled && !(0..JOINTS).all(moves) || !self.is_enabled && self.fault.is_none() {
             return Err(format!("again: enabled, moves from {before:?} to {:?} rad", self.position));
         }
         Ok(())
@@ -660,9 +668,11 @@ mod tests {
 
     type Errs = fn(&mut LegState);
 
-    /// An enabled leg at rest that errs from a tick on, and answers reads of its statusword and mode.
+    /// An enabled leg that errs from a tick on, and answers SDO requests. A velocity moves its joints.
     struct FakeLeg {
         ticks: u64,
+        travel: f64,
+        moves: bool,
         errs: Errs,
         answer: Option<Frame>,
     }
@@ -672,6 +682,7 @@ mod tests {
         const OVERSHOOT: f64 = 1.0;
 
         fn send(&mut self, frame: Frame) {
+            self.moves |= frame.data().starts_with(&[0x23, 0xFF, 0x60]);
             if let [service, low, high, ..] = *frame.data() {
                 let value = if low == 0x41 { 0x27 } else { 0 };
                 let answer = [if service == 0x40 { 0x4B } else { 0x60 }, low, high, 0, value, 0, 0, 0];
@@ -686,7 +697,9 @@ mod tests {
         fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<LegState>, String> {
             self.ticks += 1;
             self.answer.take().iter().for_each(heard);
-            let mut state = LegState { torque: [20.0; JOINTS], position: [0.5; JOINTS], ..LegState::AT_REST };
+            self.travel += if self.moves { 2.5e-5 } else { 0.0 };
+            let position = [0.5 - self.travel, 0.5 + self.travel];
+            let mut state = LegState { torque: [20.0; JOINTS], position, ..LegState::AT_REST };
             if self.ticks >= ERRS {
                 (self.errs)(&mut state);
             }
@@ -709,17 +722,23 @@ mod tests {
         let leg = LegFile::load(DEFAULT_LEG).expect("a shipped leg");
         let bounds = JointBounds::of(&leg).expect("a leg that can be moved");
         for (kind, errs) in errs {
-            let leg = FakeLeg { ticks: 0, errs, answer: None };
+            let leg = FakeLeg { ticks: 0, travel: 0.0, moves: false, errs, answer: None };
             let steps = vec![Step::Wait(4900), Step::Wait(1000)];
             let found = check_session(leg, bounds, &HostSession { by_hand: true, steps });
             assert_eq!(found.err().as_deref().unwrap_or("").split(':').next(), Some(kind));
         }
         // A leg that no stop turns off.
-        let leg = FakeLeg { ticks: 0, errs: |_| {}, answer: None };
+        let leg = FakeLeg { ticks: 0, travel: 0.0, moves: false, errs: |_| {}, answer: None };
         let found = check_session(leg, bounds, &HostSession { by_hand: true, steps: vec![Step::Word(1, 0)] });
         assert!(found.is_err_and(|why| why.starts_with("stops:")));
         // A leg that no host can enable, without a reason.
-        let leg = FakeLeg { ticks: ERRS, errs: |state| state.is_enabled = false, answer: None };
+        let leg = FakeLeg {
+            ticks: ERRS,
+            travel: 0.0,
+            moves: false,
+            errs: |state| state.is_enabled = false,
+            answer: None,
+        };
         let found = check_session(leg, bounds, &HostSession { by_hand: true, steps: Vec::new() });
         assert!(found.is_err_and(|why| why.starts_with("again:")));
     }
