@@ -313,13 +313,14 @@ impl<const N: usize> Servo<N> {
         }
         let holding_torque = core::array::from_fn(|joint| {
             let NewtonMetre(applied) = decision.torque[joint];
-            if efforts.is_some_and(|efforts| !efforts[joint].held) {
-                return NewtonMetre(applied);
-            }
             let error = RadianPerSecond(motion.velocity_rad_per_s[joint]) - velocity[joint];
+            let (share, error) = match efforts.map(|efforts| &efforts[joint]) {
+                Some(Effort { held: false, damping_share, .. }) => (*damping_share, -velocity[joint]),
+                _ => (1.0, error),
+            };
             // No more than what opposes the joint's own velocity: the rest of it may carry a load.
-            let NewtonMetre(whole) = self.damped(joint, 1.0, -velocity[joint]);
-            let braking = clamp(self.damped(joint, 1.0, error).0, min(whole, 0.0), max(whole, 0.0));
+            let NewtonMetre(whole) = self.damped(joint, share, -velocity[joint]);
+            let braking = clamp(self.damped(joint, share, error).0, min(whole, 0.0), max(whole, 0.0));
             NewtonMetre(clamp(wanted_torque[joint].0 - braking, min(applied, 0.0), max(applied, 0.0)))
         });
         ServoOutput {

@@ -36,8 +36,6 @@ const STANDING: f32 = 0.005;
 const LONGEST_STOP_S: f32 = 2.0;
 /// Least torque that a host leaves a joint to stop and to hold with, as a share of its limit.
 const LEAST_TORQUE: f32 = 0.1;
-/// Limit of an impedance's damper that never acts, N m.
-const LARGEST_DAMPER_NM: f32 = 1e6;
 /// Largest angle that homing gives to the present position: a turn.
 const LARGEST_HOME_RAD: f32 = core::f32::consts::TAU;
 
@@ -104,8 +102,9 @@ pub struct Follower {
     torque: f32,
     /// Impedance: difference of the spring to the torque before the mode, which decays, N m.
     carried: f32,
-    /// Impedance: limit of the damper, N m, which grows from the braking torque before the mode.
-    damper: f32,
+    /// Impedance: difference of the damper to the braking torque before the mode, which decays, N m. Never
+    /// beyond the damper's torque: it would push the joint on once it is slow.
+    damper_gap: f32,
     /// [`JointCommand::is_requested`] of the previous tick.
     seen: u8,
     /// Profile position: the active set-point.
@@ -199,7 +198,7 @@ impl Follower {
         course: Course::at_rest(0.0),
         torque: 0.0,
         carried: 0.0,
-        damper: 0.0,
+        damper_gap: 0.0,
         seen: 0,
         goal: None,
         arrived: false,
@@ -356,15 +355,16 @@ impl Follower {
     fn yield_to(&mut self, target: &ImpedanceTarget, tick: &Tick<'_>) {
         let Tick { command, measured, .. } = tick;
         let (spring, damper) = self.spring(target, tick.range, &tick.bounds, measured);
+        let damper = clamp(damper, -tick.largest, tick.largest);
         if tick.starts {
-            (self.carried, self.damper) = (measured.torque.0 - spring, abs(measured.braking.0));
+            (self.carried, self.damper_gap) = (measured.torque.0 - spring, damper - measured.braking.0);
         }
         let most = max(command.torque_slope_nm_per_s, tick.least_slope) * TICK_S;
         self.carried -= clamp(self.carried, -most, most);
-        // A damper whose difference was carried would push the joint on once it is slow.
-        let damper = clamp(damper, -self.damper, self.damper);
-        self.damper = min(self.damper + most, LARGEST_DAMPER_NM);
-        self.torque = self.bounded(spring + damper + self.carried, -tick.largest, tick.largest);
+        self.damper_gap -= clamp(self.damper_gap, -most, most);
+        self.damper_gap = clamp(self.damper_gap, min(damper, 0.0), max(damper, 0.0));
+        let torque = spring + damper - self.damper_gap + self.carried;
+        self.torque = self.bounded(torque, -tick.largest, tick.largest);
         let near = abs(target.position.0 - measured.position.0) <= command.position_window.0;
         self.reach(near, command.position_time);
     }

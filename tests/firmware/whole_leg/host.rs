@@ -417,18 +417,35 @@ fn a_halt_ends_in_time_whatever_the_host_has_set() {
     }
 }
 
+/// Impedance mode without a spring.
+fn damper(damping: f32) -> Target {
+    Target::Impedance(ImpedanceTarget {
+        position: Radian(1.5),
+        velocity: RadianPerSecond::ZERO,
+        stiffness: 0.0,
+        damping,
+        torque: NewtonMetre::ZERO,
+    })
+}
+
+#[test]
+fn a_damper_acts_from_the_first_tick() {
+    let mut hosted = Hosted::enabled_at([0.5, 1.5]);
+    hosted.commands[1].target = damper(100.0);
+    hosted.commands[1].torque_slope_nm_per_s = 0.0;
+    hosted.run(1);
+    hosted.pair.world.push(1, -60.0, 0.3);
+    let mut most = 0.0_f32;
+    for _ in 0..SECOND / 4 {
+        hosted.run(1);
+        most = most.max(hosted.status[1].velocity.0.abs());
+    }
+    assert!((0.3..1.0).contains(&most), "{most} rad/s");
+}
+
 #[test]
 fn a_leg_that_is_enabled_while_it_falls_is_not_driven_back_by_its_brake() {
-    let impedance = |damping| {
-        Target::Impedance(ImpedanceTarget {
-            position: Radian(1.5),
-            velocity: RadianPerSecond::ZERO,
-            stiffness: 0.0,
-            damping,
-            torque: NewtonMetre::ZERO,
-        })
-    };
-    for target in [Target::ProfileTorque(NewtonMetre::ZERO), impedance(0.0), impedance(50.0)] {
+    for target in [Target::ProfileTorque(NewtonMetre::ZERO), damper(0.0), damper(50.0)] {
         let mut hosted = Hosted::enabled_at([0.5, 1.5]);
         hosted.tick(Some(ControlRequest::Power(PowerRequest::DisableVoltage)));
         hosted.commands[1].target = target;
