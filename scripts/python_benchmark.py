@@ -37,7 +37,7 @@ def median_s(function, runs=RUNS):
 def regressors():
     import pinocchio
 
-    urdf = ROOT / "host/tests/data/double_pendulum/double_pendulum_simple.urdf"
+    urdf = ROOT / "host/tool/tests/data/double_pendulum/double_pendulum_simple.urdf"
     model = pinocchio.buildModelFromUrdf(str(urdf))
     data = model.createData()
     leg = si.Leg.from_urdf(urdf)

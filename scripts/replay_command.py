@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-CARGO = ["cargo", "run", "--quiet", "--package", "scarab-host", "--bin", "scarab", "--"]
+CARGO = ["cargo", "run", "--quiet", "--package", "scarab-tool", "--bin", "scarab", "--"]
 
 
 class Outcome:

@@ -2,7 +2,7 @@
 """Writes robot descriptions (URDF) with torques by Pinocchio, which `cargo sim leg --urdf` is tested against.
 
   scripts/venv DIR pin==4.1.0
-  DIR/bin/python scripts/robot_vectors.py host/tests/data/robots.json
+  DIR/bin/python scripts/robot_vectors.py host/tool/tests/data/robots.json
 
 Each robot has one to three revolute joints in a chain, with links on fixed joints before, between and behind
 them, inertial frames turned at random, and in some robots a side branch whose moving joint is locked. The axes
@@ -23,7 +23,7 @@ import pinocchio
 
 STATES = 6
 # Robot of others, from the package example-robot-data 6.0.0; its licence lies beside it.
-REAL = Path(__file__).parent.parent / "host/tests/data/double_pendulum/double_pendulum_simple.urdf"
+REAL = Path(__file__).parent.parent / "host/tool/tests/data/double_pendulum/double_pendulum_simple.urdf"
 
 
 def numbers(values):

@@ -13,17 +13,17 @@ use scarab::leg::{Activity, AssistPhase, ControlRequest, DriveState, IdentifiedM
 use scarab::model::planar::BASE;
 use scarab::store::{JointProvenance, ModelRecord, Provenance};
 use scarab::units::{Metre, NewtonMetre};
-use scarab_host::base::error::ToolError;
-use scarab_host::formats::kept_file::memory::Memory;
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::formats::leg_file::assist::AssistFile;
-use scarab_host::image::build;
-use scarab_host::leg::exercise::{Exercise, hip_and_knee};
-use scarab_host::leg::two_bodies::MuscleTone;
-use scarab_host::rig::options::{DriveModel, SimulationOptions};
-use scarab_host::rig::pair::{Context, Pair};
-use scarab_host::run::assist::study::Mode;
-use scarab_host::run::assist::subject::{Cuffs, Subject};
+use scarab_base::error::ToolError;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::leg_file::assist::AssistFile;
+use scarab_identify::leg::exercise::{Exercise, hip_and_knee};
+use scarab_identify::leg::two_bodies::MuscleTone;
+use scarab_rig::assist::study::Mode;
+use scarab_rig::assist::subject::{Cuffs, Subject};
+use scarab_rig::image::build;
+use scarab_rig::kept_file::memory::Memory;
+use scarab_rig::options::{DriveModel, SimulationOptions};
+use scarab_rig::pair::{Context, Pair};
 use serde::Serialize;
 
 use crate::image::Image;

@@ -7,13 +7,13 @@ use std::rc::Rc;
 use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
-use scarab_host::base::error::ToolError;
-use scarab_host::base::files;
-use scarab_host::base::number::Number;
-use scarab_host::cli::assist::ModeArgument;
-use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
-use scarab_host::image::build;
-use scarab_host::run::assist::subject::Cuffs;
+use scarab_base::error::ToolError;
+use scarab_base::files;
+use scarab_base::number::Number;
+use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_rig::assist::study::Mode;
+use scarab_rig::assist::subject::Cuffs;
+use scarab_rig::image::build;
 use serde::Serialize;
 
 use crate::assist::{self, AssistComparison};
@@ -129,7 +129,7 @@ struct AssistArguments {
     leg: String,
     /// Mode; may be repeated. All three unless given.
     #[arg(long, value_enum)]
-    mode: Vec<ModeArgument>,
+    mode: Vec<Mode>,
     #[command(flatten)]
     run: Simulated,
 }
@@ -395,13 +395,13 @@ fn print_run(report: &ChipReport, wall_s: f64) {
 fn run_assist(arguments: &AssistArguments) -> Result<bool, ToolError> {
     let leg = LegFile::load(&arguments.leg)?;
     let options = Options { time_factor: arguments.run.time_factor, ..Options::default() };
-    let all = [ModeArgument::Transparent, ModeArgument::Weight, ModeArgument::Periodic];
+    let all = [Mode::Transparent, Mode::Weight, Mode::Periodic];
     let modes = if arguments.mode.is_empty() { &all[..] } else { &arguments.mode };
     // Firm cuffs: their resonance lies above a gait's harmonics, where small differences would grow.
     let cuffs = Cuffs { stiffness: 20e3, damping: 400.0 };
     let mut found = Vec::new();
     for mode in modes {
-        let comparison = assist::compare(&leg, (*mode).into(), &cuffs, arguments.run.seed, &options)?;
+        let comparison = assist::compare(&leg, *mode, &cuffs, arguments.run.seed, &options)?;
         println!(
             "{:<12} interaction torque, N m rms: image {:.3} {:.3}, host {:.3} {:.3}; phases {}; law {:.1} % of the processor; missed {}",
             comparison.mode,

@@ -14,9 +14,9 @@
 
 use std::ops::Range;
 
+use scarab_base::error::ToolError;
 use scarab_boot::Region;
-use scarab_host::base::error::ToolError;
-use scarab_host::image::panics::Panics;
+use scarab_rig::image::panics::Panics;
 use serde::Serialize;
 
 use crate::load::{CURRENT_INTERRUPT, SERVO};

@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use scarab::bus::Frame;
+use scarab_base::error::ToolError;
 use scarab_boot::Region;
-use scarab_host::base::error::ToolError;
-use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
-use scarab_host::image::build::{firmware_build, run, target_directory};
+use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_rig::image::build::{firmware_build, run, target_directory};
 use serde::Serialize;
 
 use crate::chip::{Chip, STOP};

@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use scarab::bus::Frame;
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 
 use crate::load::{CURRENT_INTERRUPT, SERVO};
 use crate::machine::{End, Snapshot};

@@ -6,8 +6,8 @@ use std::rc::Rc;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile32, FileHeader, ProgramHeader};
 use object::{Endianness, Object, ObjectSymbol, SymbolKind};
+use scarab_base::error::{FileError, ToolError};
 use scarab_boot::{FLASH, FLASH_BYTES, Region};
-use scarab_host::base::error::{FileError, ToolError};
 
 /// Name of the bootloader's file.
 const BOOTLOADER: &str = "scarab-boot";

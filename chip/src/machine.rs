@@ -18,8 +18,8 @@ mod changes;
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use scarab_base::error::ToolError;
 use scarab_boot::{FLASH, FLASH_BYTES, Region};
-use scarab_host::base::error::ToolError;
 use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode, Prot};
 use unicorn_engine::{ArmCpuModel, RegisterARM as Register, UcHookId, Unicorn};
 

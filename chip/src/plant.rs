@@ -773,7 +773,7 @@ fn turn_freely(axis: &Axis, torque: f64) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::peripherals::pwm::tests::bridge;
-    use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+    use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 
     #[test]
     fn an_edge_at_the_end_of_a_slice_is_not_late() {

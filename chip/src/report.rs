@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use scarab_host::base::error::ToolError;
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::report::{BaseReport, RunReport};
-use scarab_host::rig::options::SimulationOptions;
-use scarab_host::run::identify::identify_one;
-use scarab_host::run::trace::report::run_report;
-use scarab_host::with_leg_size;
+use scarab_base::error::ToolError;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::report::{BaseReport, RunReport};
+use scarab_identify::with_leg_size;
+use scarab_rig::identify::identify_one;
+use scarab_rig::options::SimulationOptions;
+use scarab_rig::traced::report::run_report;
 use serde::Serialize;
 
 use crate::findings::Finding;
@@ -232,7 +232,7 @@ impl ChipReport {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scarab_host::base::number::Number;
+    use scarab_base::number::Number;
     use serde_json::Value;
 
     /// A report in which every list has an entry.

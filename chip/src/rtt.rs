@@ -3,10 +3,10 @@
 //! The image's transport (SEGGER RTT) is a ring buffer in memory: its control block names buffer, size, and
 //! the positions of writer and reader. A probe reads up to the writer's position and moves the reader's.
 
-use scarab_host::base::error::ToolError;
-use scarab_host::formats::trace::Decoder;
-use scarab_host::formats::trace::read::Trace;
-use scarab_host::formats::trace::text;
+use scarab_base::error::ToolError;
+use scarab_rig::trace::Decoder;
+use scarab_rig::trace::read::Trace;
+use scarab_rig::trace::text;
 
 use crate::machine::Machine;
 use crate::time::{Ticks, seconds};

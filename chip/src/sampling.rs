@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 
 use serde::Serialize;
 
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 
 use crate::chip::Sampling;
 use crate::machine::Snapshot;

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 
 use scarab::bus::Frame;
 use scarab::bus::commissioning::{BoardState, StepResult};
-use scarab_host::base::error::ToolError;
-use scarab_host::rig::bus::server::{Server, What};
-use scarab_host::rig::pair::start_position;
+use scarab_base::error::ToolError;
+use scarab_rig::bus::server::{Server, What};
+use scarab_rig::pair::start_position;
 
 use crate::plant::JOINTS;
 use crate::session::Session;

@@ -10,9 +10,9 @@ use scarab::bus::Frame;
 use scarab::bus::commissioning::BoardState;
 use scarab::hal::Contacts;
 use scarab::safety::NoticeCode;
-use scarab_host::base::error::ToolError;
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::rig::pair::start_position;
+use scarab_base::error::ToolError;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_rig::pair::start_position;
 
 use crate::chip::{Chip, ENABLING, START, STATUS_LIGHT};
 use crate::image::Image;

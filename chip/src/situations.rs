@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use scarab::bus::Frame;
-use scarab_host::base::error::ToolError;
-use scarab_host::rig::bus::host::{TARGETS, compact_mapping};
+use scarab_base::error::ToolError;
+use scarab_rig::bus::host::{TARGETS, compact_mapping};
 use serde::Serialize;
 
 use crate::load::{CURRENT, SERVO_NAME};

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 
 use crate::chip::STOP;
 use crate::machine::Snapshot;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 
 use crate::machine::Snapshot;
 use crate::peripherals::flash::Cut;

@@ -10,8 +10,8 @@ use std::fmt::Write as _;
 use crc::{CRC_16_XMODEM, Crc};
 use scarab::bus::Frame;
 use scarab::bus::program::{ProgramCommand, ProgramError, ProgramStatus};
+use scarab_base::error::ToolError;
 use scarab_boot::{HEADER_AT, Region, seal};
-use scarab_host::base::error::ToolError;
 use serde::Serialize;
 
 use crate::machine::Snapshot;

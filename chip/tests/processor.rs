@@ -9,7 +9,7 @@ use scarab_chip::machine::{End, Machine, Options};
 use scarab_chip::peripherals::rcc::ResetReason;
 use scarab_chip::plant::Plant;
 use scarab_chip::time::{TICK_HZ, Ticks, ticks};
-use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 
 const RAM: u32 = 0x2000_0000;
 /// Address of the software trigger of interrupts, of the interrupt enables, and of the priorities.

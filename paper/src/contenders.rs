@@ -34,7 +34,7 @@ use scarab::real::Real;
 use scarab::swarm::{
     Bas, BasSettings, Bso, BsoSettings, InertiaWeight, Objective, Pso, PsoSettings, Search, SwarmError,
 };
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 use serde::{Serialize, Serializer};
 
 use super::problems::MOST_COORDINATES;

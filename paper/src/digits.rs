@@ -1,6 +1,6 @@
 //! Numbers as the paper's tables print them.
 
-use scarab_host::base::number::{self, Number};
+use scarab_base::number::{self, Number};
 
 /// Formats a number with four digits; a dash if unknown.
 #[must_use]

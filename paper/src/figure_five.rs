@@ -9,7 +9,7 @@
 use scarab::swarm::{
     Bas, BasSettings, Bso, BsoSettings, Pso, PsoSettings, Search, SwarmError, TestFunction, TestProblem,
 };
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 use serde_json::Map;
 
 use super::contenders::{Algorithm, SWARM};

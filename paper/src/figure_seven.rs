@@ -9,12 +9,12 @@
 //! printed. The paper's percentages are therefore listed for information only.
 
 use scarab::ident::Plan;
-use scarab_host::base::error::ToolError;
-use scarab_host::base::names::plan_name;
-use scarab_host::base::number::Number;
-use scarab_host::base::shard::Shard;
-use scarab_host::base::table::Table;
-use scarab_host::leg::motions::EXCITATION_CYCLES;
+use scarab_base::error::ToolError;
+use scarab_base::names::plan_name;
+use scarab_base::number::Number;
+use scarab_base::shard::Shard;
+use scarab_base::table::Table;
+use scarab_identify::leg::motions::EXCITATION_CYCLES;
 use serde::Serialize;
 
 use super::chain::{self, ChainOptions, ChainRun, Fit, JOINTS, LEG, NOISE_PERCENT, PLANS, median, predicted};

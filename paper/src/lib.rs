@@ -46,11 +46,11 @@ pub mod table_three;
 pub mod tables_five_six;
 pub mod verification;
 
-use scarab_host::base::error::ToolError;
-use scarab_host::base::shard::Shard;
-use scarab_host::formats::shard::ShardResults;
-use scarab_host::report::SCHEMA;
-use scarab_host::view::figures::Figure;
+use scarab_base::error::ToolError;
+use scarab_base::shard::Shard;
+use scarab_identify::formats::shard::ShardResults;
+use scarab_identify::report::SCHEMA;
+use scarab_tool::view::figures::Figure;
 use serde_json::{Map, Value};
 
 use crate::runs::{PaperRuns, joined};
@@ -91,7 +91,7 @@ impl Part {
         !matches!(self, Self::TableThree | Self::FigureFive)
     }
 
-    /// Name of the part's section in a document ([`scarab_host::view::document`]).
+    /// Name of the part's section in a document ([`scarab_tool::view::document`]).
     #[must_use]
     pub const fn section_name(self) -> &'static str {
         match self {
@@ -128,7 +128,7 @@ impl PaperOptions {
 /// Results of one part.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Name of the section in a document ([`scarab_host::view::document`]).
+    /// Name of the section in a document ([`scarab_tool::view::document`]).
     pub name: &'static str,
     /// Tables and text, Markdown.
     pub markdown: String,

@@ -15,13 +15,13 @@
 use nalgebra::Vector3;
 use scarab::ident::Plan;
 use scarab::model::{INERTIAL_PARAMETERS, Payload, RigidBody};
-use scarab_host::base::error::ToolError;
-use scarab_host::base::number::Number;
-use scarab_host::base::shard::Shard;
-use scarab_host::base::table::Table;
-use scarab_host::formats::leg_file::{LegFile, LinkParameters};
-use scarab_host::leg::setup;
-use scarab_host::report::{BaseReport, RunReport};
+use scarab_base::error::ToolError;
+use scarab_base::number::Number;
+use scarab_base::shard::Shard;
+use scarab_base::table::Table;
+use scarab_identify::formats::leg_file::{LegFile, LinkParameters};
+use scarab_identify::leg::setup;
+use scarab_identify::report::{BaseReport, RunReport};
 use serde::{Deserialize, Serialize};
 
 use super::chain::{self, ChainOptions, Fit, JOINTS, NOISE_PERCENT, ROOM, median};

@@ -4,18 +4,18 @@ use std::process::ExitCode;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use scarab_host::base::error::{EXIT_ACCEPTED, ToolError};
-use scarab_host::base::output;
-use scarab_host::base::shard::Shard;
-use scarab_host::cli::arguments::{Input, Output, OutputFolder, Updated};
-use scarab_host::cli::common::write_json;
-use scarab_host::cli::merge::parsed;
-use scarab_host::cli::perform;
-use scarab_host::formats::shard::{Argument, CampaignHeader, Program, ShardFiles, ShardResults};
-use scarab_host::view::{document, figures};
+use scarab_base::error::{EXIT_ACCEPTED, ToolError};
+use scarab_base::output;
+use scarab_base::shard::Shard;
+use scarab_identify::formats::shard::{Argument, CampaignHeader, Program, ShardFiles, ShardResults};
 use scarab_paper::contenders::Algorithm;
 use scarab_paper::runs::PaperRuns;
 use scarab_paper::{PaperOptions, Part};
+use scarab_tool::cli::arguments::{Input, Output, OutputFolder, Updated};
+use scarab_tool::cli::common::write_json;
+use scarab_tool::cli::merge::parsed;
+use scarab_tool::cli::perform;
+use scarab_tool::view::{document, figures};
 
 /// Limit of the runs.
 const MOST_SEEDS: u64 = 100_000;

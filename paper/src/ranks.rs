@@ -10,11 +10,11 @@ use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::ident::{Factor, RowModel, Smoothed};
 use scarab::model::{BaseParameters, ColumnMask, INERTIAL_PARAMETERS, Parameter};
-use scarab_host::base::error::ToolError;
-use scarab_host::base::names::parameter_name;
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::formats::leg_file::geometry::chain;
-use scarab_host::report::RunReport;
+use scarab_base::error::ToolError;
+use scarab_base::names::parameter_name;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::leg_file::geometry::chain;
+use scarab_identify::report::RunReport;
 use serde::Serialize;
 
 use super::chain::{JOINTS, ROOM};

@@ -5,10 +5,10 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use scarab_host::base::error::ToolError;
-use scarab_host::base::shard::Shard;
-use scarab_host::formats::shard::ShardResults;
-use scarab_host::report::RunReport;
+use scarab_base::error::ToolError;
+use scarab_base::shard::Shard;
+use scarab_identify::formats::shard::ShardResults;
+use scarab_identify::report::RunReport;
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Fit, JOINTS};

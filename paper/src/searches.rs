@@ -6,8 +6,8 @@
 //! same shifts and rotations.
 
 use scarab::real::Real;
-use scarab_host::base::error::ToolError;
-use scarab_host::base::shard::Shard;
+use scarab_base::error::ToolError;
+use scarab_base::shard::Shard;
 
 use super::contenders::{self, Algorithm};
 use super::problems::{CASES, Case};

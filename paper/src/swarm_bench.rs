@@ -9,10 +9,10 @@ use scarab::ident::{
 };
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT};
 use scarab::swarm::{Bso, BsoSettings, Objective};
-use scarab_host::base::error::ToolError;
-use scarab_host::base::words::exact;
-use scarab_host::rig::pair::Context;
-use scarab_host::run::consistent;
+use scarab_base::error::ToolError;
+use scarab_base::words::exact;
+use scarab_identify::run::consistent;
+use scarab_rig::pair::Context;
 use serde::{Deserialize, Serialize};
 
 use super::raw_cost::RawCost;

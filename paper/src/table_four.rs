@@ -1,7 +1,7 @@
 //! Table IV: searches on the test functions, compared with the paper's printed results.
 
-use scarab_host::base::error::ToolError;
-use scarab_host::base::table::Table;
+use scarab_base::error::ToolError;
+use scarab_base::table::Table;
 use serde_json::Map;
 
 use super::contenders::{Algorithm, ITERATIONS};

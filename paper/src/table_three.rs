@@ -12,8 +12,8 @@
 use std::fmt::Write;
 
 use scarab::swarm::{Objective, TestFunction, TestProblem};
-use scarab_host::base::error::ToolError;
-use scarab_host::base::table::Table;
+use scarab_base::error::ToolError;
+use scarab_base::table::Table;
 use serde::Serialize;
 use serde_json::Map;
 

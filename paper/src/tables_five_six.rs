@@ -11,11 +11,11 @@
 //! error/sigma  root mean square over the runs of (value - truth) / sigma, sigma that of each run
 //! ```
 
-use scarab_host::base::error::ToolError;
-use scarab_host::base::number::Number;
-use scarab_host::base::shard::Shard;
-use scarab_host::base::table::Table;
-use scarab_host::report::RunReport;
+use scarab_base::error::ToolError;
+use scarab_base::number::Number;
+use scarab_base::shard::Shard;
+use scarab_base::table::Table;
+use scarab_identify::report::RunReport;
 use serde::Serialize;
 
 use super::chain::{self, ChainOptions, LEG, NOISE_PERCENT, PLANS, median};

@@ -15,9 +15,9 @@ use scarab::motion::gait::{self, GaitJoint};
 use scarab::motion::{Fourier, HARMONICS, MotionError, Periodic, Phase};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::{Radian, Second};
-use scarab_host::base::error::ToolError;
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::leg::setup;
+use scarab_base::error::ToolError;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::leg::setup;
 
 use super::chain::{JOINTS, ROOM};
 

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use scarab::model::{
     AnatomicalJoint, Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, joint_torques, regressor,
 };
-use scarab_host::base::error::ToolError;
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::formats::leg_file::geometry::chain;
-use scarab_host::leg::states::Angles;
+use scarab_base::error::ToolError;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::leg_file::geometry::chain;
+use scarab_identify::leg::states::Angles;
 
 /// States below which one core is faster.
 const LEAST_PARALLEL: usize = 256;

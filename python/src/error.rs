@@ -2,7 +2,7 @@
 
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::{PyErr, create_exception};
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 
 create_exception!(
     scarab_ident,

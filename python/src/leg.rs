@@ -9,27 +9,27 @@ use pyo3::prelude::*;
 use scarab::ident::{Estimator, Plan, prior_parameters};
 use scarab::leg::{LoggedSample, Segment};
 use scarab::model::{INERTIAL_PARAMETERS, LegParameters, PARAMETERS_PER_JOINT, Parameter, Payload};
-use scarab_host::base::error::ToolError;
-use scarab_host::base::files;
-use scarab_host::base::names::parameter_name;
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::formats::leg_file::check::LARGEST_NOISE_PERCENT;
-use scarab_host::formats::recording::Recording;
-use scarab_host::formats::robot::Robot;
-use scarab_host::formats::temperature;
-use scarab_host::leg::from_robot::{self, RobotOptions};
-use scarab_host::leg::placed_mass::PlacedMass;
-use scarab_host::leg::setup::{PriorChoice, links};
-use scarab_host::leg::states::Angles;
-use scarab_host::rig::options::{DriveModel, SimulationOptions};
-use scarab_host::run::excite::assumption::Assumption;
-use scarab_host::run::excite::bench::ExciteOptions;
-use scarab_host::run::excite::design::DesignOptions;
-use scarab_host::run::excite::run::{check, excite};
-use scarab_host::run::identify::recorded;
-use scarab_host::run::replay::{Recordings, ReplayOptions, replay};
-use scarab_host::run::simulate::{SimulatedRun, simulate};
-use scarab_host::with_leg_size;
+use scarab_base::error::ToolError;
+use scarab_base::files;
+use scarab_base::names::parameter_name;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::leg_file::check::LARGEST_NOISE_PERCENT;
+use scarab_identify::formats::recording::Recording;
+use scarab_identify::formats::robot::Robot;
+use scarab_identify::formats::temperature;
+use scarab_identify::leg::from_robot::{self, RobotOptions};
+use scarab_identify::leg::placed_mass::PlacedMass;
+use scarab_identify::leg::setup::{PriorChoice, links};
+use scarab_identify::leg::states::Angles;
+use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
+use scarab_identify::with_leg_size;
+use scarab_rig::excite::assumption::Assumption;
+use scarab_rig::excite::bench::ExciteOptions;
+use scarab_rig::excite::design::DesignOptions;
+use scarab_rig::excite::run::{check, excite};
+use scarab_rig::identify::recorded;
+use scarab_rig::options::{DriveModel, SimulationOptions};
+use scarab_rig::simulate::{SimulatedRun, simulate};
 
 use crate::arrays::{Numbers, Rows, column, finite, shaped, vector};
 use crate::dynamics::{Dynamics, States};
@@ -471,7 +471,8 @@ fn flat_parameters<const N: usize>(leg: &LegFile, of: Option<&str>) -> PyResult<
 }
 
 /// Report and curves of a simulation, and its recordings, the training motion first.
-type Simulated = ((scarab_host::report::RunReport, scarab_host::report::series::Series), Vec<Recording>);
+type Simulated =
+    ((scarab_identify::report::RunReport, scarab_identify::report::series::Series), Vec<Recording>);
 
 fn simulated<const N: usize, const B: usize>(
     leg: &LegFile,

@@ -1,14 +1,14 @@
 //! `scarab_ident._native`: Scarab's model and identification for Python.
 //!
-//! The module converts arrays, calls the functions of `scarab-host` and converts the results. Shapes, units
+//! The module converts arrays, calls the functions of the host crates and converts the results. Shapes, units
 //! and errors of every function are in `scarab_ident/_native.pyi`; `build.rs` takes docstrings from there.
 //!
 //! | Python | Rust |
 //! | --- | --- |
-//! | `Leg` | [`scarab_host::formats::leg_file::LegFile`] |
-//! | `Leg.identify` | [`scarab_host::run::replay`], as `cargo sim replay` |
-//! | `Leg.simulate` | [`scarab_host::run::simulate`], as `cargo sim identify` |
-//! | `Leg.excite` | [`scarab_host::run::excite`], as `cargo sim excite` |
+//! | `Leg` | [`scarab_identify::formats::leg_file::LegFile`] |
+//! | `Leg.identify` | [`scarab_identify::run::replay`], as `cargo sim replay` |
+//! | `Leg.simulate` | [`scarab_rig::simulate`], as `cargo sim identify` |
+//! | `Leg.excite` | [`scarab_rig::excite`], as `cargo sim excite` |
 //! | `beetle_swarm` | [`scarab::swarm::Bso`] |
 
 #![expect(clippy::too_many_arguments, reason = "functions have the keyword arguments of Python")]

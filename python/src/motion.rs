@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
-use scarab_host::base::error::{FileError, ToolError};
-use scarab_host::base::files;
-use scarab_host::formats::excitation::Excitation;
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::formats::motion_samples::{MotionSamples, SampleRate};
-use scarab_host::run::excite::assumption::{Assumption, assumed};
-use scarab_host::run::excite::run::{Excited, check};
-use scarab_host::with_leg_size;
+use scarab_base::error::{FileError, ToolError};
+use scarab_base::files;
+use scarab_identify::formats::excitation::Excitation;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::motion_samples::{MotionSamples, SampleRate};
+use scarab_identify::with_leg_size;
+use scarab_rig::excite::assumption::{Assumption, assumed};
+use scarab_rig::excite::run::{Excited, check};
 
 use crate::arrays::{object, shaped, vector};
 use crate::error::{argument, raised};

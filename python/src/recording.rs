@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
-use scarab_host::formats::recording::dialect::{Decimal, Delimiter};
-use scarab_host::formats::recording::import::{ColumnChoice, Import, UnitChoice};
-use scarab_host::formats::recording::{JointSeries, Read, Recording};
-use scarab_host::run::replay::warnings::of_more_joints;
-use scarab_host::view::tables::reading_notes;
+use scarab_identify::formats::recording::dialect::{Decimal, Delimiter};
+use scarab_identify::formats::recording::import::{ColumnChoice, Import, UnitChoice};
+use scarab_identify::formats::recording::{JointSeries, Read, Recording};
+use scarab_identify::run::replay::warnings::of_more_joints;
+use scarab_tool::view::tables::reading_notes;
 
 use crate::arrays::{Array, Numbers, column, shaped, vector};
 use crate::error::{argument, raised};

@@ -8,7 +8,7 @@ import pytest
 import scarab_ident as si
 from conftest import ROOT
 
-ROBOTS = json.loads((ROOT / "host/tests/data/robots.json").read_text())["robots"]
+ROBOTS = json.loads((ROOT / "host/tool/tests/data/robots.json").read_text())["robots"]
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=[robot["name"] for robot in ROBOTS])

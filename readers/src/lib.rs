@@ -1,7 +1,7 @@
 //! Recordings in Parquet and MCAP files, as columns of numbers.
 //!
 //! Why a crate of its own: these libraries take minutes to compile, and `parquet` is under Apache-2.0 only.
-//! `scarab-host` uses it with the feature `readers`.
+//! `scarab-identify` uses it with the feature `readers`.
 //!
 //! Every file is untrusted. A record or page that claims more than 64 MB is refused before it is decoded, and
 //! the file is read piece by piece. Memory therefore does not grow with the file.

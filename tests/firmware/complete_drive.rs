@@ -1,12 +1,12 @@
 //! A leg identified through its board's current loops, motors and converters, compared with ideal drives.
 
-use scarab_host::base::number::Number;
-use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
-use scarab_host::report::RunReport;
-use scarab_host::rig::options::{DriveModel, SimulationOptions};
-use scarab_host::rig::pair::{Context, Pair};
-use scarab_host::rig::perturb::Perturbation;
-use scarab_host::run::identify::{identify_many, identify_one};
+use scarab_base::number::Number;
+use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_identify::report::RunReport;
+use scarab_rig::identify::{identify_many, identify_one};
+use scarab_rig::options::{DriveModel, SimulationOptions};
+use scarab_rig::pair::{Context, Pair};
+use scarab_rig::perturb::Perturbation;
 
 fn leg() -> LegFile {
     LegFile::load(DEFAULT_LEG).expect("shipped")

@@ -1,9 +1,9 @@
 //! Checks of the architecture: allowed dependencies between modules, and a few rules that no compiler checks.
 //!
-//! A module here is one at the top of `src/` or `host/src/`, or a folder of `src/ident/`. The tables below
-//! are the design's. A change to them is a change of the architecture and belongs in a commit of its own.
-//! Comments do not count as a use, unit tests do. A test that needs more modules than its own may use belongs
-//! in `tests/`.
+//! A module here is one at the top of a crate, or a folder of `src/ident/`. Which crate may use which is in
+//! their manifests. The tables below are the design's. A change to them is a change of the architecture and
+//! belongs in a commit of its own. Comments do not count as a use, unit tests do. A test that needs more
+//! modules than its own may use belongs in `tests/`.
 
 mod tokens;
 
@@ -12,9 +12,6 @@ use std::path::{Path, PathBuf};
 
 use scarab::safety::{FaultCode, NoticeCode};
 use tokens::{Token, tokens};
-
-/// Modules with their allowed dependencies, besides themselves.
-type Table = [(&'static str, &'static [&'static str])];
 
 /// Modules of the firmware; the open ones are allowed to all.
 const FIRMWARE: [(&str, &[&str]); 21] = [
@@ -50,30 +47,45 @@ const IDENT: [(&str, &[&str]); 5] = [
     ("monitor", &["signal", "record", "solve", "judge"]),
 ];
 
-/// Modules of the host tool: each uses only modules above it, so there is no cycle.
-const HOST: [(&str, &[&str]); 11] = [
-    ("base", &[]),
-    ("report", &["base"]),
-    ("formats", &["base", "report"]),
-    ("client", &["base", "formats"]),
-    ("leg", &["base", "formats"]),
-    ("rig", &["base", "formats", "leg"]),
-    ("run", &["base", "report", "formats", "client", "leg", "rig"]),
-    ("image", &["base", "report", "formats", "leg", "rig", "run"]),
-    ("faults", &["base", "report", "formats", "leg", "rig", "run", "image"]),
-    ("view", &["base", "report", "formats"]),
-    ("cli", &["base", "report", "formats", "client", "leg", "rig", "run", "image", "faults", "view"]),
+/// Modules of the host's crates in layers: each uses its own layer and those before it.
+const HOST: [(&str, &[&[&str]]); 4] = [
+    (
+        "host/client/src",
+        &[
+            &["adapter", "slcan", "candump", "alarms", "wire", "report", "activity_words"],
+            &["master", "words"],
+            &["other_hosts"],
+            &["commission", "node_ids", "update"],
+        ],
+    ),
+    ("host/identify/src", &[&["report"], &["formats"], &["leg"], &["run"]]),
+    (
+        "host/rig/src",
+        &[
+            &["image", "kept_file", "trace"],
+            &["board", "faulty_board", "operator", "options", "pair", "perturb", "worn"],
+            &["bus", "excite", "identified"],
+            &["scale", "shaking", "simulate", "watch"],
+            &["assist", "identify", "monitor", "motor"],
+            &["faults", "traced"],
+        ],
+    ),
+    ("host/tool/src", &[&["eds", "excitation_constant", "live"], &["view"], &["cli"]]),
 ];
 
 /// Firmware modules that every other firmware module may use.
 const OPEN: [&str; 5] = ["units", "real", "place", "checksum", "testing"];
 
 /// Source folders of all crates.
-const SOURCES: [&str; 9] = [
+const SOURCES: [&str; 13] = [
     "src",
     "boot/src",
     "hal-sim/src",
-    "host/src",
+    "host/base/src",
+    "host/client/src",
+    "host/identify/src",
+    "host/rig/src",
+    "host/tool/src",
     "paper/src",
     "chip/src",
     "chip/drivers/src",
@@ -114,11 +126,10 @@ const LARGEST_LINE_COUNT: usize = 900;
 #[test]
 fn every_module_uses_only_permitted_modules() {
     let mut offences = Vec::new();
-    for (folder, root, table, open) in [
-        ("src", "crate", &FIRMWARE[..], &OPEN[..]),
-        ("src/ident", "ident", &IDENT, &[]),
-        ("host/src", "crate", &HOST, &[]),
-    ] {
+    for (folder, root, table, open) in
+        [("src", "crate", &FIRMWARE[..], &OPEN[..]), ("src/ident", "ident", &IDENT, &[])]
+    {
+        let modules: Vec<&str> = table.iter().map(|(name, _)| *name).collect();
         for file in source_files(folder) {
             let inside = &file.path[folder.len() + 1..];
             let module = module_of(inside);
@@ -129,7 +140,7 @@ fn every_module_uses_only_permitted_modules() {
                 offences.push(format!("{}: module `{module}` is not in the table", file.path));
                 continue;
             };
-            for used in modules_used(&file.text, module_depth(inside), root, table) {
+            for used in modules_used(&file.text, module_depth(inside), root, &modules) {
                 if used.text != module && !open.contains(&used.text) && !allowed.contains(&used.text) {
                     offences
                         .push(format!("{}:{}: `{module}` may not use `{}`", file.path, used.line, used.text));
@@ -141,22 +152,47 @@ fn every_module_uses_only_permitted_modules() {
 }
 
 #[test]
-fn modules_of_host_and_ident_are_listed_below_those_they_use() {
-    for table in [&HOST[..], &IDENT] {
-        for (place, (module, allowed)) in table.iter().enumerate() {
-            for used in *allowed {
-                let is_above = table[..place].iter().any(|(name, _)| name == used);
-                assert!(is_above, "`{module}` uses `{used}` below it");
-            }
+fn folders_of_ident_are_listed_below_those_they_use() {
+    for (place, (module, allowed)) in IDENT.iter().enumerate() {
+        for used in *allowed {
+            assert!(IDENT[..place].iter().any(|(name, _)| name == used), "`{module}` uses `{used}` below it");
         }
     }
 }
 
 #[test]
+fn modules_of_the_host_use_their_layer_and_those_before_it() {
+    let mut offences = Vec::new();
+    for (folder, layers) in HOST {
+        let modules = layers.concat();
+        for file in source_files(folder) {
+            let inside = &file.path[folder.len() + 1..];
+            let module = module_of(inside);
+            if ["lib", "main"].contains(&module) {
+                continue;
+            }
+            let Some(layer) = layers.iter().position(|layer| layer.contains(&module)) else {
+                offences.push(format!("{}: module `{module}` is not in the table", file.path));
+                continue;
+            };
+            let allowed = layers[..=layer].concat();
+            for used in modules_used(&file.text, module_depth(inside), "crate", &modules) {
+                if !allowed.contains(&used.text) {
+                    offences
+                        .push(format!("{}:{}: `{module}` may not use `{}`", file.path, used.line, used.text));
+                }
+            }
+        }
+    }
+    assert_none(&offences);
+}
+
+#[test]
 fn the_swarm_uses_only_the_maths_module_of_the_crate() {
+    let modules = FIRMWARE.map(|(name, _)| name);
     let mut offences = Vec::new();
     for file in source_files("src/swarm") {
-        for used in modules_used(&file.text, module_depth(&file.path["src/".len()..]), "crate", &FIRMWARE) {
+        for used in modules_used(&file.text, module_depth(&file.path["src/".len()..]), "crate", &modules) {
             if !["swarm", "real"].contains(&used.text) {
                 offences.push(format!("{}:{}: `swarm` may not use `{}`", file.path, used.line, used.text));
             }
@@ -210,9 +246,12 @@ fn only_one_module_of_the_tool_writes_files() {
         ["OpenOptions", "::", "new"],
     ];
     let mut offences = Vec::new();
-    for file in source_files("host/src").into_iter().chain(source_files("paper/src")) {
+    for file in source_files("host").into_iter().chain(source_files("paper/src")) {
+        let is_elsewhere = ["host/base/src/files/", "host/tool/tests/", "host/build.rs"]
+            .iter()
+            .any(|path| file.path.starts_with(path));
         let all = tokens(&file.text);
-        for three in all.windows(3).filter(|_| !file.path.starts_with("host/src/base/files/")) {
+        for three in all.windows(3).filter(|_| !is_elsewhere) {
             let names = [three[0].text, three[1].text, three[2].text];
             if WRITERS.contains(&names) {
                 offences.push(format!("{}:{}: {} outside files/", file.path, three[0].line, names.concat()));
@@ -439,7 +478,10 @@ fn no_file_names_a_path_of_one_machine() {
 #[test]
 fn a_use_is_found_in_groups_paths_and_through_super() {
     let used = |source: &str, depth| -> Vec<String> {
-        modules_used(source, depth, "crate", &FIRMWARE).iter().map(|token| token.text.to_owned()).collect()
+        modules_used(source, depth, "crate", &FIRMWARE.map(|(name, _)| name))
+            .iter()
+            .map(|token| token.text.to_owned())
+            .collect()
     };
     assert_eq!(
         used("use crate::{leg::Leg, model::{chain, servo as s}, swarm};", 1),
@@ -457,7 +499,10 @@ fn a_use_is_found_in_groups_paths_and_through_super() {
 #[test]
 fn uses_inside_ident_are_found_by_folder_and_by_item() {
     let used = |source: &str, depth| -> Vec<String> {
-        modules_used(source, depth, "ident", &IDENT).iter().map(|token| token.text.to_owned()).collect()
+        modules_used(source, depth, "ident", &IDENT.map(|(name, _)| name))
+            .iter()
+            .map(|token| token.text.to_owned())
+            .collect()
     };
     assert_eq!(used("use crate::ident::{judge::verdict, solve}; use crate::model;", 2), ["judge", "solve"]);
     assert_eq!(used("use crate::{ident::record::rows::Ends, leg};", 2), ["record"]);
@@ -549,8 +594,8 @@ fn module_depth(inside: &str) -> usize {
     inside.split('/').count() - usize::from(inside.ends_with("/mod.rs"))
 }
 
-/// Every module of `table` that a file at `depth` names below `root`, by `root::` or by enough `super::`.
-fn modules_used<'a>(source: &'a str, depth: usize, root: &str, table: &Table) -> Vec<Token<'a>> {
+/// Every one of these modules that a file at `depth` names below `root`, by `root::` or by enough `super::`.
+fn modules_used<'a>(source: &'a str, depth: usize, root: &str, modules: &[&str]) -> Vec<Token<'a>> {
     let all = tokens(source);
     let mut used = named_below(&all, root);
     for start in 0..all.len() {
@@ -567,7 +612,7 @@ fn modules_used<'a>(source: &'a str, depth: usize, root: &str, table: &Table) ->
     // everything and always counts. An item that `ident` re-exports may come from any of its folders,
     // so every name below `ident` counts.
     if root == "crate" {
-        used.retain(|name| name.text == "*" || table.iter().any(|(module, _)| *module == name.text));
+        used.retain(|name| name.text == "*" || modules.contains(&name.text));
     }
     used
 }

@@ -5,10 +5,10 @@ use std::rc::Rc;
 use scarab::bus::Frame;
 use scarab::leg::Mode;
 use scarab::safety::FaultCode;
-use scarab_host::base::error::ToolError;
-use scarab_host::base::random::Random;
-use scarab_host::faults::bench::hostile::{frame, malformed};
-use scarab_host::rig::bus::host::TARGETS;
+use scarab_base::error::ToolError;
+use scarab_base::random::Random;
+use scarab_rig::bus::host::TARGETS;
+use scarab_rig::faults::bench::hostile::{frame, malformed};
 
 use crate::faults::{DAMP_S, Machines, Verdict, begin, jitter};
 use crate::machine::Snapshot;

@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use scarab::safety::RANGE_TOLERANCE;
-use scarab_host::base::error::ToolError;
-use scarab_host::base::random::Random;
-use scarab_host::rig::board::axis_configuration;
-use scarab_host::rig::options::SimulationOptions;
-use scarab_host::rig::pair::Context;
+use scarab_base::error::ToolError;
+use scarab_base::random::Random;
+use scarab_rig::board::axis_configuration;
+use scarab_rig::options::SimulationOptions;
+use scarab_rig::pair::Context;
 
 use crate::crashes::{self, CrashKind};
 use crate::faults::{Expected, Machines, Verdict, begin, judge, watch};

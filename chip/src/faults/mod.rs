@@ -19,7 +19,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 
 use crate::chip::Chip;
 use crate::machine::Snapshot;

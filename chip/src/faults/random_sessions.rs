@@ -1,13 +1,13 @@
-//! B7: random host sessions, those of the host's campaign (`scarab_host::faults::random_hosts`)
+//! B7: random host sessions, those of the host's campaign (`scarab_rig::faults::random_hosts`)
 //! on a leg that its operator has enabled.
 
 use std::collections::VecDeque;
 
 use scarab::bus::Frame;
 use scarab::hal::{Contacts, SERVO_RATE_HZ};
-use scarab_host::base::error::ToolError;
-use scarab_host::base::random::Random;
-use scarab_host::faults::random_hosts::{
+use scarab_base::error::ToolError;
+use scarab_base::random::Random;
+use scarab_rig::faults::random_hosts::{
     HostSession, HostedLeg, JointBounds, LegState, check_session, is_like,
 };
 

@@ -3,8 +3,8 @@
 use std::rc::Rc;
 
 use scarab::bus::Frame;
-use scarab_host::base::error::ToolError;
-use scarab_host::base::random::Random;
+use scarab_base::error::ToolError;
+use scarab_base::random::Random;
 
 use crate::chip::LostTriggers;
 use crate::faults::{Machines, PERIOD_S, Verdict, begin, jitter};

@@ -5,10 +5,10 @@ use std::rc::Rc;
 use scarab::leg::{DriveState, Fingerprint};
 use scarab::safety::{InhibitReason, NoticeCode};
 use scarab::store::{Key, ModelRecord};
-use scarab_host::base::error::ToolError;
-use scarab_host::base::random::Random;
-use scarab_host::faults::bench::kept::{corrupt, identified, readable, window, worn};
-use scarab_host::formats::kept_file::memory::Memory;
+use scarab_base::error::ToolError;
+use scarab_base::random::Random;
+use scarab_rig::faults::bench::kept::{corrupt, identified, readable, window, worn};
+use scarab_rig::kept_file::memory::Memory;
 
 use crate::faults::{DAMP_S, Machines, Verdict, begin};
 use crate::machine::Snapshot;

@@ -1,6 +1,6 @@
 //! E3, E5: encoders that start at another count, and motors that are wired wrongly, from the calibration on.
 
-use scarab_host::base::error::ToolError;
+use scarab_base::error::ToolError;
 
 use hal_sim::drive::description::{AxisDescription, EncoderWiring};
 

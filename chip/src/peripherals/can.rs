@@ -9,7 +9,7 @@
 use std::collections::VecDeque;
 
 use scarab::bus::Frame;
-use scarab_host::rig::bus::wire;
+use scarab_client::wire;
 
 use crate::findings::{Access, NO_REGISTER, NOT_MODELLED};
 use crate::time::{NEVER, TICK_HZ, Ticks};

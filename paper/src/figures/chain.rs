@@ -5,12 +5,12 @@ use plotters::element::{Circle, EmptyElement, PathElement, Rectangle};
 use plotters::series::PointSeries;
 use plotters::style::text_anchor::HPos;
 use plotters::style::{Color, ShapeStyle};
-use scarab_host::base::error::ToolError;
-use scarab_host::view::figures::canvas::{
+use scarab_base::error::ToolError;
+use scarab_tool::view::figures::canvas::{
     Area, Axes, DARK, DrawingError, Key, LEFT, PALE, SHADE, VERMILION, axes, legend, line, px, range, render,
     symmetric, text,
 };
-use scarab_host::view::figures::{Figure, Group, WIDTH, curve};
+use scarab_tool::view::figures::{Figure, Group, WIDTH, curve};
 
 /// Heights of title with legend, and of a joint; pixels.
 const HEAD: i32 = 58;

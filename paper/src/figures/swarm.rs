@@ -12,12 +12,12 @@ use plotters::series::DashedLineSeries;
 use plotters::style::text_anchor::HPos;
 use plotters::style::{Color, RGBColor, ShapeStyle};
 use scarab::swarm::{Objective, TestProblem};
-use scarab_host::base::error::ToolError;
-use scarab_host::view::figures::canvas::{
+use scarab_base::error::ToolError;
+use scarab_tool::view::figures::canvas::{
     Area, Axes, BLUE, Chart, DARK, DrawingError, GREEN, GRID, Key, LEFT, VERMILION, axes, font, legend, line,
     px, render, text,
 };
-use scarab_host::view::figures::{Figure, Group, WIDTH};
+use scarab_tool::view::figures::{Figure, Group, WIDTH};
 
 /// Heights of the contour maps, the curves, and title with legend; pixels.
 const MAPS: u32 = 420;
@@ -227,7 +227,7 @@ fn trace(area: &Area<'_>, walks: &[Walk]) -> Result<(), DrawingError> {
         &area,
         &Axes {
             x: 0.0..settled,
-            y: scarab_host::view::figures::canvas::range(values.iter()),
+            y: scarab_tool::view::figures::canvas::range(values.iter()),
             x_label: "iterations",
             y_label: "x, y",
             x_ticks: 5,

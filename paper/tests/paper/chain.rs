@@ -3,7 +3,7 @@
 //!
 //! Few runs each: the claims must hold for every run.
 
-use scarab_host::base::shard::Shard;
+use scarab_base::shard::Shard;
 use scarab_paper::printed::{TABLE_FIVE, TABLE_SIX};
 use scarab_paper::{convergence, figure_seven, load_change, tables_five_six};
 

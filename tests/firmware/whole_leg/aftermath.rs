@@ -1,7 +1,7 @@
 //! A refused, aborted or overtaken identification has no lasting effect.
 
 use scarab::safety::PowerRequest;
-use scarab_host::formats::leg_file::StribeckFile;
+use scarab_identify::formats::leg_file::StribeckFile;
 
 use super::*;
 

@@ -1,10 +1,10 @@
 //! Legs that differ from the firmware's assumptions, and moving wearers.
 
 use scarab::ident::Reason;
-use scarab_host::base::number::Number;
-use scarab_host::formats::leg_file::PushesFile;
-use scarab_host::report::RunReport;
-use scarab_host::run::simulate::simulate;
+use scarab_base::number::Number;
+use scarab_identify::formats::leg_file::PushesFile;
+use scarab_identify::report::RunReport;
+use scarab_rig::simulate::simulate;
 
 use super::*;
 

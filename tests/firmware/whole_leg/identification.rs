@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use scarab_host::formats::leg_file::LegFile;
-use scarab_host::formats::recording::Recording;
-use scarab_host::formats::recording::import::Import;
-use scarab_host::report::RunReport;
-use scarab_host::rig::options::SimulationOptions;
-use scarab_host::run::identify::identify_one;
-use scarab_host::run::replay::{Recordings, ReplayOptions, replay};
-use scarab_host::run::simulate::simulate;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::recording::Recording;
+use scarab_identify::formats::recording::import::Import;
+use scarab_identify::report::RunReport;
+use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
+use scarab_rig::identify::identify_one;
+use scarab_rig::options::SimulationOptions;
+use scarab_rig::simulate::simulate;
 
 use super::*;
 
@@ -19,9 +19,8 @@ fn run(seed: u64) -> RunReport {
 
 /// Errors of the base parameters in reported standard deviations.
 fn errors_in_sigma(report: &RunReport) -> Vec<(String, f64)> {
-    let error = |base: &scarab_host::report::BaseReport| {
-        let known =
-            |number: scarab_host::base::number::Number| number.known().expect("determined and simulated");
+    let error = |base: &scarab_identify::report::BaseReport| {
+        let known = |number: scarab_base::number::Number| number.known().expect("determined and simulated");
         (base.name.clone(), (known(base.value) - known(base.truth)) / known(base.sigma))
     };
     report.base_parameters.iter().map(error).collect()

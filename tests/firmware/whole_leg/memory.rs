@@ -5,7 +5,7 @@ use std::mem::size_of;
 use scarab::ident::record::window::{NUMBERS, Window};
 use scarab::ident::{Estimate, HeldOut, Record, Recorder, RowFilter, Solver, SwarmSearch};
 use scarab::leg::{Control, Identification, Leg, ModelMonitor};
-use scarab_host::rig::pair::{PENDING, TAPS};
+use scarab_rig::pair::{PENDING, TAPS};
 
 use super::*;
 

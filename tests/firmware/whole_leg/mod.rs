@@ -23,9 +23,9 @@ use scarab::ident::Verdict;
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase, Step};
 use scarab::model::planar::{BASE, JOINTS};
 use scarab::safety::DriveState;
-use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
-use scarab_host::rig::options::SimulationOptions;
-use scarab_host::rig::pair;
+use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_rig::options::SimulationOptions;
+use scarab_rig::pair;
 
 type Pair = pair::Pair<JOINTS, BASE>;
 type Context = pair::Context<JOINTS, BASE>;

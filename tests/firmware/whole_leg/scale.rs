@@ -5,9 +5,10 @@ use nalgebra::Vector3;
 use scarab::leg::{IdentifiedModel, LoggedSample};
 use scarab::model::Payload;
 use scarab::servo::TorqueModel;
-use scarab_host::formats::leg_file::BodySide;
-use scarab_host::leg::posture::on_side;
-use scarab_host::run::scale::{Corrected, Scale};
+use scarab_identify::formats::leg_file::BodySide;
+use scarab_identify::leg::posture::on_side;
+use scarab_identify::run::scale::Scale;
+use scarab_rig::scale::{self, Corrected};
 
 use super::*;
 
@@ -48,13 +49,13 @@ fn corrected(
     let scale = second_run(&run.pair, &ON_THE_KNEE, stated);
     let identification = run.pair.leg.identification();
     let solver = identification.solver().expect("solved");
-    let corrected = scale.corrected(context(), solver, identification.validation(), &run.log);
+    let corrected = scale::corrected(&scale, context(), solver, identification.validation(), &run.log);
     (scale, corrected)
 }
 
 /// Second run with a mass `carried` on the leg and a mass `stated` to the firmware.
 fn second_run(pair: &Pair, carried: &Payload<f64>, stated: &Payload<f64>) -> Scale<JOINTS, BASE> {
-    Scale::find_with(context(), pair, carried, stated).expect("the drive holds 5 kg")
+    scale::find_with(context(), pair, carried, stated).expect("the drive holds 5 kg")
 }
 
 fn true_base() -> [f64; BASE] {

@@ -1,0 +1,329 @@
+//! Tables, with three renderers: plain text, HTML and Markdown.
+//!
+//! A column states once what its cells are and whether it is shown; a row gives one cell per column. Cells
+//! are plain text; HTML typesets minus signs and units.
+
+use maud::{Markup, Render, html};
+use unicode_width::UnicodeWidthStr;
+
+/// Least width of a Markdown column: its rule needs three characters.
+const LEAST_RULE: usize = 3;
+
+/// Content of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// Name of the row.
+    Label,
+    Text,
+    /// Aligned to the right.
+    Number,
+    Unit,
+}
+
+#[derive(Clone, Debug)]
+struct Column {
+    head: String,
+    kind: Kind,
+    /// Style of the cells in HTML.
+    class: Option<&'static str>,
+    is_shown: bool,
+    is_html_only: bool,
+}
+
+/// Cell of a table.
+#[derive(Clone, Debug)]
+pub enum Cell {
+    /// Words or a number.
+    Text(String),
+    /// Words, and the markup that HTML shows instead.
+    Html(String, Markup),
+}
+
+impl Cell {
+    /// Words with numbers, whose minus signs HTML typesets.
+    #[must_use]
+    pub fn typeset(text: String) -> Self {
+        let markup = typeset(&text).render();
+        Self::Html(text, markup)
+    }
+
+    fn text(&self) -> &str {
+        match self {
+            Self::Text(text) | Self::Html(text, _) => text,
+        }
+    }
+}
+
+impl From<Markup> for Cell {
+    fn from(markup: Markup) -> Self {
+        Self::Html(String::new(), markup)
+    }
+}
+
+macro_rules! plain_cells {
+    ($($type:ty),*) => {$(
+        impl From<$type> for Cell {
+            fn from(value: $type) -> Self {
+                Self::Text(value.to_string())
+            }
+        }
+    )*};
+}
+plain_cells!(String, &String, &str, usize, u32, u64);
+
+/// Cells of one row, each of its own type.
+#[macro_export]
+macro_rules! cells {
+    ($($cell:expr),* $(,)?) => { [$($crate::table::Cell::from($cell)),*] };
+}
+pub use cells;
+
+#[derive(Clone, Debug)]
+struct Row {
+    is_failed: bool,
+    cells: Vec<Cell>,
+}
+
+/// A table; see the module.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    class: Option<&'static str>,
+    columns: Vec<Column>,
+    rows: Vec<Row>,
+}
+
+impl Table {
+    /// Table with a style in HTML.
+    #[must_use]
+    pub fn of_class(class: &'static str) -> Self {
+        Self { class: Some(class), ..Self::default() }
+    }
+
+    fn columns<H: Into<String>>(mut self, kind: Kind, heads: impl IntoIterator<Item = H>) -> Self {
+        let class = (kind == Kind::Number).then_some("n");
+        let column = |head: H| Column { head: head.into(), kind, class, is_shown: true, is_html_only: false };
+        self.columns.extend(heads.into_iter().map(column));
+        self
+    }
+
+    /// Adds a column with the names of the rows.
+    #[must_use]
+    pub fn label(self, head: impl Into<String>) -> Self {
+        self.columns(Kind::Label, [head])
+    }
+
+    /// Adds columns of words.
+    #[must_use]
+    pub fn text(self, heads: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.columns(Kind::Text, heads)
+    }
+
+    /// Adds columns of numbers.
+    #[must_use]
+    pub fn numbers(self, heads: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.columns(Kind::Number, heads)
+    }
+
+    /// Adds columns of numbers that are shown under a condition; rows have their cells in any case.
+    #[must_use]
+    pub fn numbers_if(mut self, is_shown: bool, heads: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        let before = self.columns.len();
+        self = self.numbers(heads);
+        self.columns[before..].iter_mut().for_each(|column| column.is_shown = is_shown);
+        self
+    }
+
+    /// Adds a column of units.
+    #[must_use]
+    pub fn unit(self) -> Self {
+        self.columns(Kind::Unit, ["unit"])
+    }
+
+    /// Shows the last column in HTML only.
+    #[must_use]
+    pub fn html_only(mut self) -> Self {
+        if let Some(column) = self.columns.last_mut() {
+            column.is_html_only = true;
+        }
+        self
+    }
+
+    /// Style of the last column's cells in HTML.
+    #[must_use]
+    pub fn styled(mut self, class: &'static str) -> Self {
+        if let Some(column) = self.columns.last_mut() {
+            column.class = Some(class);
+        }
+        self
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = impl Into<Cell>>) {
+        self.marked_row(false, cells);
+    }
+
+    /// Adds a row that HTML marks if it failed.
+    pub fn marked_row(&mut self, is_failed: bool, cells: impl IntoIterator<Item = impl Into<Cell>>) {
+        self.rows.push(Row { is_failed, cells: cells.into_iter().map(Into::into).collect() });
+    }
+
+    /// Whether the table has no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Renders plain text: the header, then one line per row.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let columns = self.widths(0);
+        let mut text = String::new();
+        for cells in self.lines() {
+            let padded =
+                cells.iter().zip(&columns).map(|(cell, column)| format!(" {} ", padded(cell, *column)));
+            text += padded.collect::<String>().trim_end();
+            text.push('\n');
+        }
+        text
+    }
+
+    /// Renders Markdown with aligned columns, which a terminal shows well too.
+    #[must_use]
+    pub fn to_markdown(&self) -> String {
+        let columns = self.widths(LEAST_RULE);
+        let rule = |(kind, width): &(Kind, usize)| match kind {
+            Kind::Number => format!("{}:", "-".repeat(width - 1)),
+            _ => "-".repeat(*width),
+        };
+        let rules: Vec<String> = columns.iter().map(rule).collect();
+        let mut lines = self.lines();
+        lines.insert(1, rules.iter().map(String::as_str).collect());
+        let line = |cells: Vec<&str>| {
+            let padded =
+                cells.iter().zip(&columns).map(|(cell, column)| format!("| {} ", padded(cell, *column)));
+            padded.collect::<String>() + "|\n"
+        };
+        lines.into_iter().map(line).collect()
+    }
+
+    /// Renders HTML; without a header if all heads are empty.
+    #[must_use]
+    pub fn to_html(&self) -> Markup {
+        let shown = || self.columns.iter().filter(|column| column.is_shown);
+        html! {
+            div.wide { table class=[self.class] {
+                @if shown().any(|column| !column.head.is_empty()) {
+                    thead { tr { @for column in shown() {
+                        th class=[(column.kind == Kind::Number).then_some("n")] scope="col" { (column.head) }
+                    } } }
+                }
+                tbody { @for row in &self.rows {
+                    tr class=[row.is_failed.then_some("failed")] {
+                        @for (column, cell) in self.columns.iter().zip(&row.cells).filter(|(column, _)| column.is_shown) {
+                            @if column.kind == Kind::Label { th scope="row" { (markup(column.kind, cell)) } }
+                            @else { td class=[column.class] { (markup(column.kind, cell)) } }
+                        }
+                    }
+                } }
+            } }
+        }
+    }
+
+    /// Columns of a text, with their places.
+    fn of_text(&self) -> impl Iterator<Item = (usize, &Column)> {
+        self.columns.iter().enumerate().filter(|(_, column)| column.is_shown && !column.is_html_only)
+    }
+
+    /// Texts of header and rows; a missing cell is empty.
+    fn lines(&self) -> Vec<Vec<&str>> {
+        let heads = self.of_text().map(|(_, column)| column.head.as_str()).collect();
+        let cells = |row| self.of_text().map(|(place, _)| cell(row, place)).collect();
+        core::iter::once(heads).chain(self.rows.iter().map(cells)).collect()
+    }
+
+    /// Kind and width of each column of a text.
+    fn widths(&self, least: usize) -> Vec<(Kind, usize)> {
+        let width = |(place, column): (usize, &Column)| {
+            let cells = self.rows.iter().map(|row| cell(row, place).width());
+            (column.kind, cells.fold(column.head.width().max(least), usize::max))
+        };
+        self.of_text().map(width).collect()
+    }
+}
+
+fn cell(row: &Row, place: usize) -> &str {
+    row.cells.get(place).map_or("", Cell::text)
+}
+
+/// Fills a cell up to the width of its column.
+fn padded(cell: &str, (kind, width): (Kind, usize)) -> String {
+    let space = " ".repeat(width.saturating_sub(cell.width()));
+    if kind == Kind::Number { space + cell } else { cell.to_owned() + &space }
+}
+
+fn markup(kind: Kind, cell: &Cell) -> Markup {
+    match (kind, cell) {
+        (_, Cell::Html(_, markup)) => markup.clone(),
+        (Kind::Number, Cell::Text(text)) => typeset(text).render(),
+        (Kind::Unit, Cell::Text(text)) => text.replace("m2", "m\u{b2}").replace(' ', "\u{a0}").render(),
+        (_, Cell::Text(text)) => text.render(),
+    }
+}
+
+/// Gives digits a true minus sign; an unknown number becomes a dash.
+#[must_use]
+pub fn typeset(digits: &str) -> String {
+    match digits {
+        "-" => "\u{2013}".into(),
+        known => known.replace('-', "\u{2212}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        let mut table = Table::of_class("c")
+            .label("name")
+            .numbers(["value"])
+            .numbers_if(false, ["hidden"])
+            .unit()
+            .text(["bar"])
+            .html_only()
+            .text(["why"])
+            .styled("words");
+        table.row(cells!["a<b", "-1.5", "x", "kg m2", html! { b { "!" } }, ""]);
+        table.marked_row(true, cells!["\u{817f}", 20_u32, "x", "N m", html! {}, "so-so"]);
+        table
+    }
+
+    #[test]
+    fn one_table_is_rendered_as_text_markdown_and_html() {
+        assert_eq!(
+            table().to_text(),
+            " name  value  unit   why\n a<b    -1.5  kg m2\n \u{817f}       20  N m    so-so\n"
+        );
+        assert_eq!(
+            table().to_markdown(),
+            "| name | value | unit  | why   |\n| ---- | ----: | ----- | ----- |\n| a<b  |  -1.5 | kg m2 |       |\n\
+             | \u{817f}   |    20 | N m   | so-so |\n"
+        );
+        assert_eq!(
+            table().to_html().into_string(),
+            "<div class=\"wide\"><table class=\"c\"><thead><tr><th scope=\"col\">name</th>\
+             <th class=\"n\" scope=\"col\">value</th><th scope=\"col\">unit</th><th scope=\"col\">bar</th>\
+             <th scope=\"col\">why</th></tr></thead><tbody><tr><th scope=\"row\">a&lt;b</th>\
+             <td class=\"n\">\u{2212}1.5</td><td>kg\u{a0}m\u{b2}</td><td><b>!</b></td><td class=\"words\"></td></tr>\
+             <tr class=\"failed\"><th scope=\"row\">\u{817f}</th><td class=\"n\">20</td><td>N\u{a0}m</td><td></td>\
+             <td class=\"words\">so-so</td></tr></tbody></table></div>"
+        );
+    }
+
+    #[test]
+    fn a_table_without_heads_has_no_header_in_html() {
+        let mut table = Table::default().label("").text([""]);
+        table.row(["key", "value"]);
+        assert!(!table.to_html().into_string().contains("thead"));
+    }
+}

@@ -1,0 +1,436 @@
+//! CANopen master of a host: frames through an slcan adapter, network management and SDO transfers.
+//!
+//! | part | content |
+//! | --- | --- |
+//! | [`crate::adapter`] | line to an adapter |
+//! | [`Client`] | reads and writes objects of nodes, and keeps their emergency messages |
+//!
+//! Source: CiA 301, SDO. Values of up to four bytes are transferred at once, longer ones are read in segments
+//! and written in blocks.
+
+use std::io::{BufReader, Write};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crc::{CRC_16_XMODEM, Crc};
+use scarab::bus::{Abort, Frame};
+use scarab_base::error::ToolError;
+use scarab_base::output::printable;
+
+use crate::adapter::Adapter;
+use crate::slcan::{self, BELL, LONGEST_LINE, next_line};
+
+/// Longest wait for an answer; a board that erases a sector of a new image is silent for up to 2 s.
+const PATIENCE: Duration = Duration::from_secs(6);
+/// Time after which a request is repeated.
+const REPEAT: Duration = Duration::from_secs(1);
+/// Frames between reader and client.
+const MOST_WAITING: usize = 4096;
+/// Longest value that is read, in bytes.
+const MOST_BYTES: usize = 4096;
+/// Number of identifiers.
+const IDENTIFIERS: usize = 0x800;
+/// Bytes of a segment.
+const SEGMENT: usize = 7;
+const REQUEST: u16 = 0x600;
+const ANSWER: u16 = 0x580;
+const EMERGENCY: u16 = 0x80;
+/// COB-IDs of the layer setting services.
+const LSS: [u16; 2] = [0x7E5, 0x7E4];
+/// Node-ID of this host, and interval of its heartbeats.
+pub const HOST: u8 = 0x70;
+const HEARTBEAT: Duration = Duration::from_millis(100);
+/// Frame of a heartbeat: operational.
+const ALIVE: (u16, u8) = (0x700, 5);
+
+/// Object of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Object(pub u16, pub u8);
+
+/// Emergency message of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Emergency {
+    /// Node-ID.
+    pub node: u8,
+    /// Error code; 0 when the error has ended.
+    pub code: u16,
+    /// Bytes behind the error register; those of a short message are 0.
+    pub information: [u8; 5],
+}
+
+/// Connection to the nodes of a bus.
+pub struct Client {
+    /// Shared with the heartbeats.
+    line: Arc<Mutex<Adapter>>,
+    frames: Receiver<Result<Frame, String>>,
+    emergencies: Vec<Emergency>,
+    /// Identifiers that were received; an adapter does not return this client's own frames.
+    heard: Box<[bool; IDENTIFIERS]>,
+}
+
+/// Why a request failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RequestError {
+    /// The node aborted the transfer with this code.
+    Aborted(u32),
+    /// The node did not answer.
+    Silent,
+    /// The value has no end.
+    Endless,
+    /// The adapter failed.
+    Adapter(String),
+}
+
+impl RequestError {
+    /// Whether the node aborted for this reason.
+    #[must_use]
+    pub fn is(&self, abort: Abort) -> bool {
+        *self == Self::Aborted(abort.code())
+    }
+
+    /// Error of the bus as a whole.
+    #[must_use]
+    pub fn of_bus(self) -> ToolError {
+        match self {
+            Self::Adapter(why) => ToolError::input(format!(
+                "--slcan: {why}; run the command again once the bus is free and its boards answer"
+            )),
+            Self::Silent | Self::Endless | Self::Aborted(_) => ToolError::input("no answer on the bus"),
+        }
+    }
+
+    /// Error with the node and the object.
+    #[must_use]
+    pub fn of(self, node: u8, Object(index, sub): Object) -> ToolError {
+        let why = match self {
+            Self::Aborted(code) => format!("refused with abort code {code:08X}"),
+            Self::Silent => format!(
+                "no answer within {} s: is the board powered, the bit rate right, the bus terminated? `node-ids` lists the boards",
+                PATIENCE.as_secs()
+            ),
+            Self::Endless => {
+                format!("the value has more than {MOST_BYTES} bytes: this is no node of a Scarab board")
+            }
+            Self::Adapter(why) => return Self::Adapter(why).of_bus(),
+        };
+        ToolError::input(format!("node {node}, object {index:04X}:{sub}: {why}"))
+    }
+}
+
+impl Client {
+    /// Takes over an adapter with an open channel.
+    ///
+    /// # Errors
+    /// Those of the operating system.
+    pub fn new(line: Adapter) -> Result<Self, ToolError> {
+        let reader = line.try_clone().map_err(|error| ToolError::input(format!("--slcan: {error}")))?;
+        let (give, frames) = sync_channel(MOST_WAITING);
+        thread::spawn(move || {
+            let mut reader = BufReader::new(reader);
+            while let Some(line) = next_line(&mut reader, &[b'\r', BELL[0]]).transpose() {
+                let decoded = match line {
+                    Ok(line) if line.len() == LONGEST_LINE => Err(format!(
+                        "the adapter sends a line of {LONGEST_LINE} bytes or more, which is no frame"
+                    )),
+                    Ok(line) => slcan::decode(&String::from_utf8_lossy(&line)),
+                    Err(error) => Err(error.to_string()),
+                };
+                let ends = decoded.is_err();
+                if let Some(found) = decoded.transpose()
+                    && (give.send(found).is_err() || ends)
+                {
+                    return;
+                }
+            }
+            let _ = give.send(Err("the adapter closed the connection".into()));
+        });
+        let heard = Box::new([false; IDENTIFIERS]);
+        Ok(Self { line: Arc::new(Mutex::new(line)), frames, emergencies: Vec::new(), heard })
+    }
+
+    /// Whether a frame with this identifier was received.
+    #[must_use]
+    pub fn has_heard(&self, identifier: u16) -> bool {
+        self.heard.get(usize::from(identifier)).is_some_and(|heard| *heard)
+    }
+
+    /// Sends a frame.
+    ///
+    /// # Errors
+    /// The adapter failed.
+    pub fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
+        send(&self.line, frame).map_err(|error| RequestError::Adapter(error.to_string()))
+    }
+
+    /// Sends heartbeats from now on, as long as this client exists: nodes that watch it (1016) stop when the
+    /// process ends.
+    pub fn begin_heartbeats(&self) {
+        let line: Weak<Mutex<Adapter>> = Arc::downgrade(&self.line);
+        let (identifier, operational) = ALIVE;
+        let alive = Frame::new(identifier + u16::from(HOST), &[operational]);
+        thread::spawn(move || {
+            while let Some(line) = line.upgrade() {
+                if send(&line, &alive).is_err() {
+                    return;
+                }
+                drop(line);
+                thread::sleep(HEARTBEAT);
+            }
+        });
+    }
+
+    /// Receives frames for a time, or until one is wanted.
+    fn receive(
+        &mut self,
+        until: Instant,
+        wanted: impl Fn(&Frame) -> bool,
+    ) -> Result<Option<Frame>, RequestError> {
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            let frame = match self.frames.recv_timeout(left) {
+                Ok(Ok(frame)) => frame,
+                Ok(Err(why)) => return Err(RequestError::Adapter(why)),
+                Err(RecvTimeoutError::Timeout) => return Ok(None),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(RequestError::Adapter("the adapter closed the connection".into()));
+                }
+            };
+            if let Some(heard) = self.heard.get_mut(usize::from(frame.id())) {
+                *heard = true;
+            }
+            if let (0x81..=0xFF, [low, high, rest @ ..]) = (frame.id(), frame.data()) {
+                let mut information = [0; 5];
+                for (to, from) in information.iter_mut().zip(rest.iter().skip(1)) {
+                    *to = *from;
+                }
+                let (node, code) = ((frame.id() - EMERGENCY) as u8, u16::from_le_bytes([*low, *high]));
+                self.emergencies.push(Emergency { node, code, information });
+            }
+            if wanted(&frame) {
+                return Ok(Some(frame));
+            }
+        }
+    }
+
+    /// Waits, and keeps emergency messages.
+    ///
+    /// # Errors
+    /// The adapter failed.
+    pub fn wait(&mut self, time: Duration) -> Result<(), RequestError> {
+        self.receive(Instant::now() + time, |_| false).map(drop)
+    }
+
+    /// Takes the emergency messages since the last call.
+    pub fn take_emergencies(&mut self) -> Vec<Emergency> {
+        std::mem::take(&mut self.emergencies)
+    }
+
+    /// Sends a request, repeatedly if it is not answered.
+    fn ask(&mut self, node: u8, request: [u8; 8], object: Option<Object>) -> Result<[u8; 8], RequestError> {
+        // A late answer to an earlier request.
+        self.receive(Instant::now(), |_| false)?;
+        let end = Instant::now() + PATIENCE;
+        while Instant::now() < end {
+            self.send(&Frame::new(REQUEST + u16::from(node), &request))?;
+            let answers = |frame: &Frame| {
+                let data = frame.data();
+                let named = |Object(index, sub): Object| {
+                    data.get(1..4) == Some(&[index as u8, (index >> 8) as u8, sub])
+                };
+                // An abort, or the answer to this kind of request: segment, upload, download.
+                let kind = data.first().map(|command| command >> 5);
+                let expected = match request[0] >> 5 {
+                    3 => 0,
+                    2 => 2,
+                    6 => 5,
+                    _ => 3,
+                };
+                let answers = kind == Some(4) || kind == Some(expected);
+                frame.id() == ANSWER + u16::from(node)
+                    && data.len() == 8
+                    && answers
+                    && object.is_none_or(named)
+            };
+            let Some(frame) = self.receive(end.min(Instant::now() + REPEAT), answers)? else { continue };
+            let Ok(data) = <[u8; 8]>::try_from(frame.data()) else { continue };
+            if data[0] == 0x80 {
+                let [.., a, b, c, d] = data;
+                return Err(RequestError::Aborted(u32::from_le_bytes([a, b, c, d])));
+            }
+            return Ok(data);
+        }
+        Err(RequestError::Silent)
+    }
+
+    /// Sends requests of the layer setting services, each a service and its number, and waits for an answer
+    /// with the service `answer`: its number, or `None` if no node answers in time.
+    ///
+    /// # Errors
+    /// The adapter failed.
+    pub fn lss(
+        &mut self,
+        requests: &[(u8, u32)],
+        answer: u8,
+        time: Duration,
+    ) -> Result<Option<u32>, RequestError> {
+        self.receive(Instant::now(), |_| false)?;
+        let [to, from] = LSS;
+        for (service, number) in requests {
+            let [a, b, c, d] = number.to_le_bytes();
+            self.send(&Frame::new(to, &[*service, a, b, c, d, 0, 0, 0]))?;
+        }
+        let answers = |frame: &Frame| frame.id() == from && frame.data().first() == Some(&answer);
+        let found = self.receive(Instant::now() + time, answers)?;
+        Ok(found.and_then(|frame| {
+            let number = frame.data().get(1..5)?.try_into().ok()?;
+            Some(u32::from_le_bytes(number))
+        }))
+    }
+
+    /// Sends a network management command to a node.
+    ///
+    /// # Errors
+    /// The adapter failed.
+    pub fn manage(&mut self, node: u8, command: u8) -> Result<(), RequestError> {
+        self.send(&Frame::new(0, &[command, node]))
+    }
+
+    /// Reads the bytes of an object.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
+    pub fn bytes(&mut self, node: u8, object: Object) -> Result<Vec<u8>, RequestError> {
+        let Object(index, sub) = object;
+        let [low, high] = index.to_le_bytes();
+        let [command, _, _, _, value @ ..] =
+            self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0], Some(object))?;
+        if command & 2 != 0 {
+            let unused = if command & 1 == 0 { 0 } else { usize::from(command >> 2 & 3) };
+            return Ok(value[..4 - unused].to_vec());
+        }
+        let mut bytes = Vec::new();
+        for toggle in [0, 0x10].into_iter().cycle() {
+            let [command, part @ ..] = self.ask(node, [0x60 | toggle, 0, 0, 0, 0, 0, 0, 0], None)?;
+            let unused = usize::from(command >> 1 & 7);
+            bytes.extend_from_slice(&part[..7 - unused.min(7)]);
+            if command & 1 != 0 {
+                break;
+            }
+            if bytes.len() > MOST_BYTES {
+                return Err(RequestError::Endless);
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// Reads a number of at most four bytes; it is not sign-extended.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
+    pub fn read(&mut self, node: u8, object: Object) -> Result<u32, ToolError> {
+        let bytes = self.bytes(node, object).map_err(|error| error.of(node, object))?;
+        let mut value = [0; 4];
+        for (to, from) in value.iter_mut().zip(bytes) {
+            *to = from;
+        }
+        Ok(u32::from_le_bytes(value))
+    }
+
+    /// Reads a REAL32; unknown values are NaN.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
+    pub fn real(&mut self, node: u8, object: Object) -> Result<f64, ToolError> {
+        self.read(node, object).map(|bits| f64::from(f32::from_bits(bits)))
+    }
+
+    /// Reads a text; its control characters are escaped.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
+    pub fn text(&mut self, node: u8, object: Object) -> Result<String, ToolError> {
+        let bytes = self.bytes(node, object).map_err(|error| error.of(node, object))?;
+        Ok(printable(&String::from_utf8_lossy(&bytes)))
+    }
+
+    /// Writes bytes by block transfer; `progress` is called with the number that has arrived.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
+    pub fn download(
+        &mut self,
+        node: u8,
+        object: Object,
+        bytes: &[u8],
+        mut progress: impl FnMut(usize),
+    ) -> Result<(), RequestError> {
+        let Object(index, sub) = object;
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), (bytes.len() as u32).to_le_bytes());
+        let begin = self.ask(node, [0xC6, low, high, sub, a, b, c, d], Some(object))?;
+        let (mut offset, mut block) = (0, usize::from(begin[4]).clamp(1, 127));
+        while offset < bytes.len() {
+            let end = bytes.len().min(offset + SEGMENT * block);
+            for (number, segment) in (1..).zip(bytes[offset..end].chunks(SEGMENT)) {
+                let is_last = offset + SEGMENT * usize::from(number) >= bytes.len();
+                let mut data = [0; 8];
+                data[0] = number | u8::from(is_last) << 7;
+                data[1..=segment.len()].copy_from_slice(segment);
+                self.send(&Frame::new(REQUEST + u16::from(node), &data))?;
+            }
+            let until = Instant::now() + PATIENCE;
+            let Some(frame) = self.receive(until, |frame| {
+                frame.id() == ANSWER + u16::from(node) && matches!(frame.data().first(), Some(0x80 | 0xA2))
+            })?
+            else {
+                return Err(RequestError::Silent);
+            };
+            match *frame.data() {
+                [0xA2, taken, next, ..] => {
+                    // The node asks for the segments after a lost one again.
+                    offset = end.min(offset + SEGMENT * usize::from(taken));
+                    block = usize::from(next).clamp(1, 127);
+                }
+                [.., a, b, c, d] => return Err(RequestError::Aborted(u32::from_le_bytes([a, b, c, d]))),
+                _ => return Err(RequestError::Silent),
+            }
+            progress(offset);
+        }
+        let unused = (bytes.len().next_multiple_of(SEGMENT) - bytes.len()) as u8;
+        let [low, high] = Crc::<u16>::new(&CRC_16_XMODEM).checksum(bytes).to_le_bytes();
+        self.ask(node, [0xC1 | unused << 2, low, high, 0, 0, 0, 0, 0], None).map(drop)
+    }
+
+    /// Writes a number of `size` bytes.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
+    pub fn try_write(&mut self, node: u8, object: Object, value: u32, size: u8) -> Result<(), RequestError> {
+        let Object(index, sub) = object;
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+        let request = [0x23 | (4 - size.min(4)) << 2, low, high, sub, a, b, c, d];
+        self.ask(node, request, Some(object)).map(drop)
+    }
+
+    /// Writes a number of `size` bytes.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
+    pub fn write(&mut self, node: u8, object: Object, value: u32, size: u8) -> Result<(), ToolError> {
+        self.try_write(node, object, value, size).map_err(|error| error.of(node, object))
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        let _ = self.line.lock().unwrap_or_else(PoisonError::into_inner).write_all(b"C\r");
+    }
+}
+
+/// Sends a frame as one line.
+fn send(line: &Mutex<Adapter>, frame: &Frame) -> std::io::Result<()> {
+    let mut text = Vec::new();
+    slcan::encode(frame, &mut text);
+    line.lock().unwrap_or_else(PoisonError::into_inner).write_all(&text)
+}

@@ -1,0 +1,47 @@
+//! Geometry of a leg file in the firmware's types, and its fingerprint.
+
+use scarab::model::{AnatomicalJoint, Chain, DenavitHartenberg, Fingerprint};
+use scarab_base::error::FileError;
+
+use super::{BodySide, LegFile};
+
+/// Kinematic chain of a leg.
+pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, FileError> {
+    let geometry: Vec<_> = leg
+        .joints
+        .iter()
+        .map(|joint| DenavitHartenberg { alpha: joint.dh.alpha, a: joint.dh.a, d: joint.dh.d })
+        .collect();
+    let count = geometry.len();
+    let geometry: [_; N] =
+        geometry.try_into().map_err(|_| leg.error(format!("{count} joints, expected {N}")))?;
+    Chain::new(&geometry).map_err(|_| leg.error("a D-H number is not finite"))
+}
+
+/// Anatomical to D-H angles of every joint.
+pub fn anatomy<const N: usize>(leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N], FileError> {
+    let mut joints = [AnatomicalJoint::identity(); N];
+    for (slot, joint) in joints.iter_mut().zip(&leg.joints) {
+        let direction = if joint.direction < 0 { -1 } else { 1 };
+        *slot = AnatomicalJoint::new(direction, joint.zero_offset_deg.to_radians()).map_err(|_| {
+            leg.error(format!("joint {}: `direction` or `zero_offset_deg` is invalid", joint.name))
+        })?;
+    }
+    Ok(joints)
+}
+
+/// Fingerprint of a leg as the board computes it, sixteen hexadecimal digits.
+pub fn fingerprint(leg: &LegFile) -> Result<String, FileError> {
+    fn of<const N: usize>(leg: &LegFile) -> Result<Fingerprint, FileError> {
+        let mounting = if leg.side == BodySide::Left { -1.0 } else { 1.0 };
+        let constants = core::array::from_fn(|joint| mounting * leg.joints[joint].torque_per_ampere as f32);
+        let anatomy = anatomy::<N>(leg)?.map(|joint| joint.convert());
+        Ok(Fingerprint::of(&chain::<N>(leg)?.convert(), &anatomy, &constants))
+    }
+    let fingerprint = match leg.joints.len() {
+        1 => of::<1>(leg),
+        2 => of::<2>(leg),
+        _ => of::<3>(leg),
+    }?;
+    Ok(format!("{:016x}", fingerprint.0))
+}

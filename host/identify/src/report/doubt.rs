@@ -1,0 +1,294 @@
+//! Errors of the logging chain of a recording, as data and in words.
+
+use scarab_base::number::Number;
+use serde::Serialize;
+
+use crate::report::findings::FindingReport;
+
+/// Estimated errors of the logging chain of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct DoubtReport {
+    /// Most likely reason of a refusal; `null` where nothing was refused.
+    pub likely_cause: Option<CauseReport>,
+    /// Every direction, whatever its value.
+    pub directions: Vec<DirectionReport>,
+    /// Root mean square misfit of the filtered torque over its noise, for each joint.
+    pub misfit_over_noise: Vec<Number>,
+    /// Parameters that end at a limit of the prior.
+    pub at_prior_limit: Vec<String>,
+    /// Scatter between the recordings identified from.
+    pub recordings: RecordingsReport,
+    /// Bandwidth of the rows.
+    #[serde(flatten)]
+    pub bandwidth: Option<BandwidthReport>,
+}
+
+/// Bandwidth of a replay.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BandwidthReport {
+    /// Frequency at which the low-pass is 3 dB down, Hz.
+    pub bandwidth_hz: f64,
+    /// Whether it was chosen by the encoders' steps.
+    #[serde(rename = "bandwidth_chosen")]
+    pub is_chosen: bool,
+    /// Larger bandwidth that the encoders allow, where the noise explains the misfit.
+    #[serde(rename = "bandwidth_proposed_hz")]
+    pub proposed_hz: Option<f64>,
+    /// Largest bandwidth at which Stribeck friction is searched for, where the encoders are too coarse here.
+    #[serde(rename = "bandwidth_for_stribeck_hz")]
+    pub stribeck_hz: Option<f64>,
+}
+
+impl BandwidthReport {
+    /// Line of the report.
+    fn line(&self) -> String {
+        let hz = self.bandwidth_hz;
+        let stribeck = self.stribeck_hz.map_or(String::new(), |lower| {
+            format!(
+                "; an encoder (by the leg file's `encoder` or the recording) is too coarse to search for Stribeck friction, \
+                 which would bias friction unseen: `--bandwidth {lower}` searches for it"
+            )
+        });
+        if self.is_chosen {
+            format!(
+                "bandwidth: {hz} Hz, chosen from 3.2 to 16 Hz: the largest that the recording's rate allows and at which the \
+                 encoders' steps shift no parameter by more than its sigma, or the smallest if none qualifies{stribeck}"
+            )
+        } else if let Some(larger) = self.proposed_hz {
+            format!(
+                "bandwidth: {hz} Hz; the encoders allow {larger} Hz, at which sticking biases friction less: `--bandwidth {larger}`"
+            )
+        } else {
+            format!("bandwidth: {hz} Hz{stribeck}")
+        }
+    }
+}
+
+/// Scatter of the parameters between recordings, by excluding one at a time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RecordingsReport {
+    /// Number of recordings identified from.
+    pub count: usize,
+    /// Standard deviation of each base parameter, in their order; empty where it is unknown.
+    pub sigma: Vec<Number>,
+}
+
+impl RecordingsReport {
+    /// Line of the report: whether sigma contains the scatter.
+    #[must_use]
+    pub fn line(&self) -> String {
+        match (self.count, self.sigma.is_empty()) {
+            (0, _) => "sigma does not contain the scatter between recordings: too few rows".into(),
+            (1, _) => {
+                "sigma does not contain the scatter between recordings: only one recording was given".into()
+            }
+            (count, true) => format!(
+                "sigma does not contain the scatter between the {count} recordings: without one of them the others do not \
+                 determine every parameter"
+            ),
+            (count, false) => {
+                format!("sigma contains the scatter between {count} recordings (each excluded once)")
+            }
+        }
+    }
+}
+
+/// Most likely reason of a refusal.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CauseReport {
+    /// A word of the closed list.
+    pub name: &'static str,
+    /// Joint, from 1; `null` for all or unknown.
+    pub joint: Option<usize>,
+    /// Size in the direction's unit; `null` if it has none.
+    pub value: Number,
+    /// Standard deviation of the size.
+    pub sigma: Number,
+    /// Sentence with the evidence.
+    pub words: String,
+    /// Units in which the cause reads the columns.
+    #[serde(skip)]
+    pub reads: Vec<ReadAs>,
+}
+
+/// Reading of the columns in another unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReadAs {
+    /// Joint angles in degrees.
+    Degrees,
+    /// Joint angles in turns.
+    Turns,
+    /// Angles of the motor in rad.
+    MotorRadians,
+    /// Angles of the motor in degrees.
+    MotorDegrees,
+    /// Angles of the motor in turns.
+    MotorTurns,
+    /// Torques in mN m.
+    MillinewtonMetres,
+}
+
+/// One direction: an error of the logging chain with its estimate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DirectionReport {
+    /// `delay`, `encoder_scale`, `torque_scale`, `gravity`.
+    pub name: &'static str,
+    /// Joint, from 1; `null` for gravity.
+    pub joint: Option<usize>,
+    /// Estimate; `null` where the motion does not determine it.
+    pub value: Number,
+    /// Standard deviation: the larger of noise and scatter over segments.
+    pub sigma: Number,
+    /// Source of the standard deviation: `noise` or `segments`.
+    pub sigma_from: &'static str,
+    /// `ms`, `%` or `deg`.
+    pub unit: &'static str,
+    /// Largest magnitude that chance explains.
+    pub limit: Number,
+    /// Share of the misfit that the direction explains, 0..1.
+    pub explained: Number,
+    /// Share of the misfit from which the direction refuses.
+    pub explained_limit: Number,
+    /// Largest shift of a parameter, in its sigma, when the direction is fitted.
+    pub largest_shift: Number,
+    /// False where the recording is refused for this direction.
+    pub passed: bool,
+    /// Directions and parameters that cannot be distinguished from this one.
+    pub alike: Vec<String>,
+}
+
+/// A fault in a recording's columns.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SampleFinding {
+    /// `saturation`, `held_samples`, `quantised` or `time_stamps`.
+    pub name: &'static str,
+    /// File, as named.
+    pub file: String,
+    /// Joint, from 1; `null` for a fault of all columns.
+    pub joint: Option<usize>,
+    /// Limit of the torque in N m, holding time in s, step in rad or N m, error of the stamps in s.
+    pub value: f64,
+    /// Unit of the value.
+    pub unit: &'static str,
+    /// Standard deviation of the value, if it is an estimate.
+    pub sigma: Option<f64>,
+    /// Share of the samples, 0..1.
+    pub share: f64,
+    /// Whether the recording must not be identified from.
+    pub refuses: bool,
+    /// The finding in a sentence.
+    pub text: String,
+}
+
+impl DirectionReport {
+    /// Estimate in words: "torque of joint 1: 9.8 +- 0.4 ms late".
+    #[must_use]
+    pub fn words(&self) -> String {
+        let joint = self.joint.unwrap_or(0);
+        let (Some(value), Some(sigma)) = (self.value.known(), self.sigma.known()) else {
+            return format!("{}: not shown by this motion", self.subject());
+        };
+        let size = format!("{:.*} +- {:.*}", digits(sigma), value.abs(), digits(sigma), sigma);
+        let negative = value < 0.0;
+        match self.name {
+            "delay" => {
+                format!("torque of joint {joint}: {size} ms {}", if negative { "early" } else { "late" })
+            }
+            "encoder_scale" => {
+                format!("angle of joint {joint}: {size} % too {}", if negative { "small" } else { "large" })
+            }
+            "torque_scale" => format!(
+                "torque of joint {joint}: {size} % too {} against joint 1",
+                if negative { "small" } else { "large" }
+            ),
+            _ => format!("gravity: turned by {}{size} degrees", if negative { "-" } else { "" }),
+        }
+    }
+
+    fn subject(&self) -> String {
+        match self.joint {
+            Some(joint) => format!("{} of joint {joint}", self.name.replace('_', " ")),
+            None => self.name.into(),
+        }
+    }
+
+    /// Line of the report.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let alike = match self.alike.as_slice() {
+            [] => String::new(),
+            names => format!(" (not distinguished from {})", names.join(", ").replace('_', " ")),
+        };
+        format!("{}{alike}", self.words())
+    }
+
+    /// Test of the verdict.
+    #[must_use]
+    pub fn finding(&self) -> FindingReport {
+        let words = if self.passed {
+            String::new()
+        } else {
+            format!(
+                "{}, limit {:.3} {}; it explains {:.0} % of the misfit and moves a parameter by {:.1} sigma",
+                self.words(),
+                self.limit.known().unwrap_or(f64::NAN),
+                self.unit,
+                100.0 * self.explained.known().unwrap_or(f64::NAN),
+                self.largest_shift.known().unwrap_or(f64::NAN),
+            )
+        };
+        FindingReport {
+            reason: "residual",
+            test: self.name,
+            joint: self.joint,
+            motion: None,
+            value: self.value,
+            limit: self.limit,
+            passed: self.passed,
+            words,
+        }
+    }
+}
+
+/// Decimals that show two digits of a standard deviation.
+fn digits(sigma: f64) -> usize {
+    (1.0 - sigma.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize
+}
+
+impl CauseReport {
+    /// Printed line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let name = format!("{}: ", self.name.replace('_', " "));
+        format!("likely cause: {name}{}", self.words.strip_prefix(&name).unwrap_or(&self.words))
+    }
+
+    /// Whether the line contains what a finding says, so that it suffices.
+    #[must_use]
+    pub fn says(&self, finding: &FindingReport) -> bool {
+        !finding.words.is_empty() && self.words.starts_with(&finding.words)
+    }
+}
+
+impl DoubtReport {
+    /// Lines below the tables.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines: Vec<String> = self.bandwidth.iter().map(BandwidthReport::line).collect();
+        let ratios: Vec<String> = self
+            .misfit_over_noise
+            .iter()
+            .enumerate()
+            .filter_map(|(joint, ratio)| Some(format!("joint {}: {:.2}", joint + 1, ratio.known()?)))
+            .collect();
+        if !ratios.is_empty() {
+            lines.push(format!("misfit over noise: {}", ratios.join("; ")));
+        }
+        lines.extend(self.directions.iter().map(DirectionReport::line));
+        lines.push(self.recordings.line());
+        if !self.at_prior_limit.is_empty() {
+            lines.push(format!("at a limit of the prior: {}", self.at_prior_limit.join(", ")));
+        }
+        lines
+    }
+}

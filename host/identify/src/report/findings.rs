@@ -1,0 +1,195 @@
+//! Evidence of the verdict: every test with its value and limit, and a sentence for each failure.
+
+use scarab::ident::{Evidence, Reason, Test};
+use serde::{Deserialize, Serialize};
+
+use scarab_base::number::Number;
+use scarab_base::words::{Word, word};
+
+/// One test of the verdict, with its result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FindingReport {
+    /// Reason for rejection if the test failed: a word of the closed list.
+    #[serde(deserialize_with = "word")]
+    pub reason: Word,
+    /// Name of the test.
+    #[serde(deserialize_with = "word")]
+    pub test: Word,
+    /// Joint, from 1; `null` if the test does not concern one joint.
+    pub joint: Option<usize>,
+    /// Name of the unused motion; `null` for the training motion, or for all.
+    pub motion: Option<String>,
+    /// Tested value.
+    pub value: Number,
+    /// Limit of the value.
+    pub limit: Number,
+    /// Whether the value is within the limit.
+    pub passed: bool,
+    /// Meaning of a failed test in a sentence with its numbers; empty if it passed.
+    pub words: String,
+}
+
+impl FindingReport {
+    /// Report of one piece of evidence; `motions` are the names of the unused motions.
+    #[must_use]
+    pub fn new(evidence: &Evidence<f32>, motions: &[&str]) -> Self {
+        let motion = evidence.motion.map(|index| {
+            motions.get(index).map_or_else(|| format!("motion {}", index + 1), |name| (*name).to_owned())
+        });
+        let words =
+            if evidence.passed { String::new() } else { sentence(evidence, motion.as_deref().unwrap_or("")) };
+        Self {
+            reason: evidence.reason.name(),
+            test: evidence.test.name(),
+            joint: evidence.joint.map(|joint| joint + 1),
+            motion,
+            value: evidence.value.into(),
+            limit: evidence.limit.into(),
+            passed: evidence.passed,
+            words,
+        }
+    }
+
+    /// Report of a drive that stopped before the end of the identification; `words` give the reason.
+    #[must_use]
+    pub fn stopped(words: String) -> Self {
+        Self {
+            reason: Reason::Input.name(),
+            test: Test::Drive.name(),
+            joint: None,
+            motion: None,
+            value: 0.0.into(),
+            limit: 1.0.into(),
+            passed: false,
+            words,
+        }
+    }
+}
+
+/// Error of a link's length that every recording should show.
+const LARGEST_UNTESTED_LENGTH: f64 = 0.1;
+
+/// Sentences about lengths that the recording hardly tests: the limit of their test is wide.
+#[must_use]
+pub fn untested_lengths(findings: &[FindingReport]) -> Vec<String> {
+    let wide = |finding: &&FindingReport| {
+        finding.test == Test::LinkLength.name()
+            && finding.passed
+            && finding.limit.known().is_none_or(|limit| limit > LARGEST_UNTESTED_LENGTH)
+    };
+    let words = |finding: &FindingReport| {
+        let shown = finding
+            .limit
+            .known()
+            .map_or("no error".into(), |limit| format!("only errors above {:.0} %", 100.0 * limit));
+        format!(
+            "length of the link before joint {}: this recording shows {shown}; measure it, or hold out a motion that \
+             excites every joint",
+            finding.joint.unwrap_or(0)
+        )
+    };
+    findings.iter().filter(wide).map(words).collect()
+}
+
+/// Sentence for a failed test.
+fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
+    let joint = evidence.joint.map_or(0, |joint| joint + 1);
+    let (value, limit) = (f64::from(evidence.value), f64::from(evidence.limit));
+    let known = value.abs() < 1e30;
+    let on = if motion.is_empty() { String::new() } else { format!(" on {motion}") };
+    match evidence.test {
+        Test::Rows => {
+            format!("joint {joint} moved in {value:.0} of the filtered rows, at least {limit:.0} are needed")
+        }
+        Test::NotFinite => format!("{value:.0} samples or rows{on} are not finite"),
+        Test::Torque => format!("the torque of joint {joint} is always zero"),
+        Test::Search if known => format!(
+            "the search has not converged: it ended {value:.2} chi-square units above least squares, limit {limit:.2}; \
+             try another --swarm-seed; a simulated leg also needs noise of its torque (--torque-noise 1), because single \
+             precision cannot resolve less"
+        ),
+        Test::Search => "the search did not finish".into(),
+        Test::Drive => "the drive stopped during the identification".into(),
+        Test::Speed => {
+            format!("joint {joint} hardly moved: {value:.4} rad/s rms, at least {limit:.3} are needed")
+        }
+        Test::EncoderPulse => format!(
+            "encoder too coarse at this bandwidth: one count of joint {joint} is a pulse of {value:.3} rad/s, limit \
+             {limit:.3} rad/s; {:.2} times this bandwidth is low enough",
+            limit / value
+        ),
+        Test::Determined => format!("the motion determines {value:.0} of {limit:.0} base parameters"),
+        Test::Condition if known => {
+            format!("the motion hardly distinguishes the parameters: condition {value:.0}, limit {limit:.0}")
+        }
+        Test::Condition => "the motion does not distinguish the parameters".into(),
+        Test::PredictedUncertainty => format!(
+            "the excitation leaves the torque of joint {joint}{on} uncertain by {:.1} % of its rms, limit {:.1} %",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::Finite => format!("a parameter of joint {joint} is not finite"),
+        Test::NegativeParameter => format!(
+            "a parameter of joint {joint} that must be positive is {value:.1} sigma below zero, limit {limit:.0} sigma"
+        ),
+        Test::NegativeEnergy => {
+            format!("kinetic energy is negative in some posture, by {value:.1} sigma, limit {limit:.0} sigma")
+        }
+        Test::PriorBox => format!(
+            "every leg that the prior allows misses the data: {value:.0} chi-square units above least squares, limit \
+             {limit:.0}"
+        ),
+        Test::DynamicShare => format!(
+            "inertia and friction make {:.2} % of the torque of joint {joint}, a measured torque has at least \
+             {:.0} %: it was computed from the angle",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::TrainingError if known => format!(
+            "joint {joint}: torque error of {value:.3} N m rms on the training motion, limit {limit:.3} N m"
+        ),
+        Test::TrainingError => format!("no torque of joint {joint} could be compared with the model"),
+        Test::WholeError => format!(
+            "joint {joint}: torque error of {:.0} % on the training motion, excluded rows included, limit {:.0} %: hold a \
+             motion out",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::ValidationError if known => {
+            format!("joint {joint}: torque error of {value:.3} N m rms{on}, limit {limit:.3} N m")
+        }
+        Test::ValidationError => format!("no torque of joint {joint}{on} could be compared with the model"),
+        Test::SlowResidual => format!(
+            "joint {joint}: slow residual of {value:.3} N m{on}, longer than half a second, limit {limit:.3} N m"
+        ),
+        Test::LinkLength => format!(
+            "the torque indicates another geometry: a link before joint {joint} {:.1} % {} than configured, limit {:.1} %; a \
+             wrong zero or a leaning trunk looks alike",
+            100.0 * value.abs(),
+            if value < 0.0 { "shorter" } else { "longer" },
+            100.0 * limit
+        ),
+        Test::EncoderZero => format!(
+            "the torque indicates another geometry: the zero of joint {joint} {:+.1} degrees from the configured one, limit \
+             {:.1} degrees; another length or a leaning trunk looks alike",
+            value.to_degrees(),
+            limit.to_degrees()
+        ),
+        Test::CommonDisturbance => {
+            let on = if motion.is_empty() { " on the training motion" } else { on.as_str() };
+            format!(
+                "something held the leg{on}: the torques of all joints deviate together for {value:.2} s, limit {limit:.2} s"
+            )
+        }
+        Test::ReplacedShare => format!(
+            "joint {joint}: {:.1} % of the samples{on} are outliers, limit {:.0} %",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::DisturbedShare => format!(
+            "joint {joint}: {:.0} % of the rows{on} are disturbed, limit {:.0} %",
+            100.0 * value,
+            100.0 * limit
+        ),
+    }
+}

@@ -1,0 +1,64 @@
+//! Model terms of each joint: requested, used, and why.
+
+use serde::{Deserialize, Serialize};
+
+use scarab_base::number::Number;
+use scarab_base::precision::{sigma, value};
+use scarab_base::words::{Word, word};
+
+/// Decision about one term of one joint's model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelChoiceReport {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// `rotor`, `offset`, `stribeck` or `asymmetric_coulomb`, as in leg files.
+    #[serde(deserialize_with = "word")]
+    pub option: Word,
+    /// `auto`, `on` or `off`.
+    #[serde(deserialize_with = "word")]
+    pub asked: Word,
+    /// `on` or `off`.
+    #[serde(deserialize_with = "word")]
+    pub used: Word,
+    /// Chi-square explained by the term; unknown if the data did not decide.
+    pub gain_chi2: Number,
+    /// Limit below which the term is dropped.
+    pub limit_chi2: Number,
+    /// Reason in words.
+    pub why: String,
+}
+
+/// Coulomb friction of one joint in both directions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DirectionsReport {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// Friction while the D-H angle grows, N m.
+    pub forward_nm: Number,
+    /// Standard deviation of `forward_nm`.
+    pub forward_sigma_nm: Number,
+    /// Friction while the D-H angle falls, N m; not negative for friction.
+    pub backward_nm: Number,
+    /// Standard deviation of `backward_nm`.
+    pub backward_sigma_nm: Number,
+}
+
+/// One line for each decision that was left to the data.
+#[must_use]
+pub fn lines(choices: &[ModelChoiceReport], directions: &[DirectionsReport]) -> Vec<String> {
+    let open = choices.iter().filter(|choice| choice.asked == "auto");
+    let open = open.map(|choice| {
+        format!("model, joint {}: {} {} (auto): {}", choice.joint, choice.option, choice.used, choice.why)
+    });
+    let directions = directions.iter().map(|found| {
+        format!(
+            "Coulomb friction of joint {}: {} +- {} N m while the D-H angle grows, {} +- {} N m while it falls",
+            found.joint,
+            value(found.forward_nm, found.forward_sigma_nm),
+            sigma(found.forward_sigma_nm),
+            value(found.backward_nm, found.backward_sigma_nm),
+            sigma(found.backward_sigma_nm)
+        )
+    });
+    open.chain(directions).collect()
+}

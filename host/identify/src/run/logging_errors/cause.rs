@@ -1,0 +1,593 @@
+//! Most likely cause of a refusal, from fits repeated with one error corrected.
+//!
+//! ```text
+//! remaining     misfit of the refit over the torque, root mean square over the joints
+//! plausible     no parameter that must be positive is below zero by more than 5 sigma;
+//!               torque of the prior's sign and size
+//! ```
+//!
+//! Ranking: findings about samples first, then the plausible correction that leaves least of the misfit.
+//! Where the uncorrected fit is not plausible, a correction must make it so. Otherwise the correction must
+//! halve the misfit's power, or be a direction that refuses. Another leg is named only where a link's length
+//! or a zero is significant.
+
+use scarab_base::number::Number;
+
+use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
+use crate::report::findings::FindingReport;
+use crate::run::logging_errors::directions::{CHANCE, Directions, Found, label};
+use crate::run::logging_errors::lag::{self, Lag};
+use crate::run::logging_errors::midway::Midway;
+use crate::run::logging_errors::rows::{Equations, Motion};
+use crate::run::logging_errors::samples::SATURATION;
+use crate::run::logging_errors::{LoggingErrors, Question, midway_words, sample_cause};
+
+/// Sigma by which a parameter may be negative.
+const NEGATIVE_SIGMA: f64 = 5.0;
+/// Ratio of a joint's torque to the prior's, beyond which its unit is wrong.
+const PLAUSIBLE_RATIO: f64 = 30.0;
+/// Part of the misfit that a correction may leave where the uncorrected fit is plausible.
+const HALVED: f64 = 0.7;
+/// Significance of a direction that is named where no other cause is found.
+const WEAKER: f64 = 3.0;
+/// Misfits closer than this ratio count as equal: the simpler correction is named.
+const EQUAL: f64 = 1.1;
+/// Misfit over the torque up to which one correction may be all that is wrong.
+const SMALL_MISFIT: f64 = 0.2;
+/// Misfits closer than this ratio are those of mirrored legs.
+const MIRRORED: f64 = 1.001;
+
+/// Change of the angles and torques of one instant.
+type Change<const N: usize> = Box<dyn Fn(&mut [f64; N], &mut [f64; N])>;
+
+/// A correction of the samples: angles and torques of one instant, anatomical.
+struct Correction<const N: usize> {
+    name: &'static str,
+    joint: Option<usize>,
+    words: String,
+    reads: Vec<ReadAs>,
+    apply: Change<N>,
+}
+
+/// Quality of a fit.
+#[derive(Clone, Copy, Debug)]
+struct Quality {
+    remaining: f64,
+    sound: bool,
+}
+
+/// A corrected error with its fit.
+struct Tried {
+    cause: CauseReport,
+    quality: Quality,
+    /// Whether the same error of another joint cannot be distinguished.
+    is_shared: bool,
+}
+
+/// Names the most likely cause of a refusal.
+#[must_use]
+pub fn likely<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    errors: Option<&LoggingErrors<N, B>>,
+    samples: &[SampleFinding],
+    findings: &[FindingReport],
+) -> CauseReport {
+    if let Some(finding) = samples.iter().find(|finding| finding.refuses) {
+        return sample_cause(finding);
+    }
+    if let Some(cause) = motionless(findings) {
+        return cause;
+    }
+    let Some(errors) = errors else { return excluded(samples).unwrap_or_else(unknown) };
+    if let Some(cause) = encoder_steps(question, errors, findings) {
+        return cause;
+    }
+    // Damage resembles friction at rest and columns without effect: the refused fit's choice of both is not
+    // used.
+    let plain = question.with_all_columns();
+    let again = plain.as_ref().and_then(|plain| LoggingErrors::of(plain).ok().flatten());
+    let (question, errors) = match (&plain, &again) {
+        (Some(plain), Some(again)) => (plain, again),
+        _ => (question, errors),
+    };
+    let here = quality(question, &errors.equations);
+    let mut tried = refits(question);
+    // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
+    let lags = lag::all(&errors.equations).into_iter().filter(|lag| lag.significance > CHANCE);
+    tried.extend(lags.map(|lag| of_lag(question, errors, lag, here)));
+    for (found, report) in errors.found.iter().zip(&errors.directions) {
+        let certain = found.significance() > CHANCE && (!report.passed || !here.sound);
+        if certain {
+            tried.push(of_direction(question, errors, found, report, here));
+        }
+    }
+    if let Some(midway) = errors.midway.as_ref().filter(|midway| midway.refuses()) {
+        tried.push(Tried {
+            cause: CauseReport {
+                name: "changed_midway",
+                joint: midway.joint.map(|joint| joint + 1),
+                value: midway.change.into(),
+                sigma: midway.sigma.into(),
+                words: midway_words(midway),
+                reads: Vec::new(),
+            },
+            quality: Quality {
+                remaining: here.remaining * (1.0 - midway.explained).max(0.0).sqrt(),
+                sound: true,
+            },
+            is_shared: false,
+        });
+    }
+    tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
+    let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(errors, &tried.cause)).collect();
+    let passing = tried.into_iter().zip(refused).filter(|(tried, refused)| {
+        tried.quality.sound && (!here.sound || *refused || tried.quality.remaining < HALVED * here.remaining)
+    });
+    let best = nearest(passing.map(|(tried, _)| tried).collect());
+    let geometry = findings
+        .iter()
+        .find(|finding| !finding.passed && matches!(finding.test, "link_length" | "encoder_zero"));
+    match (best, geometry) {
+        (Some(best), _) => best,
+        (None, Some(finding)) => CauseReport {
+            name: "other_leg",
+            joint: finding.joint,
+            value: finding.value,
+            sigma: Number::UNKNOWN,
+            words: finding.words.clone(),
+            reads: Vec::new(),
+        },
+        (None, None) => weaker(question, errors, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
+    }
+}
+
+/// A joint that hardly moved as the cause.
+fn motionless(findings: &[FindingReport]) -> Option<CauseReport> {
+    let failed = |test: &str| findings.iter().find(|finding| !finding.passed && finding.test == test);
+    let finding = failed("speed").or_else(|| failed("rows"))?;
+    Some(CauseReport {
+        name: "motion",
+        joint: finding.joint,
+        value: finding.value,
+        sigma: Number::UNKNOWN,
+        words: format!("{}; record a motion that moves every joint", finding.words),
+        reads: Vec::new(),
+    })
+}
+
+/// Encoder steps as the cause: where nothing else refuses, or where a lower bandwidth makes the recording
+/// acceptable.
+fn encoder_steps<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    errors: &LoggingErrors<N, B>,
+    findings: &[FindingReport],
+) -> Option<CauseReport> {
+    let bias = errors.encoder?;
+    let mut failed = findings.iter().filter(|finding| !finding.passed);
+    let words = if let Some(steps) = failed.clone().find(|finding| finding.test == "encoder_steps")
+        && failed.all(|finding| finding.test == "encoder_steps")
+    {
+        steps.words.clone()
+    } else {
+        let hz = question.calmer_hz().ok()??;
+        let calmer = question.at(hz);
+        let errors = LoggingErrors::of(&calmer).ok()??;
+        let is_right = errors.directions.iter().all(|direction| direction.passed)
+            && !errors.midway.as_ref().is_some_and(Midway::refuses)
+            && !errors.encoder.is_some_and(|bias| bias.refuses())
+            && quality(&calmer, &errors.equations).sound;
+        if !is_right {
+            return None;
+        }
+        format!("encoder too coarse at this bandwidth: with `--bandwidth {hz}` the recording is accepted")
+    };
+    let (joint, share) = bias.largest_share();
+    Some(CauseReport {
+        name: "encoder_steps",
+        joint: Some(joint + 1),
+        value: share.into(),
+        sigma: Number::UNKNOWN,
+        words,
+        reads: Vec::new(),
+    })
+}
+
+/// A joint, or all, whose angle is in degrees. It spans more than two turns; read as degrees it leaves less
+/// than half of the misfit and a plausible leg.
+#[must_use]
+pub fn in_degrees<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    errors: &LoggingErrors<N, B>,
+) -> Option<CauseReport> {
+    let here = quality(question, &errors.equations);
+    let candidates = angle_units(question).into_iter().chain(unit_pairs(question)).filter(|correction| {
+        correction.reads.contains(&ReadAs::Degrees)
+            && spans(question, correction.joint, 2.0 * std::f64::consts::TAU)
+    });
+    let tried = candidates.filter_map(|correction| refit(question, &correction));
+    nearest(
+        tried.filter(|tried| tried.quality.sound && tried.quality.remaining < 0.5 * here.remaining).collect(),
+    )
+}
+
+/// Cause that leaves least of the misfit; of nearly equal ones the simpler, of one name the better.
+fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
+    let least = passing.iter().map(|tried| tried.quality.remaining).fold(f64::INFINITY, f64::min);
+    passing.retain(|tried| tried.quality.remaining <= EQUAL * least);
+    let name = passing.first()?.cause.name;
+    passing.retain(|tried| tried.cause.name == name);
+    passing.sort_by(|one, other| one.quality.remaining.total_cmp(&other.quality.remaining));
+    let mut all = passing.into_iter();
+    let mut best = all.next()?;
+    // The mirrored leg moves alike: one joint's sign, or that of all others.
+    let alike = all.take_while(|tried| tried.quality.remaining <= MIRRORED * best.quality.remaining);
+    let joints: Vec<String> = alike.filter_map(|tried| Some(tried.cause.joint?.to_string())).collect();
+    if !joints.is_empty() {
+        best.cause.words +=
+            &format!("; the same correction of joint {} explains it as well", joints.join(" or "));
+    }
+    if best.is_shared {
+        best.cause.joint = None;
+    }
+    Some(best.cause)
+}
+
+/// Direction that is not significant enough to refuse by itself, named after another refusal.
+fn weaker<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    errors: &LoggingErrors<N, B>,
+    here: Quality,
+) -> Option<CauseReport> {
+    let pairs = errors.found.iter().zip(&errors.directions);
+    let likely = pairs.filter(|(found, report)| {
+        found.significance() > WEAKER
+            && found.explained() > 0.3 * report.explained_limit.known().unwrap_or(1.0)
+    });
+    let tried = likely.map(|(found, report)| of_direction(question, errors, found, report, here));
+    nearest(tried.filter(|tried| tried.quality.sound).collect())
+}
+
+/// Saturated stretches whose exclusion leaves too little to judge.
+fn excluded(samples: &[SampleFinding]) -> Option<CauseReport> {
+    samples.iter().find(|finding| finding.name == SATURATION).map(sample_cause)
+}
+
+fn unknown() -> CauseReport {
+    CauseReport {
+        name: "unknown",
+        joint: None,
+        value: Number::UNKNOWN,
+        sigma: Number::UNKNOWN,
+        words: "no correction of units and no single one of signs, columns, delay, scale or gravity makes the recording \
+                acceptable"
+            .into(),
+        reads: Vec::new(),
+    }
+}
+
+fn is_refusing<const N: usize, const B: usize>(errors: &LoggingErrors<N, B>, cause: &CauseReport) -> bool {
+    // A low-pass, or a delay of all joints, belongs to the delays that refused.
+    let is_lag = cause.name == "torque_filter" || (cause.name == "delay" && cause.joint.is_none());
+    cause.name == "changed_midway"
+        || errors.directions.iter().filter(|report| !report.passed).any(|report| {
+            (is_lag && report.name == "delay") || (report.name == cause.name && report.joint == cause.joint)
+        })
+}
+
+fn of_lag<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    errors: &LoggingErrors<N, B>,
+    lag: Lag<B>,
+    here: Quality,
+) -> Tried {
+    let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+    let sound = is_sound(question, &lag.values, &sigma)
+        && agrees(question, &errors.equations, &lag.columns, &lag.torque);
+    let remaining = here.remaining * lag.remaining.sqrt();
+    Tried { cause: lag.cause, quality: Quality { remaining, sound }, is_shared: false }
+}
+
+fn of_direction<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    errors: &LoggingErrors<N, B>,
+    found: &Found<B>,
+    report: &DirectionReport,
+    here: Quality,
+) -> Tried {
+    let remaining = here.remaining * (1.0 - found.explained()).max(0.0).sqrt();
+    let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+    let directions = Directions { equations: &errors.equations, zero: question.zero(), axis: question.axis };
+    let (columns, torque) = directions.system(found.kind, found.value);
+    let sound =
+        is_sound(question, &found.values, &sigma) && agrees(question, &errors.equations, &columns, &torque);
+    let mut cause = CauseReport::direction(found.kind, report);
+    if !found.alike.is_empty() {
+        cause.words = format!(
+            "{} ({} cannot be distinguished from {})",
+            cause.words,
+            label(found.kind),
+            found.alike.join(", ")
+        );
+    }
+    let is_shared = found.alike.iter().any(|other| other.starts_with(found.kind.name()));
+    Tried { cause, quality: Quality { remaining, sound }, is_shared }
+}
+
+fn refits<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Tried> {
+    corrections(question).iter().filter_map(|correction| refit(question, correction)).collect()
+}
+
+/// Equations with all angles in one other unit, for each unit that is possible.
+#[must_use]
+pub fn with_other_angles<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+) -> Vec<(ReadAs, Equations<N, B>)> {
+    let of_all = angle_units(question).into_iter().filter(|correction| correction.joint.is_none());
+    of_all
+        .filter_map(|correction| {
+            let motions: Vec<Motion<N>> =
+                question.motions.iter().map(|motion| corrected(question, motion, &correction)).collect();
+            Some((*correction.reads.first()?, question.equations(&motions).ok().flatten()?))
+        })
+        .collect()
+}
+
+/// Fit of the corrected motions; `None` with too few rows.
+fn refit<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    correction: &Correction<N>,
+) -> Option<Tried> {
+    let motions: Vec<Motion<N>> =
+        question.motions.iter().map(|motion| corrected(question, motion, correction)).collect();
+    let equations = question.equations(&motions).ok().flatten()?;
+    let quality = quality(question, &equations);
+    let words = format!(
+        "{}; then the misfit is {:.1} % of the torque{}",
+        correction.words,
+        100.0 * quality.remaining,
+        if quality.remaining < SMALL_MISFIT {
+            " and no inertia or friction is negative"
+        } else {
+            ": there is another error"
+        }
+    );
+    let cause = CauseReport {
+        name: correction.name,
+        joint: correction.joint.map(|joint| joint + 1),
+        value: Number::UNKNOWN,
+        sigma: Number::UNKNOWN,
+        words,
+        reads: correction.reads.clone(),
+    };
+    Some(Tried { cause, quality, is_shared: false })
+}
+
+/// Whether the angle of a joint, or of each, spans more than this, rad.
+fn spans<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    joint: Option<usize>,
+    least: f64,
+) -> bool {
+    (0..N).filter(|at| joint.is_none_or(|joint| joint == *at)).all(|at| {
+        let angles = || question.motions.iter().flat_map(|motion| &motion.position).map(|angles| angles[at]);
+        angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min) > least
+    })
+}
+
+fn corrected<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    motion: &Motion<N>,
+    correction: &Correction<N>,
+) -> Motion<N> {
+    let anatomy = &question.anatomy;
+    let mut motion = motion.clone();
+    for (position, torque) in motion.position.iter_mut().zip(&mut motion.torque) {
+        let mut angles = core::array::from_fn(|joint| anatomy[joint].angle_from_chain(position[joint]));
+        let mut torques = core::array::from_fn(|joint| anatomy[joint].from_chain(torque[joint]));
+        (correction.apply)(&mut angles, &mut torques);
+        *position = core::array::from_fn(|joint| anatomy[joint].angle_to_chain(angles[joint]));
+        *torque = core::array::from_fn(|joint| anatomy[joint].to_chain(torques[joint]));
+    }
+    motion
+}
+
+/// All joints, then each where there are several.
+fn subjects<const N: usize>() -> impl Iterator<Item = Option<usize>> {
+    std::iter::once(None).chain((0..N).filter(|_| N > 1).map(Some))
+}
+
+fn words_of(joint: Option<usize>) -> String {
+    joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1))
+}
+
+/// Torque in mN m.
+fn millinewton_metres<const N: usize>() -> Correction<N> {
+    Correction {
+        name: "torque_unit",
+        joint: None,
+        words: "torque divided by 1000: is it in mN m?".into(),
+        reads: vec![ReadAs::MillinewtonMetres],
+        apply: Box::new(|_, torques| torques.iter_mut().for_each(|torque| *torque /= 1000.0)),
+    }
+}
+
+/// Corrections of the angles' unit: degrees that span more than a turn in rad, turns of the joint that span
+/// less, and angles of the motor where its gear ratio is stated.
+fn angle_units<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
+    use std::f64::consts::TAU;
+    let mut all = Vec::new();
+    let mut add = |joint: Option<usize>, reads: ReadAs, unit: &str, factors: [f64; N]| {
+        let factors = core::array::from_fn::<f64, N, _>(|at| {
+            if joint.is_none_or(|joint| joint == at) { factors[at] } else { 1.0 }
+        });
+        all.push(Correction {
+            name: "angle_unit",
+            joint,
+            words: format!("angle of {} read as {unit}", words_of(joint)),
+            reads: vec![reads],
+            apply: Box::new(move |angles, _| {
+                angles.iter_mut().zip(factors).for_each(|(angle, factor)| *angle *= factor);
+            }),
+        });
+    };
+    let degree = TAU / 360.0;
+    for joint in subjects::<N>().filter(|joint| spans(question, *joint, TAU)) {
+        add(joint, ReadAs::Degrees, "degrees", [degree; N]);
+    }
+    if !spans(question, None, TAU) {
+        add(None, ReadAs::Turns, "turns", [TAU; N]);
+    }
+    let ratios: Option<Vec<f64>> = question.motor_ratio.iter().copied().collect();
+    if let Some(ratios) = ratios {
+        let of_motor = |unit: f64| core::array::from_fn(|joint| unit / ratios[joint]);
+        add(None, ReadAs::MotorRadians, "angle of the motor in rad", of_motor(1.0));
+        add(None, ReadAs::MotorDegrees, "angle of the motor in degrees", of_motor(degree));
+        add(None, ReadAs::MotorTurns, "turns of the motor", of_motor(TAU));
+    }
+    all
+}
+
+/// Corrections of angle and torque at once.
+fn unit_pairs<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
+    let pair = |angle: Correction<N>| {
+        let torque = millinewton_metres::<N>();
+        Correction {
+            name: "units",
+            joint: angle.joint,
+            words: format!("{}, and {}", angle.words, torque.words),
+            reads: [angle.reads, torque.reads].concat(),
+            apply: Box::new(move |angles: &mut [f64; N], torques: &mut [f64; N]| {
+                (angle.apply)(angles, torques);
+                (torque.apply)(angles, torques);
+            }) as Change<N>,
+        }
+    };
+    angle_units(question).into_iter().map(pair).collect()
+}
+
+/// All single corrections of units, signs and columns; the simpler first.
+fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
+    let chosen = |joint: Option<usize>, at: usize| joint.is_none_or(|joint| joint == at);
+    let mut all = vec![millinewton_metres()];
+    for joint in subjects::<N>() {
+        all.push(Correction {
+            name: "torque_sign",
+            joint,
+            words: format!("torque of {} negated", words_of(joint)),
+            reads: Vec::new(),
+            apply: Box::new(move |_, torques| {
+                let each = torques.iter_mut().enumerate();
+                each.filter(|(at, _)| chosen(joint, *at)).for_each(|(_, torque)| *torque = -*torque);
+            }),
+        });
+    }
+    all.extend(angle_units(question));
+    for one in 0..N {
+        for other in one + 1..N {
+            let names = format!("{} and {}", one + 1, other + 1);
+            all.push(Correction {
+                name: "joints_swapped",
+                joint: None,
+                words: format!("torques of joints {names} exchanged"),
+                reads: Vec::new(),
+                apply: Box::new(move |_, torques| torques.swap(one, other)),
+            });
+            all.push(Correction {
+                name: "joints_swapped",
+                joint: None,
+                words: format!("angles of joints {names} exchanged"),
+                reads: Vec::new(),
+                apply: Box::new(move |angles, _| angles.swap(one, other)),
+            });
+            all.push(Correction {
+                name: "joints_swapped",
+                joint: None,
+                words: format!("joints {names} exchanged"),
+                reads: Vec::new(),
+                apply: Box::new(move |angles, torques| {
+                    angles.swap(one, other);
+                    torques.swap(one, other);
+                }),
+            });
+        }
+    }
+    for joint in (0..N).filter(|_| N > 1) {
+        all.push(Correction {
+            name: "direction",
+            joint: Some(joint),
+            words: format!("angle and torque of joint {} with the other sign", joint + 1),
+            reads: Vec::new(),
+            apply: Box::new(move |angles, torques| {
+                angles[joint] = -angles[joint];
+                torques[joint] = -torques[joint];
+            }),
+        });
+    }
+    all
+}
+
+fn quality<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    equations: &Equations<N, B>,
+) -> Quality {
+    let fit = equations.fit(&equations.columns, &equations.torque, false);
+    let segments: Vec<usize> = equations.places.iter().map(|place| place.cluster).collect();
+    let scatter = crate::run::logging_errors::fit::segment_sigma(
+        &fit,
+        &equations.columns,
+        &equations.torque,
+        &equations.weight,
+        &segments,
+    );
+    let sigma = core::array::from_fn(|base| fit.inverse[base][base].max(0.0).sqrt().max(scatter[base]));
+    let shares = (0..N).map(|joint| {
+        let torques = equations.places.iter().zip(&equations.torque);
+        let of: Vec<f64> =
+            torques.filter(|(place, _)| place.joint == joint).map(|(_, torque)| torque * torque).collect();
+        let power = of.iter().sum::<f64>() / of.len().max(1) as f64;
+        equations.row_sigma[joint].powi(2) * equations.information() / power.max(1e-300)
+    });
+    Quality {
+        remaining: (shares.sum::<f64>() / N as f64).sqrt(),
+        sound: is_sound(question, &fit.values, &sigma)
+            && agrees(question, equations, &equations.columns, &equations.torque),
+    }
+}
+
+/// Whether every parameter that must be positive is so within 5 sigma.
+fn is_sound<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    values: &[f64; B],
+    sigma: &[f64; B],
+) -> bool {
+    (0..question.model.base.rank()).filter(|&base| question.active[base]).all(|base| {
+        let bounded = question.model.base.independent(base).is_some_and(|(_, kind)| kind.is_never_negative());
+        !bounded || values[base] > -NEGATIVE_SIGMA * sigma[base]
+    })
+}
+
+/// Whether the torque has the sign and size of the prior's; without a prior, at most thrice the joint's
+/// limit.
+fn agrees<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    equations: &Equations<N, B>,
+    columns: &[[f64; B]],
+    torque: &[f64],
+) -> bool {
+    let rows = || equations.places.iter().zip(torque).zip(columns);
+    let Some(prior) = question.prior else {
+        return rows().all(|((place, torque), _)| torque.abs() < 3.0 * question.torque_limit[place.joint]);
+    };
+    let (mut along, mut measured, mut expected) = (0.0, [0.0; N], [0.0; N]);
+    for ((place, torque), row) in rows() {
+        let guess: f64 = row.iter().zip(&prior).map(|(element, value)| element * value).sum();
+        along += guess * torque;
+        measured[place.joint] += torque * torque;
+        expected[place.joint] += guess * guess;
+    }
+    along > 0.0
+        && measured.iter().zip(expected).all(|(measured, expected)| {
+            let ratio = (measured / expected.max(1e-300)).sqrt();
+            (1.0 / PLAUSIBLE_RATIO..PLAUSIBLE_RATIO).contains(&ratio)
+        })
+}

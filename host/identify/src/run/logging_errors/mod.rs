@@ -1,0 +1,373 @@
+//! Errors of the logging chain that the verdict on a model alone does not detect.
+//!
+//! Why: a recording with a late torque, or with a wrong encoder scale, fits almost as well as a right one,
+//! with wrong parameters and a small sigma. Each such error is fitted beside the parameters and always
+//! reported. It refuses the recording where it is significant, changes the parameters, and explains part of
+//! the misfit.
+//!
+//! | file | subject |
+//! | --- | --- |
+//! | [`rows`] | filtered rows of whole recordings in double precision, weights |
+//! | [`fit`] | least squares, a further column beside it, both standard deviations |
+//! | [`directions`] | delay, encoder scale, torque scale, gravity |
+//! | [`lag`] | low-pass or delay of the torque as a cause |
+//! | [`midway`] | gain or sign of the torque that changes midway |
+//! | [`encoder`] | bias by the steps of an encoder |
+//! | [`noise`] | noise of the torque at the recording's own rate |
+//! | [`samples`], [`stamps`] | samples that no sensor measured, wrong time stamps |
+//! | [`cause`] | most likely cause of a refusal, by refits |
+//! | [`report`] | JSON and lines |
+//!
+//! Runs on the host only.
+
+pub mod cause;
+pub mod directions;
+pub mod encoder;
+pub mod fit;
+pub mod lag;
+pub mod midway;
+pub mod noise;
+pub mod report;
+pub mod rows;
+pub mod samples;
+pub mod stamps;
+
+use nalgebra::Vector3;
+use scarab::ident::record::recorder::STILL_SPEED;
+use scarab::ident::{KernelError, RowModel};
+use scarab::model::AnatomicalJoint;
+use scarab_base::number::Number;
+
+use crate::report::doubt::{CauseReport, DirectionReport, DoubtReport, RecordingsReport, SampleFinding};
+use crate::report::findings::FindingReport;
+use directions::{Directions, Found};
+use encoder::{Bias, Encoders, LARGEST_NOISE, LARGEST_SHARE};
+use midway::Midway;
+use rows::{Equations, Filters, Motion};
+
+/// Recordings and the chosen model: input of all checks.
+pub struct Question<const N: usize, const B: usize> {
+    /// Model that was chosen.
+    pub model: RowModel<f64, N, B>,
+    /// Columns that were estimated.
+    pub active: [bool; B],
+    /// Anatomical angles of the joints.
+    pub anatomy: [AnatomicalJoint<f64>; N],
+    /// Axis of the first joint in the base frame.
+    pub axis: Vector3<f64>,
+    /// Whole recordings.
+    pub motions: Vec<Motion<N>>,
+    /// Bandwidth of the rows, Hz.
+    pub bandwidth_hz: f64,
+    /// Base parameters of the prior.
+    pub prior: Option<[f64; B]>,
+    /// Torque limit of each joint, N m.
+    pub torque_limit: [f64; N],
+    /// Density of each joint's torque noise, (N m)^2 s.
+    pub noise: [Option<f64>; N],
+    /// Standard deviation of each base parameter by noise.
+    pub sigma: [f64; B],
+    /// Motor turns per joint turn, where the leg file states an encoder at the motor.
+    pub motor_ratio: [Option<f64>; N],
+    /// How the angles were read.
+    pub encoders: Encoders<N>,
+}
+
+impl<const N: usize, const B: usize> Question<N, B> {
+    /// Chain angles of the joints' zeros, rad.
+    #[must_use]
+    pub fn zero(&self) -> [f64; N] {
+        self.anatomy.map(|joint| joint.zero_offset())
+    }
+
+    /// This input with every column and without Stribeck friction; `None` if nothing changes.
+    #[must_use]
+    pub fn with_all_columns(&self) -> Option<Self> {
+        let active = core::array::from_fn(|base| base < self.model.base.rank());
+        let is_plain = self.model.stribeck.iter().all(|curve| curve.excess == 0.0);
+        if is_plain && active == self.active {
+            return None;
+        }
+        let model = RowModel { stribeck: scarab::ident::no_stribeck(), ..self.model.clone() };
+        Some(Self { model, active, motions: self.motions.clone(), ..*self })
+    }
+
+    /// Equations of other motions under this model; `None` with too few rows.
+    ///
+    /// # Errors
+    /// The filter cannot be built for the bandwidth.
+    pub fn equations(&self, motions: &[Motion<N>]) -> Result<Option<Equations<N, B>>, KernelError> {
+        self.equations_at(motions, self.bandwidth_hz)
+    }
+
+    /// Equations of other motions at another bandwidth.
+    ///
+    /// # Errors
+    /// The filter cannot be built for the bandwidth.
+    pub fn equations_at(
+        &self,
+        motions: &[Motion<N>],
+        bandwidth_hz: f64,
+    ) -> Result<Option<Equations<N, B>>, KernelError> {
+        let model = self.model_at(bandwidth_hz);
+        Ok(Equations::new(&model, motions, Filters::new(bandwidth_hz)?, &self.active))
+    }
+
+    /// Model for rows of a lower bandwidth.
+    fn model_at(&self, bandwidth_hz: f64) -> RowModel<f64, N, B> {
+        let share = bandwidth_hz / self.bandwidth_hz;
+        let still_speed = self.model.still_speed.map(|speed| (share * speed).max(STILL_SPEED));
+        RowModel { still_speed, pulse: self.model.pulse.map(|pulse| share * pulse), ..self.model.clone() }
+    }
+
+    /// Bandwidth at which the encoders' steps are negligible, if they are not at this one.
+    ///
+    /// # Errors
+    /// The filter cannot be built for the bandwidth.
+    fn calmer_hz(&self) -> Result<Option<f64>, KernelError> {
+        let hz = self.encoders.bandwidth_hz(self.bandwidth_hz, |hz| self.equations_at(&self.motions, hz))?;
+        Ok((hz < self.bandwidth_hz).then_some(hz))
+    }
+
+    /// This input at a lower bandwidth.
+    fn at(&self, bandwidth_hz: f64) -> Self {
+        Self { model: self.model_at(bandwidth_hz), motions: self.motions.clone(), bandwidth_hz, ..*self }
+    }
+}
+
+/// Results of all checks.
+pub struct LoggingErrors<const N: usize, const B: usize> {
+    /// Rows of all recordings.
+    pub equations: Equations<N, B>,
+    /// Directions with their fits.
+    pub found: Vec<Found<B>>,
+    /// Directions as reported.
+    pub directions: Vec<DirectionReport>,
+    /// Change midway.
+    pub midway: Option<Midway>,
+    /// Misfit over noise of each joint; `None` where the noise is unknown.
+    pub misfit_over_noise: [Option<f64>; N],
+    /// Standard deviation of each base parameter: noise, scatter over segments, and possible errors that were
+    /// not refused.
+    pub sigma: [Sigma; B],
+    /// Effect of the encoders' steps; `None` where they are negligible.
+    pub encoder: Option<Bias<N, B>>,
+    /// Bandwidth at which the steps are negligible, Hz; only where they refuse.
+    better_hz: Option<f64>,
+}
+
+/// Standard deviation of a parameter in its parts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sigma {
+    /// Part caused by noise.
+    pub noise: f64,
+    /// Part caused by the scatter over segments of the recording.
+    pub segments: f64,
+    /// Part caused by the scatter between recordings; zero where unknown.
+    pub recordings: f64,
+    /// Part caused by directions that are not significant.
+    pub logging: f64,
+    /// Part caused by the steps of the encoders.
+    pub encoder: f64,
+}
+
+impl Sigma {
+    /// Part caused by unmodelled effects.
+    #[must_use]
+    pub fn misfit(&self) -> f64 {
+        self.segments.max(self.recordings)
+    }
+
+    /// Reported value.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.noise.max(self.misfit()).hypot(self.logging).hypot(self.encoder)
+    }
+
+    /// Largest part.
+    #[must_use]
+    pub fn source(&self) -> &'static str {
+        let scatter = self.noise.max(self.misfit());
+        if self.logging.max(self.encoder) > scatter {
+            if self.encoder > self.logging { "encoder" } else { "doubt" }
+        } else if self.recordings > self.noise.max(self.segments) {
+            "recordings"
+        } else if self.segments > self.noise {
+            "segments"
+        } else {
+            "noise"
+        }
+    }
+}
+
+impl<const N: usize, const B: usize> LoggingErrors<N, B> {
+    /// Fits every direction; `None` where a joint has too few rows.
+    ///
+    /// # Errors
+    /// The filter cannot be built for the bandwidth.
+    pub fn of(question: &Question<N, B>) -> Result<Option<Self>, KernelError> {
+        let Some(equations) = question.equations(&question.motions)? else { return Ok(None) };
+        let found = Directions { equations: &equations, zero: question.zero(), axis: question.axis }.all();
+        let fit = equations.fit(&equations.columns, &equations.torque, true);
+        let scatter = equations.scatter(&fit);
+        let encoder = question.encoders.bias(&equations, &fit, question.bandwidth_hz)?;
+        let better_hz = match encoder {
+            Some(bias) if bias.refuses() => question.calmer_hz()?,
+            _ => None,
+        };
+        let mut sigma: [Sigma; B] = core::array::from_fn(|base| Sigma {
+            noise: question.sigma[base],
+            segments: scatter[base],
+            recordings: 0.0,
+            logging: 0.0,
+            encoder: encoder.map_or(0.0, |bias| bias.sigma[base]),
+        });
+        let misfit_over_noise = core::array::from_fn(|joint| {
+            let misfit = equations.row_sigma[joint] * equations.information().sqrt();
+            let noise = (question.noise[joint]? * scarab::ident::SAMPLE_RATE_HZ * equations.energy()).sqrt();
+            (noise > 0.0).then(|| misfit / noise)
+        });
+        let systematic = systematic(&misfit_over_noise, &equations.rows);
+        let parameters = sigma.map(|sigma| sigma.total());
+        let directions: Vec<DirectionReport> =
+            found.iter().map(|found| DirectionReport::of(found, &parameters, systematic)).collect();
+        for (found, _) in found.iter().zip(&directions).filter(|(_, report)| report.passed) {
+            for (sigma, variance) in sigma.iter_mut().zip(found.variance()) {
+                sigma.logging = sigma.logging.hypot(variance.sqrt());
+            }
+        }
+        let midway = midway::look(&equations);
+        Ok(Some(Self { equations, found, directions, midway, misfit_over_noise, sigma, encoder, better_hz }))
+    }
+
+    /// Findings for the verdict.
+    #[must_use]
+    pub fn findings(&self) -> Vec<FindingReport> {
+        let mut findings: Vec<FindingReport> = self.directions.iter().map(DirectionReport::finding).collect();
+        findings.extend(self.encoder.as_ref().map(|bias| {
+            let ((joint, value), limit) = if bias.is_beyond() {
+                (bias.largest_noise(), LARGEST_NOISE)
+            } else {
+                (bias.largest_share(), LARGEST_SHARE)
+            };
+            FindingReport {
+                reason: "input",
+                test: "encoder_steps",
+                joint: Some(joint + 1),
+                motion: None,
+                value: value.into(),
+                limit: limit.into(),
+                passed: !bias.refuses(),
+                words: if bias.refuses() { self.encoder_words(bias) } else { String::new() },
+            }
+        }));
+        findings.extend(self.midway.as_ref().map(|midway| {
+            let refused = midway.refuses();
+            FindingReport {
+                reason: "residual",
+                test: "changed_midway",
+                joint: midway.joint.map(|joint| joint + 1),
+                motion: None,
+                value: midway.change.into(),
+                limit: midway.limit().into(),
+                passed: !refused,
+                words: if refused { midway_words(midway) } else { String::new() },
+            }
+        }));
+        findings
+    }
+
+    /// Message about steps that are too coarse.
+    fn encoder_words(&self, bias: &Bias<N, B>) -> String {
+        let better = self.better_hz.map_or(String::new(), |hz| format!("; `--bandwidth {hz}` is better"));
+        let effect = if bias.is_beyond() {
+            let (joint, share) = bias.largest_noise();
+            format!(
+                "make {:.0} % of the acceleration of joint {}, limit {:.0} %",
+                100.0 * share,
+                joint + 1,
+                100.0 * LARGEST_NOISE
+            )
+        } else {
+            let (joint, share) = bias.largest_share();
+            format!(
+                "change the torque of joint {} by {:.1} % of its rms, limit {:.1} %",
+                joint + 1,
+                100.0 * share,
+                100.0 * LARGEST_SHARE
+            )
+        };
+        format!("encoder too coarse at this bandwidth: its steps {effect}{better}")
+    }
+
+    /// Report without a cause.
+    #[must_use]
+    pub fn report(&self) -> DoubtReport {
+        DoubtReport {
+            likely_cause: None,
+            directions: self.directions.clone(),
+            misfit_over_noise: self.misfit_over_noise.map(Number::from).to_vec(),
+            at_prior_limit: Vec::new(),
+            recordings: RecordingsReport::default(),
+            bandwidth: None,
+        }
+    }
+}
+
+/// Finding about samples, for the verdict.
+#[must_use]
+pub fn sample_finding(finding: &SampleFinding) -> FindingReport {
+    FindingReport {
+        reason: "input",
+        test: finding.name,
+        joint: finding.joint,
+        motion: None,
+        value: finding.value.into(),
+        limit: Number::UNKNOWN,
+        passed: !finding.refuses,
+        words: if finding.refuses { format!("{}: {}", finding.file, finding.text) } else { String::new() },
+    }
+}
+
+/// Finding about samples, as the likely cause.
+#[must_use]
+pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
+    CauseReport {
+        name: finding.name,
+        joint: finding.joint,
+        value: finding.value.into(),
+        sigma: finding.sigma.into(),
+        words: format!("{}: {}", finding.file, finding.text),
+        reads: Vec::new(),
+    }
+}
+
+/// Message about a change midway.
+#[must_use]
+pub fn midway_words(midway: &Midway) -> String {
+    let joints = midway.joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
+    let what = if midway.change < -1.0 {
+        "changes its sign".into()
+    } else {
+        format!("changes by {:+.0} +- {:.0} %", 100.0 * midway.change, 100.0 * midway.sigma)
+    };
+    format!(
+        "the torque of {joints} {what} after {:.0} % of the recording, which explains {:.0} % of the misfit",
+        100.0 * midway.share,
+        100.0 * midway.explained
+    )
+}
+
+/// Part of the misfit's power that is not noise, 0..1; one where the noise is unknown.
+fn systematic<const N: usize>(misfit_over_noise: &[Option<f64>; N], rows: &[f64; N]) -> f64 {
+    let all: f64 = rows.iter().sum();
+    let noise: f64 = misfit_over_noise
+        .iter()
+        .zip(rows)
+        .map(|(ratio, rows)| ratio.map_or(0.0, |ratio| rows / (ratio * ratio).max(1.0)))
+        .sum();
+    (1.0 - noise / all.max(1.0)).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,56 @@
+//! Judges the fitted directions for report and verdict.
+
+use scarab_base::number::Number;
+
+use crate::report::doubt::{CauseReport, DirectionReport};
+use crate::run::logging_errors::directions::{
+    CHANCE, EXPLAINED_SHARE, Found, Kind, SMALLEST_SYSTEMATIC, TOLERATED_SHIFT,
+};
+
+impl DirectionReport {
+    /// Judges a direction. `sigma` is that of the parameters, `systematic` the part of the misfit that is not
+    /// noise.
+    #[must_use]
+    pub fn of<const B: usize>(found: &Found<B>, sigma: &[f64; B], systematic: f64) -> Self {
+        let (unit, factor) = found.kind.unit();
+        let shifts = found.shift.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
+        let largest = shifts.map(|(shift, sigma)| (shift / sigma).abs()).fold(0.0, f64::max);
+        let needed = EXPLAINED_SHARE * systematic.max(SMALLEST_SYSTEMATIC);
+        let known = |value: f64| if found.seen { Number::from(value) } else { Number::UNKNOWN };
+        let refused =
+            found.significance() > CHANCE && largest > TOLERATED_SHIFT && found.explained() > needed;
+        Self {
+            name: found.kind.name(),
+            joint: found.kind.joint().map(|joint| joint + 1),
+            value: known(factor * found.value),
+            sigma: known(factor * found.sigma()),
+            sigma_from: if found.noise_sigma >= found.segment_sigma { "noise" } else { "segments" },
+            unit,
+            limit: known(factor * CHANCE * found.sigma()),
+            explained: known(found.explained()),
+            explained_limit: needed.into(),
+            largest_shift: known(largest),
+            passed: !refused,
+            alike: found.alike.clone(),
+        }
+    }
+}
+
+impl CauseReport {
+    /// A direction as the likely cause.
+    #[must_use]
+    pub fn direction(kind: Kind, direction: &DirectionReport) -> Self {
+        Self {
+            name: kind.name(),
+            joint: direction.joint,
+            value: direction.value,
+            sigma: direction.sigma,
+            words: format!(
+                "{}; fitted, it explains {:.0} % of the misfit",
+                direction.words(),
+                100.0 * direction.explained.known().unwrap_or(0.0)
+            ),
+            reads: Vec::new(),
+        }
+    }
+}

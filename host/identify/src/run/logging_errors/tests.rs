@@ -1,0 +1,255 @@
+//! A two-link arm with analytic motion, damaged in one way at a time.
+
+use nalgebra::Vector3;
+use scarab::ident::{LinkPrior, RowModel, Smoothed, prior_parameters};
+use scarab::model::{
+    AnatomicalJoint, BaseParameters, Chain, DenavitHartenberg, PARAMETERS_PER_JOINT, RigidBody,
+};
+use scarab_base::random::Random;
+
+use crate::run::logging_errors::*;
+use scarab::model::planar::BASE;
+
+const NOISE_NM: f64 = 0.3;
+
+fn model() -> RowModel<f64, 2, BASE> {
+    let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
+    let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
+    let chain = Chain::<f64, 2>::new(&geometry).expect("two joints");
+    let gravity = Vector3::new(9.81, 0.0, 0.0);
+    let base = BaseParameters::analyse(&chain, &gravity, &[[true; PARAMETERS_PER_JOINT]; 2]);
+    RowModel::new(chain, gravity, base.expect("13 of them"))
+}
+
+fn truth() -> [LinkPrior<f64>; 2] {
+    [(8.0, 0.2, 0.15), (5.0, 0.18, 0.09)].map(|(mass, centre, inertia)| LinkPrior {
+        body: RigidBody {
+            mass,
+            centre_of_mass: Vector3::new(centre, 0.01, 0.0),
+            inertia: nalgebra::Matrix3::from_diagonal(&Vector3::new(0.02, inertia, inertia)),
+        },
+        rotor_inertia: 0.1,
+        coulomb_friction: 2.0,
+        viscous_friction: 1.0,
+        offset: 0.0,
+    })
+}
+
+/// Angle, speed and acceleration of both joints at a time.
+fn instant(time_s: f64) -> Smoothed<f64, 2> {
+    let mut instant =
+        Smoothed { position: [0.5, 0.8], velocity: [0.0; 2], acceleration: [0.0; 2], torque: [0.0; 2] };
+    let waves = [
+        [(0.45, 0.31, 0.0), (0.2, 0.83, 1.0), (0.06, 1.9, 0.3)],
+        [(0.5, 0.43, 2.0), (0.25, 1.07, 0.5), (0.05, 2.3, 1.7)],
+    ];
+    for joint in 0..2 {
+        for (amplitude, frequency, phase) in waves[joint] {
+            let speed = std::f64::consts::TAU * frequency;
+            let (sine, cosine) = (speed * time_s + phase).sin_cos();
+            instant.position[joint] += amplitude * sine;
+            instant.velocity[joint] += amplitude * speed * cosine;
+            instant.acceleration[joint] -= amplitude * speed * speed * sine;
+        }
+    }
+    instant
+}
+
+/// 20 s at 500 Hz; the torque of joint `j` is `late_s[j]` late.
+fn motion(late_s: [f64; 2], seed: u64) -> Motion<2> {
+    let model = model();
+    let values = model.base.project(&prior_parameters(&truth()));
+    let mut random = Random::new("", seed);
+    let torque = |joint: usize, time_s: f64| -> f64 {
+        model.rows(&instant(time_s)).regressor[joint].iter().zip(&values).map(|(y, p)| y * p).sum()
+    };
+    let mut motion = Motion { training_s: f64::INFINITY, position: Vec::new(), torque: Vec::new() };
+    for sample in 0..10_000 {
+        let time_s = f64::from(sample) / 500.0;
+        motion.position.push(instant(time_s).position);
+        motion
+            .torque
+            .push([0, 1].map(|joint| torque(joint, time_s - late_s[joint]) + NOISE_NM * random.normal()));
+    }
+    motion
+}
+
+fn question(motions: Vec<Motion<2>>) -> Question<2, BASE> {
+    let model = model();
+    let prior = model.base.project(&prior_parameters(&truth()));
+    Question {
+        active: [true; BASE],
+        anatomy: [AnatomicalJoint::identity(); 2],
+        axis: Vector3::new(0.0, 0.0, 1.0),
+        motions,
+        bandwidth_hz: 8.0,
+        prior: Some(prior),
+        torque_limit: [150.0; 2],
+        motor_ratio: [None; 2],
+        encoders: Encoders { joints: [None; 2], sample_s: 0.002 },
+        noise: [Some(NOISE_NM * NOISE_NM / 500.0); 2],
+        sigma: [0.0; BASE],
+        model,
+    }
+}
+
+fn errors(question: &Question<2, BASE>) -> LoggingErrors<2, BASE> {
+    LoggingErrors::of(question).expect("a bandwidth").expect("enough rows")
+}
+
+/// Refused directions by name and joint.
+fn refused(errors: &LoggingErrors<2, BASE>) -> Vec<(&'static str, Option<usize>)> {
+    let failed = errors.directions.iter().filter(|direction| !direction.passed);
+    failed.map(|direction| (direction.name, direction.joint)).collect()
+}
+
+fn cause_of(question: &Question<2, BASE>) -> CauseReport {
+    let errors = errors(question);
+    cause::likely(question, Some(&errors), &[], &[])
+}
+
+fn estimate(errors: &LoggingErrors<2, BASE>, name: &str, joint: Option<usize>) -> (f64, f64) {
+    let found = errors.directions.iter().find(|one| one.name == name && one.joint == joint);
+    let found = found.expect("reported");
+    (found.value.known().expect("seen"), found.sigma.known().expect("seen"))
+}
+
+#[test]
+fn a_right_recording_has_no_finding_and_its_misfit_is_noise() {
+    for seed in 0..4 {
+        let errors = errors(&question(vec![motion([0.0; 2], seed)]));
+        assert!(refused(&errors).is_empty(), "{:?}", refused(&errors));
+        assert!(!errors.midway.is_some_and(|midway| midway.refuses()));
+        for direction in &errors.directions {
+            let (value, sigma) = (direction.value.known(), direction.sigma.known());
+            let (Some(value), Some(sigma)) = (value, sigma) else { panic!("{direction:?}") };
+            assert!(value.abs() < 4.5 * sigma, "{}", direction.words());
+        }
+        for ratio in errors.misfit_over_noise {
+            assert!((ratio.expect("known") - 1.0).abs() < 0.15, "{ratio:?}");
+        }
+    }
+}
+
+#[test]
+fn a_late_torque_is_found_at_its_size_and_refused_with_its_joint() {
+    for late in [0.010, 0.020, 0.060] {
+        let question = question(vec![motion([0.0, late], 1)]);
+        let errors = errors(&question);
+        let (value, sigma) = estimate(&errors, "delay", Some(2));
+        // 1 % for the slope at 50 Hz and the interpolation.
+        assert!((value - 1e3 * late).abs() < 4.0 * sigma + 0.01 * 1e3 * late, "{value} +- {sigma}");
+        assert!(refused(&errors).contains(&("delay", Some(2))), "{:?}", refused(&errors));
+        let cause = cause_of(&question);
+        assert_eq!((cause.name, cause.joint), ("delay", Some(2)), "{}", cause.words);
+    }
+}
+
+/// Motion whose torques of some joints pass a first-order low-pass.
+fn filtered(joints: &[usize], constant_s: f64) -> Motion<2> {
+    let mut motion = motion([0.0; 2], 1);
+    for &joint in joints {
+        let mut state = motion.torque[0][joint];
+        for torques in &mut motion.torque {
+            state += (1.0 - (-0.002 / constant_s).exp()) * (torques[joint] - state);
+            torques[joint] = state;
+        }
+    }
+    motion
+}
+
+#[test]
+fn a_low_pass_of_the_torque_is_not_called_a_delay() {
+    for (joints, joint) in [(&[0, 1][..], None), (&[1], Some(2))] {
+        let cause = cause_of(&question(vec![filtered(joints, 0.032)]));
+        assert_eq!((cause.name, cause.joint), ("torque_filter", joint), "{}", cause.words);
+        let (value, sigma) = (cause.value.known().expect("a time"), cause.sigma.known().expect("a time"));
+        // Half a sample for the filter's discrete form, 2 % for the slope of the sampled torque.
+        assert!((value - 32.0).abs() < 4.0 * sigma + 1.7, "{value} +- {sigma}");
+    }
+    let cause = cause_of(&question(vec![motion([0.020, 0.020], 1)]));
+    assert_eq!((cause.name, cause.joint), ("delay", None), "{}", cause.words);
+    let (value, sigma) = (cause.value.known().expect("a time"), cause.sigma.known().expect("a time"));
+    assert!((value - 20.0).abs() < 4.0 * sigma + 0.2, "{value} +- {sigma}");
+}
+
+#[test]
+fn scales_and_gravity_are_found_at_their_size() {
+    let mut scaled = motion([0.0; 2], 1);
+    scaled.position.iter_mut().for_each(|angles| angles[1] *= 1.05);
+    let errors_of = |motion: Motion<2>| errors(&question(vec![motion]));
+    let found = errors_of(scaled);
+    let (value, sigma) = estimate(&found, "encoder_scale", Some(2));
+    assert!((value - 5.0).abs() < 4.0 * sigma + 0.1, "{value} +- {sigma}");
+    assert!(refused(&found).contains(&("encoder_scale", Some(2))));
+
+    let mut gain = motion([0.0; 2], 1);
+    gain.torque.iter_mut().for_each(|torques| torques[1] *= 1.3);
+    let found = errors_of(gain);
+    let (value, sigma) = estimate(&found, "torque_scale", Some(2));
+    assert!((value - 30.0).abs() < 4.0 * sigma + 0.3, "{value} +- {sigma}");
+    assert!(refused(&found).contains(&("torque_scale", Some(2))));
+
+    let mut turned = question(vec![motion([0.0; 2], 1)]);
+    let (sine, cosine) = 30_f64.to_radians().sin_cos();
+    turned.model.gravity = Vector3::new(9.81 * cosine, 9.81 * sine, 0.0);
+    let found = errors(&turned);
+    let (value, sigma) = estimate(&found, "gravity", None);
+    assert!((value - 30.0).abs() < 4.0 * sigma + 0.3, "{value} +- {sigma}");
+    assert_eq!(cause_of(&turned).name, "gravity");
+}
+
+#[test]
+fn a_sign_that_changes_midway_is_found_with_its_time() {
+    for share in [0.25, 0.5, 0.75] {
+        let mut flipped = motion([0.0; 2], 1);
+        let from = (share * flipped.torque.len() as f64) as usize;
+        flipped.torque[from..].iter_mut().flatten().for_each(|torque| *torque = -*torque);
+        let question = question(vec![flipped]);
+        let midway = errors(&question).midway.expect("looked for");
+        assert!(midway.refuses() && midway.change < -1.5, "{midway:?}");
+        assert!((midway.share - share).abs() < 0.05, "{midway:?}");
+        assert_eq!(cause_of(&question).name, "changed_midway");
+    }
+}
+
+#[test]
+fn units_signs_and_columns_are_named() {
+    type Damage = fn(&mut [f64; 2], &mut [f64; 2]);
+    let cases: [(&str, Damage); 6] = [
+        ("torque_sign", |_, torques| torques.iter_mut().for_each(|torque| *torque = -*torque)),
+        ("torque_unit", |_, torques| torques.iter_mut().for_each(|torque| *torque *= 1000.0)),
+        ("angle_unit", |angles, _| angles.iter_mut().for_each(|angle| *angle = angle.to_degrees())),
+        ("joints_swapped", |_, torques| torques.swap(0, 1)),
+        ("joints_swapped", |angles, _| angles.swap(0, 1)),
+        ("direction", |angles, torques| (angles[0], torques[0]) = (-angles[0], -torques[0])),
+    ];
+    for (name, damage) in cases {
+        let mut damaged = motion([0.0; 2], 1);
+        for (angles, torques) in damaged.position.iter_mut().zip(&mut damaged.torque) {
+            damage(angles, torques);
+        }
+        let cause = cause_of(&question(vec![damaged]));
+        assert_eq!(cause.name, name, "{}", cause.words);
+    }
+}
+
+#[test]
+fn a_push_is_not_taken_for_a_direction() {
+    let mut pushed = motion([0.0; 2], 1);
+    for (index, torques) in pushed.torque[4000..4300].iter_mut().enumerate() {
+        let pulse = 15.0 * (std::f64::consts::PI * index as f64 / 300.0).sin();
+        torques.iter_mut().for_each(|torque| *torque += pulse);
+    }
+    let errors = errors(&question(vec![pushed]));
+    assert!(refused(&errors).is_empty(), "{:?}", refused(&errors));
+    assert!(!errors.midway.is_some_and(|midway| midway.refuses()));
+}
+
+#[test]
+fn a_motion_with_too_few_rows_has_no_result() {
+    let mut short = motion([0.0; 2], 1);
+    short.position.truncate(600);
+    short.torque.truncate(600);
+    assert!(LoggingErrors::of(&question(vec![short])).expect("a bandwidth").is_none());
+}

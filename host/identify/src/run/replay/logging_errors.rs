@@ -1,0 +1,430 @@
+//! Checks the recordings of a replay for errors of the logging chain, and adds the results to its report.
+
+mod units;
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+use scarab::ident::{Choice, Reason, Record, RowModel, Solver, noise, prior_parameters};
+use scarab::model::friction::Stribeck;
+use scarab::model::{AnatomicalJoint, PARAMETERS_PER_JOINT, Parameter};
+use scarab_base::error::ToolError;
+use scarab_base::names::parameter_name;
+use scarab_base::stats::quantile;
+
+use crate::formats::leg_file::LegFile;
+use crate::formats::leg_file::geometry::anatomy;
+use crate::formats::recording::{JointSeries, Recording};
+use crate::leg::background::Background;
+use crate::report::RunReport;
+use crate::report::doubt::{BandwidthReport, ReadAs, RecordingsReport};
+use crate::report::findings::FindingReport;
+use crate::run::logging_errors::encoder::{Encoder, Encoders};
+use crate::run::logging_errors::rows::{Equations, Filters, Motion};
+use crate::run::logging_errors::{LoggingErrors, Question, cause, noise as scatter, sample_finding};
+use crate::run::replay::cleaning::cleaned;
+use crate::run::replay::recordings::leave_one_out;
+use crate::run::replay::screening::Screening;
+use crate::run::replay::{Parts, Recordings, ReplayOptions, bandwidth_error, parts};
+use crate::run::resample::{Resampled, TRUSTED_BANDWIDTH};
+
+/// Misfit over noise up to which noise explains the misfit, so that limits follow from the noise.
+const EXPLAINED_BY_NOISE: f64 = 1.3;
+/// Share of a limit of the prior from which a parameter counts as at the limit.
+const AT_LIMIT: f64 = 0.98;
+
+/// Whole recording, with the duration of its training part.
+pub(super) struct Whole {
+    pub recording: Recording,
+    pub training_s: f64,
+}
+
+/// Recording with an even clock, and with the torque scaled and delayed, as requested. `ratios` are the
+/// recorded torques over the true ones.
+pub(super) fn corrected(
+    mut recording: Recording,
+    options: &ReplayOptions,
+    ratios: &[f64],
+) -> Result<Recording, ToolError> {
+    let joints = ratios.len();
+    for (series, ratio) in recording.joints.iter_mut().zip(ratios) {
+        series.torque_nm.iter_mut().for_each(|torque| *torque /= ratio);
+    }
+    if options.even_stamps {
+        let (first, step) = (
+            recording.time_s.first().copied().unwrap_or(0.0),
+            recording.duration_s() / (recording.time_s.len().max(2) - 1) as f64,
+        );
+        recording.time_s = (0..recording.time_s.len()).map(|sample| first + step * sample as f64).collect();
+    }
+    let delays = &options.torque_delay_ms;
+    if delays.is_empty() {
+        return Ok(recording);
+    }
+    if delays.len() != 1 && delays.len() != joints {
+        return Err(ToolError::input(format!(
+            "--torque-delay: {} values; give one for all joints, or one for each of {joints}",
+            delays.len()
+        )));
+    }
+    let late_s: Vec<f64> =
+        (0..joints).map(|joint| delays[if delays.len() == 1 { 0 } else { joint }] * 1e-3).collect();
+    let duration = recording.duration_s();
+    if let Some(wrong) = late_s.iter().find(|late| !(late.abs() < 0.1 * duration)) {
+        return Err(ToolError::input(format!(
+            "--torque-delay {}: the limit is a tenth of the recording ({:.0} ms)",
+            1e3 * wrong,
+            100.0 * duration
+        )));
+    }
+    Ok(advanced(&recording, &late_s))
+}
+
+/// Recording with each torque taken later by its delay; samples whose torque lies outside are dropped.
+fn advanced(recording: &Recording, late_s: &[f64]) -> Recording {
+    let time = &recording.time_s;
+    let (Some(&first), Some(&last)) = (time.first(), time.last()) else { return recording.clone() };
+    let inside = |now: f64| late_s.iter().all(|late| (first..=last).contains(&(now + late)));
+    let kept: Vec<usize> = (0..time.len()).filter(|&sample| inside(time[sample])).collect();
+    let at = |values: &[f64], now: f64| {
+        let right = time.partition_point(|&stamp| stamp < now).clamp(1, time.len() - 1);
+        let share = (now - time[right - 1]) / (time[right] - time[right - 1]);
+        values[right - 1] + share * (values[right] - values[right - 1])
+    };
+    let joints = recording.joints.iter().zip(late_s).map(|(series, late)| JointSeries {
+        position_rad: kept.iter().map(|&sample| series.position_rad[sample]).collect(),
+        torque_nm: kept.iter().map(|&sample| at(&series.torque_nm, time[sample] + late)).collect(),
+    });
+    Recording {
+        file: recording.file.clone(),
+        time_s: kept.iter().map(|&sample| time[sample]).collect(),
+        joints: joints.collect(),
+        joints_in_file: recording.joints_in_file,
+    }
+}
+
+/// Density of each joint's torque noise at the recordings' own rates, (N m)^2 s.
+pub(super) fn noise_density<const N: usize>(recordings: &[Recording], bandwidth_hz: f64) -> [Option<f64>; N] {
+    let clean: Vec<Recording> = recordings.iter().map(|recording| cleaned::<N>(recording).0).collect();
+    core::array::from_fn(|joint| {
+        let parts = clean.iter().filter_map(|recording| {
+            Some(scatter::scatter(&recording.time_s, &recording.joints.get(joint)?.torque_nm, bandwidth_hz))
+        });
+        scatter::density(parts.flatten().collect())
+    })
+}
+
+/// Standard deviation of a 500 Hz sample with noise of these densities; zero where unknown.
+pub(super) fn sample_noise<const N: usize>(density: &[Option<f64>; N]) -> [f32; N] {
+    density
+        .map(|density| density.map_or(0.0, |density| (density * scarab::ident::SAMPLE_RATE_HZ).sqrt() as f32))
+}
+
+/// Whether noise explains the misfit of every joint's best fit. Only then limits follow from the noise.
+pub(super) fn is_explained_by_noise<const N: usize, const B: usize>(record: &Record<f32, N, B>) -> bool {
+    let rows = noise(record);
+    (0..N).all(|joint| {
+        let misfit = rows[joint] * record.row_information.sqrt();
+        record
+            .filtered_noise(joint)
+            .is_some_and(|noise| f64::from(misfit) <= EXPLAINED_BY_NOISE * f64::from(noise))
+    })
+}
+
+/// Recordings on the grid, in chain angles and torques, cut at excluded stretches; and the file of each part.
+fn motions<const N: usize>(
+    wholes: &[Whole],
+    anatomy: &[AnatomicalJoint<f64>; N],
+    robust: bool,
+    screening: &Screening,
+) -> (Vec<Motion<N>>, Vec<usize>) {
+    let parts = |(file, whole): (usize, &Whole)| {
+        let clean = if robust { cleaned::<N>(&whole.recording).0 } else { whole.recording.clone() };
+        let grid = Resampled::of(&clean);
+        let chain = |values: [f64; N], of: fn(&AnatomicalJoint<f64>, f64) -> f64| {
+            core::array::from_fn(|joint| of(&anatomy[joint], values[joint]))
+        };
+        let motion = |points: Range<usize>| Motion {
+            training_s: whole.training_s - points.start as f64 * crate::run::replay::GRID_S,
+            position: points
+                .clone()
+                .filter_map(|point| grid.position_rad::<N>(point))
+                .map(|values| chain(values, |joint, angle| joint.angle_to_chain(angle)))
+                .collect(),
+            torque: points
+                .filter_map(|point| grid.torque_nm::<N>(point))
+                .map(|values| chain(values, |joint, torque| joint.to_chain(torque)))
+                .collect(),
+        };
+        let mut parts = Vec::new();
+        let mut begin = 0;
+        for excluded in screening.excluded(&whole.recording, grid.start_s) {
+            if begin < excluded.start.min(grid.len()) {
+                parts.push(motion(begin..excluded.start.min(grid.len())));
+            }
+            begin = begin.max(excluded.end);
+        }
+        if begin < grid.len() {
+            parts.push(motion(begin..grid.len()));
+        }
+        parts.into_iter().map(move |part| (part, file))
+    };
+    wholes.iter().enumerate().flat_map(parts).unzip()
+}
+
+/// Encoders of the recordings' angles: the coarsest of each joint, at the median time of the samples.
+pub(super) fn encoders<const N: usize>(wholes: &[Whole], leg: &LegFile) -> Encoders<N> {
+    let steps_s = wholes.iter().map(|whole| whole.recording.median_step_s()).collect();
+    let joints = core::array::from_fn(|joint| {
+        let described_rad = leg.joints.get(joint)?.encoder.step_rad();
+        let found = wholes
+            .iter()
+            .filter_map(|whole| Encoder::of(&whole.recording.joints.get(joint)?.position_rad, described_rad));
+        found.max_by(|one, other| one.step_rad.total_cmp(&other.step_rad))
+    });
+    Encoders { joints, sample_s: quantile(steps_s, 0.5) }
+}
+
+/// Bandwidth for `--bandwidth auto`: the largest at which the encoders' steps are negligible, and which the
+/// recordings' rate permits.
+pub(super) fn chosen_bandwidth<const N: usize, const B: usize>(
+    leg: &LegFile,
+    background: &Background<N, B>,
+    recordings: &Recordings,
+    options: &ReplayOptions,
+) -> Result<f64, ToolError> {
+    let Parts { wholes, screening, .. } = parts(recordings, options, leg, &[1.0; N])?;
+    let robust = options.estimator == scarab::ident::Estimator::Robust;
+    let (motions, _) = motions(&wholes, &anatomy::<N>(leg)?, robust, &screening);
+    let encoders: Encoders<N> = encoders(&wholes, leg);
+    let active = core::array::from_fn(|base| base < background.model.base.rank());
+    let largest_hz = TRUSTED_BANDWIDTH / encoders.sample_s;
+    let rows = |bandwidth_hz| {
+        let mut model = background.model.clone();
+        encoders.describe(leg, bandwidth_hz, &mut model);
+        Ok(Equations::new(&model, &motions, Filters::new(bandwidth_hz)?, &active))
+    };
+    encoders.bandwidth_hz(largest_hz, rows).map_err(|error| bandwidth_error(options.bandwidth_hz, error))
+}
+
+/// Data for all checks of the recordings.
+pub(super) struct Subject<'a, const N: usize, const B: usize> {
+    pub leg: &'a LegFile,
+    pub background: &'a Background<N, B>,
+    pub anatomy: &'a [AnatomicalJoint<f64>; N],
+    pub solver: &'a Solver<f32, N, B>,
+    pub wholes: &'a [Whole],
+    pub options: &'a ReplayOptions,
+    pub noise: [Option<f64>; N],
+    pub screening: &'a Screening,
+    /// Base parameters of a known load, which the recorded torque contains.
+    pub load: [f32; B],
+    /// Larger bandwidth that the encoders allow.
+    pub proposed_hz: Option<f64>,
+    /// Largest bandwidth of the Stribeck search, where the encoders are too coarse for it.
+    pub stribeck_hz: Option<f64>,
+}
+
+impl<const N: usize, const B: usize> Subject<'_, N, B> {
+    /// Adds directions, sigma, tests and the likely cause of a refusal to the report.
+    pub(super) fn examine(&self, run: &mut RunReport) -> Result<Option<String>, ToolError> {
+        let samples = self.screening.findings();
+        let (question, file_of) = self.question();
+        let mut errors = LoggingErrors::of(&question)
+            .map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
+        let mut report = errors.as_ref().map(LoggingErrors::report).unwrap_or_default();
+        if let Some(errors) = &mut errors {
+            report.recordings = self.between_recordings(errors, &file_of);
+            self.widen(run, errors);
+            run.findings.extend(errors.findings());
+            run.findings.extend(cause::in_degrees(&question, errors).map(|found| {
+                let remedy = units::remedy(self.options.import.as_ref(), &found);
+                FindingReport {
+                    reason: Reason::Input.name(),
+                    test: found.name,
+                    joint: found.joint,
+                    motion: None,
+                    value: found.value,
+                    limit: found.value,
+                    passed: false,
+                    words: found.words + &remedy.unwrap_or_default(),
+                }
+            }));
+        }
+        run.findings.extend(samples.iter().filter(|found| found.refuses).map(sample_finding));
+        let failed =
+            |name: &str| run.findings.iter().any(|finding| !finding.passed && finding.reason == name);
+        let before: Vec<&str> =
+            run.reasons.iter().copied().filter(|name| *name != Reason::Contact.name()).collect();
+        run.reasons = Reason::ALL
+            .map(Reason::name)
+            .into_iter()
+            .filter(|name| before.contains(name) || failed(name))
+            .collect();
+        report.at_prior_limit = at_prior_limit(run);
+        report.bandwidth = Some(BandwidthReport {
+            bandwidth_hz: self.options.bandwidth_hz,
+            is_chosen: self.options.chooses_bandwidth,
+            proposed_hz: self.proposed_hz,
+            stribeck_hz: self.stribeck_hz,
+        });
+        run.verdict = if run.accepted() { "accepted" } else { "refused" };
+        let import = self.options.import.as_ref();
+        let current =
+            errors.as_ref().and_then(|errors| units::current(&question, &errors.equations, import, None));
+        let mut suspected = current.as_ref();
+        if !run.accepted() {
+            let mut cause = cause::likely(&question, errors.as_ref(), samples, &run.findings);
+            // A torque in mN m and a current in mA differ by the torque constants only.
+            let is_scale = cause.name == "unknown" || cause.reads.contains(&ReadAs::MillinewtonMetres);
+            let with_angles = || {
+                let angles = cause::with_other_angles(&question);
+                angles
+                    .iter()
+                    .filter(|(read, _)| cause.name == "unknown" || cause.reads.contains(read))
+                    .find_map(|(read, equations)| units::current(&question, equations, import, Some(*read)))
+            };
+            if let Some(current) = suspected.take_if(|_| is_scale) {
+                cause = current.clone();
+            } else if let Some(current) = is_scale.then(with_angles).flatten() {
+                cause = current;
+            } else {
+                cause.words += &units::remedy(import, &cause).unwrap_or_default();
+            }
+            correct_words(run, cause.name);
+            report.likely_cause = Some(cause);
+        }
+        // Torques of another scale make another leg, which may be accepted.
+        let warning = suspected
+            .zip(self.wholes.first())
+            .map(|(current, whole)| format!("{}: {}", whole.recording.file.display(), current.words));
+        run.doubt = Some(report);
+        Ok(warning)
+    }
+
+    /// Adds the scatter between recordings to sigma.
+    fn between_recordings(&self, errors: &mut LoggingErrors<N, B>, file_of: &[usize]) -> RecordingsReport {
+        let (count, scatter) = leave_one_out(&errors.equations, file_of);
+        let Some(scatter) = scatter else { return RecordingsReport { count, sigma: Vec::new() } };
+        for (sigma, scatter) in errors.sigma.iter_mut().zip(scatter) {
+            sigma.recordings = scatter;
+        }
+        let kept = self.background.kept(&self.solver.record().selection.dropped);
+        RecordingsReport { count, sigma: kept.map(|base| scatter[base].into()).collect() }
+    }
+
+    /// Input of the checks, and the file of each of its motions.
+    fn question(&self) -> (Question<N, B>, Vec<usize>) {
+        let (background, solver) = (self.background, self.solver);
+        let dropped = &solver.record().selection.dropped;
+        let rank = background.model.base.rank();
+        let model = RowModel {
+            stribeck_choice: [Choice::Off; N],
+            stribeck: background.device.stribeck.map(|curve| Stribeck {
+                excess: f64::from(curve.excess),
+                velocity: f64::from(curve.velocity),
+            }),
+            ..background.model.clone()
+        };
+        let (sine, cosine) = self.leg.joints.first().map_or((0.0, 1.0), |joint| joint.dh.alpha.sin_cos());
+        let load = self.load.map(f64::from);
+        // The recorded torque includes the load's.
+        let prior = background.prior.as_ref().map(|prior| {
+            let alone = model.base.project(&prior_parameters(prior));
+            core::array::from_fn(|base| alone[base] + load[base])
+        });
+        let estimate = solver.estimate();
+        let robust = self.options.estimator == scarab::ident::Estimator::Robust;
+        let (motions, file_of) = motions(self.wholes, self.anatomy, robust, self.screening);
+        let question = Question {
+            active: core::array::from_fn(|base| base < rank && !dropped[base]),
+            anatomy: *self.anatomy,
+            axis: Vector3::new(0.0, -sine, cosine),
+            motions,
+            bandwidth_hz: self.options.bandwidth_hz,
+            prior,
+            torque_limit: core::array::from_fn(|joint| {
+                self.leg.joints.get(joint).map_or(f64::INFINITY, |joint| joint.torque_limit_nm)
+            }),
+            noise: self.noise,
+            motor_ratio: core::array::from_fn(|joint| {
+                self.options.import.as_ref()?.drives.get(joint)?.motor_ratio
+            }),
+            encoders: encoders(self.wholes, self.leg),
+            sigma: core::array::from_fn(|base| estimate.sigma(base).map_or(0.0, f64::from)),
+            model,
+        };
+        (question, file_of)
+    }
+
+    /// Replaces the reported standard deviations by the larger ones.
+    fn widen(&self, run: &mut RunReport, errors: &LoggingErrors<N, B>) {
+        let kept: Vec<usize> = self.background.kept(&self.solver.record().selection.dropped).collect();
+        let mut ratios = vec![1.0; kept.len()];
+        for ((base, report), ratio) in kept.iter().zip(&mut run.base_parameters).zip(&mut ratios) {
+            let Some(before) = report.sigma.known() else { continue };
+            let sigma = errors.sigma[*base];
+            report.sigma = sigma.total().into();
+            report.sigma_from = sigma.source();
+            report.sigma_noise = sigma.noise.into();
+            report.sigma_misfit = sigma.misfit().into();
+            if before > 0.0 {
+                *ratio = sigma.total() / before;
+            }
+            if report.terms.len() == 1 {
+                for parameter in run.parameters.iter_mut().filter(|parameter| parameter.name == report.name) {
+                    if parameter.sigma.known().is_some() {
+                        parameter.sigma = sigma.total().into();
+                    }
+                }
+            }
+        }
+        for (row, one) in run.detail.covariance.iter_mut().zip(&ratios) {
+            for (element, other) in row.iter_mut().zip(&ratios) {
+                *element *= one * other;
+            }
+        }
+    }
+}
+
+/// Parameters that end at a limit of the prior: mass at a fifth or five times, rotor and friction at five
+/// times.
+fn at_prior_limit(run: &RunReport) -> Vec<String> {
+    let limited = [Parameter::M, Parameter::IA, Parameter::FC, Parameter::FV];
+    let mut found = Vec::new();
+    for (index, parameter) in run.parameters.iter().enumerate() {
+        let Some(kind) = Parameter::ALL.get(index % PARAMETERS_PER_JOINT) else { continue };
+        let (Some(value), Some(prior)) = (parameter.value.known(), parameter.prior.known()) else { continue };
+        if !limited.contains(kind) || !(prior > 0.0) {
+            continue;
+        }
+        if value >= 5.0 * AT_LIMIT * prior {
+            found.push(format!("{} at five times the prior", parameter.name));
+        } else if *kind == Parameter::M && value * AT_LIMIT <= 0.2 * prior {
+            found.push(format!("{} at a fifth of the prior", parameter_name(parameter.joint - 1, *kind)));
+        }
+    }
+    found
+}
+
+/// Removes the words "computed from the angle" where the sign or unit of the torque is wrong.
+fn correct_words(run: &mut RunReport, cause: &str) {
+    if !matches!(
+        cause,
+        "torque_sign"
+            | "torque_unit"
+            | "angle_unit"
+            | "units"
+            | "torque_current"
+            | "joints_swapped"
+            | "direction"
+            | "gravity"
+    ) {
+        return;
+    }
+    for finding in run.findings.iter_mut().filter(|finding| finding.test == "dynamic_share") {
+        if let Some(at) = finding.words.find(": it was computed from the angle") {
+            finding.words.truncate(at);
+        }
+    }
+}

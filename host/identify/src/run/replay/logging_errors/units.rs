@@ -1,0 +1,168 @@
+//! Units of the columns as the cause of a refusal: the options that read them so; currents read as torques.
+//!
+//! ```text
+//! r_i = sum g tau / sum g^2        recorded torque over the prior's torque g, over the rows of joint i
+//! u                                1 for A, 1/1000 for mA
+//! current, constant k_i stated     r_i k_i u is near 1 for every joint; for one, r_i and r_i / 1000 are not
+//! current in A, k_i unknown        r_i is far below 1 for every joint, in the shape of the prior's torque
+//! current in mA, k_i unknown       r_i is far above 1, r_i / 1000 below 1, and far below it for one joint
+//! ```
+//!
+//! Without a prior nothing shows the scale of the torques, so nothing is suspected.
+
+use scarab_base::number::Number;
+
+use crate::formats::recording::import::Import;
+use crate::formats::recording::signal::{Quantity, Signal, Unit};
+use crate::formats::recording::suggest::{Reading, options, readings};
+use crate::report::doubt::{CauseReport, ReadAs};
+use crate::run::logging_errors::Question;
+use crate::run::logging_errors::rows::Equations;
+
+/// Ratio to the prior's torque that an error of the prior explains.
+const PRIOR_ERROR: f64 = 1.6;
+/// Factor by which a stated constant must bring the ratio nearer to 1.
+const NEARER: f64 = 2.0;
+/// Largest ratio of a current to a torque whose constant is unknown.
+const CURRENT_RATIO: f64 = 0.2;
+/// Least correlation of recorded torque and the prior's.
+const ALIKE: f64 = 0.8;
+
+/// Options that read the columns as the cause states, where it is a unit.
+pub(super) fn remedy(import: Option<&Import>, cause: &CauseReport) -> Option<String> {
+    let mut changed = readings(import?);
+    let counts = cause.reads.iter().map(|read| apply(&mut changed, *read, cause.joint)).collect::<Vec<_>>();
+    let is_possible = !counts.is_empty() && counts.iter().all(|count| *count > 0);
+    is_possible.then(|| format!("; read it so by {}", options(&changed)))
+}
+
+/// Reads the columns of a joint, or of all, in another unit. Returns how many columns change.
+fn apply(readings: &mut [Reading], read: ReadAs, joint: Option<usize>) -> usize {
+    let (unit, of_motor) = match read {
+        ReadAs::Degrees => ("deg", false),
+        ReadAs::Turns => ("turn", false),
+        ReadAs::MotorRadians => ("rad", true),
+        ReadAs::MotorDegrees => ("deg", true),
+        ReadAs::MotorTurns => ("turn", true),
+        ReadAs::MillinewtonMetres => ("mNm", false),
+    };
+    let Some(unit) = Unit::named(unit) else { return 0 };
+    // The torques of a joint whose angle is wrong are those of all joints.
+    let joint = if read == ReadAs::MillinewtonMetres { None } else { joint };
+    let is_meant = |signal: Signal| {
+        let is_of_joint = matches!(signal, Signal::Angle(_) | Signal::Torque(_));
+        is_of_joint && joint.is_none_or(|joint| signal.joint() == Some(joint))
+    };
+    let meant = readings.iter_mut().filter(|reading| {
+        reading.signal.quantity() == unit.quantity && is_meant(reading.signal) && reading.unit.factor() == 1.0
+    });
+    meant
+        .map(|reading| {
+            reading.unit = unit;
+            if let (Signal::Angle(joint), true) = (reading.signal, of_motor) {
+                reading.signal = Signal::MotorAngle(joint);
+            }
+        })
+        .count()
+}
+
+/// Currents that were read as torques, by the scale of the prior. `angles` is how the equations read the
+/// angles, where it is not as stated.
+pub(super) fn current<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    equations: &Equations<N, B>,
+    import: Option<&Import>,
+    angles: Option<ReadAs>,
+) -> Option<CauseReport> {
+    let import = import?;
+    let is_torque = |joint: usize| !import.columns.contains_key(&Signal::Current(joint + 1));
+    let scales = scales(equations, &question.prior?);
+    let is_alike = scales.iter().all(|scale| scale.ratio > 0.0 && scale.likeness >= ALIKE);
+    if !is_alike || !(0..N).all(is_torque) {
+        return None;
+    }
+    let ratios: Vec<String> = scales.iter().map(|scale| format!("{:.3}", scale.ratio)).collect();
+    let ratios = format!("torque is {} of the prior's (joints in order)", ratios.join(", "));
+    let stated: Option<Vec<f64>> =
+        import.drives.iter().map(|drive| drive.torque_per_ampere.map(f64::abs)).collect();
+    let in_unit = |unit: &Unit| scales.iter().map(|scale| scale.ratio * unit.factor()).collect::<Vec<_>>();
+    let mut units = Unit::of(Quantity::Current);
+    let (unit, words) = match stated {
+        Some(constants) => {
+            // All are near 1, and one is nearer than as a torque in N m or mN m.
+            let explains = |unit: &Unit| {
+                let after =
+                    in_unit(unit).into_iter().zip(&constants).map(|(ratio, constant)| ratio * constant);
+                let after: Vec<f64> = after.map(|ratio| ratio.ln().abs()).collect();
+                let is_no_torque = |torque: Unit| {
+                    let before = scales.iter().map(|scale| (scale.ratio * torque.factor()).ln().abs());
+                    before.zip(&after).any(|(before, after)| before > after + NEARER.ln())
+                };
+                after.iter().all(|after| *after < PRIOR_ERROR.ln())
+                    && Unit::of(Quantity::Torque).all(is_no_torque)
+            };
+            let unit = units.find(explains)?;
+            (unit, format!("{ratios}, and `torque_per_ampere` of the leg file explains it: is it a current?"))
+        }
+        None => {
+            let is_small = |unit: &Unit| in_unit(unit).iter().all(|ratio| *ratio < CURRENT_RATIO);
+            let is_large = |unit: &Unit| {
+                let ratios = in_unit(unit);
+                scales.iter().all(|scale| scale.ratio > 1.0 / CURRENT_RATIO)
+                    && ratios.iter().all(|ratio| *ratio < 1.0)
+                    && ratios.iter().any(|ratio| *ratio < CURRENT_RATIO)
+            };
+            let unit =
+                units.find(|unit| if unit.factor() == 1.0 { is_small(unit) } else { is_large(unit) })?;
+            let constants: Vec<String> =
+                in_unit(&unit).iter().map(|ratio| format!("{:.2}", 1.0 / ratio)).collect();
+            let words = format!(
+                "{ratios}, in its shape: is it a current? Then state each joint's `torque_per_ampere` (by the prior about {})",
+                constants.join(", ")
+            );
+            (unit, words)
+        }
+    };
+    let mut changed: Vec<Reading> = readings(import)
+        .into_iter()
+        .map(|reading| match reading.signal {
+            Signal::Torque(joint) => Reading { signal: Signal::Current(joint), unit, ..reading },
+            _ => reading,
+        })
+        .collect();
+    if angles.is_some_and(|angles| apply(&mut changed, angles, None) == 0) {
+        return None;
+    }
+    Some(CauseReport {
+        name: "torque_current",
+        joint: None,
+        value: scales.first().map_or(Number::UNKNOWN, |scale| scale.ratio.into()),
+        sigma: Number::UNKNOWN,
+        words: format!("{words}; read it so by {}", options(&changed)),
+        reads: angles.into_iter().collect(),
+    })
+}
+
+/// Scale of a joint's recorded torque.
+struct Scale {
+    /// Recorded torque over the prior's.
+    ratio: f64,
+    /// Cosine between both, -1..1.
+    likeness: f64,
+}
+
+fn scales<const N: usize, const B: usize>(equations: &Equations<N, B>, prior: &[f64; B]) -> [Scale; N] {
+    core::array::from_fn(|joint| {
+        let (mut along, mut measured, mut expected) = (0.0, 0.0, 0.0);
+        for ((place, torque), row) in equations.places.iter().zip(&equations.torque).zip(&equations.columns) {
+            if place.joint == joint {
+                let guess: f64 = row.iter().zip(prior).map(|(element, value)| element * value).sum();
+                along += guess * torque;
+                measured += torque * torque;
+                expected += guess * guess;
+            }
+        }
+        let product: f64 = measured * expected;
+        Scale { ratio: along / expected.max(1e-300), likeness: along / product.sqrt().max(1e-300) }
+    })
+}

@@ -1,0 +1,165 @@
+//! E5: a motor that is wired differently from its axis' configuration, or comes loose during calibration. Its
+//! calibration must refuse before any torque is requested.
+//!
+//! In two of five runs a phase wire, the encoder or a shunt breaks at a tick of the calibration. A passed
+//! calibration counts as missed if its result differs from that of an intact motor. Otherwise the result is
+//! usable, and the running axis detects the broken part (P1, E1, C1 to C3).
+
+use core::f64::consts::TAU;
+
+use hal_sim::drive::description::{AxisDescription, EncoderWiring, SupplyDescription};
+use hal_sim::faults::{Channel, Form, Injection, Injector, Timing};
+use rayon::prelude::*;
+use scarab::hal::{AxisCommand, CURRENT_RATE_HZ};
+use scarab::motor::{Calibration, CalibrationStep, Calibrator};
+use scarab_base::error::ToolError;
+use scarab_base::random::Random;
+use scarab_identify::formats::leg_file::{JointFile, LegFile, MotorFile};
+use scarab_identify::leg::board_words::axis_error;
+
+use crate::board::{axis_configuration, calibration_settings, commission, rested};
+use crate::faults::bench::{Bench, outcome};
+use crate::faults::draw::AMPERE_PER_CODE;
+use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
+
+pub(super) const BENCH: Bench = Bench {
+    head: Head {
+        id: "E5",
+        fault: "phases, encoder or shunts connected wrongly, not at all, or loose during a calibration",
+        detector: "checks of the calibration",
+        state: "Refuse",
+        deadline_ms: f64::INFINITY,
+        unit: "",
+        codes: &[],
+        lacking: None,
+    },
+    run: calibrate,
+};
+
+/// Longest calibration, periods; usually some seconds.
+const LONGEST: u64 = 60 * CURRENT_RATE_HZ as u64;
+
+/// Number of ways to connect an axis wrongly.
+const WAYS: u64 = 11;
+
+fn calibrate(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    seeds.par_iter().map(|seed| one(head, leg, *seed, blind)).collect()
+}
+
+fn one(head: &Head, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
+    let mut random = Random::new(head.id, seed);
+    let drives = leg.complete_description::<2>()?;
+    let index = random.below(drives.axes.len() as u64) as usize;
+    let joint = &leg.joints[index];
+    let motor =
+        joint.motor.as_ref().ok_or_else(|| leg.error("every joint needs a motor (`[joint.motor]`)"))?;
+    if random.below(5) < 2 {
+        return loose(head, joint, motor, &drives.axes[index], &drives.supply, seed, &mut random, blind);
+    }
+    let sound = drives.axes[index];
+    let mut axis = sound;
+    let wiring = &mut axis.wiring;
+    match random.below(WAYS) {
+        0 => wiring.phases.swap(0, 1),
+        1 => wiring.phases.swap(1, 2),
+        2 => wiring.phases.swap(0, 2),
+        3 => {
+            wiring.encoder = match wiring.encoder {
+                EncoderWiring::Reversed => EncoderWiring::Forward,
+                _ => EncoderWiring::Reversed,
+            };
+        }
+        4 => wiring.encoder = EncoderWiring::Missing,
+        way @ 5..=7 => wiring.open = Some(way as usize - 5),
+        8 => wiring.shunts_exchanged = true,
+        way => wiring.shunts_inverted[way as usize - 9] = true,
+    }
+    if blind {
+        // Blind: the checks pass for every motor.
+        axis = sound;
+    }
+    let configuration = axis_configuration(joint, motor);
+    let settings = calibration_settings(&configuration, motor);
+    let angle = random.uniform(0.0, TAU);
+    let name = &joint.name;
+    let passed = commission(name, &configuration, settings, &axis, &drives.supply, angle, seed).is_ok();
+    Ok(outcome(head, seed, (!passed).then_some("Refuse")))
+}
+
+/// Loose part.
+enum Loose {
+    Wire(usize),
+    Reading(Injection),
+}
+
+/// Runs a calibration in which a part becomes loose at a tick.
+#[expect(clippy::too_many_arguments, reason = "a motor, its surroundings, and how the run is done")]
+fn loose(
+    head: &Head,
+    joint: &JointFile,
+    motor: &MotorFile,
+    axis: &AxisDescription,
+    supply: &SupplyDescription,
+    seed: u64,
+    random: &mut Random,
+    blind: bool,
+) -> Result<Outcome, ToolError> {
+    let configuration = axis_configuration(joint, motor);
+    let settings = calibration_settings(&configuration, motor);
+    let angle = random.uniform(0.0, TAU);
+    let measure = |loose: Option<(u64, &Loose)>| -> Result<(u64, Option<Calibration>), ToolError> {
+        let mut stand = rested(axis, supply, angle, seed);
+        let mut injector = Injector::new(seed);
+        if let Some((_, Loose::Reading(injection))) = loose {
+            injector.add(*injection);
+        }
+        let mut calibrator =
+            Calibrator::new(&configuration, settings).map_err(|error| ToolError::input(axis_error(error)))?;
+        let mut command = AxisCommand::OFF;
+        for tick in 0..LONGEST {
+            if let Some((at, Loose::Wire(output))) = loose
+                && at == tick
+            {
+                stand.break_wire(*output);
+            }
+            let mut sample = stand.period(&command, 0.0);
+            injector.sample(0, tick, &mut sample);
+            match calibrator.tick(&sample) {
+                CalibrationStep::Running(next) => command = next,
+                CalibrationStep::Done(found) => return Ok((tick, Some(found))),
+                CalibrationStep::Refused(_) => return Ok((tick, None)),
+            }
+        }
+        Ok((LONGEST, None))
+    };
+    let (length, sound) = measure(None)?;
+    let at = random.below(length);
+    let shunt = if random.coin() { Channel::ShuntB } else { Channel::ShuntC };
+    let reading =
+        |channel, form| Loose::Reading(Injection { channel, joint: 0, form, timing: Timing::from(at) });
+    let loose = match random.below(6) {
+        output @ 0..=2 => Loose::Wire(output as usize),
+        3 => reading(Channel::Counter, Form::Stuck),
+        4 => reading(shunt, Form::Stuck),
+        _ => reading(shunt, Form::Offset(random.sign() * random.uniform(5.0, 60.0) / AMPERE_PER_CODE)),
+    };
+    // Blind: the checks pass for every motor.
+    let (_, found) = if blind { (at, sound) } else { measure(Some((at, &loose)))? };
+    let is_right = found.zip(sound).is_some_and(|(found, sound)| is_like(&found, &sound));
+    let mut came = outcome(head, seed, found.is_none().then_some("Refuse"));
+    came.period = at;
+    came.undetectable = is_right && !blind;
+    Ok(came)
+}
+
+/// Returns whether two calibrations agree within the tolerance of a running axis: 5 electrical degrees, 1 A
+/// of offset, a fifth of the resistance.
+fn is_like(found: &Calibration, sound: &Calibration) -> bool {
+    let turns = (found.offset().turns() - sound.offset().turns()).rem_euclid(1.0);
+    let mut zeros = found.current_offsets().into_iter().zip(sound.current_offsets());
+    let resistance = found.resistance().0 / sound.resistance().0;
+    turns.min(1.0 - turns) < 5.0 / 360.0
+        && zeros.all(|(found, sound)| f64::from(found - sound).abs() * AMPERE_PER_CODE < 1.0)
+        && (0.8..1.25).contains(&resistance)
+}

@@ -1,0 +1,100 @@
+//! C1 before any bridge switches: a current-sensor offset while the bridges are off prevents enabling.
+//!
+//! One machine at rest with open contacts is forked for each run. A tenth of a second after the offset
+//! appears, the operator closes the enabling switch.
+
+use hal_sim::faults::{Channel, Form, Injector, Timing};
+use rayon::prelude::*;
+use scarab::safety::{DriveState, FaultCode};
+use scarab_base::error::ToolError;
+use scarab_base::random::Random;
+use scarab_identify::formats::leg_file::LegFile;
+
+use crate::faults::bench::{Bench, outcome};
+use crate::faults::draw::{AMPERE_PER_CODE, at};
+use crate::faults::invariants::{Invariants, Scope};
+use crate::faults::run::Outcome;
+use crate::faults::scenario::Head;
+use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S, Rig};
+use crate::options::{DriveModel, SimulationOptions};
+use crate::pair::Context;
+use scarab::model::planar::BASE;
+use scarab::model::planar::JOINTS;
+
+/// Periods until the switch is closed; the low-pass of 2.7 ms has settled by then.
+const RELEASED: u64 = PERIODS_PER_S / 10;
+/// Periods until the drive must be enabled, with a margin.
+const ENABLED: u64 = PERIODS_PER_S / 2;
+/// Detectable offset of one shunt, A: 2 A of the vector, plus 10 % for calibration and low-pass.
+const SEEN_A: f64 = 1.1 * 2.0 * 0.866;
+
+pub(super) const ZEROS: Bench = Bench {
+    head: Head {
+        id: "C1",
+        fault: "current offset while the bridges are off",
+        detector: "offset limit at enabling",
+        state: "Refuse / Off",
+        deadline_ms: 10.0,
+        unit: "A",
+        codes: &[FaultCode::CurrentOffset],
+        lacking: None,
+    },
+    run: arm,
+};
+
+/// A ready machine at rest, drive off.
+pub(super) fn ready(leg: &LegFile) -> Result<Rig<JOINTS, BASE>, ToolError> {
+    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+    let context = Context::<JOINTS, BASE>::new(leg, &options)?;
+    Rig::new(leg, &context, 1)
+}
+
+fn arm(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    let ready = ready(leg)?;
+    Ok(seeds.par_iter().map(|seed| one(head, leg, &ready, *seed, blind)).collect())
+}
+
+fn one(head: &Head, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, blind: bool) -> Outcome {
+    let mut random = Random::new("C1 at rest", seed);
+    let mut rig = ready.clone();
+    rig.injector = Injector::new(seed);
+    if blind {
+        rig.blind = head.codes;
+    }
+    let joint = random.below(JOINTS as u64) as usize;
+    let size = random.logarithmic(0.5, 6.0);
+    let channel = if random.coin() { Channel::ShuntB } else { Channel::ShuntC };
+    let offset = Form::Offset(random.sign() * size / AMPERE_PER_CODE);
+    let injection = at(channel, joint, offset, Timing::from(0));
+    rig.injector.add(injection);
+    let scope = Scope::of([injection].iter(), &[]);
+    let mut invariants = Invariants::new(leg, scope, &rig);
+    let (mut enabled, mut alarmed, mut switched) = (None, None, false);
+    for period in 0..RELEASED + ENABLED {
+        if period == RELEASED {
+            rig.hand.enabling = true;
+        }
+        rig.advance();
+        invariants.see(&rig, false);
+        switched |= rig.is_switching();
+        if rig.state() == DriveState::OperationEnabled {
+            enabled = enabled.or(Some(rig.period));
+        }
+        if rig.alarm().is_some() {
+            alarmed = alarmed.or(Some(rig.period));
+        }
+    }
+    let refused = alarmed.is_some() && !switched;
+    let after =
+        alarmed.zip(enabled).map(|(alarmed, enabled)| (alarmed - enabled.min(alarmed)) as f64 * PERIOD_MS);
+    let mut found = outcome(head, seed, refused.then_some("Refuse"));
+    found.period = ready.period;
+    found.after_ms = after.filter(|_| refused);
+    found.detected = refused && after.is_none_or(|after| after <= head.deadline_ms);
+    found.undetectable = !refused && size <= SEEN_A;
+    found.alarm = rig.alarm().map(FaultCode::name);
+    found.magnitude = Some(size);
+    found.broken = invariants.into_broken();
+    found.hash = format!("{:016x}", rig.hash);
+    found
+}

@@ -1,0 +1,61 @@
+//! Gate drivers' registers and bridge temperatures, checked by the housekeeping.
+
+use hal_sim::faults::{Channel, Form, Timing};
+use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
+use scarab::safety::FaultCode;
+use scarab_base::random::Random;
+
+use crate::faults::draw::{at, one};
+use crate::faults::scenario::{Bounds, Expected, Row, Scenario};
+use crate::faulty_board::PERIODS_PER_S;
+use scarab::model::planar::JOINTS;
+
+/// Rows of this group.
+pub static ROWS: [Row; 2] = [
+    Row {
+        id: "P2",
+        fault: "gate driver lost its configuration",
+        detector: "registers read back every 8 ms",
+        state: "Off",
+        codes: &[FaultCode::GateConfiguration],
+        deadline_ms: 10.0,
+        unit: "",
+        lacking: Some("registers that change and recover between two checks"),
+        draw: registers,
+    },
+    Row {
+        id: "T1",
+        fault: "overtemperature, thermistor open or short",
+        detector: "temperature and range of the thermistor every 50 ms",
+        state: "Limit, Damp",
+        codes: &[FaultCode::Temperature, FaultCode::Thermistor],
+        deadline_ms: 100.0,
+        unit: "degrees",
+        lacking: Some("a thermistor that is stuck within its range"),
+        draw: temperature,
+    },
+];
+
+/// P2: changed registers.
+fn registers(random: &mut Random, _: &Bounds) -> Scenario {
+    let joint = random.below(JOINTS as u64) as usize;
+    one(at(Channel::GateRegisters, joint, Form::Off, Timing::from(0)), Expected::Off)
+}
+
+/// T1: an open or shorted wire, or a bridge temperature.
+fn temperature(random: &mut Random, _: &Bounds) -> Scenario {
+    let joint = random.below(JOINTS as u64) as usize;
+    let code = match random.below(3) {
+        0 => [0.0, 4095.0][random.below(2) as usize],
+        _ => random.uniform(2500.0, 3700.0).round(),
+    };
+    let degrees = temperature_c(code as u16);
+    let spoilt = at(Channel::Thermistor, joint, Form::Rail(code), Timing::from(0));
+    Scenario {
+        magnitude: degrees.map(f64::from),
+        by_design: degrees.is_some_and(|degrees| degrees < HOTTEST_C),
+        // Twice the time between two checks.
+        patience: PERIODS_PER_S / 8,
+        ..one(spoilt, Expected::Damp)
+    }
+}

@@ -1,0 +1,37 @@
+//! Wearer during the motion.
+
+use scarab::safety::FaultCode;
+use scarab_base::random::Random;
+
+use crate::faults::draw::beside;
+use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
+use crate::faulty_board::PERIODS_PER_S;
+use scarab::model::planar::JOINTS;
+
+/// Rows of this group.
+pub static ROWS: [Row; 1] = [Row {
+    id: "H1",
+    fault: "wearer holds or pushes the leg",
+    detector: "torque cap; speed",
+    state: "Limit",
+    codes: &[FaultCode::Overspeed],
+    // Duration of torque above the cap, without interruption.
+    deadline_ms: 50.0,
+    unit: "N m",
+    lacking: None,
+    draw: held,
+}];
+
+/// H1: a hand holds or pushes a joint for up to a second.
+fn held(random: &mut Random, _: &Bounds) -> Scenario {
+    let joint = random.below(JOINTS as u64) as usize;
+    let strength = random.logarithmic(5.0, 300.0);
+    let seconds = random.uniform(0.1, 1.0);
+    let event = if random.coin() {
+        Event::Hold(joint, strength, seconds)
+    } else {
+        Event::Push(joint, random.sign() * strength.min(60.0), seconds)
+    };
+    let periods = ((seconds + 0.5) * PERIODS_PER_S as f64) as u64;
+    Scenario { magnitude: Some(strength), patience: periods, ..beside(event, Expected::Kept) }
+}

@@ -1,0 +1,323 @@
+//! Stored data of a board as a readable file: objects of its nodes, calibrations, and the models.
+//!
+//! Why: the data can be moved to a replacement board, and calibrations can be viewed or compared without a
+//! bus. A board does not trust the file: it still checks a calibration at the motor and a model against the
+//! leg's fingerprint.
+//!
+//! ```text
+//! flash image --Store::load, checks--> KeptFile --to_toml--> text   damaged or invalid parts: omitted
+//! flash image <--Store::save (drive off)-- KeptFile <--parse, checks-- text   all or nothing
+//! ```
+//!
+//! An export reports the parts that it omits. An import does not change the parts that its file does not
+//! name.
+//!
+//! Both directions have the same checks, so every export can be imported. Floats are written with
+//! the digits that restore the f32 exactly, angles in radians with those that restore the unit of
+//! 2^-32 turns. Keys are an interface (`docs/files.md`): unknown ones are errors.
+
+mod convert;
+mod flash;
+pub mod memory;
+mod objects;
+mod text;
+
+pub use flash::FlashContents;
+
+use scarab::store::Key;
+use serde::Deserialize;
+
+use scarab_base::error::FileError;
+use scarab_base::toml_file;
+
+/// Version of the keys.
+pub const KEPT_SCHEMA: i64 = 1;
+
+/// Contents of a file; parts not named stay unchanged.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptFile {
+    /// [`KEPT_SCHEMA`].
+    pub schema: i64,
+    /// Objects of the nodes.
+    #[serde(default)]
+    pub node: Vec<NodeObjects>,
+    /// Calibrations of the axes.
+    #[serde(default)]
+    pub calibration: Vec<AxisCalibration>,
+    /// The accepted model of the leg, empty or unknown whether worn.
+    pub model: Option<ModelPart>,
+    /// The accepted model of the worn leg.
+    pub worn_model: Option<ModelPart>,
+}
+
+/// Joint of the leg with its node and axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Joint {
+    /// First joint.
+    Hip,
+    /// Second joint.
+    Knee,
+    /// Third joint, in models only.
+    Ankle,
+}
+
+impl Joint {
+    /// All joints, from the base.
+    pub const ALL: [Self; 3] = [Self::Hip, Self::Knee, Self::Ankle];
+
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hip => "hip",
+            Self::Knee => "knee",
+            Self::Ankle => "ankle",
+        }
+    }
+}
+
+/// Objects of a node that a host has changed.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NodeObjects {
+    /// Joint of the node.
+    pub joint: Joint,
+    /// All stored objects; the others have their initial values.
+    pub objects: Vec<ObjectValue>,
+}
+
+/// Value of one object.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectValue {
+    /// Index in the dictionary.
+    pub index: u16,
+    /// Subindex in the dictionary.
+    pub subindex: u8,
+    /// Name in the dictionary; for people, and checked if present.
+    pub name: Option<String>,
+    /// Value in the object's own unit.
+    pub value: i64,
+}
+
+/// Calibration of an axis.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisCalibration {
+    /// Joint of the axis.
+    pub joint: Joint,
+    /// Resistance of one phase, ohm.
+    pub resistance_ohm: f64,
+    /// Inductance along the flux, H.
+    pub direct_inductance_h: f64,
+    /// Inductance across the flux, H.
+    pub quadrature_inductance_h: f64,
+    /// Electrical angle at the index, from -pi to pi.
+    pub offset_rad: f64,
+    /// Encoder settings of the calibration.
+    pub encoder: Encoder,
+    /// Temperature of the winding at the calibration, degrees Celsius, if known.
+    #[serde(default)]
+    pub winding_c: Option<f64>,
+    /// Readings at the joint's zero, with an absolute encoder at the joint.
+    #[serde(default)]
+    pub joint_zero: Option<JointZeroPart>,
+}
+
+/// Readings at a joint's zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointZeroPart {
+    /// Rotor position within a turn, counts.
+    pub rotor_counts: i32,
+    /// Reading of the joint's encoder, 2^-14 turns.
+    pub joint_steps: u16,
+    /// Check of direction and ratio.
+    pub setting: u8,
+}
+
+/// Settings for which a calibration is valid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Encoder {
+    /// Direction of the counter while the field turns from A over B to C.
+    pub counter: Counter,
+    /// Pole pairs of the motor.
+    pub pole_pairs: u8,
+    /// Encoder counts per turn.
+    pub counts_per_turn: u32,
+    /// Whether positions count from an absolute encoder's zero.
+    #[serde(default)]
+    pub absolute: bool,
+}
+
+/// Direction of a counter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Counter {
+    /// Counter runs with the field.
+    Up,
+    /// Counter runs against the field.
+    Down,
+}
+
+/// Accepted model with its origin.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelPart {
+    /// Fingerprint of the leg: 16 hexadecimal digits, as in model files.
+    pub fingerprint: String,
+    /// Version of the firmware that identified the model.
+    pub firmware: String,
+    /// Number of models accepted on the board so far.
+    pub generation: u32,
+    /// Seed of the swarm; text, since it may need all 64 bits.
+    pub swarm_seed: String,
+    /// Temperature of the warmer bridge, degrees Celsius; absent if unknown.
+    pub bridge_temperature_c: Option<f64>,
+    /// Whether a person wore the leg; absent if unknown.
+    pub worn: Option<bool>,
+    /// Share of the mass matrix that is certain by 2 sigma, 0 to 1; 0 if unknown.
+    #[serde(default)]
+    pub inertia_lower_bound: f64,
+    /// Joints, from the base.
+    pub joint: Vec<ModelJoint>,
+}
+
+/// One joint of a model.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelJoint {
+    /// Joint.
+    pub joint: Joint,
+    /// Fourteen parameters, SI units.
+    pub parameters: Parameters,
+    /// Friction that decreases with speed.
+    pub stribeck: StribeckPart,
+    /// Meaning of the constant column.
+    pub constant: ConstantPart,
+    /// Friction that is certain by 2 sigma; 0 if unknown.
+    #[serde(default)]
+    pub friction_lower_bound: FrictionBound,
+    /// Distance to the previous joint, m.
+    pub length_m: f64,
+    /// Torque constant at the joint, N m/A.
+    pub torque_per_ampere: f64,
+    /// RMS of measured minus predicted torque on an unused motion, N m; absent if unknown.
+    pub rms_nm: Option<f64>,
+    /// Mean absolute torque on that motion, N m; absent if unknown.
+    pub mean_absolute_nm: Option<f64>,
+}
+
+/// Fourteen parameters of a joint, by symbol.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[serde(rename_all = "UPPERCASE")]
+#[expect(missing_docs, reason = "the symbols of `scarab::model::Parameter`, which explains them")]
+pub struct Parameters {
+    pub xx: f64,
+    pub xy: f64,
+    pub xz: f64,
+    pub yy: f64,
+    pub yz: f64,
+    pub zz: f64,
+    pub hx: f64,
+    pub hy: f64,
+    pub hz: f64,
+    pub m: f64,
+    pub ia: f64,
+    pub fc: f64,
+    pub fv: f64,
+    pub off: f64,
+}
+
+/// Stribeck curve: Coulomb friction * (1 + excess exp(-(speed / velocity)^2)).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StribeckPart {
+    /// Excess, at least 0.
+    pub excess: f64,
+    /// Speed of the decay, rad/s.
+    pub velocity_rad_s: f64,
+}
+
+/// Lower bounds of a joint's friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionBound {
+    /// Coulomb friction, N m.
+    pub coulomb_nm: f64,
+    /// Viscous friction, N m s/rad.
+    pub viscous_nm_s_rad: f64,
+}
+
+/// Meaning of a joint's constant column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ConstantPart {
+    /// Torque offset.
+    Offset,
+    /// Difference of friction between the directions.
+    Asymmetry,
+}
+
+impl KeptFile {
+    /// Parses and checks a text; `file` is its name in error messages.
+    ///
+    /// # Errors
+    /// The file is invalid; the error names the line or part.
+    pub fn parse(text: &str, file: &str) -> Result<Self, FileError> {
+        let raw: toml::Table = toml_file::parse(text, file)?;
+        match raw.get("schema") {
+            Some(toml::Value::Integer(KEPT_SCHEMA)) => {}
+            Some(schema) => {
+                let reason = format!("schema {schema} is unknown; this program reads {KEPT_SCHEMA}");
+                return Err(FileError::new(file, reason));
+            }
+            None => return Err(FileError::new(file, "has no `schema`: not a file of stored data")),
+        }
+        let kept: Self = toml_file::parse(text, file)?;
+        kept.check().map_err(|why| FileError::new(file, why))?;
+        Ok(kept)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        once("node", self.node.iter().map(|node| node.joint))?;
+        once("calibration", self.calibration.iter().map(|axis| axis.joint))?;
+        for node in &self.node {
+            objects::to_bytes(&node.objects, node.joint).map_err(|why| of_node(node.joint, &why))?;
+        }
+        for axis in &self.calibration {
+            axis.to_kept().map_err(|why| format!("calibration of the {}: {why}", axis.joint.name()))?;
+        }
+        for (table, key, model) in
+            [("model", Key::Model, &self.model), ("worn_model", Key::WornModel, &self.worn_model)]
+        {
+            if let Some(model) = model {
+                model.check(key).map_err(|why| format!("{table}: {why}"))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn of_node(joint: Joint, why: &str) -> String {
+    format!("objects of the {}: {why}", joint.name())
+}
+
+/// Rejects repeated joints and joints that a board does not have.
+fn once(what: &str, joints: impl Iterator<Item = Joint>) -> Result<(), String> {
+    let mut seen = Vec::new();
+    for joint in joints {
+        if joint == Joint::Ankle {
+            return Err(format!("{what}: a board does not store data of the ankle"));
+        }
+        if seen.contains(&joint) {
+            return Err(format!("{what}: the {} occurs twice", joint.name()));
+        }
+        seen.push(joint);
+    }
+    Ok(())
+}

@@ -1,0 +1,44 @@
+//! The operator of a simulated leg, who acts by the contacts.
+
+use scarab::hal::Contacts;
+use scarab::leg::Activity;
+use scarab::safety::DriveState;
+use scarab_base::error::ToolError;
+use scarab_identify::formats::leg_file::LegFile;
+
+use crate::faulty_board::{PERIODS_PER_S, Rig};
+
+/// Periods until the operator's contacts count, and until the drive has to be enabled.
+const OPEN: u64 = PERIODS_PER_S / 5;
+const ENABLED: u64 = PERIODS_PER_S;
+
+/// Opens both contacts, then holds the enabling switch until the drive is enabled; returns whether it is.
+pub fn enable<const N: usize, const B: usize>(rig: &mut Rig<N, B>) -> bool {
+    rig.hand = Contacts::default();
+    for _ in 0..OPEN {
+        rig.advance();
+    }
+    rig.hand.enabling = true;
+    for _ in 0..ENABLED {
+        rig.advance();
+        if rig.state() == DriveState::OperationEnabled {
+            return true;
+        }
+    }
+    false
+}
+
+/// Starts an identification, or what else the leg is configured for, as an operator does: enables the drive,
+/// then presses the button.
+pub fn begin<const N: usize, const B: usize>(leg: &LegFile, rig: &mut Rig<N, B>) -> Result<(), ToolError> {
+    enable(rig);
+    rig.hand = Contacts { enabling: true, start: true };
+    for _ in 0..ENABLED {
+        rig.advance();
+        if matches!(rig.leg.control().activity(), Activity::Identify(_) | Activity::Assist(_)) {
+            rig.hand.start = false;
+            return Ok(());
+        }
+    }
+    Err(leg.error("the operator's contacts begin nothing").into())
+}

@@ -1,0 +1,221 @@
+//! Complete simulated run: the firmware's leg against the plant, with data that only a simulation provides.
+
+use std::time::Instant;
+
+use hal_sim::world::TICK_S;
+use scarab::leg::{Activity, ControlOutput, ControlRequest, IdentifyPhase, LoggedSample, Step};
+use scarab::motion::Periodic;
+use scarab::real::sqrt;
+use scarab_base::error::ToolError;
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::report::series::Series;
+use scarab_identify::report::{RunReport, TrackingReport};
+
+use crate::options::SimulationOptions;
+use crate::pair::{Context, Pair};
+use crate::perturb;
+use crate::scale;
+use crate::shaking::Shaking;
+use crate::watch::Watch;
+
+/// Limit of a run, s.
+const LONGEST_RUN_S: f64 = 300.0;
+
+/// Result of a simulated run.
+#[derive(Clone, Debug)]
+pub struct SimulatedRun<const N: usize> {
+    /// The report.
+    pub report: RunReport,
+    /// Samples of the motions identified from and predicted.
+    pub log: Vec<LoggedSample<N>>,
+    /// Curves; empty unless requested.
+    pub series: Series,
+}
+
+/// Sees a run while it is simulated.
+pub trait Observer<const N: usize, const B: usize> {
+    /// Begins a run.
+    fn begin(&mut self, context: &Context<N, B>);
+    /// Sees the tick just run.
+    fn tick(&mut self, pair: &Pair<N, B>, output: &ControlOutput<N>);
+}
+
+/// Sees nothing.
+impl<const N: usize, const B: usize> Observer<N, B> for () {
+    fn begin(&mut self, _: &Context<N, B>) {}
+    fn tick(&mut self, _: &Pair<N, B>, _: &ControlOutput<N>) {}
+}
+
+/// Drives, identifies, validates and tracks one simulated leg.
+pub fn simulate<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &SimulationOptions,
+) -> Result<SimulatedRun<N>, ToolError> {
+    simulate_observed::<N, B>(leg, options, &mut ())
+}
+
+/// [`simulate`] with an observer, which sees all but the tracking after the verdict.
+pub fn simulate_observed<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &SimulationOptions,
+    observer: &mut impl Observer<N, B>,
+) -> Result<SimulatedRun<N>, ToolError> {
+    let started = Instant::now();
+    let wrong = options.perturbations.as_slice();
+    let simulated = perturb::simulated(leg, wrong)?;
+    let mut context = Context::<N, B>::new(&perturb::believed(leg, wrong)?, options)?;
+    perturb::configure(&mut context, wrong)?;
+    observer.begin(&context);
+    let Driven { pair, mut watch, stopped, shaking } =
+        drive_observed(leg, &simulated, &context, options, observer)?;
+    let mut run = if stopped.is_some() {
+        watch.report(&pair, options, Vec::new(), stopped, started)?
+    } else {
+        let tracking = track(&context, &pair);
+        watch.scale = Some(scale::find(&context, &pair, options.payload.as_ref(), options.load.as_ref())?);
+        watch.report(&pair, options, tracking, None, started)?
+    };
+    shaking.explain(&simulated, &mut run.report);
+    Ok(run)
+}
+
+/// Leg after one identification, with its observation.
+pub struct Driven<'a, const N: usize, const B: usize> {
+    /// Leg and plant after the verdict.
+    pub pair: Pair<N, B>,
+    /// Data unknown to the firmware.
+    pub watch: Watch<'a, N, B>,
+    /// Reason for a missing verdict.
+    pub stopped: Option<String>,
+    /// Speed of the plant beside its command.
+    pub shaking: Shaking<N>,
+}
+
+/// Runs from drive off to the verdict: the firmware of `context` against the plant `simulated`;
+/// `leg` is the user's leg.
+pub fn drive<'a, const N: usize, const B: usize>(
+    leg: &LegFile,
+    simulated: &LegFile,
+    context: &'a Context<N, B>,
+    options: &SimulationOptions,
+) -> Result<Driven<'a, N, B>, ToolError> {
+    drive_observed(leg, simulated, context, options, &mut ())
+}
+
+fn drive_observed<'a, const N: usize, const B: usize>(
+    leg: &LegFile,
+    simulated: &LegFile,
+    context: &'a Context<N, B>,
+    options: &SimulationOptions,
+    observer: &mut impl Observer<N, B>,
+) -> Result<Driven<'a, N, B>, ToolError> {
+    let wrong = options.perturbations.as_slice();
+    let mut pair = Pair::new(simulated, context, options.seed)?;
+    if let Some(load) = &options.load {
+        pair.world.attach(load.joint, load.mass, load.place.into());
+    }
+    perturb::at_start(leg, &mut pair, wrong)?;
+    let anatomy = context.configuration.joints.map(|joint| joint.scale.anatomy);
+    let mut shaking = Shaking::new(
+        anatomy.map(|anatomy| f64::from(anatomy.direction())),
+        anatomy.map(|anatomy| f64::from(anatomy.zero_offset())),
+    );
+    let mut watch = Watch::new(context);
+    if !pair.enable(context.gravity) {
+        let words = "the drive refused to be enabled at the start: the leg is outside its range";
+        return Ok(Driven { pair, watch, stopped: Some(words.into()), shaking });
+    }
+    let mut request = Some(ControlRequest::Identify);
+    let largest = (LONGEST_RUN_S / TICK_S) as u64;
+    let mut before = Activity::Idle;
+    loop {
+        // State behind this tick's sensor readings, without noise.
+        let (torque, sticking) = (pair.world.motor_torque(), pair.world.sticking());
+        let output = pair.tick(request.take(), context.gravity);
+        watch.see(&pair, &torque, &sticking, output.logged.as_ref());
+        shaking.take(&pair.world, &output.motion);
+        observer.tick(&pair, &output);
+        let activity = pair.leg.control().activity();
+        if activity != before {
+            match activity {
+                Activity::Identify(IdentifyPhase::Excite) => {
+                    perturb::at_excitation(simulated, context, &mut pair, wrong);
+                }
+                Activity::Identify(IdentifyPhase::Settle) => {
+                    perturb::after_excitation(simulated, &mut pair, wrong);
+                }
+                Activity::Identify(IdentifyPhase::Validate { motion: 0, step: Step::Approach }) => {
+                    perturb::before_validation(context, &mut pair, wrong);
+                }
+                _ => {}
+            }
+            before = activity;
+        }
+        match activity {
+            Activity::Identify(_) => {}
+            _ if pair.leg.control().verdict().is_some() => {
+                return Ok(Driven { pair, watch, stopped: None, shaking });
+            }
+            _ => {
+                let stopped = Some(pair.stop_words(leg));
+                return Ok(Driven { pair, watch, stopped, shaking });
+            }
+        }
+        if pair.ticks > largest {
+            return Err(leg.error("identification did not end").into());
+        }
+    }
+}
+
+/// Position error on the 3 s gait, with feedback alone and with the model, from the same instant.
+fn track<const N: usize, const B: usize>(context: &Context<N, B>, pair: &Pair<N, B>) -> Vec<TrackingReport> {
+    let motion = context.motions.validation[1];
+    let error = |with_model: bool| -> Option<[f64; N]> {
+        (!with_model || pair.leg.control().model().is_some())
+            .then(|| tracking_error(context, pair.clone(), motion, with_model))
+            .flatten()
+    };
+    let (without, with) = (error(false), error(true));
+    (0..N)
+        .map(|joint| TrackingReport {
+            joint: joint + 1,
+            rms_deg_without_model: without.map(|error| error[joint]).into(),
+            rms_deg_with_model: with.map(|error| error[joint]).into(),
+        })
+        .collect()
+}
+
+fn tracking_error<const N: usize, const B: usize>(
+    context: &Context<N, B>,
+    mut pair: Pair<N, B>,
+    motion: Periodic<N>,
+    with_model: bool,
+) -> Option<[f64; N]> {
+    let scales = context.configuration.joints.map(|joint| joint.scale);
+    let motion = context.configuration.prove(motion).ok()?;
+    if !pair.leg.set_tracked(motion) {
+        return None;
+    }
+    let mut request = Some(ControlRequest::Track { with_model });
+    let (mut squared, mut count) = ([0.0; N], 0_u32);
+    let end = pair.ticks + (60.0 / TICK_S) as u64;
+    while pair.ticks < end {
+        let truth = pair.world.anatomical_position();
+        let output = pair.tick(request.take(), context.gravity);
+        match pair.leg.control().activity() {
+            Activity::Track(Step::Run) => {
+                for joint in 0..N {
+                    let scale = &scales[joint];
+                    let angle = f64::from(scale.anatomy.direction()) * truth[joint]
+                        + f64::from(scale.anatomy.zero_offset());
+                    let error = f64::from(output.motion.position_rad[joint]) - angle;
+                    squared[joint] += error * error;
+                }
+                count += 1;
+            }
+            Activity::Track(Step::Approach) => {}
+            _ => break,
+        }
+    }
+    (count > 0).then(|| squared.map(|sum| sqrt(sum / f64::from(count)).to_degrees()))
+}

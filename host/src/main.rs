@@ -1,5 +1,0 @@
-//! The host tool: `cargo sim`.
-
-fn main() -> std::process::ExitCode {
-    scarab_host::cli::main()
-}

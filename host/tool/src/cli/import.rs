@@ -1,0 +1,109 @@
+//! Options that state how recordings are read.
+
+use clap::{Args, ValueEnum};
+
+use scarab_base::error::ToolError;
+use scarab_base::names::BY_CARGO;
+use scarab_base::shell::{program_of, quoted};
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::recording::dialect::{Decimal, Delimiter};
+use scarab_identify::formats::recording::import::{ColumnChoice, Import, UnitChoice};
+
+/// Columns, units and format of all recordings of the command.
+#[derive(Args, Debug)]
+pub struct ImportArguments {
+    /// Columns by name or number from 1: SIGNAL=COLUMN,.. with the signals t, q1.. (joint angle) or motor1..
+    /// (motor angle), tau1.. (joint torque) or i1.. (motor current). Example: t=time,q1=position_0,tau1=4
+    #[arg(long, value_name = "SIGNAL=COLUMN,..", value_delimiter = ',', help_heading = "Recordings")]
+    columns: Vec<ColumnChoice>,
+    /// Units: UNIT,.. for all signals of a quantity, SIGNAL=UNIT for one; s, ms, us, ns, rad, mrad, deg,
+    /// turn, Nm, mNm, A, mA. Default: s, rad, Nm, A. Example: ms,deg,tau2=mNm
+    #[arg(long, value_name = "UNIT,..", value_delimiter = ',', help_heading = "Recordings")]
+    units: Vec<UnitChoice>,
+    /// Skip rows that are invalid, at most 5 % of a file; they are counted and reported.
+    #[arg(long, help_heading = "Recordings")]
+    skip_bad: bool,
+    /// Separator of fields, where the first lines allow two.
+    #[arg(long, value_enum, help_heading = "Recordings")]
+    delimiter: Option<DelimiterArgument>,
+    /// Decimal sign, where the first lines allow two.
+    #[arg(long, value_enum, help_heading = "Recordings")]
+    decimal: Option<DecimalArgument>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DelimiterArgument {
+    Comma,
+    Semicolon,
+    Tab,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DecimalArgument {
+    Point,
+    Comma,
+}
+
+impl ImportArguments {
+    /// How to read the recordings of this leg. `name` is the leg's name or file.
+    pub fn import(&self, leg: &LegFile, name: &str) -> Result<Import, ToolError> {
+        let (text, _) = LegFile::text(name)?;
+        let import = Import {
+            skip_bad: self.skip_bad,
+            delimiter: self.delimiter.map(|delimiter| match delimiter {
+                DelimiterArgument::Comma => Delimiter::Comma,
+                DelimiterArgument::Semicolon => Delimiter::Semicolon,
+                DelimiterArgument::Tab => Delimiter::Tab,
+            }),
+            decimal: self.decimal.map(|decimal| match decimal {
+                DecimalArgument::Point => Decimal::Point,
+                DecimalArgument::Comma => Decimal::Comma,
+            }),
+            command: command(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
+            ..Import::of(leg, &text)
+        };
+        import.with(&self.columns, &self.units).map_err(ToolError::input)
+    }
+}
+
+/// The command as typed, without `--columns` and `--units`.
+fn command(words: impl Iterator<Item = String>) -> String {
+    let words: Vec<String> = words.collect();
+    let mut command = program_of(words.iter().cloned());
+    let mut words = words.into_iter().skip(1).filter(|word| word != BY_CARGO);
+    while let Some(word) = words.next() {
+        if word == "--columns" || word == "--units" {
+            words.next();
+        } else if !word.starts_with("--columns=") && !word.starts_with("--units=") {
+            command.push(' ');
+            command.push_str(&quoted(&word));
+        }
+    }
+    command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BY_CARGO, command};
+    use scarab_base::shell::ALIAS;
+
+    #[test]
+    fn a_proposed_command_keeps_all_other_options() {
+        let typed = [
+            "target/scarab",
+            BY_CARGO,
+            "replay",
+            "my run.csv",
+            "--columns",
+            "t=a",
+            "--units=ms",
+            "--split",
+            "0.7",
+        ];
+        assert_eq!(
+            command(typed.into_iter().map(str::to_owned)),
+            format!("{ALIAS} replay 'my run.csv' --split 0.7")
+        );
+        assert_eq!(command(["scarab", "replay"].into_iter().map(str::to_owned)), "scarab replay");
+    }
+}

@@ -1,0 +1,43 @@
+//! `update`: a new image for a board, over its bus.
+
+use std::path::Path;
+
+use clap::Args;
+use scarab_base::error::{EXIT_ACCEPTED, FileError, ToolError};
+use scarab_base::output;
+use scarab_client::adapter::open;
+use scarab_client::master::Client;
+use scarab_client::update::{Update, check};
+
+use crate::cli::arguments::Input;
+use crate::cli::serve::bit_rates;
+
+/// Bus, board and image.
+#[derive(Args, Debug)]
+pub struct UpdateArguments {
+    /// Adapter of the bus (slcan): HOST:PORT or a serial device.
+    #[arg(long, value_name = "ADAPTER")]
+    slcan: String,
+    /// Bit rate of the bus, kbit/s.
+    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
+    bit_rate: u64,
+    /// Either node-ID of the board.
+    #[arg(long, value_name = "ID", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=127))]
+    node: u8,
+    /// Program for an update, which `cargo fw` writes (scarab-image.bin).
+    #[arg(value_name = "IMAGE.bin")]
+    image: Input,
+}
+
+/// Updates; exit code 3 where the board refuses, 2 where file or bus are wrong.
+pub fn run(arguments: &UpdateArguments) -> Result<u8, ToolError> {
+    let path: &Path = &arguments.image;
+    let program = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
+    let header = check(&program).map_err(|why| ToolError::input(format!("{}: {why}", path.display())))?;
+    let client = Client::new(open(&arguments.slcan, arguments.bit_rate)?)?;
+    let mut say = |words: &str| {
+        let _ = output::print(&format!("{words}\n"));
+    };
+    Update { client, node: arguments.node, say: &mut say }.run(&program, &header)?;
+    Ok(EXIT_ACCEPTED)
+}

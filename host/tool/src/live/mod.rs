@@ -1,0 +1,18 @@
+//! Sources of a live picture: each reports what it sees while it runs, paced to the clock.
+//!
+//! | part | content |
+//! | --- | --- |
+//! | [`clock`], [`picture`], [`progress`] | pace; samples, rows and estimates from logged samples |
+//! | [`simulated`] | a simulated leg that identifies itself |
+//! | [`playback`] | a recording, played back |
+//! | [`bus`] | legs on a CANopen bus, from the frames of a silent listener |
+//! | [`traced`] | the trace of a board, as it arrives or from a file |
+
+pub mod bus;
+pub mod clock;
+pub mod picture;
+pub mod playback;
+pub mod progress;
+pub mod report;
+pub mod simulated;
+pub mod traced;

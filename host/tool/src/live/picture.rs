@@ -1,0 +1,228 @@
+//! Reports of one leg from its logged samples: means, filtered torque with its prediction, estimates.
+
+use scarab::ident::Plan;
+use scarab::leg::LoggedSample;
+use scarab::model::AnatomicalJoint;
+use scarab::servo::{LOG_RATE_HZ, SERVO_RATE_HZ, TICKS_PER_LOG};
+use scarab_identify::formats::leg_file::{JointFile, LegFile};
+use scarab_identify::leg::background::Background;
+use scarab_identify::leg::stick::Stick;
+use scarab_identify::report::{BaseReport, RunReport};
+
+use crate::live::progress::{PredictedRow, Progress};
+use crate::live::report::{
+    EstimateOrigin, JointScene, LegScene, LiveEstimate, LiveNote, LiveOutcome, LiveParameter, LiveRow,
+    LiveSample, LiveUpdate, RATE_HZ, Scene, Severity,
+};
+
+/// Logged samples of one period.
+const SAMPLES: u32 = LOG_RATE_HZ / RATE_HZ;
+/// Time from the middle of a period to its last servo tick, s.
+const HALF_PERIOD_S: f64 = (SERVO_RATE_HZ / RATE_HZ - 1) as f64 / 2.0 / SERVO_RATE_HZ as f64;
+
+/// Time from the middle of a logged sample to its last servo tick, s.
+pub const HALF_SAMPLE_S: f64 = (TICKS_PER_LOG - 1) as f64 / 2.0 / SERVO_RATE_HZ as f64;
+
+/// Description of a source with one leg.
+#[must_use]
+pub fn scene(leg: &LegFile, source: String, speed: f64) -> Scene {
+    let joint = |joint: &JointFile| JointScene { name: joint.name.clone() };
+    let joints = leg.joints.iter().map(joint).collect();
+    Scene { source, speed, legs: vec![LegScene { name: leg.name.clone(), joints }] }
+}
+
+/// Sums over one period of the picture, in the model's angles and signs.
+#[derive(Clone, Copy)]
+struct Sums<const N: usize> {
+    angle: [f64; N],
+    torque: [f64; N],
+    logged: u32,
+    commanded: [f64; N],
+    ticks: u32,
+}
+
+impl<const N: usize> Sums<N> {
+    const EMPTY: Self = Self { angle: [0.0; N], torque: [0.0; N], logged: 0, commanded: [0.0; N], ticks: 0 };
+}
+
+/// Reports about one leg.
+pub struct Picture<'a, const N: usize> {
+    leg: &'a LegFile,
+    out: &'a dyn Fn(LiveUpdate),
+    stick: Stick,
+    anatomy: [AnatomicalJoint<f64>; N],
+    sums: Sums<N>,
+    /// Whether torques come from currents by the leg's torque constants.
+    has_currents: bool,
+    /// Place of the leg in the scene.
+    place: usize,
+    /// Time of the reports, s: that of the last servo tick.
+    pub time_s: f64,
+}
+
+impl<'a, const N: usize> Picture<'a, N> {
+    /// Creates the reports of a leg, at time zero.
+    pub fn new(leg: &'a LegFile, anatomy: [AnatomicalJoint<f64>; N], out: &'a dyn Fn(LiveUpdate)) -> Self {
+        let stick = Stick::of(leg);
+        Self { leg, out, stick, anatomy, sums: Sums::EMPTY, has_currents: true, place: 0, time_s: 0.0 }
+    }
+
+    /// Reports currents as unknown.
+    #[must_use]
+    pub fn without_currents(self) -> Self {
+        Self { has_currents: false, ..self }
+    }
+
+    /// Reports as the leg at this place of the scene.
+    #[must_use]
+    pub fn at(self, place: usize) -> Self {
+        Self { place, ..self }
+    }
+
+    /// Place of the leg in the scene.
+    #[must_use]
+    pub fn place(&self) -> usize {
+        self.place
+    }
+
+    /// Leg of the picture.
+    #[must_use]
+    pub fn leg(&self) -> &'a LegFile {
+        self.leg
+    }
+
+    /// Begins a period.
+    pub fn restart(&mut self) {
+        self.sums = Sums::EMPTY;
+    }
+
+    /// Hands on a report.
+    pub fn send(&self, update: LiveUpdate) {
+        (self.out)(update);
+    }
+
+    /// Adds a line to the timeline.
+    pub fn note(&self, weight: Severity, words: impl Into<String>) {
+        let time_s = rounded(self.time_s);
+        self.send(LiveUpdate::Note(LiveNote { time_s, weight, words: words.into() }));
+    }
+
+    /// Takes the commanded angles of one servo tick, D-H, rad.
+    pub fn command(&mut self, position_rad: &[f32; N]) {
+        self.sums.ticks += 1;
+        for (sum, angle) in self.sums.commanded.iter_mut().zip(position_rad) {
+            *sum += f64::from(*angle);
+        }
+    }
+
+    /// Adds a logged sample to the means and to the progress of the identification. In the motion to identify
+    /// from, least squares over the motion so far are reported each second. A torque that is not a number is
+    /// unknown.
+    pub fn learn<const B: usize>(
+        &mut self,
+        logged: &LoggedSample<N>,
+        progress: &mut Progress<N, B>,
+        background: &Background<N, B>,
+        plan: Plan,
+    ) {
+        self.log(logged);
+        if !logged.sample.torque_nm.iter().all(|torque| torque.is_finite()) {
+            progress.break_off();
+            return;
+        }
+        let Some(row) = progress.push(logged) else { return };
+        self.row(&row);
+        if progress.is_due() {
+            let estimate = progress.estimate(plan, background.model.base.rank());
+            let base = background.base_parameters(&[false; B], &estimate, None);
+            self.estimate(EstimateOrigin::Motion, 0, &base);
+        }
+    }
+
+    /// Adds a logged sample to the means; the last one of a period ends it.
+    fn log(&mut self, logged: &LoggedSample<N>) {
+        let sums = &mut self.sums;
+        sums.logged += 1;
+        for joint in 0..N {
+            sums.angle[joint] += f64::from(logged.sample.position_rad[joint]);
+            sums.torque[joint] += f64::from(logged.sample.torque_nm[joint]);
+        }
+        if sums.logged < SAMPLES {
+            return;
+        }
+        let sums = core::mem::replace(&mut self.sums, Sums::EMPTY);
+        let angles = sums.angle.map(|sum| sum / f64::from(SAMPLES));
+        let anatomical = |joint: usize, angle: f64| self.anatomy[joint].angle_from_chain(angle) as f32;
+        let torque: [Option<f64>; N] = core::array::from_fn(|joint| {
+            let torque = self.anatomy[joint].from_chain(sums.torque[joint] / f64::from(SAMPLES));
+            Some(torque).filter(|torque| torque.is_finite())
+        });
+        let commanded = |joint: usize| {
+            (sums.ticks > 0).then(|| anatomical(joint, sums.commanded[joint] / f64::from(sums.ticks)))
+        };
+        let current = |joint: usize| {
+            let torque = torque[joint].filter(|_| self.has_currents)?;
+            Some((torque / self.leg.joints[joint].torque_per_ampere) as f32)
+        };
+        let sample = LiveSample {
+            leg: self.place,
+            time_s: rounded(self.time_s - HALF_PERIOD_S),
+            angle_rad: (0..N).map(|joint| anatomical(joint, angles[joint])).collect(),
+            commanded_rad: (0..N).map(commanded).collect(),
+            torque_nm: torque.iter().map(|torque| torque.map(|torque| torque as f32)).collect(),
+            current_a: (0..N).map(current).collect(),
+            points_m: self.stick.points(&angles),
+        };
+        self.send(LiveUpdate::Sample(sample));
+    }
+
+    /// Reports a row.
+    fn row(&mut self, row: &PredictedRow<N>) {
+        let signed = |(joint, torque): (usize, &Option<f32>)| {
+            torque.map(|torque| self.anatomy[joint].from_chain(f64::from(torque)) as f32)
+        };
+        let measured = row.measured.map(Some);
+        let row = LiveRow {
+            leg: self.place,
+            time_s: rounded(self.time_s - HALF_SAMPLE_S - row.age_s),
+            measured_nm: measured.iter().enumerate().filter_map(signed).collect(),
+            predicted_nm: row.predicted.iter().enumerate().map(signed).collect(),
+        };
+        self.send(LiveUpdate::Row(row));
+    }
+
+    /// Reports an estimate.
+    pub fn estimate(&mut self, origin: EstimateOrigin, iterations: u32, base: &[BaseReport]) {
+        let values = base.iter().map(|base| LiveParameter {
+            name: base.name.clone(),
+            unit: base.unit,
+            value: base.value,
+            sigma: base.sigma,
+            truth: base.truth,
+        });
+        let (time_s, values) = (rounded(self.time_s), values.collect());
+        self.send(LiveUpdate::Estimate(LiveEstimate { leg: self.place, time_s, origin, iterations, values }));
+    }
+
+    /// Reports the end of a run.
+    pub fn conclude(&mut self, report: &RunReport) {
+        self.estimate(EstimateOrigin::Result, report.bso.iterations, &report.base_parameters);
+        self.send(LiveUpdate::Outcome(LiveOutcome {
+            leg: self.place,
+            verdict: report.verdict.into(),
+            validated: report.validated,
+            reasons: report.reasons.iter().map(|reason| (*reason).into()).collect(),
+            findings: report.findings.clone(),
+        }));
+        let (weight, words) = match report.accepted() {
+            true => (Severity::Note, "verdict: accepted".into()),
+            false => (Severity::Warning, format!("verdict: refused, {}", report.reasons.join(", "))),
+        };
+        self.note(weight, words);
+    }
+}
+
+/// Time in whole microseconds, s.
+fn rounded(time_s: f64) -> f64 {
+    (time_s * 1e6).round() / 1e6
+}

@@ -1,0 +1,193 @@
+//! Recordings with faulty columns: clipped, held, frozen, wrongly stamped, or given twice; and the duration
+//! of a push.
+
+use scarab_base::random::Random;
+
+use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The MuJoCo recording after a change of its table.
+fn changed(folder: &Folder, change: impl Fn(&mut Table)) -> PathBuf {
+    let mut table = Table::read(MUJOCO);
+    change(&mut table);
+    let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let rows: Vec<String> = table.rows.iter().map(line).collect();
+    folder.write("walk.csv", &format!("{}\n{}\n", table.header.join(","), rows.join("\n")))
+}
+
+fn index(table: &Table, name: &str) -> usize {
+    table.header.iter().position(|present| present == name).expect("a column")
+}
+
+/// Report and output of a replay of the MuJoCo leg.
+fn replay(folder: &Folder, file: &Path, arguments: &str) -> (Run, Value) {
+    let json = folder.path("run.json");
+    let arguments = format!("replay --leg mujoco-leg --split 0.66667 {arguments}");
+    let run = scarab(&arguments, &[file, Path::new("--json"), &json]);
+    (run, folder.json("run.json"))
+}
+
+/// Names of the findings in the columns, joint and whether they refuse.
+fn samples(report: &Value) -> Vec<(&str, Option<u64>, bool)> {
+    let list = report["samples"].as_array().expect("a list").iter();
+    list.map(|found| {
+        let name = found["name"].as_str().expect("a name");
+        (name, found["joint"].as_u64(), found["refuses"].as_bool().expect("known"))
+    })
+    .collect()
+}
+
+/// Largest distance of the base parameters from those of another report, in its sigma.
+fn distance(report: &Value, other: &Value) -> f64 {
+    let names = other["base_parameters"].as_array().expect("a list").iter();
+    names
+        .map(|entry| {
+            let name = entry["name"].as_str().expect("a name");
+            (base(report, name, "value") - base(other, name, "value")).abs() / base(report, name, "sigma")
+        })
+        .fold(0.0, f64::max)
+}
+
+fn clip(table: &mut Table, name: &str, share: f64) {
+    let column = index(table, name);
+    let limit = share * table.rows.iter().fold(0.0, |top: f64, row| top.max(row[column].abs()));
+    table.rows.iter_mut().for_each(|row| row[column] = row[column].clamp(-limit, limit));
+}
+
+#[test]
+fn saturated_torque_is_refused_or_where_short_excluded() {
+    let folder = Folder::new();
+    let (run, clean) = replay(&folder, Path::new(MUJOCO), "");
+    run.ends_with(0);
+    assert_eq!(clean["samples"], serde_json::json!([]));
+
+    let file = changed(&folder, |table| clip(table, "tau2_Nm", 0.3));
+    let (run, report) = replay(&folder, &file, "");
+    let run = run.ends_with(3);
+    assert!(reasons(&report).contains(&"input"), "{report}");
+    assert!(samples(&report).contains(&("saturation", Some(2), true)), "{:?}", samples(&report));
+    assert!(run.printed.contains("tau2_Nm ends at a limit of 3.28"), "{}", run.printed);
+    assert!(run.printed.contains("of the samples lie, first at "), "{}", run.printed);
+
+    let file = changed(&folder, |table| clip(table, "tau1_Nm", 0.93));
+    let (run, report) = replay(&folder, &file, "");
+    let run = run.ends_with(0);
+    assert_eq!(samples(&report), [("saturation", Some(1), false)]);
+    assert!(run.errors.contains("These stretches are excluded"), "{}", run.errors);
+    assert!(distance(&report, &clean) < 3.0, "{}", distance(&report, &clean));
+}
+
+#[test]
+fn held_torque_is_refused_and_frozen_stretches_are_excluded() {
+    let folder = Folder::new();
+    let file = changed(&folder, |table| {
+        let column = index(table, "tau1_Nm");
+        for row in 0..table.rows.len() {
+            table.rows[row][column] = table.rows[row / 5 * 5][column];
+        }
+    });
+    let (run, report) = replay(&folder, &file, "");
+    let run = run.ends_with(3);
+    assert_eq!(samples(&report), [("held_samples", Some(1), true)]);
+    assert!(run.printed.contains("tau1_Nm repeats its values"), "{}", run.printed);
+
+    let (_, clean) = replay(&folder, Path::new(MUJOCO), "");
+    let file = changed(&folder, |table| {
+        for first in [3_000, 9_000] {
+            let frozen = table.rows[first].clone();
+            table.rows[first..first + 250].iter_mut().for_each(|row| row[1..].copy_from_slice(&frozen[1..]));
+        }
+    });
+    let (run, report) = replay(&folder, &file, "");
+    run.ends_with(0);
+    assert_eq!(samples(&report), [("held_samples", None, false)]);
+    assert!(distance(&report, &clean) < 3.0, "{}", distance(&report, &clean));
+}
+
+#[test]
+fn wrong_time_stamps_are_refused_where_inertias_are_wrong() {
+    let folder = Folder::new();
+    let file = changed(&folder, |table| {
+        let column = index(table, "t_s");
+        // Late by up to 1.9 ms, irregularly: rows are stamped when the recorder has time.
+        let mut random = Random::new("stamps", 5);
+        for row in &mut table.rows {
+            row[column] += random.uniform(0.0, 1.9e-3);
+        }
+    });
+    let (run, report) = replay(&folder, &file, "--bandwidth 25");
+    run.ends_with(3);
+    assert_eq!(samples(&report), [("time_stamps", None, true)]);
+    let found = report["samples"][0]["value"].as_f64().expect("a number");
+    // Uniform in 1.9 ms: 0.548 ms rms.
+    assert!((found / 0.548e-3 - 1.0).abs() < 0.05, "{found}");
+}
+
+#[test]
+fn a_recording_given_twice_is_bad_input_under_any_name() {
+    let folder = Folder::new();
+    let text = fs::read_to_string(MUJOCO).expect("the recording");
+    let (file, copy) = (folder.write("arm.csv", &text), folder.write("copy.csv", &text));
+    let spelled = folder.path(".").join("arm.csv");
+    let refused = |paths: &[&Path]| scarab("replay --leg mujoco-leg", paths).refusal();
+    for other in [&file, &copy, &spelled] {
+        let message = refused(&[&file, Path::new("--validate"), other]);
+        assert!(message.contains("which is identified from: it cannot be held out"), "{message}");
+        let message = refused(&[&file, other]);
+        assert!(message.contains("holds the same samples as"), "{message}");
+    }
+    #[cfg(unix)]
+    {
+        let link = folder.path("link.csv");
+        std::os::unix::fs::symlink(&file, &link).expect("a link");
+        assert!(refused(&[&file, Path::new("--validate"), &link]).contains("holds the same samples"));
+    }
+}
+
+#[test]
+fn the_duration_of_a_push_does_not_depend_on_recording_length() {
+    push_for(&[1, 4]);
+}
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn the_duration_of_a_push_is_right_in_forty_minutes() {
+    push_for(&[2, 10, 20, 40, 80]);
+}
+
+/// Repeats the recording of 30 s, pushes both joints for 0.6 s, and expects that duration and acceptance.
+fn push_for(repetitions: &[usize]) {
+    let folder = Folder::new();
+    for &periods in repetitions {
+        let file = changed(&folder, |table| {
+            let once = table.rows.clone();
+            // The motion has a period of 10 s, so it continues without a step.
+            for turn in 1..periods {
+                table.rows.extend(once.iter().map(|row| {
+                    let mut row = row.clone();
+                    row[0] += 0.002 * (turn * once.len()) as f64;
+                    row
+                }));
+            }
+            // Both joints move then; friction at rest would hide a part of the push.
+            let first = 12.2;
+            for name in ["tau1_Nm", "tau2_Nm"] {
+                let column = index(table, name);
+                let top = table.rows.iter().fold(0.0, |top: f64, row| top.max(row[column].abs()));
+                for row in &mut table.rows {
+                    let phase = (row[0] - first) / 0.6;
+                    if (0.0..1.0).contains(&phase) {
+                        row[column] += 1.2 * top * phase * (1.0 - phase);
+                    }
+                }
+            }
+        });
+        let (run, report) = replay(&folder, &file, "");
+        run.ends_with(0);
+        let seen = report["outliers"]["longest_common_s"].as_f64().expect("a number");
+        println!("{} s: pushed for {seen} s", 30 * periods);
+        assert!((0.48..=0.72).contains(&seen), "{} s: {seen} s", 30 * periods);
+    }
+}
