@@ -29,7 +29,9 @@ fn main() {
         println!("cargo::rerun-if-changed={}", source.display());
         collect(&source, workspace.unwrap_or(&package), &mut files);
     }
-    collect(&package.join("src"), &package, &mut files);
+    let own = package.join("src");
+    println!("cargo::rerun-if-changed={}", own.display());
+    collect(&own, &package, &mut files);
     // FNV-1a, 64 bits.
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for (name, content) in &files {

@@ -1,4 +1,4 @@
-//! Records of the image, read from its memory as a debug probe does, and decoded by the host tool.
+//! Records of the image, read from its memory as a debug probe does, and decoded by `scarab-rig`.
 //!
 //! The image's transport (SEGGER RTT) is a ring buffer in memory: its control block names buffer, size, and
 //! the positions of writer and reader. A probe reads up to the writer's position and moves the reader's.
@@ -21,7 +21,7 @@ const CHANNEL_BYTES: usize = 24;
 pub struct Probe {
     block: u32,
     decoder: Decoder,
-    /// Records so far, as the host tool reads them.
+    /// Records so far, as `scarab-rig` reads them.
     pub trace: Trace,
     /// Records with the time at which they were read.
     pub lines: Vec<(Ticks, String)>,

@@ -28,7 +28,7 @@ const ARGUMENTS: [(&str, &str); 7] = [
     ("--parallel", "parallel_rad"),
 ];
 
-/// Exception for an error of the tool.
+/// Exception for an error of the host crates.
 pub fn raised(error: impl Into<ToolError>) -> PyErr {
     match error.into() {
         ToolError::Refused(reason) => RefusedError::new_err(in_python(&reason)),

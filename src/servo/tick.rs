@@ -80,8 +80,8 @@ pub struct ServoOutput<const N: usize> {
     pub tracking_error: [Radian; N],
     /// Torques of feedforward and feedback before the monitor.
     pub wanted_torque: [NewtonMetre; N],
-    /// Torques that hold the joints: those applied, without the damping that brakes a moving joint.
-    pub holding_torque: [NewtonMetre; N],
+    /// Part of the wanted torques that opposes the joints' own velocities.
+    pub braking_torque: [NewtonMetre; N],
     /// Decision of the monitor; its command is for the drives.
     pub decision: Decision<N>,
 }
@@ -311,17 +311,17 @@ impl<const N: usize> Servo<N> {
                 self.controllers[joint].preset(&self.joints[joint].controller, preset);
             }
         }
-        let holding_torque = core::array::from_fn(|joint| {
-            let NewtonMetre(applied) = decision.torque[joint];
-            let error = RadianPerSecond(motion.velocity_rad_per_s[joint]) - velocity[joint];
-            let (share, error) = match efforts.map(|efforts| &efforts[joint]) {
-                Some(Effort { held: false, damping_share, .. }) => (*damping_share, -velocity[joint]),
-                _ => (1.0, error),
+        let braking_torque = core::array::from_fn(|joint| {
+            let opposite = -velocity[joint].0;
+            let (share, braking) = match efforts.map(|efforts| &efforts[joint]) {
+                Some(Effort { held: false, damping_share, .. }) => (*damping_share, opposite),
+                // No more than the joint's own velocity: the rest of the error may carry a load.
+                _ => {
+                    let error = motion.velocity_rad_per_s[joint] + opposite;
+                    (1.0, clamp(error, min(opposite, 0.0), max(opposite, 0.0)))
+                }
             };
-            // No more than what opposes the joint's own velocity: the rest of it may carry a load.
-            let NewtonMetre(whole) = self.damped(joint, share, -velocity[joint]);
-            let braking = clamp(self.damped(joint, share, error).0, min(whole, 0.0), max(whole, 0.0));
-            NewtonMetre(clamp(wanted_torque[joint].0 - braking, min(applied, 0.0), max(applied, 0.0)))
+            self.damped(joint, share, RadianPerSecond(braking))
         });
         ServoOutput {
             position,
@@ -329,7 +329,7 @@ impl<const N: usize> Servo<N> {
             accepted_counts,
             tracking_error,
             wanted_torque,
-            holding_torque,
+            braking_torque,
             decision,
         }
     }

@@ -1,6 +1,6 @@
 //! The firmware's library: whole legs in simulated hardware, identification on synthetic motion, storage,
-//! registers of the board, tables of the swarm. One program, so that the library and the host tool are linked
-//! once.
+//! registers of the board, tables of the swarm. One program, so that the library and the host crates are
+//! linked once.
 
 mod board_registers;
 mod complete_drive;

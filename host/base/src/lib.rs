@@ -1,4 +1,12 @@
-//! Basics of the host crates: errors, numbers and their formatting, tables, output files, shards.
+//! Basics of the host crates.
+//!
+//! | module | contents |
+//! | --- | --- |
+//! | [`error`], [`output`], [`shell`] | errors and exit codes, standard output, words of a command line |
+//! | [`files`], [`toml_file`] | texts that are read, files that are written, TOML |
+//! | [`number`], [`precision`], [`rounding`], [`words`] | numbers and words of reports and files |
+//! | [`names`], [`table`] | names in reports; tables as text, HTML and Markdown |
+//! | [`random`], [`shard`], [`stats`] | random numbers of a run, runs divided among processes, statistics |
 
 #![expect(
     clippy::disallowed_methods,

@@ -8,6 +8,7 @@
 //! | [`activity_words`], [`words`] | what a leg does and waits for, in words |
 //! | [`other_hosts`] | another host that uses the bus |
 //! | [`commission`], [`node_ids`], [`update`] | a board is brought up, numbered, updated |
+//! | [`report`] | result of a commissioning |
 
 pub mod activity_words;
 pub mod adapter;

@@ -7,7 +7,7 @@
 //! | [`bus`] | boards on a simulated bus, also behind a port |
 //! | [`kept_file`] | stored data of a board |
 //! | [`trace`], [`traced`] | records of a trace; the run that they tell of |
-//! | [`simulate`], [`identify`], [`watch`], [`scale`] | a simulated leg is identified |
+//! | [`simulate`], [`identify`], [`identified`], [`watch`], [`scale`] | a simulated leg is identified |
 //! | [`excite`], [`shaking`] | design of an exciting motion |
 //! | [`monitor`], [`assist`], [`motor`] | a watched model, an assisted wearer, a motor stand |
 //! | [`image`] | the flash image is built and read |

@@ -66,12 +66,21 @@ pub struct Measured {
     pub position: Radian,
     /// Joint velocity.
     pub velocity: RadianPerSecond,
-    /// Torque that holds the joint ([`ServoOutput::holding_torque`](crate::servo::ServoOutput)).
-    pub torque: NewtonMetre,
-    /// Torque that brakes the joint besides.
+    /// Torque that the servo wanted, what of it brakes the joint, and the torque that was applied.
+    pub wanted: NewtonMetre,
     pub braking: NewtonMetre,
+    pub applied: NewtonMetre,
     /// Whether the joint returns into its range.
     pub returns: bool,
+}
+
+impl Measured {
+    /// Parts of the applied torque that hold the joint and that brake it, N m.
+    fn holding_and_braking(&self) -> (f32, f32) {
+        let NewtonMetre(applied) = self.applied;
+        let holding = clamp((self.wanted - self.braking).0, min(applied, 0.0), max(applied, 0.0));
+        (holding, applied - holding)
+    }
 }
 
 /// Demand on the servo at one tick, anatomical.
@@ -357,7 +366,8 @@ impl Follower {
         let (spring, damper) = self.spring(target, tick.range, &tick.bounds, measured);
         let damper = clamp(damper, -tick.largest, tick.largest);
         if tick.starts {
-            (self.carried, self.damper_gap) = (measured.torque.0 - spring, damper - measured.braking.0);
+            let (holding, braking) = measured.holding_and_braking();
+            (self.carried, self.damper_gap) = (holding - spring, damper - braking);
         }
         let most = max(command.torque_slope_nm_per_s, tick.least_slope) * TICK_S;
         self.carried -= clamp(self.carried, -most, most);
@@ -438,7 +448,7 @@ impl Follower {
     fn begin(&mut self, command: &JointCommand, measured: &Measured) {
         self.mode = command.target.mode();
         self.brake_from(measured);
-        self.torque = measured.torque.0;
+        (self.torque, _) = measured.holding_and_braking();
         (self.goal, self.next, self.left) = (None, None, 0);
         (self.arrived, self.waits) = (false, false);
         (self.outside, self.inside, self.reached, self.deviates) = (0, 0, false, false);

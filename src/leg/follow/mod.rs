@@ -113,12 +113,14 @@ impl<const N: usize> Following<N> {
 
     /// Measured values of a joint, from the servo's output.
     fn measured(&self, joint: usize, output: &ServoOutput<N>) -> Option<Measured> {
-        let (anatomy, holding) = (self.anatomy.get(joint)?, *output.holding_torque.get(joint)?);
+        let anatomy = self.anatomy.get(joint)?;
+        let torque = |of: &[NewtonMetre; N]| Some(NewtonMetre(anatomy.from_chain(of.get(joint)?.0)));
         Some(Measured {
             position: Radian(anatomy.angle_from_chain(output.position.get(joint)?.0)),
             velocity: RadianPerSecond(anatomy.from_chain(output.velocity.get(joint)?.0)),
-            torque: NewtonMetre(anatomy.from_chain(holding.0)),
-            braking: NewtonMetre(anatomy.from_chain((*output.decision.torque.get(joint)? - holding).0)),
+            wanted: torque(&output.wanted_torque)?,
+            braking: torque(&output.braking_torque)?,
+            applied: torque(&output.decision.torque)?,
             returns: *output.decision.returns.get(joint)?,
         })
     }

@@ -87,7 +87,7 @@ impl Foreign {
                 let kind = if self == Self::Parquet { "a Parquet file" } else { "an MCAP file" };
                 refused(&format!(
                     "{kind}, which this program is built without: in the clone give the same command with `cargo sim-readers` \
-                     instead of `{}`; an installed program needs `cargo install --path host --features readers`",
+                     instead of `{}`; an installed program needs `cargo install --path host/tool --features readers`",
                     scarab_base::shell::program()
                 ))
             }
