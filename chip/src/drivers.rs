@@ -3,7 +3,7 @@
 //! Why: the model and the firmware come from one reading of the reference manual. The program
 //! (`chip/drivers`) sets registers only through another project's drivers. Each row of the result compares
 //! what a driver's documentation promises with the model, in physical units. Its computations also run on the
-//! host; the words of its exceptions are those that QEMU 7.2 gave ([`EXCEPTIONS`]). Known limit: no driver
+//! host; the words of its exceptions are those that QEMU 7.2 gave (`EXCEPTIONS`). Known limit: no driver
 //! with DMA.
 
 use std::path::{Path, PathBuf};

@@ -5,12 +5,15 @@
 //! into its range.
 
 use std::rc::Rc;
+use std::time::Duration;
 
 use scarab::bus::Frame;
 use scarab::bus::commissioning::BoardState;
 use scarab::hal::Contacts;
 use scarab::safety::NoticeCode;
 use scarab_base::error::ToolError;
+use scarab_client::bus;
+use scarab_client::master::{Client, Object, RequestError};
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_rig::pair::start_position;
 
@@ -79,6 +82,8 @@ pub struct Session {
     is_known: bool,
     /// Records before the last start.
     started: usize,
+    /// Frames of the board that were received since the last one was sent to it.
+    received: usize,
 }
 
 /// Records that are printed when they arrive.
@@ -103,9 +108,8 @@ type Telemetry<'a> = (&'a str, u16, u8, f64, Option<f64>, &'a dyn Fn(&Session) -
 const LIGHT_SAMPLES: u32 = 400;
 const LIGHT_CYCLE_S: f64 = 2.0;
 
-/// Readings of which the mean is compared, and longest wait for one, s.
+/// Readings of which the mean is compared.
 const READINGS: u32 = 20;
-const ANSWER_S: f64 = 0.5;
 /// Relative error of the current measurement: amplifiers and shunts.
 const GAIN_ERROR: f64 = 0.03;
 
@@ -132,6 +136,7 @@ impl Session {
             prints: false,
             is_known: false,
             started: 0,
+            received: 0,
         })
     }
 
@@ -380,8 +385,7 @@ impl Session {
         let mut wrong = Vec::new();
         for joint in 0..JOINTS {
             let node = 1 + joint as u16;
-            let [rated_a, rated_nm] =
-                [0x6075, 0x6076].map(|index| self.read_object(node, index, 0, ANSWER_S));
+            let [rated_a, rated_nm] = [0x6075, 0x6076].map(|index| self.read_object(node, index, 0));
             let (rated_a, rated_nm) = (f64::from(rated_a?) * 1e-6, f64::from(rated_nm?) * 1e-6);
             let phase = |place: usize| move |session: &Self| session.axis(joint).currents()[place];
             // The plant's torque contains the motor's cogging, which its current does not show.
@@ -405,7 +409,7 @@ impl Session {
                 let is_short = is_by_current || index == 0x2170;
                 let (mut shown, mut own) = (0.0, 0.0);
                 for _ in 0..READINGS {
-                    let value = self.read_object(node, index, sub, ANSWER_S)?;
+                    let value = self.read_object(node, index, sub)?;
                     let value = if is_short { f64::from(value as i16) } else { f64::from(value as i32) };
                     shown += unit * value / f64::from(READINGS);
                     own += truth(self) / f64::from(READINGS);
@@ -425,7 +429,7 @@ impl Session {
         // The firmware counts from its first instruction, and reports the longest of the last second.
         for (name, sub, exception) in [("current interrupt", 7, CURRENT_INTERRUPT), ("servo tick", 8, SERVO)]
         {
-            let shown = f64::from(self.read_object(1, 0x2170, sub, ANSWER_S)?) * 1e-3;
+            let shown = f64::from(self.read_object(1, 0x2170, sub)?) * 1e-3;
             let used = self.machine.chip().load.of(exception);
             let mean = microseconds(used.ticks) / used.entries.max(1) as f64;
             let row = format!(
@@ -441,8 +445,8 @@ impl Session {
     }
 
     fn status_light(&mut self) -> Result<(), ToolError> {
-        let state = self.read_object(1, 0x2160, 2, ANSWER_S)? as u8;
-        let is_on = self.read_object(1, 0x6041, 0, ANSWER_S)? & 0x6F == 0x27;
+        let state = self.read_object(1, 0x2160, 2)? as u8;
+        let is_on = self.read_object(1, 0x6041, 0)? & 0x6F == 0x27;
         let sample = |session: &mut Self| {
             session.run(LIGHT_CYCLE_S / f64::from(LIGHT_SAMPLES))?;
             Ok::<_, ToolError>(session.machine.chip().gpio.is_driven_high(STATUS_LIGHT))
@@ -539,40 +543,17 @@ impl Session {
         self.machine.chip().plant.position().map(f64::to_degrees)
     }
 
-    /// Sends a request to a node's object dictionary and returns the answer.
-    ///
-    /// # Errors
-    /// No answer arrives in time.
-    pub fn ask(&mut self, node: u16, request: [u8; 8], longest: f64) -> Result<[u8; 8], ToolError> {
-        self.machine.chip_mut().can.sent.clear();
-        self.machine.chip_mut().send_frame(Frame::new(0x600 + node, &request));
-        let end = self.now() + ticks(longest);
-        while self.now() < end && !self.machine.chip().flash.is_cut {
-            self.run(POLL_S)?;
-            let answers = self.machine.chip().can.sent.iter();
-            let mut answers = answers.filter(|(_, frame)| frame.id() == 0x580 + node);
-            if let Some((_, frame)) = answers.next() {
-                let mut answer = [0; 8];
-                answer[..frame.data().len()].copy_from_slice(frame.data());
-                return Ok(answer);
-            }
-        }
-        Err(ToolError::input(format!("node {node} does not answer {request:02x?} within {longest} s")))
+    /// Client of the board's nodes.
+    pub fn client(&mut self) -> Client<&mut Self> {
+        Client::over(self)
     }
 
     /// Writes a value of four bytes to an object.
     ///
     /// # Errors
     /// The node refuses the value or does not answer.
-    pub fn write_object(
-        &mut self,
-        node: u16,
-        index: u16,
-        sub: u8,
-        value: u32,
-        longest: f64,
-    ) -> Result<(), ToolError> {
-        self.write_sized(node, index, sub, value, 4, longest)
+    pub fn write_object(&mut self, node: u16, index: u16, sub: u8, value: u32) -> Result<(), ToolError> {
+        self.write_sized(node, index, sub, value, 4)
     }
 
     /// Writes a value of 1, 2 or 4 bytes to an object.
@@ -586,16 +567,12 @@ impl Session {
         sub: u8,
         value: u32,
         bytes: u8,
-        longest: f64,
     ) -> Result<(), ToolError> {
-        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
-        // An expedited download names the number of bytes without data (CiA 301, 7.2.4.3.3).
-        let command = 0x23 | (4 - bytes) << 2;
-        let answer = self.ask(node, [command, low, high, sub, a, b, c, d], longest)?;
-        if answer[0] == 0x60 {
-            return Ok(());
-        }
-        Err(ToolError::Refused(format!("node {node} refuses {index:04x}:{sub} = {value:#x}: {answer:02x?}")))
+        let (node, object) = (node as u8, Object(index, sub));
+        self.client().try_write(node, object, value, bytes).map_err(|error| match error {
+            RequestError::Aborted(_) => ToolError::Refused(error.of(node, object).to_string()),
+            error => error.of(node, object),
+        })
     }
 
     /// Writes a request that changes the flash ("save", "load") and waits for its emergency messages: FF0D
@@ -604,7 +581,7 @@ impl Session {
     /// # Errors
     /// The node refuses the request, fails, or does not finish in time.
     pub fn store(&mut self, index: u16, word: [u8; 4], longest: f64) -> Result<(), ToolError> {
-        self.write_object(1, index, 1, u32::from_le_bytes(word), 0.5)?;
+        self.write_object(1, index, 1, u32::from_le_bytes(word))?;
         let end = self.now() + ticks(longest);
         while self.now() < end && !self.machine.chip().flash.is_cut {
             let sent = &self.machine.chip().can.sent;
@@ -629,16 +606,8 @@ impl Session {
     ///
     /// # Errors
     /// The node refuses the request or does not answer.
-    pub fn read_object(&mut self, node: u16, index: u16, sub: u8, longest: f64) -> Result<u32, ToolError> {
-        let [low, high] = index.to_le_bytes();
-        let answer = self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0], longest)?;
-        let value = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
-        match answer[0] {
-            0x43 => Ok(value),
-            0x4B => Ok(value & 0xFFFF),
-            0x4F => Ok(value & 0xFF),
-            _ => Err(ToolError::Refused(format!("node {node} refuses {index:04x}:{sub}: {answer:02x?}"))),
-        }
+    pub fn read_object(&mut self, node: u16, index: u16, sub: u8) -> Result<u32, ToolError> {
+        self.client().read(node as u8, Object(index, sub))
     }
 
     /// Saves the machine.
@@ -647,5 +616,37 @@ impl Session {
     /// Unicorn cannot save its registers.
     pub fn save(&self) -> Result<Snapshot, ToolError> {
         self.machine.save()
+    }
+}
+
+impl bus::Bus for Session {
+    /// Sends a frame, and forgets those that were received before.
+    fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
+        let chip = self.machine.chip_mut();
+        chip.can.sent.clear();
+        chip.send_frame(*frame);
+        self.received = 0;
+        Ok(())
+    }
+
+    fn receive(&mut self, until: Duration) -> Result<Option<Frame>, RequestError> {
+        loop {
+            let chip = self.machine.chip();
+            if let Some((_, frame)) = chip.can.sent.get(self.received) {
+                self.received += 1;
+                return Ok(Some(*frame));
+            }
+            if chip.flash.is_cut {
+                return Err(RequestError::Silent);
+            }
+            if bus::Bus::now(self) >= until {
+                return Ok(None);
+            }
+            self.run(POLL_S).map_err(|error| RequestError::Adapter(error.to_string()))?;
+        }
+    }
+
+    fn now(&self) -> Duration {
+        Duration::from_secs_f64(seconds(Self::now(self)))
     }
 }

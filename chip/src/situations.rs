@@ -49,8 +49,6 @@ const WAY: f64 = 20_000.0;
 const MOTION_HZ: f64 = 0.5;
 /// COB-ID of frames that no node of this board uses.
 pub(crate) const OTHER: u16 = 0x5FF;
-/// Longest time for an answer, s.
-pub(crate) const ANSWER_S: f64 = 0.5;
 
 /// Load in one situation.
 #[derive(Clone, Debug, Serialize)]
@@ -210,8 +208,7 @@ pub(crate) fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
     session.machine.chip_mut().send_frame(Frame::new(0, &[1, 0]));
     session.run(0.1)?;
     for node in [1_u16, 2] {
-        let mut write =
-            |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
+        let mut write = |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes);
         for (index, sub, value, bytes) in compact_mapping(usize::from(node) - 1) {
             write(index, sub, value, bytes)?;
         }
@@ -219,7 +216,7 @@ pub(crate) fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
     }
     for (word, state) in [(0x6, 0x21), (0x7, 0x23), (0xF, 0x27)] {
         for node in [1, 2] {
-            session.write_sized(node, 0x6040, 0, word, 2, ANSWER_S)?;
+            session.write_sized(node, 0x6040, 0, word, 2)?;
         }
         for node in [1, 2] {
             reach(session, node, state)?;
@@ -227,9 +224,9 @@ pub(crate) fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
     }
     let mut positions = [0; 2];
     for (node, position) in (1..).zip(&mut positions) {
-        let value = session.read_object(node, 0x6064, 0, ANSWER_S)?;
-        session.write_sized(node, 0x607A, 0, value, 4, ANSWER_S)?;
-        session.write_sized(node, 0x6060, 0, 8, 1, ANSWER_S)?;
+        let value = session.read_object(node, 0x6064, 0)?;
+        session.write_sized(node, 0x607A, 0, value, 4)?;
+        session.write_sized(node, 0x6060, 0, 8, 1)?;
         *position = value.cast_signed();
     }
     Ok(positions)
@@ -239,7 +236,7 @@ pub(crate) fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
 fn reach(session: &mut Session, node: u16, state: u32) -> Result<(), ToolError> {
     let until = session.now() + ticks(2.0);
     while session.now() < until {
-        if session.read_object(node, 0x6041, 0, ANSWER_S)? & 0x6F == state {
+        if session.read_object(node, 0x6041, 0)? & 0x6F == state {
             return Ok(());
         }
         session.run(5e-3)?;

@@ -67,7 +67,7 @@ impl Session {
     fn read_after_cut(&mut self) -> Result<u32, ToolError> {
         self.power_up()?;
         self.run(1e-2)?;
-        self.read_object(1, OBJECT, 0, 0.5)
+        self.read_object(1, OBJECT, 0)
     }
 }
 
@@ -76,12 +76,12 @@ impl Session {
 /// # Errors
 /// The image does not store at all.
 pub fn run(session: &mut Session) -> Result<CutReport, ToolError> {
-    let default = session.read_object(1, OBJECT, 0, 0.5)?;
+    let default = session.read_object(1, OBJECT, 0)?;
     let empty = session.save()?;
     let mut report = CutReport::default();
     cut_saves(session, "first save", &empty, [default, OLD], &mut report)?;
     session.machine.restore(&empty)?;
-    session.write_object(1, OBJECT, 0, OLD, 0.5)?;
+    session.write_object(1, OBJECT, 0, OLD)?;
     session.store(SAVE.0, SAVE.1, LONGEST_S)?;
     let old = session.save()?;
     cut_saves(session, "second save", &old, [OLD, NEW], &mut report)?;
@@ -100,13 +100,13 @@ fn cut_saves(
     let mut cuts = SaveReport { save, ..SaveReport::default() };
     session.machine.restore(saved)?;
     let words = session.machine.chip().flash.words;
-    session.write_object(1, OBJECT, 0, after, 0.5)?;
+    session.write_object(1, OBJECT, 0, after)?;
     session.store(SAVE.0, SAVE.1, LONGEST_S)?;
     cuts.words = session.machine.chip().flash.words - words;
     // One more than the words: the save is then complete.
     for word in 0..=cuts.words {
         session.machine.restore(saved)?;
-        session.write_object(1, OBJECT, 0, after, 0.5)?;
+        session.write_object(1, OBJECT, 0, after)?;
         session.machine.chip_mut().flash.cut = Some(Cut::Word(word));
         session.store(SAVE.0, SAVE.1, LONGEST_S)?;
         if session.machine.chip().flash.is_cut == (word == cuts.words) {

@@ -7,11 +7,11 @@
 
 use std::fmt::Write as _;
 
-use crc::{CRC_16_XMODEM, Crc};
-use scarab::bus::Frame;
 use scarab::bus::program::{ProgramCommand, ProgramError, ProgramStatus};
 use scarab_base::error::ToolError;
 use scarab_boot::{HEADER_AT, Region, seal};
+use scarab_client::master::Object;
+use scarab_client::update::{DATA, SOFTWARE, STATUS, Update, check};
 use serde::Serialize;
 
 use crate::machine::Snapshot;
@@ -19,15 +19,8 @@ use crate::peripherals::flash::Cut;
 use crate::session::Session;
 use crate::time::{seconds, ticks};
 
-/// Program data, control, software identification and status.
-const DATA: u16 = 0x1F50;
-const CONTROL: u16 = 0x1F51;
-const SOFTWARE: u16 = 0x1F56;
-const STATUS: u16 = 0x1F57;
 /// Node through which the image comes.
-const NODE: u16 = 1;
-/// Longest answer while sectors are erased, s.
-const ERASED_S: f64 = 8.0;
+const NODE: u8 = 1;
 /// Longest start that swaps both images and swaps them back, s.
 const SWAPPED_S: f64 = 90.0;
 /// Word that requests a swap, as `embassy-boot` writes it.
@@ -124,7 +117,8 @@ impl Session {
     /// Runs until the first node's boot-up message, without a request of the host.
     fn await_start(&mut self, longest: f64) -> Result<(), ToolError> {
         let end = self.now() + ticks(longest);
-        while !self.machine.chip().can.sent.iter().any(|(_, frame)| frame.id() == 0x700 + NODE) {
+        let started = 0x700 + u16::from(NODE);
+        while !self.machine.chip().can.sent.iter().any(|(_, frame)| frame.id() == started) {
             if self.now() >= end {
                 return Err(ToolError::input(format!("no boot-up message within {longest} s")));
             }
@@ -143,87 +137,41 @@ impl Session {
         self.await_start(SWAPPED_S)
     }
 
-    /// Writes a command for the program; the board may cut its power.
+    /// Gives a command for the program.
     fn command(&mut self, command: ProgramCommand) -> Result<(), ToolError> {
-        self.write_sized(NODE, CONTROL, 1, command as u32, 1, 0.5)
+        Update { client: self.client(), node: NODE, say: &mut |_: &str| {} }.command(command)
     }
 
-    /// Waits until nothing is under way; returns the status. `None` after a power cut.
-    fn settled(&mut self) -> Result<Option<ProgramStatus>, ToolError> {
-        let end = self.now() + ticks(ERASED_S);
-        while self.now() < end {
-            let answer = self.read_object(NODE, STATUS, 1, ERASED_S);
-            if self.machine.chip().flash.is_cut {
-                return Ok(None);
-            }
-            let status = ProgramStatus(answer?);
-            if !status.has(ProgramStatus::UNDER_WAY) {
-                return Ok(Some(status));
-            }
-            self.run(5e-3)?;
-        }
-        Err(ToolError::input(format!("the program's status stays under way for {ERASED_S} s")))
+    /// Waits until nothing is under way.
+    fn settled(&mut self) -> Result<ProgramStatus, ToolError> {
+        Update { client: self.client(), node: NODE, say: &mut |_: &str| {} }.settled()
     }
 
     /// Gives a command and waits until it is finished.
-    fn command_done(&mut self, command: ProgramCommand) -> Result<Option<ProgramStatus>, ToolError> {
+    fn command_done(&mut self, command: ProgramCommand) -> Result<ProgramStatus, ToolError> {
         self.command(command)?;
         self.settled()
     }
 
-    /// Waits for an answer of the node.
-    fn answer(&mut self, longest: f64) -> Result<[u8; 8], ToolError> {
-        let end = self.now() + ticks(longest);
-        while self.now() < end {
-            let sent = &mut self.machine.chip_mut().can.sent;
-            if let Some(place) = sent.iter().position(|(_, frame)| frame.id() == 0x580 + NODE) {
-                let (_, frame) = sent.remove(place);
-                let mut answer = [0; 8];
-                answer[..frame.data().len()].copy_from_slice(frame.data());
-                return Ok(answer);
-            }
-            self.run(1e-3)?;
-        }
-        Err(ToolError::input(format!("no answer within {longest} s")))
-    }
-
-    /// Writes a domain by blocks; `between` is called after each and says whether to go on.
+    /// Writes a program; `between` is called after each block.
     fn download(
         &mut self,
         program: &[u8],
-        mut between: impl FnMut(&mut Self, usize) -> Result<(), ToolError>,
+        mut between: impl FnMut(&Self) -> Result<(), ToolError>,
     ) -> Result<(), ToolError> {
-        let [low, high] = DATA.to_le_bytes();
-        let [a, b, c, d] = (program.len() as u32).to_le_bytes();
-        let begin = self.ask(NODE, [0xC6, low, high, 1, a, b, c, d], 0.5)?;
-        let refused = |answer: [u8; 8]| ToolError::Refused(format!("the download is refused: {answer:02x?}"));
-        if begin[0] & 0xFB != 0xA0 {
-            return Err(refused(begin));
-        }
-        self.machine.chip_mut().can.sent.clear();
-        let (mut offset, mut block) = (0, usize::from(begin[4]));
-        while offset < program.len() {
-            let end = program.len().min(offset + 7 * block);
-            let segments = program[offset..end].chunks(7);
-            let count = segments.len();
-            for (place, segment) in segments.enumerate() {
-                let is_last = end == program.len() && place + 1 == count;
-                let mut data = [0; 8];
-                data[0] = (place as u8 + 1) | u8::from(is_last) << 7;
-                data[1..=segment.len()].copy_from_slice(segment);
-                self.machine.chip_mut().send_frame(Frame::new(0x600 + NODE, &data));
+        let mut kept = Ok(());
+        let progress = |session: &&mut Self, _| {
+            if kept.is_ok() {
+                kept = between(session);
             }
-            let answer = self.answer(2.0)?;
-            if answer[0] != 0xA2 || usize::from(answer[1]) != count {
-                return Err(refused(answer));
-            }
-            (offset, block) = (end, usize::from(answer[2]));
-            between(self, offset)?;
-        }
-        let unused = (7 - program.len() % 7) % 7;
-        let [low, high] = Crc::<u16>::new(&CRC_16_XMODEM).checksum(program).to_le_bytes();
-        let end = self.ask(NODE, [0xC1 | (unused as u8) << 2, low, high, 0, 0, 0, 0, 0], 2.0)?;
-        if end[0] == 0xA1 { Ok(()) } else { Err(refused(end)) }
+        };
+        let written = self.client().download(NODE, DATA, program, progress);
+        written.map_err(|error| error.of(NODE, DATA))?;
+        kept
+    }
+
+    fn read(&mut self, Object(index, sub): Object) -> Result<u32, ToolError> {
+        self.read_object(u16::from(NODE), index, sub)
     }
 }
 
@@ -236,8 +184,8 @@ impl Bench<'_> {
 
     /// Checks which image runs and that its sectors are undamaged.
     fn running(&mut self, expected: Expected) -> Result<String, String> {
-        let software = self.session.read_object(NODE, SOFTWARE, 1, 0.5).map_err(|error| error.to_string())?;
-        let status = self.session.read_object(NODE, STATUS, 1, 0.5).map_err(|error| error.to_string())?;
+        let software = self.session.read(SOFTWARE).map_err(|error| error.to_string())?;
+        let status = self.session.read(STATUS).map_err(|error| error.to_string())?;
         let is_new = software == checksum(&self.new);
         if !is_new && software != checksum(&self.old) {
             return Err(format!("1F56 is {software:#x}, of neither image"));
@@ -266,17 +214,16 @@ impl Bench<'_> {
         let idle = self.session.save()?;
         self.session.command_done(ProgramCommand::Stop)?;
         let cleared = self.session.command_done(ProgramCommand::Clear)?;
-        let is_cleared = cleared.is_some_and(|status| status.has(ProgramStatus::CLEARED));
+        let is_cleared = cleared.has(ProgramStatus::CLEARED);
         self.note("clear", if is_cleared { Ok("cleared".into()) } else { Err(format!("{cleared:x?}")) });
         let cleared = self.session.save()?;
         let begun = self.session.now();
         let program = self.new.clone();
-        self.session.download(&program, |_, _| Ok(()))?;
+        self.session.download(&program, |_| Ok(()))?;
         self.session.settled()?;
         self.report.download_s = seconds(self.session.now() - begun);
         let written = self.session.save()?;
         let (begun, resets) = (self.session.now(), self.session.resets.len());
-        self.session.machine.chip_mut().can.sent.clear();
         self.session.command(ProgramCommand::Start)?;
         self.session.await_start(SWAPPED_S)?;
         self.report.restart_s = seconds(self.session.now() - begun);
@@ -289,7 +236,6 @@ impl Bench<'_> {
     /// What becomes of an image on trial.
     fn trials(&mut self, trial: &Snapshot) -> Result<(), ToolError> {
         self.session.machine.restore(trial)?;
-        self.session.machine.chip_mut().can.sent.clear();
         self.session.command(ProgramCommand::Reset)?;
         let found = self.session.await_start(SWAPPED_S).map_err(|error| error.to_string());
         let found = found.and_then(|()| self.running(Expected::Old));
@@ -313,7 +259,7 @@ impl Bench<'_> {
         self.note("power cut without confirmation, and the old image has decayed", found);
         self.session.machine.restore(trial)?;
         let status = self.session.command_done(ProgramCommand::Start)?;
-        let confirmed = status.is_some_and(|status| !status.has(ProgramStatus::ON_TRIAL));
+        let confirmed = !status.has(ProgramStatus::ON_TRIAL);
         let found = self.start_up(Expected::New);
         self.note("power cut after the confirmation", if confirmed { found } else { Err("on trial".into()) });
         Ok(())
@@ -347,7 +293,7 @@ impl Bench<'_> {
         for (name, damage, error) in &cases {
             self.session.machine.restore(written)?;
             damage(self.session.machine.chip_mut().flash.region_mut(&Region::NEW_IMAGE));
-            let status = self.session.command_done(ProgramCommand::Start)?.unwrap_or_default();
+            let status = self.session.command_done(ProgramCommand::Start)?;
             let is_refused = status.error() == *error as u8 && status.has(ProgramStatus::STOPPED);
             let found = format!("refused: {}", error.words());
             let found = if is_refused { Ok(found) } else { Err(format!("status {:#x}", status.0)) };
@@ -423,7 +369,7 @@ impl Bench<'_> {
         let blocks = program.len().div_ceil(7 * 32);
         let every = (blocks as u64 / points).max(1);
         let (mut count, mut states) = (0, Vec::new());
-        self.session.download(&program, |session, _| {
+        self.session.download(&program, |session| {
             count += 1;
             if count % every == 0 {
                 states.push(session.save()?);
@@ -455,24 +401,16 @@ impl Bench<'_> {
     /// Confirms an image on trial, and brings the other one onto the board.
     fn update(&mut self) -> Result<String, String> {
         let words = |error: ToolError| error.to_string();
-        let status = self.session.read_object(NODE, STATUS, 1, 0.5).map_err(words)?;
+        let status = self.session.read(STATUS).map_err(words)?;
         if ProgramStatus(status).has(ProgramStatus::ON_TRIAL) {
             self.session.command_done(ProgramCommand::Start).map_err(words)?;
         }
-        let software = self.session.read_object(NODE, SOFTWARE, 1, 0.5).map_err(words)?;
-        let (program, expected) = if software == checksum(&self.new) {
-            (self.old.clone(), Expected::Old)
-        } else {
-            (self.new.clone(), Expected::New)
-        };
-        for command in [ProgramCommand::Stop, ProgramCommand::Clear] {
-            self.session.command_done(command).map_err(words)?;
-        }
-        self.session.download(&program, |_, _| Ok(())).map_err(words)?;
-        self.session.settled().map_err(words)?;
-        self.session.machine.chip_mut().can.sent.clear();
-        self.session.command(ProgramCommand::Start).map_err(words)?;
-        self.session.await_start(SWAPPED_S).map_err(words)?;
+        let is_new = self.session.read(SOFTWARE).map_err(words)? == checksum(&self.new);
+        let (program, expected) =
+            if is_new { (&self.old, Expected::Old) } else { (&self.new, Expected::New) };
+        let header = check(program)?;
+        let mut update = Update { client: self.session.client(), node: NODE, say: &mut |_: &str| {} };
+        update.run(program, &header).map_err(words)?;
         self.running(expected)
     }
 }
@@ -508,12 +446,10 @@ pub fn run(session: &mut Session, points: u64, every_block: bool) -> Result<Upda
     })?;
     bench.cut_download(&cleared, if every_block { u64::MAX } else { points })?;
     bench.cut("swaps the new image in", &written, points, Expected::Either, |session| {
-        session.machine.chip_mut().can.sent.clear();
         session.command(ProgramCommand::Start)?;
         session.await_start(SWAPPED_S)
     })?;
     bench.cut("swaps the old image back", &trial, points, Expected::Old, |session| {
-        session.machine.chip_mut().can.sent.clear();
         session.command(ProgramCommand::Reset)?;
         session.await_start(SWAPPED_S)
     })?;

@@ -53,7 +53,7 @@ const HOST: [(&str, &[&[&str]]); 4] = [
         "host/client/src",
         &[
             &["adapter", "slcan", "candump", "alarms", "wire", "report", "activity_words"],
-            &["master", "words"],
+            &["bus", "master", "words"],
             &["other_hosts"],
             &["commission", "node_ids", "update"],
         ],

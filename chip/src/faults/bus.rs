@@ -14,7 +14,7 @@ use crate::faults::{DAMP_S, Machines, Verdict, begin, jitter};
 use crate::machine::Snapshot;
 use crate::plant::JOINTS;
 use crate::session::Session;
-use crate::situations::{ANSWER_S, CYCLE_S, OTHER, take_over, targets};
+use crate::situations::{CYCLE_S, OTHER, take_over, targets};
 use crate::time::{Ticks, seconds, ticks};
 
 const NODES: [u16; JOINTS] = [1, 2];
@@ -95,8 +95,7 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
     // Fault, or quick stop.
     let option = if random.coin() { 1 } else { 3 };
     for node in NODES {
-        let mut write =
-            |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
+        let mut write = |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes);
         write(0x6007, 0, option, 2)?;
         write(0x1016, 1, HOST << 16 | times_ms[0], 4)?;
         write(0x1401, 5, times_ms[1], 2)?;
@@ -197,7 +196,7 @@ fn answers(session: &mut Session) -> Result<Result<(), String>, ToolError> {
         return Ok(Err(format!("of both nodes {nodes:?} start again")));
     }
     for node in nodes {
-        match session.read_object(node, 0x1000, 0, ANSWER_S) {
+        match session.read_object(node, 0x1000, 0) {
             Ok(SERVO_DRIVE) => {}
             other => return Ok(Err(format!("node {node} answers {other:?}"))),
         }
@@ -283,10 +282,9 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     send(session, Frame::new(0, &[1, 0]));
     session.run(0.1)?;
     for node in NODES {
-        let place = session.read_object(node, 0x6064, 0, ANSWER_S)?;
-        let torque = session.read_object(node, 0x6077, 0, ANSWER_S)?;
-        let mut write =
-            |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
+        let place = session.read_object(node, 0x6064, 0)?;
+        let torque = session.read_object(node, 0x6077, 0)?;
+        let mut write = |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes);
         write(0x6060, 0, u32::from((mode as i8).cast_unsigned()), 1)?;
         write(0x607A, 0, place, 4)?;
         write(0x60FF, 0, 0, 4)?;
@@ -300,7 +298,7 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     let (torque, place) = (plant.torque(), plant.position());
     session.machine.chip_mut().can.sent.clear();
     for node in NODES {
-        session.write_sized(node, 0x6040, 0, 0xF, 2, ANSWER_S)?;
+        session.write_sized(node, 0x6040, 0, 0xF, 2)?;
     }
     for _ in 0..TAKEN {
         session.run(CYCLE_S)?;
@@ -314,8 +312,8 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
         }
     }
     for node in NODES {
-        let word = session.read_object(node, 0x6041, 0, ANSWER_S)?;
-        let shown = session.read_object(node, 0x6061, 0, ANSWER_S)?;
+        let word = session.read_object(node, 0x6041, 0)?;
+        let shown = session.read_object(node, 0x6061, 0)?;
         let codes = emergencies(session, node);
         let ignores = matches!(mode as i8, -1 | 8..=10) && word & 1 << 12 == 0;
         if word & 0x806F != 0x27

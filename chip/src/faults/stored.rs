@@ -2,11 +2,13 @@
 
 use std::rc::Rc;
 
+use scarab::bus::Abort;
 use scarab::leg::{DriveState, Fingerprint};
 use scarab::safety::{InhibitReason, NoticeCode};
 use scarab::store::{Key, ModelRecord};
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
+use scarab_client::master::Object;
 use scarab_rig::faults::bench::kept::{corrupt, identified, readable, window, worn};
 use scarab_rig::kept_file::memory::Memory;
 
@@ -19,15 +21,12 @@ use crate::time::ticks;
 
 /// Values that are stored one after the other.
 const WINDOWS: [u32; 2] = [20_000, 30_000];
-const ANSWER_S: f64 = 0.5;
 /// Number of models accepted so far, in the object dictionary.
 const MODELS: (u16, u8) = (0x2100, 7);
 /// Inhibit reasons.
 const INHIBIT: (u16, u8) = (0x2170, 1);
 /// Ways to corrupt a memory.
 const WAYS: u64 = 6;
-/// Answer to a request that is refused in this state of the drive (CiA 301: 0800 0022).
-const REFUSED: [u8; 4] = [0x22, 0, 0, 0x08];
 
 /// A board that has stored two generations of objects and of models, and a model of the worn leg.
 pub struct Stored {
@@ -54,7 +53,7 @@ impl Machines<'_> {
         self.session.machine.restore(&booted)?;
         for window in WINDOWS {
             for node in [1, 2] {
-                self.session.write_object(node, OBJECT, 0, window, ANSWER_S)?;
+                self.session.write_object(node, OBJECT, 0, window)?;
             }
             self.session.store(SAVE.0, SAVE.1, LONGEST_S)?;
         }
@@ -95,7 +94,7 @@ fn start(session: &mut Session, booted: &Snapshot, flash: &[u8]) -> Result<Start
         let sent = session.machine.chip().can.sent.iter();
         sent.filter(|(_, frame)| frame.id() == 0x80 + node).any(|(_, frame)| frame.data().starts_with(&code))
     });
-    let mut read = |node, (index, sub)| session.read_object(node, index, sub, ANSWER_S);
+    let mut read = |node, (index, sub)| session.read_object(node, index, sub);
     let windows = [read(1, (OBJECT, 0))?, read(2, (OBJECT, 0))?];
     Ok(Start { windows, generation: read(1, MODELS)?, reports })
 }
@@ -159,7 +158,7 @@ fn drive_off<'a>(machines: &'a mut Machines<'_>, random: &mut Random) -> Result<
     session.hold_switch(false);
     session.run(2.0 * DAMP_S)?;
     for node in [1, 2] {
-        session.write_object(node, OBJECT, 0, WINDOWS[0], ANSWER_S)?;
+        session.write_object(node, OBJECT, 0, WINDOWS[0])?;
     }
     Ok(session)
 }
@@ -175,7 +174,7 @@ fn low(
     session.machine.chip_mut().set_supply(random.uniform(2.7, 2.9));
     let refused = session.store(request.0, request.1, LONGEST_S);
     let (index, sub) = INHIBIT;
-    let causes = session.read_object(1, index, sub, ANSWER_S)?;
+    let causes = session.read_object(1, index, sub)?;
     let is_same = session.machine.chip_mut().flash.parameters_mut() == cells;
     if !matches!(refused, Err(ToolError::Refused(_)))
         || causes != InhibitReason::ProcessorSupply.bit()
@@ -185,7 +184,7 @@ fn low(
     }
     session.power_up()?;
     session.run(20e-3)?;
-    session.write_object(1, OBJECT, 0, WINDOWS[0], ANSWER_S)?;
+    session.write_object(1, OBJECT, 0, WINDOWS[0])?;
     Ok(session.store(request.0, request.1, LONGEST_S).map(|()| 0.0).map_err(|error| error.to_string()))
 }
 
@@ -198,15 +197,14 @@ fn armed(
     let session = &mut *machines.session;
     begin(session, &moving, random.below(ticks(0.5)))?;
     let cells = session.machine.chip_mut().flash.parameters_mut().to_vec();
-    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), word);
-    let node = 1 + random.below(2) as u16;
-    let answer = session.ask(node, [0x23, low, high, 1, a, b, c, d], ANSWER_S)?;
+    let node = 1 + random.below(2) as u8;
+    let answer = session.client().try_write(node, Object(index, 1), u32::from_le_bytes(word), 4);
     session.run(0.1)?;
-    let is_refused = answer[..4] == [0x80, low, high, 1] && answer[4..] == REFUSED;
+    let is_refused = answer.as_ref().is_err_and(|error| error.is(Abort::State));
     let is_same = session.machine.chip_mut().flash.parameters_mut() == cells;
     let switched = session.machine.chip().plant.switchings.iter().flatten().count();
     if !is_refused || !is_same || switched > 0 {
-        return Ok(Err(format!("answer {answer:02x?}, flash unchanged {is_same}, {switched} switchings")));
+        return Ok(Err(format!("answer {answer:?}, flash unchanged {is_same}, {switched} switchings")));
     }
     Ok(Ok(0.0))
 }

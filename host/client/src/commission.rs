@@ -14,7 +14,7 @@
 //!
 //! Another host ends the procedure ([`OtherHosts`]): it would be taken for the operator's hand.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use scarab::bus::commissioning::{BoardState, CommissioningStep, StepResult};
 use scarab::bus::{Abort, Identity};
@@ -225,14 +225,14 @@ impl<'a> Commission<'a> {
         let mut result = Ok(());
         let until = self.options.until;
         for step in Step::ALL.into_iter().filter(|step| *step <= until) {
-            let begun = Instant::now();
+            let begun = self.client.now();
             let found = self.perform(step);
             let words = match &found {
                 Ok(words) => words.clone(),
                 Err(error) => format!("failed: {error}"),
             };
             self.line(&format!("{:<10} {words}", step.name()));
-            let seconds = begun.elapsed().as_secs_f64();
+            let seconds = self.seconds_since(begun);
             self.report.steps.push(StepTaken { step: step.name(), result: words, seconds });
             if let Err(error) = found {
                 result = Err(error);
@@ -325,7 +325,7 @@ impl<'a> Commission<'a> {
     ) -> Result<(), ToolError> {
         self.line(&format!("           please: {words}"));
         self.wait(READ_TIME)?;
-        let begun = Instant::now();
+        let begun = self.client.now();
         (self.said, self.shown) = (None, Vec::new());
         loop {
             self.check_alone()?;
@@ -333,7 +333,7 @@ impl<'a> Commission<'a> {
                 return Ok(());
             }
             self.show_emergencies();
-            if begun.elapsed().as_secs_f64() > patience_s {
+            if self.seconds_since(begun) > patience_s {
                 let why = match &self.said {
                     Some(said) => format!("the board says: {said}; asked for: {words}"),
                     None => format!("for the operator: {words}"),
@@ -447,12 +447,16 @@ impl<'a> Commission<'a> {
         })
     }
 
+    fn seconds_since(&self, begun: Duration) -> f64 {
+        (self.client.now() - begun).as_secs_f64()
+    }
+
     /// Asks the board for a step; returns its result once it has ended.
     fn perform_step(&mut self, step: CommissioningStep, longest_s: f64) -> Result<StepResult, ToolError> {
         let node = self.first();
         self.client.write(node, COMMAND, step as u32, 1)?;
-        let begun = Instant::now();
-        while begun.elapsed().as_secs_f64() < longest_s {
+        let begun = self.client.now();
+        while self.seconds_since(begun) < longest_s {
             let number = self.read(RESULT)?;
             let result = StepResult::ALL.into_iter().find(|result| *result as u32 == number);
             match result {
@@ -726,7 +730,7 @@ impl<'a> Commission<'a> {
             self.begin_identification()?;
         }
         self.line("           the leg moves for about a minute: keep clear, and hold the switch");
-        let begun = Instant::now();
+        let begun = self.client.now();
         let mut last = 0;
         loop {
             self.check_alone()?;
@@ -746,7 +750,7 @@ impl<'a> Commission<'a> {
             if !(1..=7).contains(&activity) {
                 break;
             }
-            if begun.elapsed().as_secs_f64() > LONGEST_IDENTIFICATION_S {
+            if self.seconds_since(begun) > LONGEST_IDENTIFICATION_S {
                 return Err(refused(format!("no verdict after {LONGEST_IDENTIFICATION_S} s")));
             }
             self.wait(LOOK)?;
@@ -767,8 +771,8 @@ impl<'a> Commission<'a> {
     /// Starts the identification; a leg that still returns into its range refuses it.
     fn begin_identification(&mut self) -> Result<(), ToolError> {
         let node = self.first();
-        let begun = Instant::now();
-        while begun.elapsed().as_secs_f64() < LONGEST_RETURN_S {
+        let begun = self.client.now();
+        while self.seconds_since(begun) < LONGEST_RETURN_S {
             self.check_alone()?;
             self.client.write(node, IDENTIFY, 1, 1)?;
             self.wait(AGAIN)?;
@@ -848,9 +852,9 @@ impl<'a> Commission<'a> {
                 Err(error) => Err(error.of(node, Object(0x1010, 1))),
             }
         })?;
-        let begun = Instant::now();
+        let begun = self.client.now();
         let mut writes = false;
-        while begun.elapsed().as_secs_f64() < LONGEST_STORE_S {
+        while self.seconds_since(begun) < LONGEST_STORE_S {
             self.wait(LOOK)?;
             for emergency in self.client.take_emergencies().into_iter().filter(|found| found.node == node) {
                 writes |= emergency.code == NoticeCode::Storing.number();

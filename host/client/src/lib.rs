@@ -1,7 +1,8 @@
-//! CANopen master behind an slcan adapter, and the procedures on it.
+//! CANopen master, and the procedures on it.
 //!
 //! | module | contents |
 //! | --- | --- |
+//! | [`bus`] | frames and a clock, behind an adapter or simulated |
 //! | [`adapter`], [`slcan`], [`candump`] | line to an adapter; its frames; logs of frames |
 //! | [`master`] | reads and writes objects of nodes, and keeps their emergency messages |
 //! | [`alarms`], [`wire`] | what emergency messages and frames on the wire mean |
@@ -13,6 +14,7 @@
 pub mod activity_words;
 pub mod adapter;
 pub mod alarms;
+pub mod bus;
 pub mod candump;
 pub mod commission;
 pub mod master;

@@ -1,18 +1,10 @@
-//! CANopen master of a host: frames through an slcan adapter, network management and SDO transfers.
-//!
-//! | part | content |
-//! | --- | --- |
-//! | [`crate::adapter`] | line to an adapter |
-//! | [`Client`] | reads and writes objects of nodes, and keeps their emergency messages |
+//! CANopen master of a host: network management and SDO transfers over any [`Bus`]. Reads and writes objects
+//! of nodes, and keeps their emergency messages.
 //!
 //! Source: CiA 301, SDO. Values of up to four bytes are transferred at once, longer ones are read in segments
 //! and written in blocks.
 
-use std::io::{BufReader, Write};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crc::{CRC_16_XMODEM, Crc};
 use scarab::bus::{Abort, Frame};
@@ -20,14 +12,12 @@ use scarab_base::error::ToolError;
 use scarab_base::output::printable;
 
 use crate::adapter::Adapter;
-use crate::slcan::{self, BELL, LONGEST_LINE, next_line};
+use crate::bus::{Bus, Line};
 
 /// Longest wait for an answer; a board that erases a sector of a new image is silent for up to 2 s.
 const PATIENCE: Duration = Duration::from_secs(6);
 /// Time after which a request is repeated.
 const REPEAT: Duration = Duration::from_secs(1);
-/// Frames between reader and client.
-const MOST_WAITING: usize = 4096;
 /// Longest value that is read, in bytes.
 const MOST_BYTES: usize = 4096;
 /// Number of identifiers.
@@ -39,11 +29,8 @@ const ANSWER: u16 = 0x580;
 const EMERGENCY: u16 = 0x80;
 /// COB-IDs of the layer setting services.
 const LSS: [u16; 2] = [0x7E5, 0x7E4];
-/// Node-ID of this host, and interval of its heartbeats.
+/// Node-ID of this host.
 pub const HOST: u8 = 0x70;
-const HEARTBEAT: Duration = Duration::from_millis(100);
-/// Frame of a heartbeat: operational.
-const ALIVE: (u16, u8) = (0x700, 5);
 
 /// Object of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,10 +48,8 @@ pub struct Emergency {
 }
 
 /// Connection to the nodes of a bus.
-pub struct Client {
-    /// Shared with the heartbeats.
-    line: Arc<Mutex<Adapter>>,
-    frames: Receiver<Result<Frame, String>>,
+pub struct Client<B = Line> {
+    bus: B,
     emergencies: Vec<Emergency>,
     /// Identifiers that were received; an adapter does not return this client's own frames.
     heard: Box<[bool; IDENTIFIERS]>,
@@ -124,30 +109,26 @@ impl Client {
     ///
     /// # Errors
     /// Those of the operating system.
-    pub fn new(line: Adapter) -> Result<Self, ToolError> {
-        let reader = line.try_clone().map_err(|error| ToolError::input(format!("--slcan: {error}")))?;
-        let (give, frames) = sync_channel(MOST_WAITING);
-        thread::spawn(move || {
-            let mut reader = BufReader::new(reader);
-            while let Some(line) = next_line(&mut reader, &[b'\r', BELL[0]]).transpose() {
-                let decoded = match line {
-                    Ok(line) if line.len() == LONGEST_LINE => Err(format!(
-                        "the adapter sends a line of {LONGEST_LINE} bytes or more, which is no frame"
-                    )),
-                    Ok(line) => slcan::decode(&String::from_utf8_lossy(&line)),
-                    Err(error) => Err(error.to_string()),
-                };
-                let ends = decoded.is_err();
-                if let Some(found) = decoded.transpose()
-                    && (give.send(found).is_err() || ends)
-                {
-                    return;
-                }
-            }
-            let _ = give.send(Err("the adapter closed the connection".into()));
-        });
-        let heard = Box::new([false; IDENTIFIERS]);
-        Ok(Self { line: Arc::new(Mutex::new(line)), frames, emergencies: Vec::new(), heard })
+    pub fn new(adapter: Adapter) -> Result<Self, ToolError> {
+        Line::new(adapter).map(Self::over)
+    }
+
+    /// Sends heartbeats as long as this client exists ([`Line::begin_heartbeats`]).
+    pub fn begin_heartbeats(&self) {
+        self.bus.begin_heartbeats();
+    }
+}
+
+impl<B: Bus> Client<B> {
+    /// Takes over a bus.
+    pub fn over(bus: B) -> Self {
+        Self { bus, emergencies: Vec::new(), heard: Box::new([false; IDENTIFIERS]) }
+    }
+
+    /// Present time of the bus.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        self.bus.now()
     }
 
     /// Whether a frame with this identifier was received.
@@ -161,42 +142,17 @@ impl Client {
     /// # Errors
     /// The adapter failed.
     pub fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
-        send(&self.line, frame).map_err(|error| RequestError::Adapter(error.to_string()))
-    }
-
-    /// Sends heartbeats from now on, as long as this client exists: nodes that watch it (1016) stop when the
-    /// process ends.
-    pub fn begin_heartbeats(&self) {
-        let line: Weak<Mutex<Adapter>> = Arc::downgrade(&self.line);
-        let (identifier, operational) = ALIVE;
-        let alive = Frame::new(identifier + u16::from(HOST), &[operational]);
-        thread::spawn(move || {
-            while let Some(line) = line.upgrade() {
-                if send(&line, &alive).is_err() {
-                    return;
-                }
-                drop(line);
-                thread::sleep(HEARTBEAT);
-            }
-        });
+        self.bus.send(frame)
     }
 
     /// Receives frames for a time, or until one is wanted.
     fn receive(
         &mut self,
-        until: Instant,
+        until: Duration,
         wanted: impl Fn(&Frame) -> bool,
     ) -> Result<Option<Frame>, RequestError> {
         loop {
-            let left = until.saturating_duration_since(Instant::now());
-            let frame = match self.frames.recv_timeout(left) {
-                Ok(Ok(frame)) => frame,
-                Ok(Err(why)) => return Err(RequestError::Adapter(why)),
-                Err(RecvTimeoutError::Timeout) => return Ok(None),
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Err(RequestError::Adapter("the adapter closed the connection".into()));
-                }
-            };
+            let Some(frame) = self.bus.receive(until)? else { return Ok(None) };
             if let Some(heard) = self.heard.get_mut(usize::from(frame.id())) {
                 *heard = true;
             }
@@ -219,7 +175,7 @@ impl Client {
     /// # Errors
     /// The adapter failed.
     pub fn wait(&mut self, time: Duration) -> Result<(), RequestError> {
-        self.receive(Instant::now() + time, |_| false).map(drop)
+        self.receive(self.now() + time, |_| false).map(drop)
     }
 
     /// Takes the emergency messages since the last call.
@@ -230,9 +186,9 @@ impl Client {
     /// Sends a request, repeatedly if it is not answered.
     fn ask(&mut self, node: u8, request: [u8; 8], object: Option<Object>) -> Result<[u8; 8], RequestError> {
         // A late answer to an earlier request.
-        self.receive(Instant::now(), |_| false)?;
-        let end = Instant::now() + PATIENCE;
-        while Instant::now() < end {
+        self.receive(self.now(), |_| false)?;
+        let end = self.now() + PATIENCE;
+        while self.now() < end {
             self.send(&Frame::new(REQUEST + u16::from(node), &request))?;
             let answers = |frame: &Frame| {
                 let data = frame.data();
@@ -253,7 +209,7 @@ impl Client {
                     && answers
                     && object.is_none_or(named)
             };
-            let Some(frame) = self.receive(end.min(Instant::now() + REPEAT), answers)? else { continue };
+            let Some(frame) = self.receive(end.min(self.now() + REPEAT), answers)? else { continue };
             let Ok(data) = <[u8; 8]>::try_from(frame.data()) else { continue };
             if data[0] == 0x80 {
                 let [.., a, b, c, d] = data;
@@ -275,14 +231,14 @@ impl Client {
         answer: u8,
         time: Duration,
     ) -> Result<Option<u32>, RequestError> {
-        self.receive(Instant::now(), |_| false)?;
+        self.receive(self.now(), |_| false)?;
         let [to, from] = LSS;
         for (service, number) in requests {
             let [a, b, c, d] = number.to_le_bytes();
             self.send(&Frame::new(to, &[*service, a, b, c, d, 0, 0, 0]))?;
         }
         let answers = |frame: &Frame| frame.id() == from && frame.data().first() == Some(&answer);
-        let found = self.receive(Instant::now() + time, answers)?;
+        let found = self.receive(self.now() + time, answers)?;
         Ok(found.and_then(|frame| {
             let number = frame.data().get(1..5)?.try_into().ok()?;
             Some(u32::from_le_bytes(number))
@@ -355,7 +311,7 @@ impl Client {
         Ok(printable(&String::from_utf8_lossy(&bytes)))
     }
 
-    /// Writes bytes by block transfer; `progress` is called with the number that has arrived.
+    /// Writes bytes by block transfer; `progress` is called with the bus and the number that has arrived.
     ///
     /// # Errors
     /// The node refuses or is silent.
@@ -364,7 +320,7 @@ impl Client {
         node: u8,
         object: Object,
         bytes: &[u8],
-        mut progress: impl FnMut(usize),
+        mut progress: impl FnMut(&B, usize),
     ) -> Result<(), RequestError> {
         let Object(index, sub) = object;
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), (bytes.len() as u32).to_le_bytes());
@@ -379,7 +335,7 @@ impl Client {
                 data[1..=segment.len()].copy_from_slice(segment);
                 self.send(&Frame::new(REQUEST + u16::from(node), &data))?;
             }
-            let until = Instant::now() + PATIENCE;
+            let until = self.now() + PATIENCE;
             let Some(frame) = self.receive(until, |frame| {
                 frame.id() == ANSWER + u16::from(node) && matches!(frame.data().first(), Some(0x80 | 0xA2))
             })?
@@ -395,7 +351,7 @@ impl Client {
                 [.., a, b, c, d] => return Err(RequestError::Aborted(u32::from_le_bytes([a, b, c, d]))),
                 _ => return Err(RequestError::Silent),
             }
-            progress(offset);
+            progress(&self.bus, offset);
         }
         let unused = (bytes.len().next_multiple_of(SEGMENT) - bytes.len()) as u8;
         let [low, high] = Crc::<u16>::new(&CRC_16_XMODEM).checksum(bytes).to_le_bytes();
@@ -420,17 +376,4 @@ impl Client {
     pub fn write(&mut self, node: u8, object: Object, value: u32, size: u8) -> Result<(), ToolError> {
         self.try_write(node, object, value, size).map_err(|error| error.of(node, object))
     }
-}
-
-impl Drop for Client {
-    fn drop(&mut self) {
-        let _ = self.line.lock().unwrap_or_else(PoisonError::into_inner).write_all(b"C\r");
-    }
-}
-
-/// Sends a frame as one line.
-fn send(line: &Mutex<Adapter>, frame: &Frame) -> std::io::Result<()> {
-    let mut text = Vec::new();
-    slcan::encode(frame, &mut text);
-    line.lock().unwrap_or_else(PoisonError::into_inner).write_all(&text)
 }

@@ -15,6 +15,7 @@
 use scarab_base::error::ToolError;
 use std::time::Duration;
 
+use crate::bus::Bus;
 use crate::master::{Client, HOST, Object, RequestError};
 use crate::words::JointState;
 
@@ -51,7 +52,7 @@ impl OtherHosts {
     ///
     /// # Errors
     /// [`ToolError::Refused`] with the sign and the next step; or the bus fails.
-    pub fn look(client: &mut Client, nodes: &[u8], may_be_on: MayBeOn) -> Result<Self, ToolError> {
+    pub fn look<B: Bus>(client: &mut Client<B>, nodes: &[u8], may_be_on: MayBeOn) -> Result<Self, ToolError> {
         let mut signs = vec![
             (0, "network management".into()),
             (0x80, "SYNC".into()),
@@ -80,7 +81,7 @@ impl OtherHosts {
     ///
     /// # Errors
     /// [`ToolError::Refused`] with the sign and the next step.
-    pub fn check(&self, client: &Client) -> Result<(), ToolError> {
+    pub fn check<B: Bus>(&self, client: &Client<B>) -> Result<(), ToolError> {
         match self.signs.iter().find(|(identifier, _)| client.has_heard(*identifier)) {
             None => Ok(()),
             Some((identifier, words)) => Err(ToolError::Refused(format!(
@@ -91,7 +92,7 @@ impl OtherHosts {
     }
 
     /// Adds the identifiers of SYNC and received PDOs that a node is set to.
-    fn add_signs(&mut self, client: &mut Client, node: u8) -> Result<(), ToolError> {
+    fn add_signs<B: Bus>(&mut self, client: &mut Client<B>, node: u8) -> Result<(), ToolError> {
         // A stopped node answers no SDO.
         if optional(client, node, STATUSWORD).is_err() {
             client.manage(node, START).map_err(RequestError::of_bus)?;
@@ -112,7 +113,7 @@ impl OtherHosts {
 }
 
 /// Reads an object that other firmware may not have.
-fn optional(client: &mut Client, node: u8, object: Object) -> Result<Option<u32>, ToolError> {
+fn optional<B: Bus>(client: &mut Client<B>, node: u8, object: Object) -> Result<Option<u32>, ToolError> {
     match client.bytes(node, object) {
         Ok(bytes) => Ok(Some(bytes.iter().take(4).rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte)))),
         Err(RequestError::Aborted(_)) => Ok(None),
@@ -121,7 +122,7 @@ fn optional(client: &mut Client, node: u8, object: Object) -> Result<Option<u32>
 }
 
 /// Refuses a drive that a host controls, or that is on although it must not be.
-fn check_drive(client: &mut Client, node: u8, may_be_on: MayBeOn) -> Result<(), ToolError> {
+fn check_drive<B: Bus>(client: &mut Client<B>, node: u8, may_be_on: MayBeOn) -> Result<(), ToolError> {
     let controlword = optional(client, node, CONTROLWORD)?.unwrap_or(0);
     let state = optional(client, node, STATUSWORD)?.and_then(|word| JointState::of(word as u16));
     let name = state.map_or("unknown state", JointState::name);

@@ -3,20 +3,24 @@
 //! Nothing is remembered: each run reads from the board which image runs, and begins where that leaves it. A
 //! board that does not come to the confirmation goes back to the image before at its next restart.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use scarab::bus::Abort;
 use scarab::bus::program::{ProgramCommand, ProgramError, ProgramStatus};
 use scarab_base::error::ToolError;
 use scarab_boot::{Check, Header, ImageError};
 
+use crate::bus::{Bus, Line};
 use crate::master::{Client, Object, RequestError};
 use crate::other_hosts::{MayBeOn, OtherHosts};
 
-const DATA: Object = Object(0x1F50, 1);
+/// Program data.
+pub const DATA: Object = Object(0x1F50, 1);
 const CONTROL: Object = Object(0x1F51, 1);
-const SOFTWARE: Object = Object(0x1F56, 1);
-const STATUS: Object = Object(0x1F57, 1);
+/// Check sum of the running image.
+pub const SOFTWARE: Object = Object(0x1F56, 1);
+/// State of an update ([`ProgramStatus`]).
+pub const STATUS: Object = Object(0x1F57, 1);
 /// Hardware version, and that of a simulated board, which has no program that could be replaced.
 const HARDWARE: Object = Object(0x1009, 0);
 const SIMULATED: &str = "simulated";
@@ -54,16 +58,16 @@ pub fn check(program: &[u8]) -> Result<Header, &'static str> {
 }
 
 /// Update of one board.
-pub struct Update<'a> {
+pub struct Update<'a, B = Line> {
     /// Connection to the bus.
-    pub client: Client,
+    pub client: Client<B>,
     /// Either node of the board.
     pub node: u8,
     /// Receives a line for each step.
     pub say: &'a mut dyn FnMut(&str),
 }
 
-impl Update<'_> {
+impl<B: Bus> Update<'_, B> {
     /// Brings this program onto the board and confirms it.
     ///
     /// # Errors
@@ -136,7 +140,7 @@ impl Update<'_> {
         (self.say)("clear      done");
         let (say, length) = (&mut self.say, program.len());
         let mut next = 25;
-        let progress = |arrived: usize| {
+        let progress = |_: &B, arrived: usize| {
             if 100 * arrived >= next * length {
                 say(&format!("write      {next} % of {length} bytes"));
                 next += 25;
@@ -151,8 +155,8 @@ impl Update<'_> {
     /// Starts the new image and waits until it answers.
     fn restart(&mut self, header: &Header) -> Result<(), ToolError> {
         self.command(ProgramCommand::Start)?;
-        let end = Instant::now() + RESTART;
-        while Instant::now() < end {
+        let end = self.client.now() + RESTART;
+        while self.client.now() < end {
             match self.client.bytes(self.node, STATUS) {
                 Ok(bytes) => {
                     let status = ProgramStatus(bytes.iter().rev().fold(0, |sum, b| sum << 8 | u32::from(*b)));
@@ -182,7 +186,11 @@ impl Update<'_> {
         self.client.read(self.node, STATUS).map(ProgramStatus)
     }
 
-    fn command(&mut self, command: ProgramCommand) -> Result<(), ToolError> {
+    /// Gives a command.
+    ///
+    /// # Errors
+    /// The board refuses, or the bus fails.
+    pub fn command(&mut self, command: ProgramCommand) -> Result<(), ToolError> {
         self.client.try_write(self.node, CONTROL, command as u32, 1).map_err(|error| {
             if error.is(Abort::State) {
                 let why = "the board refuses it now: turn the drive off, and wait for what is under way";
@@ -194,14 +202,17 @@ impl Update<'_> {
     }
 
     /// Waits until nothing is under way.
-    fn settled(&mut self) -> Result<ProgramStatus, ToolError> {
-        let end = Instant::now() + CLEARING;
+    ///
+    /// # Errors
+    /// Something stays under way, or the bus fails.
+    pub fn settled(&mut self) -> Result<ProgramStatus, ToolError> {
+        let end = self.client.now() + CLEARING;
         loop {
             let status = self.status()?;
             if !status.has(ProgramStatus::UNDER_WAY) {
                 return Ok(status);
             }
-            if Instant::now() > end {
+            if self.client.now() > end {
                 let seconds = CLEARING.as_secs();
                 return Err(ToolError::input(format!("still under way after {seconds} s (1F57:1)")));
             }

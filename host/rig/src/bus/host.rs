@@ -9,10 +9,14 @@
 //! Each kind of frame can be stopped ([`Speaks`]).
 
 use core::f64::consts::TAU;
+use std::collections::VecDeque;
+use std::time::Duration;
 
 use scarab::bus::Frame;
 use scarab::leg::Permission;
 use scarab_base::error::ToolError;
+use scarab_client::bus::Bus;
+use scarab_client::master::{Client, Object, RequestError};
 use scarab_client::wire::Sent;
 use scarab_identify::formats::leg_file::LegFile;
 
@@ -30,16 +34,13 @@ const SYNC: u16 = 0x80;
 /// COB-ID of both joints' targets; hip and knee take their half each.
 pub const TARGETS: u16 = 0x301;
 const WORDS: u16 = 0x200;
-const REQUEST: u16 = 0x600;
-const ANSWER: u16 = 0x580;
 const HEARTBEAT: u16 = 0x700;
 /// Bit 31 of a COB-ID: disabled.
 const UNUSED: u32 = 1 << 31;
 /// Controlword "enable operation".
 const ENABLED: u16 = 0xF;
-/// Servo ticks per cycle, and the timeout of an answer.
+/// Servo ticks per cycle.
 const CYCLE: u64 = 4;
-const PATIENCE: u32 = 40;
 /// Motion towards the middle of each joint's range and back: amplitude in rad, rate in Hz.
 const WAY_RAD: f64 = 0.25;
 const RATE_HZ: f64 = 0.7;
@@ -95,7 +96,8 @@ pub struct Host {
     sent_ns: [u64; 2],
     /// End of the last cyclic frame to each node on the wire.
     cyclic_ns: [u64; JOINTS],
-    answer: Option<Frame>,
+    /// SDO answers that were not read yet.
+    answers: VecDeque<Frame>,
     /// Emergency messages: node and code.
     emergencies: Vec<(u16, u16)>,
 }
@@ -118,7 +120,7 @@ impl Host {
             cycle: CYCLE,
             sent_ns: [0; 2],
             cyclic_ns: [0; JOINTS],
-            answer: None,
+            answers: VecDeque::new(),
             emergencies: Vec::new(),
         }
     }
@@ -159,7 +161,7 @@ impl Host {
         if self.speaks.heartbeat > 0 && self.ticks.is_multiple_of(self.speaks.heartbeat) {
             self.network.send(Frame::new(HEARTBEAT + NUMBER, &[5]));
         }
-        let (sent_ns, answer, cyclic_ns) = (&mut self.sent_ns, &mut self.answer, &mut self.cyclic_ns);
+        let (sent_ns, answers, cyclic_ns) = (&mut self.sent_ns, &mut self.answers, &mut self.cyclic_ns);
         let (emergencies, places) = (&mut self.emergencies, &mut self.places);
         let show = |sent: &Sent| {
             let id = sent.frame.id();
@@ -185,7 +187,7 @@ impl Host {
                         *place = i32::from_le_bytes([*a, *b, *c, *d]);
                     }
                 }
-                (_, 0x581..=0x5FF) => *answer = Some(sent.frame),
+                (_, 0x581..=0x5FF) => answers.push_back(sent.frame),
                 _ => {}
             }
         };
@@ -231,33 +233,12 @@ impl Host {
         &self.emergencies
     }
 
-    /// Sends an SDO request and returns the answer.
-    ///
-    /// # Errors
-    /// The node does not answer within 10 ms.
-    pub fn ask(&mut self, node: u16, request: [u8; 8]) -> Result<Frame, ToolError> {
-        self.answer = None;
-        self.network.send(Frame::new(REQUEST + node, &request));
-        for _ in 0..PATIENCE {
-            self.run(1);
-            if let Some(answer) = self.answer.take_if(|answer| answer.id() == ANSWER + node) {
-                return Ok(answer);
-            }
-        }
-        Err(refused(format!("node {node} does not answer to {request:x?}")))
-    }
-
     /// Reads an object of at most four bytes.
     ///
     /// # Errors
-    /// The node does not answer, or not with a value.
+    /// The node does not answer, or refuses.
     pub fn read(&mut self, node: u16, index: u16, sub: u8) -> Result<u32, ToolError> {
-        let [low, high] = index.to_le_bytes();
-        let answer = self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0])?;
-        match answer.data() {
-            [kind, _, _, _, a, b, c, d] if kind >> 5 == 2 => Ok(u32::from_le_bytes([*a, *b, *c, *d])),
-            data => Err(refused(format!("node {node}, object {index:x}:{sub}: {data:x?}"))),
-        }
+        Client::over(self).read(node as u8, Object(index, sub))
     }
 
     /// Writes an object of `size` bytes.
@@ -265,12 +246,7 @@ impl Host {
     /// # Errors
     /// The node does not answer, or refuses.
     pub fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) -> Result<(), ToolError> {
-        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
-        let answer = self.ask(node, [0x23 | (4 - size) << 2, low, high, sub, a, b, c, d])?;
-        match answer.data() {
-            [0x60, ..] => Ok(()),
-            data => Err(refused(format!("node {node}, object {index:x}:{sub}: {data:x?}"))),
-        }
+        Client::over(self).write(node as u8, Object(index, sub), value, size)
     }
 
     /// Starts the nodes and configures the compact mapping: statusword, position and speed; both targets in
@@ -318,6 +294,30 @@ impl Host {
             "its host cannot enable it: {state:?}, inhibit reasons {causes:x}, emergencies {:x?}",
             self.emergencies
         )))
+    }
+}
+
+impl Bus for Host {
+    fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
+        self.network.send(*frame);
+        Ok(())
+    }
+
+    /// Receives SDO answers; emergency messages are in [`Host::emergencies`].
+    fn receive(&mut self, until: Duration) -> Result<Option<Frame>, RequestError> {
+        loop {
+            if let Some(frame) = self.answers.pop_front() {
+                return Ok(Some(frame));
+            }
+            if self.now() >= until {
+                return Ok(None);
+            }
+            self.run(1);
+        }
+    }
+
+    fn now(&self) -> Duration {
+        Duration::from_nanos(self.network.now_ns())
     }
 }
 

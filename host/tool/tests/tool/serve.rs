@@ -1,6 +1,10 @@
 //! `serve` as seen by a client at its port: messages, refusals, and discarded frames.
 
+use scarab::bus::Frame;
 use scarab_base::random::Random;
+use scarab_client::bus::Bus;
+use scarab_client::master::{self, Object, RequestError};
+use scarab_client::slcan;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
@@ -83,13 +87,41 @@ impl Drop for Serve {
 pub struct Client {
     stream: TcpStream,
     received: Vec<u8>,
+    begun: Instant,
+}
+
+impl Bus for Client {
+    fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
+        self.frame(frame.id(), frame.data());
+        Ok(())
+    }
+
+    fn receive(&mut self, until: Duration) -> Result<Option<Frame>, RequestError> {
+        loop {
+            let left = until.saturating_sub(self.now());
+            self.stream.set_nonblocking(left.is_zero()).expect("a socket");
+            if !left.is_zero() {
+                self.stream.set_read_timeout(Some(left)).expect("a socket");
+            }
+            let line = self.try_line();
+            self.stream.set_nonblocking(false).expect("a socket");
+            let Ok(line) = line else { return Ok(None) };
+            if let Some(frame) = slcan::decode(&line.expect("a connection")).expect("slcan") {
+                return Ok(Some(frame));
+            }
+        }
+    }
+
+    fn now(&self) -> Duration {
+        self.begun.elapsed()
+    }
 }
 
 impl Client {
     fn silent(address: &str) -> Self {
         let stream = TcpStream::connect(address).expect("it listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
-        Self { stream, received: Vec::new() }
+        Self { stream, received: Vec::new(), begun: Instant::now() }
     }
 
     pub fn new(serve: &Serve) -> Self {
@@ -133,52 +165,35 @@ impl Client {
     }
 
     pub fn frame(&mut self, id: u16, data: &[u8]) {
-        let bytes: String = data.iter().map(|byte| format!("{byte:02X}")).collect();
-        self.say(&format!("t{id:03X}{}{bytes}\r", data.len()));
+        let mut line = Vec::new();
+        slcan::encode(&Frame::new(id, data), &mut line);
+        self.stream.write_all(&line).expect("a connection");
     }
 
-    /// Sends an SDO request until it is answered: a busy machine drops a late one that could enable the leg.
-    fn request(&mut self, node: u16, request: [u8; 8]) -> [u8; 8] {
+    /// Repeats a request until it is answered: a busy machine drops a late one that could enable the leg.
+    fn ask<T>(
+        &mut self,
+        object: Object,
+        request: impl Fn(&mut master::Client<&mut Self>) -> Result<T, RequestError>,
+    ) -> T {
         let begin = Instant::now();
         loop {
-            self.frame(0x600 + node, &request);
-            if let Some(answer) = self.answer(node, &request[1..4]) {
-                return answer;
-            }
-            assert!(begin.elapsed() < PATIENCE, "no answer to {request:02X?}");
-        }
-    }
-
-    /// Answer of an object within a second.
-    fn answer(&mut self, node: u16, object: &[u8]) -> Option<[u8; 8]> {
-        let (begin, limit) = (Instant::now(), Duration::from_secs(1));
-        let prefix = format!("t{:03X}8", 0x580 + node);
-        self.stream.set_read_timeout(Some(limit)).expect("a socket");
-        while begin.elapsed() < limit {
-            let Ok(line) = self.try_line() else { break };
-            let line = line.expect("a connection");
-            let Some(data) = line.strip_prefix(&prefix) else { continue };
-            let digits = |place: usize| data[2 * place..2 * place + 2].to_owned();
-            let answer: [u8; 8] =
-                core::array::from_fn(|place| u8::from_str_radix(&digits(place), 16).expect("a digit"));
-            if &answer[1..4] == object {
-                return Some(answer);
+            match request(&mut master::Client::over(&mut *self)) {
+                Err(RequestError::Silent) => assert!(begin.elapsed() < PATIENCE, "{object:x?}: no answer"),
+                answer => return answer.unwrap_or_else(|error| panic!("{object:x?}: {error:?}")),
             }
         }
-        None
     }
 
     pub fn read(&mut self, node: u16, index: u16, sub: u8) -> u32 {
-        let [low, high] = index.to_le_bytes();
-        let [kind, _, _, _, a, b, c, d] = self.request(node, [0x40, low, high, sub, 0, 0, 0, 0]);
-        assert_eq!(kind >> 5, 2, "{index:x}:{sub}");
-        u32::from_le_bytes([a, b, c, d])
+        let object = Object(index, sub);
+        let bytes = self.ask(object, |client| client.bytes(node as u8, object));
+        bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
     }
 
     pub fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {
-        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
-        let answer = self.request(node, [0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]);
-        assert_eq!(answer[0], 0x60, "{index:x}:{sub}");
+        let object = Object(index, sub);
+        self.ask(object, |client| client.try_write(node as u8, object, value, size));
     }
 
     fn state(&mut self, node: u16) -> u32 {

@@ -21,11 +21,12 @@ use embassy_futures::block_on;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
-use scarab::bus::{LONGEST, stored_entries};
+use scarab::bus::{Abort, LONGEST, stored_entries};
 use scarab::leg::{ControlRequest, DriveState, IdentifiedModel, NoticeCode, Wearing};
 use scarab::store::{Key, ModelRecord};
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
+use scarab_client::master::{Client, Object};
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::bus::board::Board;
@@ -415,13 +416,13 @@ fn requested(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let before = fork.host.board().memory().bytes().to_vec();
     let node = 1 + fork.random.below(2) as u16;
     let (object, word) = if fork.random.coin() { (0x1010_u16, *b"save") } else { (0x1011, *b"load") };
-    let ([low, high], [a, b, c, d]) = (object.to_le_bytes(), word);
     fork.host.write(node, WINDOW, 0, 50_000 + fork.random.below(1000) as u32, 4)?;
-    let answer = fork.host.ask(node, [0x23, low, high, 1, a, b, c, d])?;
+    let answer =
+        Client::over(&mut fork.host).try_write(node as u8, Object(object, 1), u32::from_le_bytes(word), 4);
     if blind {
         fork.host.board().memory().keep_objects(OFF, 0, &[1, 2, 3]);
     }
-    let refused = answer.data() == [0x80, low, high, 1, 0x22, 0, 0, 0x08];
+    let refused = answer.is_err_and(|error| error.is(Abort::State));
     fork.run(400);
     let untouched = fork.host.board().memory().bytes() == before;
     let moves = fork.host.is_enabled();
