@@ -145,36 +145,24 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
             100.0 * value,
             100.0 * limit
         ),
-        Test::TrainingError if known => format!(
-            "joint {joint}: torque error of {value:.3} N m rms on the training motion, limit {limit:.3} N m"
-        ),
-        Test::TrainingError => format!("no torque of joint {joint} could be compared with the model"),
-        Test::WholeError => format!(
-            "joint {joint}: torque error of {:.0} % on the training motion, excluded rows included, limit {:.0} %: hold a \
-             motion out",
-            100.0 * value,
-            100.0 * limit
-        ),
-        Test::ValidationError if known => {
-            format!("joint {joint}: torque error of {value:.3} N m rms{on}, limit {limit:.3} N m")
+        Test::TrainingError | Test::WholeError | Test::ValidationError | Test::SlowResidual => {
+            torque_error(evidence, joint, &on)
         }
-        Test::ValidationError => format!("no torque of joint {joint}{on} could be compared with the model"),
-        Test::SlowResidual => format!(
-            "joint {joint}: slow residual of {value:.3} N m{on}, longer than half a second, limit {limit:.3} N m"
-        ),
-        Test::LinkLength => format!(
-            "the torque indicates another geometry: a link before joint {joint} {:.1} % {} than configured, limit {:.1} %; a \
-             wrong zero or a leaning trunk looks alike",
-            100.0 * value.abs(),
-            if value < 0.0 { "shorter" } else { "longer" },
-            100.0 * limit
-        ),
-        Test::EncoderZero => format!(
-            "the torque indicates another geometry: the zero of joint {joint} {:+.1} degrees from the configured one, limit \
-             {:.1} degrees; another length or a leaning trunk looks alike",
-            value.to_degrees(),
-            limit.to_degrees()
-        ),
+        Test::LinkLength => {
+            let direction = if value < 0.0 { "shorter" } else { "longer" };
+            let found = format!(
+                "a link before joint {joint} {:.1} % {direction} than configured",
+                100.0 * value.abs()
+            );
+            other_geometry(&found, &format!("{:.1} %", 100.0 * limit), "a wrong zero")
+        }
+        Test::EncoderZero => {
+            let found = format!(
+                "the zero of joint {joint} {:+.1} degrees from the configured one",
+                value.to_degrees()
+            );
+            other_geometry(&found, &format!("{:.1} degrees", limit.to_degrees()), "another length")
+        }
         Test::CommonDisturbance => {
             let on = if motion.is_empty() { " on the training motion" } else { on.as_str() };
             format!(
@@ -192,4 +180,36 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
             100.0 * limit
         ),
     }
+}
+
+/// Sentence for torque that differs from the model's.
+fn torque_error(evidence: &Evidence<f32>, joint: usize, on: &str) -> String {
+    let (value, limit) = (f64::from(evidence.value), f64::from(evidence.limit));
+    let known = value.abs() < 1e30;
+    match evidence.test {
+        Test::TrainingError if known => format!(
+            "joint {joint}: torque error of {value:.3} N m rms on the training motion, limit {limit:.3} N m"
+        ),
+        Test::TrainingError => format!("no torque of joint {joint} could be compared with the model"),
+        Test::WholeError => format!(
+            "joint {joint}: torque error of {:.0} % on the training motion, excluded rows included, limit {:.0} %: hold a \
+             motion out",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::ValidationError if known => {
+            format!("joint {joint}: torque error of {value:.3} N m rms{on}, limit {limit:.3} N m")
+        }
+        Test::ValidationError => format!("no torque of joint {joint}{on} could be compared with the model"),
+        _ => format!(
+            "joint {joint}: slow residual of {value:.3} N m{on}, longer than half a second, limit {limit:.3} N m"
+        ),
+    }
+}
+
+/// Sentence for a geometry that the torque contradicts; `alike` looks like it.
+fn other_geometry(found: &str, limit: &str, alike: &str) -> String {
+    format!(
+        "the torque indicates another geometry: {found}, limit {limit}; {alike} or a leaning trunk looks alike"
+    )
 }

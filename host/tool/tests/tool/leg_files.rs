@@ -71,19 +71,22 @@ fn missing_keys_have_the_documented_defaults() {
     assert_eq!((truth.rotor_inertia, truth.coulomb, truth.viscous, truth.offset), (0.0, 3.0, 0.0, 0.0));
 }
 
+fn joint(lines: &str) -> String {
+    format!("{MINIMAL}{lines}\n")
+}
+
+/// Texts, each with the line and the words of its error.
+fn are_refused(cases: &[(String, Option<usize>, &str)]) {
+    for (text, line, words) in cases {
+        let fault = LegFile::parse(text, "bad.toml").expect_err(text);
+        assert_eq!(fault.line, *line, "{fault}\n{text}");
+        assert!(fault.reason.contains(words), "{fault}\nexpected: {words}");
+        assert!(fault.to_string().starts_with(&format!("bad.toml:{}: ", line.unwrap_or(0))), "{fault}");
+    }
+}
+
 #[test]
 fn every_error_names_file_line_and_reason() {
-    let joint = |lines: &str| format!("{MINIMAL}{lines}\n");
-    let truth = |mass: &str, inertia: &str| {
-        joint(&format!(
-            "direction = 1\ntruth = {{ mass = {mass}, com = [0.1, 0.0, 0.0], inertia_com = {inertia} }}"
-        ))
-    };
-    let motor = |key: &str, value: &str| {
-        let (name, _) = key.split_once(" = ").expect("a key with its value");
-        joint(&MOTOR.replace(key, &format!("{name} = {value}")))
-    };
-    let body = "[0.01, 0.0, 0.0, 0.05, 0.0, 0.05]";
     let above = |line: &str| MINIMAL.replace("[[joint]]", &format!("{line}\n[[joint]]"));
     let segments = |shank: &str, wearer: &str| {
         above(&format!(
@@ -123,44 +126,6 @@ fn every_error_names_file_line_and_reason() {
             "joint `hip`: `name` is the name of an earlier joint",
         ),
         (joint("colour = \"red\""), Some(7), "unknown field `colour`"),
-        (joint("[joint.motor]\npoles = 7"), Some(8), "unknown field `poles`"),
-        (joint("[joint.motor]\npole_pair = 7"), Some(8), "did you mean `pole_pairs`?"),
-        (motor("resistance_ohm = 0.039", "39.0"), Some(9), "`motor.resistance_ohm` is 39, outside 0.001..10"),
-        (motor("inductance_d_uh = 15.0", "1.5"), Some(10), "its time constant is below 0.08 ms"),
-        (motor("pole_pairs = 7", "0"), Some(8), "`motor.pole_pairs` is 0, outside 1..64"),
-        (
-            joint(&format!("{MOTOR}calibration_turns = 2.1")),
-            Some(12),
-            "`motor.calibration_turns` is 2.1, outside 1.21..2",
-        ),
-        (
-            joint(&format!("{MOTOR}winding_limit_c = 60.0")),
-            Some(12),
-            "`motor.winding_limit_c` is 60, outside 70..250",
-        ),
-        (
-            joint(&format!(
-                "{MOTOR}thermistor = {{ pull_up_ohm = 3300.0, r25_ohm = 10000.0, beta_k = 343.5 }}"
-            )),
-            Some(12),
-            "`motor.thermistor` has `beta_k` 343.5, outside 1000..6000",
-        ),
-        (
-            joint(&format!("{MOTOR}thermistor = {{ pull_up_ohm = 5e4, r25_ohm = 1e3, beta_k = 3435.0 }}")),
-            Some(12),
-            "`motor.thermistor` reads -102 to 44 degrees, needs -20 to 120: choose a smaller pull-up",
-        ),
-        (
-            joint(&format!("{MOTOR}thermistor = {{ pull_up_ohm = 1e3, r25_ohm = 5e4, beta_k = 3435.0 }}")),
-            Some(12),
-            "choose a larger pull-up",
-        ),
-        (
-            joint(&format!("encoder = {{ side = \"joint\", counts = 8192, ratio = 1.0 }}\n{MOTOR}")),
-            Some(8),
-            "joint `hip`: `motor` needs an encoder at the motor",
-        ),
-        (joint(&format!("torque_per_ampere = 0.01\n{MOTOR}")), Some(8), "has a flux of 0.000019 V s"),
         (
             above(
                 "supply = { voltage_v = 480.0, resistance_ohm = 0.05, capacitance_uf = 1500.0, brake_ohm = 2.0 }",
@@ -203,6 +168,77 @@ fn every_error_names_file_line_and_reason() {
             Some(8),
             "`dh.a` is 9, outside -5..5",
         ),
+        (
+            format!("torque_noise_percent = -1.0\n{MINIMAL}"),
+            Some(1),
+            "`torque_noise_percent` is -1, outside 0..100",
+        ),
+        (
+            format!("pushes = {{ per_minute = 0.0, torque_nm = 5.0, duration_s = 0.3 }}\n{MINIMAL}"),
+            Some(1),
+            "`pushes.per_minute` is 0",
+        ),
+    ];
+    are_refused(&cases);
+}
+
+#[test]
+fn every_error_of_a_motor_names_file_line_and_reason() {
+    let motor = |key: &str, value: &str| {
+        let (name, _) = key.split_once(" = ").expect("a key with its value");
+        joint(&MOTOR.replace(key, &format!("{name} = {value}")))
+    };
+    are_refused(&[
+        (joint("[joint.motor]\npoles = 7"), Some(8), "unknown field `poles`"),
+        (joint("[joint.motor]\npole_pair = 7"), Some(8), "did you mean `pole_pairs`?"),
+        (motor("resistance_ohm = 0.039", "39.0"), Some(9), "`motor.resistance_ohm` is 39, outside 0.001..10"),
+        (motor("inductance_d_uh = 15.0", "1.5"), Some(10), "its time constant is below 0.08 ms"),
+        (motor("pole_pairs = 7", "0"), Some(8), "`motor.pole_pairs` is 0, outside 1..64"),
+        (
+            joint(&format!("{MOTOR}calibration_turns = 2.1")),
+            Some(12),
+            "`motor.calibration_turns` is 2.1, outside 1.21..2",
+        ),
+        (
+            joint(&format!("{MOTOR}winding_limit_c = 60.0")),
+            Some(12),
+            "`motor.winding_limit_c` is 60, outside 70..250",
+        ),
+        (
+            joint(&format!(
+                "{MOTOR}thermistor = {{ pull_up_ohm = 3300.0, r25_ohm = 10000.0, beta_k = 343.5 }}"
+            )),
+            Some(12),
+            "`motor.thermistor` has `beta_k` 343.5, outside 1000..6000",
+        ),
+        (
+            joint(&format!("{MOTOR}thermistor = {{ pull_up_ohm = 5e4, r25_ohm = 1e3, beta_k = 3435.0 }}")),
+            Some(12),
+            "`motor.thermistor` reads -102 to 44 degrees, needs -20 to 120: choose a smaller pull-up",
+        ),
+        (
+            joint(&format!("{MOTOR}thermistor = {{ pull_up_ohm = 1e3, r25_ohm = 5e4, beta_k = 3435.0 }}")),
+            Some(12),
+            "choose a larger pull-up",
+        ),
+        (
+            joint(&format!("encoder = {{ side = \"joint\", counts = 8192, ratio = 1.0 }}\n{MOTOR}")),
+            Some(8),
+            "joint `hip`: `motor` needs an encoder at the motor",
+        ),
+        (joint(&format!("torque_per_ampere = 0.01\n{MOTOR}")), Some(8), "has a flux of 0.000019 V s"),
+    ]);
+}
+
+#[test]
+fn every_error_of_a_body_names_file_line_and_reason() {
+    let body = "[0.01, 0.0, 0.0, 0.05, 0.0, 0.05]";
+    let truth = |mass: &str, inertia: &str| {
+        joint(&format!(
+            "direction = 1\ntruth = {{ mass = {mass}, com = [0.1, 0.0, 0.0], inertia_com = {inertia} }}"
+        ))
+    };
+    are_refused(&[
         (truth("0.0", body), Some(8), "joint `hip`: `truth.mass` is 0; it must be above 0"),
         (truth("-1.0", body), Some(8), "`truth.mass` is -1"),
         (
@@ -222,23 +258,7 @@ fn every_error_names_file_line_and_reason() {
             Some(8),
             "`stribeck.static_nm` is 2, outside 3..1000",
         ),
-        (
-            format!("torque_noise_percent = -1.0\n{MINIMAL}"),
-            Some(1),
-            "`torque_noise_percent` is -1, outside 0..100",
-        ),
-        (
-            format!("pushes = {{ per_minute = 0.0, torque_nm = 5.0, duration_s = 0.3 }}\n{MINIMAL}"),
-            Some(1),
-            "`pushes.per_minute` is 0",
-        ),
-    ];
-    for (text, line, words) in cases {
-        let fault = LegFile::parse(&text, "bad.toml").expect_err(&text);
-        assert_eq!(fault.line, line, "{fault}\n{text}");
-        assert!(fault.reason.contains(words), "{fault}\nexpected: {words}");
-        assert!(fault.to_string().starts_with(&format!("bad.toml:{}: ", line.unwrap_or(0))), "{fault}");
-    }
+    ]);
 }
 
 #[test]

@@ -283,18 +283,20 @@ fn rounded_parallel_axes_are_refused_until_they_are_declared_parallel() {
     }
 }
 
+/// The simple robot with an ankle.
+fn ankle(kind: &str) -> String {
+    let joint = format!(
+        "<link name=\"foot\"/><joint name=\"ankle\" type=\"{kind}\"><parent link=\"shank\"/><child link=\"foot\"/></joint>\n</robot>"
+    );
+    SIMPLE.replace("</robot>", &joint)
+}
+
+fn joints(names: &[&str]) -> RobotOptions {
+    RobotOptions { joints: names.iter().map(|name| (*name).to_owned()).collect(), ..plain() }
+}
+
 #[test]
 fn every_joint_that_is_no_leg_is_refused_by_name() {
-    let ankle = |kind: &str| {
-        let joint = format!(
-            "<link name=\"foot\"/><joint name=\"ankle\" type=\"{kind}\"><parent link=\"shank\"/><child link=\"foot\"/></joint>\n</robot>"
-        );
-        SIMPLE.replace("</robot>", &joint)
-    };
-    let joints = |names: &[&str]| RobotOptions {
-        joints: names.iter().map(|name| (*name).to_owned()).collect(),
-        ..plain()
-    };
     let lock = |name: &str, at: f64| RobotOptions {
         locked: vec![(name.to_owned(), at)],
         ..joints(&["hip", "knee"])
@@ -380,7 +382,10 @@ fn every_joint_that_is_no_leg_is_refused_by_name() {
         let refused = converted(&text, &options).expect_err(reason);
         assert!(refused.starts_with("robot.urdf:") && refused.contains(reason), "{reason}: {refused}");
     }
-    // All joints to be held are named at once, each at a position within its range.
+}
+
+#[test]
+fn all_joints_to_be_held_are_named_at_once_each_at_a_position_within_its_range() {
     let crowd = SIMPLE.replace(
         "</robot>",
         "<link name=\"foot\"/><joint name=\"ankle roll\" type=\"revolute\"><parent link=\"shank\"/><child link=\"foot\"/>\
@@ -399,11 +404,14 @@ fn every_joint_that_is_no_leg_is_refused_by_name() {
     let held = [("hip", 0.0), ("ankle roll", 0.35), ("toes", 0.0)].map(|(name, at)| (name.to_owned(), at));
     let held = RobotOptions { locked: held.into(), ..joints(&["knee"]) };
     assert_eq!(converted(&crowd, &held).expect("as proposed").leg.joints[0].name, "knee");
+}
+
+#[test]
+fn fixed_and_held_joints_and_bodies_left_out_are_accepted() {
     // Many robots state an axis of length 0 at joints that do not move.
     let welded =
         ankle("fixed").replace("<child link=\"foot\"/>", "<child link=\"foot\"/><axis xyz=\"0 0 0\"/>");
     converted(&welded, &plain()).expect("the axis has no meaning");
-    // A held joint, and bodies left out, are accepted.
     converted(SIMPLE, &RobotOptions { locked: vec![("knee".into(), 0.5)], ..joints(&["hip"]) })
         .expect("a pendulum");
     converted(&ankle("revolute"), &RobotOptions { with_prior: false, ..plain() })

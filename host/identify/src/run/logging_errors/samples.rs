@@ -203,113 +203,114 @@ impl<'a> Look<'a> {
     }
 
     fn finish(mut self, reach_s: f64) -> Screened {
-        let file = self.recording.file.display().to_string();
-        let samples = self.recording.time_s.len().max(1) as f64;
-        let mut findings = Vec::new();
         let at_limit: Vec<bool> = (0..self.recording.time_s.len())
             .map(|k| self.limits.iter().any(|limit| limit.is_at[k]))
             .collect();
         self.find_frozen_torque(&at_limit);
-        let frozen_s = self.is_frozen.iter().filter(|&&frozen| frozen).count() as f64 / samples
-            * self.recording.duration_s();
+        let known: Vec<bool> =
+            self.is_frozen.iter().zip(&at_limit).map(|(&frozen, &at)| frozen || at).collect();
+        let mut findings = self.columns(&known);
+        let is_held = findings.iter().any(|finding| finding.name == HELD && finding.refuses);
+        let spans = if is_held { Vec::new() } else { self.spans(&at_limit) };
+        let lost = lost_share(self.recording, &spans, reach_s);
+        let excluded = Excluded { lost: (!is_held).then_some(lost), refuses: lost > LARGEST_LOSS };
+        findings.extend(self.limits.iter().map(|limit| self.saturated(limit, &excluded)));
+        findings.extend(self.frozen(&excluded));
+        Screened { findings, spans }
+    }
 
-        let mut known = self.is_frozen.clone();
-        known.iter_mut().zip(&at_limit).for_each(|(known, &at)| *known |= at);
-        let mut is_held = false;
+    fn finding(&self, name: &'static str, joint: Option<usize>, text: String) -> SampleFinding {
+        let file = self.recording.file.display().to_string();
+        let joint = joint.map(|joint| joint + 1);
+        SampleFinding {
+            name,
+            file,
+            joint,
+            value: 0.0,
+            unit: "s",
+            sigma: None,
+            share: 0.0,
+            refuses: false,
+            text,
+        }
+    }
+
+    /// Columns that repeat their values, and those with coarse steps.
+    fn columns(&self, known: &[bool]) -> Vec<SampleFinding> {
+        let mut findings = Vec::new();
         for (joint, series) in self.recording.joints.iter().enumerate() {
             let columns = [
                 (&series.torque_nm, step(&series.torque_nm), "tau", "Nm", HELD_TORQUE),
                 (&series.position_rad, self.angle_steps[joint], "q", "rad", HELD_ANGLE),
             ];
             for (values, u, symbol, unit, limit) in columns {
-                let held = self.held(values, u, &known);
+                let name = format!("{symbol}{}_{unit}", joint + 1);
+                let held = self.held(values, u, known);
                 if held.share > limit {
-                    let refuses = held.time_s > HARMLESS_HOLD_S;
-                    is_held |= refuses;
+                    let text = format!(
+                        "{name} repeats its values: {:.0} % of the samples are held, for {:.1} ms each. On average they \
+                         are {:.1} ms late: record every value when it is measured",
+                        100.0 * held.share,
+                        1e3 * held.time_s,
+                        0.5e3 * held.time_s
+                    );
                     findings.push(SampleFinding {
-                        name: HELD,
-                        file: file.clone(),
-                        joint: Some(joint + 1),
                         value: held.time_s,
-                        unit: "s",
-                        sigma: None,
                         share: held.share,
-                        refuses,
-                        text: format!(
-                            "{symbol}{}_{unit} repeats its values: {:.0} % of the samples are held, for {:.1} ms each. On \
-                             average they are {:.1} ms late: record every value when it is measured",
-                            joint + 1,
-                            100.0 * held.share,
-                            1e3 * held.time_s,
-                            0.5e3 * held.time_s
-                        ),
+                        refuses: held.time_s > HARMLESS_HOLD_S,
+                        ..self.finding(HELD, Some(joint), text)
                     });
                 }
-                if let Some(finding) = coarse(values, &format!("{symbol}{}_{unit}", joint + 1), unit) {
-                    findings.push(SampleFinding { file: file.clone(), joint: Some(joint + 1), ..finding });
+                if let Some(finding) = coarse(values, &name, unit) {
+                    let file = self.recording.file.display().to_string();
+                    findings.push(SampleFinding { file, joint: Some(joint + 1), ..finding });
                 }
             }
         }
+        findings
+    }
 
-        let spans = if is_held { Vec::new() } else { self.spans(&at_limit) };
-        let lost = lost_share(self.recording, &spans, reach_s);
-        let refuses = lost > LARGEST_LOSS;
-        let fate = |what: &str| {
-            if is_held {
-                String::new()
-            } else if refuses {
-                format!(
-                    ". {:.0} % of the recording would be lost, limit {:.0} %: {what}",
-                    100.0 * lost,
-                    100.0 * LARGEST_LOSS
-                )
-            } else {
-                format!(". These stretches are excluded, {:.1} % of the recording", 100.0 * lost)
-            }
-        };
-        let first = |is_marked: &[bool]| {
-            let sample = is_marked.iter().position(|&is_marked| is_marked).unwrap_or(0);
-            format!("{:.3} s", self.recording.time_s.get(sample).copied().unwrap_or(0.0))
-        };
-        for limit in &self.limits {
-            let share = limit.is_at.iter().filter(|&&at| at).count() as f64 / samples;
-            findings.push(SampleFinding {
-                name: SATURATION,
-                file: file.clone(),
-                joint: Some(limit.joint + 1),
-                value: limit.limit_nm,
-                unit: "N m",
-                sigma: None,
-                share,
-                refuses,
-                text: format!(
-                    "tau{}_Nm ends at a limit of {:.4} N m, where {:.1} % of the samples lie, first at {}{}",
-                    limit.joint + 1,
-                    limit.limit_nm,
-                    100.0 * share,
-                    first(&limit.is_at),
-                    fate("record with a larger range of the torque, or a calmer motion")
-                ),
-            });
+    fn saturated(&self, limit: &Limit, excluded: &Excluded) -> SampleFinding {
+        let share = count(&limit.is_at) / self.recording.time_s.len().max(1) as f64;
+        let text = format!(
+            "tau{}_Nm ends at a limit of {:.4} N m, where {:.1} % of the samples lie, first at {}{}",
+            limit.joint + 1,
+            limit.limit_nm,
+            100.0 * share,
+            self.first(&limit.is_at),
+            excluded.words("record with a larger range of the torque, or a calmer motion")
+        );
+        SampleFinding {
+            value: limit.limit_nm,
+            unit: "N m",
+            share,
+            refuses: excluded.refuses,
+            ..self.finding(SATURATION, Some(limit.joint), text)
         }
-        if frozen_s > 0.0 {
-            findings.push(SampleFinding {
-                name: HELD,
-                file,
-                joint: None,
-                value: frozen_s,
-                unit: "s",
-                sigma: None,
-                share: frozen_s / self.recording.duration_s(),
-                refuses,
-                text: format!(
-                    "columns are constant for {frozen_s:.2} s in all while the leg moves, first at {}{}",
-                    first(&self.is_frozen),
-                    fate("the recorder loses samples")
-                ),
-            });
-        }
-        Screened { findings, spans }
+    }
+
+    /// Stretches in which all columns are constant.
+    fn frozen(&self, excluded: &Excluded) -> Option<SampleFinding> {
+        let share = count(&self.is_frozen) / self.recording.time_s.len().max(1) as f64;
+        let frozen_s = share * self.recording.duration_s();
+        let text = format!(
+            "columns are constant for {frozen_s:.2} s in all while the leg moves, first at {}{}",
+            self.first(&self.is_frozen),
+            excluded.words("the recorder loses samples")
+        );
+        let finding = self.finding(HELD, None, text);
+        (frozen_s > 0.0).then_some(SampleFinding {
+            value: frozen_s,
+            share,
+            refuses: excluded.refuses,
+            ..finding
+        })
+    }
+
+    /// Time of the first marked sample, in words.
+    fn first(&self, is_marked: &[bool]) -> String {
+        let sample = is_marked.iter().position(|&is_marked| is_marked).unwrap_or(0);
+        format!("{:.3} s", self.recording.time_s.get(sample).copied().unwrap_or(0.0))
     }
 
     /// Marks constant stretches of torque where the column is noisy and not at its limit.
@@ -354,6 +355,33 @@ impl<'a> Look<'a> {
 struct Held {
     share: f64,
     time_s: f64,
+}
+
+/// Stretches that are excluded from a recording.
+struct Excluded {
+    /// Share of the recording that is lost with them; `None` if held columns refuse it anyway.
+    lost: Option<f64>,
+    refuses: bool,
+}
+
+impl Excluded {
+    /// What becomes of the stretches, in words; `advice` where too much is lost.
+    fn words(&self, advice: &str) -> String {
+        match self.lost.map(|lost| 100.0 * lost) {
+            None => String::new(),
+            Some(lost) if self.refuses => {
+                format!(
+                    ". {lost:.0} % of the recording would be lost, limit {:.0} %: {advice}",
+                    100.0 * LARGEST_LOSS
+                )
+            }
+            Some(lost) => format!(". These stretches are excluded, {lost:.1} % of the recording"),
+        }
+    }
+}
+
+fn count(is_marked: &[bool]) -> f64 {
+    is_marked.iter().filter(|&&is_marked| is_marked).count() as f64
 }
 
 /// Share of a recording that is lost by excluded spans and by windows that need `reach_s` on either side.

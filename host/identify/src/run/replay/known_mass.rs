@@ -10,7 +10,9 @@ use scarab::ident::{Record, Solver, torque_constant_ratio};
 use scarab::model::Payload;
 use scarab_base::error::ToolError;
 
-use super::{Parts, Recordings, ReplayOptions, Samples, feed, new_recorder, parts};
+use super::read::{Parts, parts};
+use super::rows::{Samples, feed, new_recorder};
+use super::{Recordings, ReplayOptions};
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::Read;

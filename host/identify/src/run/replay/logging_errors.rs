@@ -14,7 +14,7 @@ use scarab_base::stats::quantile;
 
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
-use crate::formats::recording::{JointSeries, Recording};
+use crate::formats::recording::Recording;
 use crate::leg::background::Background;
 use crate::report::RunReport;
 use crate::report::doubt::{BandwidthReport, ReadAs, RecordingsReport};
@@ -23,85 +23,17 @@ use crate::run::logging_errors::encoder::{Encoder, Encoders};
 use crate::run::logging_errors::rows::{Equations, Filters, Motion};
 use crate::run::logging_errors::{LoggingErrors, Question, cause, noise as scatter, sample_finding};
 use crate::run::replay::cleaning::cleaned;
+use crate::run::replay::read::{Parts, Whole, parts};
 use crate::run::replay::recordings::leave_one_out;
+use crate::run::replay::rows::{GRID_S, bandwidth_error};
 use crate::run::replay::screening::Screening;
-use crate::run::replay::{Parts, Recordings, ReplayOptions, bandwidth_error, parts};
+use crate::run::replay::{Recordings, ReplayOptions};
 use crate::run::resample::{Resampled, TRUSTED_BANDWIDTH};
 
 /// Misfit over noise up to which noise explains the misfit, so that limits follow from the noise.
 const EXPLAINED_BY_NOISE: f64 = 1.3;
 /// Share of a limit of the prior from which a parameter counts as at the limit.
 const AT_LIMIT: f64 = 0.98;
-
-/// Whole recording, with the duration of its training part.
-pub(super) struct Whole {
-    pub recording: Recording,
-    pub training_s: f64,
-}
-
-/// Recording with an even clock, and with the torque scaled and delayed, as requested. `ratios` are the
-/// recorded torques over the true ones.
-pub(super) fn corrected(
-    mut recording: Recording,
-    options: &ReplayOptions,
-    ratios: &[f64],
-) -> Result<Recording, ToolError> {
-    let joints = ratios.len();
-    for (series, ratio) in recording.joints.iter_mut().zip(ratios) {
-        series.torque_nm.iter_mut().for_each(|torque| *torque /= ratio);
-    }
-    if options.even_stamps {
-        let (first, step) = (
-            recording.time_s.first().copied().unwrap_or(0.0),
-            recording.duration_s() / (recording.time_s.len().max(2) - 1) as f64,
-        );
-        recording.time_s = (0..recording.time_s.len()).map(|sample| first + step * sample as f64).collect();
-    }
-    let delays = &options.torque_delay_ms;
-    if delays.is_empty() {
-        return Ok(recording);
-    }
-    if delays.len() != 1 && delays.len() != joints {
-        return Err(ToolError::input(format!(
-            "--torque-delay: {} values; give one for all joints, or one for each of {joints}",
-            delays.len()
-        )));
-    }
-    let late_s: Vec<f64> =
-        (0..joints).map(|joint| delays[if delays.len() == 1 { 0 } else { joint }] * 1e-3).collect();
-    let duration = recording.duration_s();
-    if let Some(wrong) = late_s.iter().find(|late| !(late.abs() < 0.1 * duration)) {
-        return Err(ToolError::input(format!(
-            "--torque-delay {}: the limit is a tenth of the recording ({:.0} ms)",
-            1e3 * wrong,
-            100.0 * duration
-        )));
-    }
-    Ok(advanced(&recording, &late_s))
-}
-
-/// Recording with each torque taken later by its delay; samples whose torque lies outside are dropped.
-fn advanced(recording: &Recording, late_s: &[f64]) -> Recording {
-    let time = &recording.time_s;
-    let (Some(&first), Some(&last)) = (time.first(), time.last()) else { return recording.clone() };
-    let inside = |now: f64| late_s.iter().all(|late| (first..=last).contains(&(now + late)));
-    let kept: Vec<usize> = (0..time.len()).filter(|&sample| inside(time[sample])).collect();
-    let at = |values: &[f64], now: f64| {
-        let right = time.partition_point(|&stamp| stamp < now).clamp(1, time.len() - 1);
-        let share = (now - time[right - 1]) / (time[right] - time[right - 1]);
-        values[right - 1] + share * (values[right] - values[right - 1])
-    };
-    let joints = recording.joints.iter().zip(late_s).map(|(series, late)| JointSeries {
-        position_rad: kept.iter().map(|&sample| series.position_rad[sample]).collect(),
-        torque_nm: kept.iter().map(|&sample| at(&series.torque_nm, time[sample] + late)).collect(),
-    });
-    Recording {
-        file: recording.file.clone(),
-        time_s: kept.iter().map(|&sample| time[sample]).collect(),
-        joints: joints.collect(),
-        joints_in_file: recording.joints_in_file,
-    }
-}
 
 /// Density of each joint's torque noise at the recordings' own rates, (N m)^2 s.
 pub(super) fn noise_density<const N: usize>(recordings: &[Recording], bandwidth_hz: f64) -> [Option<f64>; N] {
@@ -145,7 +77,7 @@ fn motions<const N: usize>(
             core::array::from_fn(|joint| of(&anatomy[joint], values[joint]))
         };
         let motion = |points: Range<usize>| Motion {
-            training_s: whole.training_s - points.start as f64 * crate::run::replay::GRID_S,
+            training_s: whole.training_s - points.start as f64 * GRID_S,
             position: points
                 .clone()
                 .filter_map(|point| grid.position_rad::<N>(point))

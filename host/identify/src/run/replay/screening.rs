@@ -116,8 +116,7 @@ impl Continuity {
     /// Whether this point does not continue the previous one.
     pub(super) fn breaks(&mut self, file: usize, time_s: f64) -> bool {
         let before = self.before.replace((file, time_s));
-        before
-            .is_some_and(|(last, last_s)| last != file || time_s - last_s > 1.5 * crate::run::replay::GRID_S)
+        before.is_some_and(|(last, last_s)| last != file || time_s - last_s > 1.5 * super::rows::GRID_S)
     }
 }
 

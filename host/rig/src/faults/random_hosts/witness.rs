@@ -472,16 +472,8 @@ impl<L: HostedLeg> Play<L> {
                 self.expect(joint, index);
                 self.write(joint, (index, sub, bytes), value)
             }
-            Step::Word(joint, word) => {
-                self.answer = None;
-                self.word(joint, word)?;
-                self.run(if word == 0 { TAKES_OVER as u32 + L::DELAY } else { 0 })?;
-                let confirmed = self.answer.is_some_and(|answer| answer[..3] == [0x60, 0x40, 0x60]);
-                if word == 0 && confirmed && self.is_enabled {
-                    return Err("stops: a 0 is confirmed, and the leg stays enabled".into());
-                }
-                Ok(())
-            }
+            Step::Word(joint, 0) => self.disable(joint),
+            Step::Word(joint, word) => self.word(joint, word),
             Step::Enable => [6, 7, 0xF].into_iter().try_for_each(|word| {
                 self.word(JOINTS, word)?;
                 self.run(8)
@@ -499,43 +491,15 @@ impl<L: HostedLeg> Play<L> {
                 self.expect(joint, 0x607A);
                 self.write(joint, (0x607A, 0, 4), place.wrapping_add(by))
             }
-            Step::Home(joint, offset) => {
-                self.modes[joint] = 6;
-                self.write(joint, (0x6060, 0, 1), 6)?;
-                self.write(joint, (0x6098, 0, 1), 37)?;
-                self.write(joint, (0x607C, 0, 4), offset)?;
-                self.run(8)?;
-                self.write(joint, (0x6040, 0, 2), 0x1F)?;
-                self.write(joint, (0x6040, 0, 2), 0x0F)
-            }
+            Step::Home(joint, offset) => self.home(joint, offset),
             Step::Pdo(joint, number, bytes) => {
                 self.pdo(joint, number, &bytes);
                 self.run(2)?;
                 self.learn_modes()
             }
             Step::Map(joint, number, objects) => self.map(joint, number, objects),
-            Step::Cycle(words, count, apart) => {
-                for _ in 0..count {
-                    for (joint, word) in words.into_iter().enumerate() {
-                        let [low, high] = word.to_le_bytes();
-                        self.pdo(joint, 1, &[low, high, 0, 0, 0, 0, 0, 0]);
-                    }
-                    self.run(u32::from(apart))?;
-                }
-                self.learn_modes()
-            }
-            Step::Sync(count, apart) => {
-                for joint in 0..JOINTS {
-                    if let Some(pdo) = self.waits[joint].take() {
-                        self.expect_pdo(joint, pdo);
-                    }
-                }
-                for _ in 0..count {
-                    self.send(0x80, &[]);
-                    self.run(u32::from(apart))?;
-                }
-                self.learn_modes()
-            }
+            Step::Cycle(words, count, apart) => self.cycle(words, count, apart),
+            Step::Sync(count, apart) => self.sync(count, apart),
             Step::Nmt(command, node) => {
                 // A node that resets or stops says nothing of an earlier fault.
                 self.unheard = None;
@@ -571,6 +535,52 @@ impl<L: HostedLeg> Play<L> {
                 self.words()
             }
         }
+    }
+
+    /// Writes a controlword of 0; once it is confirmed, the leg is off.
+    fn disable(&mut self, joint: usize) -> Result<(), String> {
+        self.answer = None;
+        self.word(joint, 0)?;
+        self.run(TAKES_OVER as u32 + L::DELAY)?;
+        let confirmed = self.answer.is_some_and(|answer| answer[..3] == [0x60, 0x40, 0x60]);
+        if confirmed && self.is_enabled {
+            return Err("stops: a 0 is confirmed, and the leg stays enabled".into());
+        }
+        Ok(())
+    }
+
+    fn home(&mut self, joint: usize, offset: i32) -> Result<(), String> {
+        self.modes[joint] = 6;
+        self.write(joint, (0x6060, 0, 1), 6)?;
+        self.write(joint, (0x6098, 0, 1), 37)?;
+        self.write(joint, (0x607C, 0, 4), offset)?;
+        self.run(8)?;
+        self.write(joint, (0x6040, 0, 2), 0x1F)?;
+        self.write(joint, (0x6040, 0, 2), 0x0F)
+    }
+
+    fn cycle(&mut self, words: [u16; JOINTS], count: u8, apart: u8) -> Result<(), String> {
+        for _ in 0..count {
+            for (joint, word) in words.into_iter().enumerate() {
+                let [low, high] = word.to_le_bytes();
+                self.pdo(joint, 1, &[low, high, 0, 0, 0, 0, 0, 0]);
+            }
+            self.run(u32::from(apart))?;
+        }
+        self.learn_modes()
+    }
+
+    fn sync(&mut self, count: u8, apart: u8) -> Result<(), String> {
+        for joint in 0..JOINTS {
+            if let Some(pdo) = self.waits[joint].take() {
+                self.expect_pdo(joint, pdo);
+            }
+        }
+        for _ in 0..count {
+            self.send(0x80, &[]);
+            self.run(u32::from(apart))?;
+        }
+        self.learn_modes()
     }
 
     /// The enabled leg moves when a well-behaved host commands a velocity, towards the middle of its range.

@@ -1,0 +1,141 @@
+//! From rows to the swarm's result.
+
+use scarab::ident::{ConstantRatio, Ends, Estimator, SearchState, Solver, Stretches};
+
+use super::ReplayOptions;
+use super::known_mass::{load_base, settled};
+use super::logging_errors::{is_explained_by_noise, sample_noise};
+use super::rows::{HostRecorder, Samples, feed};
+use super::screening::Continuity;
+use crate::leg::background::Background;
+use crate::report::Source;
+
+/// Evaluations between two updates of the search.
+const SLICE: u32 = 20;
+
+/// Result of the search over the training part.
+pub(super) struct Solved<const N: usize, const B: usize> {
+    pub solver: Solver<f32, N, B>,
+    /// Recorder of the training part, cleared: held-out parts are judged by its noise.
+    pub recorder: Box<HostRecorder<N, B>>,
+    pub sources: Vec<Source>,
+    /// Base parameters of a known load, which the recorded torque contains.
+    pub load: [f32; B],
+    /// Whether the torques' noise explains the misfit.
+    pub noise_is_known: bool,
+    pub search: Search,
+}
+
+impl<const N: usize, const B: usize> Solved<N, B> {
+    /// The found base parameters with those of the load.
+    pub(super) fn values(&self) -> [f32; B] {
+        with(self.solver.values(), &self.load)
+    }
+}
+
+/// Course of the search, in chi-square units.
+pub(super) struct Search {
+    /// Iterations and excess over the constrained optimum.
+    pub excess: Vec<(u32, f64)>,
+    /// First iteration with an excess of at most 0.5.
+    pub to_half: Option<u32>,
+    /// Excess of that optimum over least squares.
+    pub floor: f64,
+}
+
+/// Identifies from the training part, whose torques have this noise. `scale` is the recorded over the true
+/// torque of each joint, which is divided out already; its sigma is added.
+pub(super) fn solve<const N: usize, const B: usize>(
+    background: &mut Background<N, B>,
+    mut recorder: Box<HostRecorder<N, B>>,
+    training: &[Samples<N>],
+    noise: &[Option<f64>; N],
+    options: &ReplayOptions,
+    scale: Option<[ConstantRatio<f32>; N]>,
+) -> Solved<N, B> {
+    recorder.set_estimator(options.estimator);
+    let sources = feed(&mut recorder, background, training, "training", |_, _, _| {});
+    let mut record = recorder.finish();
+    for (count, joint) in record.outliers.replaced.iter_mut().zip(0..) {
+        *count += training.iter().map(|samples| samples.replaced[joint]).sum::<u32>();
+    }
+    record.noise = sample_noise(noise);
+    let noise_is_known = is_explained_by_noise(&record);
+    if !noise_is_known {
+        record.noise = [0.0; N];
+    }
+    let mut solver = settled(background, record, options);
+    let load = load_base(background, options);
+    let as_recorded = solver.record().clone();
+    if options.load.is_some() {
+        solver = settled(background, as_recorded.corrected(&[1.0; N], &load), options);
+    }
+    for (joint, found) in scale.iter().flatten().enumerate() {
+        let mut moved = [1.0; N];
+        moved[joint] += found.sigma / found.ratio;
+        let moved = settled(background, as_recorded.corrected(&moved, &load), options);
+        solver.widen(moved.least_squares());
+    }
+    let search = search(background, &mut solver);
+    background.device.stribeck = solver.stribeck(&background.device);
+    recorder.clear(Ends::Whole);
+    if options.estimator == Estimator::Robust {
+        let record = if options.load.is_some() { &as_recorded } else { solver.record() };
+        let stretches = Stretches::new(&background.device, record, &with(solver.found(), &load));
+        time_disturbances(&mut recorder, background, training, stretches, &mut solver);
+        recorder.clear(Ends::Whole);
+    }
+    if !noise_is_known {
+        recorder.count_disturbances();
+    }
+    Solved { solver, recorder, sources, load, noise_is_known, search }
+}
+
+fn with<const B: usize>(values: [f32; B], load: &[f32; B]) -> [f32; B] {
+    core::array::from_fn(|base| values[base] + load[base])
+}
+
+/// Runs the swarm to its end.
+fn search<const N: usize, const B: usize>(
+    background: &Background<N, B>,
+    solver: &mut Solver<f32, N, B>,
+) -> Search {
+    let optimum = background.costs(solver);
+    let mut course = Search { excess: Vec::new(), to_half: None, floor: optimum.above };
+    loop {
+        let state = solver.advance(&background.device, SLICE);
+        if !matches!(state, SearchState::Failed(_)) {
+            let excess = optimum.factor.excess(&solver.search().values().map(f64::from)) - optimum.above;
+            let iterations = solver.search().iterations();
+            if course.excess.last().is_none_or(|(last, _)| *last != iterations) {
+                course.excess.push((iterations, excess));
+            }
+            if excess <= 0.5 && course.to_half.is_none() {
+                course.to_half = Some(iterations);
+            }
+        }
+        if state != SearchState::Running {
+            return course;
+        }
+    }
+}
+
+/// Takes the durations of disturbances from the rows themselves, because blocks of a long motion are long.
+fn time_disturbances<const N: usize, const B: usize>(
+    recorder: &mut HostRecorder<N, B>,
+    background: &Background<N, B>,
+    training: &[Samples<N>],
+    mut stretches: Stretches<f32, N, B>,
+    solver: &mut Solver<f32, N, B>,
+) {
+    let mut continuity = Continuity::default();
+    feed(recorder, background, training, "training", |file, time_s, progress| {
+        if continuity.breaks(file, time_s) {
+            stretches.break_off();
+        }
+        if let Some(rows) = &progress.rows {
+            stretches.take(rows);
+        }
+    });
+    solver.time_disturbances(&stretches);
+}
