@@ -12,8 +12,8 @@ use scarab::bus::commissioning::BoardState;
 use scarab::hal::Contacts;
 use scarab::safety::NoticeCode;
 use scarab_base::error::ToolError;
-use scarab_client::bus;
-use scarab_client::master::{Client, Object, RequestError};
+use scarab_client::bus::{self, Object, Patience, RequestError};
+use scarab_client::master::Client;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_rig::pair::start_position;
 
@@ -82,8 +82,10 @@ pub struct Session {
     is_known: bool,
     /// Records before the last start.
     started: usize,
-    /// Frames of the board that were received since the last one was sent to it.
+    /// Frames of `can.sent` that a client has received.
     received: usize,
+    /// Longest wait for an answer.
+    pub patience: Duration,
 }
 
 /// Records that are printed when they arrive.
@@ -108,6 +110,8 @@ type Telemetry<'a> = (&'a str, u16, u8, f64, Option<f64>, &'a dyn Fn(&Session) -
 const LIGHT_SAMPLES: u32 = 400;
 const LIGHT_CYCLE_S: f64 = 2.0;
 
+/// Longest wait for an answer.
+const ANSWER: Duration = Duration::from_millis(500);
 /// Readings of which the mean is compared.
 const READINGS: u32 = 20;
 /// Relative error of the current measurement: amplifiers and shunts.
@@ -137,6 +141,7 @@ impl Session {
             is_known: false,
             started: 0,
             received: 0,
+            patience: ANSWER,
         })
     }
 
@@ -543,6 +548,12 @@ impl Session {
         self.machine.chip().plant.position().map(f64::to_degrees)
     }
 
+    /// Forgets the frames that the board has sent so far.
+    pub fn forget_frames(&mut self) {
+        self.machine.chip_mut().can.sent.clear();
+        self.received = 0;
+    }
+
     /// Client of the board's nodes.
     pub fn client(&mut self) -> Client<&mut Self> {
         Client::over(self)
@@ -569,10 +580,7 @@ impl Session {
         bytes: u8,
     ) -> Result<(), ToolError> {
         let (node, object) = (node as u8, Object(index, sub));
-        self.client().try_write(node, object, value, bytes).map_err(|error| match error {
-            RequestError::Aborted(_) => ToolError::Refused(error.of(node, object).to_string()),
-            error => error.of(node, object),
-        })
+        self.client().try_write(node, object, value, bytes).map_err(|error| error.refused(node, object))
     }
 
     /// Writes a request that changes the flash ("save", "load") and waits for its emergency messages: FF0D
@@ -607,7 +615,8 @@ impl Session {
     /// # Errors
     /// The node refuses the request or does not answer.
     pub fn read_object(&mut self, node: u16, index: u16, sub: u8) -> Result<u32, ToolError> {
-        self.client().read(node as u8, Object(index, sub))
+        let (node, object) = (node as u8, Object(index, sub));
+        self.client().try_read(node, object).map_err(|error| error.refused(node, object))
     }
 
     /// Saves the machine.
@@ -622,10 +631,8 @@ impl Session {
 impl bus::Bus for Session {
     /// Sends a frame, and forgets those that were received before.
     fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
-        let chip = self.machine.chip_mut();
-        chip.can.sent.clear();
-        chip.send_frame(*frame);
-        self.received = 0;
+        self.forget_frames();
+        self.machine.chip_mut().send_frame(*frame);
         Ok(())
     }
 
@@ -637,16 +644,20 @@ impl bus::Bus for Session {
                 return Ok(Some(*frame));
             }
             if chip.flash.is_cut {
-                return Err(RequestError::Silent);
+                return Err(RequestError::Failed("the power was cut".into()));
             }
             if bus::Bus::now(self) >= until {
                 return Ok(None);
             }
-            self.run(POLL_S).map_err(|error| RequestError::Adapter(error.to_string()))?;
+            self.run(POLL_S).map_err(|error| RequestError::Failed(error.to_string()))?;
         }
     }
 
     fn now(&self) -> Duration {
         Duration::from_secs_f64(seconds(Self::now(self)))
+    }
+
+    fn patience(&self) -> Patience {
+        Patience::once(self.patience)
     }
 }

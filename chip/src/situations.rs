@@ -256,7 +256,7 @@ pub(crate) fn targets(start: [i32; 2], time: f64) -> Frame {
 
 /// Sends SYNC and targets at 1 kHz; frames for others fill the rest of the wire.
 fn follow(session: &mut Session, start: [i32; 2], cycles: Range<u32>) -> Result<(), ToolError> {
-    session.machine.chip_mut().can.sent.clear();
+    session.forget_frames();
     let expected = 2 * cycles.len();
     for cycle in cycles {
         let time = f64::from(cycle) * CYCLE_S;

@@ -49,7 +49,7 @@ pub struct CutReport {
 impl Session {
     /// Starts the board again after a power cut and waits for its node.
     pub(crate) fn power_up(&mut self) -> Result<(), ToolError> {
-        self.machine.chip_mut().can.sent.clear();
+        self.forget_frames();
         self.machine.power_cycle();
         self.boot()?;
         let end = self.now() + ticks(REPAIR_S);

@@ -6,11 +6,12 @@
 //! the last cut of each part it must take another update.
 
 use std::fmt::Write as _;
+use std::time::Duration;
 
 use scarab::bus::program::{ProgramCommand, ProgramError, ProgramStatus};
 use scarab_base::error::ToolError;
 use scarab_boot::{HEADER_AT, Region, seal};
-use scarab_client::master::Object;
+use scarab_client::bus::Object;
 use scarab_client::update::{DATA, SOFTWARE, STATUS, Update, check};
 use serde::Serialize;
 
@@ -19,10 +20,14 @@ use crate::peripherals::flash::Cut;
 use crate::session::Session;
 use crate::time::{seconds, ticks};
 
+/// Longest answer while sectors are erased.
+const ERASED: Duration = Duration::from_secs(8);
 /// Node through which the image comes.
 const NODE: u8 = 1;
 /// Longest start that swaps both images and swaps them back, s.
 const SWAPPED_S: f64 = 90.0;
+/// Segments of a block.
+const BLOCK: usize = 32;
 /// Word that requests a swap, as `embassy-boot` writes it.
 const SWAP: [u8; 4] = [0xF0; 4];
 /// Instants within an erase at which the power is cut.
@@ -132,7 +137,7 @@ impl Session {
 
     /// Cuts the power and waits until an image runs.
     fn start_up(&mut self) -> Result<(), ToolError> {
-        self.machine.chip_mut().can.sent.clear();
+        self.forget_frames();
         self.machine.power_cycle();
         self.await_start(SWAPPED_S)
     }
@@ -142,9 +147,12 @@ impl Session {
         Update { client: self.client(), node: NODE, say: &mut |_: &str| {} }.command(command)
     }
 
-    /// Waits until nothing is under way.
+    /// Waits until nothing is under way; the board is silent while it erases a sector.
     fn settled(&mut self) -> Result<ProgramStatus, ToolError> {
-        Update { client: self.client(), node: NODE, say: &mut |_: &str| {} }.settled()
+        let patience = core::mem::replace(&mut self.patience, ERASED);
+        let settled = Update { client: self.client(), node: NODE, say: &mut |_: &str| {} }.settled();
+        self.patience = patience;
+        settled
     }
 
     /// Gives a command and waits until it is finished.
@@ -159,14 +167,21 @@ impl Session {
         program: &[u8],
         mut between: impl FnMut(&Self) -> Result<(), ToolError>,
     ) -> Result<(), ToolError> {
-        let mut kept = Ok(());
+        let (mut blocks, mut kept) = (0, Ok(()));
         let progress = |session: &&mut Self, _| {
+            blocks += 1;
             if kept.is_ok() {
                 kept = between(session);
             }
         };
         let written = self.client().download(NODE, DATA, program, progress);
-        written.map_err(|error| error.of(NODE, DATA))?;
+        written.map_err(|error| error.refused(NODE, DATA))?;
+        let least = program.len().div_ceil(7 * BLOCK);
+        if blocks != least {
+            return Err(ToolError::Refused(format!(
+                "{blocks} blocks instead of {least}: segments were lost"
+            )));
+        }
         kept
     }
 
@@ -244,7 +259,7 @@ impl Bench<'_> {
         self.note("power cut after that", found);
         self.session.machine.restore(trial)?;
         let refused = [ProgramCommand::Stop, ProgramCommand::Clear]
-            .map(|command| self.session.command(command).is_err());
+            .map(|command| matches!(self.session.command(command), Err(ToolError::Refused(_))));
         let found = self.start_up(Expected::Old);
         let found = if refused == [true; 2] { found } else { Err("stopped or cleared".into()) };
         self.note("another update while on trial is refused; power cut", found);
@@ -366,7 +381,7 @@ impl Bench<'_> {
     fn cut_download(&mut self, cleared: &Snapshot, points: u64) -> Result<(), ToolError> {
         self.session.machine.restore(cleared)?;
         let program = self.new.clone();
-        let blocks = program.len().div_ceil(7 * 32);
+        let blocks = program.len().div_ceil(7 * BLOCK);
         let every = (blocks as u64 / points).max(1);
         let (mut count, mut states) = (0, Vec::new());
         self.session.download(&program, |session| {
@@ -409,6 +424,7 @@ impl Bench<'_> {
         let (program, expected) =
             if is_new { (&self.old, Expected::Old) } else { (&self.new, Expected::New) };
         let header = check(program)?;
+        self.session.patience = ERASED;
         let mut update = Update { client: self.session.client(), node: NODE, say: &mut |_: &str| {} };
         update.run(program, &header).map_err(words)?;
         self.running(expected)

@@ -80,7 +80,7 @@ pub struct ServoOutput<const N: usize> {
     pub tracking_error: [Radian; N],
     /// Torques of feedforward and feedback before the monitor.
     pub wanted_torque: [NewtonMetre; N],
-    /// Part of the wanted torques that opposes the joints' own velocities.
+    /// Damping within the wanted torques that opposes the joints' own velocities.
     pub braking_torque: [NewtonMetre; N],
     /// Decision of the monitor; its command is for the drives.
     pub decision: Decision<N>,

@@ -52,8 +52,9 @@ const HOST: [(&str, &[&[&str]]); 4] = [
     (
         "host/client/src",
         &[
-            &["adapter", "slcan", "candump", "alarms", "wire", "report", "activity_words"],
-            &["bus", "master", "words"],
+            &["bus", "slcan", "candump", "alarms", "wire", "report", "activity_words"],
+            &["adapter"],
+            &["master", "words"],
             &["other_hosts"],
             &["commission", "node_ids", "update"],
         ],

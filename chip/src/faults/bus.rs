@@ -101,9 +101,8 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
         write(0x1401, 5, times_ms[1], 2)?;
         write(0x2013, 0, 0, 1)?;
     }
-    let can = &mut session.machine.chip_mut().can;
-    can.sent.clear();
-    can.heard = Some(Vec::new());
+    session.forget_frames();
+    session.machine.chip_mut().can.heard = Some(Vec::new());
     // So often that one lost heartbeat has no effect.
     let beat = u64::from(times_ms[0] * 4 / 10).max(1);
     let lead = LEAD + random.below(LEAD);
@@ -185,7 +184,7 @@ pub fn hostile(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolEr
 fn answers(session: &mut Session) -> Result<Result<(), String>, ToolError> {
     session.machine.chip_mut().can.partner.clear();
     session.run(5e-3)?;
-    session.machine.chip_mut().can.sent.clear();
+    session.forget_frames();
     send(session, Frame::new(0, &[129, 0]));
     session.run(20e-3)?;
     // Hostile frames may have set other node-IDs.
@@ -296,7 +295,7 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     }
     let plant = &session.machine.chip().plant;
     let (torque, place) = (plant.torque(), plant.position());
-    session.machine.chip_mut().can.sent.clear();
+    session.forget_frames();
     for node in NODES {
         session.write_sized(node, 0x6040, 0, 0xF, 2)?;
     }
@@ -311,10 +310,10 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
             }
         }
     }
-    for node in NODES {
+    let codes = NODES.map(|node| emergencies(session, node));
+    for (node, codes) in NODES.into_iter().zip(codes) {
         let word = session.read_object(node, 0x6041, 0)?;
         let shown = session.read_object(node, 0x6061, 0)?;
-        let codes = emergencies(session, node);
         let ignores = matches!(mode as i8, -1 | 8..=10) && word & 1 << 12 == 0;
         if word & 0x806F != 0x27
             || ignores

@@ -97,7 +97,7 @@ impl HostedLeg for ChipLeg<'_> {
     }
 
     fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<LegState>, String> {
-        self.session.machine.chip_mut().can.sent.clear();
+        self.session.forget_frames();
         self.session.run(1.0 / f64::from(SERVO_RATE_HZ)).map_err(|error| error.to_string())?;
         self.session.machine.chip().can.sent.iter().for_each(|(_, frame)| heard(frame));
         self.read_records();

@@ -8,7 +8,7 @@ use scarab::safety::{InhibitReason, NoticeCode};
 use scarab::store::{Key, ModelRecord};
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
-use scarab_client::master::Object;
+use scarab_client::bus::{Object, RequestError};
 use scarab_rig::faults::bench::kept::{corrupt, identified, readable, window, worn};
 use scarab_rig::kept_file::memory::Memory;
 
@@ -199,6 +199,9 @@ fn armed(
     let cells = session.machine.chip_mut().flash.parameters_mut().to_vec();
     let node = 1 + random.below(2) as u8;
     let answer = session.client().try_write(node, Object(index, 1), u32::from_le_bytes(word), 4);
+    if let Err(RequestError::Failed(why)) = answer {
+        return Err(ToolError::input(why));
+    }
     session.run(0.1)?;
     let is_refused = answer.as_ref().is_err_and(|error| error.is(Abort::State));
     let is_same = session.machine.chip_mut().flash.parameters_mut() == cells;

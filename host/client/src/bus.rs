@@ -1,24 +1,15 @@
 //! The bus as a client sees it: frames and a clock. Behind it is an adapter, a simulated network, or a model
 //! of the microcontroller.
 
-use std::io::{BufReader, Write};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use scarab::bus::Frame;
+use scarab::bus::{Abort, Frame};
 use scarab_base::error::ToolError;
 
-use crate::adapter::Adapter;
-use crate::master::{HOST, RequestError};
-use crate::slcan::{self, BELL, LONGEST_LINE, next_line};
-
-/// Frames between reader and client.
-const MOST_WAITING: usize = 4096;
-/// Interval of this host's heartbeats, and their frame: operational.
-const HEARTBEAT: Duration = Duration::from_millis(100);
-const ALIVE: (u16, u8) = (0x700, 5);
+/// Node-ID of this host.
+pub const HOST: u8 = 0x70;
+/// Longest value that is read, in bytes.
+pub(crate) const MOST_BYTES: usize = 4096;
 
 /// Frames to and from the nodes, and the time that they live in.
 pub trait Bus {
@@ -29,7 +20,8 @@ pub trait Bus {
     fn send(&mut self, frame: &Frame) -> Result<(), RequestError>;
 
     /// Receives the next frame; `None` if none comes before [`Bus::now`] is `until`. Frames that have arrived
-    /// are returned even if it is later.
+    /// are returned even if it is later. A simulated bus may keep other frames than answers to itself, and
+    /// forget those that were not received before the next one is sent.
     ///
     /// # Errors
     /// The bus failed, or no node can answer any more.
@@ -37,6 +29,31 @@ pub trait Bus {
 
     /// Time since an instant that does not change.
     fn now(&self) -> Duration;
+
+    /// Times after which a client repeats a request, and gives it up.
+    fn patience(&self) -> Patience {
+        Patience::REAL
+    }
+}
+
+/// Times of a request without an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// Longest wait for the answer.
+    pub answer: Duration,
+    /// Time after which the request is repeated.
+    pub repeat: Duration,
+}
+
+impl Patience {
+    /// On a real bus: a board that erases a sector of a new image is silent for up to 2 s.
+    pub const REAL: Self = Self { answer: Duration::from_secs(6), repeat: Duration::from_secs(1) };
+
+    /// One request, which must be answered in this time: a simulated bus loses none.
+    #[must_use]
+    pub const fn once(answer: Duration) -> Self {
+        Self { answer, repeat: answer }
+    }
 }
 
 impl<B: Bus> Bus for &mut B {
@@ -51,94 +68,68 @@ impl<B: Bus> Bus for &mut B {
     fn now(&self) -> Duration {
         (**self).now()
     }
-}
 
-/// Bus behind an slcan adapter, in real time.
-pub struct Line {
-    /// Shared with the heartbeats.
-    adapter: Arc<Mutex<Adapter>>,
-    frames: Receiver<Result<Frame, String>>,
-    begun: Instant,
-}
-
-impl Line {
-    /// Takes over an adapter with an open channel, which is closed at the end.
-    ///
-    /// # Errors
-    /// Those of the operating system.
-    pub fn new(adapter: Adapter) -> Result<Self, ToolError> {
-        let reader = adapter.try_clone().map_err(|error| ToolError::input(format!("--slcan: {error}")))?;
-        let (give, frames) = sync_channel(MOST_WAITING);
-        thread::spawn(move || {
-            let mut reader = BufReader::new(reader);
-            while let Some(line) = next_line(&mut reader, &[b'\r', BELL[0]]).transpose() {
-                let decoded = match line {
-                    Ok(line) if line.len() == LONGEST_LINE => Err(format!(
-                        "the adapter sends a line of {LONGEST_LINE} bytes or more, which is no frame"
-                    )),
-                    Ok(line) => slcan::decode(&String::from_utf8_lossy(&line)),
-                    Err(error) => Err(error.to_string()),
-                };
-                let ends = decoded.is_err();
-                if let Some(found) = decoded.transpose()
-                    && (give.send(found).is_err() || ends)
-                {
-                    return;
-                }
-            }
-            let _ = give.send(Err("the adapter closed the connection".into()));
-        });
-        Ok(Self { adapter: Arc::new(Mutex::new(adapter)), frames, begun: Instant::now() })
-    }
-
-    /// Sends heartbeats from now on, as long as this line exists: nodes that watch it (1016) stop when the
-    /// process ends.
-    pub fn begin_heartbeats(&self) {
-        let adapter: Weak<Mutex<Adapter>> = Arc::downgrade(&self.adapter);
-        let (identifier, operational) = ALIVE;
-        let alive = Frame::new(identifier + u16::from(HOST), &[operational]);
-        thread::spawn(move || {
-            while let Some(adapter) = adapter.upgrade() {
-                if send(&adapter, &alive).is_err() {
-                    return;
-                }
-                drop(adapter);
-                thread::sleep(HEARTBEAT);
-            }
-        });
+    fn patience(&self) -> Patience {
+        (**self).patience()
     }
 }
 
-impl Bus for Line {
-    fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
-        send(&self.adapter, frame).map_err(|error| RequestError::Adapter(error.to_string()))
+/// Object of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Object(pub u16, pub u8);
+
+/// Why a request failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RequestError {
+    /// The node aborted the transfer with this code.
+    Aborted(u32),
+    /// The node did not answer within this time.
+    Silent(Duration),
+    /// The value has no end.
+    Endless,
+    /// The bus failed, with the next step where the user can take one.
+    Failed(String),
+}
+
+impl RequestError {
+    /// Whether the node aborted for this reason.
+    #[must_use]
+    pub fn is(&self, abort: Abort) -> bool {
+        *self == Self::Aborted(abort.code())
     }
 
-    fn receive(&mut self, until: Duration) -> Result<Option<Frame>, RequestError> {
-        match self.frames.recv_timeout(until.saturating_sub(self.now())) {
-            Ok(Ok(frame)) => Ok(Some(frame)),
-            Ok(Err(why)) => Err(RequestError::Adapter(why)),
-            Err(RecvTimeoutError::Timeout) => Ok(None),
-            Err(RecvTimeoutError::Disconnected) => {
-                Err(RequestError::Adapter("the adapter closed the connection".into()))
-            }
+    /// Error of the bus as a whole.
+    #[must_use]
+    pub fn of_bus(self) -> ToolError {
+        match self {
+            Self::Failed(why) => ToolError::input(why),
+            Self::Silent(_) | Self::Endless | Self::Aborted(_) => ToolError::input("no answer on the bus"),
         }
     }
 
-    fn now(&self) -> Duration {
-        self.begun.elapsed()
+    /// Error with the node and the object.
+    #[must_use]
+    pub fn of(self, node: u8, Object(index, sub): Object) -> ToolError {
+        let why = match self {
+            Self::Aborted(code) => format!("refused with abort code {code:08X}"),
+            Self::Silent(patience) => format!(
+                "no answer within {} s: is the board powered, the bit rate right, the bus terminated? `node-ids` lists the boards",
+                patience.as_secs_f64()
+            ),
+            Self::Endless => {
+                format!("the value has more than {MOST_BYTES} bytes: this is no node of a Scarab board")
+            }
+            Self::Failed(_) => return self.of_bus(),
+        };
+        ToolError::input(format!("node {node}, object {index:04X}:{sub}: {why}"))
     }
-}
 
-impl Drop for Line {
-    fn drop(&mut self) {
-        let _ = self.adapter.lock().unwrap_or_else(PoisonError::into_inner).write_all(b"C\r");
+    /// Like [`Self::of`]; a node that aborts has refused.
+    #[must_use]
+    pub fn refused(self, node: u8, object: Object) -> ToolError {
+        match self {
+            Self::Aborted(_) => ToolError::Refused(self.of(node, object).to_string()),
+            error => error.of(node, object),
+        }
     }
-}
-
-/// Sends a frame as one line.
-fn send(adapter: &Mutex<Adapter>, frame: &Frame) -> std::io::Result<()> {
-    let mut text = Vec::new();
-    slcan::encode(frame, &mut text);
-    adapter.lock().unwrap_or_else(PoisonError::into_inner).write_all(&text)
 }

@@ -27,7 +27,8 @@ use scarab_base::names::parameter_name;
 use scarab_base::number::Number;
 
 use crate::alarms;
-use crate::master::{Client, HOST, Object, RequestError};
+use crate::bus::{HOST, Object, RequestError};
+use crate::master::Client;
 use crate::other_hosts::{MayBeOn, OtherHosts};
 use crate::report::{CommissionReport, JointCommissioned, ParameterRead, StepTaken};
 use crate::words::JointState;

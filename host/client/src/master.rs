@@ -7,19 +7,13 @@
 use std::time::Duration;
 
 use crc::{CRC_16_XMODEM, Crc};
-use scarab::bus::{Abort, Frame};
+use scarab::bus::Frame;
 use scarab_base::error::ToolError;
 use scarab_base::output::printable;
 
-use crate::adapter::Adapter;
-use crate::bus::{Bus, Line};
+use crate::adapter::{Adapter, AdapterBus};
+use crate::bus::{Bus, MOST_BYTES, Object, RequestError};
 
-/// Longest wait for an answer; a board that erases a sector of a new image is silent for up to 2 s.
-const PATIENCE: Duration = Duration::from_secs(6);
-/// Time after which a request is repeated.
-const REPEAT: Duration = Duration::from_secs(1);
-/// Longest value that is read, in bytes.
-const MOST_BYTES: usize = 4096;
 /// Number of identifiers.
 const IDENTIFIERS: usize = 0x800;
 /// Bytes of a segment.
@@ -29,12 +23,6 @@ const ANSWER: u16 = 0x580;
 const EMERGENCY: u16 = 0x80;
 /// COB-IDs of the layer setting services.
 const LSS: [u16; 2] = [0x7E5, 0x7E4];
-/// Node-ID of this host.
-pub const HOST: u8 = 0x70;
-
-/// Object of a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Object(pub u16, pub u8);
 
 /// Emergency message of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,60 +36,11 @@ pub struct Emergency {
 }
 
 /// Connection to the nodes of a bus.
-pub struct Client<B = Line> {
+pub struct Client<B = AdapterBus> {
     bus: B,
     emergencies: Vec<Emergency>,
     /// Identifiers that were received; an adapter does not return this client's own frames.
     heard: Box<[bool; IDENTIFIERS]>,
-}
-
-/// Why a request failed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum RequestError {
-    /// The node aborted the transfer with this code.
-    Aborted(u32),
-    /// The node did not answer.
-    Silent,
-    /// The value has no end.
-    Endless,
-    /// The adapter failed.
-    Adapter(String),
-}
-
-impl RequestError {
-    /// Whether the node aborted for this reason.
-    #[must_use]
-    pub fn is(&self, abort: Abort) -> bool {
-        *self == Self::Aborted(abort.code())
-    }
-
-    /// Error of the bus as a whole.
-    #[must_use]
-    pub fn of_bus(self) -> ToolError {
-        match self {
-            Self::Adapter(why) => ToolError::input(format!(
-                "--slcan: {why}; run the command again once the bus is free and its boards answer"
-            )),
-            Self::Silent | Self::Endless | Self::Aborted(_) => ToolError::input("no answer on the bus"),
-        }
-    }
-
-    /// Error with the node and the object.
-    #[must_use]
-    pub fn of(self, node: u8, Object(index, sub): Object) -> ToolError {
-        let why = match self {
-            Self::Aborted(code) => format!("refused with abort code {code:08X}"),
-            Self::Silent => format!(
-                "no answer within {} s: is the board powered, the bit rate right, the bus terminated? `node-ids` lists the boards",
-                PATIENCE.as_secs()
-            ),
-            Self::Endless => {
-                format!("the value has more than {MOST_BYTES} bytes: this is no node of a Scarab board")
-            }
-            Self::Adapter(why) => return Self::Adapter(why).of_bus(),
-        };
-        ToolError::input(format!("node {node}, object {index:04X}:{sub}: {why}"))
-    }
 }
 
 impl Client {
@@ -110,10 +49,10 @@ impl Client {
     /// # Errors
     /// Those of the operating system.
     pub fn new(adapter: Adapter) -> Result<Self, ToolError> {
-        Line::new(adapter).map(Self::over)
+        AdapterBus::new(adapter).map(Self::over)
     }
 
-    /// Sends heartbeats as long as this client exists ([`Line::begin_heartbeats`]).
+    /// Sends heartbeats as long as this client exists ([`AdapterBus::begin_heartbeats`]).
     pub fn begin_heartbeats(&self) {
         self.bus.begin_heartbeats();
     }
@@ -140,7 +79,7 @@ impl<B: Bus> Client<B> {
     /// Sends a frame.
     ///
     /// # Errors
-    /// The adapter failed.
+    /// The bus failed, or no node can answer any more.
     pub fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
         self.bus.send(frame)
     }
@@ -173,7 +112,7 @@ impl<B: Bus> Client<B> {
     /// Waits, and keeps emergency messages.
     ///
     /// # Errors
-    /// The adapter failed.
+    /// The bus failed, or no node can answer any more.
     pub fn wait(&mut self, time: Duration) -> Result<(), RequestError> {
         self.receive(self.now() + time, |_| false).map(drop)
     }
@@ -187,7 +126,8 @@ impl<B: Bus> Client<B> {
     fn ask(&mut self, node: u8, request: [u8; 8], object: Option<Object>) -> Result<[u8; 8], RequestError> {
         // A late answer to an earlier request.
         self.receive(self.now(), |_| false)?;
-        let end = self.now() + PATIENCE;
+        let patience = self.bus.patience();
+        let end = self.now() + patience.answer;
         while self.now() < end {
             self.send(&Frame::new(REQUEST + u16::from(node), &request))?;
             let answers = |frame: &Frame| {
@@ -209,7 +149,7 @@ impl<B: Bus> Client<B> {
                     && answers
                     && object.is_none_or(named)
             };
-            let Some(frame) = self.receive(end.min(self.now() + REPEAT), answers)? else { continue };
+            let Some(frame) = self.receive(end.min(self.now() + patience.repeat), answers)? else { continue };
             let Ok(data) = <[u8; 8]>::try_from(frame.data()) else { continue };
             if data[0] == 0x80 {
                 let [.., a, b, c, d] = data;
@@ -217,14 +157,14 @@ impl<B: Bus> Client<B> {
             }
             return Ok(data);
         }
-        Err(RequestError::Silent)
+        Err(RequestError::Silent(patience.answer))
     }
 
     /// Sends requests of the layer setting services, each a service and its number, and waits for an answer
     /// with the service `answer`: its number, or `None` if no node answers in time.
     ///
     /// # Errors
-    /// The adapter failed.
+    /// The bus failed, or no node can answer any more.
     pub fn lss(
         &mut self,
         requests: &[(u8, u32)],
@@ -248,7 +188,7 @@ impl<B: Bus> Client<B> {
     /// Sends a network management command to a node.
     ///
     /// # Errors
-    /// The adapter failed.
+    /// The bus failed, or no node can answer any more.
     pub fn manage(&mut self, node: u8, command: u8) -> Result<(), RequestError> {
         self.send(&Frame::new(0, &[command, node]))
     }
@@ -285,13 +225,17 @@ impl<B: Bus> Client<B> {
     ///
     /// # Errors
     /// The node refuses or is silent.
+    pub fn try_read(&mut self, node: u8, object: Object) -> Result<u32, RequestError> {
+        let bytes = self.bytes(node, object)?;
+        Ok(bytes.iter().take(4).rev().fold(0, |value, byte| value << 8 | u32::from(*byte)))
+    }
+
+    /// Reads a number of at most four bytes; it is not sign-extended.
+    ///
+    /// # Errors
+    /// The node refuses or is silent.
     pub fn read(&mut self, node: u8, object: Object) -> Result<u32, ToolError> {
-        let bytes = self.bytes(node, object).map_err(|error| error.of(node, object))?;
-        let mut value = [0; 4];
-        for (to, from) in value.iter_mut().zip(bytes) {
-            *to = from;
-        }
-        Ok(u32::from_le_bytes(value))
+        self.try_read(node, object).map_err(|error| error.of(node, object))
     }
 
     /// Reads a REAL32; unknown values are NaN.
@@ -335,12 +279,13 @@ impl<B: Bus> Client<B> {
                 data[1..=segment.len()].copy_from_slice(segment);
                 self.send(&Frame::new(REQUEST + u16::from(node), &data))?;
             }
-            let until = self.now() + PATIENCE;
+            let patience = self.bus.patience().answer;
+            let until = self.now() + patience;
             let Some(frame) = self.receive(until, |frame| {
                 frame.id() == ANSWER + u16::from(node) && matches!(frame.data().first(), Some(0x80 | 0xA2))
             })?
             else {
-                return Err(RequestError::Silent);
+                return Err(RequestError::Silent(patience));
             };
             match *frame.data() {
                 [0xA2, taken, next, ..] => {
@@ -349,7 +294,7 @@ impl<B: Bus> Client<B> {
                     block = usize::from(next).clamp(1, 127);
                 }
                 [.., a, b, c, d] => return Err(RequestError::Aborted(u32::from_le_bytes([a, b, c, d]))),
-                _ => return Err(RequestError::Silent),
+                _ => return Err(RequestError::Silent(patience)),
             }
             progress(&self.bus, offset);
         }

@@ -6,7 +6,8 @@ use std::time::Duration;
 use scarab::bus::{Identity, NodeId};
 use scarab_base::error::ToolError;
 
-use crate::master::{Client, HOST, RequestError};
+use crate::bus::{HOST, RequestError};
+use crate::master::Client;
 use crate::other_hosts::{MayBeOn, OtherHosts};
 
 /// Services: state of all nodes, identity of one, its answer, search, its answer, node-ID, store, question.

@@ -15,8 +15,8 @@
 use scarab_base::error::ToolError;
 use std::time::Duration;
 
-use crate::bus::Bus;
-use crate::master::{Client, HOST, Object, RequestError};
+use crate::bus::{Bus, HOST, Object, RequestError};
+use crate::master::Client;
 use crate::words::JointState;
 
 /// Time in which a host that controls a leg shows itself.
@@ -114,8 +114,8 @@ impl OtherHosts {
 
 /// Reads an object that other firmware may not have.
 fn optional<B: Bus>(client: &mut Client<B>, node: u8, object: Object) -> Result<Option<u32>, ToolError> {
-    match client.bytes(node, object) {
-        Ok(bytes) => Ok(Some(bytes.iter().take(4).rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte)))),
+    match client.try_read(node, object) {
+        Ok(value) => Ok(Some(value)),
         Err(RequestError::Aborted(_)) => Ok(None),
         Err(error) => Err(error.of(node, object)),
     }

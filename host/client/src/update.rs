@@ -10,8 +10,9 @@ use scarab::bus::program::{ProgramCommand, ProgramError, ProgramStatus};
 use scarab_base::error::ToolError;
 use scarab_boot::{Check, Header, ImageError};
 
-use crate::bus::{Bus, Line};
-use crate::master::{Client, Object, RequestError};
+use crate::adapter::AdapterBus;
+use crate::bus::{Bus, Object, RequestError};
+use crate::master::Client;
 use crate::other_hosts::{MayBeOn, OtherHosts};
 
 /// Program data.
@@ -58,7 +59,7 @@ pub fn check(program: &[u8]) -> Result<Header, &'static str> {
 }
 
 /// Update of one board.
-pub struct Update<'a, B = Line> {
+pub struct Update<'a, B = AdapterBus> {
     /// Connection to the bus.
     pub client: Client<B>,
     /// Either node of the board.
@@ -74,14 +75,13 @@ impl<B: Bus> Update<'_, B> {
     /// The board refuses, or the bus fails.
     pub fn run(&mut self, program: &[u8], header: &Header) -> Result<(), ToolError> {
         OtherHosts::look(&mut self.client, &[self.node], MayBeOn::No)?;
-        let running = self.client.bytes(self.node, SOFTWARE).map_err(|error| {
+        let running = self.client.try_read(self.node, SOFTWARE).map_err(|error| {
             if error.is(Abort::NoObject) {
                 ToolError::Refused("this firmware takes no update over the bus; use a debug probe".into())
             } else {
                 error.of(self.node, SOFTWARE)
             }
         })?;
-        let running = running.iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte));
         let serial = self.client.read(self.node, Object(0x1018, 4))?;
         (self.say)(&format!("find       serial number {serial:08X}, image {running:08X}"));
         if self.client.text(self.node, HARDWARE)? == SIMULATED {
@@ -157,9 +157,9 @@ impl<B: Bus> Update<'_, B> {
         self.command(ProgramCommand::Start)?;
         let end = self.client.now() + RESTART;
         while self.client.now() < end {
-            match self.client.bytes(self.node, STATUS) {
-                Ok(bytes) => {
-                    let status = ProgramStatus(bytes.iter().rev().fold(0, |sum, b| sum << 8 | u32::from(*b)));
+            match self.client.try_read(self.node, STATUS) {
+                Ok(status) => {
+                    let status = ProgramStatus(status);
                     let waits = status.has(ProgramStatus::UNDER_WAY);
                     if status.has(ProgramStatus::STOPPED) && !waits {
                         return Err(refused("the new image", status));
@@ -169,7 +169,7 @@ impl<B: Bus> Update<'_, B> {
                     }
                 }
                 // The board swaps the images.
-                Err(RequestError::Silent) => {}
+                Err(RequestError::Silent(_)) => {}
                 Err(error) => return Err(error.of(self.node, STATUS)),
             }
             self.client.wait(POLL).map_err(|error| error.of(self.node, STATUS))?;

@@ -15,8 +15,8 @@ use std::time::Duration;
 use scarab::bus::Frame;
 use scarab::leg::Permission;
 use scarab_base::error::ToolError;
-use scarab_client::bus::Bus;
-use scarab_client::master::{Client, Object, RequestError};
+use scarab_client::bus::{Bus, Object, Patience, RequestError};
+use scarab_client::master::Client;
 use scarab_client::wire::Sent;
 use scarab_identify::formats::leg_file::LegFile;
 
@@ -39,6 +39,8 @@ const HEARTBEAT: u16 = 0x700;
 const UNUSED: u32 = 1 << 31;
 /// Controlword "enable operation".
 const ENABLED: u16 = 0xF;
+/// Longest wait for an SDO answer.
+const ANSWER: Duration = Duration::from_millis(10);
 /// Servo ticks per cycle.
 const CYCLE: u64 = 4;
 /// Motion towards the middle of each joint's range and back: amplitude in rad, rate in Hz.
@@ -238,7 +240,8 @@ impl Host {
     /// # Errors
     /// The node does not answer, or refuses.
     pub fn read(&mut self, node: u16, index: u16, sub: u8) -> Result<u32, ToolError> {
-        Client::over(self).read(node as u8, Object(index, sub))
+        let (node, object) = (node as u8, Object(index, sub));
+        Client::over(self).try_read(node, object).map_err(|error| error.refused(node, object))
     }
 
     /// Writes an object of `size` bytes.
@@ -246,7 +249,8 @@ impl Host {
     /// # Errors
     /// The node does not answer, or refuses.
     pub fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) -> Result<(), ToolError> {
-        Client::over(self).write(node as u8, Object(index, sub), value, size)
+        let (node, object) = (node as u8, Object(index, sub));
+        Client::over(self).try_write(node, object, value, size).map_err(|error| error.refused(node, object))
     }
 
     /// Starts the nodes and configures the compact mapping: statusword, position and speed; both targets in
@@ -318,6 +322,10 @@ impl Bus for Host {
 
     fn now(&self) -> Duration {
         Duration::from_nanos(self.network.now_ns())
+    }
+
+    fn patience(&self) -> Patience {
+        Patience::once(ANSWER)
     }
 }
 

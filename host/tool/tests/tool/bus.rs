@@ -1,7 +1,11 @@
 //! Two legs on one bus: load of a cycle, latencies, and the effect of a saturated bus on the legs.
 
-use scarab::bus::Frame;
+use std::time::Duration;
+
+use scarab::bus::{Abort, Frame};
 use scarab::leg::DriveState;
+use scarab_client::bus::{self, Object, Patience, RequestError};
+use scarab_client::master::Client;
 use scarab_client::wire::Sent;
 use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_rig::bus::network::Network;
@@ -10,10 +14,42 @@ use scarab_rig::bus::serve::{ServeOptions, network};
 const NODES: [u16; 4] = [1, 2, 3, 4];
 const OFF: u32 = 1 << 31;
 const SYNC: u16 = 0x80;
+const MS: Duration = Duration::from_millis(1);
 
 struct Bus {
     network: Network<2, 13>,
     sent: Vec<Sent>,
+    /// Frames that a client has received.
+    received: usize,
+}
+
+impl bus::Bus for Bus {
+    fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
+        self.received = self.sent.len();
+        self.network.send(*frame);
+        Ok(())
+    }
+
+    fn receive(&mut self, until: Duration) -> Result<Option<Frame>, RequestError> {
+        loop {
+            if let Some(sent) = self.sent.get(self.received) {
+                self.received += 1;
+                return Ok(Some(sent.frame));
+            }
+            if bus::Bus::now(self) >= until {
+                return Ok(None);
+            }
+            self.run(1);
+        }
+    }
+
+    fn now(&self) -> Duration {
+        Duration::from_nanos(self.network.now_ns())
+    }
+
+    fn patience(&self) -> Patience {
+        Patience::once(5 * MS)
+    }
 }
 
 impl Bus {
@@ -21,7 +57,7 @@ impl Bus {
         let options = ServeOptions::local(2);
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
         let network = network(&leg, &options, None, &[]).expect("the default leg");
-        let mut bus = Self { network, sent: Vec::new() };
+        let mut bus = Self { network, sent: Vec::new(), received: 0 };
         bus.run(4);
         let boots: Vec<u16> = bus.sent.iter().map(|sent| sent.frame.id()).collect();
         assert_eq!(boots, NODES.map(|node| 0x700 + node));
@@ -37,20 +73,13 @@ impl Bus {
         }
     }
 
-    /// Writes an object by SDO download, which must be answered within 5 ms.
     fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {
-        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
-        self.network.send(Frame::new(0x600 + node, &[0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]));
-        let before = self.sent.len();
-        for _ in 0..20 {
-            self.run(1);
-            let answer = self.sent[before..].iter().find(|sent| sent.frame.id() == 0x580 + node);
-            if let Some(answer) = answer {
-                assert_eq!(answer.frame.data(), [0x60, low, high, sub, 0, 0, 0, 0], "{node} {index:x} {sub}");
-                return;
-            }
-        }
-        panic!("no answer of node {node} to {index:x} {sub}");
+        let written = Client::over(self).try_write(node as u8, Object(index, sub), value, size);
+        assert_eq!(written, Ok(()), "{node} {index:x} {sub}");
+    }
+
+    fn read(&mut self, node: u16, index: u16) -> u32 {
+        Client::over(self).read(node as u8, Object(index, 0)).expect("an answer")
     }
 
     fn map(&mut self, node: u16, communication: u16, cob: u16, kind: u8, objects: &[u32]) {
@@ -267,15 +296,7 @@ fn stored_objects_and_the_new_node_id_apply_after_a_reset() {
     assert!(
         bus.sent.iter().filter(|sent| sent.frame.id() == 0x701 && sent.frame.data() == [0x7F]).count() >= 1
     );
-    let read = |bus: &mut Bus, node: u16, index: u16| {
-        let [low, high] = index.to_le_bytes();
-        bus.sent.clear();
-        bus.network.send(Frame::new(0x600 + node, &[0x40, low, high, 0, 0, 0, 0, 0]));
-        bus.run(8);
-        let answer = bus.sent.iter().find(|sent| sent.frame.id() == 0x580 + node).expect("an answer");
-        u32::from_le_bytes(answer.frame.data()[4..].try_into().expect("four bytes"))
-    };
-    assert_eq!((read(&mut bus, 1, 0x6065), read(&mut bus, 20, 0x6065)), (12_345, 87_266));
+    assert_eq!((bus.read(1, 0x6065), bus.read(20, 0x6065)), (12_345, 87_266));
     // Restores the default parameters (object 1011).
     bus.sent.clear();
     bus.write(1, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
@@ -298,17 +319,14 @@ fn stored_objects_and_the_new_node_id_apply_after_a_reset() {
     assert_eq!(answers, 2);
     bus.network.send(Frame::new(0, &[129, 0]));
     bus.run(20);
-    assert_eq!((read(&mut bus, 1, 0x6065), read(&mut bus, 2, 0x6065)), (87_266, 87_266));
+    assert_eq!((bus.read(1, 0x6065), bus.read(2, 0x6065)), (87_266, 87_266));
 }
 
 #[test]
 fn nothing_is_stored_while_the_drive_is_on() {
     let mut bus = Bus::new();
     bus.enable();
-    let [low, high] = 0x1010_u16.to_le_bytes();
-    bus.sent.clear();
-    bus.network.send(Frame::new(0x601, &[0x23, low, high, 1, b's', b'a', b'v', b'e']));
-    bus.run(8);
-    let answer = bus.sent.iter().find(|sent| sent.frame.id() == 0x581).expect("an answer");
-    assert_eq!(answer.frame.data(), [0x80, low, high, 1, 0x22, 0, 0, 0x08]);
+    let save = u32::from_le_bytes(*b"save");
+    let refused = Client::over(&mut bus).try_write(1, Object(0x1010, 1), save, 4);
+    assert_eq!(refused, Err(RequestError::Aborted(Abort::State.code())));
 }

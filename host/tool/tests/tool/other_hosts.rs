@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use scarab_boot::{HEADER_AT, Header, seal};
 use scarab_client::adapter::open;
-use scarab_client::master::{self, Object, RequestError};
+use scarab_client::bus::{Object, RequestError};
+use scarab_client::master;
 
 use crate::command::{Folder, Run, scarab};
 use crate::serve::{Client, Serve};

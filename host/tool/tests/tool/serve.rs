@@ -2,8 +2,8 @@
 
 use scarab::bus::Frame;
 use scarab_base::random::Random;
-use scarab_client::bus::Bus;
-use scarab_client::master::{self, Object, RequestError};
+use scarab_client::bus::{Bus, Object, RequestError};
+use scarab_client::master;
 use scarab_client::slcan;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -179,7 +179,7 @@ impl Client {
         let begin = Instant::now();
         loop {
             match request(&mut master::Client::over(&mut *self)) {
-                Err(RequestError::Silent) => assert!(begin.elapsed() < PATIENCE, "{object:x?}: no answer"),
+                Err(RequestError::Silent(_)) => assert!(begin.elapsed() < PATIENCE, "{object:x?}: no answer"),
                 answer => return answer.unwrap_or_else(|error| panic!("{object:x?}: {error:?}")),
             }
         }
@@ -187,8 +187,7 @@ impl Client {
 
     pub fn read(&mut self, node: u16, index: u16, sub: u8) -> u32 {
         let object = Object(index, sub);
-        let bytes = self.ask(object, |client| client.bytes(node as u8, object));
-        bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
+        self.ask(object, |client| client.try_read(node as u8, object))
     }
 
     pub fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {

@@ -26,7 +26,8 @@ use scarab::leg::{ControlRequest, DriveState, IdentifiedModel, NoticeCode, Weari
 use scarab::store::{Key, ModelRecord};
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
-use scarab_client::master::{Client, Object};
+use scarab_client::bus::Object;
+use scarab_client::master::Client;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::bus::board::Board;

@@ -12,8 +12,8 @@
 //! | a sector erased | 0.25 to 0.5 s more for each | no zeros: enabling requires a new reference |
 //!
 //! Neither is a fault: nothing is reported, and the watchdog does not reset. Hosts receive FF0D before and
-//! 0000 after the write. Hosts that continue to send also receive the loss of frames (8110, 0000). The
-//! requested data is stored.
+//! 0000 after the write. Hosts that continue to send also receive the loss of frames (8110). At
+//! the end no error is left. The requested data is stored.
 
 use scarab::leg::DriveState;
 use scarab::safety::{FaultCode, NO_ERROR, NoticeCode};
@@ -30,16 +30,18 @@ use crate::faults::scenario::Head;
 const OFF: DriveState = DriveState::SwitchOnDisabled;
 /// More records than fill a sector.
 const MOST_RECORDS: u32 = 1000;
-/// Servo ticks until a request is in progress, of the longest flash write, and until hosts are informed.
+/// Servo ticks until a request is in progress, of the longest flash write, and until hosts are informed:
+/// twice the inhibit time of emergency messages.
 const START_TICKS: u64 = 16;
 const LONGEST: u64 = 20_000;
-const REPORT_TICKS: u64 = 40;
+const REPORT_TICKS: u64 = 80;
 const NS_PER_S: f64 = 1e9;
 /// Servo ticks for each step of enabling.
 const ENABLING: u64 = 400;
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 /// Object of the stored following window, micro-radian.
 const WINDOW: u16 = 0x6065;
+const ERROR_REGISTER: u16 = 0x1001;
 /// Emergency codes: a flash write begins; frames were lost; no error.
 const STORING: u16 = NoticeCode::Storing.number();
 const LOST: u16 = NoticeCode::Overrun.number();
@@ -110,11 +112,14 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
             .map(|(_, code)| *code)
             .collect::<Vec<_>>()
     });
-    // Frames sent during the stall may be lost, which is reported; nothing else may be.
+    // Frames sent during the stall may be lost, which is reported; nothing else may be. The inhibit time
+    // makes one message of the ends of both.
     let is_reported = reports.iter().all(|codes| {
         let first = codes.strip_prefix(&[STORING]);
-        first.is_some_and(|rest| rest == [CLEAR] || rest == [LOST, CLEAR, CLEAR])
+        first.is_some_and(|rest| matches!(rest, [CLEAR] | [LOST, CLEAR] | [LOST, CLEAR, CLEAR]))
     });
+    let registers = [fork.host.read(1, ERROR_REGISTER, 0)?, fork.host.read(2, ERROR_REGISTER, 0)?];
+    let is_reported = is_reported && registers == [0; 2];
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let calm = alarm.is_none() && !fork.host.rig().is_restarted();
     // The leg is commanded to keep its position, which takes some cycles to send.
