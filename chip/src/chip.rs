@@ -18,7 +18,7 @@ use crate::peripherals::iwdg::Iwdg;
 use crate::peripherals::pwm::{Outputs, Pins};
 use crate::peripherals::rcc::{Rcc, ResetReason};
 use crate::peripherals::spi::Spi;
-use crate::peripherals::timer::{Event, Kind, MOE, NAMES, Timer};
+use crate::peripherals::timer::{Event, Kind, NAMES, Timer};
 use crate::plant::{JOINTS, Plant};
 use crate::system::System;
 use crate::time::{NEVER, Ticks};
@@ -284,12 +284,6 @@ impl Chip {
         }
         self.follow_clocks();
         self.refresh_plant();
-    }
-
-    /// Whether the main output of both bridges' timers is off.
-    #[must_use]
-    pub fn is_released(&self) -> bool {
-        self.timers[..JOINTS].iter().all(|timer| timer.main_output() & MOE == 0)
     }
 
     // Events.

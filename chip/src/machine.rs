@@ -182,13 +182,6 @@ impl Machine {
         &self.core.get_data().image
     }
 
-    /// Changes the cycles per instruction.
-    pub fn set_time_factor(&mut self, factor: f64) {
-        let state = self.core.get_data_mut();
-        state.factor = factor;
-        state.follow_clock(true);
-    }
-
     /// Lets the code of an exception hang from now on: its time passes without progress. 0 is the thread.
     pub fn hang(&mut self, exception: Option<u8>) {
         self.core.get_data_mut().hung = exception;

@@ -16,10 +16,10 @@ use core::f64::consts::{PI, TAU};
 
 use hal_sim::conventions::Anatomy;
 use hal_sim::description::LegDescription;
-use hal_sim::drive::axis::{PERIOD_S, QUARTER_S};
+use hal_sim::drive::axis::PERIOD_S;
 use hal_sim::drive::counter::{Counter, steps};
 use hal_sim::drive::description::{
-    AxisDescription, CompleteDescription, CouplingDescription, EncoderWiring, SupplyDescription,
+    AxisDescription, CompleteDescription, CouplingDescription, SupplyDescription,
 };
 use hal_sim::drive::motor::{Direction, Motor, Terminal};
 use hal_sim::drive::shunts::ShuntState;
@@ -542,15 +542,6 @@ impl Plant {
         Some(steps(encoder.direction * (angle + encoder.error * angle.sin()) + encoder.zero))
     }
 
-    /// Whether the index line of an axis is high at the last mechanical step.
-    #[must_use]
-    pub fn index_level(&self, axis: usize) -> bool {
-        let axis = &self.axes[axis];
-        let width = TAU / axis.description.counter.counts;
-        let missing = axis.has_no_index() || axis.description.wiring.encoder == EncoderWiring::Missing;
-        !missing && (axis.angle - axis.description.counter.index).rem_euclid(TAU) < width
-    }
-
     /// Advances the motors to an instant.
     pub fn advance(&mut self, now: Ticks, bridges: &mut [Bridge<'_>; JOINTS]) {
         while self.electric < now {
@@ -751,12 +742,6 @@ impl Plant {
         }
         let (_, rising) = self.axes[1 - axis].edges_within(ticks(self.coupling.window), now);
         self.coupling.ampere_per_edge * f64::from(rising)
-    }
-
-    /// Longest slice of the motors' integration, s.
-    #[must_use]
-    pub const fn slice_s() -> f64 {
-        QUARTER_S
     }
 }
 

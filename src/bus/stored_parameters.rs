@@ -330,11 +330,4 @@ mod tests {
         assert_eq!(refused(Object::at(0x2002, 0), 300), Some(Object::at(0x2002, 0)));
         assert_eq!(refused(Object::at(0x2001, 0), 128), Some(Object::at(0x2001, 0)));
     }
-
-    #[test]
-    fn parameters_that_do_not_fit_are_refused() {
-        let mut board = Board::started(1);
-        assert_eq!(board.write(0x1017, 0, 50, 2), Ok(()));
-        assert_eq!(board.nodes[0].store(&mut board.axes[0], &mut [0; 5]), Err(Abort::Store));
-    }
 }

@@ -64,22 +64,6 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
         curve.with_period(period)
     }
 
-    /// Builds a curve from velocity coefficients `a_k`, `b_k` in rad/s, lowest harmonic first.
-    pub fn from_velocity_coefficients(
-        period: Second,
-        centre_rad: [f32; N],
-        a_rad_per_s: [[f32; H]; N],
-        b_rad_per_s: [[f32; H]; N],
-    ) -> Result<Self, MotionError> {
-        let second_per_rad = period.0 / TURN_RAD;
-        let amplitude = |coefficients: [[f32; H]; N], sign: f32| {
-            coefficients.map(|joint| {
-                core::array::from_fn(|index| sign * joint[index] * second_per_rad / (index + 1) as f32)
-            })
-        };
-        Self::new(period, centre_rad, amplitude(a_rad_per_s, 1.0), amplitude(b_rad_per_s, -1.0))
-    }
-
     /// Returns a curve with this path and another period.
     pub fn with_period(self, period: Second) -> Result<Self, MotionError> {
         if !(period.0 > 0.0 && is_finite(period.0) && is_finite(TURN_RAD / period.0)) {
@@ -211,20 +195,6 @@ pub(super) mod tests {
                     assert!((f64::from(state.acceleration_rad_per_s2[joint]) - acceleration).abs() < 3e-5);
                 }
             }
-        }
-    }
-
-    #[test]
-    fn velocity_coefficients_are_the_amplitudes_of_the_velocity() {
-        let period = Second(4.0);
-        let curve = Fourier::<1, 2>::from_velocity_coefficients(period, [0.1], [[0.3, 0.0]], [[0.0, 0.5]])
-            .expect("finite");
-        for step in 0..40 {
-            let turn = step as f32 / 40.0;
-            let state = curve.state_at(&Phase::steady(turn));
-            let expected = 0.3 * sin_cos(TURN_RAD * turn).1 + 0.5 * sin_cos(2.0 * TURN_RAD * turn).0;
-            // Single precision of sums of two terms below 1.
-            assert!((state.velocity_rad_per_s[0] - expected).abs() < 1e-6);
         }
     }
 

@@ -260,16 +260,6 @@ mod tests {
     }
 
     #[test]
-    fn a_quarter_turn_has_sine_one() {
-        for quarter in 0..8 {
-            let rotation = ElectricalAngle::from_turns(quarter as f32 / 4.0).rotation();
-            let expected = [0.0, 1.0, 0.0, -1.0];
-            assert!((rotation.sine - expected[quarter % 4]).abs() < 1.2e-7);
-            assert!((rotation.cosine - expected[(quarter + 1) % 4]).abs() < 1.2e-7);
-        }
-    }
-
-    #[test]
     fn a_constant_speed_is_tracked_without_lag_and_through_every_wrap() {
         let scale = CountScale::new(8192, 7).expect("usual");
         for counts_per_tick in [-40.7_f64, -3.3, 0.11, 12.9] {

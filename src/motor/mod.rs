@@ -17,8 +17,7 @@
 //! | [`ModelWatch`], [`ShuntWatch`] | plausibility of voltages, currents and codes against each other |
 //! | [`calibration`] | measures and refuses; the only source of a [`Calibration`] |
 //! | [`Chopper`] | burns regenerated energy in the brake resistor |
-//! | [`mod@reference`] | the joint's zero: an end stop or a stated pose |
-//! | [`Transmission`] | current to joint torque and back |
+//! | [`mod@reference`] | the joint's zero from a stated pose |
 //!
 //! Equations, the timing within one PWM period and measured figures: docs/motor.md.
 
@@ -35,7 +34,6 @@ pub mod modulation;
 pub mod reference;
 pub mod sense;
 pub mod shunt_watch;
-pub mod transmission;
 
 pub use absolute::{AbsoluteAngle, AbsoluteEncoders};
 pub use angle::{CountScale, ElectricalAngle, Rotation, SpeedTracker};
@@ -52,7 +50,6 @@ pub use model_watch::{ModelLimits, ModelWatch};
 pub use modulation::{BridgeTiming, DeadTime, Modulator};
 pub use sense::SenseScale;
 pub use shunt_watch::ShuntWatch;
-pub use transmission::{Transmission, TransmissionConfiguration};
 
 #[cfg(test)]
 pub(crate) mod testing;

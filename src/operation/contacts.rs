@@ -360,19 +360,6 @@ mod tests {
     }
 
     #[test]
-    fn closing_while_inhibited_enables_nothing_later() {
-        let mut operator = trusted();
-        let held = Situation { enabling: true, ..READY };
-        assert_eq!(requested(&mut operator, Situation { blocked: true, ..held }, RATE_HZ).count(), 0);
-        assert_eq!(requested(&mut operator, held, RATE_HZ).count(), 0);
-        assert_eq!(requested(&mut operator, READY, STEADY_TICKS).count(), 0);
-        assert_eq!(
-            requested(&mut operator, held, RATE_HZ).next(),
-            Some(OperatorRequest::Power(PowerRequest::Shutdown))
-        );
-    }
-
-    #[test]
     fn a_blocked_uncalibrated_or_unreferenced_leg_is_not_enabled() {
         let held = Situation { enabling: true, ..READY };
         for now in [

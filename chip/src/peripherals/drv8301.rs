@@ -77,11 +77,6 @@ impl Drivers {
         self.drivers[axis].registers = [0; 4];
     }
 
-    /// Sets a driver's status registers.
-    pub fn set_status(&mut self, axis: usize, status: [u16; 2]) {
-        self.drivers[axis].registers[..2].copy_from_slice(&status);
-    }
-
     /// Ends the selection of a driver.
     pub fn release(&mut self, now: Ticks) {
         self.released = now;

@@ -163,12 +163,6 @@ impl Rcc {
         self.power & 0x4000 != 0
     }
 
-    /// Whether the clock security's interrupt is pending.
-    #[must_use]
-    pub fn crystal_failed(&self) -> bool {
-        self.interrupts & 1 << 7 != 0
-    }
-
     /// Stops the crystal. Returns whether the clock security detected it and switched to the internal
     /// oscillator.
     pub fn stop_crystal(&mut self) -> bool {

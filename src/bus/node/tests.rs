@@ -109,33 +109,6 @@ fn synchronous_pdos_are_written_at_the_sync() {
 }
 
 #[test]
-fn a_pdo_can_be_remapped_while_operational() {
-    let mut board = started();
-    for (index, sub, value, size) in [
-        (0x1801, 1, 0x8000_0281, 4),
-        (0x1A01, 0, 0, 1),
-        (0x1801, 2, 2, 1),
-        (0x1A01, 1, 0x6041_0010, 4),
-        (0x1A01, 2, 0x6064_0020, 4),
-        (0x1A01, 3, 0x2010_0010, 4),
-        (0x1A01, 0, 3, 1),
-        (0x1801, 1, 0x281, 4),
-    ] {
-        assert_eq!(board.write(index, sub, value, size), Ok(()), "{index:x} {sub}");
-        assert_eq!(board.nodes[0].state(), NmtState::Operational);
-    }
-    let lengths = |board: &mut Board| -> std::vec::Vec<usize> {
-        board.receive(0x080, &[]);
-        let frames = board.frames();
-        frames.iter().filter(|frame| frame.id() == 0x281).map(|frame| frame.data().len()).collect()
-    };
-    assert_eq!(
-        [lengths(&mut board), lengths(&mut board), lengths(&mut board)],
-        [[].to_vec(), [8].to_vec(), [].to_vec()]
-    );
-}
-
-#[test]
 fn a_short_pdo_is_reported_and_ignored_and_a_late_one_stops_the_drive() {
     let mut board = started();
     board.receive(0x301, &[1, 2, 3]);

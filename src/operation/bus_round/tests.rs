@@ -22,8 +22,6 @@ struct Bench {
     bus: BusEnds<'static, 2>,
     storage: Handover<StoreJob<2>>,
     drive: DriveState,
-    /// The operator holds the enabling switch.
-    held: bool,
     /// The leg takes its orders.
     takes: bool,
     requests: Vec<LegRequest>,
@@ -41,7 +39,6 @@ impl Bench {
             bus,
             storage: Handover::new(StoreJob::NOTHING),
             drive: DriveState::SwitchOnDisabled,
-            held: true,
             takes: true,
             requests: Vec::new(),
         };
@@ -69,13 +66,8 @@ impl Bench {
             }
             self.drive = self.drive.after(DriveEvent::Tick, 4);
             let joint = JointStatus { drive: self.drive, ..JointStatus::NONE };
-            let status = LegStatus {
-                joints: [joint; 2],
-                held: self.held,
-                blocked: false,
-                rests: false,
-                ..LegStatus::NONE
-            };
+            let status =
+                LegStatus { joints: [joint; 2], held: true, blocked: false, rests: false, ..LegStatus::NONE };
             // The previous report may still wait.
             let _ = self.host.status.enqueue(status);
             self.hardware.now_us += 500;
@@ -203,17 +195,6 @@ fn bus_off_is_reported_once_and_nothing_is_sent() {
     bench.run(8);
     assert_eq!(bench.requests, [LegRequest::Power(PowerRequest::QuickStop)]);
     assert_eq!(bench.emergencies(), [(0x81, 0x8140), (0x81, 0), (0x82, 0x8140), (0x82, 0)]);
-}
-
-#[test]
-fn with_an_open_switch_no_enabling_step_reaches_the_leg() {
-    let mut bench = Bench::new();
-    bench.held = false;
-    bench.enable();
-    assert_eq!((bench.requests.len(), bench.drive), (0, DriveState::SwitchOnDisabled));
-    bench.held = true;
-    bench.enable();
-    assert_eq!(bench.drive, DriveState::OperationEnabled);
 }
 
 #[test]

@@ -250,12 +250,6 @@ fn an_erased_or_foreign_calibration_is_not_used() {
     assert_eq!(bench.press(), [(0, unchecked())]);
 }
 
-/// Executes the housekeeper's order on a motor whose power was off, and returns the outcome.
-fn carried_out(motor: &mut TestMotor, order: Order) -> Outcome {
-    let mut state = AxisState::OFF;
-    carried_out_by(&mut state, motor, order)
-}
-
 fn carried_out_by(stage: &mut AxisState, motor: &mut TestMotor, order: Order) -> Outcome {
     stage.obey(order);
     let mut sample = motor.sample();
@@ -273,29 +267,6 @@ fn carried_out_by(stage: &mut AxisState, motor: &mut TestMotor, order: Order) ->
         sample = motor.period(command);
     }
     panic!("the calibration does not end");
-}
-
-#[test]
-fn an_encoder_moved_without_power_is_refused_and_then_measured() {
-    let mut motor = TestMotor::default();
-    let stored = calibrate(&mut motor, &CONFIGURATION).expect("sound").stored().expect("an index");
-    // The rotor was moved; in the second case the encoder is 20 electrical degrees off on its shaft.
-    for (shaft_deg, fits) in [(0.0, true), (20.0, false)] {
-        let mut motor =
-            TestMotor { angle: motor.angle + 11.0, random: TestRandom::new(9), ..TestMotor::default() };
-        motor.encoder_zero += shaft_deg / 360.0 / 7.0;
-        let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
-        let (_, order) = bench.press().remove(0);
-        let outcome = carried_out(&mut motor, order);
-        assert_eq!(matches!(outcome, Outcome::Calibrated(_)), fits, "{outcome:?}");
-        if !fits {
-            assert!(matches!(outcome, Outcome::Refused(CalibrationRefusal::StoredOffset(_))), "{outcome:?}");
-            bench.ends(0, outcome);
-            let (_, order) = bench.press().remove(0);
-            let outcome = carried_out(&mut motor, order);
-            assert!(matches!(outcome, Outcome::Calibrated(_)), "{outcome:?}");
-        }
-    }
 }
 
 #[test]

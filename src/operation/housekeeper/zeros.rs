@@ -175,9 +175,9 @@ impl<const N: usize> Housekeeper<N> {
         for (joint, (pose, found)) in reference.poses.iter_mut().enumerate() {
             let sample = JointSample { encoder_counts: counts(joint, level), ..JointSample::default() };
             match pose.tick(&sample) {
-                ReferenceStep::Running(_) => {}
-                ReferenceStep::Found(_) => *found = true,
-                ReferenceStep::Refused(_) => standing = false,
+                ReferenceStep::Running => {}
+                ReferenceStep::Found => *found = true,
+                ReferenceStep::Moved => standing = false,
             }
         }
         self.reference = Some(reference).filter(|_| standing);

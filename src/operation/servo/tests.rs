@@ -261,19 +261,6 @@ fn findings_reach_control_one_per_tick() {
 }
 
 #[test]
-fn the_operators_request_precedes_the_hosts() {
-    let mut bench = Bench::begun();
-    bench.tick();
-    bench.ask(ControlRequest::Power(PowerRequest::Shutdown));
-    bench.order(None, Some(LegRequest::Power(PowerRequest::DisableVoltage)));
-    let states = [1, 2].map(|_| {
-        bench.tick();
-        bench.control.state()
-    });
-    assert_eq!(states, [DriveState::ReadyToSwitchOn, DriveState::SwitchOnDisabled]);
-}
-
-#[test]
 fn the_start_button_begins_nothing_while_a_host_has_the_drive() {
     for hosted in [false, true] {
         let mut bench = Bench::enabled();
@@ -291,19 +278,6 @@ fn the_start_button_begins_nothing_while_a_host_has_the_drive() {
 fn accepted(event: &LegEvent<2>) -> Option<bool> {
     let LegEvent::Record(Record::Request { accepted, .. }) = event else { return None };
     Some(*accepted)
-}
-
-#[test]
-fn an_open_enabling_switch_stops_an_enabled_leg() {
-    for [enabling, permits] in [[false, true], [true, false]] {
-        let mut bench = Bench::enabled();
-        bench.hardware.contacts.enabling = enabling;
-        bench.signals.set_permits(permits);
-        bench.tick();
-        let state = bench.control.state();
-        assert!(matches!(state, DriveState::QuickStopActive { .. }), "{state:?}");
-        assert_eq!(bench.signals.permission(), Permission::Damp);
-    }
 }
 
 #[test]

@@ -1,17 +1,4 @@
 use super::*;
-use crate::safety::FaultCode;
-
-#[test]
-fn a_reported_fault_has_its_code_and_joint() {
-    let signals = Signals::<2>::new();
-    for fault in BoardFault::ALL {
-        signals.report(fault, 1);
-        assert_eq!(signals.take_reported(0).count(), 0);
-        assert!(signals.take_reported(1).eq([fault]));
-        assert_eq!(signals.take_reported(1).count(), 0, "once");
-    }
-    assert_eq!(BoardFault::Thermistor.code(), FaultCode::Thermistor);
-}
 
 #[test]
 fn a_target_is_followed_only_while_the_drive_is_enabled() {

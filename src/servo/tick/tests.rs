@@ -333,21 +333,6 @@ fn a_servo_that_is_begun_anew_is_off_and_takes_counts_from_another_zero_for_good
 }
 
 #[test]
-fn the_same_ticks_give_the_same_bits() {
-    let run = || {
-        let mut bench = Bench::enabled(JOINTS, Plant { gravity: 20.0, ..Plant::KNEE });
-        let outputs: std::vec::Vec<_> = (0..500)
-            .map(|tick| {
-                let motion = MotionState::at_rest([tick as f32 * 1e-4; 2]);
-                bench.tick(motion, Some(&Exact), None)
-            })
-            .collect();
-        (outputs, bench.servo)
-    };
-    assert_eq!(run(), run());
-}
-
-#[test]
 fn absurd_joints_are_refused_by_name() {
     use crate::safety::{LimitQuantity, LimitsError};
     let refused = |change: fn(&mut JointConfiguration)| {

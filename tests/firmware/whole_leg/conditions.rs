@@ -29,17 +29,6 @@ fn a_dead_motor_is_never_accepted() {
 }
 
 #[test]
-fn a_seized_joint_is_refused_as_unexcited() {
-    for joint in 0..JOINTS {
-        let mut leg = default_leg();
-        // Friction beyond the motor's torque.
-        leg.joints[joint].truth.as_mut().expect("simulated").coulomb = 1000.0;
-        let (verdict, _) = outcome(&leg);
-        assert!(verdict.is_some_and(|verdict| verdict.has(Reason::Unexcited)), "joint {joint}");
-    }
-}
-
-#[test]
 fn a_joint_with_a_third_of_its_torque_missing_is_refused() {
     for joint in 0..JOINTS {
         let mut leg = default_leg();

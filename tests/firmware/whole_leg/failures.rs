@@ -1,8 +1,6 @@
 //! Stops and faults in the middle of an identification.
 
-use scarab::hal::DriveCommand;
 use scarab::safety::{FaultCode, PowerRequest};
-use scarab::units::Ampere;
 
 use super::*;
 
@@ -70,24 +68,6 @@ fn a_quick_stop_in_any_phase_allows_a_later_identification() {
         // With its outputs off the leg has come to rest within its range.
         assert!(pair.enable(context().gravity), "{phase}");
         assert!(identify(&mut pair).is_some_and(Verdict::is_accepted), "{phase}");
-    }
-}
-
-#[test]
-fn a_nan_current_turns_off_at_once_and_keeps_the_old_model() {
-    for absurd in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        for joint in 0..JOINTS {
-            let mut pair = identifying_again();
-            let model = pair.leg.control().model().copied();
-            assert!(is_enabled(&pair) && model.is_some());
-            pair.sample.joints[joint].current = Ampere(absurd);
-            let output = tick(&mut pair, None);
-            assert_eq!(*output.servo.drive(), DriveCommand::OFF);
-            assert_eq!(output.servo.decision.fault.map(|fault| fault.code), Some(FaultCode::NotFinite));
-            assert_eq!(activity(&pair), Activity::Idle);
-            nothing_comes_of_it(&mut pair, SECOND);
-            assert_eq!((pair.leg.control().model().copied(), pair.leg.control().verdict()), (model, None));
-        }
     }
 }
 

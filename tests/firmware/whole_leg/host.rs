@@ -696,29 +696,6 @@ fn no_host_command_moves_a_joint_farther_out() {
 }
 
 #[test]
-fn a_returning_joint_that_is_pushed_outwards_stops_the_leg() {
-    let mut hosted = Hosted::enabled_at([0.3, 0.04]);
-    hosted.commands[1].target = Target::ProfileVelocity(RadianPerSecond(0.1));
-    hosted.run(SECOND / 4);
-    hosted.pair.world.push(1, -60.0, 0.5);
-    for _ in 0..SECOND {
-        hosted.run(1);
-    }
-    let fault = Fault { code: FaultCode::PositionLimit, joint: 1 };
-    assert_eq!(hosted.pair.leg.control().state().fault(), Some(fault));
-}
-
-#[test]
-fn a_forbidden_return_leaves_the_drive_off_with_its_reason() {
-    let mut hosted = Hosted::resting_at([0.3, 0.04]);
-    hosted.pair.leg.halves().0.permit_return([true, false]);
-    assert!(!hosted.pair.enable(context().gravity));
-    let output = hosted.tick(Some(ControlRequest::Power(PowerRequest::EnableOperation)));
-    let refused = output.servo.decision.refused.expect("a reason");
-    assert_eq!((refused.number(), refused.reason as u8), (2, 20));
-}
-
-#[test]
 fn an_identification_outside_the_range_returns_slowly_too() {
     for (joint, pose, _) in OUTSIDE {
         let mut hosted = Hosted::resting_at(pose);

@@ -101,27 +101,6 @@ fn a_cloned_leg_and_world_continue_identically() {
 }
 
 #[test]
-fn any_slicing_of_the_search_gives_the_same_base_values() {
-    let solved = |evaluations: u32| {
-        let mut pair = before_the_search();
-        pair.evaluations = evaluations;
-        let solving = |pair: &Pair| {
-            matches!(
-                activity(pair),
-                Activity::Identify(IdentifyPhase::Excite | IdentifyPhase::Settle | IdentifyPhase::Solve)
-            )
-        };
-        assert!(run_until(&mut pair, |pair| !solving(pair)));
-        let solver = pair.leg.identification().solver().expect("solved");
-        (solver.estimate().values.map(f32::to_bits), solver.search().evaluations())
-    };
-    let one = solved(1);
-    assert!(one.1 > 1000);
-    assert_eq!(one, solved(7));
-    assert_eq!(one, solved(100));
-}
-
-#[test]
 fn the_noise_free_bias_is_below_a_seventh_of_sigma() {
     let quiet = SimulationOptions { torque_noise_percent: Some(0.0), ..SimulationOptions::of_seed(1) };
     let quiet = simulate::<JOINTS, BASE>(&default_leg(), &quiet).expect("it runs").report;

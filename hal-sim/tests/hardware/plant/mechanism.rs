@@ -5,95 +5,21 @@ use hal_sim::description::LegDescription;
 use hal_sim::mechanism::Mechanism;
 use nalgebra::{Matrix4, Rotation3, Translation3, Vector3};
 
-/// q1 q2 qd1 qd2 qdd1 qdd2 tau1 tau2 of the rigid bodies, computed with Pinocchio 4.1.0.
-const REFERENCE: [[f64; 8]; 9] = [
-    [0.466745656122075, 1.59064282508583, 0.0, 0.0, 0.0, 0.0, 25.7552446543669, 7.82234915926932],
-    [
-        0.731432609617443,
-        0.752896282759668,
-        0.396749501384476,
-        -3.77952709405545,
-        7.6053932602442,
-        1.14429939657835,
-        50.1595148089075,
-        12.9752011568864,
-    ],
-    [
-        0.314166590665049,
-        1.3398518716811,
-        -1.57444136566684,
-        -0.372016884154788,
-        -10.9787490825851,
-        -2.90661040658612,
-        -2.08873628372835,
-        4.56649469913641,
-    ],
-    [
-        0.208355418257922,
-        0.525552619866316,
-        2.00291738104042,
-        -1.75672993611168,
-        -0.444270767050948,
-        14.4221159940372,
-        22.2978729853845,
-        9.22462013073368,
-    ],
-    [
-        0.270092693366198,
-        0.97131451973901,
-        0.45927104072728,
-        -0.00810838154388094,
-        -2.26609246103767,
-        2.27115481017296,
-        14.9569024621441,
-        7.29912842294851,
-    ],
-    [
-        -0.957531206281351,
-        -2.62155852821598,
-        1.19786300610592,
-        -1.05157984640312,
-        1.87435662800441,
-        12.175499590949,
-        -25.6743652021742,
-        6.90841892763465,
-    ],
-    [
-        -0.246166762875078,
-        1.18360273369407,
-        2.90119693009898,
-        -0.874212992818969,
-        6.35430985277278,
-        7.64374260323972,
-        16.2104982120808,
-        14.0285355211901,
-    ],
-    [
-        1.58369684076196,
-        -0.890181228695226,
-        2.05988440493146,
-        -3.62684269739017,
-        13.5259853911371,
-        -8.75780883933336,
-        67.372468626213,
-        7.68897691175313,
-    ],
-    [
-        2.22108126949774,
-        -2.19850825809935,
-        -3.17529846870296,
-        2.82823674426132,
-        3.23192017373185,
-        14.2867069938128,
-        30.027897453881,
-        0.14172363374008,
-    ],
-];
+/// Number, q1 q2 qd1 qd2 qdd1 qdd2, and tau1 tau2 of the rigid bodies; computed with Pinocchio 4.1.0.
+const REFERENCE: &str = include_str!("../../../../tests/data/planar_hip_knee/torque.csv");
+
+/// States of the reference, and their torques.
+fn reference() -> impl Iterator<Item = [f64; 8]> {
+    REFERENCE.lines().skip(1).map(|line| {
+        let mut numbers = line.split(',').skip(1).map(|number| number.parse().expect("a number"));
+        core::array::from_fn(|_| numbers.next().expect("eight columns"))
+    })
+}
 
 #[test]
 fn lagrange_torque_equals_the_reference_vectors() {
     let leg = Mechanism::new(&planar_leg());
-    for row in REFERENCE {
+    for row in reference() {
         let [q1, q2, v1, v2, a1, a2, tau1, tau2] = row;
         let torque = leg.inverse_dynamics(&[q1, q2], &[v1, v2], &[a1, a2]);
         // The vectors are printed with 15 digits; the largest torque in them is about 70 N m.
@@ -174,21 +100,4 @@ fn coriolis_and_gravity_torque_are_the_derivatives_of_the_energies() {
         // Rounding of energies near 50 J over 2e-5.
         assert!((rate_of_momentum - force - torque[joint]).abs() < 2e-8, "joint {joint}");
     }
-}
-
-#[test]
-fn power_of_the_torques_is_the_rate_of_change_of_energy() {
-    let chain = Mechanism::new(&spatial_chain());
-    let acceleration = [0.8, -2.0, 1.5];
-    let torque = chain.inverse_dynamics(&ANGLES, &RATES, &acceleration);
-    let power: f64 = (0..3).map(|i| torque[i] * RATES[i]).sum();
-    let energy = |time: f64| {
-        let angles =
-            core::array::from_fn(|i| ANGLES[i] + time * RATES[i] + 0.5 * time * time * acceleration[i]);
-        let rates = core::array::from_fn(|i| RATES[i] + time * acceleration[i]);
-        chain.kinetic_energy(&angles, &rates) + chain.potential_energy(&angles)
-    };
-    let step = 1e-5;
-    let rate = (energy(step) - energy(-step)) / (2.0 * step);
-    assert!((rate - power).abs() < 2e-8, "{rate} {power}");
 }

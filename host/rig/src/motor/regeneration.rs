@@ -4,7 +4,7 @@
 //! speed. A current of 50 A brakes it to a tenth of that speed, with and without the brake chopper.
 
 use hal_sim::drive::stand::Load;
-use scarab::motor::AxisFault;
+use scarab::trace::words::axis_fault;
 use scarab_base::error::ToolError;
 use scarab_identify::report::motor::RegenerationReport;
 
@@ -67,18 +67,7 @@ fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
         motion_j: 0.5 * inertia * bench.top_speed * bench.top_speed,
         returned_j,
         brake_j: energy.brake - before.brake,
-        fault: rig.axis.fault().map(|fault| match fault {
-            AxisFault::CurrentSense => "current_sense",
-            AxisFault::Overcurrent => "overcurrent",
-            AxisFault::BusVoltage => "bus_voltage",
-            AxisFault::Encoder => "encoder",
-            AxisFault::NotANumber => "not_a_number",
-            AxisFault::EncoderFrozen => "encoder_frozen",
-            AxisFault::OpenPhase => "open_phase",
-            AxisFault::CurrentOffset => "current_zero",
-            AxisFault::Parameters => "parameters",
-            AxisFault::StuckConversion => "stuck_conversion",
-        }),
+        fault: rig.axis.fault().map(axis_fault),
         time_ms,
         bus_v,
         speed_rad_s,

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use scarab::bus::{Abort, Frame};
+use scarab::bus::Frame;
 use scarab::leg::DriveState;
 use scarab_client::bus::{self, Object, Patience, RequestError};
 use scarab_client::master::Client;
@@ -320,13 +320,4 @@ fn stored_objects_and_the_new_node_id_apply_after_a_reset() {
     bus.network.send(Frame::new(0, &[129, 0]));
     bus.run(20);
     assert_eq!((bus.read(1, 0x6065), bus.read(2, 0x6065)), (87_266, 87_266));
-}
-
-#[test]
-fn nothing_is_stored_while_the_drive_is_on() {
-    let mut bus = Bus::new();
-    bus.enable();
-    let save = u32::from_le_bytes(*b"save");
-    let refused = Client::over(&mut bus).try_write(1, Object(0x1010, 1), save, 4);
-    assert_eq!(refused, Err(RequestError::Aborted(Abort::State.code())));
 }

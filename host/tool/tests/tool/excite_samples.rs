@@ -111,34 +111,6 @@ fn samples_are_the_states_that_the_servo_follows() {
 }
 
 #[test]
-fn speed_and_acceleration_are_the_derivatives_of_the_angle() {
-    let folder = Folder::new();
-    offset_leg(&folder);
-    let (table, _) = sampled(&folder, 500);
-    let time = table.column("t_s");
-    for joint in ["1", "2"] {
-        let of = |prefix: &str, unit: &str| table.column(&format!("{prefix}{joint}_{unit}"));
-        let (q, qd, qdd) = (of("q", "rad"), of("qd", "radps"), of("qdd", "radps2"));
-        for (value, derivative) in [(&q, &qd), (&qd, &qdd)] {
-            let largest = derivative.iter().fold(0.0, |most: f64, one| most.max(one.abs()));
-            assert!(largest > 0.5, "the joint moves");
-            for at in 1..time.len() - 2 {
-                let found = (value[at + 1] - value[at - 1]) / (time[at + 1] - time[at - 1]);
-                // Rounding of the device's single precision over 4 ms: 1e-4. The rule's own error at six
-                // harmonics of 3.3 s: (0.002 x 11)^2 / 6, below 1e-4 of the largest value.
-                let difference = (found - derivative[at]).abs() / largest;
-                assert!(
-                    difference < 5e-4,
-                    "joint {joint}, {} s: {found} against {}",
-                    time[at],
-                    derivative[at]
-                );
-            }
-        }
-    }
-}
-
-#[test]
 fn the_samples_are_states_for_predict_and_regressor() {
     let folder = Folder::new();
     offset_leg(&folder);

@@ -7,11 +7,9 @@ use scarab_identify::run::predict::Predictor;
 
 use crate::command::{Folder, Table, scarab};
 use crate::kept::{kept, model, predict, text};
-use crate::pendulum::{Motion, leg};
 use hal_sim::leg::Leg;
 use scarab::ident::prior_parameters;
 use scarab::model::JointState;
-use std::path::Path;
 
 fn states() -> [JointState<f64, 2>; 2] {
     [
@@ -106,40 +104,4 @@ fn the_table_has_total_band_and_parts_in_both_angle_conventions() {
         assert_eq!(anatomical.column(&format!("tau2{part}_Nm")), other);
         assert_eq!(anatomical.column(&format!("tau1{part}_Nm")), table.column(&format!("tau1{part}_Nm")));
     }
-}
-
-#[test]
-fn predict_reads_the_columns_of_a_recording_as_replay_does() {
-    let folder = Folder::new();
-    let zero_offset = 30_f64.to_radians();
-    let motion = Motion { direction: -1.0, zero_offset, ..Motion::default() };
-    let leg = folder.write("leg.toml", &leg("direction = -1\nzero_offset_deg = 30.0\n"));
-    let (recording, model) = (folder.write("a.csv", &motion.csv()), folder.path("model.toml"));
-    let line = [&recording, Path::new("--leg"), &leg, Path::new("--save-model"), &model];
-    scarab("replay --split 0.5", &line).ends_with(0);
-    // Speeds and accelerations for the recording: differences of noise-free angles.
-    let samples = motion.samples();
-    let mut states = String::from("t_s,q1_rad,qd1_radps,qdd1_radps2\n");
-    let mut recorded = Vec::new();
-    for three in samples.windows(3) {
-        let [[before, first, _], [time, angle, torque], [after, last, _]] = three else { unreachable!() };
-        let step = (after - before) / 2.0;
-        let speed = (last - first) / (2.0 * step);
-        let acceleration = (last - 2.0 * angle + first) / (step * step);
-        states += &format!("{time:e},{angle:e},{speed:e},{acceleration:e}\n");
-        recorded.push((speed, *torque));
-    }
-    let states = folder.write("states.csv", &states);
-    let run = scarab("predict --model", &[&model, "--states".as_ref(), &states]).ends_with(0);
-    let predicted = Table::parse(&run.printed).column("tau1_Nm");
-    let (mut squares, mut count) = (0.0, 0.0);
-    // Near the turning points of the pendulum the sign of its speed is uncertain.
-    for ((_, torque), predicted) in recorded.iter().zip(predicted).filter(|((speed, _), _)| speed.abs() > 0.2)
-    {
-        squares += (torque - predicted) * (torque - predicted);
-        count += 1.0;
-    }
-    let rms = (squares / count).sqrt();
-    // The recording's noise is uniform within 0.2 N m: 0.115 N m rms. Torques reach 30 N m.
-    assert!((0.1..0.13).contains(&rms), "{rms} N m");
 }

@@ -7,7 +7,6 @@ use scarab::ident::{Kernel, LowPass};
 use scarab::real::sqrt;
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 /// Replays the named recordings of the folder with its `leg.toml`; writes `report.json` and `torque.csv`.
 fn replay(folder: &Folder, files: &[&str], arguments: &str) -> (Value, crate::command::Run) {
@@ -311,20 +310,4 @@ fn the_same_seed_gives_the_same_report_and_another_the_same_optimum() {
         let difference = (base(&other, name, "value") - base(&first, name, "value")).abs();
         assert!(difference < 0.2 * base(&first, name, "sigma"), "{name}: {difference}");
     }
-}
-
-#[test]
-fn a_pipe_closed_at_once_is_not_an_error() {
-    let folder = folder_with("", &[("a.csv", Motion::default())]);
-    let mut tool = Command::new(env!("CARGO_BIN_EXE_scarab"))
-        .args(["replay", "--parameters", "--leg"])
-        .args([folder.path("leg.toml"), folder.path("a.csv")])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the tool runs");
-    drop(tool.stdout.take());
-    let output = tool.wait_with_output().expect("it ends");
-    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
-    assert_eq!(output.status.code(), Some(0));
 }

@@ -398,17 +398,6 @@ fn currents_that_were_read_as_torques_are_suspected_by_the_scale_of_the_prior() 
 }
 
 #[test]
-fn a_sign_that_flips_midway_is_named() {
-    for share in [0.25, 0.5, 0.75] {
-        let mut flipped = samples();
-        let from = (share * flipped.len() as f64) as usize;
-        flipped[from..].iter_mut().flat_map(|row| &mut row[3..]).for_each(|torque| *torque = -*torque);
-        let (report, _) = replay(&flipped, "", 3);
-        assert_eq!(report["likely_cause"]["name"], "changed_midway", "{share}: {}", report["likely_cause"]);
-    }
-}
-
-#[test]
 fn impossible_torque_delays_are_refused() {
     let refused = |value: &str| {
         scarab(&format!("replay {MUJOCO} --leg mujoco-leg --torque-delay {value}"), &[]).refusal()

@@ -100,16 +100,6 @@ fn geometry_of_another_convention_gives_a_warning() {
 }
 
 #[test]
-fn columns_in_degrees_are_refused_with_the_complete_command() {
-    let message = refusal("t_s,q1_deg,tau1_Nm\n0,0,0\n");
-    assert!(
-        message.contains("has no column `q1_rad`")
-            && message.contains("--columns t=t_s,q1=q1_deg,tau1=tau1_Nm --units s,deg,Nm"),
-        "{message}"
-    );
-}
-
-#[test]
 fn implausible_options_are_refused_with_their_limits() {
     let refused =
         |arguments: &str| scarab(&format!("replay {MUJOCO} --leg mujoco-leg {arguments}"), &[]).refusal();
@@ -176,28 +166,6 @@ fn time_in_another_unit_is_refused_by_the_rate_with_the_likely_unit() {
     let refused = refusal_of("--units ms", &seconds);
     assert!(refused.contains("is the time in s? Then it would be 500 Hz"), "{refused}");
     assert!(refused.contains("--columns t=t_ms,q1=q1_rad,tau1=tau1_Nm --units s,rad,Nm"), "{refused}");
-}
-
-#[test]
-fn missing_and_impossible_legs_are_refused() {
-    let folder = Folder::new();
-    let recording = folder.write("walk.csv", &Motion::default().csv());
-    let refused = |leg: &Path| scarab("replay --leg", &[leg, &recording]).refusal();
-    let message = refused(Path::new("none-such"));
-    assert!(message.starts_with("error: none-such: cannot be read"), "{message}");
-    assert!(
-        message.contains("is not the name of a shipped leg (x2-wearer-75kg, x2-rough, mujoco-leg,"),
-        "{message}"
-    );
-    let message = refused(&folder.write("leg.toml", &leg("colour = \"red\"\n")));
-    assert!(message.contains("leg.toml:7: unknown field `colour`"), "{message}");
-    let message = refused(&folder.write("leg.toml", &leg("").replace("gravity", "# gravity")));
-    assert!(message.contains("missing field `gravity`"), "{message}");
-    let message = refused(&folder.write("leg.toml", &leg("direction = 2\n")));
-    assert!(message.contains("leg.toml:7: "), "{message}");
-    // Leg of two joints and a recording of one.
-    let message = refused(Path::new("mujoco-leg"));
-    assert!(message.contains("walk.csv:1: the header has no column `q2_rad`"), "{message}");
 }
 
 /// Reasons of the verdict for a recording of the MuJoCo leg with a replaced header.

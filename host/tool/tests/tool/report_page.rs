@@ -251,14 +251,6 @@ fn refused_runs_are_reported_with_their_seeds() {
 }
 
 #[test]
-fn an_unwritable_page_is_reported() {
-    let folder = Folder::new();
-    let nowhere = folder.path("no/such/folder/report.html");
-    let run = scarab("identify --report", &[&nowhere]).ends_with(2);
-    assert!(run.errors.contains("report.html: cannot be written"), "{}", run.errors);
-}
-
-#[test]
 fn a_recording_without_held_out_part_is_not_called_validated() {
     let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg"), 0);
     assert!(page.one(".verdict.accepted").contains("Not validated"));

@@ -1,8 +1,6 @@
 //! Recordings with faulty columns: clipped, held, frozen, wrongly stamped, or given twice; and the duration
 //! of a push.
 
-use scarab_base::random::Random;
-
 use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
 use serde_json::Value;
 use std::fs;
@@ -77,52 +75,6 @@ fn saturated_torque_is_refused_or_where_short_excluded() {
     assert_eq!(samples(&report), [("saturation", Some(1), false)]);
     assert!(run.errors.contains("These stretches are excluded"), "{}", run.errors);
     assert!(distance(&report, &clean) < 3.0, "{}", distance(&report, &clean));
-}
-
-#[test]
-fn held_torque_is_refused_and_frozen_stretches_are_excluded() {
-    let folder = Folder::new();
-    let file = changed(&folder, |table| {
-        let column = index(table, "tau1_Nm");
-        for row in 0..table.rows.len() {
-            table.rows[row][column] = table.rows[row / 5 * 5][column];
-        }
-    });
-    let (run, report) = replay(&folder, &file, "");
-    let run = run.ends_with(3);
-    assert_eq!(samples(&report), [("held_samples", Some(1), true)]);
-    assert!(run.printed.contains("tau1_Nm repeats its values"), "{}", run.printed);
-
-    let (_, clean) = replay(&folder, Path::new(MUJOCO), "");
-    let file = changed(&folder, |table| {
-        for first in [3_000, 9_000] {
-            let frozen = table.rows[first].clone();
-            table.rows[first..first + 250].iter_mut().for_each(|row| row[1..].copy_from_slice(&frozen[1..]));
-        }
-    });
-    let (run, report) = replay(&folder, &file, "");
-    run.ends_with(0);
-    assert_eq!(samples(&report), [("held_samples", None, false)]);
-    assert!(distance(&report, &clean) < 3.0, "{}", distance(&report, &clean));
-}
-
-#[test]
-fn wrong_time_stamps_are_refused_where_inertias_are_wrong() {
-    let folder = Folder::new();
-    let file = changed(&folder, |table| {
-        let column = index(table, "t_s");
-        // Late by up to 1.9 ms, irregularly: rows are stamped when the recorder has time.
-        let mut random = Random::new("stamps", 5);
-        for row in &mut table.rows {
-            row[column] += random.uniform(0.0, 1.9e-3);
-        }
-    });
-    let (run, report) = replay(&folder, &file, "--bandwidth 25");
-    run.ends_with(3);
-    assert_eq!(samples(&report), [("time_stamps", None, true)]);
-    let found = report["samples"][0]["value"].as_f64().expect("a number");
-    // Uniform in 1.9 ms: 0.548 ms rms.
-    assert!((found / 0.548e-3 - 1.0).abs() < 0.05, "{found}");
 }
 
 #[test]

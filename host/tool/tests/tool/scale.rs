@@ -44,20 +44,6 @@ fn a_known_mass_makes_the_report_absolute_and_widens_sigma() {
 }
 
 #[test]
-fn a_stated_load_is_subtracted_an_unstated_one_is_in_the_parameters() {
-    let folder = Folder::new();
-    let run = scarab("identify --load 3@knee:0.3 --json", &[&folder.path("run.json")]).ends_with(0);
-    assert!(run.printed.contains("3 kg on link 2 at x 0.3, y 0 m subtracted"), "{}", run.printed);
-    let json = folder.json("run.json");
-    assert_eq!(json["scale"], "relative");
-    for base in json["base_parameters"].as_array().expect("thirteen") {
-        let [value, truth, sigma] = ["value", "truth", "sigma"].map(|key| base[key].as_f64().expect("known"));
-        // 0.9 kg m of first moment would be 300 sigma.
-        assert!((value - truth).abs() < 4.0 * sigma, "{}", base["name"]);
-    }
-}
-
-#[test]
 fn implausible_masses_are_refused_with_option_and_reason() {
     for (arguments, reason) in [
         ("identify --payload 0@knee:0.2", "above 0 and at most 50"),

@@ -255,33 +255,6 @@ fn a_lost_client_disconnects_the_boards_and_stops_the_leg() {
 }
 
 #[test]
-fn emergencies_are_printed_once_with_their_reason() {
-    let serve = Serve::new();
-    let mut client = Client::new(&serve);
-    client.write(1, 0x6040, 0, 15, 2);
-    serve.waits_for(
-        "leg 1: emergency FF0E: a step towards enabled is refused: joint 1, no such step from this state",
-    );
-    client.enable(ENABLED);
-    // A heartbeat each 50 ms, once.
-    client.write(1, 0x1016, 1, 0x50 << 16 | 50, 4);
-    client.frame(0x750, &[5]);
-    serve.waits_for("leg 1: emergency 8130: the host's heartbeat is missed");
-    client.until(OFF);
-    client.enable(ENABLED);
-    client.frame(0, &[1, 0]);
-    // A cyclic host, silent for longer than 100 ms.
-    for _ in 0..30 {
-        client.frame(0x80, &[]);
-        thread::sleep(2 * MS);
-    }
-    serve.waits_for("leg 1: emergency FF0F: its host fell silent");
-    for code in ["FF0E", "8130", "FF0F"] {
-        assert_eq!(serve.errors().matches(&format!("emergency {code}")).count(), 1, "{}", serve.errors());
-    }
-}
-
-#[test]
 fn a_second_client_is_refused_a_silent_connection_blocks_no_client() {
     let serve = Serve::at("localhost:0", "");
     let _silent: Vec<Client> = (0..3).map(|_| Client::silent(&serve.address)).collect();

@@ -73,25 +73,6 @@ fn one_wrong_index_pulse_changes_no_command_and_takes_nothing() {
 }
 
 #[test]
-fn glitches_of_a_rotor_at_rest_are_no_index_however_often() {
-    let mut bench = Bench::at(0.0, &CONFIGURATION);
-    for speed in [50.0, -50.0].into_iter().cycle().take(6) {
-        // A glitch at the same position each time, half a turn of travel in between.
-        // No rotor stops within a period.
-        let before = bench.motor.speed;
-        for left in (0..20).rev() {
-            bench.motor.speed = before * f64::from(left) / 20.0;
-            bench.run_sampled(ask(0.0), 6, |_| {});
-        }
-        bench.run_sampled(ask(0.0), 240, |_| {});
-        bench.run_sampled(ask(0.0), 6, |sample| sample.index_count = Some(sample.encoder_count));
-        bench.motor.speed = speed;
-        bench.run_sampled(ask(0.0), TURN / 2, |sample| sample.index_count = None);
-        assert_eq!(bench.axis.fault(), None);
-    }
-}
-
-#[test]
 fn counts_that_were_lost_are_seen_at_the_second_index() {
     for (missed, speed) in [(6, 50.0), (-6, 50.0), (30, -50.0)] {
         let mut bench = Bench::at(speed, &CONFIGURATION);

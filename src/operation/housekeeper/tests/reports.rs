@@ -141,17 +141,3 @@ fn a_reference_is_refused_while_a_joint_moves() {
         assert_eq!(bench.orders, places, "{moving:?}");
     }
 }
-
-#[test]
-fn a_reset_restarts_the_gate_drivers_and_clears_old_reasons() {
-    for (configures, causes) in [(true, 0), (false, InhibitReason::GateConfiguration.bit())] {
-        let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
-        bench.hardware.gates_configure = configures;
-        bench.signals.inhibit.raise(InhibitReason::GateFault);
-        for _ in 0..25 {
-            bench.hold(false, true);
-        }
-        assert_eq!(bench.hardware.gates_switched, [false, true]);
-        assert_eq!(bench.signals.inhibit.causes(), causes);
-    }
-}

@@ -84,27 +84,6 @@ fn lost_records_are_reported_by_number_and_invalidate_a_result() {
 }
 
 #[test]
-fn text_around_the_records_is_skipped() {
-    let mut lines = vec!["      Erasing done".to_owned(), String::new(), "\u{fffd}\u{0}garbage".to_owned()];
-    for (index, line) in quiet().into_iter().enumerate() {
-        lines.push(match index % 4 {
-            0 => format!("{:.6} INFO  {line}", index as f64 * 0.01),
-            1 => format!("[INFO ] {line} (scarab src/trace/record.rs:{index})"),
-            2 => format!("\u{1b}[32mINFO\u{1b}[0m {line}\r"),
-            _ => line + " later_key=[1, 2]",
-        });
-        if index % 50 == 0 {
-            lines.push("INFO  embassy: initialised".to_owned());
-        }
-    }
-    let trace = read(&lines);
-    assert_eq!((trace.problem_count, trace.lost(), trace.results.len()), (0, 0, 1), "{:?}", trace.problems);
-    let (around, plain) = (run_report(&trace, &default_leg()), run_report(&read(&quiet()), &default_leg()));
-    let (around, plain) = (around.expect("complete"), plain.expect("complete"));
-    assert_eq!((around.base_parameters, around.findings), (plain.base_parameters, plain.findings));
-}
-
-#[test]
 fn an_unreadable_line_is_reported_with_its_number() {
     let mut lines = quiet();
     lines.insert(3, "state n=3 tick=1x drive=a activity=b phase=c motion=0".into());

@@ -190,6 +190,7 @@ fn values_that_are_repeated_are_found_with_their_holding_time() {
             let (finding, spans) = only(&held, HELD);
             assert!((finding.value - 0.002 * hold as f64).abs() < 1e-9, "{finding:?}");
             assert!(finding.refuses && spans.is_empty());
+            assert!(finding.text.contains("repeats its values"), "{}", finding.text);
         }
     }
 }
