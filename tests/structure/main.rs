@@ -63,7 +63,7 @@ const HOST: [(&str, &[&[&str]]); 4] = [
     (
         "host/rig/src",
         &[
-            &["image", "kept_file", "trace"],
+            &["image", "kept_file", "report", "trace"],
             &["board", "faulty_board", "operator", "options", "pair", "perturb", "worn"],
             &["bus", "excite", "identified"],
             &["scale", "shaking", "simulate", "watch"],

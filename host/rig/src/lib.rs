@@ -10,6 +10,7 @@
 //! | [`simulate`], [`identify`], [`identified`], [`watch`], [`scale`] | a simulated leg is identified |
 //! | [`excite`], [`shaking`] | design of an exciting motion |
 //! | [`monitor`], [`assist`], [`motor`] | a watched model, an assisted wearer, a motor stand |
+//! | [`report`] | results of assistance, monitor and motor stand |
 //! | [`image`] | the flash image is built and read |
 //! | [`faults`] | the fault catalogue, injected into the whole firmware |
 
@@ -35,6 +36,7 @@ pub mod operator;
 pub mod options;
 pub mod pair;
 pub mod perturb;
+pub mod report;
 pub mod scale;
 pub mod shaking;
 pub mod simulate;

@@ -6,6 +6,7 @@
 
 mod update;
 
+use crate::report::monitor::{AlarmReport, MonitorRun};
 use hal_sim::description::PushDescription;
 use hal_sim::world::TICK_S;
 use scarab::leg::{Activity, ControlRequest, ProvedMotion, Step};
@@ -16,7 +17,6 @@ use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::Second;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::{LegFile, PushesFile};
-use scarab_identify::report::monitor::{AlarmReport, MonitorRun};
 
 use crate::identified::identify;
 use crate::options::SimulationOptions;

@@ -2,18 +2,14 @@
 //!
 //! The names of the fields are an interface. An unknown number is `null`, never NaN.
 
-pub mod assist;
 pub mod disturbances;
 pub mod doubt;
 pub mod excite;
 pub mod findings;
 pub mod model_choice;
-pub mod monitor;
-pub mod motor;
 pub mod reading;
 pub mod scale;
 pub mod series;
-pub mod spread;
 pub mod trace;
 
 use std::collections::BTreeMap;

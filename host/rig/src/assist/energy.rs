@@ -13,6 +13,7 @@
 //! At rest: a wearer walks and then holds still. After `REST_S` the velocities of a drawn exoskeleton must
 //! be below one encoder count per 0.1 s; otherwise the friction compensation keeps it moving.
 
+use crate::report::assist::EnergyReport;
 use hal_sim::wearer::muscles::Intention;
 use hal_sim::world::TICK_S;
 use rayon::prelude::*;
@@ -23,7 +24,6 @@ use scarab_base::number::Number;
 use scarab_base::random::Random;
 use scarab_base::stats::rms;
 use scarab_identify::leg::exercise::{Exercise, hip_and_knee};
-use scarab_identify::report::assist::EnergyReport;
 
 use super::draws;
 use super::subject::{Models, Subject};

@@ -13,6 +13,7 @@
 
 use core::f64::consts::TAU;
 
+use crate::report::assist::PeriodicReport;
 use hal_sim::wearer::description::WearerDescription;
 use hal_sim::wearer::motion::{CadenceChange, Gait, IntendedMotion};
 use hal_sim::wearer::muscles::Intention;
@@ -21,7 +22,6 @@ use scarab::leg::AssistShares;
 use scarab_base::error::ToolError;
 use scarab_base::stats::rms;
 use scarab_identify::leg::exercise::{Exercise, hip_and_knee};
-use scarab_identify::report::assist::PeriodicReport;
 
 use super::subject::Subject;
 use super::trial::{Drives, GivenEnergy, LimbAlone, Stage};

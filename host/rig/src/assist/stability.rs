@@ -51,9 +51,9 @@ use rayon::prelude::*;
 use scarab::assist::differentiator::LEAD_S;
 use scarab::assist::law::AHEAD_S;
 
+use crate::report::assist::{StabilityCurve, StabilityReport};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::report::assist::{StabilityCurve, StabilityReport};
 
 /// Knee angles of the analysis, degrees.
 const KNEES_DEG: [f64; 5] = [10.0, 30.0, 50.0, 70.0, 90.0];

@@ -1,5 +1,9 @@
 //! Every mode, motion and comparison of `assist`, over all seeds.
 
+use crate::report::assist::{
+    AssistReport, AssistRow, BodyMassReport, EnergyReport, InteractionCurve, PeriodicReport, RefusedReport,
+    SharesReport, WearerSum,
+};
 use hal_sim::wearer::description::WearerDescription;
 use rayon::prelude::*;
 use scarab::assist::energy::BUDGET_J;
@@ -12,10 +16,6 @@ use scarab_identify::leg::exercise::{Exercise, hip_and_knee};
 use scarab_identify::leg::setup::base_rank;
 use scarab_identify::leg::two_bodies::{MuscleTone, TwoBodies};
 use scarab_identify::report::SCHEMA;
-use scarab_identify::report::assist::{
-    AssistReport, AssistRow, BodyMassReport, EnergyReport, InteractionCurve, PeriodicReport, RefusedReport,
-    SharesReport, WearerSum,
-};
 
 use super::energy::{energy, limit_cycles};
 use super::periodic::periodic;

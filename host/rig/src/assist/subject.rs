@@ -3,13 +3,13 @@
 //! Two identifications on the simulated hardware: the exoskeleton alone (`empty`), and the exoskeleton on the
 //! limp wearer (`worn`). Both have the sensors' noise of the worn leg: a sensor does not know who wears it.
 
+use crate::report::assist::RefusedReport;
 use hal_sim::wearer::description::WearerDescription;
 use scarab::ident::{Estimate, prior_parameters};
 use scarab::leg::{IdentifiedModel, Wearing};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::leg::two_bodies::{MuscleTone, TwoBodies};
-use scarab_identify::report::assist::RefusedReport;
 
 use crate::identified::identify;
 use crate::options::SimulationOptions;

@@ -1,10 +1,10 @@
 //! The quick update compared with the changes that were made.
 
+use crate::report::monitor::{HypothesisReport, UpdateReport, ValueReport};
 use scarab::ident::{Cause, Hypothesis, PAYLOAD_PARAMETERS, Reason, Thresholds, Update};
 use scarab::model::{Parameter, Payload};
 use scarab_base::names::parameter_name;
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::report::monitor::{HypothesisReport, UpdateReport, ValueReport};
 
 use super::Disturbance;
 

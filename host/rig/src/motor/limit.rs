@@ -5,9 +5,9 @@
 //! within the limit. Integrator wind-up would delay the recovery. Its time is compared with the same step at
 //! 48 V, where the voltage suffices.
 
+use crate::report::motor::LimitReport;
 use scarab::units::Volt;
 use scarab_base::error::ToolError;
-use scarab_identify::report::motor::LimitReport;
 
 use crate::motor::{Bench, PERIOD_S};
 

@@ -15,6 +15,7 @@ pub mod regeneration;
 pub mod ripple;
 pub mod step;
 
+use crate::report::motor::MotorReport;
 use hal_sim::drive::description::{AxisDescription, SupplyDescription};
 use hal_sim::drive::stand::{Load, Stand};
 use scarab::board::odrive_v3_6::settings::drives::BANDWIDTH;
@@ -25,7 +26,6 @@ use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::{LegFile, MotorFile};
 use scarab_identify::leg::board_words as words;
 use scarab_identify::report::SCHEMA;
-use scarab_identify::report::motor::MotorReport;
 
 use crate::board::{BRAKE, BUS, axis_configuration, calibration_settings, commission};
 

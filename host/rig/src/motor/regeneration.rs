@@ -3,10 +3,10 @@
 //! The inertia is a leg joint's 2.5 kg m^2, reduced to the motor by the joint's gear, at the joint's top
 //! speed. A current of 50 A brakes it to a tenth of that speed, with and without the brake chopper.
 
+use crate::report::motor::RegenerationReport;
 use hal_sim::drive::stand::Load;
 use scarab::trace::words::axis_fault;
 use scarab_base::error::ToolError;
-use scarab_identify::report::motor::RegenerationReport;
 
 use crate::motor::{Bench, PERIOD_S};
 

@@ -6,9 +6,9 @@
 
 use core::f64::consts::TAU;
 
+use crate::report::motor::RippleReport;
 use scarab::motor::DeadTime;
 use scarab_base::error::ToolError;
-use scarab_identify::report::motor::RippleReport;
 
 use crate::motor::{Bench, PERIOD_S};
 

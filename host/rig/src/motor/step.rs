@@ -7,9 +7,9 @@
 //! controller's zero cancels the motor's pole, and an integrator remains, delayed by one period and
 //! held for one. The step comes with the sample of index 0.
 
+use crate::report::motor::{Shape, StepReport};
 use core::f64::consts::TAU;
 use scarab_base::error::ToolError;
-use scarab_identify::report::motor::{Shape, StepReport};
 
 use crate::motor::{Bench, PERIOD_S};
 

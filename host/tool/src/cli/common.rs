@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::view::spread::Spread;
 use clap::{Args, ValueEnum};
 use scarab::ident::{Estimator, Plan};
 use scarab_base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
@@ -11,7 +12,6 @@ use scarab_identify::formats::shard::{CampaignHeader, Program};
 use scarab_identify::formats::temperature;
 use scarab_identify::leg::setup::PriorChoice;
 use scarab_identify::report::series::Series;
-use scarab_identify::report::spread::Spread;
 use scarab_identify::report::{RunReport, Source};
 
 use crate::cli::arguments::{Output, OutputFolder};

@@ -7,9 +7,9 @@ use scarab_identify::formats::leg_file::{LegFile, PushesFile};
 use scarab_identify::leg::placed_mass::PlacedMass;
 use scarab_identify::leg::setup::DEFAULT_SEED;
 use scarab_identify::report::SCHEMA;
-use scarab_identify::report::monitor::{MonitorRun, MonitorRuns};
 use scarab_identify::with_leg_size;
 use scarab_rig::monitor::{Disturbance, MonitorOptions, watch};
+use scarab_rig::report::monitor::{MonitorRun, MonitorRuns};
 
 use crate::cli::arguments::Output;
 use crate::cli::common::write_json;

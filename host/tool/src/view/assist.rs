@@ -2,7 +2,7 @@
 
 use scarab_base::number::Number;
 use scarab_base::table::{Table, cells};
-use scarab_identify::report::assist::{AssistReport, PeriodicReport};
+use scarab_rig::report::assist::{AssistReport, PeriodicReport};
 
 /// Torque with two decimals, or a dash.
 fn torque(value: Number) -> String {

@@ -32,12 +32,12 @@ mod trajectories;
 
 use std::path::Path;
 
+use crate::view::spread::Spread;
 use canvas::{Area, DrawingError, render};
 use scarab_base::error::ToolError;
 use scarab_base::files;
 use scarab_identify::report::RunReport;
 use scarab_identify::report::series::{Role, Series};
-use scarab_identify::report::spread::Spread;
 
 /// Width of every figure, pixels.
 pub const WIDTH: u32 = 900;

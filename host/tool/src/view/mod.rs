@@ -9,4 +9,5 @@ pub mod live;
 pub mod monitor;
 pub mod motor;
 pub mod runs;
+pub mod spread;
 pub mod tables;

@@ -4,7 +4,7 @@ use scarab_base::error::ToolError;
 use scarab_base::number::{Number, number};
 use scarab_base::output::say;
 use scarab_base::table::{Table, cells};
-use scarab_identify::report::monitor::{MonitorRun, MonitorRuns};
+use scarab_rig::report::monitor::{MonitorRun, MonitorRuns};
 
 /// Prints a run in a few lines.
 fn print_run(run: &MonitorRun) -> Result<(), ToolError> {

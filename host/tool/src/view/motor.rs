@@ -1,7 +1,7 @@
 //! Formats the measurements of `motor` as tables.
 
 use scarab_base::table::{Table, cells};
-use scarab_identify::report::motor::MotorReport;
+use scarab_rig::report::motor::MotorReport;
 
 /// Formats all tables.
 #[must_use]

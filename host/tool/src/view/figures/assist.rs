@@ -3,7 +3,7 @@
 use plotters::style::text_anchor::HPos;
 use plotters::style::{RGBColor, ShapeStyle};
 use scarab_base::error::ToolError;
-use scarab_identify::report::assist::{AssistReport, AssistRow, InteractionCurve, StabilityReport};
+use scarab_rig::report::assist::{AssistReport, AssistRow, InteractionCurve, StabilityReport};
 
 use crate::view::figures::canvas::{
     Area, Axes, BLUE, DARK, DrawingError, GREEN, GRID, Key, LEFT, PALE, VERMILION, axes, legend, line, px,

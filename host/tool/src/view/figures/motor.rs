@@ -6,7 +6,7 @@ use plotters::style::text_anchor::HPos;
 use plotters::style::{RGBColor, ShapeStyle};
 use scarab_base::error::ToolError;
 use scarab_base::files;
-use scarab_identify::report::motor::MotorReport;
+use scarab_rig::report::motor::MotorReport;
 
 use crate::view::figures::canvas::{
     Area, Axes, BLUE, DARK, DrawingError, GREEN, GRID, Key, LEFT, PALE, VERMILION, axes, legend, line, px,

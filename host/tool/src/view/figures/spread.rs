@@ -1,10 +1,10 @@
 //! Base parameters over many runs: a dot per run, and a bar of one standard deviation to both sides
 //! of their mean.
 
+use crate::view::spread::Spread;
 use plotters::element::{Circle, PathElement};
 use plotters::style::Color;
 use plotters::style::text_anchor::HPos;
-use scarab_identify::report::spread::Spread;
 
 use crate::view::figures::canvas::{Area, BLUE, DARK, DrawingError, Key, legend, line, px, text};
 use crate::view::figures::parameters::{ONE_SIGMA, THREE_SIGMA, frame, labels, sigma_axis};

@@ -1,7 +1,7 @@
 //! Page of compensation and assistance.
 
 use maud::{DOCTYPE, Markup, html};
-use scarab_identify::report::assist::AssistReport;
+use scarab_rig::report::assist::AssistReport;
 
 use crate::view::assist::{notes, periodic, rows, shares, wearer_sums};
 use crate::view::figures::{Figure, Group};

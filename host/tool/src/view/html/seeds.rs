@@ -1,13 +1,13 @@
 //! Page of many runs of one leg: verdicts, distribution of parameters about the truth, margins of
 //! the tests.
 
+use crate::view::spread::Spread;
 use maud::{DOCTYPE, Markup, html};
 use scarab_base::error::ToolError;
 use scarab_base::table::{Table, cells};
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::RunReport;
 use scarab_identify::report::findings::FindingReport;
-use scarab_identify::report::spread::Spread;
 
 use crate::view::figures::Figure;
 use crate::view::html::{

@@ -2,7 +2,7 @@
 
 use scarab_base::stats::rms;
 
-use crate::report::RunReport;
+use scarab_identify::report::RunReport;
 
 /// One base parameter over all runs that determine it.
 #[derive(Clone, Debug, PartialEq)]
