@@ -32,11 +32,6 @@ fn refusal_with(line: &str) -> String {
 
 #[test]
 fn bad_recordings_are_refused_with_file_line_and_reason() {
-    assert_eq!(refusal(""), "error: walk.csv: the file is empty\n");
-    assert_eq!(
-        refusal("t_s,q1_rad,tau1_Nm\n"),
-        "error: walk.csv: too short: 0 samples over 0.000 s, but at least 50 over 1 s are needed\n"
-    );
     assert_eq!(
         refusal("t_s,q1_rad,torque\n0,0,0\n"),
         "error: walk.csv:1: the header has no column `tau1_Nm`; its columns are: t_s, q1_rad, torque; needed \
@@ -47,20 +42,6 @@ fn bad_recordings_are_refused_with_file_line_and_reason() {
     assert_eq!(
         refusal_with("0.2,NaN,1.0"),
         "error: walk.csv:102: `NaN` in column `q1_rad` is not finite (--skip-bad skips such rows, up to 5 %)\n"
-    );
-    assert_eq!(
-        refusal_with("0.1,0.2,1.0"),
-        "error: walk.csv:102: time 0.1 s does not exceed the previous 0.198 s (--skip-bad skips such rows, up to 5 %)\n"
-    );
-    assert_eq!(
-        refusal_with("0.198,0.2,1.0"),
-        "error: walk.csv:102: time 0.198 s does not exceed the previous 0.198 s (--skip-bad skips such rows, up to 5 %)\n"
-    );
-    let whole = Motion::default().csv();
-    let truncated = &whole[..whole.len() - 12];
-    assert_eq!(
-        refusal(truncated),
-        "error: walk.csv:5001: 2 fields, but the header has 3: is the line truncated? (--skip-bad skips such rows, up to 5 %)\n"
     );
 }
 
@@ -126,13 +107,6 @@ fn implausible_options_are_refused_with_their_limits() {
     assert!(refused(&format!("--split 0.5 --validate {MUJOCO}")).contains("cannot be used with"));
     assert!(refused("--validate no-such-file.csv").contains("no-such-file.csv: cannot be read"));
     assert!(refused("--prior wrong:200").contains("is not a percentage"));
-    assert!(
-        refused("--json /no-such-folder/report.json")
-            .contains("/no-such-folder/report.json: cannot be written")
-    );
-    assert!(
-        refused("--csv /no-such-folder/torque.csv").contains("/no-such-folder/torque.csv: cannot be written")
-    );
 }
 
 #[test]
@@ -210,22 +184,6 @@ fn a_motionless_joint_is_refused_as_unexcited() {
     // Said once, as the cause.
     assert_eq!(run.printed.matches("joint 1 hardly moved").count(), 1, "{}", run.printed);
     assert!(run.printed.contains("likely cause: motion: joint 1 hardly moved"), "{}", run.printed);
-    assert!(reasons(&folder.json("report.json")).contains(&"unexcited"));
-
-    // Only one joint moves: the knee's column repeats its first angle.
-    let text = std::fs::read_to_string(MUJOCO).expect("the recording");
-    let knee_still: Vec<String> = text
-        .lines()
-        .map(|line| {
-            let mut fields: Vec<&str> = line.split(',').collect();
-            if fields[0] != "t_s" {
-                fields[2] = "0.857";
-            }
-            fields.join(",")
-        })
-        .collect();
-    let file = folder.write("knee.csv", &knee_still.join("\n"));
-    scarab("replay --leg mujoco-leg", &[&file, Path::new("--json"), &json]).ends_with(3);
     assert!(reasons(&folder.json("report.json")).contains(&"unexcited"));
 }
 
