@@ -629,7 +629,7 @@ impl Session {
 }
 
 impl bus::Bus for Session {
-    /// Sends a frame, and forgets those that were received before.
+    /// Sends a frame, and forgets all that the board sent before.
     fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
         self.forget_frames();
         self.machine.chip_mut().send_frame(*frame);

@@ -6,12 +6,11 @@
 //! the last cut of each part it must take another update.
 
 use std::fmt::Write as _;
-use std::time::Duration;
 
 use scarab::bus::program::{ProgramCommand, ProgramError, ProgramStatus};
 use scarab_base::error::ToolError;
 use scarab_boot::{HEADER_AT, Region, seal};
-use scarab_client::bus::Object;
+use scarab_client::bus::{Object, Patience};
 use scarab_client::update::{DATA, SOFTWARE, STATUS, Update, check};
 use serde::Serialize;
 
@@ -20,8 +19,6 @@ use crate::peripherals::flash::Cut;
 use crate::session::Session;
 use crate::time::{seconds, ticks};
 
-/// Longest answer while sectors are erased.
-const ERASED: Duration = Duration::from_secs(8);
 /// Node through which the image comes.
 const NODE: u8 = 1;
 /// Longest start that swaps both images and swaps them back, s.
@@ -149,7 +146,7 @@ impl Session {
 
     /// Waits until nothing is under way; the board is silent while it erases a sector.
     fn settled(&mut self) -> Result<ProgramStatus, ToolError> {
-        let patience = core::mem::replace(&mut self.patience, ERASED);
+        let patience = core::mem::replace(&mut self.patience, Patience::REAL.answer);
         let settled = Update { client: self.client(), node: NODE, say: &mut |_: &str| {} }.settled();
         self.patience = patience;
         settled
@@ -424,9 +421,11 @@ impl Bench<'_> {
         let (program, expected) =
             if is_new { (&self.old, Expected::Old) } else { (&self.new, Expected::New) };
         let header = check(program)?;
-        self.session.patience = ERASED;
+        let patience = core::mem::replace(&mut self.session.patience, Patience::REAL.answer);
         let mut update = Update { client: self.session.client(), node: NODE, say: &mut |_: &str| {} };
-        update.run(program, &header).map_err(words)?;
+        let updated = update.run(program, &header).map_err(words);
+        self.session.patience = patience;
+        updated?;
         self.running(expected)
     }
 }

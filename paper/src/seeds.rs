@@ -2,7 +2,7 @@
 //!
 //! Why a type: results on the seeds with which constants were tuned are biased. A [`ReportSeed`]
 //! cannot be made from an arbitrary number. [`CHOOSING`] covers the seeds used while the swarm was
-//! designed. These are the tests' first seeds (90,001 in `tests/swarm_tables.rs`), the examples'
+//! designed. These are the tests' first seeds (90,001 in `tests/firmware/swarm_tables.rs`), the examples'
 //! (1), and those of the experiments behind the constants (31, 55, 31337, 31338). [`LEAPS`] covers
 //! those behind the leaps' constants.
 

@@ -25,7 +25,7 @@
 //! before any bridge may switch; its flash refuses all other accesses (docs/files.md).
 //!
 //! **Wear.** An unchanged value is not written again. A sector is erased once per some 15 KB of records;
-//! measured in `tests/store.rs`.
+//! measured in `tests/firmware/store.rs`.
 //!
 //! Cost: the crate `sequential-storage` (its wear levelling and repair are tested by fuzzing there) and
 //! `zerocopy` (layouts).

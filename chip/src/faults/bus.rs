@@ -25,7 +25,7 @@ const SYNC: u16 = 0x80;
 /// Cycles before a host may fall silent, and cycles of hostile frames.
 const LEAD: u64 = 100;
 const FLOOD: u32 = 100;
-/// Longest time until a lost host has an effect, beyond its own time, s.
+/// Longest time until a lost host has an effect, beyond its timeout, s.
 const LATE_S: f64 = 20e-3;
 /// Frames that wait for the wire while it is flooded.
 const WAITING: usize = 12;
@@ -83,7 +83,7 @@ fn release(session: &mut Session) -> Result<Option<Ticks>, String> {
     Ok(released)
 }
 
-/// B1: heartbeat, targets or both end. The leg is damped in time after the host's own time, then off; the
+/// B1: heartbeat, targets or both end. The leg is damped in time after the host's timeout, then off; the
 /// bus says why, and the host's return does not enable.
 pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let hosted = machines.hosted()?;
@@ -296,8 +296,14 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     let plant = &session.machine.chip().plant;
     let (torque, place) = (plant.torque(), plant.position());
     session.forget_frames();
+    let mut codes = [const { Vec::new() }; JOINTS];
+    let collect = |session: &Session, codes: &mut [Vec<u16>; JOINTS]| {
+        codes.iter_mut().zip(NODES).for_each(|(codes, node)| codes.extend(emergencies(session, node)));
+    };
     for node in NODES {
         session.write_sized(node, 0x6040, 0, 0xF, 2)?;
+        collect(session, &mut codes);
+        session.forget_frames();
     }
     for _ in 0..TAKEN {
         session.run(CYCLE_S)?;
@@ -310,7 +316,7 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
             }
         }
     }
-    let codes = NODES.map(|node| emergencies(session, node));
+    collect(session, &mut codes);
     for (node, codes) in NODES.into_iter().zip(codes) {
         let word = session.read_object(node, 0x6041, 0)?;
         let shown = session.read_object(node, 0x6061, 0)?;

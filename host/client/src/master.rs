@@ -16,6 +16,8 @@ use crate::bus::{Bus, MOST_BYTES, Object, RequestError};
 
 /// Number of identifiers.
 const IDENTIFIERS: usize = 0x800;
+/// Blocks in a row of which a node takes nothing.
+const MOST_VAIN: u32 = 8;
 /// Bytes of a segment.
 const SEGMENT: usize = 7;
 const REQUEST: u16 = 0x600;
@@ -270,6 +272,7 @@ impl<B: Bus> Client<B> {
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), (bytes.len() as u32).to_le_bytes());
         let begin = self.ask(node, [0xC6, low, high, sub, a, b, c, d], Some(object))?;
         let (mut offset, mut block) = (0, usize::from(begin[4]).clamp(1, 127));
+        let mut vain = 0;
         while offset < bytes.len() {
             let end = bytes.len().min(offset + SEGMENT * block);
             for (number, segment) in (1..).zip(bytes[offset..end].chunks(SEGMENT)) {
@@ -289,6 +292,10 @@ impl<B: Bus> Client<B> {
             };
             match *frame.data() {
                 [0xA2, taken, next, ..] => {
+                    vain = if taken == 0 { vain + 1 } else { 0 };
+                    if vain > MOST_VAIN {
+                        return Err(RequestError::Silent(patience));
+                    }
                     // The node asks for the segments after a lost one again.
                     offset = end.min(offset + SEGMENT * usize::from(taken));
                     block = usize::from(next).clamp(1, 127);

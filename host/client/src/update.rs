@@ -25,7 +25,7 @@ pub const STATUS: Object = Object(0x1F57, 1);
 /// Hardware version, and that of a simulated board, which has no program that could be replaced.
 const HARDWARE: Object = Object(0x1009, 0);
 const SIMULATED: &str = "simulated";
-/// Longest clearing: two sectors of 2 s, and the announcement.
+/// Longest clearing: three sectors of 2 s, and the announcement.
 const CLEARING: Duration = Duration::from_secs(10);
 /// Longest restart with both swaps.
 const RESTART: Duration = Duration::from_secs(90);

@@ -178,3 +178,20 @@ fn impossible_requests_are_refused() {
         assert!(refusal.contains(named), "{arguments}: {refusal}");
     }
 }
+
+#[test]
+fn figure_five_is_drawn_for_each_function_small_and_well_formed() {
+    let folder = Folder::new();
+    scarab("--figure 5 --seeds 5 --out", &[&folder.path("drawn")]).ends_with(0);
+    for function in ["f1", "f2", "f3", "f4"] {
+        let path = folder.path("drawn").join(format!("figure-5-{function}.svg"));
+        let svg = fs::read_to_string(&path).expect("it was drawn");
+        roxmltree::Document::parse(&svg).unwrap_or_else(|error| panic!("{function}: {error}"));
+        assert!(!svg.contains("NaN") && !svg.contains("inf,"), "{function}");
+        // Suitable size for a repository.
+        assert!(svg.len() < 250_000, "{function}: {} bytes", svg.len());
+        for word in ["bso-paper", "pso", "bas", "iterations", "evaluations"] {
+            assert!(svg.contains(word), "{function}: `{word}` is missing");
+        }
+    }
+}

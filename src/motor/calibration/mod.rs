@@ -582,9 +582,9 @@ const LONGEST_SHARE: f32 = 1.1 * 1.89;
 const LEAST_TRAVEL_TURNS: f32 = 3.4;
 /// Copper 100 K warmer or colder has 39 % more or less resistance.
 const RESISTANCE_SHARE: f32 = 0.4;
-/// A measurement is within 2 % (100 motors of `hal-sim/tests/calibration`), at standstill within 4 % (400
-/// legs there), so 6 % together. Magnets 100 K warmer have 12 % less flux, and so saturate the iron less: at
-/// most 12 % of inductance. Together 18 %, and a margin.
+/// A measurement is within 2 % (100 motors of `hal-sim/tests/hardware/calibration`), at standstill within 4 %
+/// (400 legs there), so 6 % together. Magnets 100 K warmer have 12 % less flux, so they saturate the iron
+/// less: at most 12 % of inductance. Together 18 %, and a margin.
 const INDUCTANCE_SHARE: f32 = 0.2;
 /// The flux of a data sheet is up to 10 % off, magnets 100 K warmer have 12 % less, and a margin.
 const FLUX_SHARE: f32 = 0.25;

@@ -201,9 +201,10 @@ fn torque_error(evidence: &Evidence<f32>, joint: usize, on: &str) -> String {
             format!("joint {joint}: torque error of {value:.3} N m rms{on}, limit {limit:.3} N m")
         }
         Test::ValidationError => format!("no torque of joint {joint}{on} could be compared with the model"),
-        _ => format!(
+        Test::SlowResidual => format!(
             "joint {joint}: slow residual of {value:.3} N m{on}, longer than half a second, limit {limit:.3} N m"
         ),
+        other => unreachable!("{other:?} is no error of torque"),
     }
 }
 

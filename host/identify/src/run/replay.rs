@@ -200,8 +200,7 @@ fn identified<const N: usize, const B: usize>(
     if let Some(path) = &options.csv {
         write_predictions(path, &judged.predictions, &anatomy)?;
     }
-    let mut sources = core::mem::take(&mut solved.sources);
-    sources.extend(judged.sources.iter().cloned());
+    let sources = solved.sources.iter().chain(&judged.sources).cloned().collect();
     let simulated_s = training.iter().chain(&held_out).map(Samples::duration_s).sum();
     let mut run = report(&background, &solved, judged, options, simulated_s);
 
@@ -216,7 +215,7 @@ fn identified<const N: usize, const B: usize>(
         options,
         noise: noise[0],
         screening: &parts.screening,
-        load: solved.load,
+        load: solved.load.unwrap_or([0.0; B]),
         proposed_hz,
         stribeck_hz,
     };

@@ -240,8 +240,8 @@ impl RowReport {
 }
 
 fn percent(share: Number) -> String {
-    // Rounded down, so that no miss disappears.
-    let digits = |share: f64| format!("{:.2} %", (1e4 * share).floor() / 1e2);
+    // Rounded down, so that no miss disappears; a binary share may lie just below its decimal one.
+    let digits = |share: f64| format!("{:.2} %", (1e4 * share + 1e-9).floor() / 1e2);
     share.known().map_or_else(|| "-".into(), digits)
 }
 

@@ -2,6 +2,7 @@
 //! of a push.
 
 use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
+use scarab_base::random::Random;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -133,4 +134,23 @@ fn push_for(repetitions: &[usize]) {
         println!("{} s: pushed for {seen} s", 30 * periods);
         assert!((0.48..=0.72).contains(&seen), "{} s: {seen} s", 30 * periods);
     }
+}
+
+#[test]
+fn wrong_time_stamps_are_refused_where_inertias_are_wrong() {
+    let folder = Folder::new();
+    let file = changed(&folder, |table| {
+        let column = index(table, "t_s");
+        // Late by up to 1.9 ms, irregularly: rows are stamped when the recorder has time.
+        let mut random = Random::new("stamps", 5);
+        for row in &mut table.rows {
+            row[column] += random.uniform(0.0, 1.9e-3);
+        }
+    });
+    let (run, report) = replay(&folder, &file, "--bandwidth 25");
+    run.ends_with(3);
+    assert_eq!(samples(&report), [("time_stamps", None, true)]);
+    let found = report["samples"][0]["value"].as_f64().expect("a number");
+    // Uniform in 1.9 ms: 0.548 ms rms.
+    assert!((found / 0.548e-3 - 1.0).abs() < 0.05, "{found}");
 }

@@ -289,7 +289,7 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// Stretches in which all columns are constant.
+    /// Stretches in which a column is constant while the leg moves.
     fn frozen(&self, excluded: &Excluded) -> Option<SampleFinding> {
         let share = count(&self.is_frozen) / self.recording.time_s.len().max(1) as f64;
         let frozen_s = share * self.recording.duration_s();

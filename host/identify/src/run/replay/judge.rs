@@ -52,7 +52,7 @@ pub(super) fn judge<const N: usize, const B: usize>(
     });
     looked_at.break_off();
     let mut unused = recorder.finish();
-    if load.iter().any(|value| *value != 0.0) {
+    if let Some(load) = load {
         unused = unused.corrected(&[1.0; N], load);
     }
     unused.noise = if *noise_is_known { sample_noise(noise) } else { [0.0; N] };

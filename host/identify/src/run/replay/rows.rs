@@ -20,7 +20,7 @@ pub(super) const TAPS: usize = 2048;
 /// Open outputs of that filter.
 pub(super) const PENDING: usize = 205;
 /// Sample time of the firmware, s.
-pub(crate) const GRID_S: f64 = 1.0 / SAMPLE_RATE_HZ;
+pub(super) const GRID_S: f64 = 1.0 / SAMPLE_RATE_HZ;
 /// Above this bandwidth, 50 Hz rows alias the noise that the low-pass passes, and sigma becomes too small.
 const LARGEST_BANDWIDTH_HZ: f64 = 25.0;
 

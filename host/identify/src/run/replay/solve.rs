@@ -1,4 +1,4 @@
-//! From rows to the swarm's result.
+//! From samples to the swarm's result.
 
 use scarab::ident::{ConstantRatio, Ends, Estimator, SearchState, Solver, Stretches};
 
@@ -20,7 +20,7 @@ pub(super) struct Solved<const N: usize, const B: usize> {
     pub recorder: Box<HostRecorder<N, B>>,
     pub sources: Vec<Source>,
     /// Base parameters of a known load, which the recorded torque contains.
-    pub load: [f32; B],
+    pub load: Option<[f32; B]>,
     /// Whether the torques' noise explains the misfit.
     pub noise_is_known: bool,
     pub search: Search,
@@ -29,7 +29,7 @@ pub(super) struct Solved<const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> Solved<N, B> {
     /// The found base parameters with those of the load.
     pub(super) fn values(&self) -> [f32; B] {
-        with(self.solver.values(), &self.load)
+        with(self.solver.values(), &self.load.unwrap_or([0.0; B]))
     }
 }
 
@@ -88,6 +88,7 @@ pub(super) fn solve<const N: usize, const B: usize>(
     if !noise_is_known {
         recorder.count_disturbances();
     }
+    let load = options.load.is_some().then_some(load);
     Solved { solver, recorder, sources, load, noise_is_known, search }
 }
 

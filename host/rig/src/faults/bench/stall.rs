@@ -30,8 +30,8 @@ use crate::faults::scenario::Head;
 const OFF: DriveState = DriveState::SwitchOnDisabled;
 /// More records than fill a sector.
 const MOST_RECORDS: u32 = 1000;
-/// Servo ticks until a request is in progress, of the longest flash write, and until hosts are informed:
-/// twice the inhibit time of emergency messages.
+/// Servo ticks until a request is in progress, of the longest flash write, and until hosts are informed,
+/// twice the inhibit time of emergency messages, or a board has started.
 const START_TICKS: u64 = 16;
 const LONGEST: u64 = 20_000;
 const REPORT_TICKS: u64 = 80;
