@@ -329,3 +329,51 @@ impl<B: Bus> Client<B> {
         self.try_write(node, object, value, size).map_err(|error| error.of(node, object))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::Patience;
+
+    /// Node that accepts a block transfer and takes none of its segments.
+    struct TakesNothing {
+        blocks: u32,
+        answer: Option<Frame>,
+        now: Duration,
+    }
+
+    impl Bus for TakesNothing {
+        fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
+            let answer = |data: [u8; 8]| Some(Frame::new(ANSWER + 3, &data));
+            match frame.data() {
+                [0xC6, ..] => self.answer = answer([0xA4, 0x50, 0x1F, 1, 2, 0, 0, 0]),
+                [2, ..] => {
+                    self.blocks += 1;
+                    self.answer = answer([0xA2, 0, 2, 0, 0, 0, 0, 0]);
+                }
+                _ => {}
+            }
+            Ok(())
+        }
+
+        fn receive(&mut self, until: Duration) -> Result<Option<Frame>, RequestError> {
+            let answer = self.answer.take();
+            if answer.is_none() {
+                self.now = until;
+            }
+            Ok(answer)
+        }
+
+        fn now(&self) -> Duration {
+            self.now
+        }
+    }
+
+    #[test]
+    fn a_download_is_given_up_where_the_node_takes_no_segment() {
+        let mut client = Client::over(TakesNothing { blocks: 0, answer: None, now: Duration::ZERO });
+        let result = client.download(3, Object(0x1F50, 1), &[0; 100], |_, taken| assert_eq!(taken, 0));
+        assert_eq!(result, Err(RequestError::Silent(Patience::REAL.answer)));
+        assert_eq!(client.bus.blocks, MOST_VAIN + 1);
+    }
+}
