@@ -326,7 +326,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
                 axis.void_targets();
             }
         }
-        (self.leg.activity, self.leg.change) = (status.activity, status.change);
+        self.leg.update(status.activity, status.change);
         let commanded = self.axes.iter().any(Axis::is_commanded);
         self.hosted = commanded || self.hosted && drive.permission() != Permission::Off;
         let refused = core::mem::take(&mut self.refused) || status.refused.is_some();

@@ -290,7 +290,6 @@ impl Node {
         if self.communication.state != NmtState::Operational {
             return;
         }
-        self.receive_cycle(Kind::Sync, now_us);
         let counter = match (self.communication.sync_overflow, frame.data()) {
             (0, _) => None,
             (overflow, &[counter]) if (1..=overflow).contains(&counter) => Some(counter),
@@ -300,10 +299,11 @@ impl Node {
                 return self.communication.emergency.set(Source::Sync, Some(report));
             }
         };
+        self.receive_cycle(Kind::Sync, now_us);
         self.communication.emergency.set(Source::Sync, None);
         for place in 0..PDOS {
-            if self.communication.receive.get_mut(place).is_some_and(|receive| receive.at_sync()) {
-                self.write_received(place, objects);
+            if self.communication.receive.get_mut(place).is_some_and(|receive| receive.at_sync(now_us)) {
+                self.apply_received(place, now_us, objects);
             }
         }
         objects.synchronise();
@@ -323,14 +323,24 @@ impl Node {
             return FrameEffect::Nothing;
         };
         let received = receive.take(frame, now_us);
-        self.receive_cycle(Kind::Receive(place as u8), now_us);
-        let too_short = ErrorReport::code(NoticeCode::ShortPdo.number());
-        let error = (received == Received::TooShort).then_some(too_short);
-        self.communication.emergency.set(Source::Receive(place as u8), error);
-        if received == Received::Now {
-            self.write_received(place, objects);
+        match received {
+            Received::Now => self.apply_received(place, now_us, objects),
+            // Values that wait for a SYNC which never comes command nothing.
+            Received::AtSync => {}
+            Received::TooShort => {
+                self.receive_cycle(Kind::Receive(place as u8), now_us);
+                let error = ErrorReport::code(NoticeCode::ShortPdo.number());
+                self.communication.emergency.set(Source::Receive(place as u8), Some(error));
+            }
         }
         FrameEffect::Something
+    }
+
+    /// Handles a received PDO whose values are valid now.
+    fn apply_received<O: Objects>(&mut self, place: usize, now_us: u64, objects: &mut O) {
+        self.receive_cycle(Kind::Receive(place as u8), now_us);
+        self.communication.emergency.set(Source::Receive(place as u8), None);
+        self.write_received(place, objects);
     }
 
     /// Writes the objects of a received PDO. An object that rejects its value keeps the old one.

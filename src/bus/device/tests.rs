@@ -232,6 +232,56 @@ fn a_host_that_a_reset_left_in_control_is_missed_without_a_controlword() {
 }
 
 #[test]
+fn settings_of_the_next_identification_and_assistance_end_with_the_session() {
+    use crate::assist::AssistShares;
+    use crate::leg::Wearing;
+    let settings = |bench: &Bench| (bench.device.leg.wearing, bench.device.leg.shares);
+    let unset = (None, AssistShares::GRAVITY_ONLY);
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    bench.write(1, 0x2100, 13, 2, 1);
+    bench.write(1, 0x2150, 3, 500, 2);
+    bench.enable();
+    let shares = settings(&bench).1;
+    assert_ne!(shares, unset.1);
+    // The leg is worn in this identification, and unknown in the next one.
+    bench.write(1, 0x2100, 1, 1, 1);
+    let worn = |order: &LegOrder<2>| matches!(order.request, Some(LegRequest::Identify { wearing, .. }) if wearing == Some(Wearing::Worn));
+    assert!(bench.orders.iter().any(worn));
+    assert_eq!(settings(&bench), (Some(Wearing::Worn), shares), "not begun");
+    bench.device.leg.update(Activity::Identify(crate::leg::IdentifyPhase::Approach), [false; 2]);
+    assert_eq!(settings(&bench), (None, shares));
+    bench.run(1);
+    for end in [[129, 0], [130, 1], [128, 2]] {
+        bench.write(2, 0x2100, 13, 1, 1);
+        bench.write(2, 0x2150, 3, 500, 2);
+        bench.send(0, &end);
+        assert_eq!(settings(&bench), unset, "{end:?}");
+        bench.send(0, &[1, 0]);
+    }
+}
+
+#[test]
+fn a_host_whose_synchronous_pdos_wait_for_a_sync_is_lost() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x1401, 2, 1, 1);
+    // The other node watches nothing.
+    bench.write(2, 0x2013, 0, 0, 1);
+    bench.send(0, &[1, 0]);
+    bench.enable();
+    for _ in 0..50 {
+        bench.send(0x301, &[0, 0, 0, 0]);
+        bench.send(0x80, &[]);
+    }
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+    // Its frames go on, but none of its values becomes valid.
+    for _ in 0..100 {
+        bench.send(0x301, &[0, 0, 0, 0]);
+    }
+    assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+}
+
+#[test]
 fn a_leg_that_is_taken_over_node_by_node_stays_enabled() {
     let mut bench = Bench::new();
     bench.drive = DriveState::OperationEnabled;

@@ -403,9 +403,9 @@ impl Axis {
         self.take_request();
     }
 
-    /// Makes all targets void until they are written again.
+    /// Makes all targets void until they are written again, and a start by bit 4 that was not taken yet.
     pub fn void_targets(&mut self) {
-        self.targets = Targets::default();
+        (self.targets, self.asks) = (Targets::default(), false);
     }
 
     /// Takes the command to disable voltage of a host that does not control the leg.
@@ -514,6 +514,12 @@ impl Axis {
         self.take_request();
     }
 
+    /// Sets the mode (6060). An edge of bit 4 that came in another mode starts nothing in this one.
+    pub(super) fn set_mode(&mut self, mode: i8) {
+        self.asks &= mode == self.settings.mode;
+        self.settings.mode = mode;
+    }
+
     /// Takes a set-point or a start of homing, once the leg is in that mode and can take it.
     fn take_request(&mut self) {
         let mode = self.settings.mode;
@@ -531,7 +537,10 @@ impl Axis {
                 self.set_point = SetPoint { position, relative_to, immediately };
             }
             Some(Mode::Homing) => {}
-            _ => return,
+            _ => {
+                self.asks = false;
+                return;
+            }
         }
         if mode == Mode::Homing as i8 {
             // Targets would name other positions.

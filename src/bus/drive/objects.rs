@@ -161,7 +161,7 @@ impl Objects for Axis {
                 if !is_offered {
                     return Err(Abort::Range);
                 }
-                settings.mode = value as i8;
+                self.set_mode(value as i8);
             }
             (0x6065, _) => settings.following_window = value,
             (0x6066, _) => settings.following_time_ms = value as u16,

@@ -106,6 +106,21 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
         matches!(self.requested, Some(LegCommand::Identify | LegCommand::Assist))
     }
 
+    /// Takes over the leg's activity and the model monitor's state after a tick.
+    pub fn update(&mut self, activity: Activity, change: [bool; 2]) {
+        let identifies = |activity| matches!(activity, Activity::Identify(_));
+        if identifies(activity) && !identifies(self.activity) {
+            // It belonged to the identification that begins.
+            self.wearing = None;
+        }
+        (self.activity, self.change) = (activity, change);
+    }
+
+    /// Discards what a host said about the next identification and assistance, when its session ends.
+    pub fn end_session(&mut self) {
+        (self.wearing, self.shares) = (None, AssistShares::GRAVITY_ONLY);
+    }
+
     /// Takes the pending request.
     pub fn take_request(&mut self) -> Option<LegCommand> {
         self.requested.take()
@@ -355,6 +370,7 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
 
     fn lost(&mut self, why: Lost) {
         self.axis.lost(why);
+        self.leg.end_session();
     }
 
     fn misses_host(&self) -> bool {

@@ -126,6 +126,25 @@ fn a_short_pdo_is_reported_and_ignored_and_a_late_one_stops_the_drive() {
 }
 
 #[test]
+fn the_event_timer_of_a_synchronous_pdo_is_restarted_by_its_sync() {
+    let mut board = started();
+    assert_eq!(board.write(0x1401, 2, 1, 1), Ok(()));
+    assert_eq!(board.write(0x1401, 5, 10, 2), Ok(()));
+    let is_late = |frames: &[Frame]| frames.iter().any(|frame| codes(&[*frame]).contains(&0x8250));
+    for (syncs, late) in [(true, false), (false, true)] {
+        let mut found = false;
+        for _ in 0..10 {
+            board.receive(0x301, &[1, 0, 0, 0]);
+            if syncs {
+                board.receive(0x080, &[]);
+            }
+            found |= is_late(&board.run(8));
+        }
+        assert_eq!(found, late, "{syncs}");
+    }
+}
+
+#[test]
 fn a_counted_sync_without_valid_counter_is_ignored() {
     let mut board = started();
     assert_eq!(board.write(0x1019, 0, 4, 1), Ok(()));

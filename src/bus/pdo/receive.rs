@@ -31,7 +31,9 @@ impl Receive {
         Self { parameters, data: [0; 8], waits: false, due_us: None }
     }
 
-    /// Takes over a frame with this PDO's COB-ID. Bytes beyond the mapped ones are ignored.
+    /// Takes over a frame with this PDO's COB-ID. Bytes beyond the mapped ones are ignored. The event timer of
+    /// a synchronous PDO is restarted by the SYNC that makes its values valid: without SYNC its host commands
+    /// nothing, however often it sends.
     pub fn take(&mut self, frame: &Frame, now_us: u64) -> Received {
         if frame.data().len() < self.parameters.length() {
             return Received::TooShort;
@@ -39,15 +41,25 @@ impl Receive {
         for (place, byte) in self.data.iter_mut().zip(frame.data()) {
             *place = *byte;
         }
-        let event_us = self.event_us();
-        self.due_us = (event_us > 0).then_some(now_us + event_us);
         self.waits = self.parameters.is_synchronous();
+        if !self.waits {
+            self.restart_event_timer(now_us);
+        }
         if self.waits { Received::AtSync } else { Received::Now }
     }
 
     /// Whether values were waiting for this SYNC.
-    pub fn at_sync(&mut self) -> bool {
-        core::mem::take(&mut self.waits)
+    pub fn at_sync(&mut self, now_us: u64) -> bool {
+        let waited = core::mem::take(&mut self.waits);
+        if waited {
+            self.restart_event_timer(now_us);
+        }
+        waited
+    }
+
+    fn restart_event_timer(&mut self, now_us: u64) {
+        let event_us = self.event_us();
+        self.due_us = (event_us > 0).then_some(now_us + event_us);
     }
 
     /// Whether the event timer has just expired; reported once.

@@ -139,10 +139,10 @@ fn a_received_pdo_takes_effect_by_its_type_and_can_time_out() {
     assert_eq!(parameters.set_communication(5, 10), Ok(()));
     let mut receive = Receive::new(parameters);
     assert_eq!(receive.take(&Frame::new(0x201, &[6]), 0), Received::TooShort);
-    assert!(!receive.at_sync());
+    assert!(!receive.at_sync(5_000));
     assert_eq!(receive.take(&Frame::new(0x201, &[6, 0, 9]), 0), Received::AtSync);
-    assert!(receive.at_sync() && !receive.at_sync());
-    assert!(!receive.is_missed(10_000) && receive.is_missed(10_001) && !receive.is_missed(20_000));
+    assert!(receive.at_sync(5_000) && !receive.at_sync(5_000));
+    assert!(!receive.is_missed(15_000) && receive.is_missed(15_001) && !receive.is_missed(30_000));
     assert_eq!(receive.parameters.set_communication(2, 254), Ok(()));
     assert_eq!(receive.take(&Frame::new(0x201, &[6, 0]), 0), Received::Now);
 }

@@ -19,6 +19,9 @@
 //! No setting makes a stop endless: whatever a host has set, a joint slows down from its largest speed, and a
 //! torque fades from its limit, within [`LONGEST_STOP_S`].
 //!
+//! The limits of a host (607D) act within the joint's range. Limits that exclude the joint when a mode begins
+//! are extended to its position, so they pull it nowhere.
+//!
 //! While a joint returns into its range (`safety::Monitor`), every position or velocity mode moves it slowly.
 //! Targets are limited to the range, and the commanded position is never farther out than the joint.
 
@@ -130,6 +133,10 @@ pub struct Follower {
     /// Cyclic position: no target within the window has come yet.
     waits: bool,
     halted: bool,
+    /// The host's limits (607D) as stated, and the range that they leave. When they come into force, at the
+    /// beginning of a mode or by a change, they are extended to the joint: they must not pull it.
+    stated: [Radian; 2],
+    range: [f32; 2],
     /// Whether the joint returned in the previous tick.
     returned: bool,
     /// Ticks for which the joint has been outside the following window, or inside the position window.
@@ -165,11 +172,16 @@ struct Tick<'a> {
 }
 
 impl<'a> Tick<'a> {
-    fn new(command: &'a JointCommand, measured: &'a Measured, whole: &Bounds, starts: bool) -> Self {
+    fn new(
+        command: &'a JointCommand,
+        measured: &'a Measured,
+        whole: &Bounds,
+        range: [f32; 2],
+        starts: bool,
+    ) -> Self {
         let slow =
             Bounds { speed: min(whole.speed, RETURN_SPEED), torque: RETURN_TORQUE * whole.torque, ..*whole };
         let bounds = if measured.returns { slow } else { *whole };
-        let [low, high] = bounds.range;
         let stops = command.halt || command.target == Target::Hold;
         let least = if stops { LEAST_TORQUE * bounds.torque } else { 0.0 };
         let gentlest = min(whole.speed / LONGEST_STOP_S, whole.acceleration);
@@ -177,7 +189,7 @@ impl<'a> Tick<'a> {
             command,
             measured,
             bounds,
-            range: [max(low, command.range[0].0), min(high, command.range[1].0)],
+            range,
             rates: Rates {
                 speed: min(command.velocity.0, bounds.speed),
                 acceleration: min(command.acceleration.0, bounds.acceleration),
@@ -217,6 +229,8 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
+        stated: [Radian(f32::NAN); 2],
+        range: [0.0; 2],
         returned: false,
         outside: 0,
         inside: 0,
@@ -270,8 +284,11 @@ impl Follower {
         self.stand(command, measured);
         let ends = core::mem::replace(&mut self.returned, measured.returns) && !measured.returns;
         self.limited = false;
+        if command.range != self.stated {
+            self.limit_range(command, measured, bounds);
+        }
         let starts = begins || was_halted && !command.halt || ends;
-        let tick = Tick::new(command, measured, bounds, starts);
+        let tick = Tick::new(command, measured, bounds, self.range, starts);
         let demand = Demand {
             course: self.course,
             velocity_offset: 0.0,
@@ -337,6 +354,13 @@ impl Follower {
         self.conclude(demand, &tick)
     }
 
+    /// Range that the host's limits leave.
+    fn limit_range(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) {
+        let within = |angle: Radian| clamp(angle.0, bounds.range[0], bounds.range[1]);
+        let ([low, high], position) = (command.range.map(within), within(measured.position));
+        (self.stated, self.range) = (command.range, [min(low, position), max(high, position)]);
+    }
+
     /// Updates whether the joint stands.
     fn stand(&mut self, command: &JointCommand, measured: &Measured) {
         let is_slow = abs(measured.velocity.0) <= command.standing_speed.0;
@@ -381,8 +405,8 @@ impl Follower {
 
     /// Profile velocity: changes the velocity along its ramp.
     fn run(&mut self, velocity: f32, tick: &Tick<'_>) {
-        let Tick { command, measured, rates, .. } = tick;
-        let wanted = self.bounded(velocity, -rates.speed, rates.speed);
+        let Tick { command, measured, bounds, .. } = tick;
+        let wanted = self.bounded(velocity, -bounds.speed, bounds.speed);
         self.course.accelerate(wanted, &tick.braking(), tick.range, TICK_S);
         self.course.keep_within(command.following_window.0, measured.position.0);
         let near = abs(wanted - measured.velocity.0) <= command.velocity_window.0;
@@ -452,8 +476,8 @@ impl Follower {
         (self.goal, self.next, self.left) = (None, None, 0);
         (self.arrived, self.waits) = (false, false);
         (self.outside, self.inside, self.reached, self.deviates) = (0, 0, false, false);
-        // NaN: the first target of a cyclic mode always starts a period.
-        self.target = f32::NAN;
+        // NaN: the first target of a cyclic mode always starts a period, and the host's limits come into force.
+        (self.target, self.stated) = (f32::NAN, [Radian(f32::NAN); 2]);
     }
 
     /// Continues with no more than the joint's own velocity. A cyclic target that has jumped leaves the

@@ -750,6 +750,64 @@ fn a_host_s_search_for_a_stop_ends_at_the_range() {
     }
 }
 
+#[test]
+fn limits_that_exclude_a_joint_when_it_is_enabled_pull_it_nowhere() {
+    let joint = 1;
+    for limits in [[0.2, 0.3], [-9.0, -8.0]] {
+        for way in 0..3 {
+            let mut hosted = Hosted::new();
+            hosted.run(SECOND);
+            let from = hosted.position(joint);
+            let mut hosted = Hosted::resting_at(hosted.pair.world.anatomical_position());
+            hosted.commands[joint].range = limits.map(|limit| Radian(from + limit));
+            hosted.pair.leg.command(&hosted.commands);
+            assert!(hosted.pair.enable(context().gravity));
+            hosted.run(10);
+            match way {
+                0 => impedance(&mut hosted, joint, from, 200.0, 15.0),
+                1 => hosted.cyclic(joint, from),
+                _ => hosted.point(joint, from, true),
+            }
+            for _ in 0..SECOND {
+                hosted.run(1);
+                let moved = (hosted.position(joint) - from).abs();
+                assert!(moved < 0.06 && is_enabled(&hosted.pair), "{limits:?} {way}: moved by {moved} rad");
+            }
+        }
+    }
+    // It moves into them at any speed, and is then held by the other one.
+    for is_cyclic in [true, false] {
+        let mut hosted = Hosted::new();
+        hosted.run(SECOND);
+        let from = hosted.position(joint);
+        let mut hosted = Hosted::resting_at(hosted.pair.world.anatomical_position());
+        hosted.commands[joint].range = [0.1, 0.5].map(|limit| Radian(from + limit));
+        hosted.pair.leg.command(&hosted.commands);
+        assert!(hosted.pair.enable(context().gravity));
+        hosted.run(10);
+        for tick in 0..2 * SECOND {
+            let target = (0.8 * tick as f32 / SECOND as f32).min(0.6);
+            match is_cyclic {
+                true => hosted.cyclic(joint, from + target),
+                false => impedance(&mut hosted, joint, from + target, 200.0, 15.0),
+            }
+            hosted.run(1);
+            assert!(is_enabled(&hosted.pair) && hosted.position(joint) < from + 0.52, "{is_cyclic} {tick}");
+        }
+        assert!(hosted.position(joint) > from + 0.3, "{is_cyclic}: {}", hosted.position(joint) - from);
+    }
+}
+
+#[test]
+fn a_profile_velocity_is_not_limited_by_that_of_the_profile() {
+    let mut hosted = Hosted::new();
+    hosted.commands[1].velocity = RadianPerSecond(0.1);
+    hosted.commands[1].target = Target::ProfileVelocity(RadianPerSecond(0.4));
+    hosted.run(SECOND / 2);
+    let JointStatus { velocity, reached, .. } = hosted.status[1];
+    assert!(reached && (velocity.0 - 0.4).abs() < 0.05, "{velocity:?}");
+}
+
 /// Commands a spring and a damper around a position.
 fn impedance(hosted: &mut Hosted, joint: usize, position: f32, stiffness: f32, damping: f32) {
     hosted.commands[joint].torque_slope_nm_per_s = 400.0;
