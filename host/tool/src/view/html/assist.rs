@@ -5,6 +5,7 @@ use scarab_rig::report::assist::AssistReport;
 
 use crate::view::assist::{notes, periodic, rows, shares, wearer_sums};
 use crate::view::figures::{Figure, Group};
+use crate::view::html::table::ToHtml;
 use crate::view::html::{Circumstances, drawing, page_head};
 
 /// Creates the page.
