@@ -155,17 +155,10 @@ fn based(
     let wearer = Exercise::Gait(CADENCE_HZ);
     let worn = leg.assist.map(|_| Worn::new::<BASE>(leg, wearer, base)).transpose()?;
     let leg = worn.as_ref().map_or(leg, |worn| &worn.exoskeleton);
-    let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
-    let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
-    if widened {
-        for joint in &mut context.configuration.joints {
-            (joint.torque, joint.current) = (joint.torque * WIDENED, joint.current * WIDENED);
-        }
-    }
-    let mut length = if worn.is_some() { WORN_LENGTH } else { length(leg, &context, base)? };
-    if let Some(seconds) = options.seconds {
-        length = length.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
-    }
+    let context = context(leg, base, widened)?;
+    let whole = if worn.is_some() { WORN_LENGTH } else { length(leg, &context, base)? };
+    let shortened = |seconds: f64| whole.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
+    let length = options.seconds.map_or(whole, shortened);
     let setting = Setting { leg, bounds, manner: options.manner, widened, length };
     let mut jobs = setting.jobs(options, twice, base);
     let mut stops = if every { stops(length) } else { Vec::new() };
@@ -175,13 +168,9 @@ fn based(
         return Ok(campaign);
     }
     let mut rig = Rig::new(leg, &context, base)?;
-    if let Some(worn) = &worn {
-        worn.dress(&mut rig)?;
-    }
+    worn.as_ref().map_or(Ok(()), |worn| worn.dress(&mut rig))?;
     begin(leg, &mut rig)?;
-    if let Some(worn) = &worn {
-        worn.walk(&mut rig)?;
-    }
+    worn.as_ref().map_or(Ok(()), |worn| worn.walk(&mut rig))?;
     jobs.sort_by_key(|(period, job)| (*period, job.order()));
     // The shard with the last stop runs the identification to its end.
     let last_stop = stops.last().copied().map(|stop| if Some(stop) == last_of_all { length } else { stop });
@@ -211,6 +200,18 @@ fn based(
     let (periods, not_run) = (rig.period - from, jobs.count());
     campaign.bases.push(Base { seed: base, widened, periods, alarm, not_run });
     Ok(campaign)
+}
+
+/// Context of a base; `widened` torque caps are never reached.
+fn context(leg: &LegFile, base: u64, widened: bool) -> Result<Context<JOINTS, BASE>, ToolError> {
+    let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
+    let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
+    if widened {
+        for joint in &mut context.configuration.joints {
+            (joint.torque, joint.current) = (joint.torque * WIDENED, joint.current * WIDENED);
+        }
+    }
+    Ok(context)
 }
 
 /// Returns whether the stop comes in this period: every servo tick, and every period from 1 s to 2 s.

@@ -265,27 +265,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             Expected::Ignored => return self.ignore(),
             _ => {}
         }
-        let before = *self.rig.commands();
-        let limit = self.begun + self.scenario.patience;
-        let mut seen = None;
-        let mut false_alarm = false;
-        while seen.is_none() && (self.rig.period < limit) {
-            self.step();
-            if self.scenario.expected == Expected::Rejected && self.rig.period == self.begun + 1 {
-                let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
-                let kept = self.rig.commands()[joint] == before[joint];
-                let rejected = kept && self.rig.alarm().is_none();
-                seen = rejected.then_some("Limit");
-                if !rejected {
-                    break;
-                }
-            } else if self.rig.alarm().is_some() && !self.is_before() {
-                seen = self.safe_state();
-            }
-            if self.onset.is_some_and(|onset| self.is_too_late(onset)) {
-                break;
-            }
-        }
+        let seen = self.run_until_safe();
         let safe = self.rig.period;
         let alarm = self.rig.alarm();
         // A fault that begins only while the safe machine is watched does not belong to this run.
@@ -294,10 +274,8 @@ impl<'a, const B: usize> Watched<'a, B> {
             self.judge(state, code);
         }
         self.watch_on(seen);
-        if self.scenario.expected == Expected::Rejected {
-            // A single wrong reading must not stop the leg.
-            false_alarm = self.rig.alarm().is_some();
-        }
+        // A single wrong reading must not stop the leg.
+        let mut false_alarm = self.scenario.expected == Expected::Rejected && self.rig.alarm().is_some();
         // An alarm before the onset counts for this row only if its own detectors reported.
         let own = alarm.is_none_or(|code| self.row.fault.codes.contains(&code));
         let early = onset.is_none() && !own;
@@ -327,6 +305,31 @@ impl<'a, const B: usize> Watched<'a, B> {
             hash: format!("{:016x}", self.rig.hash),
             recording: self.recording,
         }
+    }
+
+    /// Runs until the state that the fault must lead to, which is returned, or until it is too late.
+    fn run_until_safe(&mut self) -> Option<&'static str> {
+        let before = *self.rig.commands();
+        let limit = self.begun + self.scenario.patience;
+        let mut seen = None;
+        while seen.is_none() && (self.rig.period < limit) {
+            self.step();
+            if self.scenario.expected == Expected::Rejected && self.rig.period == self.begun + 1 {
+                let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
+                let kept = self.rig.commands()[joint] == before[joint];
+                let rejected = kept && self.rig.alarm().is_none();
+                seen = rejected.then_some("Limit");
+                if !rejected {
+                    break;
+                }
+            } else if self.rig.alarm().is_some() && !self.is_before() {
+                seen = self.safe_state();
+            }
+            if self.onset.is_some_and(|onset| self.is_too_late(onset)) {
+                break;
+            }
+        }
+        seen
     }
 
     fn is_too_late(&self, onset: u64) -> bool {

@@ -109,19 +109,24 @@ fn reacts(fork: &mut Fork<'_>, charges: bool) -> bool {
     if charges { charge < 1.0 || board.signals.given_brake() > 0.0 } else { draw < 1.0 }
 }
 
-fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError> {
-    let charges = fork.fault.id == CHARGE.fault.id;
+/// States a drawn limit of the battery's current, A, in one direction. In that of V5 half of the legs have
+/// no brake resistor.
+fn set_limit(fork: &mut Fork<'_>, charges: bool, brake: Ohm, blind: bool) -> f64 {
     let limit = if charges { fork.random.logarithmic(0.5, 3.0) } else { fork.random.logarithmic(0.5, 8.0) };
     let stated = Some(Ampere(limit as f32)).filter(|_| !blind);
     let limits = match charges {
         true => SupplyLimits { draw: None, charge: stated, brake },
         false => SupplyLimits { draw: stated, charge: None, brake },
     };
-    let board = &mut fork.host.rig().board;
-    board.limit_supply(limits);
+    fork.host.rig().board.limit_supply(limits);
     if charges && fork.random.coin() {
         fork.host.rig().board.loops.remove_chopper();
     }
+    limit
+}
+
+/// Pushes every joint once. Returns the longest duration, s.
+fn push_joints(fork: &mut Fork<'_>, charges: bool) -> f64 {
     let mut longest_push: f64 = 0.0;
     for joint in 0..JOINTS {
         let (peak, seconds) = match charges {
@@ -132,6 +137,13 @@ fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError
         fork.host.rig().world.push(joint, peak, seconds);
         longest_push = longest_push.max(seconds);
     }
+    longest_push
+}
+
+fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError> {
+    let charges = fork.fault.id == CHARGE.fault.id;
+    let limit = set_limit(&mut fork, charges, brake, blind);
+    let longest_push = push_joints(&mut fork, charges);
     let sign = if charges { -1.0 } else { 1.0 };
     let (above, below) = (1.0 + RELATIVE, 1.0 - RELATIVE);
     let (mut current, mut before, mut most) = (0.0, delivered(&mut fork), 0.0_f64);
