@@ -320,6 +320,31 @@ fn print_findings(session: &Session) {
     }
 }
 
+/// Prints the processor's load by interrupt and by level.
+fn print_load(report: &ChipReport) {
+    println!("interrupt          per second   instructions mean   worst   latency us   longest us");
+    for (name, used) in &report.interrupts {
+        println!(
+            "{name:<18} {:>10.1} {:>19.1} {:>7} {:>12.2} {:>12.2}",
+            used.per_second,
+            used.mean_instructions,
+            used.worst_instructions,
+            used.worst_latency_us,
+            used.longest_us
+        );
+    }
+    let load = &report.load;
+    println!(
+        "load: {:.1} %, level 0 {:.1} %, servo {:.1} %, bus {:.1} %, housekeeping {:.1} %, thread {:.1} %",
+        100.0 * load.total,
+        100.0 * load.level0,
+        100.0 * load.servo,
+        100.0 * load.bus,
+        100.0 * load.housekeeping,
+        100.0 * load.thread
+    );
+}
+
 fn print_run(report: &ChipReport, wall_s: f64) {
     for finding in &report.findings {
         println!(
@@ -346,27 +371,7 @@ fn print_run(report: &ChipReport, wall_s: f64) {
         report.verdict,
         report.reasons.iter().map(|why| format!(", {why}")).collect::<String>()
     );
-    println!("interrupt          per second   instructions mean   worst   latency us   longest us");
-    for (name, used) in &report.interrupts {
-        println!(
-            "{name:<18} {:>10.1} {:>19.1} {:>7} {:>12.2} {:>12.2}",
-            used.per_second,
-            used.mean_instructions,
-            used.worst_instructions,
-            used.worst_latency_us,
-            used.longest_us
-        );
-    }
-    let load = &report.load;
-    println!(
-        "load: {:.1} %, level 0 {:.1} %, servo {:.1} %, bus {:.1} %, housekeeping {:.1} %, thread {:.1} %",
-        100.0 * load.total,
-        100.0 * load.level0,
-        100.0 * load.servo,
-        100.0 * load.bus,
-        100.0 * load.housekeeping,
-        100.0 * load.thread
-    );
+    print_load(report);
     println!(
         "missed: {} current ticks, {} servo ticks; conversions lost {}; stack {} of {} bytes; records {} read, {} lost; resets {}",
         report.missed_current_ticks,

@@ -147,7 +147,7 @@ pub fn run(session: &mut Session, enabled: &Snapshot) -> Result<Vec<CrashReport>
 /// The image lacks a symbol, or does not come to an instant that is searched.
 pub fn crash(session: &mut Session, kind: CrashKind) -> Result<CrashReport, ToolError> {
     let image = session.machine.image();
-    let (address, size) = image
+    let record = image
         .variable(RECORD)
         .ok_or_else(|| ToolError::input(format!("the image has no variable {RECORD}")))?;
     let mut seen = Seen { tick: reach(session, kind)?, begun: session.now(), ..Seen::default() };
@@ -157,24 +157,9 @@ pub fn crash(session: &mut Session, kind: CrashKind) -> Result<CrashReport, Tool
     chip.plant.switchings = Some(Vec::new());
     chip.hard_fault = None;
     seen.expected = inject(session, kind)?;
-    let mut before = vec![0; size as usize];
-    session.machine.memory(address, &mut before);
-    let (mut content, injected) = (before.clone(), seen.begun);
+    let injected = seen.begun;
     let end = injected + ticks(RESET_S);
-    while seen.reset.is_none() && session.now() < end {
-        // To the end of a block.
-        let ended = session.machine.run(session.now() + 1)?;
-        let now = session.now();
-        session.machine.memory(address, &mut content);
-        if content != before {
-            seen.stored = Some([seen.stored.map_or(now, |[first, _]| first), now]);
-            before.clone_from(&content);
-        }
-        if let End::Reset(reason) = ended {
-            seen.reset = Some((now, reason));
-            session.resets.push(reason);
-        }
-    }
+    run_to_reset(session, record, end, &mut seen)?;
     if matches!(kind, CrashKind::StackOverflow(_)) {
         let fault = session.machine.chip().hard_fault;
         seen.begun = fault.ok_or_else(|| ToolError::input("the stack did not overflow"))?;
@@ -211,6 +196,33 @@ pub fn crash(session: &mut Session, kind: CrashKind) -> Result<CrashReport, Tool
         record: seen.record,
         complaints,
     })
+}
+
+/// Runs to the reset, or until `end`, and notes the stores to the crash record, at an address and of a size.
+fn run_to_reset(
+    session: &mut Session,
+    (address, size): (u32, u32),
+    end: Ticks,
+    seen: &mut Seen,
+) -> Result<(), ToolError> {
+    let mut before = vec![0; size as usize];
+    session.machine.memory(address, &mut before);
+    let mut content = before.clone();
+    while seen.reset.is_none() && session.now() < end {
+        // To the end of a block.
+        let ended = session.machine.run(session.now() + 1)?;
+        let now = session.now();
+        session.machine.memory(address, &mut content);
+        if content != before {
+            seen.stored = Some([seen.stored.map_or(now, |[first, _]| first), now]);
+            before.clone_from(&content);
+        }
+        if let End::Reset(reason) = ended {
+            seen.reset = Some((now, reason));
+            session.resets.push(reason);
+        }
+    }
+    Ok(())
 }
 
 /// Runs to an instant of the kind's level before a current tick; returns the tick's time.

@@ -109,14 +109,11 @@ pub fn serve(
     let begun = session.now();
     let mut due = Instant::now();
     while duration.is_none_or(|duration| seconds(session.now() - begun) < duration) {
-        let mut queue = session.machine.chip().can.partner.len();
-        let mut frames = Vec::new();
+        let queued = session.machine.chip().can.partner.len();
+        let mut frames: Vec<Frame> = Vec::new();
         let events = server.poll(Instant::now(), |frame, _| {
-            let taken = queue < QUEUE;
-            if taken {
-                queue += 1;
-                frames.push(frame);
-            }
+            let taken = queued + frames.len() < QUEUE;
+            frames.extend(taken.then_some(frame));
             taken
         });
         for event in events {

@@ -431,7 +431,14 @@ impl Session {
                 }
             }
         }
-        // The firmware counts from its first instruction, and reports the longest of the last second.
+        wrong.extend(self.wrong_times()?);
+        if wrong.is_empty() { Ok(()) } else { Err(ToolError::Refused(wrong.join("; "))) }
+    }
+
+    /// Compares the longest times of two interrupts, and returns the wrong ones. The firmware counts from its
+    /// first instruction, and reports the longest of the last second.
+    fn wrong_times(&mut self) -> Result<Vec<String>, ToolError> {
+        let mut wrong = Vec::new();
         for (name, sub, exception) in [("current interrupt", 7, CURRENT_INTERRUPT), ("servo tick", 8, SERVO)]
         {
             let shown = f64::from(self.read_object(1, 0x2170, sub)?) * 1e-3;
@@ -446,7 +453,7 @@ impl Session {
                 wrong.push(row);
             }
         }
-        if wrong.is_empty() { Ok(()) } else { Err(ToolError::Refused(wrong.join("; "))) }
+        Ok(wrong)
     }
 
     fn status_light(&mut self) -> Result<(), ToolError> {

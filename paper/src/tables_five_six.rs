@@ -246,12 +246,11 @@ fn base_line(printed: &Printed, methods: &[Vec<&RunReport>; 2]) -> Option<BaseLi
     })
 }
 
-fn words(report: &TablesReport) -> String {
-    let mut five = Table::default().label("").numbers([
-        "paper: real",
-        "identified",
-        "error, % as printed",
-        "by (30)",
+/// Columns of the printed values.
+const PAPER_COLUMNS: [&str; 4] = ["paper: real", "identified", "error, % as printed", "by (30)"];
+
+fn table_five(lines: &[ParameterLine]) -> Table {
+    let mut table = Table::default().label("").numbers(PAPER_COLUMNS).numbers([
         "determined by torque",
         "here: truth",
         "one-time",
@@ -259,8 +258,8 @@ fn words(report: &TablesReport) -> String {
         "sequential",
         "error, %",
     ]);
-    for line in &report.table_v {
-        five.row([
+    for line in lines {
+        table.row([
             line.name.clone(),
             number(line.paper.real.into()),
             number(line.paper.identified.into()),
@@ -279,23 +278,18 @@ fn words(report: &TablesReport) -> String {
             percent(line.sequential.error_percent.known()),
         ]);
     }
-    let mut six = Table::default().label("").numbers([
-        "paper: real",
-        "identified",
-        "error, % as printed",
-        "by (30)",
-        "sum",
-        "here: truth",
-        "one-time",
-        "error, %",
-        "error/sigma",
-        "sequential",
-        "error, %",
-        "error/sigma",
-        "least squares: error, %",
-    ]);
-    for line in &report.table_vi {
-        six.row([
+    table
+}
+
+fn table_six(lines: &[BaseLine]) -> Table {
+    let mut table = Table::default()
+        .label("")
+        .numbers(PAPER_COLUMNS)
+        .numbers(["sum", "here: truth"])
+        .numbers(["one-time", "error, %", "error/sigma"])
+        .numbers(["sequential", "error, %", "error/sigma", "least squares: error, %"]);
+    for line in lines {
+        table.row([
             line.name.clone(),
             number(line.paper.real.into()),
             number(line.paper.identified.into()),
@@ -312,6 +306,10 @@ fn words(report: &TablesReport) -> String {
             percent(line.least_squares.error_percent.known()),
         ]);
     }
+    table
+}
+
+fn words(report: &TablesReport) -> String {
     let rank = &report.rank;
     let alone = report.table_v.iter().filter(|line| matches!(line.status, "identified" | "weak"));
     let alone: Vec<_> = alone.map(|line| line.name.as_str()).collect();
@@ -332,7 +330,7 @@ fn words(report: &TablesReport) -> String {
         rank.columns,
         alone.join(" "),
         alone.len(),
-        five.to_markdown(),
-        six.to_markdown(),
+        table_five(&report.table_v).to_markdown(),
+        table_six(&report.table_vi).to_markdown(),
     )
 }

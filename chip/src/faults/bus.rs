@@ -138,7 +138,12 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
             return Ok(Err(format!("{what}: node {node} sends no emergency message")));
         }
     }
-    // The host is back.
+    host_returns(session, hosted.positions)?;
+    Ok(release(session).map(|_| after).map_err(|complaint| format!("{what}: {complaint}")))
+}
+
+/// Brings a lost host back, which repeats its controlwords.
+fn host_returns(session: &mut Session, positions: [i32; JOINTS]) -> Result<(), ToolError> {
     send(session, Frame::new(0, &[1, 0]));
     for cycle in 0..100 {
         if cycle % 10 == 0 {
@@ -146,10 +151,10 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
         }
         send(session, Frame::new(HEARTBEAT, &[5]));
         send(session, Frame::new(SYNC, &[]));
-        send(session, targets(hosted.positions, 0.0));
+        send(session, targets(positions, 0.0));
         session.run(CYCLE_S)?;
     }
-    Ok(release(session).map(|_| after).map_err(|complaint| format!("{what}: {complaint}")))
+    Ok(())
 }
 
 /// B3: frames of any kind, more than the wire carries. A drive that is off stays off; a host's motion goes on
@@ -320,12 +325,9 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     for (node, codes) in NODES.into_iter().zip(codes) {
         let word = session.read_object(node, 0x6041, 0)?;
         let shown = session.read_object(node, 0x6061, 0)?;
+        let is_shown = shown as u8 == (mode as i8).cast_unsigned();
         let ignores = matches!(mode as i8, -1 | 8..=10) && word & 1 << 12 == 0;
-        if word & 0x806F != 0x27
-            || ignores
-            || shown as u8 != (mode as i8).cast_unsigned()
-            || !codes.is_empty()
-        {
+        if word & 0x806F != 0x27 || ignores || !is_shown || !codes.is_empty() {
             return Ok(Err(format!(
                 "{mode:?}, node {node}: {word:04X}, 6061 {shown:X}, emergencies {codes:X?}"
             )));

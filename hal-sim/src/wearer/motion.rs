@@ -270,34 +270,31 @@ impl IntendedMotion {
                 &[("angle of the hip, rad,", hip, ANGLE), ("angle of the knee, rad,", knee, ANGLE)],
             )
         };
-        match self {
-            Self::Rest(posture) => angles("rest", *posture),
+        match *self {
+            Self::Rest(posture) => angles("rest", posture),
             Self::Gait(gait) => {
                 angles("gait", gait.offset)?;
-                let scale = ("scale of the angles", [0.0, 3.0]);
                 check_ranges(
                     "gait",
                     &[
                         ("cadence, Hz,", gait.cadence_hz, CADENCE),
-                        (scale.0, gait.scale[0], scale.1),
-                        (scale.0, gait.scale[1], scale.1),
+                        ("scale of the angles", gait.scale[0], [0.0, 3.0]),
+                        ("scale of the angles", gait.scale[1], [0.0, 3.0]),
                     ],
                 )?;
-                gait.change.map_or(Ok(()), |change| {
-                    check_ranges(
-                        "change of cadence",
-                        &[
-                            ("cadence, Hz,", change.cadence_hz, CADENCE),
-                            ("start, s,", change.at, [0.0, 1e6]),
-                            ("duration, s,", change.within, DURATION),
-                        ],
-                    )
-                })
+                let Some(change) = gait.change else { return Ok(()) };
+                check_ranges(
+                    "change of cadence",
+                    &[
+                        ("cadence, Hz,", change.cadence_hz, CADENCE),
+                        ("start, s,", change.at, [0.0, 1e6]),
+                        ("duration, s,", change.within, DURATION),
+                    ],
+                )
             }
-            Self::Strokes(strokes) => {
-                let [out, stay, back, rest] = strokes.durations;
-                angles("strokes", strokes.postures[0])?;
-                angles("strokes", strokes.postures[1])?;
+            Self::Strokes(Strokes { postures: [first, second], durations: [out, stay, back, rest] }) => {
+                angles("strokes", first)?;
+                angles("strokes", second)?;
                 check_ranges(
                     "strokes",
                     &[
@@ -308,14 +305,13 @@ impl IntendedMotion {
                     ],
                 )
             }
-            Self::Reaching(reaching) => {
-                angles("reaching", reaching.low)?;
-                let [shortest, longest] = reaching.durations;
+            Self::Reaching(Reaching { low, high, durations: [shortest, longest], .. }) => {
+                angles("reaching", low)?;
                 check_ranges(
                     "reaching",
                     &[
-                        ("largest angle of the hip, rad,", reaching.high[0], [reaching.low[0], ANGLE[1]]),
-                        ("largest angle of the knee, rad,", reaching.high[1], [reaching.low[1], ANGLE[1]]),
+                        ("largest angle of the hip, rad,", high[0], [low[0], ANGLE[1]]),
+                        ("largest angle of the knee, rad,", high[1], [low[1], ANGLE[1]]),
                         ("shortest movement, s,", shortest, DURATION),
                         ("longest movement, s,", longest, [shortest, DURATION[1]]),
                     ],

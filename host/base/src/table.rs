@@ -1,9 +1,8 @@
-//! Tables, with three renderers: plain text, HTML and Markdown.
+//! Tables, rendered as plain text and Markdown here, and as HTML by the tool's pages.
 //!
 //! A column states once what its cells are and whether it is shown; a row gives one cell per column. Cells
 //! are plain text; HTML typesets minus signs and units.
 
-use maud::{Markup, Render, html};
 use unicode_width::UnicodeWidthStr;
 
 /// Least width of a Markdown column: its rule needs three characters.
@@ -11,21 +10,26 @@ const LEAST_RULE: usize = 3;
 
 /// Content of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+pub enum Kind {
     /// Name of the row.
     Label,
+    /// Words.
     Text,
     /// Aligned to the right.
     Number,
+    /// Unit of the numbers beside it.
     Unit,
 }
 
+/// Column of a table.
 #[derive(Clone, Debug)]
-struct Column {
-    head: String,
-    kind: Kind,
+pub struct Column {
+    /// Text of the header.
+    pub head: String,
+    /// Content of the cells.
+    pub kind: Kind,
     /// Style of the cells in HTML.
-    class: Option<&'static str>,
+    pub class: Option<&'static str>,
     is_shown: bool,
     is_html_only: bool,
 }
@@ -35,28 +39,17 @@ struct Column {
 pub enum Cell {
     /// Words or a number.
     Text(String),
-    /// Words, and the markup that HTML shows instead.
-    Html(String, Markup),
+    /// Words with numbers, whose minus signs HTML typesets.
+    Typeset(String),
+    /// Words, and the HTML that a page shows instead.
+    Html(String, String),
 }
 
 impl Cell {
-    /// Words with numbers, whose minus signs HTML typesets.
-    #[must_use]
-    pub fn typeset(text: String) -> Self {
-        let markup = typeset(&text).render();
-        Self::Html(text, markup)
-    }
-
     fn text(&self) -> &str {
         match self {
-            Self::Text(text) | Self::Html(text, _) => text,
+            Self::Text(text) | Self::Typeset(text) | Self::Html(text, _) => text,
         }
-    }
-}
-
-impl From<Markup> for Cell {
-    fn from(markup: Markup) -> Self {
-        Self::Html(String::new(), markup)
     }
 }
 
@@ -78,16 +71,19 @@ macro_rules! cells {
 }
 pub use cells;
 
+/// Row of a table.
 #[derive(Clone, Debug)]
-struct Row {
-    is_failed: bool,
+pub struct Row {
+    /// Whether a page marks the row.
+    pub is_failed: bool,
     cells: Vec<Cell>,
 }
 
 /// A table; see the module.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
-    class: Option<&'static str>,
+    /// Style in HTML.
+    pub class: Option<&'static str>,
     columns: Vec<Column>,
     rows: Vec<Row>,
 }
@@ -206,27 +202,16 @@ impl Table {
         lines.into_iter().map(line).collect()
     }
 
-    /// Renders HTML; without a header if all heads are empty.
-    #[must_use]
-    pub fn to_html(&self) -> Markup {
-        let shown = || self.columns.iter().filter(|column| column.is_shown);
-        html! {
-            div.wide { table class=[self.class] {
-                @if shown().any(|column| !column.head.is_empty()) {
-                    thead { tr { @for column in shown() {
-                        th class=[(column.kind == Kind::Number).then_some("n")] scope="col" { (column.head) }
-                    } } }
-                }
-                tbody { @for row in &self.rows {
-                    tr class=[row.is_failed.then_some("failed")] {
-                        @for (column, cell) in self.columns.iter().zip(&row.cells).filter(|(column, _)| column.is_shown) {
-                            @if column.kind == Kind::Label { th scope="row" { (markup(column.kind, cell)) } }
-                            @else { td class=[column.class] { (markup(column.kind, cell)) } }
-                        }
-                    }
-                } }
-            } }
-        }
+    /// Columns that a page shows.
+    pub fn shown(&self) -> impl Iterator<Item = &Column> {
+        self.columns.iter().filter(|column| column.is_shown)
+    }
+
+    /// Rows with their cells in the columns that a page shows.
+    pub fn shown_rows(&self) -> impl Iterator<Item = (&Row, Vec<(&Column, &Cell)>)> {
+        self.rows.iter().map(|row| {
+            (row, self.columns.iter().zip(&row.cells).filter(|(column, _)| column.is_shown).collect())
+        })
     }
 
     /// Columns of a text, with their places.
@@ -261,15 +246,6 @@ fn padded(cell: &str, (kind, width): (Kind, usize)) -> String {
     if kind == Kind::Number { space + cell } else { cell.to_owned() + &space }
 }
 
-fn markup(kind: Kind, cell: &Cell) -> Markup {
-    match (kind, cell) {
-        (_, Cell::Html(_, markup)) => markup.clone(),
-        (Kind::Number, Cell::Text(text)) => typeset(text).render(),
-        (Kind::Unit, Cell::Text(text)) => text.replace("m2", "m\u{b2}").replace(' ', "\u{a0}").render(),
-        (_, Cell::Text(text)) => text.render(),
-    }
-}
-
 /// Gives digits a true minus sign; an unknown number becomes a dash.
 #[must_use]
 pub fn typeset(digits: &str) -> String {
@@ -284,7 +260,7 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        let mut table = Table::of_class("c")
+        let mut table = Table::default()
             .label("name")
             .numbers(["value"])
             .numbers_if(false, ["hidden"])
@@ -293,13 +269,13 @@ mod tests {
             .html_only()
             .text(["why"])
             .styled("words");
-        table.row(cells!["a<b", "-1.5", "x", "kg m2", html! { b { "!" } }, ""]);
-        table.marked_row(true, cells!["\u{817f}", 20_u32, "x", "N m", html! {}, "so-so"]);
+        table.row(cells!["a<b", "-1.5", "x", "kg m2", "!", ""]);
+        table.row(cells!["\u{817f}", 20_u32, "x", "N m", "", "so-so"]);
         table
     }
 
     #[test]
-    fn one_table_is_rendered_as_text_markdown_and_html() {
+    fn one_table_is_rendered_as_text_and_markdown() {
         assert_eq!(
             table().to_text(),
             " name  value  unit   why\n a<b    -1.5  kg m2\n \u{817f}       20  N m    so-so\n"
@@ -309,21 +285,5 @@ mod tests {
             "| name | value | unit  | why   |\n| ---- | ----: | ----- | ----- |\n| a<b  |  -1.5 | kg m2 |       |\n\
              | \u{817f}   |    20 | N m   | so-so |\n"
         );
-        assert_eq!(
-            table().to_html().into_string(),
-            "<div class=\"wide\"><table class=\"c\"><thead><tr><th scope=\"col\">name</th>\
-             <th class=\"n\" scope=\"col\">value</th><th scope=\"col\">unit</th><th scope=\"col\">bar</th>\
-             <th scope=\"col\">why</th></tr></thead><tbody><tr><th scope=\"row\">a&lt;b</th>\
-             <td class=\"n\">\u{2212}1.5</td><td>kg\u{a0}m\u{b2}</td><td><b>!</b></td><td class=\"words\"></td></tr>\
-             <tr class=\"failed\"><th scope=\"row\">\u{817f}</th><td class=\"n\">20</td><td>N\u{a0}m</td><td></td>\
-             <td class=\"words\">so-so</td></tr></tbody></table></div>"
-        );
-    }
-
-    #[test]
-    fn a_table_without_heads_has_no_header_in_html() {
-        let mut table = Table::default().label("").text([""]);
-        table.row(["key", "value"]);
-        assert!(!table.to_html().into_string().contains("thead"));
     }
 }

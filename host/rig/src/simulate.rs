@@ -151,15 +151,9 @@ fn drive_observed<'a, const N: usize, const B: usize>(
             }
             before = activity;
         }
-        match activity {
-            Activity::Identify(_) => {}
-            _ if pair.leg.control().verdict().is_some() => {
-                return Ok(Driven { pair, watch, stopped: None, shaking });
-            }
-            _ => {
-                let stopped = Some(pair.stop_words(leg));
-                return Ok(Driven { pair, watch, stopped, shaking });
-            }
+        if !matches!(activity, Activity::Identify(_)) {
+            let stopped = pair.leg.control().verdict().is_none().then(|| pair.stop_words(leg));
+            return Ok(Driven { pair, watch, stopped, shaking });
         }
         if pair.ticks > largest {
             return Err(leg.error("identification did not end").into());

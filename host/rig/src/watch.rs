@@ -5,8 +5,8 @@ use std::time::Instant;
 use hal_sim::world::TICK_S;
 use scarab::ident::record::stribeck::combination;
 use scarab::ident::{
-    Ends, FilteredRows, LARGEST_STILL_SHARE, Reason, Recorder, RowFilter, RowModel, Smoothed, Smoother,
-    Solver, Verdict,
+    Ends, FilteredRows, LARGEST_STILL_SHARE, Reason, Record, Recorder, RowFilter, RowModel, Smoothed,
+    Smoother, Solver, Verdict,
 };
 use scarab::leg::{LoggedSample, Segment};
 use scarab::model::Parameter;
@@ -100,6 +100,22 @@ fn truth_fit<const N: usize, const B: usize>(
             sticking_share: 1.0 - used as f64 / rows.len().max(1) as f64,
         }
     })
+}
+
+/// Verdict with its evidence. A drive that `stopped` before is refused for its input.
+fn judged<const N: usize, const B: usize>(
+    pair: &Pair<N, B>,
+    stopped: Option<String>,
+) -> (Verdict, Vec<FindingReport>) {
+    if let Some(words) = stopped {
+        return (Verdict::refused(Reason::Input), vec![FindingReport::stopped(words)]);
+    }
+    let mut findings = Vec::new();
+    let verdict = pair
+        .leg
+        .identification()
+        .judge_with(&mut |evidence| findings.push(FindingReport::new(evidence, &VALIDATION_NAMES)));
+    (verdict, findings)
 }
 
 /// Observer of a run, including data that the firmware does not have.
@@ -305,6 +321,24 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         Ok(Solver::new(&configuration.model, recorder.finish(), options.plan, prior, options.swarm_seed))
     }
 
+    /// The motion identified from, and the predicted ones; `values` are those of the leg with its load.
+    fn motions(
+        &self,
+        model: &RowModel<f32, N, B>,
+        training: &Record<f32, N, B>,
+        unused: &scale::Unused<N, B>,
+        values: &[f32; B],
+    ) -> (RecordedMotion<N, B>, Vec<RecordedMotion<N, B>>) {
+        let motion = |name: &str, record: &Record<f32, N, B>, rows: &[FilteredRows<f32, N, B>]| {
+            let truth = Some(truth_fit(rows, model, values));
+            RecordedMotion { name: name.into(), record: record.clone(), truth }
+        };
+        let predicted = VALIDATION_NAMES.iter().zip(unused).zip(&self.validation_rows);
+        let predicted =
+            predicted.filter_map(|((name, record), rows)| Some(motion(name, record.as_ref()?, rows)));
+        (motion("fourier", training, &self.training_rows), predicted.collect())
+    }
+
     /// Report after the verdict. If the drive `stopped` before, the result is rejected as input.
     pub fn report(
         mut self,
@@ -319,14 +353,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         let identification = pair.leg.identification();
         let nothing = self.nothing_found(options)?;
         let solver = identification.solver().unwrap_or(&nothing);
-        let mut findings = Vec::new();
-        let verdict = if let Some(words) = stopped {
-            findings.push(FindingReport::stopped(words));
-            Verdict::refused(Reason::Input)
-        } else {
-            identification
-                .judge_with(&mut |evidence| findings.push(FindingReport::new(evidence, &VALIDATION_NAMES)))
-        };
+        let (verdict, mut findings) = judged(pair, stopped);
         let scale = self.scale.take();
         let corrected = scale.as_ref().and_then(|scale| {
             scale::corrected(scale, self.context, solver, identification.validation(), &self.log)
@@ -341,21 +368,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         let model = identification.model();
         // The plant's torque includes the load of the leg.
         let carrying = loaded(scale.as_ref(), &found.estimate().values);
-        let training = RecordedMotion {
-            name: "fourier".into(),
-            record: found.record().clone(),
-            truth: Some(truth_fit(&self.training_rows, model, &carrying)),
-        };
-        let validation: Vec<_> = VALIDATION_NAMES
-            .iter()
-            .zip(unused)
-            .zip(&self.validation_rows)
-            .filter_map(|((name, record), rows)| {
-                let record = record.clone()?;
-                let truth = Some(truth_fit(rows, model, &carrying));
-                Some(RecordedMotion { name: (*name).into(), record, truth })
-            })
-            .collect();
+        let (training, validation) = self.motions(model, found.record(), unused, &carrying);
         let (cramer_rao, surplus_cramer_rao) =
             self.information.without(&found.record().selection.dropped).bounds();
         let circumstances = Circumstances {

@@ -10,7 +10,7 @@ mod trial;
 
 use core::f64::consts::TAU;
 
-use hal_sim::drive::description::EncoderWiring;
+use hal_sim::drive::description::{EncoderWiring, Wiring};
 use hal_sim::drive::stand::{Load, Stand};
 use scarab::hal::AxisCommand;
 use scarab::motor::{
@@ -83,18 +83,11 @@ fn sound(seeds: core::ops::RangeInclusive<u64>) {
 /// Number of kinds of wiring faults.
 const KINDS: u64 = 18;
 
-/// Applies each wiring fault in turn and returns the expected refusal. The axis keeps its settings;
-/// the hardware changes.
-fn apply_wiring_fault(trial: &mut Trial, seed: u64) -> Refusal {
-    let holding = trial.holding();
-    let wiring = &mut trial.axis.wiring;
-    match seed % KINDS {
-        0 => {
-            wiring.phases.swap(0, 1);
-            Refusal::Direction
-        }
-        1 => {
-            wiring.phases.swap(1, 2);
+/// Miswires the motor and returns the expected refusal; kinds 0 to 10.
+fn miswire(wiring: &mut Wiring, kind: usize) -> Refusal {
+    match kind {
+        0..=1 => {
+            wiring.phases.swap(kind, kind + 1);
             Refusal::Direction
         }
         2 => {
@@ -108,22 +101,31 @@ fn apply_wiring_fault(trial: &mut Trial, seed: u64) -> Refusal {
             wiring.encoder = EncoderWiring::Missing;
             Refusal::NoCounts
         }
-        output @ 4..=6 => {
-            wiring.open = Some(output as usize - 4);
-            Refusal::PhaseOpen([Phase::A, Phase::B, Phase::C][output as usize - 4])
+        4..=6 => {
+            wiring.open = Some(kind - 4);
+            Refusal::PhaseOpen([Phase::A, Phase::B, Phase::C][kind - 4])
         }
         7 => {
             wiring.shunts_exchanged = true;
             Refusal::ShuntsSwapped
         }
-        shunt @ 8..=9 => {
-            wiring.shunts_inverted[shunt as usize - 8] = true;
-            Refusal::ShuntInverted([Phase::B, Phase::C][shunt as usize - 8])
+        8..=9 => {
+            wiring.shunts_inverted[kind - 8] = true;
+            Refusal::ShuntInverted([Phase::B, Phase::C][kind - 8])
         }
-        10 => {
+        _ => {
             wiring.shunts_inverted = [true; 2];
             Refusal::ShuntsInverted
         }
+    }
+}
+
+/// Applies each wiring fault in turn and returns the expected refusal. The axis keeps its settings;
+/// the hardware changes.
+fn apply_wiring_fault(trial: &mut Trial, seed: u64) -> Refusal {
+    let holding = trial.holding();
+    match (seed % KINDS) as usize {
+        kind @ 0..=10 => miswire(&mut trial.axis.wiring, kind),
         11 => {
             let pairs = if trial.configuration.pole_pairs == 7 { 8 } else { 7 };
             trial.axis.motor.pole_pairs = u32::from(pairs);

@@ -44,38 +44,66 @@ impl TestRandom {
 /// Holding current, A.
 const CURRENT: f64 = 20.0;
 
+/// Motor with random constants, and the torque with which the holding current holds its rotor, N m.
+fn random_motor(random: &mut TestRandom, pole_pairs: u32) -> (MotorDescription, f64) {
+    // Ranges: 30 mOhm to 0.3 Ohm, small and large ones equally often; L/R of 0.3 ms to 1.5 ms; 20 to
+    // 100 mN m/A.
+    let resistance = random.one_of([0.03, 0.05, 0.08, 0.13, 0.2]) * random.between(1.0, 1.5);
+    let inductance_d = resistance * random.between(0.3e-3, 1.5e-3);
+    let torque_per_ampere = random.between(0.02, 0.1);
+    let holding = torque_per_ampere * CURRENT;
+    let flux = torque_per_ampere / (1.5 * f64::from(pole_pairs));
+    // If saliency outweighed the magnets, the rotor would not rest along them.
+    let inductance_q =
+        (inductance_d * random.between(1.0, 1.4)).min(inductance_d + 0.8 * flux / (1.25 * CURRENT));
+    // Current along the flux of a salient rotor holds it with less torque: 3/2 p i sin(x)
+    // (flux - (Lq - Ld) i cos(x)).
+    let held = holding * (1.0 - (inductance_q - inductance_d) * CURRENT / flux).max(0.2);
+    let motor = MotorDescription {
+        resistance,
+        inductance_d,
+        inductance_q,
+        flux,
+        pole_pairs,
+        electrical_zero: random.between(0.0, TAU),
+        cogging: random.between(0.0, 0.03) * held,
+        cogging_periods: 6 * pole_pairs,
+        thermal_resistance: 1.0,
+        thermal_time: 600.0,
+        thermistor: None,
+    };
+    (motor, held)
+}
+
+/// Configuration that fits this motor, and a counter that is `reversed` or not.
+fn matching_configuration(motor: &MotorDescription, counts: f64, reversed: bool) -> AxisConfiguration {
+    AxisConfiguration {
+        sense: SenseScale::ODRIVE_3_6,
+        timing: BridgeTiming::ODRIVE_3_6,
+        dead_time: DeadTime::Compensated { band: Ampere(0.5) },
+        pole_pairs: motor.pole_pairs as u8,
+        flux: Weber(motor.flux as f32),
+        counts_per_turn: counts as u32,
+        index: true,
+        absolute: false,
+        counter: if reversed { Direction::Down } else { Direction::Up },
+        flexion: Direction::Up,
+        bandwidth: Hertz(1000.0),
+        feedforward: true,
+        current_limit: Ampere(40.0),
+        overcurrent: Ampere(58.0),
+        bus: [Volt(20.0), Volt(58.0)],
+        greatest_speed: RadianPerSecond(400.0),
+    }
+}
+
 impl Trial {
     /// Trial wired according to its configuration.
     pub fn sound(seed: u64) -> Self {
         let mut random = TestRandom::new(seed);
         let pole_pairs = random.one_of([4, 5, 7, 10, 14, 21]);
         let counts = random.one_of([2400.0, 4000.0, 8192.0, 10_000.0, 16_384.0]);
-        // Ranges: 30 mOhm to 0.3 Ohm, small and large ones equally often; L/R of 0.3 ms to 1.5 ms; 20 to
-        // 100 mN m/A.
-        let resistance = random.one_of([0.03, 0.05, 0.08, 0.13, 0.2]) * random.between(1.0, 1.5);
-        let inductance_d = resistance * random.between(0.3e-3, 1.5e-3);
-        let torque_per_ampere = random.between(0.02, 0.1);
-        let holding = torque_per_ampere * CURRENT;
-        let flux = torque_per_ampere / (1.5 * f64::from(pole_pairs));
-        // If saliency outweighed the magnets, the rotor would not rest along them.
-        let inductance_q =
-            (inductance_d * random.between(1.0, 1.4)).min(inductance_d + 0.8 * flux / (1.25 * CURRENT));
-        // Current along the flux of a salient rotor holds it with less torque: 3/2 p i sin(x)
-        // (flux - (Lq - Ld) i cos(x)).
-        let held = holding * (1.0 - (inductance_q - inductance_d) * CURRENT / flux).max(0.2);
-        let motor = MotorDescription {
-            resistance,
-            inductance_d,
-            inductance_q,
-            flux,
-            pole_pairs,
-            electrical_zero: random.between(0.0, TAU),
-            cogging: random.between(0.0, 0.03) * held,
-            cogging_periods: 6 * pole_pairs,
-            thermal_resistance: 1.0,
-            thermal_time: 600.0,
-            thermistor: None,
-        };
+        let (motor, held) = random_motor(&mut random, pole_pairs);
         let shunts = ShuntDescription {
             offset_codes: [random.between(-80.0, 80.0), random.between(-80.0, 80.0)],
             gain_error: [random.between(-0.003, 0.003), random.between(-0.003, 0.003)],
@@ -103,24 +131,7 @@ impl Trial {
             viscous: random.between(1e-4, 5e-4),
             torque: 0.0,
         };
-        let configuration = AxisConfiguration {
-            sense: SenseScale::ODRIVE_3_6,
-            timing: BridgeTiming::ODRIVE_3_6,
-            dead_time: DeadTime::Compensated { band: Ampere(0.5) },
-            pole_pairs: pole_pairs as u8,
-            flux: Weber(flux as f32),
-            counts_per_turn: counts as u32,
-            index: true,
-            absolute: false,
-            counter: if reversed { Direction::Down } else { Direction::Up },
-            flexion: Direction::Up,
-            bandwidth: Hertz(1000.0),
-            feedforward: true,
-            current_limit: Ampere(40.0),
-            overcurrent: Ampere(58.0),
-            bus: [Volt(20.0), Volt(58.0)],
-            greatest_speed: RadianPerSecond(400.0),
-        };
+        let configuration = matching_configuration(&motor, counts, reversed);
         // Rest positions from cogging.
         let tooth = TAU / f64::from(motor.cogging_periods);
         let angle = (random.between(0.0, 6.0) / tooth).round() * tooth;

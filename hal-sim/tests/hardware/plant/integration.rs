@@ -124,13 +124,28 @@ fn fit(rows: impl Iterator<Item = ([f64; 3], f64)>) -> SVector<f64, 3> {
     normal.cholesky().expect("the motion excites all columns").solve(&right)
 }
 
-/// Fits the torque error of a motion against inverse dynamics by inertia, viscous and Coulomb
-/// friction of the joint. Rates and accelerations are eighth-order differences of the positions:
-/// the leg's actual motion. `smoothing` is the half-width of a Hann window in ticks, with which
-/// turning points may stay. Without it, rows near them are excluded.
-fn bias(description: &LegDescription<2>, record: &Record, smoothing: usize) -> [SVector<f64, 3>; 2] {
+/// Rates and accelerations at a tick by eighth-order differences of the positions: the leg's actual motion.
+fn derivatives(record: &Record, tick: usize) -> ([f64; 2], [f64; 2]) {
     const FIRST: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
     const SECOND: [f64; 5] = [-205.0 / 72.0, 8.0 / 5.0, -1.0 / 5.0, 8.0 / 315.0, -1.0 / 560.0];
+    let at = |offset: isize| record[(tick as isize + offset) as usize].0;
+    let mut rate = [0.0; 2];
+    let mut acceleration = at(0).map(|position| SECOND[0] * position / (TICK_S * TICK_S));
+    for distance in 1..=4 {
+        let (before, after) = (at(-distance), at(distance));
+        let place = distance as usize;
+        for joint in 0..2 {
+            rate[joint] += FIRST[place - 1] * (after[joint] - before[joint]) / TICK_S;
+            acceleration[joint] += SECOND[place] * (after[joint] + before[joint]) / (TICK_S * TICK_S);
+        }
+    }
+    (rate, acceleration)
+}
+
+/// Fits the torque error of a motion against inverse dynamics by inertia, viscous and Coulomb
+/// friction of the joint. `smoothing` is the half-width of a Hann window in ticks, with which
+/// turning points may stay. Without it, rows near them are excluded.
+fn bias(description: &LegDescription<2>, record: &Record, smoothing: usize) -> [SVector<f64, 3>; 2] {
     let mut without_dry_friction = *description;
     for joint in &mut without_dry_friction.joints {
         joint.friction.coulomb = 0.0;
@@ -140,21 +155,11 @@ fn bias(description: &LegDescription<2>, record: &Record, smoothing: usize) -> [
     let inner = settled..record.len() - 4;
     let rows: Vec<[([f64; 3], f64, bool); 2]> = inner
         .map(|tick| {
-            let at = |offset: isize| record[(tick as isize + offset) as usize].0;
-            let mut rate = [0.0; 2];
-            let mut acceleration = at(0).map(|position| SECOND[0] * position / (TICK_S * TICK_S));
-            for distance in 1..=4 {
-                let (before, after) = (at(-distance), at(distance));
-                let place = distance as usize;
-                for joint in 0..2 {
-                    rate[joint] += FIRST[place - 1] * (after[joint] - before[joint]) / TICK_S;
-                    acceleration[joint] += SECOND[place] * (after[joint] + before[joint]) / (TICK_S * TICK_S);
-                }
-            }
+            let (rate, acceleration) = derivatives(record, tick);
             let sign = |joint: usize, tick: usize| {
                 if record[tick].1[joint] == 0.0 { 0.0 } else { record[tick].1[joint].signum() }
             };
-            let smooth = world.inverse_dynamics(&at(0), &rate, &acceleration);
+            let smooth = world.inverse_dynamics(&record[tick].0, &rate, &acceleration);
             [0, 1].map(|joint| {
                 // Dry friction uses the true direction, not that of the differences.
                 let dry = description.joints[joint].friction.coulomb * sign(joint, tick);

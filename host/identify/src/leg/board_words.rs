@@ -51,14 +51,7 @@ pub fn refusal(reason: Refusal) -> String {
         Refusal::MotorConstants => {
             "resistance or inductance is out of range, or too large for 9.5 V at the calibration's current (`motor.resistance_ohm`, `motor.inductance_d_uh`, `motor.inductance_q_uh`)".into()
         }
-        Refusal::OtherMotor(constant, Mismatch { stated, found }) => {
-            let (constant, limit) = match constant {
-                MotorConstant::Resistance => ("resistance (ohm)", 40),
-                MotorConstant::DirectInductance => ("inductance along the flux (H)", 20),
-                MotorConstant::QuadratureInductance => ("inductance across the flux (H)", 20),
-            };
-            format!("the {constant} is {found:.3e}, stored {stated:.3e}, limit {limit} %: another motor")
-        }
+        Refusal::OtherMotor(constant, mismatch) => other_motor(constant, mismatch),
         Refusal::Flux(Mismatch { stated, found }) => format!(
             "the back-EMF shows a flux linkage of {found:.3e} V s, stated {stated:.3e}, limit 25 %: check \
              `torque_per_ampere`, `motor.pole_pairs` and `encoder.ratio`"
@@ -96,6 +89,16 @@ pub fn refusal(reason: Refusal) -> String {
         }
     };
     format!("the calibration is refused: {words}")
+}
+
+/// Motor constant that is not the stored one.
+fn other_motor(constant: MotorConstant, Mismatch { stated, found }: Mismatch) -> String {
+    let (constant, limit) = match constant {
+        MotorConstant::Resistance => ("resistance (ohm)", 40),
+        MotorConstant::DirectInductance => ("inductance along the flux (H)", 20),
+        MotorConstant::QuadratureInductance => ("inductance across the flux (H)", 20),
+    };
+    format!("the {constant} is {found:.3e}, stored {stated:.3e}, limit {limit} %: another motor")
 }
 
 const fn name(phase: Phase) -> &'static str {

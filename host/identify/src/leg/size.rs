@@ -75,12 +75,11 @@ pub struct Size {
 }
 
 /// One link before and after.
-struct Change<'a> {
-    name: &'a str,
+struct Change {
+    name: &'static str,
     stretch: f64,
-    /// Segments of a person of a given mass: before, and after for another wearer.
-    before: &'a dyn Fn(f64) -> Vec<Segment>,
-    after: Option<&'a dyn Fn(f64) -> Vec<Segment>>,
+    /// Segments of a wearer that belong to it.
+    segments: fn(&Wearer) -> Vec<Segment>,
 }
 
 impl Size {
@@ -99,60 +98,31 @@ impl Size {
         let knee = leg.joints.len().saturating_sub(1);
         let before = old.wearer(leg.link_length(knee.saturating_sub(1)), old.wearer_kg);
         let tall = self.wearer.map(|person| Wearer::of_height(person.mass, person.height));
-        let length =
-            |option: &str, given: Option<f64>, tall: Option<f64>, old: f64, [low, high]: [f64; 2]| {
-                let (cause, new) = match (given, tall, self.wearer) {
-                    (Some(given), ..) => (format!("--{option} {given}"), given),
-                    (None, Some(tall), Some(person)) => (
-                        format!("--wearer {},{}: a {option} of {tall:.3} m", person.mass, person.height),
-                        tall,
-                    ),
-                    _ => return Ok(old),
-                };
-                if (low..=high).contains(&new) {
-                    Ok(new)
-                } else {
-                    Err(ToolError::input(format!(
-                        "{cause} is outside {low}..{high} m, to which the {option} can be set"
-                    )))
-                }
-            };
         let thigh =
-            length("thigh", self.thigh, tall.map(|wearer| wearer.thigh), before.thigh, THIGH_RANGE_M)?;
+            self.length("thigh", self.thigh, tall.map(|wearer| wearer.thigh), before.thigh, THIGH_RANGE_M)?;
         let shank =
-            length("shank", self.shank, tall.map(|wearer| wearer.shank), before.shank, SHANK_RANGE_M)?;
+            self.length("shank", self.shank, tall.map(|wearer| wearer.shank), before.shank, SHANK_RANGE_M)?;
         let after = Wearer { thigh, shank, ..tall.unwrap_or(before) };
 
         let mut sized = leg.clone();
         let weight = after.mass / before.mass;
-        let with = |wearer: Wearer, mass: f64| Wearer { mass, ..wearer };
-        let is_given = self.wearer.is_some();
-        let (thigh_before, thigh_after) = (
-            |mass: f64| vec![with(before, mass).thigh()],
-            |mass: f64| vec![with(after, weight * mass).thigh()],
-        );
-        let (shank_before, shank_after) = (
-            |mass: f64| with(before, mass).shank().to_vec(),
-            |mass: f64| with(after, weight * mass).shank().to_vec(),
-        );
         let changes = [
             Change {
                 name: "thigh",
                 stretch: thigh / before.thigh,
-                before: &thigh_before,
-                after: is_given.then_some(&thigh_after),
+                segments: |wearer: &Wearer| vec![wearer.thigh()],
             },
             Change {
                 name: "shank",
                 stretch: shank / before.shank,
-                before: &shank_before,
-                after: is_given.then_some(&shank_after),
+                segments: |wearer: &Wearer| wearer.shank().to_vec(),
             },
         ];
         for (joint, change) in sized.joints.iter_mut().skip(knee.saturating_sub(1)).zip(&changes) {
             for (link, mass) in [(&mut joint.truth, old.wearer_kg), (&mut joint.prior, old.prior_wearer_kg)] {
                 if let Some(link) = link {
-                    *link = change.link(link, mass).map_err(|reason| {
+                    let another = self.wearer.map(|_| Wearer { mass: weight * mass, ..after });
+                    *link = change.link(link, Wearer { mass, ..before }, another).map_err(|reason| {
                         ToolError::input(format!("{}: joint `{}`: {reason}", leg.name, joint.name))
                     })?;
                 }
@@ -169,21 +139,52 @@ impl Size {
         });
         Ok(sized)
     }
+
+    /// New length of a link: the given one, that of a wearer as tall as this, or the old one.
+    fn length(
+        &self,
+        option: &str,
+        given: Option<f64>,
+        tall: Option<f64>,
+        old: f64,
+        [low, high]: [f64; 2],
+    ) -> Result<f64, ToolError> {
+        let (cause, new) = match (given, tall, self.wearer) {
+            (Some(given), ..) => (format!("--{option} {given}"), given),
+            (None, Some(tall), Some(person)) => {
+                (format!("--wearer {},{}: a {option} of {tall:.3} m", person.mass, person.height), tall)
+            }
+            _ => return Ok(old),
+        };
+        if (low..=high).contains(&new) {
+            Ok(new)
+        } else {
+            Err(ToolError::input(format!(
+                "{cause} is outside {low}..{high} m, to which the {option} can be set"
+            )))
+        }
+    }
 }
 
-impl Change<'_> {
-    fn link(&self, link: &LinkParameters, mass: f64) -> Result<LinkParameters, String> {
-        let Some(after) = self.after else {
+impl Change {
+    /// Link at its new length, with the segments of `another` wearer for those of `before`, if there is one.
+    fn link(
+        &self,
+        link: &LinkParameters,
+        before: Wearer,
+        another: Option<Wearer>,
+    ) -> Result<LinkParameters, String> {
+        let Some(another) = another else {
             let whole = body(link.mass, link.com, link.inertia_com);
             return Ok(linked(link, &stretched(&whole, self.stretch)));
         };
-        let machine = without(link, &(self.before)(mass)).ok_or_else(|| {
+        let machine = without(link, &(self.segments)(&before)).ok_or_else(|| {
             format!(
-                "its link is lighter than the {} of a wearer of {mass} kg, which it contains by `segments`",
-                self.name
+                "its link is lighter than the {} of a wearer of {} kg, which it contains by `segments`",
+                self.name, before.mass
             )
         })?;
-        let sum = joined_with(&stretched(&machine, self.stretch), &after(mass));
+        let sum = joined_with(&stretched(&machine, self.stretch), &(self.segments)(&another));
         sum.map(|sum| linked(link, &sum)).ok_or_else(|| "has no mass".into())
     }
 }

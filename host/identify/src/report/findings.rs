@@ -95,7 +95,7 @@ pub fn untested_lengths(findings: &[FindingReport]) -> Vec<String> {
 fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
     let joint = evidence.joint.map_or(0, |joint| joint + 1);
     let (value, limit) = (f64::from(evidence.value), f64::from(evidence.limit));
-    let known = value.abs() < 1e30;
+    let [percent, percent_limit] = [value, limit].map(|share| 100.0 * share);
     let on = if motion.is_empty() { String::new() } else { format!(" on {motion}") };
     match evidence.test {
         Test::Rows => {
@@ -103,31 +103,18 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
         }
         Test::NotFinite => format!("{value:.0} samples or rows{on} are not finite"),
         Test::Torque => format!("the torque of joint {joint} is always zero"),
-        Test::Search if known => format!(
+        Test::Search if value.abs() < 1e30 => format!(
             "the search has not converged: it ended {value:.2} chi-square units above least squares, limit {limit:.2}; \
              try another --swarm-seed; a simulated leg also needs noise of its torque (--torque-noise 1), because single \
              precision cannot resolve less"
         ),
         Test::Search => "the search did not finish".into(),
         Test::Drive => "the drive stopped during the identification".into(),
-        Test::Speed => {
-            format!("joint {joint} hardly moved: {value:.4} rad/s rms, at least {limit:.3} are needed")
-        }
-        Test::EncoderPulse => format!(
-            "encoder too coarse at this bandwidth: one count of joint {joint} is a pulse of {value:.3} rad/s, limit \
-             {limit:.3} rad/s; {:.2} times this bandwidth is low enough",
-            limit / value
-        ),
-        Test::Determined => format!("the motion determines {value:.0} of {limit:.0} base parameters"),
-        Test::Condition if known => {
-            format!("the motion hardly distinguishes the parameters: condition {value:.0}, limit {limit:.0}")
-        }
-        Test::Condition => "the motion does not distinguish the parameters".into(),
-        Test::PredictedUncertainty => format!(
-            "the excitation leaves the torque of joint {joint}{on} uncertain by {:.1} % of its rms, limit {:.1} %",
-            100.0 * value,
-            100.0 * limit
-        ),
+        Test::Speed
+        | Test::EncoderPulse
+        | Test::Determined
+        | Test::Condition
+        | Test::PredictedUncertainty => weak_excitation(evidence, joint, &on),
         Test::Finite => format!("a parameter of joint {joint} is not finite"),
         Test::NegativeParameter => format!(
             "a parameter of joint {joint} that must be positive is {value:.1} sigma below zero, limit {limit:.0} sigma"
@@ -140,29 +127,13 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
              {limit:.0}"
         ),
         Test::DynamicShare => format!(
-            "inertia and friction make {:.2} % of the torque of joint {joint}, a measured torque has at least \
-             {:.0} %: it was computed from the angle",
-            100.0 * value,
-            100.0 * limit
+            "inertia and friction make {percent:.2} % of the torque of joint {joint}, a measured torque has at least \
+             {percent_limit:.0} %: it was computed from the angle"
         ),
         Test::TrainingError | Test::WholeError | Test::ValidationError | Test::SlowResidual => {
             torque_error(evidence, joint, &on)
         }
-        Test::LinkLength => {
-            let direction = if value < 0.0 { "shorter" } else { "longer" };
-            let found = format!(
-                "a link before joint {joint} {:.1} % {direction} than configured",
-                100.0 * value.abs()
-            );
-            other_geometry(&found, &format!("{:.1} %", 100.0 * limit), "a wrong zero")
-        }
-        Test::EncoderZero => {
-            let found = format!(
-                "the zero of joint {joint} {:+.1} degrees from the configured one",
-                value.to_degrees()
-            );
-            other_geometry(&found, &format!("{:.1} degrees", limit.to_degrees()), "another length")
-        }
+        Test::LinkLength | Test::EncoderZero => other_geometry(evidence, joint),
         Test::CommonDisturbance => {
             let on = if motion.is_empty() { " on the training motion" } else { on.as_str() };
             format!(
@@ -170,15 +141,37 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
             )
         }
         Test::ReplacedShare => format!(
-            "joint {joint}: {:.1} % of the samples{on} are outliers, limit {:.0} %",
+            "joint {joint}: {percent:.1} % of the samples{on} are outliers, limit {percent_limit:.0} %"
+        ),
+        Test::DisturbedShare => {
+            format!("joint {joint}: {percent:.0} % of the rows{on} are disturbed, limit {percent_limit:.0} %")
+        }
+    }
+}
+
+/// Sentence for a motion that does not show every parameter.
+fn weak_excitation(evidence: &Evidence<f32>, joint: usize, on: &str) -> String {
+    let (value, limit) = (f64::from(evidence.value), f64::from(evidence.limit));
+    match evidence.test {
+        Test::Speed => {
+            format!("joint {joint} hardly moved: {value:.4} rad/s rms, at least {limit:.3} are needed")
+        }
+        Test::EncoderPulse => format!(
+            "encoder too coarse at this bandwidth: one count of joint {joint} is a pulse of {value:.3} rad/s, limit \
+             {limit:.3} rad/s; {:.2} times this bandwidth is low enough",
+            limit / value
+        ),
+        Test::Determined => format!("the motion determines {value:.0} of {limit:.0} base parameters"),
+        Test::Condition if value.abs() < 1e30 => {
+            format!("the motion hardly distinguishes the parameters: condition {value:.0}, limit {limit:.0}")
+        }
+        Test::Condition => "the motion does not distinguish the parameters".into(),
+        Test::PredictedUncertainty => format!(
+            "the excitation leaves the torque of joint {joint}{on} uncertain by {:.1} % of its rms, limit {:.1} %",
             100.0 * value,
             100.0 * limit
         ),
-        Test::DisturbedShare => format!(
-            "joint {joint}: {:.0} % of the rows{on} are disturbed, limit {:.0} %",
-            100.0 * value,
-            100.0 * limit
-        ),
+        other => unreachable!("{other:?} is no test of the excitation"),
     }
 }
 
@@ -208,8 +201,18 @@ fn torque_error(evidence: &Evidence<f32>, joint: usize, on: &str) -> String {
     }
 }
 
-/// Sentence for a geometry that the torque contradicts; `alike` looks like it.
-fn other_geometry(found: &str, limit: &str, alike: &str) -> String {
+/// Sentence for a link's length or a joint's zero that the torque contradicts.
+fn other_geometry(evidence: &Evidence<f32>, joint: usize) -> String {
+    let (value, limit) = (f64::from(evidence.value), f64::from(evidence.limit));
+    let (found, limit, alike) = if evidence.test == Test::LinkLength {
+        let (percent, direction) = (100.0 * value.abs(), if value < 0.0 { "shorter" } else { "longer" });
+        let found = format!("a link before joint {joint} {percent:.1} % {direction} than configured");
+        (found, format!("{:.1} %", 100.0 * limit), "a wrong zero")
+    } else {
+        let [degrees, limit] = [value, limit].map(f64::to_degrees);
+        let found = format!("the zero of joint {joint} {degrees:+.1} degrees from the configured one");
+        (found, format!("{limit:.1} degrees"), "another length")
+    };
     format!(
         "the torque indicates another geometry: {found}, limit {limit}; {alike} or a leaning trunk looks alike"
     )

@@ -460,6 +460,21 @@ mod tests {
         }
     }
 
+    /// Enables the leg as soon as it has stopped swinging.
+    fn enable_at_rest(host: &mut Host, words: &str) {
+        for tries in 0.. {
+            if enable(host) {
+                break;
+            }
+            // A refused enable is explained by FF0E and ends when the leg stops swinging.
+            let code = host.read(1, 0x603F, 0).expect("an error code");
+            assert_eq!(code, 0xFF0E, "{words}: {:?} {:x?}", host.rig().state(), host.emergencies);
+            assert!(host.emergencies.contains(&(1, 0xFF0E)), "{words}: {:x?}", host.emergencies);
+            assert!(tries < 20, "{words}: {:x?}", host.emergencies);
+            host.run(SECOND / 4);
+        }
+    }
+
     /// Moves to random poses; returns how many of them ended outside a joint's range.
     fn poses(leg: &LegFile, seed: u64, count: u32) -> u32 {
         let mut random = scarab_base::random::Random::new("poses", seed);
@@ -483,17 +498,7 @@ mod tests {
             // Earlier errors must not be taken for the reason of a refusal.
             NODES.into_iter().for_each(|node| host.write(node, 0x1003, 0, 0, 1).expect("a history"));
             host.emergencies.clear();
-            for tries in 0.. {
-                if enable(&mut host) {
-                    break;
-                }
-                // A refused enable is explained by FF0E and ends when the leg stops swinging.
-                let code = host.read(1, 0x603F, 0).expect("an error code");
-                assert_eq!(code, 0xFF0E, "{words}: {:?} {:x?}", host.rig().state(), host.emergencies);
-                assert!(host.emergencies.contains(&(1, 0xFF0E)), "{words}: {:x?}", host.emergencies);
-                assert!(tries < 20, "{words}: {:x?}", host.emergencies);
-                host.run(SECOND / 4);
-            }
+            enable_at_rest(&mut host, &words);
             let outside = |host: &mut Host| {
                 let places = host.rig().world.anatomical_position();
                 (0..JOINTS).any(|joint| {

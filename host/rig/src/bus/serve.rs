@@ -3,6 +3,7 @@
 use scarab_base::error::{FileError, ToolError};
 use scarab_base::files;
 use scarab_client::alarms::Alarms;
+use scarab_client::wire::Sent;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::leg::exercise::Exercise;
 use std::fs::File;
@@ -132,17 +133,7 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     (0..BOOT_TICKS).for_each(|_| network.tick(|_| {}));
     // Written before any client connects, so that a file error appears before a host stores anything.
     write(options.flash.as_deref(), &mut network)?;
-    if let Some(warning) =
-        judge(options.speed, &reachable(&network), options.legs).map_err(ToolError::input)?
-    {
-        eprintln!("warning: {warning}");
-    }
-    if !options.address.ip().is_loopback() {
-        eprintln!(
-            "warning: {} can be reached from other machines, and slcan has no password: every client that connects commands the legs",
-            options.address
-        );
-    }
+    warn(options, &network)?;
     let refused = |error: std::io::Error| ToolError::input(format!("{}: {error}", options.address));
     let mut server = Server::new(options.address).map_err(refused)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -173,20 +164,12 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
                 }
             });
         }
-        let events = server.flush();
-        report(&events, &mut adapter, network.now_ns());
+        report(&server.flush(), &mut adapter, network.now_ns());
         if let Some(second) = pace.second(now, network.now_ns()) {
             let reports = [second.report(options.speed), not_carried_out(adapter.take_dropped())];
             reports.iter().flatten().for_each(|report| eprintln!("last second: {report}"));
         }
-        for (leg, (board, alarms)) in (1..).zip(network.boards().iter().zip(&mut alarms)) {
-            let fault = alarms.fault(board.rig.alarm());
-            let messages = sent_by_boards
-                .iter()
-                .filter(|sent| sent.sender == leg && board.is_emergency(&sent.frame))
-                .filter_map(|sent| alarms.emergency(&sent.frame));
-            fault.into_iter().chain(messages).for_each(|line| eprintln!("leg {leg}: {line}"));
-        }
+        print_alarms(network.boards(), &mut alarms, &sent_by_boards);
         if network.boards().iter_mut().fold(false, |kept, board| board.flashing().take_kept() | kept) {
             write(options.flash.as_deref(), &mut network)?;
         }
@@ -194,7 +177,45 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
             std::thread::sleep(NAP);
         }
     }
-    // A store operation in progress is completed, as fast as possible.
+    finish_storing(&mut network);
+    write(options.flash.as_deref(), &mut network)
+}
+
+/// Warns of a speed that this machine hardly holds, and of a port that other machines reach.
+fn warn<const N: usize, const B: usize>(
+    options: &ServeOptions,
+    network: &Network<N, B>,
+) -> Result<(), ToolError> {
+    if let Some(warning) =
+        judge(options.speed, &reachable(network), options.legs).map_err(ToolError::input)?
+    {
+        eprintln!("warning: {warning}");
+    }
+    if !options.address.ip().is_loopback() {
+        eprintln!(
+            "warning: {} can be reached from other machines, and slcan has no password: every client that connects commands the legs",
+            options.address
+        );
+    }
+    Ok(())
+}
+
+/// Prints each board's new fault, and its emergency messages among the frames just sent.
+fn print_alarms<const N: usize, const B: usize>(
+    boards: &[Board<N, B>],
+    alarms: &mut [Alarms],
+    sent: &[Sent],
+) {
+    for (leg, (board, alarms)) in (1..).zip(boards.iter().zip(alarms)) {
+        let fault = alarms.fault(board.rig.alarm());
+        let own = sent.iter().filter(|sent| sent.sender == leg && board.is_emergency(&sent.frame));
+        let messages = own.filter_map(|sent| alarms.emergency(&sent.frame));
+        fault.into_iter().chain(messages).for_each(|line| eprintln!("leg {leg}: {line}"));
+    }
+}
+
+/// Completes a store operation in progress, as fast as possible.
+fn finish_storing<const N: usize, const B: usize>(network: &mut Network<N, B>) {
     for tick in 0..MOST_STORING {
         if tick > TICKS_PER_LOOK && !network.boards().iter_mut().any(|board| board.flashing().is_under_way())
         {
@@ -202,7 +223,6 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
         }
         network.tick(|_| {});
     }
-    write(options.flash.as_deref(), &mut network)
 }
 
 /// Prints events of connections; the plug follows the client.

@@ -233,21 +233,7 @@ impl Server {
         }
         // Accepted after the client was read, so that a client that has disconnected does not block the next
         // one.
-        while let Ok((stream, peer)) = self.listener.accept() {
-            if set_up(&stream).is_err() {
-                continue;
-            }
-            events.push(Event { peer, what: What::Connected });
-            let (received, out) = (VecDeque::new(), Vec::new());
-            let connection = Connection { stream, peer, line: Line::default(), received, out };
-            if self.waiting.len() >= MOST_CONNECTIONS
-                && let Some(oldest) = self.waiting.pop_front()
-            {
-                let what = What::Gone("too many connections without a channel", false);
-                events.push(Event { peer: oldest.peer, what });
-            }
-            self.waiting.push_back(connection);
-        }
+        self.accept(&mut events);
         for _ in 0..self.waiting.len() {
             let Some(mut connection) = self.waiting.pop_front() else { break };
             let (peer, client) = (connection.peer, self.client.as_ref().map(|client| client.peer));
@@ -274,6 +260,34 @@ impl Server {
                 }
             }
         }
+        self.poll_listeners(&mut events);
+        if is_drained {
+            self.drained = now;
+        }
+        events
+    }
+
+    /// Accepts connections; one too many displaces the oldest.
+    fn accept(&mut self, events: &mut Vec<Event>) {
+        while let Ok((stream, peer)) = self.listener.accept() {
+            if set_up(&stream).is_err() {
+                continue;
+            }
+            events.push(Event { peer, what: What::Connected });
+            let (received, out) = (VecDeque::new(), Vec::new());
+            let connection = Connection { stream, peer, line: Line::default(), received, out };
+            if self.waiting.len() >= MOST_CONNECTIONS
+                && let Some(oldest) = self.waiting.pop_front()
+            {
+                let what = What::Gone("too many connections without a channel", false);
+                events.push(Event { peer: oldest.peer, what });
+            }
+            self.waiting.push_back(connection);
+        }
+    }
+
+    /// Processes bytes of the listeners, which may close the channel.
+    fn poll_listeners(&mut self, events: &mut Vec<Event>) {
         for _ in 0..self.listeners.len() {
             let Some(mut listener) = self.listeners.pop_front() else { break };
             let peer = listener.peer;
@@ -286,10 +300,6 @@ impl Server {
                 Err(what) => events.push(Event { peer, what }),
             }
         }
-        if is_drained {
-            self.drained = now;
-        }
-        events
     }
 
     /// Sends the reason, and holds the connection open for a while: closing it at once would reset it.

@@ -93,8 +93,18 @@ pub fn demand<const N: usize, const B: usize>(
             demand[joint].bound_nm = demand[joint].bound_nm.max(torque.abs() + uncertainty);
         }
     }
+    add_approaches(scorer, configuration, motion.state_at(0).position_rad, &mut demand);
+    demand
+}
+
+/// Adds the torque of the approaches to a goal, from every corner of the range and from its middle.
+fn add_approaches<const N: usize, const B: usize>(
+    scorer: &Scorer<N, B>,
+    configuration: &LegConfiguration<N, B>,
+    goal: [f32; N],
+    demand: &mut [Demand; N],
+) {
     let (speed, acceleration) = configuration.approach();
-    let goal = motion.state_at(0).position_rad;
     let corner = |which: u32| -> [f32; N] {
         core::array::from_fn(|joint| {
             let limits = &configuration.joints[joint];
@@ -131,7 +141,6 @@ pub fn demand<const N: usize, const B: usize>(
             }
         }
     }
-    demand
 }
 
 fn at_rest<const N: usize>(position_rad: [f32; N]) -> MotionState<N> {

@@ -81,15 +81,7 @@ impl Obstacle {
             100.0 * margin
         );
         let words = match self.limit {
-            Limit::Motion(quantity) => {
-                let (word, key, unit) = match quantity {
-                    Quantity::Low | Quantity::High => ("angle", "range_deg", "degrees (D-H)"),
-                    Quantity::Speed => ("speed", "speed_limit_deg_s", "degrees/s"),
-                    Quantity::Acceleration => ("acceleration", "acceleration_limit_deg_s2", "degrees/s2"),
-                };
-                let [value, allowed] = [value, allowed].map(f64::to_degrees);
-                format!("its {word} reaches {value:.1}, limit {allowed:.1} {unit}: widen `{key}`")
-            }
+            Limit::Motion(quantity) => motion_words(quantity, value, allowed),
             Limit::Torque => {
                 format!(
                     "even the motion with the least torque needs {value:.3} N m, limit {allowed:.3} N m ({key}): {less}"
@@ -141,6 +133,17 @@ impl Obstacle {
 #[must_use]
 pub fn torque_limit(joint: &JointFile) -> f64 {
     joint.torque_limit_nm.min(joint.current_limit() * joint.torque_per_ampere)
+}
+
+/// Commanded angle, speed or acceleration beyond its limit; rad and s.
+fn motion_words(quantity: Quantity, value: f64, allowed: f64) -> String {
+    let (word, key, unit) = match quantity {
+        Quantity::Low | Quantity::High => ("angle", "range_deg", "degrees (D-H)"),
+        Quantity::Speed => ("speed", "speed_limit_deg_s", "degrees/s"),
+        Quantity::Acceleration => ("acceleration", "acceleration_limit_deg_s2", "degrees/s2"),
+    };
+    let [value, allowed] = [value, allowed].map(f64::to_degrees);
+    format!("its {word} reaches {value:.1}, limit {allowed:.1} {unit}: widen `{key}`")
 }
 
 /// Key that limits the torque.

@@ -22,6 +22,7 @@ use crate::excite::assumption::{Assumption, with_rotors};
 use crate::excite::bench::{Bench, ExciteOptions};
 use crate::excite::design::{Candidate, DesignOptions, Goal, SHRINK, candidates, smaller};
 use crate::excite::expectation::{Expectation, Rehearsal};
+use crate::excite::warnings::warnings;
 
 /// Duration of a design, s, and error of each base parameter that its torque covers, percent, by default.
 pub const USUAL_DURATION_S: f64 = 22.0;
@@ -277,19 +278,13 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             .map(|base| self.base(expectation, &designed, random.as_ref().map(|(random, _)| random), base))
             .collect();
         let parameters = parameters(background, expectation, &base);
-        for (file, report) in motion.joints.iter_mut().zip(&joints) {
-            file.proved = Some(Proved {
-                angle_deg: report.angle_deg.map(millis),
-                speed_deg_s: millis(report.speed_deg_s),
-                acceleration_deg_s2: millis(report.acceleration_deg_s2),
-                torque_nm: millis(report.torque_with_margin_nm),
-            });
-        }
+        prove(&mut motion, &joints);
         motion.expected = Some(Expected {
             assumed: self.assumed.into(),
             torque_noise_nm: rehearsal.noise_nm.to_vec(),
             base_parameter: base.iter().map(|base| base.expected.clone()).collect(),
         });
+        let warnings = warnings(&self.leg, self.noise, &candidate.demand, &joints, &base, &parameters);
         let report = ExciteReport {
             schema: SCHEMA,
             leg: self.leg.name.clone(),
@@ -307,14 +302,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             random: compared(&random),
             random_same_pace: compared(&quick),
             condition: expectation.condition.into(),
-            warnings: crate::excite::warnings::warnings(
-                &self.leg,
-                self.noise,
-                &candidate.demand,
-                &joints,
-                &base,
-                &parameters,
-            ),
+            warnings,
             joints,
             base_parameters: base,
             parameters,
@@ -369,6 +357,18 @@ impl<const N: usize, const B: usize> Bench<N, B> {
                 .and_then(|random| Some(designed.estimate.sigma(base)? / random.estimate.sigma(base)?))
                 .into(),
         }
+    }
+}
+
+/// Adds to a motion what is proved of its joints.
+fn prove(motion: &mut Excitation, joints: &[JointReport]) {
+    for (file, report) in motion.joints.iter_mut().zip(joints) {
+        file.proved = Some(Proved {
+            angle_deg: report.angle_deg.map(millis),
+            speed_deg_s: millis(report.speed_deg_s),
+            acceleration_deg_s2: millis(report.acceleration_deg_s2),
+            torque_nm: millis(report.torque_with_margin_nm),
+        });
     }
 }
 

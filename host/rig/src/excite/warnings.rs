@@ -2,8 +2,8 @@
 
 use scarab::servo::SERVO_RATE_HZ;
 use scarab_base::number::number;
-use scarab_identify::formats::leg_file::{DEFAULT_RANGE_DEG, LegFile};
-use scarab_identify::report::excite::{ComparedBase, ExpectedParameter, JointReport};
+use scarab_identify::formats::leg_file::{DEFAULT_RANGE_DEG, JointFile, LegFile};
+use scarab_identify::report::excite::{ComparedBase, ExpectedBase, ExpectedParameter, JointReport};
 
 use crate::excite::bench::NoiseOrigin;
 use crate::excite::demand::Demand;
@@ -25,20 +25,7 @@ pub fn warnings(
     base: &[ComparedBase],
     parameters: &[ExpectedParameter],
 ) -> Vec<String> {
-    let mut warnings = Vec::new();
-    for ComparedBase { expected, .. } in base {
-        let (Some(sigma), Some(systematic)) = (expected.sigma, expected.systematic) else {
-            warnings.push(format!("{}: not determined by this motion", expected.name));
-            continue;
-        };
-        if systematic.abs() > SYSTEMATIC_SIGMAS * sigma {
-            warnings.push(format!(
-                "{}: wrong by {:.1} sigma without any noise (encoder steps, friction at reversals): its sigma is too small",
-                expected.name,
-                systematic.abs() / sigma
-            ));
-        }
-    }
+    let mut warnings: Vec<_> = base.iter().filter_map(|base| bias_warning(&base.expected)).collect();
     for parameter in parameters.iter().filter(|parameter| parameter.status == "weak") {
         let sigma = number(parameter.sigma);
         warnings.push(format!(
@@ -71,21 +58,7 @@ pub fn warnings(
             joint.name, demand.unheld_nm, joint.torque_limit_nm
         ));
     }
-    for (file, joint) in leg.joints.iter().zip(joints) {
-        let [low, high] = joint.angle_deg;
-        if file.range_deg == DEFAULT_RANGE_DEG {
-            warnings.push(format!(
-                "{}: `range_deg` is the default {} to {}: state the range in which it may move",
-                joint.name, DEFAULT_RANGE_DEG[0], DEFAULT_RANGE_DEG[1]
-            ));
-        } else if high - low > WIDE_DEG {
-            warnings.push(format!(
-                "{}: moves through {:.0} degrees: narrow `range_deg` if cables or other links are in the way",
-                joint.name,
-                high - low
-            ));
-        }
-    }
+    warnings.extend(leg.joints.iter().zip(joints).filter_map(|(file, joint)| range_warning(file, joint)));
     if noise.of == "prior" && noise.percent > 0.0 {
         warnings.push(
             "the noise is a share of the assumed leg's torque and as wrong as that torque: measure it at rest (--torque-noise-nm)"
@@ -96,4 +69,36 @@ pub fn warnings(
         warnings.push("these figures do not include pushes of the wearer".into());
     }
     warnings
+}
+
+/// Warning about a base parameter that is not determined, or whose error is not noise.
+fn bias_warning(expected: &ExpectedBase) -> Option<String> {
+    let (Some(sigma), Some(systematic)) = (expected.sigma, expected.systematic) else {
+        return Some(format!("{}: not determined by this motion", expected.name));
+    };
+    (systematic.abs() > SYSTEMATIC_SIGMAS * sigma).then(|| {
+        format!(
+            "{}: wrong by {:.1} sigma without any noise (encoder steps, friction at reversals): its sigma is too small",
+            expected.name,
+            systematic.abs() / sigma
+        )
+    })
+}
+
+/// Warning about a joint whose range nobody has stated, or that moves far.
+fn range_warning(file: &JointFile, joint: &JointReport) -> Option<String> {
+    let ([low, high], [least, most]) = (joint.angle_deg, DEFAULT_RANGE_DEG);
+    if file.range_deg == DEFAULT_RANGE_DEG {
+        return Some(format!(
+            "{}: `range_deg` is the default {least} to {most}: state the range in which it may move",
+            joint.name
+        ));
+    }
+    (high - low > WIDE_DEG).then(|| {
+        format!(
+            "{}: moves through {:.0} degrees: narrow `range_deg` if cables or other links are in the way",
+            joint.name,
+            high - low
+        )
+    })
 }

@@ -20,9 +20,9 @@ use scarab_identify::leg::exercise::Exercise;
 
 use crate::faults::bench::offsets::OFFSETS;
 use crate::faults::bounds::bounds;
-use crate::faults::catalogue::stop::ROWS as STOP;
 use crate::faults::detectors::views;
 use crate::faults::entry::Entry;
+use crate::faults::forks::stop::ROWS as STOP;
 use crate::faults::results::{Base, Campaign};
 use crate::faults::run::{Manner, Outcome, run};
 use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
@@ -82,7 +82,7 @@ enum Job {
 impl Job {
     fn order(&self) -> (&'static str, u64) {
         match self {
-            Self::Row { row, seed, .. } => (row.id, *seed),
+            Self::Row { row, seed, .. } => (row.fault.id, *seed),
             Self::Trial { seed, .. } => ("-", *seed),
         }
     }
@@ -105,7 +105,7 @@ pub fn campaign(leg: &LegFile, whole: &CampaignOptions) -> Result<Campaign, Tool
     let part = |seeds: &[u64]| shard.part(seeds).to_vec();
     let [seeds, sweep, pairs] = [&whole.seeds, &whole.sweep, &whole.pairs].map(|seeds| part(seeds));
     let options = &CampaignOptions { seeds, sweep, pairs, ..whole.clone() };
-    let ids: Vec<&str> = options.rows.iter().map(|entry| entry.head().id).collect();
+    let ids: Vec<&str> = options.rows.iter().map(|entry| entry.fault().id).collect();
     let twice = |id: &str| ids.iter().filter(|other| **other == id).count() > 1;
     let seeds = options.seeds.iter().chain(&options.sweep).chain(&options.pairs);
     let mut bases: Vec<u64> = seeds.map(|seed| base_of(*seed)).collect();
@@ -126,14 +126,14 @@ pub fn campaign(leg: &LegFile, whole: &CampaignOptions) -> Result<Campaign, Tool
     found.into_iter().for_each(|found| campaign.add(found));
     for entry in &options.rows {
         if let Entry::Bench(bench) = entry {
-            let halved = twice(bench.head.id);
-            let seeds: Vec<u64> = if options.whole && bench.head.id == "E3" {
+            let halved = twice(bench.fault.id);
+            let seeds: Vec<u64> = if options.whole && bench.fault.id == "E3" {
                 part(&(1..=OFFSETS).collect::<Vec<_>>())
             } else {
                 options.seeds.iter().copied().filter(|seed| !halved || seed.is_multiple_of(2)).collect()
             };
             if !seeds.is_empty() {
-                campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds, options.manner.is_blind())?);
+                campaign.outcomes.extend((bench.run)(bench.fault, leg, &seeds, options.manner.is_blind())?);
             }
         }
     }
@@ -155,17 +155,10 @@ fn based(
     let wearer = Exercise::Gait(CADENCE_HZ);
     let worn = leg.assist.map(|_| Worn::new::<BASE>(leg, wearer, base)).transpose()?;
     let leg = worn.as_ref().map_or(leg, |worn| &worn.exoskeleton);
-    let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
-    let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
-    if widened {
-        for joint in &mut context.configuration.joints {
-            (joint.torque, joint.current) = (joint.torque * WIDENED, joint.current * WIDENED);
-        }
-    }
-    let mut length = if worn.is_some() { WORN_LENGTH } else { length(leg, &context, base)? };
-    if let Some(seconds) = options.seconds {
-        length = length.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
-    }
+    let context = context(leg, base, widened)?;
+    let whole = if worn.is_some() { WORN_LENGTH } else { length(leg, &context, base)? };
+    let shortened = |seconds: f64| whole.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
+    let length = options.seconds.map_or(whole, shortened);
     let setting = Setting { leg, bounds, manner: options.manner, widened, length };
     let mut jobs = setting.jobs(options, twice, base);
     let mut stops = if every { stops(length) } else { Vec::new() };
@@ -175,13 +168,9 @@ fn based(
         return Ok(campaign);
     }
     let mut rig = Rig::new(leg, &context, base)?;
-    if let Some(worn) = &worn {
-        worn.dress(&mut rig)?;
-    }
+    worn.as_ref().map_or(Ok(()), |worn| worn.dress(&mut rig))?;
     begin(leg, &mut rig)?;
-    if let Some(worn) = &worn {
-        worn.walk(&mut rig)?;
-    }
+    worn.as_ref().map_or(Ok(()), |worn| worn.walk(&mut rig))?;
     jobs.sort_by_key(|(period, job)| (*period, job.order()));
     // The shard with the last stop runs the identification to its end.
     let last_stop = stops.last().copied().map(|stop| if Some(stop) == last_of_all { length } else { stop });
@@ -213,6 +202,18 @@ fn based(
     Ok(campaign)
 }
 
+/// Context of a base; `widened` torque caps are never reached.
+fn context(leg: &LegFile, base: u64, widened: bool) -> Result<Context<JOINTS, BASE>, ToolError> {
+    let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
+    let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
+    if widened {
+        for joint in &mut context.configuration.joints {
+            (joint.torque, joint.current) = (joint.torque * WIDENED, joint.current * WIDENED);
+        }
+    }
+    Ok(context)
+}
+
 /// Returns whether the stop comes in this period: every servo tick, and every period from 1 s to 2 s.
 fn is_stopped_at(period: u64) -> bool {
     period.is_multiple_of(u64::from(PERIODS_PER_TICK)) || (PERIODS_PER_S..2 * PERIODS_PER_S).contains(&period)
@@ -237,14 +238,14 @@ impl Setting<'_> {
         let mut jobs = Vec::new();
         for entry in &options.rows {
             let Entry::Forked(row) = entry else { continue };
-            if self.manner.is_blind() && (row.id == CAPPED) != self.widened {
+            if self.manner.is_blind() && (row.fault.id == CAPPED) != self.widened {
                 continue;
             }
             for seed in options.seeds.iter().copied().filter(|seed| base_of(*seed) == base) {
-                if twice(row.id) && seed.is_multiple_of(2) {
+                if twice(row.fault.id) && seed.is_multiple_of(2) {
                     continue;
                 }
-                let mut random = Random::new(row.id, seed);
+                let mut random = Random::new(row.fault.id, seed);
                 let period = random.below(self.length);
                 let scenario = (row.draw)(&mut random, &self.bounds);
                 let views = if self.manner.is_blind() { views(row, &options.rows) } else { Vec::new() };

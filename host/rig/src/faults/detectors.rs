@@ -32,26 +32,27 @@ pub struct DetectorReport {
 
 fn forked(rows: &[Entry]) -> impl Iterator<Item = &'static Row> {
     rows.iter().filter_map(|entry| match entry {
-        Entry::Forked(row) if row.id != crate::faults::campaign::CAPPED => Some(*row),
+        Entry::Forked(row) if row.fault.id != crate::faults::campaign::CAPPED => Some(*row),
         _ => None,
     })
 }
 
 /// Codes whose own row of the catalogue is among the forked ones.
 fn codes(rows: &[Entry]) -> impl Iterator<Item = FaultCode> {
-    let has =
-        |code: &FaultCode| forked(rows).any(|row| row.id == code.catalogue() && row.codes.contains(code));
+    let has = |code: &FaultCode| {
+        forked(rows).any(|row| row.fault.id == code.catalogue() && row.fault.codes.contains(code))
+    };
     FaultCode::ALL.into_iter().filter(has)
 }
 
 /// Additional views of a row's runs: with all detectors enabled, and with each of several codes disabled
 /// alone. The main run disables all of the row's detectors; for a row with one code that is the same.
 pub(super) fn views(row: &'static Row, rows: &[Entry]) -> Vec<Blind> {
-    if row.id == crate::faults::campaign::CAPPED {
+    if row.fault.id == crate::faults::campaign::CAPPED {
         return Vec::new();
     }
-    let alone = row.codes.len() == 1;
-    let codes = codes(rows).filter(|code| !alone && row.codes.contains(code)).map(Blind::Code);
+    let alone = row.fault.codes.len() == 1;
+    let codes = codes(rows).filter(|code| !alone && row.fault.codes.contains(code)).map(Blind::Code);
     [Blind::None].into_iter().chain(codes).collect()
 }
 
@@ -73,22 +74,22 @@ fn detector(code: FaultCode, rows: &[Entry], campaign: &Campaign) -> DetectorRep
         seen_by_others: 0,
         unjudged_without: 0,
     };
-    for row in forked(rows).filter(|row| row.codes.contains(&code)) {
+    for row in forked(rows).filter(|row| row.fault.codes.contains(&code)) {
         let of = |blind: Blind| {
             let singly = campaign.singly.iter().filter(move |(how, _)| *how == blind);
-            singly.map(|(_, outcome)| outcome).filter(|outcome| outcome.fault == row.id)
+            singly.map(|(_, outcome)| outcome).filter(|outcome| outcome.fault == row.fault.id)
         };
         let reported = |outcome: &&Outcome| outcome.detected && outcome.alarm == Some(code.name());
         for seen in of(Blind::None).filter(reported) {
-            let same = |outcome: &&Outcome| outcome.fault == row.id && outcome.seed == seen.seed;
-            let without = if row.codes.len() == 1 {
+            let same = |outcome: &&Outcome| outcome.fault == row.fault.id && outcome.seed == seen.seed;
+            let without = if row.fault.codes.len() == 1 {
                 campaign.outcomes.iter().find(same)
             } else {
                 of(Blind::Code(code)).find(same)
             };
             let Some(without) = without else { continue };
-            if !report.faults.contains(&row.id) {
-                report.faults.push(row.id);
+            if !report.faults.contains(&row.fault.id) {
+                report.faults.push(row.fault.id);
             }
             report.seen += 1;
             match (without.detected, without.undetectable) {

@@ -8,7 +8,7 @@ use scarab::leg::{Activity, IdentifiedModel};
 use scarab::safety::FaultCode;
 use scarab_identify::formats::leg_file::{JointFile, LegFile};
 
-use crate::faults::catalogue::encoder::LOST_TURNS;
+use crate::faults::forks::encoder::LOST_TURNS;
 use crate::faults::scenario::Event;
 use crate::faulty_board::{Edges, PERIODS_PER_S, Rig};
 

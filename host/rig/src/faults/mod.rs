@@ -3,8 +3,9 @@
 //!
 //! | part | content |
 //! | --- | --- |
-//! | [`scenario`] | a row and a run of it: fault, onset, required reaction |
-//! | [`catalogue`], [`draw`], [`bounds`] | all rows by group |
+//! | [`catalogue`] | all faults: detector, safe state, deadline, codes |
+//! | [`scenario`] | a run: injection, onset, required reaction |
+//! | [`forks`], [`draw`], [`bounds`] | how the faults of forks are drawn |
 //! | [`run`], [`outcome`], [`invariants`] | one run, its outcome, and conditions that hold in every period |
 //! | [`aftermath`] | allowed safe states of each code; an operator who resets and enables again |
 //! | [`campaign`] | many runs, forked from identifications |
@@ -28,6 +29,7 @@ pub mod detectors;
 pub mod draw;
 pub mod entry;
 pub mod event;
+pub mod forks;
 pub mod hours;
 pub mod invariants;
 pub mod outcome;

@@ -5,12 +5,12 @@ use scarab_base::number::Number;
 use scarab_base::table::{Cell, Table, cells};
 use serde::Serialize;
 
+use crate::faults::catalogue::Fault;
 use crate::faults::detectors::{DetectorReport, detectors};
-use crate::faults::entry::{Entry, instead};
+use crate::faults::entry::Entry;
 use crate::faults::hours::HoursReport;
 use crate::faults::results::Campaign;
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::faults::trial::KINDS;
 
 /// Largest number of failures in the JSON.
@@ -122,9 +122,9 @@ impl CampaignReport {
     /// Creates the report of a campaign.
     #[must_use]
     pub fn new(entries: &[Entry], campaign: &Campaign) -> Self {
-        let mut heads: Vec<Head> = entries.iter().map(Entry::head).collect();
+        let mut faults: Vec<&Fault> = entries.iter().map(Entry::fault).collect();
         // A row that is run in two ways is described as its forks are.
-        heads.dedup_by_key(|head| head.id);
+        faults.dedup_by_key(|fault| fault.id);
         let outcomes = &campaign.outcomes;
         let failed = |outcome: &&Outcome| {
             !outcome.detected && !outcome.undetectable || outcome.false_alarm || !outcome.broken.is_empty()
@@ -141,7 +141,7 @@ impl CampaignReport {
             ),
             runs: outcomes.len(),
             undetectable_by_design: outcomes.iter().filter(|outcome| outcome.undetectable).count(),
-            rows: heads.iter().map(|head| row_report(head, outcomes)).collect(),
+            rows: faults.iter().map(|fault| row_report(fault, outcomes)).collect(),
             invariants_broken: all().map(|outcome| outcome.broken.len()).sum(),
             failures: all().filter(failed).take(MOST_FAILURES).cloned().collect(),
             every_tick: campaign.every_tick,
@@ -264,7 +264,7 @@ fn names(states: &str, state: &str) -> bool {
     states.match_indices(state).any(|(at, _)| !states[at + state.len()..].starts_with(':'))
 }
 
-fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
+fn row_report(row: &Fault, outcomes: &[Outcome]) -> RowReport {
     let of: Vec<&Outcome> = outcomes.iter().filter(|outcome| outcome.fault == row.id).collect();
     let count = |holds: &dyn Fn(&Outcome) -> bool| of.iter().filter(|outcome| holds(outcome)).count();
     let magnitudes = |seen: bool| {
@@ -295,11 +295,9 @@ fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
         worst_intermittent_ms: worst(true).into(),
         intermittent_deadline_ms: longest.into(),
         state: row.state,
-        state_instead: instead(row.id),
+        state_instead: row.instead,
         state_reached: count(&|outcome| {
-            let leads =
-                |state: &str| names(row.state, state) || instead(row.id).is_some_and(|to| names(to, state));
-            outcome.state.is_some_and(leads)
+            outcome.state.is_some_and(|state| row.leads_to(|to| names(to, state)))
         }),
         undetectable_by_design: count(&|outcome| outcome.undetectable),
         what: row.fault,

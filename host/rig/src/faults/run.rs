@@ -42,7 +42,7 @@ pub fn run<const B: usize>(
 ) -> Outcome {
     catch_unwind(AssertUnwindSafe(|| Watched::new(leg, row, scenario, seed, manner, base).finish()))
         .unwrap_or_else(|_| Outcome {
-            fault: row.id,
+            fault: row.fault.id,
             seed,
             period: base.period,
             detected: false,
@@ -116,9 +116,9 @@ impl<'a, const B: usize> Watched<'a, B> {
         rig.injector = Injector::new(seed);
         rig.blind = match manner.blind {
             Blind::None => &[],
-            Blind::Row => row.codes,
+            Blind::Row => row.fault.codes,
             Blind::Code(code) => {
-                row.codes.iter().find(|own| **own == code).map_or(&[], core::slice::from_ref)
+                row.fault.codes.iter().find(|own| **own == code).map_or(&[], core::slice::from_ref)
             }
         };
         for injection in scenario.injections.into_iter().flatten() {
@@ -140,7 +140,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             scenario,
             seed,
             invariants: Invariants::new(leg, scope, &rig),
-            random: Random::new(row.id, !seed),
+            random: Random::new(row.fault.id, !seed),
             begun,
             onset,
             angles: rig.world.anatomical_position(),
@@ -232,12 +232,12 @@ impl<'a, const B: usize> Watched<'a, B> {
 
     /// Deadline of this run where it is longer than the row's, ms.
     fn intermittent_ms(&self) -> Option<f64> {
-        self.scenario.within_ms.filter(|within| *within > self.row.deadline_ms)
+        self.scenario.within_ms.filter(|within| *within > self.row.fault.deadline_ms)
     }
 
     /// Deadline of this run, ms.
     fn deadline_ms(&self) -> f64 {
-        self.scenario.within_ms.unwrap_or(self.row.deadline_ms)
+        self.scenario.within_ms.unwrap_or(self.row.fault.deadline_ms)
     }
 
     /// Operates the contacts at random, with a complete reset now and then.
@@ -265,10 +265,53 @@ impl<'a, const B: usize> Watched<'a, B> {
             Expected::Ignored => return self.ignore(),
             _ => {}
         }
+        let seen = self.run_until_safe();
+        let safe = self.rig.period;
+        let alarm = self.rig.alarm();
+        // A fault that begins only while the safe machine is watched does not belong to this run.
+        let onset = self.onset;
+        if let (Some(state), Some(code)) = (seen, alarm) {
+            self.judge(state, code);
+        }
+        self.watch_on(seen);
+        // A single wrong reading must not stop the leg.
+        let mut false_alarm = self.scenario.expected == Expected::Rejected && self.rig.alarm().is_some();
+        // An alarm before the onset counts for this row only if its own detectors reported.
+        let own = alarm.is_none_or(|code| self.row.fault.codes.contains(&code));
+        let early = onset.is_none() && !own;
+        let elsewhere = !early && seen.is_some_and(|state| !self.leads_to(state));
+        false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !Self::is_caused_by_a_push(code));
+        let alarm = alarm.map(FaultCode::name);
+        let begun = onset.map_or(safe, |onset| onset.min(safe));
+        let after_ms = seen.map(|_| (safe - begun) as f64 * PERIOD_MS);
+        let in_time = after_ms.is_some_and(|after| after <= self.deadline_ms() + 1e-9);
+        let nothing_came = onset.is_none() && (seen.is_none() || early);
+        let stood = self.row.fault.deadline_ms.is_infinite() && !self.has_turned();
+        let in_time = in_time && !early && !elsewhere;
+        let undetectable = !in_time && !elsewhere && (self.scenario.by_design || nothing_came || stood);
+        Outcome {
+            fault: self.row.fault.id,
+            seed: self.seed,
+            period: self.begun,
+            detected: in_time,
+            undetectable,
+            false_alarm,
+            after_ms,
+            intermittent_ms: self.intermittent_ms(),
+            state: seen,
+            alarm,
+            magnitude: self.scenario.magnitude,
+            broken: self.invariants.into_broken(),
+            hash: format!("{:016x}", self.rig.hash),
+            recording: self.recording,
+        }
+    }
+
+    /// Runs until the state that the fault must lead to, which is returned, or until it is too late.
+    fn run_until_safe(&mut self) -> Option<&'static str> {
         let before = *self.rig.commands();
         let limit = self.begun + self.scenario.patience;
         let mut seen = None;
-        let mut false_alarm = false;
         while seen.is_none() && (self.rig.period < limit) {
             self.step();
             if self.scenario.expected == Expected::Rejected && self.rig.period == self.begun + 1 {
@@ -286,52 +329,12 @@ impl<'a, const B: usize> Watched<'a, B> {
                 break;
             }
         }
-        let safe = self.rig.period;
-        let alarm = self.rig.alarm();
-        // A fault that begins only while the safe machine is watched does not belong to this run.
-        let onset = self.onset;
-        if let (Some(state), Some(code)) = (seen, alarm) {
-            self.judge(state, code);
-        }
-        self.watch_on(seen);
-        if self.scenario.expected == Expected::Rejected {
-            // A single wrong reading must not stop the leg.
-            false_alarm = self.rig.alarm().is_some();
-        }
-        // An alarm before the onset counts for this row only if its own detectors reported.
-        let own = alarm.is_none_or(|code| self.row.codes.contains(&code));
-        let early = onset.is_none() && !own;
-        let elsewhere = !early && seen.is_some_and(|state| !self.leads_to(state));
-        false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !Self::is_caused_by_a_push(code));
-        let alarm = alarm.map(FaultCode::name);
-        let begun = onset.map_or(safe, |onset| onset.min(safe));
-        let after_ms = seen.map(|_| (safe - begun) as f64 * PERIOD_MS);
-        let in_time = after_ms.is_some_and(|after| after <= self.deadline_ms() + 1e-9);
-        let nothing_came = onset.is_none() && (seen.is_none() || early);
-        let stood = self.row.deadline_ms.is_infinite() && !self.has_turned();
-        let in_time = in_time && !early && !elsewhere;
-        let undetectable = !in_time && !elsewhere && (self.scenario.by_design || nothing_came || stood);
-        Outcome {
-            fault: self.row.id,
-            seed: self.seed,
-            period: self.begun,
-            detected: in_time,
-            undetectable,
-            false_alarm,
-            after_ms,
-            intermittent_ms: self.intermittent_ms(),
-            state: seen,
-            alarm,
-            magnitude: self.scenario.magnitude,
-            broken: self.invariants.into_broken(),
-            hash: format!("{:016x}", self.rig.hash),
-            recording: self.recording,
-        }
+        seen
     }
 
     fn is_too_late(&self, onset: u64) -> bool {
         let since = self.rig.period.saturating_sub(onset) as f64 * PERIOD_MS;
-        if self.row.deadline_ms.is_infinite() {
+        if self.row.fault.deadline_ms.is_infinite() {
             return self.has_turned();
         }
         since > 2.0 * self.deadline_ms() + 1.0

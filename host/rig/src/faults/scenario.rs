@@ -5,31 +5,9 @@
 //! fault with an onset condition ([`Onset`]) is judged by the machine's motion before that.
 
 use hal_sim::faults::Injection;
-use scarab::safety::FaultCode;
-
 use scarab_base::random::Random;
 
-/// Description of a row.
-#[derive(Clone, Copy, Debug)]
-pub struct Head {
-    /// Id in the catalogue.
-    pub id: &'static str,
-    /// Description of the fault.
-    pub fault: &'static str,
-    /// Detector of the fault.
-    pub detector: &'static str,
-    /// Safe state: the catalogue's last column.
-    pub state: &'static str,
-    /// Time limit from the fault to the safe state's first command, ms; infinite where the limit is not a
-    /// time.
-    pub deadline_ms: f64,
-    /// Unit of the magnitude.
-    pub unit: &'static str,
-    /// Fault codes that the firmware reports; empty for a bench.
-    pub codes: &'static [FaultCode],
-    /// Cases that are not detected yet.
-    pub lacking: Option<&'static str>,
-}
+use crate::faults::catalogue::Fault;
 
 /// Required reaction of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,26 +123,11 @@ pub struct Scenario {
     pub turns: f64,
 }
 
-/// A row of the catalogue.
+/// How a fault of the catalogue is run as forks.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// Id in the catalogue.
-    pub id: &'static str,
-    /// Description of the fault.
-    pub fault: &'static str,
-    /// Detector of the fault.
-    pub detector: &'static str,
-    /// Safe state according to the catalogue.
-    pub state: &'static str,
-    /// Fault codes that the firmware reports.
-    pub codes: &'static [FaultCode],
-    /// Time limit from the fault to the safe state's first command, ms; infinite for a limit of one rotor
-    /// turn.
-    pub deadline_ms: f64,
-    /// Unit of the magnitude.
-    pub unit: &'static str,
-    /// Cases that the detector does not cover yet.
-    pub lacking: Option<&'static str>,
+    /// The fault.
+    pub fault: &'static Fault,
     /// Draws a run for a board with these thresholds.
     pub draw: fn(&mut Random, &Bounds) -> Scenario,
 }

@@ -16,8 +16,8 @@ use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::faults::aftermath::{RESET, RESET_EVERY, hand};
-use crate::faults::catalogue::rows;
 use crate::faults::event::apply;
+use crate::faults::forks::rows;
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::recording::FaultCurves;
 use crate::faults::run::Outcome;
@@ -126,7 +126,7 @@ impl Trial {
     }
 
     fn add(&mut self, random: &mut Random, bounds: &Bounds, later: u64) {
-        let pool = || rows().filter(|row| !ALONE.contains(&row.id));
+        let pool = || rows().filter(|row| !ALONE.contains(&row.fault.id));
         let all = pool().count() as u64;
         let mut injections = Vec::new();
         if random.below(12) == 0 {

@@ -11,7 +11,8 @@ use scarab_identify::formats::leg_file::assist::AssistFile;
 use scarab_identify::formats::shard::{Argument, CampaignHeader, ShardResults};
 use scarab_rig::assist::study::Mode;
 use scarab_rig::faults::campaign::{CampaignOptions, campaign};
-use scarab_rig::faults::entry::{Entry, ON_THE_CHIP, entries};
+use scarab_rig::faults::catalogue::ON_THE_CHIP;
+use scarab_rig::faults::entry::{Entry, entries};
 use scarab_rig::faults::hours::hours;
 use scarab_rig::faults::report::{CampaignReport, line};
 use scarab_rig::faults::results::Campaign;
@@ -92,19 +93,19 @@ pub struct FaultsArguments {
 fn rows(names: &[String]) -> Result<Vec<Entry>, ToolError> {
     let all = entries();
     for name in names {
-        if ON_THE_CHIP.iter().any(|(id, _)| id == name) {
+        if ON_THE_CHIP.iter().any(|fault| fault.id == name) {
             return Err(ToolError::input(format!(
                 "--fault {name}: needs the processor; run `cargo chip faults --rows {name}`"
             )));
         }
-        if !all.iter().any(|entry| entry.head().id == name) && !KINDS.contains(&name.as_str()) {
-            let mut known: Vec<_> = all.iter().map(|entry| entry.head().id).collect();
+        if !all.iter().any(|entry| entry.fault().id == name) && !KINDS.contains(&name.as_str()) {
+            let mut known: Vec<_> = all.iter().map(|entry| entry.fault().id).collect();
             known.dedup();
             known.extend(KINDS);
             return Err(ToolError::input(format!("--fault {name}: is none of {}", known.join(", "))));
         }
     }
-    let is_asked = |entry: &Entry| names.is_empty() || names.iter().any(|name| name == entry.head().id);
+    let is_asked = |entry: &Entry| names.is_empty() || names.iter().any(|name| name == entry.fault().id);
     Ok(all.into_iter().filter(is_asked).collect())
 }
 
@@ -160,7 +161,7 @@ impl FaultsArguments {
         }
         if self.blind {
             rows.retain(Entry::can_be_blind);
-            let named = |name: &String| rows.iter().any(|entry| entry.head().id == name);
+            let named = |name: &String| rows.iter().any(|entry| entry.fault().id == name);
             if rows.is_empty() || !self.fault.iter().all(named) {
                 return Err(ToolError::input(format!(
                     "--blind: some rows of --fault {} have no detectors that can be switched off",
@@ -168,7 +169,7 @@ impl FaultsArguments {
                 )));
             }
         }
-        if self.every_tick && !rows.iter().any(|entry| entry.head().id == "X1") {
+        if self.every_tick && !rows.iter().any(|entry| entry.fault().id == "X1") {
             return Err(ToolError::input(
                 "--every-tick: tests the emergency stop (row X1), which --fault excludes",
             ));
@@ -251,7 +252,7 @@ pub(super) fn conclude(
     output::print(&report.table().to_text())?;
     output::print(&report.notes())?;
     if arguments.fault.is_empty() {
-        let rows = ON_THE_CHIP.map(|(id, fault)| format!("{id} ({fault})")).join(", ");
+        let rows = ON_THE_CHIP.map(|fault| format!("{} ({})", fault.id, fault.fault)).join(", ");
         output::print(&format!(
             "not run here, since they need the processor: {rows}; `cargo chip faults` runs them\n"
         ))?;

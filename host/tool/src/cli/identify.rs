@@ -5,6 +5,7 @@ use scarab::model::Payload;
 use scarab_base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use scarab_base::shard::Shard;
 use scarab_identify::formats::excitation::Excitation;
+use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::shard::{Argument, CampaignHeader, ShardResults};
 use scarab_identify::leg::placed_mass::PlacedMass;
 use scarab_identify::leg::setup::DEFAULT_SEED;
@@ -136,15 +137,7 @@ pub fn run(arguments: &IdentifyArguments, stated: Vec<Argument>) -> Result<u8, T
         excitation: excitation.clone(),
     };
     let Some((first, last)) = arguments.seeds else {
-        let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));
-        let log = arguments.log.as_deref();
-        let kept = arguments.model.kept(leg)?;
-        let (mut run, series) = with_leg_size!(leg, identify_one(leg, options, log))?;
-        arguments.model.compare(kept.as_ref(), &mut run);
-        let code = finish(&run, &arguments.common, "")?;
-        draw(leg, &arguments.common, &run, &series, &[])?;
-        arguments.model.save(leg, &run, leg.bandwidth_hz)?;
-        return Ok(code);
+        return run_once(arguments, leg, &options(arguments.seed.unwrap_or(DEFAULT_SEED)));
     };
     let program = program();
     let campaign =
@@ -158,6 +151,22 @@ pub fn run(arguments: &IdentifyArguments, stated: Vec<Argument>) -> Result<u8, T
         return part.write(path, &campaign, &format!("{} of {} runs", options.len(), seeds.len()));
     }
     conclude(arguments, &campaign, vec![part])
+}
+
+/// Identifies once and reports; returns the exit code.
+fn run_once(
+    arguments: &IdentifyArguments,
+    leg: &LegFile,
+    options: &SimulationOptions,
+) -> Result<u8, ToolError> {
+    let log = arguments.log.as_deref();
+    let kept = arguments.model.kept(leg)?;
+    let (mut run, series) = with_leg_size!(leg, identify_one(leg, options, log))?;
+    arguments.model.compare(kept.as_ref(), &mut run);
+    let code = finish(&run, &arguments.common, "")?;
+    draw(leg, &arguments.common, &run, &series, &[])?;
+    arguments.model.save(leg, &run, leg.bandwidth_hz)?;
+    Ok(code)
 }
 
 /// Results of a shard: its runs, in the order of their seeds.

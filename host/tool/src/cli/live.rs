@@ -203,17 +203,15 @@ impl LiveArguments {
 
 /// Serves the page until Ctrl-C; returns the exit code of the last identification.
 pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
-    for (file, example) in [
-        (&arguments.recording, "live --recording run.csv --leg my-leg.toml"),
-        (&arguments.trace, "live --trace trace.txt --leg my-leg.toml"),
-        (&arguments.candump, "live --candump - --leg my-leg.toml"),
+    for (is_given, example) in [
+        (arguments.recording.is_some(), "live --recording run.csv --leg my-leg.toml"),
+        (arguments.trace.is_some(), "live --trace trace.txt --leg my-leg.toml"),
+        (arguments.candump.is_some(), "live --candump - --leg my-leg.toml"),
+        (arguments.slcan.is_some(), "live --slcan /dev/ttyACM0 --leg my-leg.toml"),
     ] {
-        if file.is_some() {
+        if is_given {
             arguments.leg.require(example)?;
         }
-    }
-    if arguments.slcan.is_some() {
-        arguments.leg.require("live --slcan /dev/ttyACM0 --leg my-leg.toml")?;
     }
     let leg = arguments.leg.load()?;
     let speed = arguments.speed;
@@ -240,39 +238,29 @@ pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
     let shown = Arc::clone(&hub);
     // Ends with the process.
     let page = thread::spawn(move || server.serve(shown));
-    let shown = Arc::clone(&hub);
     let judges = !matches!(source, Source::Bus(_));
-    let mut source = Some(thread::spawn(move || report(&leg, source, &shown)));
+    let mut source = Some(thread::spawn(move || report(&leg, source, &hub)));
     let mut outcome = None;
     while !stop.load(Ordering::Relaxed) {
         if page.is_finished() {
-            return page.join().map_or_else(
-                |_| Err(ToolError::input("the page's thread failed")),
-                |served| served.map(|()| EXIT_REFUSED),
-            );
+            page.join().map_err(|_| ToolError::input("the page's thread failed"))??;
+            return Ok(EXIT_REFUSED);
         }
         if let Some(ended) = source.take_if(|source| source.is_finished()) {
-            let result = ended.join().map_err(|_| ToolError::input("the simulation failed"))?;
-            match result {
-                Ok((code, words)) => {
-                    say!("{words}");
-                    outcome = Some(Ok(code));
-                }
-                Err(error) => outcome = Some(Err(error)),
-            }
-            if arguments.once || matches!(outcome, Some(Err(_))) {
+            let (code, words) = ended.join().map_err(|_| ToolError::input("the simulation failed"))??;
+            say!("{words}");
+            outcome = Some(code);
+            if arguments.once {
                 break;
             }
             say!("the page stays open until Ctrl-C");
         }
         thread::sleep(PAUSE);
     }
-    outcome.unwrap_or_else(|| {
-        if judges {
-            eprintln!("stopped before a verdict");
-        }
-        Ok(if judges { EXIT_REFUSED } else { EXIT_ACCEPTED })
-    })
+    if outcome.is_none() && judges {
+        eprintln!("stopped before a verdict");
+    }
+    Ok(outcome.unwrap_or(if judges { EXIT_REFUSED } else { EXIT_ACCEPTED }))
 }
 
 /// Runs the source; returns the exit code and the verdict with its reasons.

@@ -206,6 +206,31 @@ impl Load {
     }
 }
 
+/// Describes the bus and its legs; returns these, each with the beginning of its lines in the timeline.
+fn legs<'a, const N: usize, const B: usize>(
+    leg: &'a LegFile,
+    source: &BusInput,
+    out: &'a dyn Fn(LiveUpdate),
+) -> Result<Vec<(String, Leg<'a, N, B>)>, ToolError> {
+    let ids: Vec<[u8; N]> = source.nodes.chunks_exact(N).filter_map(|ids| ids.try_into().ok()).collect();
+    let shown = if source.lines == Lines::Candump {
+        Path::new(&source.name).file_name().unwrap_or_default()
+    } else {
+        source.name.as_ref()
+    };
+    let mut described = scene(leg, format!("CANopen bus, {}", shown.display()), source.speed.unwrap_or(1.0));
+    let joints = described.legs.first().map(|leg| leg.joints.clone()).unwrap_or_default();
+    described.legs =
+        ids.iter().map(|ids| LegScene { name: leg_name(leg, ids), joints: joints.clone() }).collect();
+    out(LiveUpdate::Scene(described));
+    let mut legs = Vec::new();
+    for (place, own) in ids.iter().enumerate() {
+        let prefix = if ids.len() > 1 { format!("leg {}: ", place + 1) } else { String::new() };
+        legs.push((prefix, Leg::new(leg, *own, place, source.model.as_ref(), out)?));
+    }
+    Ok(legs)
+}
+
 /// Shows the legs of a bus until the input ends; returns the reason of the end.
 ///
 /// # Errors
@@ -215,23 +240,8 @@ pub fn watch<const N: usize, const B: usize>(
     source: BusInput,
     out: &dyn Fn(LiveUpdate),
 ) -> Result<String, ToolError> {
-    let BusInput { input, lines, name, nodes, bits_per_s, model, speed } = source;
-    let ids: Vec<[u8; N]> = nodes.chunks_exact(N).filter_map(|ids| ids.try_into().ok()).collect();
-    let shown = if lines == Lines::Candump {
-        Path::new(&name).file_name().unwrap_or_default()
-    } else {
-        name.as_ref()
-    };
-    let mut described = scene(leg, format!("CANopen bus, {}", shown.display()), speed.unwrap_or(1.0));
-    let joints = described.legs.first().map(|leg| leg.joints.clone()).unwrap_or_default();
-    described.legs =
-        ids.iter().map(|ids| LegScene { name: leg_name(leg, ids), joints: joints.clone() }).collect();
-    out(LiveUpdate::Scene(described));
-    let mut legs: Vec<(String, Leg<N, B>)> = Vec::new();
-    for (place, own) in ids.iter().enumerate() {
-        let prefix = if ids.len() > 1 { format!("leg {}: ", place + 1) } else { String::new() };
-        legs.push((prefix, Leg::new(leg, *own, place, model.as_ref(), out)?));
-    }
+    let mut legs = legs::<N, B>(leg, &source, out)?;
+    let BusInput { input, lines, name, bits_per_s, speed, .. } = source;
     let note = |time_s: f64, weight, words: String| out(LiveUpdate::Note(LiveNote { time_s, weight, words }));
     let mut load = Load { bits_per_s, since_s: 0.0, bits: 0, frames: 0, words: String::new() };
     let mut clock = speed.map(Clock::new);
@@ -278,14 +288,18 @@ pub fn watch<const N: usize, const B: usize>(
     }
     let reason = reader.join().unwrap_or_else(|_| "its reader failed".into());
     if times.offset_s.is_none() {
-        let first =
-            first_bad.map_or_else(String::new, |why| format!("; {bad} lines are none, the first: {why}"));
-        return Err(ToolError::input(format!("{name}: no CAN frame: {reason}{first}")));
+        return Err(no_frame(&name, &reason, bad, first_bad));
     }
     let bus = BusStatus { load: &load.words, heard: "", has_ended: true };
     legs.iter_mut().for_each(|(prefix, leg)| leg.report(times.now_s, prefix, &bus));
     note(times.now_s, Severity::Note, "the source has ended".into());
     Ok(format!("{name}: {reason}"))
+}
+
+/// Refusal of an input without a frame, with the first of the lines that are none.
+fn no_frame(name: &str, reason: &str, bad: u32, first: Option<String>) -> ToolError {
+    let first = first.map_or_else(String::new, |why| format!("; {bad} lines are none, the first: {why}"));
+    ToolError::input(format!("{name}: no CAN frame: {reason}{first}"))
 }
 
 /// Name of a leg with its nodes.

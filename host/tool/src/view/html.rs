@@ -18,6 +18,7 @@ mod limits;
 pub mod parameters;
 mod results;
 pub mod seeds;
+pub mod table;
 mod verdict;
 
 use jiff::{Timestamp, Unit};

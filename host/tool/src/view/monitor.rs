@@ -4,7 +4,7 @@ use scarab_base::error::ToolError;
 use scarab_base::number::{Number, number};
 use scarab_base::output::say;
 use scarab_base::table::{Table, cells};
-use scarab_rig::report::monitor::{MonitorRun, MonitorRuns};
+use scarab_rig::report::monitor::{MonitorRun, MonitorRuns, UpdateReport};
 
 /// Prints a run in a few lines.
 fn print_run(run: &MonitorRun) -> Result<(), ToolError> {
@@ -34,6 +34,11 @@ fn print_run(run: &MonitorRun) -> Result<(), ToolError> {
         say!("  too few rows for an update");
         return Ok(());
     };
+    print_update(run, update)
+}
+
+/// Prints cause, changes and effect of a quick update.
+fn print_update(run: &MonitorRun, update: &UpdateReport) -> Result<(), ToolError> {
     let compared: Vec<_> = update
         .hypotheses
         .iter()
@@ -123,6 +128,12 @@ pub fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
     }
     let again = changed.iter().filter(|run| run.alarm_after_update).count();
     say!("another alarm within a minute of the update: {again}");
+    say!("{}", change_table(&updates).to_text().trim_end());
+    Ok(())
+}
+
+/// Identified changes of the updates with the right cause, against the true ones.
+fn change_table(updates: &[&UpdateReport]) -> Table {
     let right: Vec<_> = updates.iter().filter(|update| update.right).collect();
     let mut table = Table::default()
         .label("change of")
@@ -146,6 +157,5 @@ pub fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
             value.unit,
         ]);
     }
-    say!("{}", table.to_text().trim_end());
-    Ok(())
+    table
 }

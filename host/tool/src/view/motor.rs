@@ -6,15 +6,14 @@ use scarab_rig::report::motor::MotorReport;
 /// Formats all tables.
 #[must_use]
 pub fn tables(report: &MotorReport) -> String {
+    let MotorReport { leg, joint, bandwidth_hz, .. } = report;
+    let head = format!("{leg}, {joint}: current loop of {bandwidth_hz:.0} Hz at 24 kHz\n");
+    [head, steps(report), ripple(report), limit(report), braking(report)].join("\n")
+}
+
+/// Step responses at several speeds, after the designed one.
+fn steps(report: &MotorReport) -> String {
     let [from, to] = report.steps.first().map_or([0.0; 2], |step| [step.from_a, step.to_a]);
-    let mut text = format!(
-        "{}, {}: current loop of {:.0} Hz at 24 kHz\n\nsteps of the quadrature current, {} to {} A\n",
-        report.leg,
-        report.joint,
-        report.bandwidth_hz,
-        ampere(from),
-        ampere(to)
-    );
     let mut table = Table::default().numbers(["speed, rad/s"]).text(["feedforward"]).numbers([
         "rise, ms",
         "overshoot, %",
@@ -40,8 +39,12 @@ pub fn tables(report: &MotorReport) -> String {
             format!("{:+.2}", step.error_a),
         ]);
     }
+    format!("steps of the quadrature current, {} to {} A\n{}", ampere(from), ampere(to), table.to_text())
+}
+
+/// Torque ripple with and without sensor noise and the compensation of dead time.
+fn ripple(report: &MotorReport) -> String {
     let current = report.ripple.first().map_or(0.0, |ripple| ripple.current_a);
-    text += &format!("{}\ntorque ripple at {} A, no cogging\n", table.to_text(), ampere(current));
     let mut table = Table::default()
         .numbers(["speed, rad/s"])
         .text(["sensor noise", "dead time given back"])
@@ -57,9 +60,12 @@ pub fn tables(report: &MotorReport) -> String {
             format!("{:.3}", ripple.direct_a),
         ]);
     }
+    format!("torque ripple at {} A, no cogging\n{}", ampere(current), table.to_text())
+}
+
+/// Currents at the voltage limit, and the recovery from it.
+fn limit(report: &MotorReport) -> String {
     let asked = report.limit.first().map_or(0.0, |limit| limit.asked_a);
-    text +=
-        &format!("{}\nvoltage limit: {} A asked for 100 ms, and then less\n", table.to_text(), ampere(asked));
     let mut table = Table::default()
         .numbers([
             "speed, rad/s",
@@ -83,9 +89,12 @@ pub fn tables(report: &MotorReport) -> String {
             yes(limit.released),
         ]);
     }
+    format!("voltage limit: {} A asked for 100 ms, and then less\n{}", ampere(asked), table.to_text())
+}
+
+/// Regenerative braking with and without the brake chopper.
+fn braking(report: &MotorReport) -> String {
     let current = report.regeneration.first().map_or(0.0, |braking| braking.current_a);
-    let words = format!("braking with {} A from the joint's top speed", ampere(current));
-    text += &format!("{}\n{words}\n", table.to_text());
     let mut table = Table::default()
         .text(["chopper"])
         .numbers(["highest bus, V", "motion, J", "given back, J", "brake resistor, J"])
@@ -100,7 +109,7 @@ pub fn tables(report: &MotorReport) -> String {
             braking.fault.unwrap_or("-"),
         ]);
     }
-    text + &table.to_text()
+    format!("braking with {} A from the joint's top speed\n{}", ampere(current), table.to_text())
 }
 
 /// Formats whole amperes without decimals.

@@ -7,7 +7,7 @@ use scarab_base::output::say;
 use scarab_base::stats::{quantile, rms};
 use scarab_base::table::{Table, cells};
 use scarab_identify::report::scale::summary;
-use scarab_identify::report::{ConsistentSearchReport, RunReport, RunsReport};
+use scarab_identify::report::{ConsistentSearchReport, FitReport, RunReport, RunsReport};
 
 /// Goals of a cold start: iterations, and excess in chi-square units.
 const ITERATIONS: u32 = 125;
@@ -144,6 +144,31 @@ fn spread_table(report: &RunsReport) -> Table {
     table
 }
 
+/// Torque errors of each joint on every unused motion, against the noise-free and the measured torque.
+fn fit_table(runs: &[RunReport]) -> Table {
+    let mut table = Table::default().label("motion").numbers([
+        "joint",
+        "% of mean abs, noise-free: median",
+        "worst",
+        "% of mean abs, measured: median",
+    ]);
+    for (index, fit) in runs.first().into_iter().flat_map(|run| &run.validation).enumerate() {
+        let errors = |error: &dyn Fn(&FitReport) -> Option<f64>| -> Vec<f64> {
+            runs.iter().filter_map(|run| error(run.validation.get(index)?)).collect()
+        };
+        let truth = errors(&|fit| fit.percent_of_mean_abs_vs_truth.known());
+        let measured = errors(&|fit| fit.percent_of_mean_abs.known());
+        table.row(cells![
+            &fit.motion,
+            fit.joint,
+            format!("{:.3}", quantile(truth.clone(), 0.5)),
+            format!("{:.3}", quantile(truth, 1.0)),
+            format!("{:.3}", quantile(measured, 0.5)),
+        ]);
+    }
+    table
+}
+
 /// Share of errors within a number of reported sigma, pooled.
 fn coverage(report: &RunsReport, sigmas: f64) -> f64 {
     let (mut within, mut all) = (0_u32, 0_u32);
@@ -169,27 +194,7 @@ pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
         coverage(report, 1.0),
         coverage(report, 3.0)
     );
-    let mut fits = Table::default().label("motion").numbers([
-        "joint",
-        "% of mean abs, noise-free: median",
-        "worst",
-        "% of mean abs, measured: median",
-    ]);
-    for (index, fit) in first.validation.iter().enumerate() {
-        let of = |value: &dyn Fn(&scarab_identify::report::FitReport) -> Option<f64>| -> Vec<f64> {
-            runs.iter().filter_map(|run| value(run.validation.get(index)?)).collect()
-        };
-        let truth = of(&|fit| fit.percent_of_mean_abs_vs_truth.known());
-        let measured = of(&|fit| fit.percent_of_mean_abs.known());
-        fits.row(cells![
-            &fit.motion,
-            fit.joint,
-            format!("{:.3}", quantile(truth.clone(), 0.5)),
-            format!("{:.3}", quantile(truth.clone(), 1.0)),
-            format!("{:.3}", quantile(measured.clone(), 0.5)),
-        ]);
-    }
-    say!("\n{}", fits.to_text());
+    say!("\n{}", fit_table(runs).to_text());
     let excess: Vec<f64> = runs.iter().filter_map(|run| run.bso.excess_chi2.known()).collect();
     let to_half: Vec<f64> =
         runs.iter().map(|run| run.bso.iterations_to_half_chi2.map_or(f64::INFINITY, f64::from)).collect();

@@ -15,6 +15,7 @@ use scarab_identify::report::{
 use std::collections::BTreeMap;
 
 use crate::view::html::parameters::{badge, bar};
+use crate::view::html::table::html_cell;
 
 /// Table of the base parameters: value, sigma with its parts, truth and error in sigma.
 #[must_use]
@@ -50,7 +51,7 @@ pub fn base_parameters(run: &RunReport) -> Table {
             value(base.truth, base.sigma),
             off,
             sigma(Number(base.cramer_rao.known().filter(|bound| *bound > 0.0))),
-            Cell::typeset(terms(&base.terms)),
+            Cell::Typeset(terms(&base.terms)),
         ]);
     }
     table
@@ -89,8 +90,8 @@ pub fn parameters<'a>(parameters: impl Iterator<Item = &'a ParameterReport>, is_
             value(parameter.value, parameter.sigma),
             sigma(parameter.sigma),
             parameter.unit,
-            Cell::Html(parameter.status.into(), badge(parameter.status)),
-            bar(parameter),
+            Cell::Html(parameter.status.into(), badge(parameter.status).into_string()),
+            html_cell(bar(parameter)),
             value(parameter.truth, parameter.sigma),
             parameter.grouped_with.join(", "),
         ]);

@@ -237,6 +237,59 @@ fn damaged_parts_are_reported_and_the_rest_is_exported() {
     assert!(run.errors.contains("damaged: "), "{}", run.errors);
 }
 
+/// Replacements in a complete file, each with the words of the refusal.
+const REPLACEMENTS: &[(&str, &str, &str)] = &[
+    ("schema = 1", "schema = 2", "schema 2 is unknown; this program reads 1"),
+    ("schema = 1\n", "", "has no `schema`"),
+    ("schema = 1\n", "schema = 1\nbord = 1\n", "unknown field `bord`"),
+    ("value = 50", "valeu = 50", "unknown field `valeu`"),
+    ("value = 50 }", "}", "missing field `value`"),
+    ("value = 50", "value = 65536", "0x1017:0: 65536 is not from 0 to 65535"),
+    ("value = 50", "value = -1", "0x1017:0: -1 is not from 0 to 65535"),
+    ("value = 50", "value = 50.5", ":6: "),
+    ("0x1017,", "0x1717,", "0x1717:0: there is no such object"),
+    ("0x1017,", "0x6041,", "0x6041:0: is read-only"),
+    ("0x1017,", "0x6040,", "0x6040:0: is a command"),
+    ("\"Producer heartbeat time\"", "\"Device type\"", "is `Producer heartbeat time`, not `Device type`"),
+    ("value = 9", "value = 200", "0x2001:0 (Node-ID after the next start): a node refuses this value"),
+    (
+        "value = 0x40000281",
+        "value = 0x40000001",
+        "0x1800:1 (COB-ID used by TPDO 1): a node refuses this value",
+    ),
+    ("value = -500000", "value = 1500001", "0x607D:1 is 1500001, above 0x607D:2 with 1500000"),
+    ("0x607D, subindex = 2, name = \"Max", "0x607D, subindex = 1, name = \"Min", "0x607D:1: occurs twice"),
+    ("joint = \"knee\"\nobjects", "joint = \"hip\"\nobjects", "node: the hip occurs twice"),
+    ("joint = \"knee\"\nobjects", "joint = \"ankle\"\nobjects", "a board does not store data of the ankle"),
+    ("joint = \"knee\"\nobjects", "joint = \"toe\"\nobjects", "unknown variant `toe`"),
+    ("resistance_ohm = 0.1\n", "resistance_ohm = nan\n", "calibration of the knee: `resistance_ohm` is NaN"),
+    ("resistance_ohm = 0.1\n", "resistance_ohm = 0.0\n", "`resistance_ohm` is 0; it must be above 0"),
+    ("inductance_h = 0.0001\n", "inductance_h = 1e300\n", "which a board cannot store"),
+    ("winding_c = 25.3", "winding_c = 1e4", "outside -100..1000"),
+    ("joint_steps = 16383", "joint_steps = 16384", "it must be below 16384"),
+    ("offset_rad = -3.14", "offset_rad = -3.15", "it must be from -pi to pi"),
+    ("pole_pairs = 20", "pole_pairs = 0", "pole pairs and counts per turn must be above 0"),
+    ("pole_pairs = 20", "pole_pairs = 300", "expected u8"),
+    ("ZZ = 0.4", "ZZ = inf", "model: knee: `ZZ` is inf"),
+    ("ZZ = 0.4,", "", "missing field `ZZ`"),
+    ("velocity_rad_s = 0.1", "velocity_rad_s = 0.0", "it must be above 0"),
+    ("excess = 0.25", "excess = -0.25", "`excess` is -0.25; it must not be below 0"),
+    ("constant = \"asymmetry\"", "constant = \"none\"", "unknown variant `none`"),
+    ("rms_nm = 0.31", "rms_nm = nan", "model: hip: `rms_nm` is NaN"),
+    ("firmware = \"0.1.0\"", "firmware = \"0.1\"", "three numbers up to 255"),
+    ("\"18446744073709551615\"", "\"18446744073709551616\"", "the digits of a number of 64 bits"),
+    ("bridge_temperature_c = 41.3", "bridge_temperature_c = 300", "it must be from -40 to 125"),
+    ("[[model.joint]]\njoint = \"hip\"", "[[model.joint]]\njoint = \"knee\"", "`joint`: knee instead of hip"),
+    ("worn = false", "worn = true", "model: `worn` is true: the model of a worn leg is `worn_model`"),
+    ("worn = true", "worn = false", "worn_model: `worn` must be true"),
+    ("worn = true\n", "", "worn_model: `worn` must be true"),
+    ("inertia_lower_bound = 0.95", "inertia_lower_bound = 1.05", "it must be from 0 to 1"),
+    ("inertia_lower_bound = 0.95", "inertia_lower_bound = nan", "`inertia_lower_bound` is NaN"),
+    ("{ coulomb_nm = 3.1", "{ coulomb_nm = -3.1", "`coulomb_nm` is -3.1; it must not be below 0"),
+    (", viscous_nm_s_rad = 0.9", "", "missing field `viscous_nm_s_rad`"),
+    ("[model]", "[model", ":"),
+];
+
 #[test]
 fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
     let folder = Folder::new();
@@ -244,74 +297,9 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
     import(&folder, &text(), &flash).ends_with(0);
     let before = fs::read(&flash).expect("written");
     let whole = text();
-    for (old, new, why) in [
-        ("schema = 1", "schema = 2", "schema 2 is unknown; this program reads 1"),
-        ("schema = 1\n", "", "has no `schema`"),
-        ("schema = 1\n", "schema = 1\nbord = 1\n", "unknown field `bord`"),
-        ("value = 50", "valeu = 50", "unknown field `valeu`"),
-        ("value = 50 }", "}", "missing field `value`"),
-        ("value = 50", "value = 65536", "0x1017:0: 65536 is not from 0 to 65535"),
-        ("value = 50", "value = -1", "0x1017:0: -1 is not from 0 to 65535"),
-        ("value = 50", "value = 50.5", ":6: "),
-        ("0x1017,", "0x1717,", "0x1717:0: there is no such object"),
-        ("0x1017,", "0x6041,", "0x6041:0: is read-only"),
-        ("0x1017,", "0x6040,", "0x6040:0: is a command"),
-        ("\"Producer heartbeat time\"", "\"Device type\"", "is `Producer heartbeat time`, not `Device type`"),
-        ("value = 9", "value = 200", "0x2001:0 (Node-ID after the next start): a node refuses this value"),
-        (
-            "value = 0x40000281",
-            "value = 0x40000001",
-            "0x1800:1 (COB-ID used by TPDO 1): a node refuses this value",
-        ),
-        ("value = -500000", "value = 1500001", "0x607D:1 is 1500001, above 0x607D:2 with 1500000"),
-        (
-            "0x607D, subindex = 2, name = \"Max",
-            "0x607D, subindex = 1, name = \"Min",
-            "0x607D:1: occurs twice",
-        ),
-        ("joint = \"knee\"\nobjects", "joint = \"hip\"\nobjects", "node: the hip occurs twice"),
-        (
-            "joint = \"knee\"\nobjects",
-            "joint = \"ankle\"\nobjects",
-            "a board does not store data of the ankle",
-        ),
-        ("joint = \"knee\"\nobjects", "joint = \"toe\"\nobjects", "unknown variant `toe`"),
-        (
-            "resistance_ohm = 0.1\n",
-            "resistance_ohm = nan\n",
-            "calibration of the knee: `resistance_ohm` is NaN",
-        ),
-        ("resistance_ohm = 0.1\n", "resistance_ohm = 0.0\n", "`resistance_ohm` is 0; it must be above 0"),
-        ("inductance_h = 0.0001\n", "inductance_h = 1e300\n", "which a board cannot store"),
-        ("winding_c = 25.3", "winding_c = 1e4", "outside -100..1000"),
-        ("joint_steps = 16383", "joint_steps = 16384", "it must be below 16384"),
-        ("offset_rad = -3.14", "offset_rad = -3.15", "it must be from -pi to pi"),
-        ("pole_pairs = 20", "pole_pairs = 0", "pole pairs and counts per turn must be above 0"),
-        ("pole_pairs = 20", "pole_pairs = 300", "expected u8"),
-        ("ZZ = 0.4", "ZZ = inf", "model: knee: `ZZ` is inf"),
-        ("ZZ = 0.4,", "", "missing field `ZZ`"),
-        ("velocity_rad_s = 0.1", "velocity_rad_s = 0.0", "it must be above 0"),
-        ("excess = 0.25", "excess = -0.25", "`excess` is -0.25; it must not be below 0"),
-        ("constant = \"asymmetry\"", "constant = \"none\"", "unknown variant `none`"),
-        ("rms_nm = 0.31", "rms_nm = nan", "model: hip: `rms_nm` is NaN"),
-        ("firmware = \"0.1.0\"", "firmware = \"0.1\"", "three numbers up to 255"),
-        ("\"18446744073709551615\"", "\"18446744073709551616\"", "the digits of a number of 64 bits"),
-        ("bridge_temperature_c = 41.3", "bridge_temperature_c = 300", "it must be from -40 to 125"),
-        (
-            "[[model.joint]]\njoint = \"hip\"",
-            "[[model.joint]]\njoint = \"knee\"",
-            "`joint`: knee instead of hip",
-        ),
-        (&own_fingerprint(), "12345", "`fingerprint` is `12345`; it must be 16 hexadecimal digits"),
-        ("worn = false", "worn = true", "model: `worn` is true: the model of a worn leg is `worn_model`"),
-        ("worn = true", "worn = false", "worn_model: `worn` must be true"),
-        ("worn = true\n", "", "worn_model: `worn` must be true"),
-        ("inertia_lower_bound = 0.95", "inertia_lower_bound = 1.05", "it must be from 0 to 1"),
-        ("inertia_lower_bound = 0.95", "inertia_lower_bound = nan", "`inertia_lower_bound` is NaN"),
-        ("{ coulomb_nm = 3.1", "{ coulomb_nm = -3.1", "`coulomb_nm` is -3.1; it must not be below 0"),
-        (", viscous_nm_s_rad = 0.9", "", "missing field `viscous_nm_s_rad`"),
-        ("[model]", "[model", ":"),
-    ] {
+    let own = own_fingerprint();
+    let short = (own.as_str(), "12345", "`fingerprint` is `12345`; it must be 16 hexadecimal digits");
+    for (old, new, why) in REPLACEMENTS.iter().copied().chain([short]) {
         let bad = whole.replacen(old, new, 1);
         assert_ne!(bad, whole, "{old}");
         let said = import(&folder, &bad, &flash).refusal();

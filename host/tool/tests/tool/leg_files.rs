@@ -85,15 +85,50 @@ fn are_refused(cases: &[(String, Option<usize>, &str)]) {
     }
 }
 
+/// Lines above the joints, each with the words of its error.
+const LEG_ERRORS: [(&str, &str); 8] = [
+    (
+        "segments = { shank_m = 0.4, foot_m = 0.27, wearer_kg = 75.0, prior_wearer_kg = 70.0 }",
+        "`segments` needs two joints, a hip and a knee",
+    ),
+    (
+        "segments = { shank_m = 40.0, foot_m = 0.27, wearer_kg = 75.0, prior_wearer_kg = 70.0 }",
+        "`segments.shank_m` is 40, outside 0.1..1",
+    ),
+    (
+        "segments = { shank_m = 0.4, foot_m = 0.27, wearer_kg = 7500.0, prior_wearer_kg = 70.0 }",
+        "`segments.wearer_kg` is 7500, outside 10..300",
+    ),
+    ("side = \"middle\"", "unknown variant `middle`"),
+    (
+        "supply = { voltage_v = 480.0, resistance_ohm = 0.05, capacitance_uf = 1500.0, brake_ohm = 2.0 }",
+        "`supply.voltage_v` is 480, outside 22..50",
+    ),
+    ("supply_current_a = 0.1", "`supply_current_a` is 0.1, outside 0.5..500"),
+    ("charge_current_a = 501.0", "`charge_current_a` is 501, outside 0.5..500"),
+    ("brake = { release_ms = 60.0, engage_ms = 501.0 }", "`brake.engage_ms` is 501, outside 0..500"),
+];
+
+/// Lines of a joint, each with the words of its error.
+const JOINT_ERRORS: [(&str, &str); 10] = [
+    ("colour = \"red\"", "unknown field `colour`"),
+    ("direction = 2", "joint `hip`: `direction` is 2; it must be 1 or -1"),
+    ("range_deg = [-inf, 2.0]", "`range_deg` is -inf, outside -3600..3600"),
+    ("speed_limit_deg_s = 0.0", "`speed_limit_deg_s` is 0; it must be above 0 and at most 2800"),
+    ("torque_limit_nm = 1e6", "`torque_limit_nm` is 1000000; it must be above 0"),
+    ("torque_per_ampere = nan", "`torque_per_ampere` is NaN"),
+    ("encoder = { side = \"motor\", counts = 0, ratio = 50.0 }", "`encoder.counts` is 0"),
+    ("encoder = { side = \"motor\", counts = 8192, ratio = 0.0 }", "`encoder.ratio` is 0"),
+    ("encoder = { side = \"shaft\", counts = 8192, ratio = 1.0 }", "unknown variant `shaft`"),
+    ("offset = \"maybe\"", "unknown variant `maybe`"),
+];
+
 #[test]
 fn every_error_names_file_line_and_reason() {
     let above = |line: &str| MINIMAL.replace("[[joint]]", &format!("{line}\n[[joint]]"));
-    let segments = |shank: &str, wearer: &str| {
-        above(&format!(
-            "segments = {{ shank_m = {shank}, foot_m = 0.27, wearer_kg = {wearer}, prior_wearer_kg = 70.0 }}"
-        ))
-    };
-    let cases = [
+    are_refused(&LEG_ERRORS.map(|(line, words)| (above(line), Some(4), words)));
+    are_refused(&JOINT_ERRORS.map(|(line, words)| (joint(line), Some(7), words)));
+    are_refused(&[
         ("name = \"x\"\ngravity = [9.81, 0.0]\n".to_owned(), Some(2), "length 2"),
         ("name = \"x\"\ngravity = [9.81, 0.0, 0.0\n".to_owned(), Some(2), "array"),
         (MINIMAL.replace("name = \"small\"\n", ""), Some(1), "missing field `name`"),
@@ -103,20 +138,13 @@ fn every_error_names_file_line_and_reason() {
         (MINIMAL.replace("\"small\"", "\"\""), Some(1), "`name` must be one line that is not empty"),
         (MINIMAL.replace("9.81", "nan"), Some(2), "`gravity` is NaN, outside -30..30"),
         (MINIMAL.replace("9.81", "981.0"), Some(2), "`gravity` is 981, outside -30..30"),
-        (segments("0.4", "75.0"), Some(4), "`segments` needs two joints, a hip and a knee"),
-        (segments("40.0", "75.0"), Some(4), "`segments.shank_m` is 40, outside 0.1..1"),
-        (segments("0.4", "7500.0"), Some(4), "`segments.wearer_kg` is 7500, outside 10..300"),
-        (above("side = \"middle\""), Some(4), "unknown variant `middle`"),
         (
             "name = \"x\"\ngravity = [0.0, 0.0, 0.0]\njoint = []\n".to_owned(),
             Some(3),
             "`joint` occurs 0 times; a leg has 1 to 3",
         ),
         (
-            format!(
-                "{MINIMAL}{}",
-                "[[joint]]\nname = \"a\"\ndh = { alpha = 0.0, a = 0.0, d = 0.0 }\n".repeat(3)
-            ),
+            joint(&"[[joint]]\nname = \"a\"\ndh = { alpha = 0.0, a = 0.0, d = 0.0 }\n".repeat(3)),
             Some(4),
             "`joint` occurs 4 times",
         ),
@@ -125,43 +153,7 @@ fn every_error_names_file_line_and_reason() {
             Some(8),
             "joint `hip`: `name` is the name of an earlier joint",
         ),
-        (joint("colour = \"red\""), Some(7), "unknown field `colour`"),
-        (
-            above(
-                "supply = { voltage_v = 480.0, resistance_ohm = 0.05, capacitance_uf = 1500.0, brake_ohm = 2.0 }",
-            ),
-            Some(4),
-            "`supply.voltage_v` is 480, outside 22..50",
-        ),
-        (above("supply_current_a = 0.1"), Some(4), "`supply_current_a` is 0.1, outside 0.5..500"),
-        (above("charge_current_a = 501.0"), Some(4), "`charge_current_a` is 501, outside 0.5..500"),
-        (
-            above("brake = { release_ms = 60.0, engage_ms = 501.0 }"),
-            Some(4),
-            "`brake.engage_ms` is 501, outside 0..500",
-        ),
-        (joint("direction = 2"), Some(7), "joint `hip`: `direction` is 2; it must be 1 or -1"),
         (joint("\nrange_deg = [50.0, 2.0]"), Some(8), "`range_deg` is inverted or empty: 50 to 2"),
-        (joint("range_deg = [-inf, 2.0]"), Some(7), "`range_deg` is -inf, outside -3600..3600"),
-        (
-            joint("speed_limit_deg_s = 0.0"),
-            Some(7),
-            "`speed_limit_deg_s` is 0; it must be above 0 and at most 2800",
-        ),
-        (joint("torque_limit_nm = 1e6"), Some(7), "`torque_limit_nm` is 1000000; it must be above 0"),
-        (joint("torque_per_ampere = nan"), Some(7), "`torque_per_ampere` is NaN"),
-        (joint("encoder = { side = \"motor\", counts = 0, ratio = 50.0 }"), Some(7), "`encoder.counts` is 0"),
-        (
-            joint("encoder = { side = \"motor\", counts = 8192, ratio = 0.0 }"),
-            Some(7),
-            "`encoder.ratio` is 0",
-        ),
-        (
-            joint("encoder = { side = \"shaft\", counts = 8192, ratio = 1.0 }"),
-            Some(7),
-            "unknown variant `shaft`",
-        ),
-        (joint("offset = \"maybe\""), Some(7), "unknown variant `maybe`"),
         (
             joint("dh.a = 9.0")
                 .replace("dh = { alpha = 0.0, a = 0.0, d = 0.0 }", "dh.alpha = 0.0\ndh.d = 0.0"),
@@ -178,8 +170,7 @@ fn every_error_names_file_line_and_reason() {
             Some(1),
             "`pushes.per_minute` is 0",
         ),
-    ];
-    are_refused(&cases);
+    ]);
 }
 
 #[test]

@@ -399,15 +399,8 @@ fn lines_that_are_no_frames_are_named_and_a_file_without_any_is_refused() {
     }
 }
 
-#[test]
-fn two_served_legs_are_shown_while_a_host_moves_one() {
-    let serve = Serve::at("127.0.0.1:0", "--legs 2");
-    let mut host = Client::new(&serve);
-    let live = Live::new(&format!("--leg x2-wearer-75kg --nodes 1,2,3,4 --slcan {}", serve.address));
-    serve.waits_for("listens");
-    for node in 1..=4 {
-        host.frame(0, &[1, node]);
-    }
+/// Moves nodes 1 and 2 in cyclic position to 0.1 and 0.2 rad, 100 cycles a second, until the flag is set.
+fn move_hip_and_knee(mut host: Client, stop: Arc<AtomicBool>) -> thread::JoinHandle<()> {
     host.enable(ENABLED);
     for node in [1, 2] {
         // A target far from the joint would be a following error (8611).
@@ -417,18 +410,28 @@ fn two_served_legs_are_shown_while_a_host_moves_one() {
         // This host may be slow.
         host.write(node, 0x2013, 0, 0, 1);
     }
-    // Follows its host to 0.1 and 0.2 rad, 100 cycles a second, until this test ends.
-    let stop = Arc::new(AtomicBool::new(false));
-    let stopped = Arc::clone(&stop);
-    let host = thread::spawn(move || {
-        while !stopped.load(Ordering::Relaxed) {
+    thread::spawn(move || {
+        while !stop.load(Ordering::Relaxed) {
             for node in [1_u16, 2] {
                 host.frame(0x300 + node, &(100_000 * i32::from(node)).to_le_bytes());
             }
             host.frame(0x80, &[]);
             thread::sleep(Duration::from_millis(10));
         }
-    });
+    })
+}
+
+#[test]
+fn two_served_legs_are_shown_while_a_host_moves_one() {
+    let serve = Serve::at("127.0.0.1:0", "--legs 2");
+    let mut host = Client::new(&serve);
+    let live = Live::new(&format!("--leg x2-wearer-75kg --nodes 1,2,3,4 --slcan {}", serve.address));
+    serve.waits_for("listens");
+    for node in 1..=4 {
+        host.frame(0, &[1, node]);
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    let host = move_hip_and_knee(host, Arc::clone(&stop));
     let begin = Instant::now();
     let is_there = |sample: &Value| {
         let angles = [0, 1].map(|joint| sample["angle_rad"][joint].as_f64().unwrap_or(f64::NAN));

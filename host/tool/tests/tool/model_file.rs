@@ -71,94 +71,74 @@ fn a_refused_result_is_not_stored() {
     assert!(!path.exists());
 }
 
+/// Refusal of a model file with this text, without the folder's path.
+fn refusal(folder: &Folder, text: &str) -> String {
+    let message = predict(folder, text, "").refusal();
+    message.replace(&folder.path("model.toml").display().to_string(), "model.toml")
+}
+
+#[test]
+fn a_file_that_ends_early_is_refused() {
+    let folder = Folder::new();
+    let good = text();
+    for cut in (1..good.len() - 2).step_by(997) {
+        let cut = (cut..).find(|&cut| good.is_char_boundary(cut)).expect("an end");
+        assert!(refusal(&folder, &good[..cut]).starts_with("error: model.toml"), "cut at {cut}");
+    }
+}
+
 #[test]
 fn hostile_files_are_refused_with_file_line_and_reason() {
     let folder = Folder::new();
     let good = text();
     let line_of = |needle: &str| 1 + good[..good.find(needle).expect(needle)].matches('\n').count();
-    let refusal = |text: &str| {
-        let message = predict(&folder, text, "").refusal();
-        message.replace(&folder.path("model.toml").display().to_string(), "model.toml")
-    };
     let changed = |old: &str, new: &str| {
         assert_eq!(good.matches(old).count(), 1, "{old}");
-        refusal(&good.replacen(old, new, 1))
+        refusal(&folder, &good.replacen(old, new, 1))
     };
     let base = model().base_set;
     let hx2 = base.parameters.iter().position(|base| base.name == "HX2").expect("the knee's");
     let (value, sigma) = (base.parameters[hx2].value.to_string(), base.parameters[hx2].sigma.to_string());
     let row = good.lines().position(|line| line == "covariance = [").expect("a key") + 1;
-    let covariance_line = |index: usize| good.lines().nth(row + index).expect("a row").to_owned();
 
-    assert_eq!(refusal(""), "error: model.toml: is empty\n");
-    assert_eq!(refusal("name = \"x\"\n"), "error: model.toml: has no `schema`: not a model file\n");
-    assert_eq!(
-        changed("schema = 1", "schema = 2"),
-        "error: model.toml:3: this schema is unknown; this program reads 1\n"
-    );
-    // Truncation anywhere: never a panic, never accepted.
-    for cut in (1..good.len() - 2).step_by(997) {
-        let cut = (cut..).find(|&cut| good.is_char_boundary(cut)).expect("an end");
-        assert!(refusal(&good[..cut]).starts_with("error: model.toml"), "cut at {cut}");
-    }
-    let at = line_of("name = \"HX2\", carrier");
-    assert_eq!(
-        changed(&format!("carrier = \"HX2\", value = {value}"), "carrier = \"HX2\", value = nan"),
-        format!("error: model.toml:{at}: `value` is NaN\n")
-    );
-    assert_eq!(
-        changed(
-            &format!("value = {value}, sigma = {sigma}, unit = \"kg m\", terms"),
-            "value = 1.0, sigma = -1.0, unit = \"kg m\", terms"
-        ),
-        format!("error: model.toml:{at}: `sigma` is -1; it must be above 0\n")
-    );
-    assert_eq!(
-        changed("carrier = \"HX2\"", "carrier = \"HX3\""),
-        format!("error: model.toml:{at}: `HX3` is not a parameter of this leg\n")
-    );
-    assert_eq!(
-        changed("carrier = \"HX2\"", "carrier = \"HY2\""),
-        format!("error: model.toml:{at}: `HY2` must occur once in its own sum\n")
-    );
-    let own = covariance_line(hx2);
+    assert_eq!(refusal(&folder, ""), "error: model.toml: is empty\n");
+    assert_eq!(refusal(&folder, "name = \"x\"\n"), "error: model.toml: has no `schema`: not a model file\n");
+    let own = good.lines().nth(row + hx2).expect("a row").to_owned();
     let variance = base.covariance[hx2][hx2].to_string();
     let elements = |text: &str| own.replacen(&variance, text, 1);
-    let at = row + hx2 + 1;
-    assert_eq!(
-        changed(&own, &elements("-1e-6")),
-        format!("error: model.toml:{at}: the variance of HX2 is -0.000001; it must be above 0\n")
-    );
-    assert_eq!(
-        changed(&own, &elements("4.0")),
-        format!("error: model.toml:{at}: the variance of HX2 is 4, not the square of its `sigma`\n")
-    );
-    assert_eq!(
-        changed(&own, &elements("inf")),
-        format!("error: model.toml:{at}: an element of `covariance` is inf\n")
-    );
-    assert_eq!(
-        changed(&format!("{own}\n"), ""),
-        format!("error: model.toml:{row}: `covariance` has 12 rows for 13 base parameters\n")
-    );
-    assert_eq!(
-        changed(&own, &own.replacen("],", ", 0.0],", 1)),
-        format!("error: model.toml:{at}: 14 elements in a row for 13 base parameters\n")
-    );
     let lopsided = own.replacen(&base.covariance[hx2][0].to_string(), "0.00001", 1);
-    assert_eq!(
-        changed(&own, &lopsided),
-        format!(
-            "error: model.toml:{at}: `covariance` is not symmetric: ZZ1R with HX2 differs from the reverse\n"
-        )
-    );
-    assert_eq!(
-        changed("direction = -1", "direction = -2"),
-        format!(
-            "error: model.toml:{}: joint `knee`: `direction` is -2; it must be 1 or -1\n",
-            line_of("[leg]")
-        )
-    );
+    let (in_list, in_matrix) = (line_of("name = \"HX2\", carrier"), row + hx2 + 1);
+    for (old, new, line, reason) in [
+        ("schema = 1", "schema = 2", 3, "this schema is unknown; this program reads 1"),
+        (
+            &format!("carrier = \"HX2\", value = {value}"),
+            "carrier = \"HX2\", value = nan",
+            in_list,
+            "`value` is NaN",
+        ),
+        (
+            &format!("value = {value}, sigma = {sigma}, unit = \"kg m\", terms"),
+            "value = 1.0, sigma = -1.0, unit = \"kg m\", terms",
+            in_list,
+            "`sigma` is -1; it must be above 0",
+        ),
+        ("carrier = \"HX2\"", "carrier = \"HX3\"", in_list, "`HX3` is not a parameter of this leg"),
+        ("carrier = \"HX2\"", "carrier = \"HY2\"", in_list, "`HY2` must occur once in its own sum"),
+        (&own, &elements("-1e-6"), in_matrix, "the variance of HX2 is -0.000001; it must be above 0"),
+        (&own, &elements("4.0"), in_matrix, "the variance of HX2 is 4, not the square of its `sigma`"),
+        (&own, &elements("inf"), in_matrix, "an element of `covariance` is inf"),
+        (&format!("{own}\n"), "", row, "`covariance` has 12 rows for 13 base parameters"),
+        (&own, &own.replacen("],", ", 0.0],", 1), in_matrix, "14 elements in a row for 13 base parameters"),
+        (&own, &lopsided, in_matrix, "`covariance` is not symmetric: ZZ1R with HX2 differs from the reverse"),
+        (
+            "direction = -1",
+            "direction = -2",
+            line_of("[leg]"),
+            "joint `knee`: `direction` is -2; it must be 1 or -1",
+        ),
+    ] {
+        assert_eq!(changed(old, new), format!("error: model.toml:{line}: {reason}\n"));
+    }
     assert!(changed("a = 0.39", "a = 0.40").contains("`fingerprint` is"));
     assert!(changed("[full_set]", "[full_set]\ncolour = 1").contains("unknown field `colour`"));
     assert!(changed("name = \"M2\"", "name = \"M1\"").ends_with("`M1` instead of `M2`\n"));

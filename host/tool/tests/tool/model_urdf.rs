@@ -114,13 +114,9 @@ fn described<const N: usize>(robot: &urdf_rs::Robot, leg: &LegFile) -> LegDescri
     described
 }
 
-fn checks<const N: usize, const B: usize>(name: &str) {
-    let folder = Folder::new();
-    let model = true_model::<N, B>(&folder, name);
-    let text = text(&model, "model.toml").expect("physically consistent bodies");
-    let robot = urdf_rs::read_from_string(&text).expect("another library reads it");
-    assert_eq!((robot.name.as_str(), robot.joints.len(), robot.links.len()), (name, N + 1, N + 2));
-
+/// Checks the description's bodies, friction and limits against those of the model.
+fn has_bodies_friction_and_limits(robot: &urdf_rs::Robot, model: &ModelFile) {
+    let name = &robot.name;
     for (number, stored) in model.leg.joints.iter().enumerate() {
         let parameters = model.joint_parameters(number).expect("with a prior");
         let joint = &robot.joints[number + 1];
@@ -138,6 +134,15 @@ fn checks<const N: usize, const B: usize>(name: &str) {
         );
         assert_eq!(joint.limit.effort, stored.torque_limit_nm);
     }
+}
+
+fn checks<const N: usize, const B: usize>(name: &str) {
+    let folder = Folder::new();
+    let model = true_model::<N, B>(&folder, name);
+    let text = text(&model, "model.toml").expect("physically consistent bodies");
+    let robot = urdf_rs::read_from_string(&text).expect("another library reads it");
+    assert_eq!((robot.name.as_str(), robot.joints.len(), robot.links.len()), (name, N + 1, N + 2));
+    has_bodies_friction_and_limits(&robot, &model);
 
     // The plant's Lagrange equations with the description's numbers give the model's torque.
     let description = described::<N>(&robot, &skewed(name));

@@ -295,24 +295,52 @@ fn joints(names: &[&str]) -> RobotOptions {
     RobotOptions { joints: names.iter().map(|name| (*name).to_owned()).collect(), ..plain() }
 }
 
+/// Joints chosen of the simple robot, each with the words of the refusal.
+const CHOICES: [(&[&str], &str); 6] = [
+    (&["knee", "hip"], "joint `knee`: hangs on `hip`: name the joints proximal first"),
+    (&["hip", "hip"], "joint `hip`: is named twice by --joints"),
+    (
+        &["hip", "kne"],
+        "--joints: no joint is called `kne`. Joints that move, from the root on:\n  hip (revolute)\n  knee (revolute, on hip)",
+    ),
+    (&["knee"], "joint `hip`: moves the leg and is neither chosen nor held"),
+    (&["hip"], "joint `knee`: moves the leg and is neither chosen nor held"),
+    (&["hip", "knee", "a", "b"], "no joint is called `a`"),
+];
+
+/// Replacements in the simple robot, each with the words of the refusal.
+const REPLACEMENTS: [(&str, &str, &str); 5] = [
+    (
+        "<dynamics damping=\"0.75\"",
+        "<mimic joint=\"hip\"/><dynamics damping=\"0.75\"",
+        "joint `knee`: follows another joint (`mimic`)",
+    ),
+    (
+        "xyz=\"0 0 -0.4\"",
+        "xyz=\"0 0 -400\"",
+        "joint `knee`: D-H `a` from joint `hip` is 4.0000e2 m, a leg file takes -5..5: is `xyz` in metres?",
+    ),
+    ("izz=\"0.02\"", "izz=\"0.5\"", "`prior.inertia_com` is impossible: a principal moment of 0.5"),
+    (
+        "damping=\"1.25\"",
+        "damping=\"-1\"",
+        "joint `hip`: `damping` of `dynamics` is -1; it must not be negative",
+    ),
+    ("damping=\"1.25\"", "damping=\"5000\"", "`prior.viscous` is 5000, outside 0..1000"),
+];
+
 #[test]
 fn every_joint_that_is_no_leg_is_refused_by_name() {
-    let lock = |name: &str, at: f64| RobotOptions {
-        locked: vec![(name.to_owned(), at)],
-        ..joints(&["hip", "knee"])
-    };
-    let cases: Vec<(String, RobotOptions, &str)> = vec![
+    let both = || joints(&["hip", "knee"]);
+    let lock = |name: &str, at: f64| RobotOptions { locked: vec![(name.to_owned(), at)], ..both() };
+    let cases = [
         (
             ankle("revolute"),
-            joints(&["hip", "knee"]),
+            both(),
             "joint `ankle`: moves the leg and is neither chosen nor held: choose it (--joints), or hold at a position \
              in rad or m, for example\n  --lock ankle=0",
         ),
-        (
-            ankle("floating"),
-            joints(&["hip", "knee"]),
-            "joint `ankle`: is floating and moves the leg, and cannot be held",
-        ),
+        (ankle("floating"), both(), "joint `ankle`: is floating and moves the leg, and cannot be held"),
         (
             ankle("floating"),
             lock("ankle", 0.0),
@@ -327,58 +355,17 @@ fn every_joint_that_is_no_leg_is_refused_by_name() {
         ),
         (ankle("screw"), plain(), "joint `ankle`: `type` is `screw`, not one of revolute"),
         (ankle("revolute"), plain(), "joint `ankle`: the links that it moves have no mass"),
-        (
-            SIMPLE.into(),
-            joints(&["knee", "hip"]),
-            "joint `knee`: hangs on `hip`: name the joints proximal first",
-        ),
-        (SIMPLE.into(), joints(&["hip", "hip"]), "joint `hip`: is named twice by --joints"),
-        (
-            SIMPLE.into(),
-            joints(&["hip", "kne"]),
-            "--joints: no joint is called `kne`. Joints that move, from the root on:\n  hip (revolute)\n  knee (revolute, on hip)",
-        ),
-        (SIMPLE.into(), joints(&["knee"]), "joint `hip`: moves the leg and is neither chosen nor held"),
-        (SIMPLE.into(), joints(&["hip"]), "joint `knee`: moves the leg and is neither chosen nor held"),
         (SIMPLE.into(), lock("knee", 0.5), "joint `knee`: is both chosen (--joints) and held (--lock)"),
         (
             SIMPLE.into(),
-            RobotOptions { locked: vec![("knee".into(), 2.5)], ..joints(&["hip"]) },
+            RobotOptions { joints: vec!["hip".into()], ..lock("knee", 2.5) },
             "joint `knee`: --lock holds it at 2.5, outside its limits 0..2",
         ),
-        (
-            with("<dynamics damping=\"0.75\"", "<mimic joint=\"hip\"/><dynamics damping=\"0.75\""),
-            plain(),
-            "joint `knee`: follows another joint (`mimic`)",
-        ),
-        (
-            with("type=\"revolute\"", "type=\"fixed\"").replace("type=\"revolute\"", "type=\"fixed\""),
-            plain(),
-            "0 joints turn, a leg has 1 to 3",
-        ),
-        (
-            with("xyz=\"0 0 -0.4\"", "xyz=\"0 0 -400\""),
-            plain(),
-            "joint `knee`: D-H `a` from joint `hip` is 4.0000e2 m, a leg file takes -5..5: is `xyz` in metres?",
-        ),
-        (
-            with("izz=\"0.02\"", "izz=\"0.5\""),
-            plain(),
-            "`prior.inertia_com` is impossible: a principal moment of 0.5",
-        ),
-        (
-            with("damping=\"1.25\"", "damping=\"-1\""),
-            plain(),
-            "joint `hip`: `damping` of `dynamics` is -1; it must not be negative",
-        ),
-        (with("damping=\"1.25\"", "damping=\"5000\""), plain(), "`prior.viscous` is 5000, outside 0..1000"),
-        (
-            SIMPLE.into(),
-            RobotOptions { gravity: Vector3::new(0.0, 0.0, -9.81), ..joints(&["hip", "knee", "a", "b"]) },
-            "no joint is called `a`",
-        ),
+        (SIMPLE.replace("type=\"revolute\"", "type=\"fixed\""), plain(), "0 joints turn, a leg has 1 to 3"),
     ];
-    for (text, options, reason) in cases {
+    let choices = CHOICES.map(|(names, reason)| (SIMPLE.to_owned(), joints(names), reason));
+    let replaced = REPLACEMENTS.map(|(from, to, reason)| (with(from, to), plain(), reason));
+    for (text, options, reason) in cases.into_iter().chain(choices).chain(replaced) {
         let refused = converted(&text, &options).expect_err(reason);
         assert!(refused.starts_with("robot.urdf:") && refused.contains(reason), "{reason}: {refused}");
     }

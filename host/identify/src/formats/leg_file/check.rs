@@ -140,11 +140,15 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
         place.within("release_ms", brake.release_ms, 0.0, LONGEST_BRAKE_MS)?;
         place.within("engage_ms", brake.engage_ms, 0.0, LONGEST_BRAKE_MS)?;
     }
-    if !(1..=3).contains(&leg.joints.len()) {
-        return Err(top.fault("joint", &format!("occurs {} times; a leg has 1 to 3", leg.joints.len())));
+    joints(&top, &leg.joints)
+}
+
+fn joints(top: &Place<'_>, joints: &[JointFile]) -> Result<(), Fault> {
+    if !(1..=3).contains(&joints.len()) {
+        return Err(top.fault("joint", &format!("occurs {} times; a leg has 1 to 3", joints.len())));
     }
     let mut names = HashSet::new();
-    for (number, description) in leg.joints.iter().enumerate() {
+    for (number, description) in joints.iter().enumerate() {
         joint(number, description)?;
         if !names.insert(description.name.as_str()) {
             let place = Place { joint: Some((number, &description.name)), table: None };
@@ -166,16 +170,7 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         return Err(place.fault("direction", &format!("is {}; it must be 1 or -1", joint.direction)));
     }
     place.inside("zero_offset_deg", joint.zero_offset_deg, ZERO_OFFSET)?;
-    let [lower, upper] = joint.range_deg;
-    place.inside("range_deg", lower, RANGE_END)?;
-    place.inside("range_deg", upper, RANGE_END)?;
-    if lower >= upper {
-        return Err(place.fault("range_deg", &format!("is inverted or empty: {lower} to {upper}")));
-    }
-    if upper - lower < SMALLEST_RANGE_DEG {
-        let words = format!("is {} degrees wide; at least {SMALLEST_RANGE_DEG} are needed", upper - lower);
-        return Err(place.fault("range_deg", &words));
-    }
+    range(&place, joint.range_deg)?;
     place.positive("speed_limit_deg_s", joint.speed_limit_deg_s, LARGEST_SPEED)?;
     place.positive("acceleration_limit_deg_s2", joint.acceleration_limit_deg_s2, 1e5)?;
     place.positive("torque_limit_nm", joint.torque_limit_nm, LARGEST_TORQUE)?;
@@ -218,6 +213,19 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         let coulomb = joint.truth.map_or(0.0, |truth| truth.coulomb);
         place.within("static_nm", stribeck.static_nm, coulomb, 1000.0)?;
         place.positive("speed_rad_s", stribeck.speed_rad_s, 100.0)?;
+    }
+    Ok(())
+}
+
+fn range(place: &Place<'_>, [lower, upper]: [f64; 2]) -> Result<(), Fault> {
+    place.inside("range_deg", lower, RANGE_END)?;
+    place.inside("range_deg", upper, RANGE_END)?;
+    if lower >= upper {
+        return Err(place.fault("range_deg", &format!("is inverted or empty: {lower} to {upper}")));
+    }
+    if upper - lower < SMALLEST_RANGE_DEG {
+        let words = format!("is {} degrees wide; at least {SMALLEST_RANGE_DEG} are needed", upper - lower);
+        return Err(place.fault("range_deg", &words));
     }
     Ok(())
 }

@@ -276,38 +276,40 @@ impl MotorFile {
             let complaint = format!("needs an encoder at the motor with at most {MOST_COUNTS} counts");
             return Err(whole.fault("motor", &complaint));
         }
-        if self.absolute_encoder && !AS5047P_COUNTS.contains(&joint.encoder.counts) {
-            let complaint = format!(
-                "is true, but `encoder.counts` is {}: an AS5047P has 4000 counts per turn, or 4096",
-                joint.encoder.counts
-            );
-            return Err(place.fault("absolute_encoder", &complaint));
-        }
-        if self.absolute_encoder && self.pole_pairs > AS5047P_PAIRS {
-            let complaint = format!(
-                "is true, but `pole_pairs` is {}: the encoder's error of 0.8 degrees permits at most {AS5047P_PAIRS}",
-                self.pole_pairs
-            );
-            return Err(place.fault("absolute_encoder", &complaint));
-        }
-        if self.joint_encoder.is_some() && joint.encoder.ratio > MOST_RATIO {
-            let complaint = format!(
-                "cannot tell the motor turns apart at `encoder.ratio` {}: at most {MOST_RATIO}",
-                joint.encoder.ratio
-            );
-            return Err(place.fault("joint_encoder", &complaint));
-        }
-        if self.joint_encoder.is_some() && joint.range_deg.iter().any(|end| end.abs() > MOST_RANGE_DEG) {
-            let complaint =
-                format!("measures within a turn: `range_deg` must lie within {MOST_RANGE_DEG} degrees");
-            return Err(place.fault("joint_encoder", &complaint));
-        }
+        self.check_encoders(&place, joint)?;
         let flux = self.flux(joint);
         if !(1e-4..=1.0).contains(&flux) {
             let complaint = format!(
                 "has a flux of {flux:.6} V s by torque_per_ampere, pole_pairs and encoder.ratio, outside 0.0001..1"
             );
             return Err(whole.fault("motor", &complaint));
+        }
+        Ok(())
+    }
+
+    fn check_encoders(&self, place: &Place<'_>, joint: &JointFile) -> Result<(), Fault> {
+        let (counts, ratio, pairs) = (joint.encoder.counts, joint.encoder.ratio, self.pole_pairs);
+        if self.absolute_encoder && !AS5047P_COUNTS.contains(&counts) {
+            let complaint = format!(
+                "is true, but `encoder.counts` is {counts}: an AS5047P has 4000 counts per turn, or 4096"
+            );
+            return Err(place.fault("absolute_encoder", &complaint));
+        }
+        if self.absolute_encoder && pairs > AS5047P_PAIRS {
+            let complaint = format!(
+                "is true, but `pole_pairs` is {pairs}: the encoder's error of 0.8 degrees permits at most {AS5047P_PAIRS}"
+            );
+            return Err(place.fault("absolute_encoder", &complaint));
+        }
+        if self.joint_encoder.is_some() && ratio > MOST_RATIO {
+            let complaint =
+                format!("cannot tell the motor turns apart at `encoder.ratio` {ratio}: at most {MOST_RATIO}");
+            return Err(place.fault("joint_encoder", &complaint));
+        }
+        if self.joint_encoder.is_some() && joint.range_deg.iter().any(|end| end.abs() > MOST_RANGE_DEG) {
+            let complaint =
+                format!("measures within a turn: `range_deg` must lie within {MOST_RANGE_DEG} degrees");
+            return Err(place.fault("joint_encoder", &complaint));
         }
         Ok(())
     }

@@ -8,6 +8,7 @@
 
 use scarab_base::shell::quoted;
 use std::collections::BTreeSet;
+use std::mem::discriminant;
 
 use crate::formats::recording::chosen::Names;
 use crate::formats::recording::import::{ColumnChoice, ColumnName, Drive, Import};
@@ -237,27 +238,6 @@ fn proposals(
             Some((index, name, kind))
         })
         .collect();
-    let joints = import.drives.len();
-    let of_kind = |kind: Signal, joint: usize| -> Option<usize> {
-        let of_kind: Vec<_> = candidates.iter().filter(|(.., other)| *other == kind).collect();
-        let drive = import.drives.get(joint.wrapping_sub(1));
-        if let Some((index, ..)) =
-            of_kind.iter().find(|(_, name, _)| drive.is_some_and(|drive| name.is_of(drive)))
-        {
-            return Some(*index);
-        }
-        let numbers: BTreeSet<usize> =
-            of_kind.iter().filter_map(|(_, name, _)| name.numbers.last().copied()).collect();
-        match (numbers.iter().nth(joint.saturating_sub(1)), &of_kind[..]) {
-            (Some(number), _) => of_kind
-                .iter()
-                .find(|(_, name, _)| name.numbers.last() == Some(number))
-                .map(|(index, ..)| *index),
-            (None, [(index, ..), ..]) if kind == Signal::Time => Some(*index),
-            (None, [(index, ..)]) if joints == 1 => Some(*index),
-            _ => None,
-        }
-    };
     let with_typing_error = |signal: Signal| {
         let documented = signal.column(signal.quantity().si()).to_lowercase();
         let likeness =
@@ -268,24 +248,12 @@ fn proposals(
         });
         close.max_by(|(_, a), (_, b)| likeness(a).total_cmp(&likeness(b))).map(|(index, _)| index)
     };
-    let mut choices = vec![vec![(Signal::Time, Signal::Time)]];
-    for joint in 1..=joints {
-        choices.push(vec![
-            (Signal::Angle(joint), Signal::Angle(0)),
-            (Signal::MotorAngle(joint), Signal::MotorAngle(0)),
-        ]);
-        choices.push(vec![
-            (Signal::Torque(joint), Signal::Torque(0)),
-            (Signal::Current(joint), Signal::Current(0)),
-        ]);
-    }
-    for choices in choices {
-        let known = certain.iter().find(|(signal, _)| choices.iter().any(|(choice, _)| choice == signal));
+    for choices in required(import.drives.len()) {
+        let known = certain.iter().find(|(signal, _)| choices.contains(signal));
         let proposed = known.copied().or_else(|| {
-            choices.iter().find_map(|(signal, kind)| {
-                let index =
-                    of_kind(*kind, signal.joint().unwrap_or(0)).or_else(|| with_typing_error(*signal));
-                index.map(|index| (*signal, index))
+            choices.iter().find_map(|&signal| {
+                let index = named_column(&candidates, import, signal).or_else(|| with_typing_error(signal));
+                index.map(|index| (signal, index))
             })
         });
         match proposed {
@@ -295,10 +263,44 @@ fn proposals(
                 let unit = named.unwrap_or(in_use);
                 found.push(Proposal { signal, index, unit, is_assumed: !is_stated && named.is_none() });
             }
-            _ => missing.push(choices[0].0),
+            _ => missing.push(choices[0]),
         }
     }
     (found, missing)
+}
+
+/// Column whose name states a signal: with the joint's name, by the order of the numbers, or alone.
+fn named_column(candidates: &[(usize, Name, Signal)], import: &Import, signal: Signal) -> Option<usize> {
+    let joint = signal.joint().unwrap_or(0);
+    let of_kind: Vec<_> =
+        candidates.iter().filter(|(.., kind)| discriminant(kind) == discriminant(&signal)).collect();
+    let drive = import.drives.get(joint.wrapping_sub(1));
+    if let Some((index, ..)) =
+        of_kind.iter().find(|(_, name, _)| drive.is_some_and(|drive| name.is_of(drive)))
+    {
+        return Some(*index);
+    }
+    let numbers: BTreeSet<usize> =
+        of_kind.iter().filter_map(|(_, name, _)| name.numbers.last().copied()).collect();
+    match (numbers.iter().nth(joint.saturating_sub(1)), &of_kind[..]) {
+        (Some(number), _) => {
+            of_kind.iter().find(|(_, name, _)| name.numbers.last() == Some(number)).map(|(index, ..)| *index)
+        }
+        (None, [(index, ..), ..]) if signal == Signal::Time => Some(*index),
+        (None, [(index, ..)]) if import.drives.len() == 1 => Some(*index),
+        _ => None,
+    }
+}
+
+/// Signals that a recording of so many joints must have, each with those that replace it.
+fn required(joints: usize) -> impl Iterator<Item = Vec<Signal>> {
+    let of_joints = (1..=joints).flat_map(|joint| {
+        [
+            vec![Signal::Angle(joint), Signal::MotorAngle(joint)],
+            vec![Signal::Torque(joint), Signal::Current(joint)],
+        ]
+    });
+    std::iter::once(vec![Signal::Time]).chain(of_joints)
 }
 
 /// Signal that is read from a column in a unit.
@@ -323,14 +325,7 @@ pub(crate) fn readings(import: &Import) -> Vec<Reading> {
         };
         Reading { signal, column, unit }
     };
-    let joints = 1..=import.drives.len();
-    let of_joints = joints.flat_map(|joint| {
-        [
-            reading(&[Signal::Angle(joint), Signal::MotorAngle(joint)]),
-            reading(&[Signal::Torque(joint), Signal::Current(joint)]),
-        ]
-    });
-    std::iter::once(reading(&[Signal::Time])).chain(of_joints).collect()
+    required(import.drives.len()).map(|choices| reading(&choices)).collect()
 }
 
 /// Complete command with these readings.

@@ -101,23 +101,8 @@ pub fn likely<const N: usize, const B: usize>(
             tried.push(of_direction(question, errors, found, report, here));
         }
     }
-    if let Some(midway) = errors.midway.as_ref().filter(|midway| midway.refuses()) {
-        tried.push(Tried {
-            cause: CauseReport {
-                name: "changed_midway",
-                joint: midway.joint.map(|joint| joint + 1),
-                value: midway.change.into(),
-                sigma: midway.sigma.into(),
-                words: midway_words(midway),
-                reads: Vec::new(),
-            },
-            quality: Quality {
-                remaining: here.remaining * (1.0 - midway.explained).max(0.0).sqrt(),
-                sound: true,
-            },
-            is_shared: false,
-        });
-    }
+    let midway = errors.midway.as_ref().filter(|midway| midway.refuses());
+    tried.extend(midway.map(|midway| changed_midway(midway, here)));
     tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
     let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(errors, &tried.cause)).collect();
     let passing = tried.into_iter().zip(refused).filter(|(tried, refused)| {
@@ -311,6 +296,19 @@ fn of_direction<const N: usize, const B: usize>(
     }
     let is_shared = found.alike.iter().any(|other| other.starts_with(found.kind.name()));
     Tried { cause, quality: Quality { remaining, sound }, is_shared }
+}
+
+fn changed_midway(midway: &Midway, here: Quality) -> Tried {
+    let cause = CauseReport {
+        name: "changed_midway",
+        joint: midway.joint.map(|joint| joint + 1),
+        value: midway.change.into(),
+        sigma: midway.sigma.into(),
+        words: midway_words(midway),
+        reads: Vec::new(),
+    };
+    let remaining = here.remaining * (1.0 - midway.explained).max(0.0).sqrt();
+    Tried { cause, quality: Quality { remaining, sound: true }, is_shared: false }
 }
 
 fn refits<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Tried> {

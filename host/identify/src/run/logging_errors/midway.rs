@@ -147,24 +147,13 @@ fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Mi
     }
     let (mut found, scope, factor) = best?;
     // Uncertainty of the factor: the torque after the change as a further column.
-    let torque: Vec<f64> = all
-        .places
-        .iter()
-        .zip(&all.torque)
-        .map(
-            |(place, torque)| {
-                if is_after(place, scope, found.joint, found.share) { factor * torque } else { *torque }
-            },
-        )
-        .collect();
+    let is_changed = |place: &Place| is_after(place, scope, found.joint, found.share);
+    let changed = |(place, torque): (&Place, &f64)| if is_changed(place) { factor * torque } else { *torque };
+    let torque: Vec<f64> = all.places.iter().zip(&all.torque).map(changed).collect();
     let fit = all.fit(&all.columns, &torque, false);
     let predicted = fit.predictions(&all.columns);
-    let z: Vec<f64> = all
-        .places
-        .iter()
-        .zip(&predicted)
-        .map(|(place, torque)| if is_after(place, scope, found.joint, found.share) { *torque } else { 0.0 })
-        .collect();
+    let column = |(place, torque): (&Place, &f64)| if is_changed(place) { *torque } else { 0.0 };
+    let z: Vec<f64> = all.places.iter().zip(&predicted).map(column).collect();
     let segments: Vec<usize> = all.places.iter().map(|place| place.cluster).collect();
     let scored = score(&fit, &all.columns, &torque, &z, &all.weight, &segments);
     // Chi-square of one for each independent row, independent of the previous misfit.

@@ -474,19 +474,8 @@ fn limit(parts: &[Part], upper: bool) -> Option<(f64, Vec<Vec<bool>>)> {
     // Distance of one sample below the limit.
     let below = |part: &Part, sample: usize| top - sign * part.values[sample];
     // Samples at the limit, moving or not; those that count are usable as well.
-    let at: Vec<Vec<bool>> = parts
-        .iter()
-        .map(|part| {
-            let close = |sample: Option<usize>| {
-                sample.is_some_and(|sample| sample < part.values.len() && below(part, sample) < 10.0 * band)
-            };
-            (0..part.values.len())
-                .map(|sample| {
-                    below(part, sample) < band && (close(sample.checked_sub(1)) || close(Some(sample + 1)))
-                })
-                .collect()
-        })
-        .collect();
+    let at: Vec<Vec<bool>> =
+        parts.iter().map(|part| within_band(part.values.len(), band, |sample| below(part, sample))).collect();
     let near: Vec<Vec<bool>> = parts
         .iter()
         .zip(&at)
@@ -523,23 +512,38 @@ fn limit(parts: &[Part], upper: bool) -> Option<(f64, Vec<Vec<bool>>)> {
             || equal >= 6 * (others + 1));
     let slowest = parts.iter().map(|part| part.rate_hz).fold(f64::INFINITY, f64::min);
     let ratio = if slowest >= 200.0 { 3 } else { 6 };
-    let is_flat = within >= ratio * (next + 1) && {
-        let roughness = |inside: bool| {
-            let mut rough: Vec<f64> = all()
-                .flat_map(|(part, near)| {
-                    (3..near.len())
-                        .filter(move |&last| (last - 3..=last).all(|k| part.usable[k] && near[k] == inside))
-                        .map(move |last| third_difference(&part.values[last - 3..=last]))
-                })
-                .collect();
-            (rough.len() >= 8).then(|| median(&mut rough))
-        };
-        match (roughness(true), roughness(false)) {
-            (Some(inside), Some(outside)) => inside < 0.3 * outside && outside > NOISY * range,
-            _ => false,
-        }
-    };
+    let is_flat = within >= ratio * (next + 1) && is_flattened(parts, &near, range);
     (is_exact || is_flat).then_some((sign * top, at))
+}
+
+/// Samples within `band` of an extreme, from which each is so far `below`; without outliers, which have no
+/// neighbour within ten bands.
+fn within_band(samples: usize, band: f64, below: impl Fn(usize) -> f64) -> Vec<bool> {
+    let close =
+        |sample: Option<usize>| sample.is_some_and(|sample| sample < samples && below(sample) < 10.0 * band);
+    (0..samples)
+        .map(|sample| below(sample) < band && (close(sample.checked_sub(1)) || close(Some(sample + 1))))
+        .collect()
+}
+
+/// Whether the samples `near` a limit are far less noisy than the others: a filter has flattened them.
+fn is_flattened(parts: &[Part], near: &[Vec<bool>], range: f64) -> bool {
+    let roughness = |inside: bool| {
+        let mut rough: Vec<f64> = parts
+            .iter()
+            .zip(near)
+            .flat_map(|(part, near)| {
+                (3..near.len())
+                    .filter(move |&last| (last - 3..=last).all(|k| part.usable[k] && near[k] == inside))
+                    .map(move |last| third_difference(&part.values[last - 3..=last]))
+            })
+            .collect();
+        (rough.len() >= 8).then(|| median(&mut rough))
+    };
+    match (roughness(true), roughness(false)) {
+        (Some(inside), Some(outside)) => inside < 0.3 * outside && outside > NOISY * range,
+        _ => false,
+    }
 }
 
 /// Third difference, as a share of the range, from which a column counts as noisy.

@@ -17,7 +17,7 @@ use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::Recording;
 use crate::leg::background::Background;
 use crate::report::RunReport;
-use crate::report::doubt::{BandwidthReport, ReadAs, RecordingsReport};
+use crate::report::doubt::{BandwidthReport, CauseReport, ReadAs, RecordingsReport};
 use crate::report::findings::FindingReport;
 use crate::run::logging_errors::encoder::{Encoder, Encoders};
 use crate::run::logging_errors::rows::{Equations, Filters, Motion};
@@ -206,23 +206,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             errors.as_ref().and_then(|errors| units::current(&question, &errors.equations, import, None));
         let mut suspected = current.as_ref();
         if !run.accepted() {
-            let mut cause = cause::likely(&question, errors.as_ref(), samples, &run.findings);
-            // A torque in mN m and a current in mA differ by the torque constants only.
-            let is_scale = cause.name == "unknown" || cause.reads.contains(&ReadAs::MillinewtonMetres);
-            let with_angles = || {
-                let angles = cause::with_other_angles(&question);
-                angles
-                    .iter()
-                    .filter(|(read, _)| cause.name == "unknown" || cause.reads.contains(read))
-                    .find_map(|(read, equations)| units::current(&question, equations, import, Some(*read)))
-            };
-            if let Some(current) = suspected.take_if(|_| is_scale) {
-                cause = current.clone();
-            } else if let Some(current) = is_scale.then(with_angles).flatten() {
-                cause = current;
-            } else {
-                cause.words += &units::remedy(import, &cause).unwrap_or_default();
-            }
+            let cause = self.likely_cause(&question, errors.as_ref(), &run.findings, &mut suspected);
             correct_words(run, cause.name);
             report.likely_cause = Some(cause);
         }
@@ -232,6 +216,35 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             .map(|(current, whole)| format!("{}: {}", whole.recording.file.display(), current.words));
         run.doubt = Some(report);
         Ok(warning)
+    }
+
+    /// Likely cause of a refusal, with its remedy. Takes `suspected`, a current, where it is the cause.
+    fn likely_cause(
+        &self,
+        question: &Question<N, B>,
+        errors: Option<&LoggingErrors<N, B>>,
+        findings: &[FindingReport],
+        suspected: &mut Option<&CauseReport>,
+    ) -> CauseReport {
+        let import = self.options.import.as_ref();
+        let mut cause = cause::likely(question, errors, self.screening.findings(), findings);
+        // A torque in mN m and a current in mA differ by the torque constants only.
+        let is_scale = cause.name == "unknown" || cause.reads.contains(&ReadAs::MillinewtonMetres);
+        if let Some(current) = suspected.take_if(|_| is_scale) {
+            return current.clone();
+        }
+        let with_angles = || {
+            let angles = cause::with_other_angles(question);
+            angles
+                .iter()
+                .filter(|(read, _)| cause.name == "unknown" || cause.reads.contains(read))
+                .find_map(|(read, equations)| units::current(question, equations, import, Some(*read)))
+        };
+        if let Some(current) = is_scale.then(with_angles).flatten() {
+            return current;
+        }
+        cause.words += &units::remedy(import, &cause).unwrap_or_default();
+        cause
     }
 
     /// Adds the scatter between recordings to sigma.

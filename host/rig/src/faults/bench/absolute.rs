@@ -23,16 +23,12 @@ use scarab_identify::formats::leg_file::LegFile;
 use crate::bus::board::{Board, Label};
 use crate::bus::host::Host;
 use crate::faults::bench::Bench;
-use crate::faults::bench::hosted::{Fork, TICK_MS, context, forked_within};
+use crate::faults::bench::hosted::{Fork, context, forked_within};
+use crate::faults::catalogue::{self, ENCODER_CHECK, ENCODER_CHECK_MS, Fault, TICK_MS};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
-use crate::faulty_board::PERIOD_MS;
 use crate::kept_file::memory::Memory;
 
-/// PWM periods and time between two checks.
-const CHECK: u64 = 192;
-const CHECK_MS: f64 = CHECK as f64 * PERIOD_MS;
 /// Ticks of a run: three strokes of the motion.
 const PATIENCE: u64 = 12_000;
 /// Steps of an encoder per turn, and per count of 4,096.
@@ -43,37 +39,11 @@ const COUNT: f64 = 4.0;
 const SURE: [f64; 2] = [14.0 * COUNT, 200.0];
 const HIDDEN: [f64; 2] = [10.0 * COUNT, 38.0];
 /// Random frames: at worst ten checks, and twice that where a random angle is right by chance.
-const GARBAGE_MS: f64 = 20.0 * CHECK_MS;
+const GARBAGE_MS: f64 = 20.0 * ENCODER_CHECK_MS;
 
-pub(super) const SILENT: Bench = Bench {
-    head: Head {
-        id: "E6",
-        fault: "absolute encoder without a valid frame",
-        detector: "parity and error flag, every 8 ms, five in a row",
-        state: "Damp, Short",
-        deadline_ms: 5.0 * CHECK_MS + 2.0 * TICK_MS + PERIOD_MS,
-        unit: "checks",
-        codes: &[FaultCode::AbsoluteEncoder],
-        lacking: None,
-    },
-    run: silent,
-};
+pub(super) const SILENT: Bench = Bench { fault: &catalogue::E6, run: silent };
 
-pub(super) const CONTRADICTION: Bench = Bench {
-    head: Head {
-        id: "E7",
-        fault: "absolute encoder and counter contradict each other",
-        detector: "comparison of both, every 8 ms, twice in a row",
-        state: "Short",
-        deadline_ms: 2.0 * CHECK_MS + 2.0 * TICK_MS + PERIOD_MS,
-        unit: "steps of 2^-14 turns",
-        codes: &[FaultCode::EncoderPosition],
-        lacking: Some(
-            "differences below the encoders' own errors: 1 degree of the rotor, 4.4 degrees of the joint",
-        ),
-    },
-    run: contradict,
-};
+pub(super) const CONTRADICTION: Bench = Bench { fault: &catalogue::E7, run: contradict };
 
 fn base(leg: &LegFile, blind: bool) -> Result<Host, ToolError> {
     let motors = leg.with_absolute_encoders();
@@ -87,14 +57,14 @@ fn base(leg: &LegFile, blind: bool) -> Result<Host, ToolError> {
     Ok(base)
 }
 
-fn silent(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn silent(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let scope = Scope { torque: true, range: true, rotor_position: true };
-    forked_within(head, leg, base(leg, blind)?, seeds, scope, falls_silent)
+    forked_within(fault, leg, base(leg, blind)?, seeds, scope, falls_silent)
 }
 
-fn contradict(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn contradict(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let scope = Scope { torque: false, range: true, rotor_position: false };
-    forked_within(head, leg, base(leg, blind)?, seeds, scope, contradicts)
+    forked_within(fault, leg, base(leg, blind)?, seeds, scope, contradicts)
 }
 
 /// Adds a fault from now on.
@@ -120,17 +90,17 @@ fn falls_silent(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     let (form, lasts) = match fork.random.below(3) {
         0 => (Form::Garbage, u64::MAX),
         1 => (Form::Rail(65_535.0), u64::MAX),
-        _ => (Form::Rail(65_535.0), checks * CHECK),
+        _ => (Form::Rail(65_535.0), checks * ENCODER_CHECK),
     };
     inject(&mut fork, channel, joint, form, lasts);
     let (state, after_ms) = fork.until(4 * PATIENCE / 12, reached).unzip();
     // Random frames are wrong now and then.
     let intermittent_ms = (form == Form::Garbage).then_some(GARBAGE_MS);
-    let deadline_ms = intermittent_ms.unwrap_or(fork.head.deadline_ms);
+    let deadline_ms = intermittent_ms.unwrap_or(fork.fault.deadline_ms);
     let in_time = after_ms.is_some_and(|after| after <= deadline_ms + 1e-9);
     let is_right = state == Some("Damp") || form == Form::Garbage && matches!(state, Some("Short" | "Off"));
     // An interruption of so many checks spans as many of them, whatever its phase.
-    let (is_noise, may_be) = (lasts < 5 * CHECK, lasts <= 5 * CHECK);
+    let (is_noise, may_be) = (lasts < 5 * ENCODER_CHECK, lasts <= 5 * ENCODER_CHECK);
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let magnitude = (lasts < u64::MAX).then_some(checks as f64);
     let found = fork.ended(state, alarm);
@@ -188,7 +158,7 @@ fn contradicts(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     let first = readings(&mut fork, joint);
     match kind {
         Kind::Offset(offset) => inject(&mut fork, channel, joint, Form::Offset(offset), u64::MAX),
-        Kind::Once(offset) => inject(&mut fork, channel, joint, Form::Offset(offset), CHECK - 1),
+        Kind::Once(offset) => inject(&mut fork, channel, joint, Form::Offset(offset), ENCODER_CHECK - 1),
         Kind::Frozen => inject(&mut fork, channel, joint, Form::Stuck, u64::MAX),
         Kind::Ground => inject(&mut fork, channel, joint, Form::Off, u64::MAX),
         Kind::FrozenCounter => inject(&mut fork, Channel::Counter, joint, Form::Stuck, u64::MAX),
@@ -215,12 +185,12 @@ fn contradicts(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
             after_ms = Some(since.map_or(0.0, |since| (tick + 1 - since) as f64 * TICK_MS));
             break;
         }
-        if since.is_some_and(|since| (tick - since) as f64 * TICK_MS > 2.0 * fork.head.deadline_ms) {
+        if since.is_some_and(|since| (tick - since) as f64 * TICK_MS > 2.0 * fork.fault.deadline_ms) {
             break;
         }
     }
-    let in_time = after_ms.is_some_and(|after| after <= fork.head.deadline_ms + 1e-9);
-    let lasts = longest as f64 * TICK_MS > fork.head.deadline_ms;
+    let in_time = after_ms.is_some_and(|after| after <= fork.fault.deadline_ms + 1e-9);
+    let lasts = longest as f64 * TICK_MS > fork.fault.deadline_ms;
     let is_hidden = most < HIDDEN[at] && kind != Kind::FrozenCounter;
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let found = fork.ended(state, alarm);

@@ -19,23 +19,11 @@ use scarab_identify::leg::board_words::axis_error;
 
 use crate::board::{axis_configuration, calibration_settings, commission, rested};
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::draw::AMPERE_PER_CODE;
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "E5",
-        fault: "phases, encoder or shunts connected wrongly, not at all, or loose during a calibration",
-        detector: "checks of the calibration",
-        state: "Refuse",
-        deadline_ms: f64::INFINITY,
-        unit: "",
-        codes: &[],
-        lacking: None,
-    },
-    run: calibrate,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::E5, run: calibrate };
 
 /// Longest calibration, periods; usually some seconds.
 const LONGEST: u64 = 60 * CURRENT_RATE_HZ as u64;
@@ -43,19 +31,19 @@ const LONGEST: u64 = 60 * CURRENT_RATE_HZ as u64;
 /// Number of ways to connect an axis wrongly.
 const WAYS: u64 = 11;
 
-fn calibrate(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    seeds.par_iter().map(|seed| one(head, leg, *seed, blind)).collect()
+fn calibrate(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    seeds.par_iter().map(|seed| one(fault, leg, *seed, blind)).collect()
 }
 
-fn one(head: &Head, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
-    let mut random = Random::new(head.id, seed);
+fn one(fault: &Fault, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
+    let mut random = Random::new(fault.id, seed);
     let drives = leg.complete_description::<2>()?;
     let index = random.below(drives.axes.len() as u64) as usize;
     let joint = &leg.joints[index];
     let motor =
         joint.motor.as_ref().ok_or_else(|| leg.error("every joint needs a motor (`[joint.motor]`)"))?;
     if random.below(5) < 2 {
-        return loose(head, joint, motor, &drives.axes[index], &drives.supply, seed, &mut random, blind);
+        return loose(fault, joint, motor, &drives.axes[index], &drives.supply, seed, &mut random, blind);
     }
     let sound = drives.axes[index];
     let mut axis = sound;
@@ -84,7 +72,7 @@ fn one(head: &Head, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, To
     let angle = random.uniform(0.0, TAU);
     let name = &joint.name;
     let passed = commission(name, &configuration, settings, &axis, &drives.supply, angle, seed).is_ok();
-    Ok(outcome(head, seed, (!passed).then_some("Refuse")))
+    Ok(outcome(fault, seed, (!passed).then_some("Refuse")))
 }
 
 /// Loose part.
@@ -96,7 +84,7 @@ enum Loose {
 /// Runs a calibration in which a part becomes loose at a tick.
 #[expect(clippy::too_many_arguments, reason = "a motor, its surroundings, and how the run is done")]
 fn loose(
-    head: &Head,
+    fault: &Fault,
     joint: &JointFile,
     motor: &MotorFile,
     axis: &AxisDescription,
@@ -147,7 +135,7 @@ fn loose(
     // Blind: the checks pass for every motor.
     let (_, found) = if blind { (at, sound) } else { measure(Some((at, &loose)))? };
     let is_right = found.zip(sound).is_some_and(|(found, sound)| is_like(&found, &sound));
-    let mut came = outcome(head, seed, found.is_none().then_some("Refuse"));
+    let mut came = outcome(fault, seed, found.is_none().then_some("Refuse"));
     came.period = at;
     came.undetectable = is_right && !blind;
     Ok(came)

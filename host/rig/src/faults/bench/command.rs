@@ -16,43 +16,36 @@ use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::invariants::MARGIN_RAD;
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, start_position};
 use scarab::model::planar::BASE;
 use scarab::model::planar::JOINTS;
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "J1",
-        fault: "joint commanded beyond its range, at any speed",
-        detector: "stopping-distance clamp",
-        state: "Limit, Damp",
-        deadline_ms: f64::INFINITY,
-        unit: "N m",
-        codes: &[],
-        lacking: None,
-    },
-    run: command,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::J1_COMMANDED, run: command };
 
 /// Distance by which the ends of a range are moved when the clamp is disabled.
 const WIDENED: Radian = Radian(2.0);
 
-fn command(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn command(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let mut context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
     if blind {
         for joint in &mut context.configuration.joints {
             (joint.low, joint.high) = (joint.low - WIDENED, joint.high + WIDENED);
         }
     }
-    seeds.par_iter().map(|seed| one(head, leg, &context, *seed)).collect()
+    seeds.par_iter().map(|seed| one(fault, leg, &context, *seed)).collect()
 }
 
-fn one(head: &Head, leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -> Result<Outcome, ToolError> {
-    let mut random = Random::new(head.id, seed);
+fn one(
+    fault: &Fault,
+    leg: &LegFile,
+    context: &Context<JOINTS, BASE>,
+    seed: u64,
+) -> Result<Outcome, ToolError> {
+    let mut random = Random::new(fault.id, seed);
     let mut world = World::<JOINTS>::new(&leg.description()?, seed);
     world.set_current_noise(&context.current_noise(leg));
     world.place(&start_position(leg));
@@ -67,7 +60,7 @@ fn one(head: &Head, leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -
         Some(PowerRequest::EnableOperation),
     ];
     let (mut limited, mut furthest) = (false, 0.0_f64);
-    let mut found = outcome(head, seed, None);
+    let mut found = outcome(fault, seed, None);
     let margin = MARGIN_RAD;
     for tick in 0..2 * SERVO_RATE_HZ {
         let power = enabling.get(tick as usize).copied().flatten();

@@ -11,8 +11,8 @@ use scarab_identify::formats::leg_file::LegFile;
 
 use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, forked, started};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::kept_file::memory::Memory;
 use scarab::model::planar::JOINTS;
 
@@ -27,21 +27,9 @@ const SAVE: u32 = u32::from_le_bytes(*b"save");
 const WINDOW: u16 = 0x6065;
 const KEPT: u32 = 43_210;
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "X3",
-        fault: "supply cut while moving, then back",
-        detector: "nothing is calibrated after a boot; the store",
-        state: "Refuse until reset",
-        deadline_ms: f64::INFINITY,
-        unit: "",
-        codes: &[],
-        lacking: None,
-    },
-    run: cut,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::X3, run: cut };
 
-fn cut(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn cut(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let mut host = started(leg)?;
     for node in [1, 2] {
         host.write(node, WINDOW, 0, KEPT, 4)?;
@@ -50,7 +38,7 @@ fn cut(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
     host.run(400);
     host.move_leg(leg)?;
     let ready = host.clone();
-    forked(head, leg, host, seeds, |mut fork| {
+    forked(fault, leg, host, seeds, |mut fork| {
         let remembers = blind && fork.seed.is_multiple_of(2);
         if blind && !remembers {
             *fork.host.board().memory() = Memory::new(None);

@@ -16,8 +16,8 @@ use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::{LegFile, PushesFile};
 
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::options::SimulationOptions;
 use crate::pair::Context;
 use crate::perturb::{self, Perturbation};
@@ -32,67 +32,34 @@ const SLOW_RAD_PER_S: f32 = 0.05;
 /// Share of excluded rows above which a motion counts as disturbed; an undisturbed one has less.
 const NOTICED_SHARE: f32 = 0.005;
 
-pub(super) const WEARER: Bench = Bench {
-    head: Head {
-        id: "H2",
-        fault: "wearer pushes during identification",
-        detector: "weights of the residuals; held-out motions",
-        state: "Limit",
-        deadline_ms: f64::INFINITY,
-        unit: "N m",
-        codes: &[],
-        lacking: None,
-    },
-    run: |head, leg, seeds, blind| all(head, leg, seeds, blind, pushed),
-};
+pub(super) const WEARER: Bench =
+    Bench { fault: &catalogue::H2, run: |fault, leg, seeds, blind| all(fault, leg, seeds, blind, pushed) };
 
-pub(super) const CONTACT: Bench = Bench {
-    head: Head {
-        id: "H4",
-        fault: "foot touches the ground during identification",
-        detector: "residual against the open chain",
-        state: "refused: contact",
-        deadline_ms: f64::INFINITY,
-        unit: "s",
-        codes: &[],
-        lacking: None,
-    },
-    run: |head, leg, seeds, blind| all(head, leg, seeds, blind, touching),
-};
+pub(super) const CONTACT: Bench =
+    Bench { fault: &catalogue::H4, run: |fault, leg, seeds, blind| all(fault, leg, seeds, blind, touching) };
 
-pub(super) const OTHER_LEG: Bench = Bench {
-    head: Head {
-        id: "H3",
-        fault: "other leg, other load, other wiring",
-        detector: "residual of the model, bounds, held-out motions",
-        state: "result refused, never applied",
-        deadline_ms: f64::INFINITY,
-        unit: "",
-        codes: &[],
-        lacking: None,
-    },
-    run: |head, leg, seeds, blind| all(head, leg, seeds, blind, other),
-};
+pub(super) const OTHER_LEG: Bench =
+    Bench { fault: &catalogue::H3, run: |fault, leg, seeds, blind| all(fault, leg, seeds, blind, other) };
 
 /// Leg, disturbances, magnitude.
 type Drawn = (LegFile, Vec<Perturbation>, Option<f64>);
 
 fn all(
-    head: &Head,
+    fault: &Fault,
     leg: &LegFile,
     seeds: &[u64],
     blind: bool,
     draw: fn(&mut Random, &LegFile) -> Drawn,
 ) -> Result<Vec<Outcome>, ToolError> {
     let one = |seed: &u64| {
-        let (leg, perturbations, magnitude) = draw(&mut Random::new(head.id, *seed), leg);
-        judge(head, &leg, perturbations, magnitude, *seed, blind)
+        let (leg, perturbations, magnitude) = draw(&mut Random::new(fault.id, *seed), leg);
+        judge(fault, &leg, perturbations, magnitude, *seed, blind)
     };
     seeds.par_iter().map(one).collect()
 }
 
 fn judge(
-    head: &Head,
+    fault: &Fault,
     leg: &LegFile,
     perturbations: Vec<Perturbation>,
     magnitude: Option<f64>,
@@ -120,11 +87,11 @@ fn judge(
     let harmless = error.is_some_and(|error| error <= HARMFUL_PERCENT);
     let state = match error {
         // A different leg must be refused, whatever rows are excluded.
-        Some(_) => (harmless && noticed && head.id != "H3").then_some("Limit"),
-        None => Some(refused(head, pair.leg.identification().verdict())),
+        Some(_) => (harmless && noticed && fault.id != "H3").then_some("Limit"),
+        None => Some(refused(fault, pair.leg.identification().verdict())),
     };
     let seen = state.is_some();
-    let mut found = outcome(head, seed, state);
+    let mut found = outcome(fault, seed, state);
     found.undetectable = harmless && !seen;
     found.magnitude = magnitude;
     found.hash = format!("{:016x}", error.unwrap_or(-1.0).to_bits());
@@ -132,9 +99,9 @@ fn judge(
 }
 
 /// State where no model is in use; for foot contact, whether contact is among the reasons.
-fn refused(head: &Head, verdict: Option<Verdict>) -> &'static str {
+fn refused(fault: &Fault, verdict: Option<Verdict>) -> &'static str {
     match verdict {
-        Some(verdict) if head.id == "H4" && verdict.has(Reason::Contact) => "refused: contact",
+        Some(verdict) if fault.id == "H4" && verdict.has(Reason::Contact) => "refused: contact",
         _ => "refused",
     }
 }

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hal_sim::faults::{Channel, Form, Injection, Timing};
 use rayon::prelude::*;
-use scarab::hal::{Contacts, SERVO_RATE_HZ};
+use scarab::hal::Contacts;
 use scarab::leg::Permission;
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
@@ -13,9 +13,9 @@ use scarab_identify::formats::leg_file::LegFile;
 use crate::bus::board::{Board, Label};
 use crate::bus::host::Host;
 use crate::faults::bench::outcome;
+use crate::faults::catalogue::{Fault, TICK_MS};
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::faulty_board::Rig;
 use crate::kept_file::memory::Memory;
 use crate::operator::begin;
@@ -24,8 +24,6 @@ use crate::pair::Context;
 use scarab::model::planar::BASE;
 use scarab::model::planar::JOINTS;
 
-/// Time of a servo tick, ms.
-pub(super) const TICK_MS: f64 = 1e3 / SERVO_RATE_HZ as f64;
 /// Servo ticks of the motion in which forks begin: two strokes back and forth.
 const MOTION: u64 = 11_400;
 /// Servo ticks for which the operator releases the switch.
@@ -70,7 +68,7 @@ pub(super) fn identifying(leg: &LegFile) -> Result<Host, ToolError> {
 
 /// One fork.
 pub(super) struct Fork<'a> {
-    pub(super) head: &'a Head,
+    pub(super) fault: &'a Fault,
     pub(super) seed: u64,
     pub(super) random: Random,
     pub(super) host: Host,
@@ -138,25 +136,25 @@ impl Fork<'_> {
             alarm,
             broken: self.invariants.into_broken(),
             hash,
-            ..outcome(self.head, self.seed, state)
+            ..outcome(self.fault, self.seed, state)
         }
     }
 }
 
 /// Runs each seed on a fork at a random time of the motion.
 pub(super) fn forked<'a>(
-    head: &'a Head,
+    fault: &'a Fault,
     leg: &LegFile,
     base: Host,
     seeds: &[u64],
     run: impl Fn(Fork<'a>) -> Result<Outcome, ToolError> + Sync,
 ) -> Result<Vec<Outcome>, ToolError> {
-    forked_within(head, leg, base, seeds, Scope { torque: true, range: true, rotor_position: true }, run)
+    forked_within(fault, leg, base, seeds, Scope { torque: true, range: true, rotor_position: true }, run)
 }
 
 /// Like [`forked`], with invariants of this scope.
 pub(super) fn forked_within<'a>(
-    head: &'a Head,
+    fault: &'a Fault,
     leg: &LegFile,
     mut base: Host,
     seeds: &[u64],
@@ -164,7 +162,7 @@ pub(super) fn forked_within<'a>(
     run: impl Fn(Fork<'a>) -> Result<Outcome, ToolError> + Sync,
 ) -> Result<Vec<Outcome>, ToolError> {
     let drawn = |seed: &u64| {
-        let mut random = Random::new(head.id, *seed);
+        let mut random = Random::new(fault.id, *seed);
         (random.below(MOTION), *seed, random)
     };
     let mut jobs: Vec<_> = seeds.iter().map(drawn).collect();
@@ -178,12 +176,12 @@ pub(super) fn forked_within<'a>(
             let mut host = base.clone();
             let begun = host.rig().period;
             let invariants = Invariants::new(leg, scope, host.rig());
-            forks.push(Fork { head, seed: *seed, random: random.clone(), host, invariants, begun });
+            forks.push(Fork { fault, seed: *seed, random: random.clone(), host, invariants, begun });
         }
         let one = |fork: Fork<'a>| {
             let seed = fork.seed;
             catch_unwind(AssertUnwindSafe(|| run(fork))).unwrap_or_else(|_| {
-                Ok(Outcome { broken: vec!["a panic".into()], ..outcome(head, seed, None) })
+                Ok(Outcome { broken: vec!["a panic".into()], ..outcome(fault, seed, None) })
             })
         };
         outcomes.extend(forks.into_par_iter().map(one).collect::<Result<Vec<_>, _>>()?);

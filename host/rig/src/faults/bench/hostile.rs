@@ -24,8 +24,8 @@ use crate::bus::host::Host;
 use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, forked, hosted, identifying, started};
 use crate::faults::bench::lost::{until_safe, watched};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 
 /// Servo ticks of hostile frames, and frames in each: more than the bus carries.
 const FLOOD: u64 = 400;
@@ -39,33 +39,9 @@ const FULL: f64 = 0.98;
 /// Allowed deviation of a motion because frames wait for others, rad.
 const OFF_RAD: f64 = 2e-3;
 
-pub(super) const FRAMES_BENCH: Bench = Bench {
-    head: Head {
-        id: "B3",
-        fault: "malformed and hostile frames, transfers cut and mixed",
-        detector: "lengths, ranges, states; the operator's switch",
-        state: "-",
-        deadline_ms: f64::INFINITY,
-        unit: "",
-        codes: &[],
-        lacking: None,
-    },
-    run: flood,
-};
+pub(super) const FRAMES_BENCH: Bench = Bench { fault: &catalogue::B3, run: flood };
 
-pub(super) const BABBLE: Bench = Bench {
-    head: Head {
-        id: "B4",
-        fault: "a node that sends without pause, bus at 100 %",
-        detector: "bus level below the servo's; host timeouts",
-        state: "-",
-        deadline_ms: f64::INFINITY,
-        unit: "",
-        codes: &[FaultCode::Heartbeat, FaultCode::LatePdo],
-        lacking: None,
-    },
-    run: babble,
-};
+pub(super) const BABBLE: Bench = Bench { fault: &catalogue::B4, run: babble };
 
 /// Draws any frame.
 pub fn frame(random: &mut Random) -> Frame {
@@ -133,16 +109,16 @@ pub fn malformed(random: &mut Random) -> Frame {
     }
 }
 
-fn flood(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn flood(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let of = |way: u64| seeds.iter().copied().filter(|seed| seed % 3 == way).collect::<Vec<_>>();
     let mut base = started(leg)?;
     // Blind: the enabling switch is held.
     base.rig().hand = Contacts { enabling: blind, start: false };
     base.run(400);
     let moved = hosted(leg)?;
-    let mut outcomes = forked(head, leg, base, &of(0), |fork| flooded(fork, true))?;
-    outcomes.extend(forked(head, leg, moved.clone(), &of(1), moved_on)?);
-    outcomes.extend(forked(head, leg, moved, &of(2), |fork| flooded(fork, false))?);
+    let mut outcomes = forked(fault, leg, base, &of(0), |fork| flooded(fork, true))?;
+    outcomes.extend(forked(fault, leg, moved.clone(), &of(1), moved_on)?);
+    outcomes.extend(forked(fault, leg, moved, &of(2), |fork| flooded(fork, false))?);
     Ok(outcomes)
 }
 
@@ -209,12 +185,12 @@ fn flooded(mut fork: Fork<'_>, off: bool) -> Result<Outcome, ToolError> {
     Ok(fork.ended(safe.then_some("-"), None))
 }
 
-fn babble(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn babble(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let of = |way: u64| seeds.iter().copied().filter(|seed| seed % 3 == way).collect::<Vec<_>>();
     let moved = hosted(leg)?;
-    let mut outcomes = forked(head, leg, identifying(leg)?, &of(0), beside_an_operator)?;
-    outcomes.extend(forked(head, leg, moved.clone(), &of(1), beside_a_host)?);
-    outcomes.extend(forked(head, leg, moved, &of(2), |fork| instead_of_a_host(fork, blind))?);
+    let mut outcomes = forked(fault, leg, identifying(leg)?, &of(0), beside_an_operator)?;
+    outcomes.extend(forked(fault, leg, moved.clone(), &of(1), beside_a_host)?);
+    outcomes.extend(forked(fault, leg, moved, &of(2), |fork| instead_of_a_host(fork, blind))?);
     Ok(outcomes)
 }
 
@@ -251,8 +227,7 @@ fn instead_of_a_host(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolErr
     let patience = watched(&mut fork, [true; 2], blind)?;
     fork.host.network.babble(Some(Frame::new(1 + fork.random.below(0x7F) as u16, &[0x55; 8])));
     let (state, after_ms) = until_safe(&mut fork, &patience);
-    let in_time =
-        after_ms.is_some_and(|after| (0.0..=crate::faults::bench::lost::BUS_MS + 1e-9).contains(&after));
+    let in_time = after_ms.is_some_and(|after| (0.0..=catalogue::BUS_MS + 1e-9).contains(&after));
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let found = fork.ended(state, alarm);
     Ok(Outcome { detected: in_time && state == Some("Damp"), after_ms, ..found })

@@ -36,17 +36,13 @@ use scarab_identify::formats::leg_file::LegFile;
 use crate::bus::board::{Board, Label};
 use crate::bus::host::{Host, NODES};
 use crate::faults::bench::Bench;
-use crate::faults::bench::hosted::{Fork, TICK_MS, context, forked_within};
+use crate::faults::bench::hosted::{Fork, context, forked_within};
+use crate::faults::catalogue::{self, Fault, THERMISTOR_MS};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::faulty_board::PERIOD_MS;
 use crate::kept_file::memory::Memory;
 
-/// Time between two readings of a motor's thermistor, with two of them.
-const READING_MS: f64 = 100.0;
-/// Time between the sample of a reading and the check that takes it.
-const CHECK_MS: f64 = 50.0;
 /// Codes of a partial short, hotter than 120 degrees.
 const PARTIAL: [u16; 2] = [SHORTED + 1, 640];
 /// Servo ticks per second.
@@ -65,47 +61,11 @@ const LAGGING_K: f64 = 20.0;
 /// Object of the following window, which no push may leave.
 const WINDOW: u16 = 0x6065;
 
-pub(super) const CURRENT: Bench = Bench {
-    head: Head {
-        id: "T2",
-        fault: "winding hot after long or large torque",
-        detector: "thermal model of each winding, every 2 ms",
-        state: "Limit, Damp",
-        deadline_ms: f64::INFINITY,
-        unit: "degrees",
-        codes: &[FaultCode::WindingTemperature],
-        lacking: Some("heat that the current does not show: surroundings, iron, gear"),
-    },
-    run: current,
-};
+pub(super) const CURRENT: Bench = Bench { fault: &catalogue::T2, run: current };
 
-pub(super) const COOLING: Bench = Bench {
-    head: Head {
-        id: "T3",
-        fault: "winding hotter than its model",
-        detector: "thermistor of each motor, every 100 ms, mean of eight",
-        state: "Limit, Damp",
-        deadline_ms: f64::INFINITY,
-        unit: "degrees",
-        codes: &[FaultCode::WindingTemperature],
-        lacking: Some("a thermistor that has come off its winding"),
-    },
-    run: cooling,
-};
+pub(super) const COOLING: Bench = Bench { fault: &catalogue::T3, run: cooling };
 
-pub(super) const THERMISTOR: Bench = Bench {
-    head: Head {
-        id: "T4",
-        fault: "thermistor of a motor that cannot be read",
-        detector: "range and step of its readings, every 100 ms, three in a row",
-        state: "Damp",
-        deadline_ms: 3.0 * READING_MS + CHECK_MS + 2.0 * TICK_MS + PERIOD_MS,
-        unit: "ms",
-        codes: &[FaultCode::MotorThermistor],
-        lacking: Some("a thermistor that has come off its winding"),
-    },
-    run: thermistor,
-};
+pub(super) const THERMISTOR: Bench = Bench { fault: &catalogue::T4, run: thermistor };
 
 /// The leg with other thermal constants of its motors.
 fn warmed(leg: &LegFile, kelvin_per_watt: f64, time_s: f64) -> LegFile {
@@ -132,25 +92,25 @@ fn moving(leg: &LegFile, motors: &LegFile, believed: &LegFile, seconds: f64) -> 
 /// A strong push moves a joint beyond its range.
 const PUSHED: Scope = Scope { torque: true, range: false, rotor_position: true };
 
-fn current(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn current(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let believed = warmed(leg, if blind { 1e-3 * KELVIN_PER_WATT } else { KELVIN_PER_WATT }, TIME_S);
     let base = moving(leg, &warmed(leg, KELVIN_PER_WATT, TIME_S), &believed, 3.0 * TIME_S)?;
-    forked_within(head, leg, base, seeds, PUSHED, |fork| heats(fork, TOLERANCE_K))
+    forked_within(fault, leg, base, seeds, PUSHED, |fork| heats(fork, TOLERANCE_K))
 }
 
-fn cooling(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn cooling(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let motors = warmed(leg, 2.0 * KELVIN_PER_WATT, 2.0 * TIME_S).with_thermistors();
     let believed = warmed(leg, KELVIN_PER_WATT, TIME_S);
     let believed = if blind { believed } else { believed.with_thermistors() };
     let base = moving(leg, &motors, &believed, 4.0 * TIME_S)?;
-    forked_within(head, leg, base, seeds, PUSHED, |fork| heats(fork, LAGGING_K))
+    forked_within(fault, leg, base, seeds, PUSHED, |fork| heats(fork, LAGGING_K))
 }
 
-fn thermistor(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn thermistor(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let motors = leg.with_thermistors();
     let base = moving(leg, &motors, if blind { leg } else { &motors }, 1.0)?;
     let scope = Scope { torque: true, range: true, rotor_position: true };
-    forked_within(head, leg, base, seeds, scope, fails)
+    forked_within(fault, leg, base, seeds, scope, fails)
 }
 
 /// T4.
@@ -163,20 +123,21 @@ fn fails(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     let form = forms[fork.random.below(4) as usize];
     let kind = fork.random.below(4);
     let (for_ever, alternates) = (kind < 2, kind == 2);
-    let ms = if for_ever || alternates { f64::INFINITY } else { fork.random.uniform(10.0, 5.0 * READING_MS) };
+    let ms =
+        if for_ever || alternates { f64::INFINITY } else { fork.random.uniform(10.0, 5.0 * THERMISTOR_MS) };
     let begun = fork.host.rig().period;
     let mut timing = Timing::lasting(begun, if ms.is_finite() { (ms / PERIOD_MS) as u64 } else { u64::MAX });
     if alternates {
-        let reading = (READING_MS / PERIOD_MS) as u64;
+        let reading = (THERMISTOR_MS / PERIOD_MS) as u64;
         (timing.on, timing.off) = (reading, reading);
     }
     fork.inject(Channel::MotorThermistor, joint, form, timing);
     let (state, after_ms) = fork.until(SECOND, Fork::safe_state).unzip();
     // Every other reading is bad: the fourth of them is the seventh reading.
-    let intermittent_ms = alternates.then_some(fork.head.deadline_ms + 4.0 * READING_MS);
-    let deadline_ms = intermittent_ms.unwrap_or(fork.head.deadline_ms);
+    let intermittent_ms = alternates.then_some(fork.fault.deadline_ms + 4.0 * THERMISTOR_MS);
+    let deadline_ms = intermittent_ms.unwrap_or(fork.fault.deadline_ms);
     let in_time = after_ms.is_some_and(|after| after <= deadline_ms + 1e-9);
-    let (is_noise, may_be) = (ms < 2.0 * READING_MS, ms < 3.0 * READING_MS + PERIOD_MS);
+    let (is_noise, may_be) = (ms < 2.0 * THERMISTOR_MS, ms < 3.0 * THERMISTOR_MS + PERIOD_MS);
     let alarm = fork.host.rig().alarm();
     let fault = fork.host.rig().state().fault();
     let is_right = state == Some("Damp")

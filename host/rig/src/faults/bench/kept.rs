@@ -35,8 +35,8 @@ use crate::bus::host::Host;
 use crate::faults::bench::hosted::{Fork, board, forked, hosted};
 use crate::faults::bench::stall::stall;
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::kept_file::memory::{Memory, SECTOR};
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
@@ -58,37 +58,11 @@ const UNTOUCHED: u32 = 87_266;
 /// Emergency code: stored data cannot be read.
 const LOST: u16 = NoticeCode::StoreFailed.number();
 
-const fn head(id: &'static str, fault: &'static str, detector: &'static str, state: &'static str) -> Head {
-    Head { id, fault, detector, state, deadline_ms: f64::INFINITY, unit: "", codes: &[], lacking: None }
-}
+pub(super) const CUT: Bench = Bench { fault: &catalogue::F1, run: cuts };
 
-pub(super) const CUT: Bench = Bench {
-    head: Head {
-        unit: "bytes",
-        ..head(
-            "F1",
-            "power cut at any byte of a write or erase",
-            "records are complete or absent",
-            "Refuse only if both are lost",
-        )
-    },
-    run: cuts,
-};
+pub(super) const ROT: Bench = Bench { fault: &catalogue::F2, run: rots };
 
-pub(super) const ROT: Bench = Bench {
-    head: head("F2", "corrupt or foreign parameters", "checksum, schema, ranges, fingerprint", "Refuse"),
-    run: rots,
-};
-
-pub(super) const ARMED: Bench = Bench {
-    head: head(
-        "F3",
-        "store requested while the drive is on; processor stalled during a write",
-        "permit of a drive that is off, interlock",
-        "-",
-    ),
-    run: armed,
-};
+pub(super) const ARMED: Bench = Bench { fault: &catalogue::F3, run: armed };
 
 /// Identifies a leg and returns its model as stored.
 ///
@@ -218,14 +192,14 @@ fn filled(model: &ModelRecord<JOINTS>) -> Vec<Filled> {
     all
 }
 
-fn cuts(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn cuts(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let filled = filled(&identified(leg, 1)?);
-    Ok(seeds.par_iter().map(|seed| cut(head, &filled, *seed, blind)).collect())
+    Ok(seeds.par_iter().map(|seed| cut(fault, &filled, *seed, blind)).collect())
 }
 
 /// Blind: the record overwrites the old one and is accepted without a check.
-fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
-    let mut random = Random::new(head.id, seed);
+fn cut(fault: &Fault, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
+    let mut random = Random::new(fault.id, seed);
     let Filled { memory, old, new, work } = &filled[random.below(filled.len() as u64) as usize];
     let mut memory = memory.clone();
     let bytes = 1 + random.below(*work);
@@ -243,7 +217,7 @@ fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
         read.objects[0] = Some(new[..cut].iter().chain(old.iter().skip(cut)).copied().collect());
     }
     let whole = read.is_between(old, new);
-    let mut found = outcome(head, seed, whole.then_some(head.state));
+    let mut found = outcome(fault, seed, whole.then_some(fault.state));
     if kept && read != *new {
         found.broken.push("an interrupted save was reported as done".into());
     }
@@ -312,15 +286,15 @@ impl Rotting {
     }
 }
 
-fn rots(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn rots(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let rotting = Rotting::new(leg)?;
-    seeds.par_iter().map(|seed| rot(head, &rotting, *seed, blind)).collect()
+    seeds.par_iter().map(|seed| rot(fault, &rotting, *seed, blind)).collect()
 }
 
 /// Blind: one of two checks is skipped. Either another leg's model is taken as its own, or corrupt data as if
 /// its checksum were correct.
-fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
-    let mut random = Random::new(head.id, seed);
+fn rot(fault: &Fault, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
+    let mut random = Random::new(fault.id, seed);
     let mut board = rotting.board.clone();
     let way = if blind { 4 } else { random.below(6) };
     corrupt(board.memory(), &rotting.other, way, &mut random);
@@ -354,7 +328,7 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
     let reports = [1, 2].map(|node| host.emergencies().contains(&(node, LOST)));
     let enabled = host.is_enabled();
     let holds = is_own && was_kept && windows == whole && reports == [lost; 2] && !enabled;
-    let mut found = outcome(head, seed, holds.then_some("Refuse"));
+    let mut found = outcome(fault, seed, holds.then_some("Refuse"));
     // The corruption hit no data in use, or the previous intact record is read, as after a power cut. Neither
     // is detectable.
     if !lost && !blind && found.detected {
@@ -405,10 +379,10 @@ pub fn corrupt(memory: &mut Memory, other: &ModelRecord<JOINTS>, way: u64, rando
     }
 }
 
-fn armed(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn armed(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let (off, on): (Vec<u64>, Vec<u64>) = seeds.iter().partition(|seed| seed.is_multiple_of(2));
-    let mut outcomes = stall(head, leg, &off, blind)?;
-    outcomes.extend(forked(head, leg, hosted(leg)?, &on, |fork| requested(fork, blind))?);
+    let mut outcomes = stall(fault, leg, &off, blind)?;
+    outcomes.extend(forked(fault, leg, hosted(leg)?, &on, |fork| requested(fork, blind))?);
     Ok(outcomes)
 }
 

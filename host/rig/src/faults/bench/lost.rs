@@ -22,13 +22,10 @@ use crate::bus::board::TICK_NS;
 use crate::bus::host::{NODES, Speaks};
 use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, forked, hosted};
+use crate::faults::catalogue::{self, BUS_MS, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::faulty_board::PERIOD_MS;
 
-/// Limit after a host's timeout, ms. The bus checks after every second servo tick, the servo takes the order
-/// in the next tick, and its command acts one period later.
-pub(super) const BUS_MS: f64 = 3.0 * TICK_NS as f64 * 1e-6 + PERIOD_MS;
 const MS: u64 = 1_000_000;
 /// Servo ticks of damping with a margin, and of the returned host.
 const DAMPED: u64 = 1400;
@@ -43,33 +40,9 @@ const FAULT: u32 = 1;
 /// Longest wait after a host's timeout, ns.
 pub(super) const LATE_NS: u64 = 20 * MS;
 
-pub(super) const HOST_LOST: Bench = Bench {
-    head: Head {
-        id: "B1",
-        fault: "host's heartbeat or targets no longer come",
-        detector: "heartbeat consumer, event timer of the received PDO",
-        state: "Damp",
-        deadline_ms: BUS_MS,
-        unit: "ms of the host's timeout",
-        codes: &[FaultCode::Heartbeat, FaultCode::LatePdo],
-        lacking: None,
-    },
-    run: silence,
-};
+pub(super) const HOST_LOST: Bench = Bench { fault: &catalogue::B1, run: silence };
 
-pub(super) const BUS_LOST: Bench = Bench {
-    head: Head {
-        id: "B2",
-        fault: "bus off, error passive",
-        detector: "status of the controller",
-        state: "Damp",
-        deadline_ms: 10.0,
-        unit: "",
-        codes: &[FaultCode::BusOff, FaultCode::BusPassive],
-        lacking: None,
-    },
-    run: leave,
-};
+pub(super) const BUS_LOST: Bench = Bench { fault: &catalogue::B2, run: leave };
 
 /// Timeouts of a host.
 #[derive(Clone, Copy, Debug)]
@@ -166,8 +139,8 @@ pub(super) fn comes_back(fork: &mut Fork<'_>, speaks: Speaks, faults: bool) {
     }
 }
 
-fn silence(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    forked(head, leg, hosted(leg)?, seeds, |fork| silent(fork, blind))
+fn silence(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    forked(fault, leg, hosted(leg)?, seeds, |fork| silent(fork, blind))
 }
 
 fn silent(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
@@ -197,8 +170,8 @@ fn silent(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     })
 }
 
-fn leave(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    forked(head, leg, hosted(leg)?, seeds, |fork| left(fork, blind))
+fn leave(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    forked(fault, leg, hosted(leg)?, seeds, |fork| left(fork, blind))
 }
 
 fn left(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
@@ -225,7 +198,7 @@ fn left(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     fork.host.board().set_controller(Controller::Active, !blind);
     check_report(&mut fork, state, [FaultCode::BusPassive, FaultCode::BusOff]);
     comes_back(&mut fork, speaks, option == FAULT);
-    let in_time = after_ms.is_some_and(|after| after <= fork.head.deadline_ms);
+    let in_time = after_ms.is_some_and(|after| after <= fork.fault.deadline_ms);
     let found = fork.ended(state, alarm);
     Ok(Outcome { detected: in_time && state == Some("Damp"), after_ms, ..found })
 }

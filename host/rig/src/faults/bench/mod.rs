@@ -28,17 +28,17 @@ use scarab::safety::FaultCode;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
+use crate::faults::catalogue::Fault;
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 
 /// Runs a bench for some seeds. If blind, the fault's detector is disabled as stated by each bench.
-pub type Runs = fn(&Head, &LegFile, &[u64], bool) -> Result<Vec<Outcome>, ToolError>;
+pub type Runs = fn(&Fault, &LegFile, &[u64], bool) -> Result<Vec<Outcome>, ToolError>;
 
 /// A row with its own bench.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
-    /// Description of the row.
-    pub head: Head,
+    /// The fault.
+    pub fault: &'static Fault,
     /// Runs the row for these seeds.
     pub run: Runs,
 }
@@ -76,9 +76,9 @@ pub static BENCHES: [Bench; 28] = [
 ];
 
 /// Outcome of a run: `state` if it was made safe, `None` otherwise.
-pub(super) fn outcome(head: &Head, seed: u64, state: Option<&'static str>) -> Outcome {
+pub(super) fn outcome(fault: &Fault, seed: u64, state: Option<&'static str>) -> Outcome {
     Outcome {
-        fault: head.id,
+        fault: fault.id,
         seed,
         period: 0,
         detected: state.is_some(),

@@ -20,23 +20,11 @@ use scarab_identify::formats::leg_file::LegFile;
 
 use crate::board::{axis_configuration, calibration_settings, rested};
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use scarab::model::planar::JOINTS;
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "E3",
-        fault: "16-bit counter wraps, at any of 65,536 offsets",
-        detector: "none: differences wrap",
-        state: "-",
-        deadline_ms: f64::INFINITY,
-        unit: "",
-        codes: &[],
-        lacking: None,
-    },
-    run: shift,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::E3, run: shift };
 
 /// Number of start values of a counter.
 pub const OFFSETS: u64 = 65_536;
@@ -120,13 +108,13 @@ impl Driven {
     }
 }
 
-fn shift(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn shift(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let driven = (0..JOINTS).map(|joint| Driven::new(leg, joint)).collect::<Result<Vec<_>, _>>()?;
-    Ok(seeds.par_iter().map(|seed| one(head, &driven, *seed, blind)).collect())
+    Ok(seeds.par_iter().map(|seed| one(fault, &driven, *seed, blind)).collect())
 }
 
 /// Blind: a count that stays at its end instead of wrapping.
-fn one(head: &Head, driven: &[Driven], seed: u64, blind: bool) -> Outcome {
+fn one(fault: &Fault, driven: &[Driven], seed: u64, blind: bool) -> Outcome {
     let place = (seed - 1) % OFFSETS;
     let begin = if place.is_multiple_of(2) { !(place / 2) as u16 } else { (place / 2) as u16 };
     let same = driven.iter().all(|driven| {
@@ -148,7 +136,7 @@ fn one(head: &Head, driven: &[Driven], seed: u64, blind: bool) -> Outcome {
         let (commands, joint) = run(&mut axis, |period, _| shown(&driven.samples[period]));
         axis.fault().is_none() && commands == driven.commands && joint == driven.joint
     });
-    let mut found = outcome(head, seed, same.then_some("-"));
+    let mut found = outcome(fault, seed, same.then_some("-"));
     found.magnitude = Some(f64::from(begin));
     found
 }

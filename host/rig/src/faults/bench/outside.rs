@@ -22,9 +22,9 @@ use crate::bus::board::{Board, Label};
 use crate::bus::host::{Host, NODES, Speaks};
 use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, context, forked_within};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::invariants::{MARGIN_RAD, Scope};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::kept_file::memory::Memory;
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
@@ -41,21 +41,9 @@ const FASTEST: f64 = 0.3;
 const REFUSED: u16 = NoticeCode::NotEnabled.number();
 const NOTHING: Speaks = Speaks { targets: false, words: false, heartbeat: 0 };
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "J3",
-        fault: "leg rests outside its range and is enabled",
-        detector: "bounds of the return into the range",
-        state: "Limit, Damp, Refuse",
-        deadline_ms: f64::INFINITY,
-        unit: "degrees",
-        codes: &[],
-        lacking: None,
-    },
-    run,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::J3, run };
 
-fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let mut context = context(leg)?;
     if blind {
         for joint in &mut context.configuration.joints {
@@ -67,7 +55,7 @@ fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
     base.move_leg(leg)?;
     // A returning joint is driven outside its range.
     let scope = Scope { torque: true, range: false, rotor_position: true };
-    forked_within(head, leg, base, seeds, scope, |fork| one(fork, leg))
+    forked_within(fault, leg, base, seeds, scope, |fork| one(fork, leg))
 }
 
 /// Distance of each joint beyond its range, rad, and the outward direction.

@@ -12,25 +12,13 @@ use scarab_identify::formats::leg_file::LegFile;
 
 use crate::board::BRAKE;
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "V3",
-        fault: "brake chopper with implausible settings, or an invalid voltage",
-        detector: "check at construction; bounds of the duty",
-        state: "Refuse",
-        deadline_ms: f64::INFINITY,
-        unit: "",
-        codes: &[],
-        lacking: Some("an absent resistor: the bus rises until the axes turn off (V1)"),
-    },
-    run: chop,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::V3, run: chop };
 
-fn chop(head: &Head, _: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    Ok(seeds.iter().map(|seed| one(head, *seed, blind)).collect())
+fn chop(fault: &Fault, _: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    Ok(seeds.iter().map(|seed| one(fault, *seed, blind)).collect())
 }
 
 /// Voltages given to the valid chopper in each run.
@@ -39,9 +27,9 @@ const SHOWN: usize = 16;
 const NONE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
 /// Blind: valid settings and a valid voltage are used instead, as if there were no check.
-fn one(head: &Head, seed: u64, blind: bool) -> Outcome {
-    let mut random = Random::new(head.id, seed);
-    let mut found = outcome(head, seed, judge(&mut random, blind).then_some("Refuse"));
+fn one(fault: &Fault, seed: u64, blind: bool) -> Outcome {
+    let mut random = Random::new(fault.id, seed);
+    let mut found = outcome(fault, seed, judge(&mut random, blind).then_some("Refuse"));
     for _ in 0..SHOWN {
         let volts = random.uniform(-1e3, 1e3) as f32;
         let duty = Chopper::new(BRAKE[0], BRAKE[1]).map(|chopper| chopper.duty(Volt(volts)));

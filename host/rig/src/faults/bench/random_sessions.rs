@@ -15,23 +15,11 @@ use scarab_identify::formats::leg_file::LegFile;
 use crate::bus::network::Network;
 use crate::faults::bench::hosted::board;
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::outcome::Outcome;
 use crate::faults::random_hosts::{HostSession, HostedLeg, JointBounds, LegState, check_session, is_like};
-use crate::faults::scenario::Head;
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "B7",
-        fault: "random host sessions",
-        detector: "limits, and targets that are void until written again",
-        state: "as commanded, or safe",
-        deadline_ms: f64::INFINITY,
-        unit: "",
-        codes: &[],
-        lacking: None,
-    },
-    run: sessions,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::B7, run: sessions };
 
 /// Runs that reducing a session may take.
 const MOST_RUNS: u32 = 400;
@@ -88,7 +76,7 @@ impl HostedLeg for SimulatedLeg {
     }
 }
 
-fn sessions(head: &Head, leg: &LegFile, seeds: &[u64], _: bool) -> Result<Vec<Outcome>, ToolError> {
+fn sessions(fault: &Fault, leg: &LegFile, seeds: &[u64], _: bool) -> Result<Vec<Outcome>, ToolError> {
     let (legs, bounds) = (SimulatedLeg::both(leg)?, JointBounds::of(leg)?);
     let judged = |session: &HostSession| {
         let leg = legs[usize::from(session.by_hand)].clone();
@@ -96,12 +84,12 @@ fn sessions(head: &Head, leg: &LegFile, seeds: &[u64], _: bool) -> Result<Vec<Ou
             .unwrap_or_else(|_| Err("a panic".into()))
     };
     let one = |seed: &u64| {
-        let session = HostSession::draw(&mut Random::new(head.id, *seed));
-        let Err(first) = judged(&session) else { return outcome(head, *seed, Some(head.state)) };
+        let session = HostSession::draw(&mut Random::new(fault.id, *seed));
+        let Err(first) = judged(&session) else { return outcome(fault, *seed, Some(fault.state)) };
         let reduced =
             session.reduced(MOST_RUNS, |session| judged(session).is_err_and(|why| is_like(&why, &first)));
         let why = judged(&reduced).err().unwrap_or(first);
-        Outcome { broken: vec![format!("{why}; {reduced:?}")], ..outcome(head, *seed, None) }
+        Outcome { broken: vec![format!("{why}; {reduced:?}")], ..outcome(fault, *seed, None) }
     };
     Ok(seeds.par_iter().map(one).collect())
 }
@@ -115,7 +103,7 @@ mod tests {
     fn no_random_session_breaks_an_invariant() {
         let leg = LegFile::load(DEFAULT_LEG).expect("a shipped leg");
         let seeds: Vec<u64> = (1..=200).collect();
-        let found = sessions(&BENCH.head, &leg, &seeds, false).expect("sessions");
+        let found = sessions(BENCH.fault, &leg, &seeds, false).expect("sessions");
         for outcome in found {
             assert!(outcome.broken.is_empty(), "seed {}: {}", outcome.seed, outcome.broken.join("; "));
         }

@@ -12,8 +12,8 @@ use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
 use scarab::hal::SERVO_RATE_HZ;
@@ -25,19 +25,7 @@ const LONGEST: u64 = 300 * SERVO_RATE_HZ as u64;
 /// Servo ticks for which a leg is observed after its search: half a second.
 const AFTERWARDS: u64 = 2000;
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "I1",
-        fault: "search cancelled, stopped by a fault or the emergency stop, or with an invalid result",
-        detector: "cancelled between two candidates; verdict",
-        state: "old parameters stay",
-        deadline_ms: f64::INFINITY,
-        unit: "ticks of search",
-        codes: &[],
-        lacking: None,
-    },
-    run: interrupt,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::I1, run: interrupt };
 
 /// A leg with an accepted model at the first tick of another search, and the duration of that search in
 /// ticks.
@@ -97,14 +85,14 @@ fn go(pair: &mut Pair<JOINTS, BASE>, gravity: [f32; 3], there: fn(&Pair<JOINTS, 
     }
 }
 
-fn interrupt(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn interrupt(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let searching = Searching::new(leg)?;
-    Ok(seeds.par_iter().map(|seed| one(head, &searching, *seed, blind)).collect())
+    Ok(seeds.par_iter().map(|seed| one(fault, &searching, *seed, blind)).collect())
 }
 
 /// Blind: the search is not interrupted and runs to its end.
-fn one(head: &Head, searching: &Searching, seed: u64, blind: bool) -> Outcome {
-    let mut random = Random::new(head.id, seed);
+fn one(fault: &Fault, searching: &Searching, seed: u64, blind: bool) -> Outcome {
+    let mut random = Random::new(fault.id, seed);
     let gravity = searching.gravity;
     let mut pair = searching.pair.clone();
     let way = random.below(10);
@@ -134,7 +122,7 @@ fn one(head: &Head, searching: &Searching, seed: u64, blind: bool) -> Outcome {
         }
     }
     let kept = pair.leg.control().model() == Some(&searching.old);
-    let mut found = outcome(head, seed, kept.then_some("old parameters stay"));
+    let mut found = outcome(fault, seed, kept.then_some("old parameters stay"));
     found.magnitude = Some(at as f64);
     if !kept {
         found.broken.push("parameters changed without an accepting verdict".into());

@@ -16,9 +16,9 @@ use scarab_identify::formats::leg_file::LegFile;
 use crate::bus::host::{NODES, Speaks};
 use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, forked, hosted};
-use crate::faults::bench::lost::{BUS_MS, LATE_NS, comes_back};
+use crate::faults::bench::lost::{LATE_NS, comes_back};
+use crate::faults::catalogue::{self, BUS_MS, Fault};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::faulty_board::PERIOD_MS;
 
 /// Timeout for cycles of less than 10 ms, ns.
@@ -29,22 +29,10 @@ const PAUSE: u64 = 380;
 const REPORT_TICKS: u64 = 40;
 const NOTHING: Speaks = Speaks { targets: false, words: false, heartbeat: 0 };
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "B5",
-        fault: "host without heartbeat falls silent",
-        detector: "cycles of SYNC, received PDOs and controlword",
-        state: "Damp",
-        deadline_ms: BUS_MS,
-        unit: "ms of the host's cycle",
-        codes: &[FaultCode::HostSilent],
-        lacking: None,
-    },
-    run,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::B5, run };
 
-fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    forked(head, leg, hosted(leg)?, seeds, |fork| one(fork, blind))
+fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    forked(fault, leg, hosted(leg)?, seeds, |fork| one(fork, blind))
 }
 
 fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {

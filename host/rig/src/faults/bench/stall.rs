@@ -23,8 +23,8 @@ use scarab_identify::formats::leg_file::LegFile;
 use crate::bus::host::{Host, NODES};
 use crate::faults::bench::hosted::{Fork, forked, started};
 use crate::faults::bench::lost::watched;
+use crate::faults::catalogue::Fault;
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 
 /// Drive state in which writing is permitted.
 const OFF: DriveState = DriveState::SwitchOnDisabled;
@@ -65,14 +65,14 @@ fn full(leg: &LegFile) -> Result<Host, ToolError> {
 }
 
 pub(super) fn stall(
-    head: &Head,
+    fault: &Fault,
     leg: &LegFile,
     seeds: &[u64],
     blind: bool,
 ) -> Result<Vec<Outcome>, ToolError> {
     let (erased, words): (Vec<u64>, Vec<u64>) = seeds.iter().partition(|seed| seed.is_multiple_of(4));
-    let mut outcomes = forked(head, leg, full(leg)?, &erased, |fork| stalled(fork, true, blind))?;
-    outcomes.extend(forked(head, leg, started(leg)?, &words, |fork| stalled(fork, false, blind))?);
+    let mut outcomes = forked(fault, leg, full(leg)?, &erased, |fork| stalled(fork, true, blind))?;
+    outcomes.extend(forked(fault, leg, started(leg)?, &words, |fork| stalled(fork, false, blind))?);
     Ok(outcomes)
 }
 

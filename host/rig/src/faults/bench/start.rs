@@ -11,10 +11,10 @@ use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::draw::{AMPERE_PER_CODE, at};
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S, Rig};
 use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
@@ -28,19 +28,7 @@ const ENABLED: u64 = PERIODS_PER_S / 2;
 /// Detectable offset of one shunt, A: 2 A of the vector, plus 10 % for calibration and low-pass.
 const SEEN_A: f64 = 1.1 * 2.0 * 0.866;
 
-pub(super) const ZEROS: Bench = Bench {
-    head: Head {
-        id: "C1",
-        fault: "current offset while the bridges are off",
-        detector: "offset limit at enabling",
-        state: "Refuse / Off",
-        deadline_ms: 10.0,
-        unit: "A",
-        codes: &[FaultCode::CurrentOffset],
-        lacking: None,
-    },
-    run: arm,
-};
+pub(super) const ZEROS: Bench = Bench { fault: &catalogue::C1_AT_ENABLING, run: arm };
 
 /// A ready machine at rest, drive off.
 pub(super) fn ready(leg: &LegFile) -> Result<Rig<JOINTS, BASE>, ToolError> {
@@ -49,17 +37,17 @@ pub(super) fn ready(leg: &LegFile) -> Result<Rig<JOINTS, BASE>, ToolError> {
     Rig::new(leg, &context, 1)
 }
 
-fn arm(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn arm(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let ready = ready(leg)?;
-    Ok(seeds.par_iter().map(|seed| one(head, leg, &ready, *seed, blind)).collect())
+    Ok(seeds.par_iter().map(|seed| one(fault, leg, &ready, *seed, blind)).collect())
 }
 
-fn one(head: &Head, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, blind: bool) -> Outcome {
+fn one(fault: &Fault, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, blind: bool) -> Outcome {
     let mut random = Random::new("C1 at rest", seed);
     let mut rig = ready.clone();
     rig.injector = Injector::new(seed);
     if blind {
-        rig.blind = head.codes;
+        rig.blind = fault.codes;
     }
     let joint = random.below(JOINTS as u64) as usize;
     let size = random.logarithmic(0.5, 6.0);
@@ -87,10 +75,10 @@ fn one(head: &Head, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, blind: 
     let refused = alarmed.is_some() && !switched;
     let after =
         alarmed.zip(enabled).map(|(alarmed, enabled)| (alarmed - enabled.min(alarmed)) as f64 * PERIOD_MS);
-    let mut found = outcome(head, seed, refused.then_some("Refuse"));
+    let mut found = outcome(fault, seed, refused.then_some("Refuse"));
     found.period = ready.period;
     found.after_ms = after.filter(|_| refused);
-    found.detected = refused && after.is_none_or(|after| after <= head.deadline_ms);
+    found.detected = refused && after.is_none_or(|after| after <= fault.deadline_ms);
     found.undetectable = !refused && size <= SEEN_A;
     found.alarm = rig.alarm().map(FaultCode::name);
     found.magnitude = Some(size);

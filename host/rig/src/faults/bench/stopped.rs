@@ -21,27 +21,15 @@ use scarab_identify::formats::leg_file::LegFile;
 use crate::board::{axis_configuration, calibration_settings, rested};
 use crate::faults::bench::start::ready;
 use crate::faults::bench::{Bench, outcome};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::draw::at;
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S, Rig};
 use scarab::model::planar::BASE;
 use scarab::model::planar::JOINTS;
 
-pub(super) const BENCH: Bench = Bench {
-    head: Head {
-        id: "X1",
-        fault: "emergency stop at boot or in a calibration",
-        detector: "sense pin in each tick",
-        state: "Off",
-        deadline_ms: PERIOD_MS,
-        unit: "",
-        codes: &[FaultCode::EmergencyStop],
-        lacking: None,
-    },
-    run: stop,
-};
+pub(super) const BENCH: Bench = Bench { fault: &catalogue::X1_EARLY, run: stop };
 
 /// Periods until the operator closes the switch, then presses the button, and until the end.
 const CLOSED: u64 = PERIODS_PER_S / 5;
@@ -50,7 +38,7 @@ const BOOTED: u64 = 3 * CLOSED;
 /// Longest calibration, periods; usually some seconds.
 const LONGEST: u64 = 60 * PERIODS_PER_S;
 
-fn stop(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn stop(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let ready = ready(leg)?;
     // Duration of an undisturbed calibration.
     let length = calibrated(leg, 0, 1, None, false)?.0;
@@ -58,16 +46,16 @@ fn stop(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Ou
         let mut random = Random::new("X1 at rest", *seed);
         // Only even seeds reach this bench; the odd ones are forks.
         if random.coin() {
-            Ok(boot(head, leg, &ready, *seed, &mut random, blind))
+            Ok(boot(fault, leg, &ready, *seed, &mut random, blind))
         } else {
-            calibration(head, leg, length, *seed, &mut random, blind)
+            calibration(fault, leg, length, *seed, &mut random, blind)
         }
     };
     seeds.par_iter().map(run).collect()
 }
 
 fn boot(
-    head: &Head,
+    fault: &Fault,
     leg: &LegFile,
     ready: &Rig<JOINTS, BASE>,
     seed: u64,
@@ -77,7 +65,7 @@ fn boot(
     let mut rig = ready.clone();
     rig.injector = Injector::new(seed);
     if blind {
-        rig.blind = head.codes;
+        rig.blind = fault.codes;
     }
     let begin = rig.period;
     // The very first tick is drawn in one of a thousand runs.
@@ -101,8 +89,8 @@ fn boot(
         came_back |= seen.is_some() && rig.is_switching();
     }
     let after = seen.map(|seen| (seen - pressed) as f64 * PERIOD_MS);
-    let mut found = outcome(head, seed, seen.filter(|_| !came_back).map(|_| "Off"));
-    found.detected &= after.is_some_and(|after| after <= head.deadline_ms + 1e-9);
+    let mut found = outcome(fault, seed, seen.filter(|_| !came_back).map(|_| "Off"));
+    found.detected &= after.is_some_and(|after| after <= fault.deadline_ms + 1e-9);
     found.after_ms = after;
     found.period = pressed;
     found.alarm = rig.alarm().map(FaultCode::name);
@@ -112,7 +100,7 @@ fn boot(
 }
 
 fn calibration(
-    head: &Head,
+    fault: &Fault,
     leg: &LegFile,
     length: u64,
     seed: u64,
@@ -124,7 +112,7 @@ fn calibration(
     let (ticks, released) = calibrated(leg, index, seed, Some(pressed), blind)?;
     // Ended in the tick of the stop, before a result.
     let stopped = released && ticks == pressed + 1;
-    let mut found = outcome(head, seed, stopped.then_some("Off"));
+    let mut found = outcome(fault, seed, stopped.then_some("Off"));
     found.after_ms = released.then(|| (ticks - pressed) as f64 * PERIOD_MS);
     found.period = pressed;
     found.alarm = released.then(|| FaultCode::EmergencyStop.name());

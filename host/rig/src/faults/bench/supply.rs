@@ -27,9 +27,9 @@ use crate::bus::board::{Board, Label};
 use crate::bus::host::{Host, NODES};
 use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, context, forked_within};
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
-use crate::faults::scenario::Head;
 use crate::kept_file::memory::Memory;
 
 /// Servo ticks per second, and per millisecond.
@@ -44,8 +44,6 @@ const ABSOLUTE_A: f64 = 0.2;
 const NEW_SHARE: f64 = 1.0 / 8.0;
 /// Time for which a current may exceed its limit unseen, servo ticks.
 const UNSEEN: u64 = 20 * MILLISECOND;
-/// Longest time above 1.25 times the limit, ms: 0.2 s, and the low-pass.
-const DEADLINE_MS: f64 = 210.0;
 const FAULT_FACTOR: f64 = 1.25;
 /// Servo ticks after a fault within which shorted motors return nothing.
 const SHORTED: u64 = 10 * MILLISECOND;
@@ -54,33 +52,9 @@ const BATTERY_A: f64 = 500.0;
 /// Object of the following window, which no push may leave.
 const WINDOW: u16 = 0x6065;
 
-pub(super) const DRAW: Bench = Bench {
-    head: Head {
-        id: "V4",
-        fault: "supply drawn from beyond its limit",
-        detector: "current from the axes' powers: share of the torque; 1.25 times the limit for 0.2 s",
-        state: "Limit, Damp",
-        deadline_ms: DEADLINE_MS,
-        unit: "A",
-        codes: &[FaultCode::SupplyCurrent],
-        lacking: Some("current of logic, gate drivers and calibration"),
-    },
-    run,
-};
+pub(super) const DRAW: Bench = Bench { fault: &catalogue::V4, run };
 
-pub(super) const CHARGE: Bench = Bench {
-    head: Head {
-        id: "V5",
-        fault: "battery charged beyond its limit",
-        detector: "current from the axes' powers: brake resistor, share of the torque; 1.25 times the limit for 0.2 s",
-        state: "Limit, Short",
-        deadline_ms: DEADLINE_MS,
-        unit: "A",
-        codes: &[FaultCode::ChargeCurrent],
-        lacking: Some("a brake resistor that is built in but absent or broken"),
-    },
-    run,
-};
+pub(super) const CHARGE: Bench = Bench { fault: &catalogue::V5, run };
 
 /// The leg on a battery, with random motors, cables and voltage.
 fn random_leg(leg: &LegFile, number: u64) -> LegFile {
@@ -99,7 +73,7 @@ fn random_leg(leg: &LegFile, number: u64) -> LegFile {
     leg
 }
 
-fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let mut outcomes = Vec::with_capacity(seeds.len());
     for number in 0..LEGS {
         let own: Vec<u64> = seeds.iter().copied().filter(|seed| seed % LEGS == number).collect();
@@ -116,7 +90,7 @@ fn run(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
         // A strong push moves a joint beyond its range.
         let scope = Scope { torque: true, range: false, rotor_position: true };
         let brake = Ohm(leg.supply.brake_ohm as f32);
-        outcomes.extend(forked_within(head, &leg, base, &own, scope, |fork| one(fork, brake, blind))?);
+        outcomes.extend(forked_within(fault, &leg, base, &own, scope, |fork| one(fork, brake, blind))?);
     }
     outcomes.sort_by_key(|outcome| outcome.seed);
     Ok(outcomes)
@@ -135,19 +109,24 @@ fn reacts(fork: &mut Fork<'_>, charges: bool) -> bool {
     if charges { charge < 1.0 || board.signals.given_brake() > 0.0 } else { draw < 1.0 }
 }
 
-fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError> {
-    let charges = fork.head.id == CHARGE.head.id;
+/// States a drawn limit of the battery's current, A, in one direction. In that of V5 half of the legs have
+/// no brake resistor.
+fn set_limit(fork: &mut Fork<'_>, charges: bool, brake: Ohm, blind: bool) -> f64 {
     let limit = if charges { fork.random.logarithmic(0.5, 3.0) } else { fork.random.logarithmic(0.5, 8.0) };
     let stated = Some(Ampere(limit as f32)).filter(|_| !blind);
     let limits = match charges {
         true => SupplyLimits { draw: None, charge: stated, brake },
         false => SupplyLimits { draw: stated, charge: None, brake },
     };
-    let board = &mut fork.host.rig().board;
-    board.limit_supply(limits);
+    fork.host.rig().board.limit_supply(limits);
     if charges && fork.random.coin() {
         fork.host.rig().board.loops.remove_chopper();
     }
+    limit
+}
+
+/// Pushes every joint once. Returns the longest duration, s.
+fn push_joints(fork: &mut Fork<'_>, charges: bool) -> f64 {
     let mut longest_push: f64 = 0.0;
     for joint in 0..JOINTS {
         let (peak, seconds) = match charges {
@@ -158,6 +137,13 @@ fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError
         fork.host.rig().world.push(joint, peak, seconds);
         longest_push = longest_push.max(seconds);
     }
+    longest_push
+}
+
+fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError> {
+    let charges = fork.fault.id == CHARGE.fault.id;
+    let limit = set_limit(&mut fork, charges, brake, blind);
+    let longest_push = push_joints(&mut fork, charges);
     let sign = if charges { -1.0 } else { 1.0 };
     let (above, below) = (1.0 + RELATIVE, 1.0 - RELATIVE);
     let (mut current, mut before, mut most) = (0.0, delivered(&mut fork), 0.0_f64);
@@ -184,7 +170,7 @@ fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError
         }
     }
     let alarm = fork.host.rig().alarm();
-    let own = alarm == fork.head.codes.first().copied();
+    let own = alarm == fork.fault.codes.first().copied();
     if own && charges {
         fork.run(SHORTED);
         let start = delivered(&mut fork);
@@ -201,7 +187,7 @@ fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError
         (false, _) => seen.then_some("Limit"),
     };
     let after_ms = longest as f64 / MILLISECOND as f64;
-    let in_time = seen && !unseen && after_ms <= DEADLINE_MS;
+    let in_time = seen && !unseen && after_ms <= fork.fault.deadline_ms;
     let code = alarm.filter(|_| own).map(FaultCode::name);
     let found = fork.ended(state, code);
     Ok(Outcome {

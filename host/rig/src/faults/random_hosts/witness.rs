@@ -66,6 +66,11 @@ const fn asks_for_a_step(mode: i8, index: u16) -> bool {
     }
 }
 
+/// The joint that a step means, or all.
+fn meant(joint: usize) -> impl Iterator<Item = usize> {
+    (0..JOINTS).filter(move |place| joint == JOINTS || *place == joint)
+}
+
 /// Limits of a joint.
 #[derive(Clone, Copy, Debug)]
 pub struct JointBounds {
@@ -264,7 +269,7 @@ impl<L: HostedLeg> Play<L> {
         }
         for joint in 0..JOINTS {
             let JointBounds { range: [low, high], cap } = self.bounds[joint];
-            let (before, now) = (torque[joint], seen.torque[joint]);
+            let (before, now, position) = (torque[joint], seen.torque[joint], seen.position[joint]);
             if now.abs() > L::OVERSHOOT * cap {
                 return Err(format!("cap: joint {joint} {now} of {cap} N m"));
             }
@@ -277,9 +282,9 @@ impl<L: HostedLeg> Play<L> {
             if is_fresh {
                 self.slows[joint] = f32::INFINITY;
             }
-            let out = (low - seen.position[joint]).max(seen.position[joint] - high);
+            let out = (low - position).max(position - high);
             if out > BEYOND {
-                return Err(format!("range: joint {joint} at {} rad", seen.position[joint]));
+                return Err(format!("range: joint {joint} at {position} rad"));
             }
             let (speed, returns) = (seen.speed[joint], seen.returns[joint]);
             let is_held = !self.targets && !seen.moves_itself && !returns;
@@ -291,14 +296,10 @@ impl<L: HostedLeg> Play<L> {
                 *since = ticks;
             }
             if ticks < *since + COMES_TO_REST {
-                *from = seen.position[joint];
-            } else if (seen.position[joint] - *from).abs() > HELD {
-                return Err(format!(
-                    "targets: joint {joint} went from {from} to {} rad",
-                    seen.position[joint]
-                ));
+                *from = position;
+            } else if (position - *from).abs() > HELD {
+                return Err(format!("targets: joint {joint} went from {from} to {position} rad"));
             }
-            let steps = (now - before).abs() > 0.1 * cap;
             // A joint that returns has less torque.
             let returned = core::mem::replace(&mut self.returns[joint], returns);
             // A monitor that acts or ends takes torque away, and so does a stop of a driven joint.
@@ -310,7 +311,7 @@ impl<L: HostedLeg> Play<L> {
                 || returned != returns
                 || is_less
                 || is_fresh;
-            if steps && !explained {
+            if (now - before).abs() > 0.1 * cap && !explained {
                 return Err(format!("steps: joint {joint} from {before} to {now} N m"));
             }
             self.slows[joint] = self.slows[joint].min(speed.abs());
@@ -354,7 +355,7 @@ impl<L: HostedLeg> Play<L> {
     }
 
     fn word(&mut self, joint: usize, word: u16) -> Result<(), String> {
-        (0..JOINTS).filter(|place| joint == JOINTS || *place == joint).try_for_each(|joint| {
+        meant(joint).try_for_each(|joint| {
             if word & 0x110 != 0 {
                 self.aim();
             }
@@ -478,19 +479,12 @@ impl<L: HostedLeg> Play<L> {
                 self.word(JOINTS, word)?;
                 self.run(8)
             }),
-            Step::Mode(joint, mode) => {
-                (0..JOINTS).filter(|place| joint == JOINTS || *place == joint).try_for_each(|joint| {
-                    self.modes[joint] = mode;
-                    self.explain_pending(joint..joint + 1);
-                    self.write(joint, (0x6060, 0, 1), i32::from(mode))
-                })
-            }
-            Step::Near(joint, by) => {
-                let Some(place) = self.read(joint, 0x6064)? else { return Ok(()) };
-                self.aim();
-                self.expect(joint, 0x607A);
-                self.write(joint, (0x607A, 0, 4), place.wrapping_add(by))
-            }
+            Step::Mode(joint, mode) => meant(joint).try_for_each(|joint| {
+                self.modes[joint] = mode;
+                self.explain_pending(joint..joint + 1);
+                self.write(joint, (0x6060, 0, 1), i32::from(mode))
+            }),
+            Step::Near(joint, by) => self.near(joint, by),
             Step::Home(joint, offset) => self.home(joint, offset),
             Step::Pdo(joint, number, bytes) => {
                 self.pdo(joint, number, &bytes);
@@ -500,15 +494,7 @@ impl<L: HostedLeg> Play<L> {
             Step::Map(joint, number, objects) => self.map(joint, number, objects),
             Step::Cycle(words, count, apart) => self.cycle(words, count, apart),
             Step::Sync(count, apart) => self.sync(count, apart),
-            Step::Nmt(command, node) => {
-                // A node that resets or stops says nothing of an earlier fault.
-                self.unheard = None;
-                if command == 129 {
-                    self.expect_defaults();
-                }
-                self.send(0, &[command, node]);
-                self.run(8)
-            }
+            Step::Nmt(command, node) => self.nmt(command, node),
             Step::Lss(service, byte) => {
                 self.send(0x7E5, &[service, byte, 0, 0, 0, 0, 0, 0]);
                 self.run(8)
@@ -535,6 +521,24 @@ impl<L: HostedLeg> Play<L> {
                 self.words()
             }
         }
+    }
+
+    /// Commands a joint to a place so far from its present one.
+    fn near(&mut self, joint: usize, by: i32) -> Result<(), String> {
+        let Some(place) = self.read(joint, 0x6064)? else { return Ok(()) };
+        self.aim();
+        self.expect(joint, 0x607A);
+        self.write(joint, (0x607A, 0, 4), place.wrapping_add(by))
+    }
+
+    fn nmt(&mut self, command: u8, node: u8) -> Result<(), String> {
+        // A node that resets or stops says nothing of an earlier fault.
+        self.unheard = None;
+        if command == 129 {
+            self.expect_defaults();
+        }
+        self.send(0, &[command, node]);
+        self.run(8)
     }
 
     /// Writes a controlword of 0; once it is confirmed, the leg is off.

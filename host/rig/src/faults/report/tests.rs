@@ -4,7 +4,7 @@ use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 
 use crate::faults::bounds::bounds;
-use crate::faults::catalogue::rows;
+use crate::faults::forks::rows;
 use crate::faults::report::{JUDGED, names};
 use crate::faults::scenario::{Event, Expected};
 
@@ -13,14 +13,14 @@ fn only_rows_with_harmless_runs_judge_false_alarms() {
     let bounds = bounds(&LegFile::load(DEFAULT_LEG).expect("shipped")).expect("complete drives");
     for row in rows() {
         let harmless = (1..=64).any(|seed| {
-            let scenario = (row.draw)(&mut Random::new(row.id, seed), &bounds);
+            let scenario = (row.draw)(&mut Random::new(row.fault.id, seed), &bounds);
             matches!(scenario.expected, Expected::Kept | Expected::Rejected | Expected::Ignored)
                 || matches!(
                     scenario.event,
                     Event::Kick(..) | Event::Push(..) | Event::Hold(..) | Event::Touch(_)
                 )
         });
-        assert_eq!(harmless, JUDGED.contains(&row.id), "{}", row.id);
+        assert_eq!(harmless, JUDGED.contains(&row.fault.id), "{}", row.fault.id);
     }
 }
 

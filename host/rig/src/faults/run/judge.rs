@@ -3,7 +3,6 @@
 use scarab::safety::{DriveState, FaultCode};
 
 use crate::faults::aftermath::leads_to;
-use crate::faults::entry::instead;
 use crate::faults::run::Watched;
 use crate::faults::scenario::{Event, Expected};
 
@@ -13,7 +12,7 @@ impl<const B: usize> Watched<'_, B> {
         if self.scenario.expected == Expected::Damped {
             return state == "Damp";
         }
-        self.row.state.contains(state) || instead(self.row.id).is_some_and(|to| to.contains(state))
+        self.row.fault.leads_to(|to| to.contains(state))
     }
 
     /// Returns whether the run contains only an external push and no broken part.

@@ -26,15 +26,15 @@ impl<const B: usize> Watched<'_, B> {
             longest = longest.max(beyond);
         }
         let alarm = self.rig.alarm();
-        let known = alarm.is_none_or(|code| self.row.codes.contains(&code));
+        let known = alarm.is_none_or(|code| self.row.fault.codes.contains(&code));
         let state = if damped { Some("Damp") } else { limited.then_some("Limit") };
-        let timed = self.row.deadline_ms.is_finite() && state.is_some();
+        let timed = self.row.fault.deadline_ms.is_finite() && state.is_some();
         let after_ms = timed.then_some(longest as f64 * PERIOD_MS);
         let in_time = after_ms.is_none_or(|after| after <= self.deadline_ms());
         let intermittent_ms = self.intermittent_ms();
         let broken = self.invariants.into_broken();
         Outcome {
-            fault: self.row.id,
+            fault: self.row.fault.id,
             seed: self.seed,
             period: self.begun,
             detected: state.is_some() && broken.is_empty() && known && in_time,
@@ -65,7 +65,7 @@ impl<const B: usize> Watched<'_, B> {
         let alarm = self.rig.alarm();
         let ignored = alarm.is_none() && self.rig.hash == twin.hash && self.rig.counts() == twin.counts();
         Outcome {
-            fault: self.row.id,
+            fault: self.row.fault.id,
             seed: self.seed,
             period: self.begun,
             detected: false,

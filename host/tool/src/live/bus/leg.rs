@@ -334,10 +334,8 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         let named = |joint: usize, words: &str| format!("{}: {words}", joints[joint].name);
         let now_s = self.picture.time_s;
         let is_heard = |node: &Node| !bus.has_ended && node.heard_s().is_some_and(|at| now_s - at < SILENT_S);
-        let states: [Option<JointState>; N] = core::array::from_fn(|joint| {
-            let node = &self.nodes[joint];
-            let word = node.raw(STATUSWORD, 0).filter(|_| is_heard(node))?;
-            JointState::of(word as u16)
+        let states = self.nodes.each_ref().map(|node| {
+            node.raw(STATUSWORD, 0).filter(|_| is_heard(node)).and_then(|word| JointState::of(word as u16))
         });
         let is_same = states.iter().all(|state| *state == states[0]);
         let name = |state: Option<JointState>| state.map_or("unknown", JointState::name);
@@ -350,13 +348,6 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         let is_enabled = lowest.is_some_and(JointState::is_enabled);
         let silent: Vec<String> =
             self.nodes.iter().filter(|node| !is_heard(node)).map(|node| node.id().to_string()).collect();
-        let number = |sub| {
-            let node = &self.nodes[0];
-            let is_present = node.time_s(IDENTIFICATION, sub).is_some_and(|at| now_s - at < STALE_S);
-            node.raw(IDENTIFICATION, sub).filter(|_| is_present)
-        };
-        let modes: Vec<Option<i32>> =
-            self.nodes.iter().map(|node| node.signed(node.newest(&MODE)?)).collect();
         let (doing, waits_for) = match lowest {
             _ if bus.has_ended => ("is unknown: the source has ended".into(), "nothing"),
             _ if !silent.is_empty() => {
@@ -368,7 +359,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
                 "is unknown: no statusword (6041) of every joint".into(),
                 "a PDO with it, or a host that reads it",
             ),
-            Some(_) if is_enabled => (doing(number(2), number(3), &modes), "commands of its host"),
+            Some(_) if is_enabled => (self.activity(), "commands of its host"),
             Some(state) => ("is off".into(), state.waits_for()),
         };
         let has_fault = states.iter().flatten().any(|state| state.has_fault());
@@ -397,6 +388,16 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             processor: String::new(),
             bus: bus.load.to_owned(),
         }
+    }
+
+    /// What the enabled leg does, in words.
+    fn activity(&self) -> String {
+        let present = |sub| {
+            let at_s = self.nodes[0].time_s(IDENTIFICATION, sub)?;
+            self.nodes[0].raw(IDENTIFICATION, sub).filter(|_| self.picture.time_s - at_s < STALE_S)
+        };
+        let modes = self.nodes.each_ref().map(|node| node.signed(node.newest(&MODE)?));
+        doing(present(2), present(3), &modes)
     }
 
     /// Reasons in the inputs (60FD) why the leg cannot be enabled.

@@ -35,9 +35,8 @@ fn style(joint: usize) -> (ShapeStyle, ShapeStyle) {
     (line(pale, 18), line(full, 5))
 }
 
-/// Draws all motions, two side by side.
-pub fn whole(area: &Area<'_>, joints: &[&str], motions: &[MotionSeries]) -> Result<(), DrawingError> {
-    let with_commands = commanded(motions);
+/// Draws title and legend.
+fn head(area: &Area<'_>, joints: &[&str], with_commands: bool) -> Result<(), DrawingError> {
     let title =
         if with_commands { "Angles: commanded and measured, deviation below" } else { "Measured angles" };
     text(area, (12, 14), 13, HPos::Left, title)?;
@@ -51,7 +50,13 @@ pub fn whole(area: &Area<'_>, joints: &[&str], motions: &[MotionSeries]) -> Resu
         }
         entries.push((measurement.as_str(), Key::Curve(full)));
     }
-    legend(area, (LEFT, 35), &entries)?;
+    legend(area, (LEFT, 35), &entries)
+}
+
+/// Draws all motions, two side by side.
+pub fn whole(area: &Area<'_>, joints: &[&str], motions: &[MotionSeries]) -> Result<(), DrawingError> {
+    let with_commands = commanded(motions);
+    head(area, joints, with_commands)?;
     let (_, cells) = area.split_vertically(px(HEAD));
     let all = || motions.iter().flat_map(|motion| &motion.joints);
     let angles = range(all().flat_map(|curves| curves.measured_deg.iter().chain(&curves.commanded_deg)));

@@ -6,6 +6,7 @@ use scarab_base::table::{Table, cells};
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::{ComparisonReport, RunReport};
 
+use crate::view::html::table::ToHtml;
 use crate::view::html::{exact, joint_name, measured, number, sigma, signed};
 
 /// Terms of each joint's model, with identified Stribeck and directional friction.

@@ -6,6 +6,7 @@ use scarab_base::precision;
 use scarab_base::table::{Table, cells};
 use scarab_client::report::{CommissionReport, ParameterRead};
 
+use crate::view::html::table::ToHtml;
 use crate::view::html::{page_head, parameters, time_utc};
 
 /// Value with some decimal places, or a dash. A number that rounds to zero has no sign.

@@ -4,6 +4,7 @@ use maud::{DOCTYPE, html};
 use scarab_base::table::Table;
 
 use crate::view::figures::Figure;
+use crate::view::html::table::ToHtml;
 use crate::view::html::{Circumstances, drawing, page_head};
 
 /// Results of a campaign.

@@ -11,6 +11,7 @@ use scarab_identify::report::RunReport;
 use serde_json::{Map, Value};
 
 use crate::view::html::number;
+use crate::view::html::table::{ToHtml, html_cell};
 
 /// Keys with their own sections on the page.
 const KNOWN: [&str; 39] = [
@@ -101,7 +102,8 @@ pub fn content(value: &Value, depth: usize) -> Markup {
         Value::Array(items) if depth < DEEPEST && items.iter().any(Value::is_object) => rows(items, depth),
         Value::Object(keys) if depth < DEEPEST => {
             let mut table = Table::of_class("any").label("").text([""]);
-            keys.iter().for_each(|(key, value)| table.row(cells![words(key), content(value, depth + 1)]));
+            keys.iter()
+                .for_each(|(key, value)| table.row(cells![words(key), html_cell(content(value, depth + 1))]));
             table.to_html()
         }
         Value::Object(_) => html! { (value.to_string()) },
@@ -135,7 +137,7 @@ fn rows(items: &[Value], depth: usize) -> Markup {
         false => table.text([words(column)]),
     });
     for item in items {
-        let cell = |column: &&str| content(item.get(*column).unwrap_or(&Value::Null), depth + 1);
+        let cell = |column: &&str| html_cell(content(item.get(*column).unwrap_or(&Value::Null), depth + 1));
         table.row(columns.iter().map(cell));
     }
     table.to_html()

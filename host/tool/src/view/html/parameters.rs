@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::{ParameterReport, RunReport};
 
+use crate::view::html::table::ToHtml;
 use crate::view::html::{measured, sigma};
 use crate::view::tables;
 

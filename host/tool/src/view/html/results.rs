@@ -6,6 +6,7 @@ use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::series::Role;
 use scarab_identify::report::{FitReport, RunReport, Source, scale};
 
+use crate::view::html::table::ToHtml;
 use crate::view::html::{joint_name, number};
 use crate::view::tables;
 

@@ -10,6 +10,7 @@ use scarab_identify::report::RunReport;
 use scarab_identify::report::findings::FindingReport;
 
 use crate::view::figures::Figure;
+use crate::view::html::table::ToHtml;
 use crate::view::html::{
     Circumstances, count, drawing, head, joint_name, measured, number, page_head, sigma, signed, verdict,
 };

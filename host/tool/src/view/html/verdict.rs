@@ -7,6 +7,7 @@ use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::RunReport;
 use scarab_identify::report::findings::{FindingReport, untested_lengths};
 
+use crate::view::html::table::ToHtml;
 use crate::view::html::{count, exact, joint_name, number};
 use crate::view::tables;
 

@@ -85,40 +85,17 @@ pub(super) fn current<const N: usize, const B: usize>(
     let ratios = format!("torque is {} of the prior's (joints in order)", ratios.join(", "));
     let stated: Option<Vec<f64>> =
         import.drives.iter().map(|drive| drive.torque_per_ampere.map(f64::abs)).collect();
-    let in_unit = |unit: &Unit| scales.iter().map(|scale| scale.ratio * unit.factor()).collect::<Vec<_>>();
-    let mut units = Unit::of(Quantity::Current);
     let (unit, words) = match stated {
-        Some(constants) => {
-            // All are near 1, and one is nearer than as a torque in N m or mN m.
-            let explains = |unit: &Unit| {
-                let after =
-                    in_unit(unit).into_iter().zip(&constants).map(|(ratio, constant)| ratio * constant);
-                let after: Vec<f64> = after.map(|ratio| ratio.ln().abs()).collect();
-                let is_no_torque = |torque: Unit| {
-                    let before = scales.iter().map(|scale| (scale.ratio * torque.factor()).ln().abs());
-                    before.zip(&after).any(|(before, after)| before > after + NEARER.ln())
-                };
-                after.iter().all(|after| *after < PRIOR_ERROR.ln())
-                    && Unit::of(Quantity::Torque).all(is_no_torque)
-            };
-            let unit = units.find(explains)?;
-            (unit, format!("{ratios}, and `torque_per_ampere` of the leg file explains it: is it a current?"))
-        }
+        Some(constants) => (
+            explained_unit(&scales, &constants)?,
+            format!("{ratios}, and `torque_per_ampere` of the leg file explains it: is it a current?"),
+        ),
         None => {
-            let is_small = |unit: &Unit| in_unit(unit).iter().all(|ratio| *ratio < CURRENT_RATIO);
-            let is_large = |unit: &Unit| {
-                let ratios = in_unit(unit);
-                scales.iter().all(|scale| scale.ratio > 1.0 / CURRENT_RATIO)
-                    && ratios.iter().all(|ratio| *ratio < 1.0)
-                    && ratios.iter().any(|ratio| *ratio < CURRENT_RATIO)
-            };
-            let unit =
-                units.find(|unit| if unit.factor() == 1.0 { is_small(unit) } else { is_large(unit) })?;
-            let constants: Vec<String> =
-                in_unit(&unit).iter().map(|ratio| format!("{:.2}", 1.0 / ratio)).collect();
+            let unit = fitting_unit(&scales)?;
+            let constants = scales.iter().map(|scale| format!("{:.2}", 1.0 / (scale.ratio * unit.factor())));
             let words = format!(
                 "{ratios}, in its shape: is it a current? Then state each joint's `torque_per_ampere` (by the prior about {})",
-                constants.join(", ")
+                constants.collect::<Vec<_>>().join(", ")
             );
             (unit, words)
         }
@@ -140,6 +117,34 @@ pub(super) fn current<const N: usize, const B: usize>(
         sigma: Number::UNKNOWN,
         words: format!("{words}; read it so by {}", options(&changed)),
         reads: angles.into_iter().collect(),
+    })
+}
+
+/// Unit of a current that the stated torque constants explain: with them all ratios are near 1, and one is
+/// nearer than as a torque in N m or mN m.
+fn explained_unit(scales: &[Scale], constants: &[f64]) -> Option<Unit> {
+    Unit::of(Quantity::Current).find(|unit| {
+        let ratios =
+            scales.iter().zip(constants).map(|(scale, constant)| scale.ratio * unit.factor() * constant);
+        let after: Vec<f64> = ratios.map(|ratio| ratio.ln().abs()).collect();
+        let is_no_torque = |torque: Unit| {
+            let before = scales.iter().map(|scale| (scale.ratio * torque.factor()).ln().abs());
+            before.zip(&after).any(|(before, after)| before > after + NEARER.ln())
+        };
+        after.iter().all(|after| *after < PRIOR_ERROR.ln()) && Unit::of(Quantity::Torque).all(is_no_torque)
+    })
+}
+
+/// Unit of a current with unknown torque constants, by the size of the ratios.
+fn fitting_unit(scales: &[Scale]) -> Option<Unit> {
+    Unit::of(Quantity::Current).find(|unit| {
+        let mut ratios = scales.iter().map(|scale| scale.ratio * unit.factor());
+        if unit.factor() == 1.0 {
+            return ratios.all(|ratio| ratio < CURRENT_RATIO);
+        }
+        scales.iter().all(|scale| scale.ratio > 1.0 / CURRENT_RATIO)
+            && ratios.clone().all(|ratio| ratio < 1.0)
+            && ratios.any(|ratio| ratio < CURRENT_RATIO)
     })
 }
 

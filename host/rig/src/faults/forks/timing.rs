@@ -1,43 +1,19 @@
 //! Late and missing ticks.
 
 use hal_sim::faults::{Channel, Form, Timing};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
 use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
-use crate::faulty_board::PERIOD_MS;
 use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 2] = [LATE, HUNG];
 
-const LATE: Row = Row {
-    id: "K1",
-    fault: "current ticks or the servo late or missed",
-    detector: "time between ticks; the servo's counter",
-    state: "Damp",
-    codes: &[FaultCode::CurrentTicks, FaultCode::ServoTicks],
-    deadline_ms: 1.0,
-    unit: "",
-    lacking: Some(
-        "a servo that does not answer cannot damp, nor an axis that misses three ticks at once: Off",
-    ),
-    draw: late_ticks,
-};
+const LATE: Row = Row { fault: &catalogue::K1, draw: late_ticks };
 
-const HUNG: Row = Row {
-    id: "K3",
-    fault: "a current loop or both, the servo or the housekeeping hangs",
-    detector: "watchdog, fed only if all of them ran since",
-    state: "reset, boots Refuse with the reason",
-    codes: &[FaultCode::Watchdog],
-    // 4 ms until the next check, and 512 cycles of an oscillator of 17 kHz.
-    deadline_ms: 4.0 + 512.0 / 17.0 + PERIOD_MS,
-    unit: "",
-    lacking: Some("a hang of the task that feeds the watchdog: also detected, but not run here"),
-    draw: hang,
-};
+const HUNG: Row = Row { fault: &catalogue::K3, draw: hang };
 
 /// K3: hang of any level that checks in, or of both current loops, at any tick; the others continue.
 fn hang(random: &mut Random, _: &Bounds) -> Scenario {

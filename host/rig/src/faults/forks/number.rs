@@ -1,26 +1,15 @@
 //! Values that are not finite.
 
 use hal_sim::faults::{Channel, Form, Timing};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
 use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
-use crate::faulty_board::PERIOD_MS;
 use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
-pub static ROWS: [Row; 1] = [Row {
-    id: "N1",
-    fault: "NaN or infinity in a sample, a target or the modulation",
-    detector: "checks at the inputs of servo and axis",
-    state: "Off",
-    codes: &[FaultCode::NotFinite],
-    deadline_ms: PERIOD_MS,
-    unit: "",
-    lacking: Some("cost of the search, which no port reaches (I1)"),
-    draw: not_finite,
-}];
+pub static ROWS: [Row; 1] = [Row { fault: &catalogue::N1, draw: not_finite }];
 
 /// N1: NaN or infinity between axis and servo in either direction, or in the values of an axis' modulation.
 fn not_finite(random: &mut Random, _: &Bounds) -> Scenario {

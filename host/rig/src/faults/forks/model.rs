@@ -4,9 +4,9 @@
 //! the whole deadline proves nothing.
 
 use hal_sim::faults::{Channel, Form, Timing};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{AMPERE_PER_CODE, at, one};
 use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
@@ -14,46 +14,9 @@ use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 3] = [
-    Row {
-        id: "E1",
-        fault: "encoder frozen while moving",
-        detector: "back-EMF against counts, or counts that stop within a period, 8 ms",
-        state: "Short",
-        codes: &[FaultCode::EncoderFrozen],
-        deadline_ms: 20.0,
-        unit: "",
-        lacking: Some("at rest, or so slow that dead time and resistance hide the back-EMF"),
-        draw: frozen,
-    },
-    Row {
-        id: "C1",
-        fault: "current offset drifts",
-        detector: "mean of the residual over an electrical turn",
-        state: "Refuse / Off",
-        codes: &[FaultCode::CurrentOffset, FaultCode::OpenPhase, FaultCode::Overcurrent],
-        deadline_ms: 50.0,
-        unit: "A",
-        lacking: Some("small offsets while the joint moves; below 2 A of the vector at enabling"),
-        draw: drift,
-    },
-    Row {
-        id: "P1",
-        fault: "one phase open",
-        detector: "voltage without current, 8 ms",
-        state: "Off",
-        codes: &[
-            FaultCode::OpenPhase,
-            FaultCode::CurrentOffset,
-            FaultCode::EncoderFrozen,
-            FaultCode::Overcurrent,
-        ],
-        // Half an electrical turn at 0.2 rad/s takes 45 ms; a phase has hardly any current in a part of it.
-        // The detection takes 8 ms more.
-        deadline_ms: 55.0,
-        unit: "",
-        lacking: Some("without a current target"),
-        draw: open_phase,
-    },
+    Row { fault: &catalogue::E1, draw: frozen },
+    Row { fault: &catalogue::C1, draw: drift },
+    Row { fault: &catalogue::P1, draw: open_phase },
 ];
 
 /// Time within which a joint must turn, and for which it must keep turning.

@@ -1,9 +1,9 @@
 //! Shunts, their conversions, gate drivers, phases.
 
 use hal_sim::faults::{Channel, Form, Timing};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{AMPERE_PER_CODE, at, now_and_then, one};
 use crate::faults::scenario::{Bounds, Expected, Onset, Row, Scenario};
 use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S};
@@ -11,40 +11,9 @@ use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
 pub static ROWS: [Row; 3] = [
-    Row {
-        id: "C2",
-        fault: "shunt amplifier or converter at its rail",
-        detector: "code near the rails twice",
-        state: "Off",
-        codes: &[FaultCode::CurrentSense],
-        deadline_ms: 2.0 * PERIOD_MS,
-        unit: "",
-        lacking: None,
-        draw: rail,
-    },
-    Row {
-        id: "C3",
-        fault: "conversion stuck or missing",
-        detector: "constant code while the requested current changes; end-of-conversion flags of shunts and supply",
-        state: "Off",
-        codes: &[FaultCode::Conversion, FaultCode::StuckConversion, FaultCode::CurrentOffset],
-        // Limit for a stuck conversion; a missing one is detected in its own tick.
-        deadline_ms: 4.0 * PERIOD_MS,
-        unit: "",
-        lacking: None,
-        draw: conversion,
-    },
-    Row {
-        id: "C4",
-        fault: "overcurrent, gate driver's fault",
-        detector: "length of the current vector; pin",
-        state: "Off",
-        codes: &[FaultCode::Overcurrent, FaultCode::GateFault],
-        deadline_ms: PERIOD_MS,
-        unit: "A",
-        lacking: None,
-        draw: overcurrent,
-    },
+    Row { fault: &catalogue::C2, draw: rail },
+    Row { fault: &catalogue::C3, draw: conversion },
+    Row { fault: &catalogue::C4, draw: overcurrent },
 ];
 
 /// C2: a code at a rail of amplifier or converter.

@@ -1,27 +1,17 @@
 //! Values changed by bit flips in memory.
 
 use scarab::motor::Axis;
-use scarab::safety::FaultCode;
 use scarab::servo::Servo;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::beside;
 use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
-pub static ROWS: [Row; 1] = [Row {
-    id: "M2",
-    fault: "a bit flips in gains or limits of an axis or the servo",
-    detector: "checksum over them, every 64 ms",
-    state: "Damp",
-    codes: &[FaultCode::Parameters],
-    deadline_ms: 100.0,
-    unit: "",
-    lacking: Some("motions, models and filters, which the checksum does not cover"),
-    draw: upset,
-}];
+pub static ROWS: [Row; 1] = [Row { fault: &catalogue::M2, draw: upset }];
 
 /// M2: any bit of any of the accessible values.
 fn upset(random: &mut Random, _: &Bounds) -> Scenario {

@@ -2,39 +2,17 @@
 
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
 use crate::faults::scenario::{Bounds, Expected, Row, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
-pub static ROWS: [Row; 2] = [
-    Row {
-        id: "P2",
-        fault: "gate driver lost its configuration",
-        detector: "registers read back every 8 ms",
-        state: "Off",
-        codes: &[FaultCode::GateConfiguration],
-        deadline_ms: 10.0,
-        unit: "",
-        lacking: Some("registers that change and recover between two checks"),
-        draw: registers,
-    },
-    Row {
-        id: "T1",
-        fault: "overtemperature, thermistor open or short",
-        detector: "temperature and range of the thermistor every 50 ms",
-        state: "Limit, Damp",
-        codes: &[FaultCode::Temperature, FaultCode::Thermistor],
-        deadline_ms: 100.0,
-        unit: "degrees",
-        lacking: Some("a thermistor that is stuck within its range"),
-        draw: temperature,
-    },
-];
+pub static ROWS: [Row; 2] =
+    [Row { fault: &catalogue::P2, draw: registers }, Row { fault: &catalogue::T1, draw: temperature }];
 
 /// P2: changed registers.
 fn registers(random: &mut Random, _: &Bounds) -> Scenario {

@@ -1,40 +1,17 @@
 //! Encoder counters and index.
 
 use hal_sim::faults::{Channel, Form, Injection, Timing};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
 use crate::faults::scenario::{Bounds, Expected, Onset, Row, Scenario};
-use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S};
+use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
-pub static ROWS: [Row; 2] = [
-    Row {
-        id: "E2",
-        fault: "wrong reading of an encoder, one or three in 10 ms",
-        detector: "largest step per tick: the previous duties stay; three in 10 ms in the servo",
-        state: "Limit, Damp",
-        codes: &[FaultCode::EncoderStep],
-        // Limit: the servo's next tick.
-        deadline_ms: 7.0 * PERIOD_MS,
-        unit: "counts",
-        lacking: None,
-        draw: glitch,
-    },
-    Row {
-        id: "E4",
-        fault: "lost counts, missing index; a single wrong index pulse is no fault",
-        detector: "two index pulses at one wrong position, two turns without a right one; largest step",
-        state: "Damp",
-        codes: &[FaultCode::EncoderPosition],
-        deadline_ms: f64::INFINITY,
-        unit: "counts",
-        lacking: Some("braked (Short) instead of damped, since the rotor's angle is lost with the counts"),
-        draw: lost_counts,
-    },
-];
+pub static ROWS: [Row; 2] =
+    [Row { fault: &catalogue::E2, draw: glitch }, Row { fault: &catalogue::E4, draw: lost_counts }];
 
 /// E2: one wrong counter reading, or three in 10 ms.
 fn glitch(random: &mut Random, bounds: &Bounds) -> Scenario {

@@ -1,39 +1,17 @@
 //! Joints at their limits.
 
 use hal_sim::faults::{Channel, Form, Timing};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{at, beside, one};
 use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
-pub static ROWS: [Row; 2] = [
-    Row {
-        id: "J1",
-        fault: "joint limit approached too fast: by a push, by command",
-        detector: "stopping-distance clamp",
-        state: "Limit, Damp",
-        codes: &[FaultCode::PositionLimit, FaultCode::Overspeed],
-        deadline_ms: f64::INFINITY,
-        unit: "N m",
-        lacking: Some("pushes above half of the torque cap, which no torque-limited drive can stop"),
-        draw: pushed,
-    },
-    Row {
-        id: "J2",
-        fault: "overspeed by a kick",
-        detector: "estimated speed above 1.1 times the limit",
-        state: "Damp",
-        codes: &[FaultCode::Overspeed],
-        deadline_ms: 6.0,
-        unit: "N m",
-        lacking: None,
-        draw: overspeed,
-    },
-];
+pub static ROWS: [Row; 2] =
+    [Row { fault: &catalogue::J1, draw: pushed }, Row { fault: &catalogue::J2, draw: overspeed }];
 
 /// J1: a push towards either end of the range, limited to the drive's torque left beside the leg's weight.
 fn pushed(random: &mut Random, _: &Bounds) -> Scenario {

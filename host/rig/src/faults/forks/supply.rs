@@ -1,38 +1,16 @@
 //! Bus voltage and its supply.
 
 use hal_sim::faults::{Channel, Form, Timing};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{VOLT_PER_CODE, at, now_and_then, one};
 use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
-use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S};
+use crate::faulty_board::PERIODS_PER_S;
 
 /// Rows of this group.
-pub static ROWS: [Row; 2] = [
-    Row {
-        id: "V1",
-        fault: "overvoltage: reading, or a pushing supply without brake resistor",
-        detector: "bus voltage in each tick, twice",
-        state: "Limit, Off",
-        codes: &[FaultCode::BusVoltage],
-        deadline_ms: 2.0 * PERIOD_MS,
-        unit: "V beyond",
-        lacking: None,
-        draw: overvoltage,
-    },
-    Row {
-        id: "V2",
-        fault: "undervoltage: reading, or the supply cut",
-        detector: "a fifth lost against the mean of a second, 1 ms: Damp; the lower limit in each tick, twice: Off",
-        state: "Damp if there is energy, else Off",
-        codes: &[FaultCode::BusVoltage, FaultCode::SupplyLost],
-        deadline_ms: 1.0,
-        unit: "V beyond",
-        lacking: None,
-        draw: undervoltage,
-    },
-];
+pub static ROWS: [Row; 2] =
+    [Row { fault: &catalogue::V1, draw: overvoltage }, Row { fault: &catalogue::V2, draw: undervoltage }];
 
 /// V1: a wrong reading, or a pushing supply without a brake resistor.
 fn overvoltage(random: &mut Random, bounds: &Bounds) -> Scenario {

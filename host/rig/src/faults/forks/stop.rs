@@ -1,39 +1,17 @@
 //! Emergency stop.
 
 use hal_sim::faults::{Channel, Form, Timing};
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
 use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
-use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S};
+use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
-pub static ROWS: [Row; 2] = [
-    Row {
-        id: "X1",
-        fault: "emergency stop",
-        detector: "sense pin in each tick",
-        state: "Off",
-        codes: &[FaultCode::EmergencyStop],
-        deadline_ms: PERIOD_MS,
-        unit: "",
-        lacking: None,
-        draw: emergency_stop,
-    },
-    Row {
-        id: "X2",
-        fault: "bouncing emergency stop, closed again, other contacts operated",
-        detector: "latch; operator's edges",
-        state: "Off",
-        codes: &[FaultCode::EmergencyStop],
-        deadline_ms: PERIOD_MS,
-        unit: "",
-        lacking: None,
-        draw: bouncing_stop,
-    },
-];
+pub static ROWS: [Row; 2] =
+    [Row { fault: &catalogue::X1, draw: emergency_stop }, Row { fault: &catalogue::X2, draw: bouncing_stop }];
 
 /// X1: pressed for at most 10 ms; in half of the runs during damping or braking for another fault.
 fn emergency_stop(random: &mut Random, _: &Bounds) -> Scenario {

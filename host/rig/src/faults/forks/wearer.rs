@@ -1,26 +1,15 @@
 //! Wearer during the motion.
 
-use scarab::safety::FaultCode;
 use scarab_base::random::Random;
 
+use crate::faults::catalogue;
 use crate::faults::draw::beside;
 use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
 /// Rows of this group.
-pub static ROWS: [Row; 1] = [Row {
-    id: "H1",
-    fault: "wearer holds or pushes the leg",
-    detector: "torque cap; speed",
-    state: "Limit",
-    codes: &[FaultCode::Overspeed],
-    // Duration of torque above the cap, without interruption.
-    deadline_ms: 50.0,
-    unit: "N m",
-    lacking: None,
-    draw: held,
-}];
+pub static ROWS: [Row; 1] = [Row { fault: &catalogue::H1, draw: held }];
 
 /// H1: a hand holds or pushes a joint for up to a second.
 fn held(random: &mut Random, _: &Bounds) -> Scenario {
