@@ -325,10 +325,9 @@ impl Node {
         let received = receive.take(frame, now_us);
         match received {
             Received::Now => self.apply_received(place, now_us, objects),
-            // Values that wait for a SYNC which never comes command nothing.
+            // Values that wait for a SYNC command nothing yet, and those of a short frame never do.
             Received::AtSync => {}
             Received::TooShort => {
-                self.receive_cycle(Kind::Receive(place as u8), now_us);
                 let error = ErrorReport::code(NoticeCode::ShortPdo.number());
                 self.communication.emergency.set(Source::Receive(place as u8), Some(error));
             }

@@ -1,4 +1,5 @@
-//! Faults of the campaign's catalogue injected into the chip's pins, converters, memory and flash, image unmodified.
+//! Faults of the campaign's catalogue, injected into the chip's pins, converters, memory and flash. The image
+//! is unmodified.
 //!
 //! Each run starts from a saved machine: booted, holding its pose, following the exciting motion, following a
 //! host, or searching. Instant and magnitude are drawn from the seed. Deadlines are measured at the pins:

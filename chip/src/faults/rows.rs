@@ -1,4 +1,5 @@
-//! The rows: those of one injection as data, the others by their own runs. Fault, detector and deadline are the catalogue's.
+//! The rows: those of one injection as data, the others by their own runs. Fault and deadline are the
+//! catalogue's.
 
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;

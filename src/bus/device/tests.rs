@@ -233,8 +233,7 @@ fn a_host_that_a_reset_left_in_control_is_missed_without_a_controlword() {
 
 #[test]
 fn settings_of_the_next_identification_and_assistance_end_with_the_session() {
-    use crate::assist::AssistShares;
-    use crate::leg::Wearing;
+    use crate::leg::{AssistShares, Wearing};
     let settings = |bench: &Bench| (bench.device.leg.wearing, bench.device.leg.shares);
     let unset = (None, AssistShares::GRAVITY_ONLY);
     let mut bench = Bench::new();

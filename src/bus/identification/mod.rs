@@ -110,7 +110,7 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
     pub fn update(&mut self, activity: Activity, change: [bool; 2]) {
         let identifies = |activity| matches!(activity, Activity::Identify(_));
         if identifies(activity) && !identifies(self.activity) {
-            // It belonged to the identification that begins.
+            // The statement belonged to the identification that begins.
             self.wearing = None;
         }
         (self.activity, self.change) = (activity, change);

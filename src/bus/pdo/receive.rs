@@ -31,9 +31,9 @@ impl Receive {
         Self { parameters, data: [0; 8], waits: false, due_us: None }
     }
 
-    /// Takes over a frame with this PDO's COB-ID. Bytes beyond the mapped ones are ignored. The event timer of
-    /// a synchronous PDO is restarted by the SYNC that makes its values valid: without SYNC its host commands
-    /// nothing, however often it sends.
+    /// Takes over a frame with this PDO's COB-ID. Bytes beyond the mapped ones are ignored. The event timer
+    /// of a synchronous PDO is restarted by the SYNC that makes its values valid: without SYNC its host
+    /// commands nothing, however often it sends.
     pub fn take(&mut self, frame: &Frame, now_us: u64) -> Received {
         if frame.data().len() < self.parameters.length() {
             return Received::TooShort;

@@ -275,7 +275,9 @@ impl Follower {
         if begins {
             self.begin(command, measured);
         }
-        let is_requested = core::mem::replace(&mut self.seen, command.request_count) != command.request_count;
+        let is_new = core::mem::replace(&mut self.seen, command.request_count) != command.request_count;
+        // A request of the mode before starts nothing in the one that begins.
+        let is_requested = is_new && !begins;
         let was_halted = core::mem::replace(&mut self.halted, command.halt);
         if command.halt && !was_halted {
             self.brake_from(measured);
@@ -476,7 +478,7 @@ impl Follower {
         (self.goal, self.next, self.left) = (None, None, 0);
         (self.arrived, self.waits) = (false, false);
         (self.outside, self.inside, self.reached, self.deviates) = (0, 0, false, false);
-        // NaN: the first target of a cyclic mode always starts a period, and the host's limits come into force.
+        // NaN: the first target of a cyclic mode always starts a period, the host's limits come into force.
         (self.target, self.stated) = (f32::NAN, [Radian(f32::NAN); 2]);
     }
 

@@ -79,10 +79,18 @@ impl Hosted {
     }
 
     fn point(&mut self, joint: usize, position: f32, immediately: bool) {
-        let command = &mut self.commands[joint];
         let point = SetPoint { position: Radian(position), relative_to: None, immediately };
-        (command.target, command.request_count) =
-            (Target::ProfilePosition(point), command.request_count.wrapping_add(1));
+        self.request(joint, Target::ProfilePosition(point));
+    }
+
+    /// Requests a target by bit 4, once the joint is in its mode.
+    fn request(&mut self, joint: usize, target: Target) {
+        if self.commands[joint].target.mode() != target.mode() {
+            self.commands[joint].target = target;
+            self.run(1);
+        }
+        let command = &mut self.commands[joint];
+        (command.target, command.request_count) = (target, command.request_count.wrapping_add(1));
     }
 
     fn cyclic(&mut self, joint: usize, position: f32) {
@@ -526,8 +534,7 @@ fn relative_set_points_add_to_what_the_host_has_chosen() {
         let from = hosted.position(1);
         let ask = |hosted: &mut Hosted| {
             let point = SetPoint { position: Radian(0.1), relative_to: Some(reference), immediately: true };
-            hosted.commands[1].target = Target::ProfilePosition(point);
-            hosted.commands[1].request_count += 1;
+            hosted.request(1, Target::ProfilePosition(point));
         };
         ask(&mut hosted);
         while hosted.status[1].position_demand.0 < from + 0.05 {
@@ -723,9 +730,7 @@ fn homing_without_a_method_is_an_error_and_keeps_the_zero() {
     let mut hosted = Hosted::new();
     hosted.run(2 * SECOND);
     let before = hosted.position(0);
-    let command = &mut hosted.commands[0];
-    command.target = Target::Homing { offset: Radian(f32::INFINITY) };
-    command.request_count = command.request_count.wrapping_add(1);
+    hosted.request(0, Target::Homing { offset: Radian(f32::INFINITY) });
     hosted.run(100);
     assert!(hosted.status[0].deviates && !hosted.status[0].homed);
     assert!((hosted.position(0) - before).abs() < 1e-3 && is_enabled(&hosted.pair));
@@ -795,6 +800,29 @@ fn limits_that_exclude_a_joint_when_it_is_enabled_pull_it_nowhere() {
             assert!(is_enabled(&hosted.pair) && hosted.position(joint) < from + 0.52, "{is_cyclic} {tick}");
         }
         assert!(hosted.position(joint) > from + 0.3, "{is_cyclic}: {}", hosted.position(joint) - from);
+    }
+}
+
+#[test]
+fn requests_of_one_mode_start_nothing_in_the_next() {
+    let mut hosted = Hosted::new();
+    hosted.run(SECOND);
+    let from = hosted.position(1);
+    for (before, after) in [
+        (
+            Target::Homing { offset: Radian(from) },
+            Target::ProfilePosition(SetPoint { position: Radian(from + 0.3), ..SetPoint::default() }),
+        ),
+        (Target::ProfilePosition(SetPoint::default()), Target::Homing { offset: Radian(from + 0.3) }),
+    ] {
+        hosted.commands[1].target = before;
+        hosted.run(10);
+        // Both change in one frame.
+        hosted.commands[1].request_count += 1;
+        hosted.commands[1].target = after;
+        hosted.run(SECOND / 2);
+        let JointStatus { position, homed, .. } = hosted.status[1];
+        assert!((position.0 - from).abs() < 0.01 && !homed, "{after:?}: {position:?}");
     }
 }
 

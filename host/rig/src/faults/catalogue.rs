@@ -1,8 +1,8 @@
 //! The catalogue of faults: what is injected, what detects it, the required reaction and its deadline.
 //!
 //! Each fault is stated once, here. Its runs refer to it: forks of an identification with complete drives
-//! ([`crate::faults::forks`]), a bench of its own ([`crate::faults::bench`]), and the flash image on the model of
-//! its microcontroller (`cargo chip faults`). docs/safety.md gives the reasons.
+//! ([`crate::faults::forks`]), a bench of its own ([`crate::faults::bench`]), and the flash image on the
+//! model of its microcontroller (`cargo chip faults`). docs/safety.md gives the reasons.
 
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::safety::FaultCode;
@@ -219,13 +219,13 @@ pub static C1: Fault = Fault {
     fault: "current offset drifts",
     detector: "mean of the residual over an electrical turn",
     state: "Refuse / Off",
-    // While a joint hardly moves, a wrong or missing current looks like a frozen counter. The motors are then shorted, with the speed bound of every short circuit.
+    // While a joint hardly moves, a wrong or missing current looks like a frozen counter. The motors are then
+    // shorted, with the speed bound of every short circuit.
     instead: Some("Short"),
     deadline_ms: 50.0,
     unit: "A",
     codes: &[FaultCode::CurrentOffset, FaultCode::OpenPhase, FaultCode::Overcurrent],
     lacking: Some("small offsets while the joint moves; below 2 A of the vector at enabling"),
-    ..FAULT
 };
 
 pub static C1_AT_ENABLING: Fault = Fault {
@@ -233,8 +233,6 @@ pub static C1_AT_ENABLING: Fault = Fault {
     fault: "current offset while the bridges are off",
     detector: "offset limit at enabling",
     state: "Refuse / Off",
-    // While a joint hardly moves, a wrong or missing current looks like a frozen counter. The motors are then shorted, with the speed bound of every short circuit.
-    instead: Some("Short"),
     deadline_ms: 10.0,
     unit: "A",
     codes: &[FaultCode::CurrentOffset],
