@@ -105,7 +105,7 @@ fn line<T: Real>(
     let mut line = format!("| {name} |");
     for (function, dimension) in PROBLEMS {
         let problem = TestProblem::new(function, dimension);
-        let goal = T::of(problem.minimum() + TOLERANCE);
+        let goal = T::from_double(problem.minimum() + TOLERANCE);
         let mut reached = Vec::new();
         for seed in first_seed..first_seed + runs {
             let settings = BsoSettings::Adaptive(settings);

@@ -51,15 +51,15 @@ mod tests {
     fn a_changed_bit_and_two_exchanged_words_are_detected() {
         let words = [3.5_f32, -0.0, f32::NAN, 1e-40, 7.0, 0.0];
         let sum = Checksum::EMPTY.numbers(words);
-        for place in 0..words.len() {
+        for index in 0..words.len() {
             for bit in 0..32 {
                 let mut other = words;
-                other[place] = f32::from_bits(other[place].to_bits() ^ 1 << bit);
-                assert_ne!(Checksum::EMPTY.numbers(other), sum, "word {place}, bit {bit}");
+                other[index] = f32::from_bits(other[index].to_bits() ^ 1 << bit);
+                assert_ne!(Checksum::EMPTY.numbers(other), sum, "word {index}, bit {bit}");
             }
             let mut other = words;
-            other.swap(place, (place + 1) % words.len());
-            assert_ne!(Checksum::EMPTY.numbers(other), sum, "words from {place}");
+            other.swap(index, (index + 1) % words.len());
+            assert_ne!(Checksum::EMPTY.numbers(other), sum, "words from {index}");
         }
     }
 }

@@ -16,7 +16,7 @@
 //! | [`assist`] | torque from the identified model: transparency, weight support, periodic assistance |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
 //! | [`operation`] | work of each axis, signals between tasks, rights of the operator's contacts |
-//! | `place` | large values built in place |
+//! | `in_place` | large values built in place |
 //! | [`trace`] | output of the board: records, one line each |
 //! | [`store`] | nonvolatile store: configuration, calibrations, the accepted model |
 //! | [`bus`] | a CANopen node per joint, and a board's device with its nodes, without I/O |
@@ -29,12 +29,12 @@ pub mod bus;
 pub mod checksum;
 pub mod hal;
 pub mod ident;
+mod in_place;
 pub mod leg;
 pub mod model;
 pub mod motion;
 pub mod motor;
 pub mod operation;
-mod place;
 pub mod real;
 pub mod safety;
 pub mod servo;

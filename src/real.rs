@@ -26,7 +26,7 @@ pub trait Real: RealField + Copy {
     /// Largest finite number.
     const LARGEST: Self;
     /// Nearest representable number.
-    fn of(value: f64) -> Self;
+    fn from_double(value: f64) -> Self;
     /// Value in double precision.
     fn to_double(self) -> f64;
     /// Integer part; 0 for a negative number or NaN, the largest integer for a larger number.
@@ -144,7 +144,7 @@ pub fn is_finite<T: Real>(value: T) -> bool {
 impl Real for f64 {
     const EPSILON: Self = f64::EPSILON;
     const LARGEST: Self = f64::MAX;
-    fn of(value: f64) -> Self {
+    fn from_double(value: f64) -> Self {
         value
     }
     fn to_double(self) -> f64 {
@@ -177,7 +177,7 @@ impl Real for f64 {
 impl Real for f32 {
     const EPSILON: Self = f32::EPSILON;
     const LARGEST: Self = f32::MAX;
-    fn of(value: f64) -> Self {
+    fn from_double(value: f64) -> Self {
         value as f32
     }
     fn to_double(self) -> f64 {
@@ -260,11 +260,11 @@ fn eighth_of_a_turn(x: f32) -> (f32, f32) {
 /// Median of some numbers, the upper one of two; 0 for an empty slice. Sorts the slice.
 pub fn median<T: Real>(values: &mut [T]) -> T {
     for end in 1..values.len() {
-        for place in (0..end).rev() {
-            if values[place] <= values[place + 1] {
+        for index in (0..end).rev() {
+            if values[index] <= values[index + 1] {
                 break;
             }
-            values.swap(place, place + 1);
+            values.swap(index, index + 1);
         }
     }
     values.get(values.len() / 2).copied().unwrap_or(T::zero())

@@ -37,11 +37,11 @@ type Lookup = crc::Table<1>;
 const CODE: Crc<u32, Lookup> = Crc::<u32, Lookup>::new(&CRC_32_MPEG_2);
 const START: u32 = u32::MAX;
 
-/// Place of the header in an image: after 16 exceptions and 82 interrupts.
+/// Offset of the header in an image: after 16 exceptions and 82 interrupts.
 pub const HEADER_AT: u32 = (16 + 82) * 4;
 /// Bytes of the header.
 pub const HEADER_BYTES: usize = 16;
-/// Place of the check sum in an image.
+/// Offset of the check sum in an image.
 const CHECKSUM_AT: u32 = HEADER_AT + 12;
 /// First word of a header: "SCRB".
 const MAGIC: u32 = u32::from_le_bytes(*b"SCRB");
@@ -157,8 +157,8 @@ impl Check {
 
 /// Continues a check sum over the bytes of an image from `offset` on; the stored check sum counts as erased.
 fn sum(before: u32, offset: u32, bytes: &mut [u8]) -> u32 {
-    for (place, byte) in (offset..).zip(bytes.iter_mut()) {
-        if place.wrapping_sub(CHECKSUM_AT) < 4 {
+    for (position, byte) in (offset..).zip(bytes.iter_mut()) {
+        if position.wrapping_sub(CHECKSUM_AT) < 4 {
             *byte = 0xFF;
         }
     }
@@ -183,11 +183,11 @@ pub fn seal(image: &mut [u8]) -> Result<Header, ImageError> {
     let checksum = {
         let _ = Header::decode(&header)?;
         let mut before = START;
-        for (place, chunk) in image.chunks(CHUNK).enumerate() {
+        for (index, chunk) in image.chunks(CHUNK).enumerate() {
             let mut copy = [0; CHUNK];
             let copy = copy.get_mut(..chunk.len()).unwrap_or_default();
             copy.copy_from_slice(chunk);
-            before = sum(before, (place * CHUNK) as u32, copy);
+            before = sum(before, (index * CHUNK) as u32, copy);
         }
         before
     };
@@ -205,9 +205,9 @@ mod tests {
     use std::vec::Vec;
 
     fn sealed(length: usize) -> Vec<u8> {
-        let mut image: Vec<u8> = (0..length).map(|place| (place * 7) as u8).collect();
-        for (place, word) in Header::UNSEALED.into_iter().enumerate() {
-            let at = HEADER_AT as usize + 4 * place;
+        let mut image: Vec<u8> = (0..length).map(|index| (index * 7) as u8).collect();
+        for (index, word) in Header::UNSEALED.into_iter().enumerate() {
+            let at = HEADER_AT as usize + 4 * index;
             image[at..at + 4].copy_from_slice(&word.to_le_bytes());
         }
         seal(&mut image).expect("an image");

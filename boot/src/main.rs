@@ -194,9 +194,9 @@ fn run(loader: BootLoader) -> ! {
 /// Copies bytes of the flash.
 #[expect(unsafe_code, reason = "memory by its address")]
 fn copy(address: u32, into: &mut [u8]) -> bool {
-    for (place, byte) in into.iter_mut().enumerate() {
+    for (index, byte) in into.iter_mut().enumerate() {
         // SAFETY: `Check` reads within the length of an image, which lies within its region of the flash.
-        *byte = unsafe { core::ptr::read_volatile((address + place as u32) as *const u8) };
+        *byte = unsafe { core::ptr::read_volatile((address + index as u32) as *const u8) };
     }
     true
 }

@@ -21,9 +21,9 @@ use scarab_identify::leg::two_bodies::MuscleTone;
 use scarab_rig::assist::study::Mode;
 use scarab_rig::assist::subject::{Cuffs, Subject};
 use scarab_rig::image::build;
-use scarab_rig::kept_file::memory::Memory;
 use scarab_rig::options::{DriveModel, SimulationOptions};
 use scarab_rig::pair::{Context, Pair};
+use scarab_rig::parameter_file::memory::Memory;
 use serde::Serialize;
 
 use crate::image::Image;
@@ -163,7 +163,7 @@ impl Subjected {
     }
 
     fn on_host(&self, seed: u64) -> Result<([f64; 2], Vec<String>), ToolError> {
-        let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(seed) };
+        let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(seed) };
         let context = Context::<JOINTS, BASE>::new(&self.exoskeleton, &simulation)?;
         let mut pair = Pair::new(&self.exoskeleton, &context, seed)?;
         let [empty, worn] = self.models()?;

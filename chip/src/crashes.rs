@@ -256,12 +256,12 @@ fn inject(session: &mut Session, kind: CrashKind) -> Result<Vec<String>, ToolErr
     Ok(match kind {
         CrashKind::Panic => {
             let panics = Panics::parse(&machine.image().elf, &"the image")?;
-            let own = panics.all.iter().find(|place| place.file.starts_with("src/"));
-            let place = own.ok_or_else(|| ToolError::input("the image has no panic of its own"))?;
-            machine.jump(place.address, None);
+            let own = panics.all.iter().find(|site| site.file.starts_with("src/"));
+            let site = own.ok_or_else(|| ToolError::input("the image has no panic of its own"))?;
+            machine.jump(site.address, None);
             vec![
-                format!("file={}", &place.file[place.file.len().saturating_sub(40)..]),
-                format!("line={}", place.line),
+                format!("file={}", &site.file[site.file.len().saturating_sub(40)..]),
+                format!("line={}", site.line),
             ]
         }
         CrashKind::HardFault => {
@@ -305,7 +305,7 @@ fn judge(kind: CrashKind, seen: &Seen) -> Vec<String> {
     let is_beyond = |address: u32| (RAM - BEYOND..RAM).contains(&address);
     // The entry of an interrupt that does not fit leaves no address.
     let is_of_entry = number("status").is_some_and(|status| status & fault::STACKING != 0);
-    let place = match kind {
+    let is_located = match kind {
         CrashKind::StackOverflow(_) => {
             number("address").is_some_and(|address| is_beyond(address) || address == u32::MAX && is_of_entry)
         }
@@ -325,7 +325,7 @@ fn judge(kind: CrashKind, seen: &Seen) -> Vec<String> {
         ),
         (is_due, "no current tick fell due while it was handled"),
         (field(&seen.record, "cause") == Some(kind.name()), "the next start reports another cause"),
-        (place, "the next start reports another place"),
+        (is_located, "the next start reports another place"),
         (clocks, "the record's clocks are not those of the crash"),
     ];
     let missed = expected.into_iter().filter(|(held, _)| !held);

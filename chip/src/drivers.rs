@@ -291,7 +291,7 @@ impl Check {
             steps.push(self.word(self.symbols.step) == self.step + 1);
         }
         self.step += 1;
-        let entries = self.machine.chip().load.of(16 + 10).entries;
+        let entries = self.machine.chip().load.usage(16 + 10).entries;
         let shown = format!("woken at edges {steps:?}, {entries} interrupts of EXTI4");
         self.row(
             "EXTI",

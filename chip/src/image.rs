@@ -99,7 +99,7 @@ impl Image {
 
     /// An image without names, from its first bytes.
     #[must_use]
-    pub fn of_bytes(bytes: &[u8]) -> Self {
+    pub fn from_bytes(bytes: &[u8]) -> Self {
         let mut flash = vec![0xFF; FLASH_BYTES as usize];
         flash[..bytes.len()].copy_from_slice(bytes);
         Self { elf: Vec::new(), flash, functions: Vec::new(), objects: Vec::new() }
@@ -161,11 +161,11 @@ impl Image {
     #[must_use]
     pub fn instructions(&self, address: u32, size: u32) -> u32 {
         let at = address.wrapping_sub(FLASH) as usize;
-        let (mut place, mut count) = (0, 0);
-        while place < size as usize {
+        let (mut offset, mut count) = (0, 0);
+        while offset < size as usize {
             // The upper five bits of the first halfword tell the length (ARMv7-M, A5.1).
-            let upper = self.flash.get(at + place + 1).copied().unwrap_or(0) >> 3;
-            place += if upper >= 0b11101 { 4 } else { 2 };
+            let upper = self.flash.get(at + offset + 1).copied().unwrap_or(0) >> 3;
+            offset += if upper >= 0b11101 { 4 } else { 2 };
             count += 1;
         }
         count

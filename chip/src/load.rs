@@ -139,14 +139,14 @@ impl Load {
 
     /// Use by an exception since the last [`Load::clear`].
     #[must_use]
-    pub fn of(&self, exception: u8) -> Use {
+    pub fn usage(&self, exception: u8) -> Use {
         self.uses[usize::from(exception)]
     }
 
     /// Share of the time since the last [`Load::clear`] that an exception used.
     #[must_use]
     pub fn share(&self, exception: u8, now: Ticks) -> f64 {
-        self.of(exception).ticks as f64 / (now - self.cleared).max(1) as f64
+        self.usage(exception).ticks as f64 / (now - self.cleared).max(1) as f64
     }
 
     /// Time since the last [`Load::clear`].
@@ -184,9 +184,9 @@ mod tests {
         load.leave(150);
         load.sleep(50);
         load.settle(200);
-        let servo = load.of(77);
+        let servo = load.usage(77);
         assert_eq!((servo.ticks, servo.worst, servo.latency, servo.longest), (45, 17, 10, 50));
-        assert_eq!((load.of(34).ticks, load.of(34).worst), (5, 5));
-        assert_eq!((load.asleep, load.of(0).ticks), (50, 100));
+        assert_eq!((load.usage(34).ticks, load.usage(34).worst), (5, 5));
+        assert_eq!((load.asleep, load.usage(0).ticks), (50, 100));
     }
 }

@@ -285,7 +285,7 @@ impl Machine {
     /// Loses memory, as a power cut does, and starts again; flash cells and plant stay.
     pub fn power_cycle(&mut self) {
         self.core.get_data_mut().chip.rcc = crate::peripherals::rcc::Rcc::new();
-        let noise: Vec<u8> = (0..RAM_BYTES).map(|place| (place as u8).wrapping_mul(0x9D) ^ 0xA5).collect();
+        let noise: Vec<u8> = (0..RAM_BYTES).map(|index| (index as u8).wrapping_mul(0x9D) ^ 0xA5).collect();
         self.set_memory(RAM, &noise);
         self.set_memory(CCM, &noise[..CCM_BYTES]);
         self.reset(ResetReason::PowerOn);

@@ -327,7 +327,7 @@ impl Axis {
 }
 
 fn electrical(description: &AxisDescription, angle: f64) -> Direction {
-    Direction::of(f64::from(description.motor.pole_pairs) * angle + description.motor.electrical_zero)
+    Direction::from_angle(f64::from(description.motor.pole_pairs) * angle + description.motor.electrical_zero)
 }
 
 /// Motion of the hand: joints to an angle (rad, anatomical) by a half cosine, then held.
@@ -384,7 +384,7 @@ impl Plant {
     /// Free rotors at rest; the leg held at its anatomical zero.
     #[must_use]
     pub fn new(leg: &LegDescription<JOINTS>, drives: &CompleteDescription<JOINTS>, seed: u64) -> Self {
-        let anatomy = leg.joints.map(|joint| Anatomy::of(&joint));
+        let anatomy = leg.joints.map(|joint| Anatomy::from_joint(&joint));
         let state = LegState {
             angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(0.0)),
             rates: [0.0; JOINTS],
@@ -525,16 +525,16 @@ impl Plant {
     pub fn encoder_at(&self, axis: usize, line: usize) -> Option<usize> {
         let description = &self.axes[axis].description;
         let present = [description.counter.absolute, description.joint_encoder.is_some()];
-        (0..2).filter(|place| present[*place]).nth(line)
+        (0..2).filter(|side| present[*side]).nth(line)
     }
 
     /// Reading of that encoder at an instant, 14 bits.
     #[must_use]
     pub fn encoder_steps(&self, axis: usize, line: usize, now: Ticks) -> Option<u16> {
-        let place = self.encoder_at(axis, line)?;
+        let side = self.encoder_at(axis, line)?;
         let since = seconds(now.saturating_sub(self.mechanic));
         let (axis, joint) = (&self.axes[axis], axis);
-        if place == 0 {
+        if side == 0 {
             return Some(axis.counter.steps(axis.angle + axis.speed * since));
         }
         let encoder = axis.description.joint_encoder?;

@@ -136,7 +136,7 @@ pub fn interrupts(session: &Session) -> BTreeMap<&'static str, InterruptReport> 
     let chip = session.machine.chip();
     let measured = chip.load.measured(chip.now);
     let report = |exception: u8| {
-        let used = chip.load.of(exception);
+        let used = chip.load.usage(exception);
         InterruptReport {
             per_second: used.entries as f64 * TICK_HZ as f64 / measured as f64,
             mean_instructions: used.instructions as f64 / used.entries.max(1) as f64,
@@ -151,7 +151,7 @@ pub fn interrupts(session: &Session) -> BTreeMap<&'static str, InterruptReport> 
 /// Errors of base parameters. Truth and sigma are those of an identification of the simulated leg, because a
 /// trace does not contain the truth, and the plant of this model has less noise than a machine.
 fn errors(leg: &LegFile, run: &RunReport, seed: u64) -> Result<BTreeMap<String, f64>, ToolError> {
-    let options = &SimulationOptions::of_seed(seed);
+    let options = &SimulationOptions::with_seed(seed);
     let (simulated, _) = with_leg_size!(leg, identify_one(leg, options, None))?;
     let pairs = run.base_parameters.iter().filter_map(|base| {
         let other = simulated.base_parameters.iter().find(|other| other.name == base.name)?;
@@ -296,24 +296,24 @@ mod tests {
     }
 
     /// Compares names and kinds of all fields.
-    fn assert_shape(place: &str, shown: &Value, documented: &Value) {
+    fn assert_shape(path: &str, shown: &Value, documented: &Value) {
         match (shown, documented) {
             (Value::Object(shown), Value::Object(documented)) => {
                 let names = |object: &serde_json::Map<String, Value>| {
                     object.keys().cloned().collect::<std::collections::BTreeSet<_>>()
                 };
-                assert_eq!(names(shown), names(documented), "{place}");
+                assert_eq!(names(shown), names(documented), "{path}");
                 shown.iter().for_each(|(name, value)| {
-                    assert_shape(&format!("{place}.{name}"), value, &documented[name]);
+                    assert_shape(&format!("{path}.{name}"), value, &documented[name]);
                 });
             }
             (Value::Array(shown), Value::Array(documented)) => {
-                assert_eq!(shown.len(), documented.len(), "{place}");
-                shown.iter().zip(documented).for_each(|(one, other)| assert_shape(place, one, other));
+                assert_eq!(shown.len(), documented.len(), "{path}");
+                shown.iter().zip(documented).for_each(|(one, other)| assert_shape(path, one, other));
             }
             (shown, documented) => {
-                assert_eq!(core::mem::discriminant(shown), core::mem::discriminant(documented), "{place}");
-                assert_eq!(shown.is_f64(), documented.is_f64(), "{place}");
+                assert_eq!(core::mem::discriminant(shown), core::mem::discriminant(documented), "{path}");
+                assert_eq!(shown.is_f64(), documented.is_f64(), "{path}");
             }
         }
     }

@@ -75,7 +75,7 @@ pub struct SweepReport {
 }
 
 impl SweepReport {
-    fn of(samplings: &[Sampling], bus_v: f64) -> Self {
+    fn new(samplings: &[Sampling], bus_v: f64) -> Self {
         let volts =
             |samplings: &mut dyn Iterator<Item = &Sampling>, start: f64, pick: fn(f64, f64) -> f64| {
                 samplings.map(|sampling| sampling.other_v).fold(start, pick)
@@ -154,7 +154,7 @@ fn sweep(session: &mut Session, resting: &Snapshot) -> Result<SweepReport, ToolE
         session.run(RUN_S)?;
         samplings.extend(session.machine.chip_mut().samplings.take().unwrap_or_default());
     }
-    Ok(SweepReport::of(&samplings, bus_v))
+    Ok(SweepReport::new(&samplings, bus_v))
 }
 
 impl SamplingReport {
@@ -224,18 +224,18 @@ mod tests {
 
     #[test]
     fn the_sweep_fails_with_an_edge_below_the_documented_voltage() {
-        let report = SweepReport::of(&samplings(24.6), 48.0);
+        let report = SweepReport::new(&samplings(24.6), 48.0);
         assert!(report.is_sound() && (24.6..24.61).contains(&report.clean_v), "{report:?}");
         assert!((report.share_above - 0.75).abs() < 0.01);
-        assert!(!SweepReport::of(&samplings(24.2), 48.0).is_sound());
+        assert!(!SweepReport::new(&samplings(24.2), 48.0).is_sound());
     }
 
     #[test]
     fn the_sweep_fails_where_voltages_were_not_seen() {
         let mut some = samplings(24.6);
         some.retain(|sampling| !(10.0..11.0).contains(&sampling.other_v));
-        assert!(!SweepReport::of(&some, 48.0).is_sound());
+        assert!(!SweepReport::new(&some, 48.0).is_sound());
         let low: Vec<_> = samplings(24.6).into_iter().filter(|sampling| sampling.other_v < 20.0).collect();
-        assert!(!SweepReport::of(&low, 48.0).is_sound());
+        assert!(!SweepReport::new(&low, 48.0).is_sound());
     }
 }

@@ -47,8 +47,8 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// Looks at a frame of the board.
-    fn look(&mut self, frame: &Frame, session: &mut Session) {
+    /// Reacts to a frame of the board.
+    fn on_frame(&mut self, frame: &Frame, session: &mut Session) {
         // Answers to reads of 2160:2 and 3.
         let &[0x4F, 0x60, 0x21, sub, value, ..] = frame.data() else { return };
         let now = session.now();
@@ -141,7 +141,7 @@ pub fn serve(
             server.send(frame);
         }
         if let Some(operator) = &mut operator {
-            sent.iter().for_each(|frame| operator.look(frame, session));
+            sent.iter().for_each(|frame| operator.on_frame(frame, session));
             operator.act(session);
         }
         server.flush().iter().for_each(|event| eprintln!("{event}"));

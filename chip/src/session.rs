@@ -392,7 +392,7 @@ impl Session {
             let node = 1 + joint as u16;
             let [rated_a, rated_nm] = [0x6075, 0x6076].map(|index| self.read_object(node, index, 0));
             let (rated_a, rated_nm) = (f64::from(rated_a?) * 1e-6, f64::from(rated_nm?) * 1e-6);
-            let phase = |place: usize| move |session: &Self| session.axis(joint).currents()[place];
+            let phase = |number: usize| move |session: &Self| session.axis(joint).currents()[number];
             // The plant's torque contains the motor's cogging, which its current does not show.
             let rows: [Telemetry<'_>; 9] = [
                 ("bus voltage, V", 0x6079, 0, 1e-3, Some(0.5), &|session| session.plant().supply.voltage()),
@@ -442,7 +442,7 @@ impl Session {
         for (name, sub, exception) in [("current interrupt", 7, CURRENT_INTERRUPT), ("servo tick", 8, SERVO)]
         {
             let shown = f64::from(self.read_object(1, 0x2170, sub)?) * 1e-3;
-            let used = self.machine.chip().load.of(exception);
+            let used = self.machine.chip().load.usage(exception);
             let mean = microseconds(used.ticks) / used.entries.max(1) as f64;
             let row = format!(
                 "longest {name}: {shown:.2} us, the model's mean {mean:.2} us, longest {:.2} us",

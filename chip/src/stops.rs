@@ -137,7 +137,7 @@ fn stops(
         session.machine.run(opened + ticks(WATCHED_S))?;
         let switchings = session.machine.chip_mut().plant.switchings.take().unwrap_or_default();
         situation.armed += 1;
-        let outcome = Outcome::of(&mut armed, &switchings);
+        let outcome = Outcome::from_switchings(&mut armed, &switchings);
         let Some(first) = outcome.first else {
             situation.stayed_on += 1;
             continue;
@@ -164,7 +164,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    fn of(armed: &mut [bool; 2], switchings: &[Switching]) -> Self {
+    fn from_switchings(armed: &mut [bool; 2], switchings: &[Switching]) -> Self {
         let mut outcome = Self { first: None, last: 0, again: 0 };
         let mut on_since = None;
         for switching in switchings {
@@ -197,9 +197,9 @@ mod tests {
             switching(200, 0, true),
             switching(230, 0, false),
         ];
-        let outcome = Outcome::of(&mut armed, &log);
+        let outcome = Outcome::from_switchings(&mut armed, &log);
         assert_eq!((outcome.first, outcome.last, outcome.again, armed), (Some(110), 230, 30, [false; 2]));
-        let outcome = Outcome::of(&mut [true; 2], &log[..1]);
+        let outcome = Outcome::from_switchings(&mut [true; 2], &log[..1]);
         assert_eq!(outcome.first, None);
     }
 }

@@ -103,12 +103,12 @@ fn checksum(program: &[u8]) -> u32 {
 fn changed(program: &[u8]) -> Result<Vec<u8>, ToolError> {
     let version = env!("CARGO_PKG_VERSION").as_bytes();
     let mut new = program.to_vec();
-    let places: Vec<usize> =
+    let addresses: Vec<usize> =
         (0..new.len() - version.len()).filter(|&at| &new[at..at + version.len()] == version).collect();
-    if places.is_empty() {
+    if addresses.is_empty() {
         return Err(ToolError::input("the image does not contain its version"));
     }
-    for at in places {
+    for at in addresses {
         new[at + version.len() - 1] = b'9';
     }
     seal(&mut new).map_err(|error| ToolError::input(format!("the changed image: {error:?}")))?;
@@ -482,8 +482,8 @@ mod tests {
     #[test]
     fn the_changed_image_differs_in_version_and_check_sum_only() {
         let mut image = vec![0; 2000];
-        for (place, word) in Header::UNSEALED.into_iter().enumerate() {
-            image[HEADER_AT as usize + 4 * place..][..4].copy_from_slice(&word.to_le_bytes());
+        for (index, word) in Header::UNSEALED.into_iter().enumerate() {
+            image[HEADER_AT as usize + 4 * index..][..4].copy_from_slice(&word.to_le_bytes());
         }
         image[1000..1000 + env!("CARGO_PKG_VERSION").len()]
             .copy_from_slice(env!("CARGO_PKG_VERSION").as_bytes());
@@ -491,7 +491,7 @@ mod tests {
         let new = changed(&image).expect("a version");
         assert_ne!(checksum(&new), checksum(&image));
         let at = HEADER_AT as usize + 12;
-        let other = (0..2000).filter(|&place| new[place] != image[place] && !(at..at + 4).contains(&place));
+        let other = (0..2000).filter(|&index| new[index] != image[index] && !(at..at + 4).contains(&index));
         assert_eq!(other.collect::<Vec<_>>(), [1000 + env!("CARGO_PKG_VERSION").len() - 1]);
         assert!(changed(&[0; 1000]).is_err());
     }

@@ -84,7 +84,7 @@ impl Program {
             &leg.complete_description().expect("motors"),
             1,
         );
-        let image = Rc::new(Image::of_bytes(&bytes));
+        let image = Rc::new(Image::from_bytes(&bytes));
         Machine::new(&image, Chip::new(plant, 1), &Options::default()).expect("Unicorn")
     }
 }
@@ -124,7 +124,7 @@ fn an_interrupt_returns_with_all_registers_and_floats() {
     assert_eq!(run(&mut machine, 1e-4), End::Time);
     assert_eq!(word(&machine, RAM), 2.0_f32.to_bits(), "float registers are restored");
     assert_eq!((word(&machine, RAM + 4), word(&machine, RAM + 8)), (7, 9));
-    assert_eq!(machine.chip().load.of(26).entries, 1);
+    assert_eq!(machine.chip().load.usage(26).entries, 1);
     assert_eq!(machine.chip().nvic.depth(), 0);
 }
 
@@ -148,7 +148,7 @@ fn a_higher_level_preempts_and_a_masked_one_waits() {
     run(&mut machine, 1e-4);
     assert_eq!(word(&machine, RAM + 4), 2);
     assert_eq!(word(&machine, RAM + 8), 0, "level 0x20 ran before the store, in spite of the mask");
-    assert_eq!((machine.chip().load.of(24).entries, machine.chip().load.of(28).entries), (1, 1));
+    assert_eq!((machine.chip().load.usage(24).entries, machine.chip().load.usage(28).entries), (1, 1));
 }
 
 /// Begins a program with TIM5's interrupt every millisecond: clock 16 MHz, prescaler 16, top 999.
@@ -173,7 +173,7 @@ fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
     program.handler(66).store(0x4000_0C10, 0).put(&[0x4770]);
     let mut machine = program.machine();
     run(&mut machine, 0.1005);
-    assert_eq!(machine.chip().load.of(66).entries, 100);
+    assert_eq!(machine.chip().load.usage(66).entries, 100);
     assert!(machine.chip().load.awake(machine.chip().now) < 0.05);
     assert!(machine.chip().findings.is_empty(), "{:?}", machine.chip().findings);
 }
@@ -224,7 +224,7 @@ fn frequent_interrupts_do_not_change_a_computation() {
     machine.set_memory(RAM, &[0; 32]);
     run(&mut machine, 5e-3);
     let count = word(&machine, RAM);
-    assert!(count > 500 && machine.chip().load.of(66).entries > 400, "{count}");
+    assert!(count > 500 && machine.chip().load.usage(66).entries > 400, "{count}");
     let floats = [8, 12].map(|offset| f32::from_bits(word(&machine, RAM + offset)));
     // The last round may be incomplete.
     assert!(word(&machine, RAM + 4).abs_diff(count) <= 1, "{} {count}", word(&machine, RAM + 4));

@@ -37,7 +37,8 @@ impl<T: Real> Objective<T> for DampedOscillation<'_, T> {
     }
 
     fn bounds(&self, coordinate: usize) -> (T, T) {
-        BOX.get(coordinate).map_or((T::zero(), T::one()), |&(_, _, low, high)| (T::of(low), T::of(high)))
+        BOX.get(coordinate)
+            .map_or((T::zero(), T::one()), |&(_, _, low, high)| (T::from_double(low), T::from_double(high)))
     }
 
     fn evaluate(&self, position: &[T]) -> T {

@@ -70,7 +70,7 @@ pub struct Anatomy {
 impl Anatomy {
     /// Conversion from a joint's direction (+1 or -1) and zero offset.
     #[must_use]
-    pub fn of(joint: &JointDescription) -> Self {
+    pub fn from_joint(joint: &JointDescription) -> Self {
         Self { direction: joint.direction, zero_offset: joint.zero_offset }
     }
 

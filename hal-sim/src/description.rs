@@ -74,8 +74,8 @@ impl BodyDescription {
         let com: [f64; 3] =
             core::array::from_fn(|axis| (self.mass * self.com[axis] + mass * at[axis]) / whole);
         let mut inertia_com = self.inertia_com;
-        for (part, place) in [(self.mass, self.com), (mass, at)] {
-            let [x, y, z]: [f64; 3] = core::array::from_fn(|axis| place[axis] - com[axis]);
+        for (part, centre) in [(self.mass, self.com), (mass, at)] {
+            let [x, y, z]: [f64; 3] = core::array::from_fn(|axis| centre[axis] - com[axis]);
             let about = [y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y];
             for (element, square) in inertia_com.iter_mut().zip(about) {
                 *element += part * square;

@@ -57,7 +57,7 @@ pub(crate) enum Contact {
 impl Contact {
     /// Friction state of a joint at this rate.
     #[inline(always)]
-    pub(crate) fn of(rate: f64) -> Self {
+    pub(crate) fn from_rate(rate: f64) -> Self {
         if rate > 0.0 {
             Self::Forward
         } else if rate < 0.0 {

@@ -106,15 +106,15 @@ impl<const N: usize> Leg<N> {
             breakaway: self.breakaway(levels),
             committed: state.rates.map(|rate| rate != 0.0),
         };
-        slide.solve(&state.rates.map(Contact::of))
+        slide.solve(&state.rates.map(Contact::from_rate))
     }
 
     /// Advances the leg by `duration` s under a torque (N m) that changes linearly between two values.
     pub fn advance(&self, state: &mut LegState<N>, from: &[f64; N], to: &[f64; N], duration: f64) {
         let mean = core::array::from_fn(|joint| 0.5 * (from[joint] + to[joint]));
         let coarse = self.step(state, &mean, duration);
-        let before = state.rates.map(Contact::of);
-        if coarse.rates.map(Contact::of) == before {
+        let before = state.rates.map(Contact::from_rate);
+        if coarse.rates.map(Contact::from_rate) == before {
             *state = coarse;
             return;
         }
@@ -148,7 +148,7 @@ impl<const N: usize> Leg<N> {
         let impulse = |rate: &[f64; N]| -> [f64; N] {
             core::array::from_fn(|joint| duration * self.friction[joint].dry_level(rate[joint]))
         };
-        let present = rates.map(Contact::of);
+        let present = rates.map(Contact::from_rate);
         let breakaway = self.breakaway(impulse(&[0.0; N]));
         let mut slide = Slide { matrix, momentum, sliding: impulse(rates), breakaway, committed: [false; N] };
         let mut after = slide.solve(&present);

@@ -160,8 +160,8 @@ impl<const N: usize> Mechanism<N> {
             axes[joint] = orientation * link.axis;
             orientation *= turn_about(&link.axis, angles[joint]);
         }
-        let place = point + orientation * from_joint;
-        (place, core::array::from_fn(|joint| axes[joint].cross(&(place - points[joint]))))
+        let end = point + orientation * from_joint;
+        (end, core::array::from_fn(|joint| axes[joint].cross(&(end - points[joint]))))
     }
 
     /// Unit vector against gravity; zero without gravity.

@@ -152,7 +152,7 @@ impl Wearer {
         state: &LegState<N>,
     ) -> Result<Self, WearerError> {
         wearer.check()?;
-        let plane = ExoskeletonPlane::of(leg)?;
+        let plane = ExoskeletonPlane::from_leg(leg)?;
         let body = Body::new(wearer, plane.gravity);
         let [thigh, shank] = &wearer.cuffs;
         let fitted = |segment, cuff| Cuff::fitted(segment, cuff, &plane.chain, &body.chain);
@@ -210,7 +210,7 @@ impl Wearer {
     }
 
     /// Sets the wearer at rest at the exoskeleton's posture, where the present intention begins again.
-    pub fn place<const N: usize>(&mut self, state: &LegState<N>, now: f64) {
+    pub fn move_to<const N: usize>(&mut self, state: &LegState<N>, now: f64) {
         self.limb = LimbState { angles: self.exoskeleton(state).angles, rates: [0.0; 2] };
         self.muscles.restart(convert_angles(self.limb.angles), now);
     }
@@ -262,7 +262,7 @@ impl Wearer {
         for number in 0..steps {
             let begun = number as f64 * share;
             let coarse = self.step(leg, state, &between(begun + 0.5 * share), duration * share);
-            if coarse.exoskeleton.rates.map(Contact::of) == state.rates.map(Contact::of) {
+            if coarse.exoskeleton.rates.map(Contact::from_rate) == state.rates.map(Contact::from_rate) {
                 self.take(coarse, state);
                 continue;
             }

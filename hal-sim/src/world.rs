@@ -94,7 +94,7 @@ impl<const N: usize> World<N> {
             description: *description,
             leg: Leg::new(description),
             state: LegState { angles: joints.map(|joint| joint.zero_offset), rates: [0.0; N] },
-            anatomy: joints.map(|joint| Anatomy::of(&joint)),
+            anatomy: joints.map(|joint| Anatomy::from_joint(&joint)),
             drives: joints.map(|joint| Drive::new(&joint.drive, TICK_S)),
             electric: None,
             encoders: joints.map(|joint| Encoder::new(&joint.encoder)),
@@ -116,7 +116,7 @@ impl<const N: usize> World<N> {
 
     /// Sets the leg, and its wearer if any, at rest at anatomical angles, rad. The encoders' reference does
     /// not change.
-    pub fn place(&mut self, position: &[f64; N]) {
+    pub fn move_to(&mut self, position: &[f64; N]) {
         let anatomy = &self.anatomy;
         self.state = LegState {
             angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(position[joint])),
@@ -124,10 +124,10 @@ impl<const N: usize> World<N> {
         };
         let now = self.time();
         if let Some(wearer) = &mut self.wearer {
-            wearer.place(&self.state, now);
+            wearer.move_to(&self.state, now);
         }
         if let Some(electric) = &mut self.electric {
-            electric.place(&position.map(|angle| self.mounting * angle));
+            electric.move_to(&position.map(|angle| self.mounting * angle));
         }
         self.read_sensors();
     }

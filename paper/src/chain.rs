@@ -191,7 +191,7 @@ pub fn run(plant: &LegFile, believed: &LegFile, options: &ChainOptions) -> Resul
         plan: options.plan,
         estimator: Estimator::Plain,
         with_series: options.with_series,
-        ..SimulationOptions::of_seed(options.seed)
+        ..SimulationOptions::with_seed(options.seed)
     };
     let mut context = Context::<JOINTS, ROOM>::new(believed, &simulation)?;
     let truth = setup::links::<JOINTS>(plant, |joint| joint.truth.as_ref());

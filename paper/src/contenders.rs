@@ -138,9 +138,9 @@ pub fn run_own<T: Real>(
     let refused = |error: SwarmError| ToolError::input(format!("{}: {error:?}", algorithm.id()));
     let evaluations = budget(recorder.dimension());
     let constriction = PsoSettings {
-        inertia_weight: InertiaWeight::constant(T::of(0.7298)),
-        individual_learning: T::of(1.496),
-        global_learning: T::of(1.496),
+        inertia_weight: InertiaWeight::constant(T::from_double(0.7298)),
+        individual_learning: T::from_double(1.496),
+        global_learning: T::from_double(1.496),
         ..PsoSettings::default()
     };
     match algorithm {

@@ -76,7 +76,7 @@ pub struct Spent {
 }
 
 impl Spent {
-    fn of(trials: impl Iterator<Item = Option<(u32, u32)>>) -> Self {
+    fn from_trials(trials: impl Iterator<Item = Option<(u32, u32)>>) -> Self {
         let trials: Vec<_> = trials.collect();
         let infinite = |of: fn((u32, u32)) -> u32| -> Vec<f64> {
             trials.iter().map(|reached| reached.map_or(f64::INFINITY, |spent| f64::from(of(spent)))).collect()
@@ -127,7 +127,7 @@ pub struct ConvergenceReport {
 /// Formats the section of these runs.
 pub fn section(runs: &[Vec<[Option<Trial>; 4]>]) -> Result<Section, ToolError> {
     let report = report(runs);
-    Section::of(Part::Convergence, "convergence", &report, words(&report), Vec::new())
+    Section::new(Part::Convergence, "convergence", &report, words(&report), Vec::new())
 }
 
 /// Sets of unknowns with name and goal for 95 % of the runs; the last only for legs with a link
@@ -205,8 +205,8 @@ fn leg_rows(name: &str, unknowns: &Unknowns, trials: &[[Option<Trial>; 4]]) -> V
             problem: format!("{name}-{unknowns}"),
             dimension: all().map(|trial| trial.dimension).max().unwrap_or(0),
             runs: trials.len() as u64,
-            rows: Spent::of(all().map(|trial| trial.reached[0])),
-            over_samples: Spent::of(all().map(|trial| trial.reached[1])),
+            rows: Spent::from_trials(all().map(|trial| trial.reached[0])),
+            over_samples: Spent::from_trials(all().map(|trial| trial.reached[1])),
             lowest_chi2: all().map(|trial| trial.lowest).fold(f64::INFINITY, f64::min).into(),
             goal_iterations_p95,
         })
@@ -221,7 +221,7 @@ fn ninety_five(mut values: Vec<f64>) -> Option<f64> {
 }
 
 fn motions<const N: usize, const B: usize>(leg: &LegFile) -> Result<Vec<Periodic<N>>, ToolError> {
-    let context = Context::<N, B>::new(leg, &SimulationOptions::of_seed(ReportSeed::of_run(0).search()))?;
+    let context = Context::<N, B>::new(leg, &SimulationOptions::with_seed(ReportSeed::from_run(0).search()))?;
     let limits = context.configuration.envelope();
     let best = |index: u64| {
         let seed = MOTION_SEED + 1000 * index;
@@ -237,7 +237,7 @@ fn recorded<const N: usize, const B: usize>(
     seed: u64,
     motion: Periodic<N>,
 ) -> Result<(Context<N, B>, Record<f32, N, B>), ToolError> {
-    let mut context = Context::<N, B>::new(leg, &SimulationOptions::of_seed(seed))?;
+    let mut context = Context::<N, B>::new(leg, &SimulationOptions::with_seed(seed))?;
     (context.motions.excitation, context.configuration.excitation) = (motion, motion);
     let mut pair = Pair::new(leg, &context, seed)?;
     pair.evaluations = 0;

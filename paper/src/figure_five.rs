@@ -59,7 +59,7 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
         let mut convergence = Vec::new();
         for search in SEARCHES {
             let ways = (0..runs)
-                .map(|run| way(search, &problem, ReportSeed::of_run(run)))
+                .map(|run| way(search, &problem, ReportSeed::from_run(run)))
                 .collect::<Result<Vec<_>, _>>()
                 .map_err(|error| ToolError::input(format!("{id} {}: {error:?}", search.id())))?;
             let curves = |curve: fn(&Way) -> &[f64]| ways.iter().map(curve).collect::<Vec<_>>();

@@ -49,7 +49,7 @@ struct Case {
 }
 
 impl Case {
-    fn of(plan: Plan) -> Self {
+    fn new(plan: Plan) -> Self {
         Self { noise_percent: NOISE_PERCENT, plan, cycles: EXCITATION_CYCLES, method: plan_name(plan) }
     }
 }
@@ -112,7 +112,7 @@ pub fn section(runs: &[Vec<[Fit; JOINTS]>]) -> Result<Section, ToolError> {
         chain::run(
             &leg,
             &leg,
-            &ChainOptions { with_series: true, ..ChainOptions::new(ReportSeed::of_run(0).search(), plan) },
+            &ChainOptions { with_series: true, ..ChainOptions::new(ReportSeed::from_run(0).search(), plan) },
         )
     };
     let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
@@ -120,18 +120,18 @@ pub fn section(runs: &[Vec<[Fit; JOINTS]>]) -> Result<Section, ToolError> {
     let levels: Vec<_> = report.lines.iter().filter_map(level).collect();
     let paper = report.paper.map(|paper| paper.percent);
     let figure = drawn(&curves, &levels, &paper)?;
-    Section::of(Part::FigureSeven, "verification", &report, words(&report), vec![figure])
+    Section::new(Part::FigureSeven, "verification", &report, words(&report), vec![figure])
 }
 
 /// Cases at these levels of noise.
 fn cases(levels: &[f64]) -> Vec<Case> {
     let mut cases: Vec<Case> = Vec::new();
     for &noise_percent in levels {
-        cases.extend(PLANS.map(|plan| Case { noise_percent, ..Case::of(plan) }));
+        cases.extend(PLANS.map(|plan| Case { noise_percent, ..Case::new(plan) }));
     }
     if levels.contains(&NOISE_PERCENT) {
-        cases.push(Case { method: UNWEIGHTED, ..Case::of(Plan::OneTime) });
-        cases.push(Case { method: LONG, cycles: LONG_CYCLES, ..Case::of(Plan::Sequential) });
+        cases.push(Case { method: UNWEIGHTED, ..Case::new(Plan::OneTime) });
+        cases.push(Case { method: LONG, cycles: LONG_CYCLES, ..Case::new(Plan::Sequential) });
     }
     cases
 }

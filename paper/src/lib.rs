@@ -140,7 +140,7 @@ pub struct Section {
 
 impl Section {
     /// Section from a report, with its entry of the JSON report and its figures.
-    fn of(
+    fn new(
         part: Part,
         entry: &str,
         report: &impl serde::Serialize,

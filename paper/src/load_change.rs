@@ -40,7 +40,7 @@ const TOLD: f64 = 3.0;
 /// Load on the last link near the foot, beside the plane of the leg.
 #[must_use]
 pub fn load() -> Payload<f64> {
-    Payload { joint: JOINTS - 1, mass: 5.0, place: Vector3::new(0.0, 0.40, 0.05) }
+    Payload { joint: JOINTS - 1, mass: 5.0, position: Vector3::new(0.0, 0.40, 0.05) }
 }
 
 /// One combination before and after the load change.
@@ -99,7 +99,7 @@ pub struct LoadReport {
 /// Formats the section of these runs.
 pub fn section(runs: &[Vec<LoadRun>]) -> Result<Section, ToolError> {
     let report = report(runs)?;
-    Section::of(Part::LoadChange, "load_change", &report, words(&report), Vec::new())
+    Section::new(Part::LoadChange, "load_change", &report, words(&report), Vec::new())
 }
 
 /// Chain before and after the load change.
@@ -142,7 +142,7 @@ pub fn report(runs: &[Vec<LoadRun>]) -> Result<LoadReport, ToolError> {
     let mass = |of: fn(&Difference) -> f64| median(masses.iter().map(of)).map(|value| value / thigh).into();
     Ok(LoadReport {
         load_kg: load.mass,
-        load_place_m: load.place.into(),
+        load_place_m: load.position.into(),
         runs: pairs.len() as u64,
         noise_percent: NOISE_PERCENT,
         changed_of_table_v: changed(pairs),

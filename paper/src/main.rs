@@ -160,7 +160,7 @@ fn main() -> ExitCode {
 const CAMPAIGN: &str = "paper";
 
 fn program() -> Program {
-    Program::of_sources(env!("SCARAB_SOURCES"))
+    Program::from_sources(env!("SCARAB_SOURCES"))
 }
 
 /// Joins shards and reports them like an undivided campaign.

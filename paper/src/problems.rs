@@ -126,7 +126,7 @@ impl<T: Real> Motion<T> {
         let centre = (0..dimension)
             .map(|_| {
                 let share: f64 = uniform.sample(&mut random);
-                T::of(reach * (2.0 * share - 1.0))
+                T::from_double(reach * (2.0 * share - 1.0))
             })
             .collect();
         let mut rows: Vec<Vec<f64>> = Vec::with_capacity(dimension);
@@ -143,7 +143,7 @@ impl<T: Real> Motion<T> {
             }
             rows.push(row);
         }
-        let rows = rows.into_iter().map(|row| row.into_iter().map(T::of).collect()).collect();
+        let rows = rows.into_iter().map(|row| row.into_iter().map(T::from_double).collect()).collect();
         Self { centre, rows }
     }
 }
@@ -186,7 +186,7 @@ mod tests {
         let plain = TestProblem::new(TestFunction::Ackley, 30);
         let mut centres = Vec::new();
         for run in 0..5 {
-            let problem = case.problem::<f64>(ReportSeed::of_run(run));
+            let problem = case.problem::<f64>(ReportSeed::from_run(run));
             let motion = problem.motion.as_ref().expect("a motion");
             assert!(motion.centre.iter().all(|entry| entry.abs() <= 16.0));
             // cancellation of 20 + e - 20 - e: a few units in the last place of 22
@@ -212,8 +212,8 @@ mod tests {
     #[test]
     fn both_precisions_have_the_same_problem() {
         let (single, double) = (
-            moved_case().problem::<f32>(ReportSeed::of_run(7)),
-            moved_case().problem::<f64>(ReportSeed::of_run(7)),
+            moved_case().problem::<f32>(ReportSeed::from_run(7)),
+            moved_case().problem::<f64>(ReportSeed::from_run(7)),
         );
         let difference = single.evaluate(&[3.5; 30]) - double.evaluate(&[3.5; 30]) as f32;
         // some thirty single-precision roundings of values of 20

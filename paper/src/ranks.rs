@@ -43,7 +43,7 @@ pub struct Ranks {
 
 impl Ranks {
     /// Ranks of the chain, and of one run on it.
-    pub fn of(leg: &LegFile, run: Option<&RunReport>) -> Result<Self, ToolError> {
+    pub fn new(leg: &LegFile, run: Option<&RunReport>) -> Result<Self, ToolError> {
         let listed = |joint: usize, parameter: Parameter| {
             TABLE_FIVE.iter().any(|line| line.name == parameter_name(joint, parameter))
         };

@@ -27,26 +27,26 @@ pub struct RawCost<'a, const N: usize, const B: usize> {
     model: &'a RowModel<f32, N, B>,
     stage: Stage<f32, B>,
     bounds: (LegParameters<f32, N>, LegParameters<f32, N>),
-    places: Vec<(usize, usize)>,
+    coordinates: Vec<(usize, usize)>,
 }
 
 impl<'a, const N: usize, const B: usize> RawCost<'a, N, B> {
     /// Cost of `stage` within the ranges of `prior`.
     #[must_use]
     pub fn new(model: &'a RowModel<f32, N, B>, stage: Stage<f32, B>, prior: &[LinkPrior<f32>; N]) -> Self {
-        Self { model, stage, bounds: parameter_box(model, prior), places: seen(model) }
+        Self { model, stage, bounds: parameter_box(model, prior), coordinates: seen(model) }
     }
 
     /// Joint and parameter index of every coordinate.
     #[must_use]
-    pub fn places(&self) -> &[(usize, usize)] {
-        &self.places
+    pub fn coordinates(&self) -> &[(usize, usize)] {
+        &self.coordinates
     }
 
     /// Base parameters at a position.
     pub fn base(&self, position: &[f32]) -> [f32; B] {
         let mut parameters = [[0.0; PARAMETERS_PER_JOINT]; N];
-        for (&(joint, index), &value) in self.places.iter().zip(position) {
+        for (&(joint, index), &value) in self.coordinates.iter().zip(position) {
             parameters[joint][index] = value;
         }
         self.model.base.project(&parameters)
@@ -55,11 +55,11 @@ impl<'a, const N: usize, const B: usize> RawCost<'a, N, B> {
 
 impl<const N: usize, const B: usize> Objective<f32> for RawCost<'_, N, B> {
     fn dimension(&self) -> usize {
-        self.places.len()
+        self.coordinates.len()
     }
 
     fn bounds(&self, coordinate: usize) -> (f32, f32) {
-        let Some(&(joint, index)) = self.places.get(coordinate) else { return (0.0, 0.0) };
+        let Some(&(joint, index)) = self.coordinates.get(coordinate) else { return (0.0, 0.0) };
         (self.bounds.0[joint][index], self.bounds.1[joint][index])
     }
 

@@ -35,7 +35,7 @@ impl<'o, T: Real, O: Objective<T>> Recorder<'o, T, O> {
     pub fn new(objective: &'o O, minimum: f64, tolerances: &[f64]) -> Self {
         Self {
             objective,
-            goals: tolerances.iter().map(|tolerance| T::of(minimum + tolerance)).collect(),
+            goals: tolerances.iter().map(|tolerance| T::from_double(minimum + tolerance)).collect(),
             hits: RefCell::default(),
             iteration: Cell::new(0),
             evaluations: Cell::new(0),

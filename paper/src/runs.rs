@@ -39,14 +39,14 @@ impl PaperRuns {
     /// Number of runs.
     #[must_use]
     pub fn count(&self) -> usize {
-        fn of<T>(rows: &Option<RowRuns<T>>) -> usize {
+        fn runs_of<T>(rows: &Option<RowRuns<T>>) -> usize {
             rows.iter().flatten().map(Vec::len).sum()
         }
-        of(&self.table_four)
-            + of(&self.tables_five_six)
-            + of(&self.figure_seven)
-            + of(&self.load_change)
-            + of(&self.convergence)
+        runs_of(&self.table_four)
+            + runs_of(&self.tables_five_six)
+            + runs_of(&self.figure_seven)
+            + runs_of(&self.load_change)
+            + runs_of(&self.convergence)
     }
 }
 
@@ -59,7 +59,7 @@ pub fn run_rows<C: Sync, R: Send>(
     run: impl Fn(&C, ReportSeed) -> Result<R, ToolError> + Sync,
 ) -> Result<RowRuns<R>, ToolError> {
     let numbers: Vec<u64> = (0..runs).collect();
-    let seeds = shard.part(&numbers).iter().map(|number| ReportSeed::of_run(*number));
+    let seeds = shard.part(&numbers).iter().map(|number| ReportSeed::from_run(*number));
     let all: Vec<_> = rows.iter().flat_map(|row| seeds.clone().map(move |seed| (row, seed))).collect();
     let progress = ProgressBar::new(all.len() as u64).with_message(what.to_owned());
     let style = "{msg:28} {bar:32} {pos}/{len} runs, {elapsed} gone, {eta} left";
@@ -111,7 +111,7 @@ mod tests {
             run_rows("rows", &[10, 20], 5, shard, |row, seed| Ok(row + seed.search())).expect("numbers")
         };
         let whole = run(Shard::WHOLE);
-        let seed = |run| ReportSeed::of_run(run).search();
+        let seed = |run| ReportSeed::from_run(run).search();
         assert_eq!(whole, [10, 20].map(|row| (0..5).map(|run| row + seed(run)).collect::<Vec<_>>()));
         for count in 1..=7 {
             let mut joined = vec![Vec::new(); 2];

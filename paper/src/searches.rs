@@ -91,7 +91,7 @@ fn tabulated(
 ) -> Vec<Row> {
     let row = |(index, tolerance): (usize, &f64)| {
         let hits: Hits = runs.iter().map(|hits| hits.get(index).copied().flatten()).collect();
-        Row::of(case, algorithm, precision, *tolerance, &hits)
+        Row::new(case, algorithm, precision, *tolerance, &hits)
     };
     tolerances.iter().enumerate().map(row).collect()
 }

@@ -24,7 +24,7 @@ pub struct ReportSeed(u64);
 impl ReportSeed {
     /// Seed of run number `run`; runs beyond the range get its last seed.
     #[must_use]
-    pub fn of_run(run: u64) -> Self {
+    pub fn from_run(run: u64) -> Self {
         Self(REPORT.start.saturating_add(run).min(REPORT.end - 1))
     }
 
@@ -48,7 +48,7 @@ mod tests {
     #[test]
     fn report_seeds_differ_from_all_tuning_seeds() {
         for run in [0, 1, 99_999, u64::MAX] {
-            let seed = ReportSeed::of_run(run);
+            let seed = ReportSeed::from_run(run);
             assert!(REPORT.contains(&seed.search()) && !CHOOSING.contains(&seed.search()), "{seed:?}");
             assert!(!CHOOSING.contains(&seed.problem()) && !REPORT.contains(&seed.problem()), "{seed:?}");
         }

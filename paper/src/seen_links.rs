@@ -71,7 +71,7 @@ impl<const N: usize> Objective<f32> for SeenLinks<'_, N> {
 
     fn bounds(&self, coordinate: usize) -> (f32, f32) {
         let mut free = self.held.iter().enumerate().filter(|(_, held)| held.is_none());
-        free.nth(coordinate).map_or((0.0, 0.0), |(place, _)| self.whole.bounds(place))
+        free.nth(coordinate).map_or((0.0, 0.0), |(index, _)| self.whole.bounds(index))
     }
 
     fn evaluate(&self, position: &[f32]) -> f32 {

@@ -38,7 +38,7 @@ pub struct Row {
 impl Row {
     /// Row of these runs.
     #[must_use]
-    pub fn of(
+    pub fn new(
         case: &Case,
         algorithm: Algorithm,
         precision: &'static str,

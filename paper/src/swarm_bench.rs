@@ -39,7 +39,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    fn of(dimension: usize) -> Self {
+    fn new(dimension: usize) -> Self {
         Self { dimension, reached: [None; 2], lowest: f64::INFINITY }
     }
 }
@@ -89,7 +89,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         let above = self.context.background.costs(&self.solver).above;
         let model = &self.context.background.device;
         let mut solver = self.solver.clone();
-        let mut trial = Trial::of(self.context.background.model.base.rank());
+        let mut trial = Trial::new(self.context.background.model.base.rank());
         let mut seen = 0;
         loop {
             let state = solver.advance(model, 1);
@@ -110,7 +110,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
     /// Searches every parameter with an effect on torque, each in its own range.
     pub fn raw(&self) -> Trial {
         let model = &self.context.background.device;
-        let Some(prior) = self.context.configuration.prior.as_ref() else { return Trial::of(0) };
+        let Some(prior) = self.context.configuration.prior.as_ref() else { return Trial::new(0) };
         let problem = Problem::new(self.solver.record(), model);
         let objective = RawCost::new(model, problem.whole(), prior);
         let above = self.raw_optimum(&objective);
@@ -124,7 +124,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         above: f64,
         values: impl Fn(&[f32]) -> [f32; B],
     ) -> Trial {
-        let mut trial = Trial::of(objective.dimension());
+        let mut trial = Trial::new(objective.dimension());
         let Ok(mut swarm) = Bso::<f32, 20, DIMENSIONS>::new(objective, BsoSettings::default(), self.seed)
         else {
             return trial;
@@ -152,24 +152,24 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         let mut factor = Factor::<f64, DIMENSIONS>::new();
         for (row, &right) in self.exact.triangle().iter().zip(self.exact.right()).take(base.rank()) {
             let mut raw = [0.0; DIMENSIONS];
-            for (slot, &(joint, index)) in raw.iter_mut().zip(objective.places()) {
+            for (slot, &(joint, index)) in raw.iter_mut().zip(objective.coordinates()) {
                 let terms = (0..base.rank()).map(|base_index| base.terms(base_index)[joint][index]);
                 *slot = row.iter().zip(terms).map(|(element, term)| element * term).sum();
             }
             factor.insert(&raw, right);
         }
         let mut bounds = ParameterBox { low: [0.0; DIMENSIONS], high: [0.0; DIMENSIONS] };
-        for place in 0..objective.dimension() {
-            let (low, high) = objective.bounds(place);
-            (bounds.low[place], bounds.high[place]) = (f64::from(low), f64::from(high));
-            let width = bounds.high[place] - bounds.low[place];
+        for coordinate in 0..objective.dimension() {
+            let (low, high) = objective.bounds(coordinate);
+            (bounds.low[coordinate], bounds.high[coordinate]) = (f64::from(low), f64::from(high));
+            let width = bounds.high[coordinate] - bounds.low[coordinate];
             let mut row = [0.0; DIMENSIONS];
-            row[place] = PULL.sqrt() / width;
-            factor.insert(&row, row[place] * 0.5 * (bounds.low[place] + bounds.high[place]));
+            row[coordinate] = PULL.sqrt() / width;
+            factor.insert(&row, row[coordinate] * 0.5 * (bounds.low[coordinate] + bounds.high[coordinate]));
         }
         let optimum = least_squares_in_box(&factor, objective.dimension(), &bounds);
         let mut parameters = [[0.0; PARAMETERS_PER_JOINT]; N];
-        for (&(joint, index), &value) in objective.places().iter().zip(&optimum) {
+        for (&(joint, index), &value) in objective.coordinates().iter().zip(&optimum) {
             parameters[joint][index] = value;
         }
         self.exact.excess(&base.project(&parameters))
@@ -194,7 +194,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
 
     fn whole_leg(&self, objective: &FullObjective<'_, f32, N>, above: f64) -> Trial {
         let model = &self.context.background.device;
-        let mut trial = Trial::of(objective.dimension());
+        let mut trial = Trial::new(objective.dimension());
         let settings = BsoSettings::default();
         let Ok(mut search) = FullSearch::<f32, DIMENSIONS>::new(objective, settings, self.seed) else {
             return trial;

@@ -183,10 +183,10 @@ pub fn minimisers(problem: &TestProblem) -> Vec<[f64; 2]> {
         (one[0] - other[0]).hypot(one[1] - other[1]) < 1e-3 * problem.half_width()
     };
     let mut found: Vec<[f64; 2]> = Vec::new();
-    for (value, place) in descents(problem) {
+    for (value, position) in descents(problem) {
         let is_least = (value - problem.minimum()).abs() <= AGREEMENT * (1.0 + value.abs());
-        if is_least && !found.iter().any(|known| near(known, &place)) {
-            found.push(place);
+        if is_least && !found.iter().any(|known| near(known, &position)) {
+            found.push(position);
         }
     }
     found
@@ -206,9 +206,9 @@ type Point = (f64, [f64; 2]);
 fn grid(problem: &TestProblem, points: u32) -> Vec<Point> {
     let half = problem.half_width();
     let at = |index: u32| half * (2.0 * f64::from(index) / f64::from(points - 1) - 1.0);
-    let place = |row: u32, column: u32| [at(column), at(row)];
+    let point = |row: u32, column: u32| [at(column), at(row)];
     (0..points)
-        .flat_map(|row| (0..points).map(move |column| place(row, column)))
+        .flat_map(|row| (0..points).map(move |column| point(row, column)))
         .map(|position| (problem.evaluate(&position), position))
         .collect()
 }

@@ -43,7 +43,7 @@ pub struct Found {
 
 impl Found {
     /// Summary of each run's value and sigma.
-    fn of(truth: Number, runs: &[(Number, Number)]) -> Self {
+    fn new(truth: Number, runs: &[(Number, Number)]) -> Self {
         let values = || runs.iter().filter_map(|(value, _)| value.known());
         let sigmas = || runs.iter().filter_map(|(_, sigma)| sigma.known());
         let truth = truth.known();
@@ -167,7 +167,7 @@ pub fn runs(runs: u64, shard: Shard) -> Result<RowRuns<RunReport>, ToolError> {
 /// Formats the section of these runs.
 pub fn section(runs: &[Vec<RunReport>]) -> Result<Section, ToolError> {
     let report = report(runs)?;
-    Section::of(Part::TablesFiveSix, "tables_v_vi", &report, words(&report), Vec::new())
+    Section::new(Part::TablesFiveSix, "tables_v_vi", &report, words(&report), Vec::new())
 }
 
 /// Reports these runs.
@@ -184,7 +184,7 @@ pub fn report(runs: &[Vec<RunReport>]) -> Result<TablesReport, ToolError> {
         runs: methods[0].len() as u64,
         accepted,
         iterations_median,
-        rank: Ranks::of(&leg, methods[0].first().copied())?,
+        rank: Ranks::new(&leg, methods[0].first().copied())?,
         table_v: TABLE_FIVE.iter().filter_map(|printed| parameter_line(printed, &methods)).collect(),
         table_vi: TABLE_SIX.iter().filter_map(|printed| base_line(printed, &methods)).collect(),
     })
@@ -196,7 +196,7 @@ fn parameter_line(printed: &Printed, methods: &[Vec<&RunReport>; 2]) -> Option<P
     let first = found[0].first()?;
     let of = |index: usize| -> Found {
         let runs: Vec<_> = found[index].iter().map(|found| (found.value, found.sigma)).collect();
-        Found::of(first.truth, &runs)
+        Found::new(first.truth, &runs)
     };
     let frequency = |status: &str| found[0].iter().filter(|found| found.status == status).count();
     let status = found[0].iter().map(|found| found.status).max_by_key(|status| frequency(status))?;
@@ -220,7 +220,7 @@ fn base_line(printed: &Printed, methods: &[Vec<&RunReport>; 2]) -> Option<BaseLi
     let first = found[0].first()?.clone();
     let of = |index: usize| -> Found {
         let runs: Vec<_> = found[index].iter().map(|base| (base.value, base.sigma)).collect();
-        Found::of(first.truth, &runs)
+        Found::new(first.truth, &runs)
     };
     let squares: Vec<_> = methods[0]
         .iter()
@@ -241,7 +241,7 @@ fn base_line(printed: &Printed, methods: &[Vec<&RunReport>; 2]) -> Option<BaseLi
         truth: first.truth,
         one_time: of(0),
         sequential: of(1),
-        least_squares: Found::of(first.truth, &squares),
+        least_squares: Found::new(first.truth, &squares),
         name: first.name,
     })
 }

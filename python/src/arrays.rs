@@ -22,7 +22,7 @@ pub struct Array {
 
 impl Array {
     /// Copies an array of at most two dimensions.
-    pub fn of(name: &str, given: &Numbers<'_>) -> PyResult<Self> {
+    pub fn new(name: &str, given: &Numbers<'_>) -> PyResult<Self> {
         let numpy = given.py().import("numpy")?;
         if numpy.getattr("ma")?.call_method1("is_masked", (given,))?.is_truthy()? {
             return Err(argument(format!(
@@ -67,7 +67,7 @@ fn tuple(shape: &[usize]) -> String {
 
 /// One number per sample: a vector, or a matrix of one row or column, as files of MATLAB hold it.
 pub fn column(name: &str, given: &Numbers<'_>, length: &str) -> PyResult<Vec<f64>> {
-    let array = Array::of(name, given)?;
+    let array = Array::new(name, given)?;
     match array.shape[..] {
         [_] | [1, _] | [_, 1] => Ok(array.numbers),
         _ => Err(argument(format!("{name} has the shape {}; expected ({length},)", array.shape_text()))),
@@ -86,8 +86,8 @@ pub struct Rows {
 
 impl Rows {
     /// Reads an array of shape `(samples, width)`, or `(width,)` for one sample.
-    pub fn of(name: &str, given: &Numbers<'_>, width: usize) -> PyResult<Self> {
-        let array = Array::of(name, given)?;
+    pub fn new(name: &str, given: &Numbers<'_>, width: usize) -> PyResult<Self> {
+        let array = Array::new(name, given)?;
         let (is_single, fits) = match array.shape[..] {
             [only] => (true, only == width),
             [_, last] => (false, last == width),
@@ -101,8 +101,8 @@ impl Rows {
         }
         let rows = Self { numbers: array.numbers, width, is_single };
         if let Some(at) = rows.numbers.iter().position(|number| !number.is_finite()) {
-            let (place, value) = (rows.place(at), rows.numbers[at]);
-            return Err(argument(format!("{name}[{place}] is {value}; all numbers must be finite")));
+            let (index, value) = (rows.index_of(at), rows.numbers[at]);
+            return Err(argument(format!("{name}[{index}] is {value}; all numbers must be finite")));
         }
         Ok(rows)
     }
@@ -118,7 +118,7 @@ impl Rows {
     }
 
     /// Index of a number as Python writes it.
-    fn place(&self, at: usize) -> String {
+    fn index_of(&self, at: usize) -> String {
         let (sample, joint) = (at / self.width, at % self.width);
         if self.is_single { joint.to_string() } else { format!("{sample}, {joint}") }
     }

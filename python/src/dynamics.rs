@@ -28,7 +28,7 @@ pub struct Dynamics<const N: usize> {
 }
 
 impl<const N: usize> Dynamics<N> {
-    pub fn of(leg: &LegFile, angles: Angles) -> Result<Self, ToolError> {
+    pub fn new(leg: &LegFile, angles: Angles) -> Result<Self, ToolError> {
         Ok(Self { chain: chain(leg)?, gravity: Vector3::from(leg.gravity), to_chain: angles.to_chain(leg)? })
     }
 

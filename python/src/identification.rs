@@ -42,20 +42,25 @@ pub struct Identification {
 
 impl Identification {
     /// Result of recordings; their warnings become warnings of Python.
-    pub fn of_replay(py: Python<'_>, leg: LegFile, replayed: Replayed) -> PyResult<Self> {
+    pub fn from_replay(py: Python<'_>, leg: LegFile, replayed: Replayed) -> PyResult<Self> {
         warn(py, replayed.warnings.iter().cloned())?;
         let Replayed { bandwidth_hz, run, sources, series, warnings } = replayed;
-        Ok(Self { sources, bandwidth_hz, warnings, ..Self::of(leg, run, series, bandwidth_hz) })
+        Ok(Self { sources, bandwidth_hz, warnings, ..Self::new(leg, run, series, bandwidth_hz) })
     }
 
     /// Result of a simulated leg.
-    pub fn of_simulation(py: Python<'_>, leg: LegFile, run: RunReport, series: Series) -> PyResult<Py<Self>> {
+    pub fn from_simulation(
+        py: Python<'_>,
+        leg: LegFile,
+        run: RunReport,
+        series: Series,
+    ) -> PyResult<Py<Self>> {
         let bandwidth_hz = leg.bandwidth_hz;
-        Py::new(py, Self::of(leg, run, series, bandwidth_hz))
+        Py::new(py, Self::new(leg, run, series, bandwidth_hz))
     }
 
-    fn of(leg: LegFile, run: RunReport, series: Series, bandwidth_hz: f64) -> Self {
-        let (base, model) = (BaseSet::of(&run), ModelFile::of(&leg, &run, bandwidth_hz));
+    fn new(leg: LegFile, run: RunReport, series: Series, bandwidth_hz: f64) -> Self {
+        let (base, model) = (BaseSet::from_run(&run), ModelFile::from_run(&leg, &run, bandwidth_hz));
         Self { leg, run, series, sources: Vec::new(), bandwidth_hz, warnings: Vec::new(), base, model }
     }
 
@@ -231,7 +236,7 @@ impl Identification {
         let names: Vec<_> = self.leg.joints.iter().map(|joint| joint.name.as_str()).collect();
         let written = || -> Result<(), ToolError> {
             let drawn = figures::all(&names, &self.run, &self.series)?;
-            let mut circumstances = html::Circumstances::of_command(&self.leg, []);
+            let mut circumstances = html::Circumstances::from_command(&self.leg, []);
             circumstances.command = "scarab_ident (Python)".into();
             files::write(&path, html::page(&circumstances, &self.run, &self.sources, &drawn)?)
         };
@@ -269,7 +274,7 @@ fn predicted<const N: usize>(
     angles: Angles,
     states: &States,
 ) -> Result<(Vec<f64>, Vec<f64>), ToolError> {
-    let (predictor, dynamics) = (Predictor::<N>::new(model)?, Dynamics::<N>::of(leg, angles)?);
+    let (predictor, dynamics) = (Predictor::<N>::new(model)?, Dynamics::<N>::new(leg, angles)?);
     let samples = 0..states.q.len() / N;
     let all = samples.flat_map(|sample| {
         let torques = predictor.torques(&dynamics.state(states, sample));

@@ -271,12 +271,12 @@ impl Leg {
             even_stamps,
             load: placed(&leg, load, "load")?,
             payload: placed(&leg, payload, "payload")?,
-            ..ReplayOptions::of(&leg)
+            ..ReplayOptions::from_leg(&leg)
         };
         let (leg, recordings, options) = (&leg, &recordings, &options);
         let replayed =
             compute(py, || with_leg_size!(leg, replay(leg, recordings, options)))?.map_err(raised)?;
-        Identification::of_replay(py, leg.clone(), replayed)
+        Identification::from_replay(py, leg.clone(), replayed)
     }
 
     #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.excite"))]
@@ -306,7 +306,7 @@ impl Leg {
         options.check().map_err(|reason| raised(ToolError::Input(reason)))?;
         let leg = &self.file;
         let excited = compute(py, || with_leg_size!(leg, excite(leg, options)))?.map_err(raised)?;
-        Motion::of_design(leg.clone(), excited)
+        Motion::from_design(leg.clone(), excited)
     }
 
     #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.simulate"))]
@@ -327,13 +327,13 @@ impl Leg {
             drive: named("drive", drive, &drives)?,
             excitation,
             with_series: true,
-            ..SimulationOptions::of_seed(seed)
+            ..SimulationOptions::with_seed(seed)
         };
         let leg = &self.file;
         let (identification, recordings) =
             compute(py, || with_leg_size!(leg, simulated(leg, options)))?.map_err(raised)?;
         let identification =
-            Identification::of_simulation(py, leg.clone(), identification.0, identification.1)?;
+            Identification::from_simulation(py, leg.clone(), identification.0, identification.1)?;
         let mut recordings = recordings.iter();
         let training = recordings.next().map(|first| recording(py, first)).transpose()?;
         let validation = recordings.map(|other| recording(py, other)).collect::<PyResult<Vec<_>>>()?;
@@ -421,7 +421,7 @@ pub fn states(
     joints: usize,
 ) -> PyResult<(States, usize, bool)> {
     let [q, qd, qdd] =
-        [("q", q), ("qd", qd), ("qdd", qdd)].map(|(name, array)| Rows::of(name, array, joints));
+        [("q", q), ("qd", qd), ("qdd", qdd)].map(|(name, array)| Rows::new(name, array, joints));
     let (q, qd, qdd) = (q?, qd?, qdd?);
     for (name, other) in [("qd", &qd), ("qdd", &qdd)] {
         if (other.count(), other.is_single) != (q.count(), q.is_single) {
@@ -439,7 +439,7 @@ fn regressors<const N: usize>(
     states: &States,
     columns: usize,
 ) -> PyResult<Vec<f64>> {
-    Ok(Dynamics::<N>::of(leg, angles).map_err(raised)?.regressors(states, columns))
+    Ok(Dynamics::<N>::new(leg, angles).map_err(raised)?.regressors(states, columns))
 }
 
 fn torques<const N: usize>(
@@ -451,7 +451,7 @@ fn torques<const N: usize>(
     let parameters: LegParameters<f64, N> = core::array::from_fn(|joint| {
         core::array::from_fn(|parameter| parameters[joint * PARAMETERS_PER_JOINT + parameter])
     });
-    Ok(Dynamics::<N>::of(leg, angles).map_err(raised)?.torques(states, &parameters))
+    Ok(Dynamics::<N>::new(leg, angles).map_err(raised)?.torques(states, &parameters))
 }
 
 /// Parameters of the leg file in the order of the names: `truth`, `prior`, or the first that exists.

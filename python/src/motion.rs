@@ -28,7 +28,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    pub fn of_design(leg: LegFile, excited: Excited) -> PyResult<Self> {
+    pub fn from_design(leg: LegFile, excited: Excited) -> PyResult<Self> {
         let report = serde_json::to_string(&excited.report).map_err(|error| argument(error.to_string()))?;
         Ok(Self { leg, excitation: excited.motion, report: Some(report) })
     }
@@ -36,7 +36,7 @@ impl Motion {
     fn samples_at(&self, rate_hz: u32) -> PyResult<MotionSamples> {
         let rate: SampleRate =
             rate_hz.to_string().parse().map_err(|reason| argument(format!("rate_hz: {rate_hz} {reason}")))?;
-        MotionSamples::of(&self.leg, &self.excitation, rate).map_err(raised)
+        MotionSamples::new(&self.leg, &self.excitation, rate).map_err(raised)
     }
 }
 

@@ -41,12 +41,12 @@ pub fn read(name: &str, [t, q, tau]: [&Numbers<'_>; 3], joints: usize) -> PyResu
         .zip(tau)
         .map(|(position_rad, torque_nm)| JointSeries { position_rad, torque_nm })
         .collect();
-    Recording::of_samples(Path::new(name), &time_s, &series).map_err(raised)
+    Recording::from_samples(Path::new(name), &time_s, &series).map_err(raised)
 }
 
 /// Numbers of each joint, from an array of shape `(samples, joints)`, or `(samples,)` for one joint.
 fn by_joint(name: &str, given: &Numbers<'_>, samples: usize, joints: usize) -> PyResult<Vec<Vec<f64>>> {
-    let array = Array::of(name, given)?;
+    let array = Array::new(name, given)?;
     let fits = match array.shape[..] {
         [rows] => joints == 1 && rows == samples,
         [rows, columns] => rows == samples && columns == joints,
@@ -108,7 +108,7 @@ pub fn read_recording<'py>(
         delimiter: delimiter.map(|name| named("delimiter", name, &delimiters)).transpose()?,
         decimal: decimal.map(|name| named("decimal", name, &decimals)).transpose()?,
         command: format!("scarab replay {}", path.display()),
-        ..Import::of(&leg.file, &leg.text)
+        ..Import::from_leg(&leg.file, &leg.text)
     };
     let import = import.with(&columns, &units).map_err(argument)?;
     let Read { recording: read, report } = py.detach(|| Recording::read(&path, &import)).map_err(raised)?;

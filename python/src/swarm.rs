@@ -89,7 +89,7 @@ pub fn beetle_swarm<'py>(
 
 /// Bounds of each coordinate.
 fn pairs(bounds: &Numbers<'_>) -> PyResult<Vec<(f64, f64)>> {
-    let array = Array::of("bounds", bounds)?;
+    let array = Array::new("bounds", bounds)?;
     match array.shape[..] {
         [0] | [0, _] => Ok(Vec::new()),
         [_, 2] => Ok(array.numbers.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect()),

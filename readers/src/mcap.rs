@@ -149,9 +149,9 @@ impl Table for Mcap {
             let mut has_joint = false;
             for (value, (_, content)) in values.iter_mut().zip(&contents) {
                 let mut of_joint = |joint: &String, list: &[f64]| {
-                    let place = state.name.iter().position(|name| name == joint);
-                    has_joint |= place.is_some();
-                    place.and_then(|place| list.get(place)).copied().unwrap_or(f64::NAN)
+                    let position = state.name.iter().position(|name| name == joint);
+                    has_joint |= position.is_some();
+                    position.and_then(|position| list.get(position)).copied().unwrap_or(f64::NAN)
                 };
                 *value = match content {
                     Content::Time => {

@@ -282,8 +282,8 @@ fn claimed_size(header: &[u8]) -> Option<u64> {
     let end = rest.iter().position(|byte| byte & 0x80 == 0)?;
     let rest = rest[end + 1..].strip_prefix(&[NEXT_I32])?;
     let mut zigzag = 0;
-    for (place, byte) in rest.iter().take(5).enumerate() {
-        zigzag |= u64::from(byte & 0x7F) << (7 * place);
+    for (index, byte) in rest.iter().take(5).enumerate() {
+        zigzag |= u64::from(byte & 0x7F) << (7 * index);
         if byte & 0x80 == 0 {
             return Some(zigzag >> 1);
         }

@@ -43,8 +43,8 @@ impl Drop for Temporary {
 
 /// Rows of these columns, with their numbers.
 fn rows(table: &dyn Table, names: &[&str]) -> Result<Vec<(u64, Vec<f64>)>, Error> {
-    let place = |name: &&str| table.columns().iter().position(|column| column.name == *name).expect(name);
-    let chosen: Vec<usize> = names.iter().map(place).collect();
+    let index = |name: &&str| table.columns().iter().position(|column| column.name == *name).expect(name);
+    let chosen: Vec<usize> = names.iter().map(index).collect();
     let mut rows = Vec::new();
     table.read(&chosen, &mut |Row { number, values, done }| {
         assert!((0.0..=1.0).contains(&done), "{done}");
@@ -286,11 +286,11 @@ type Change = (u8, f64, u32);
 
 fn damaged(good: &[u8], changes: &[Change]) -> Vec<u8> {
     let mut bytes = good.to_vec();
-    for &(kind, place, what) in changes {
+    for &(kind, share, what) in changes {
         if bytes.is_empty() {
             break;
         }
-        let at = ((place * bytes.len() as f64) as usize).min(bytes.len() - 1);
+        let at = ((share * bytes.len() as f64) as usize).min(bytes.len() - 1);
         let end = (at + what as usize % 40).min(bytes.len());
         match kind {
             0 => bytes[at] ^= 1 << (what % 8),

@@ -114,7 +114,7 @@ impl Crash {
         check: 0,
     };
 
-    fn of(cause: CrashCause, released: u32) -> Self {
+    fn new(cause: CrashCause, released: u32) -> Self {
         Self { cause: cause as u32, released, ..Self::NONE }
     }
 
@@ -152,13 +152,14 @@ static mut RECORD: core::mem::MaybeUninit<Crash> = core::mem::MaybeUninit::unini
 /// Takes the crash record of the previous run, if there is one.
 pub fn take() -> Option<&'static Crash> {
     static FOUND: StaticCell<Crash> = StaticCell::new();
-    let place = (&raw mut RECORD).cast::<u32>();
+    let address = (&raw mut RECORD).cast::<u32>();
     // SAFETY: the static exists, is aligned, has so many words, and any bit pattern is a valid word. The read
     // is volatile because the content was written before this image began. The only other access is a crash,
     // which never returns.
-    let words = core::array::from_fn::<u32, WORDS, _>(|word| unsafe { ptr::read_volatile(place.add(word)) });
+    let words =
+        core::array::from_fn::<u32, WORDS, _>(|word| unsafe { ptr::read_volatile(address.add(word)) });
     // SAFETY: as above; the first word is the magic number.
-    unsafe { ptr::write_volatile(place, 0) };
+    unsafe { ptr::write_volatile(address, 0) };
     let found: Crash = zerocopy::transmute!(words);
     let whole = found.magic == MAGIC && found.check == found.sum();
     whole.then(|| FOUND.try_init(found)).flatten().map(|found| &*found)
@@ -168,11 +169,11 @@ fn end(mut crash: Crash) -> ! {
     crash.kept = scarab_disable_all();
     crash.check = crash.sum();
     let words: [u32; WORDS] = zerocopy::transmute!(crash);
-    let place = (&raw mut RECORD).cast::<u32>();
-    for (place, word) in (0..WORDS).map(|word| place.wrapping_add(word)).zip(words) {
+    let address = (&raw mut RECORD).cast::<u32>();
+    for (address, word) in (0..WORDS).map(|word| address.wrapping_add(word)).zip(words) {
         // SAFETY: the static exists, is aligned and has so many words. Any other writer was interrupted by
         // this one and never resumes.
-        unsafe { ptr::write_volatile(place, word) };
+        unsafe { ptr::write_volatile(address, word) };
     }
     SCB::sys_reset()
 }
@@ -180,7 +181,7 @@ fn end(mut crash: Crash) -> ! {
 /// Panic handler: outputs off, record, reset.
 pub fn panic(information: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
-    let mut crash = Crash::of(CrashCause::Panic, scarab_disable_all());
+    let mut crash = Crash::new(CrashCause::Panic, scarab_disable_all());
     if let Some(location) = information.location() {
         let name = location.file().as_bytes();
         let kept = name.get(name.len().saturating_sub(NAME)..).unwrap_or(&[]);
@@ -195,7 +196,7 @@ pub fn panic(information: &PanicInfo<'_>) -> ! {
 /// Ends the run from a board's own handler; the caller chooses the meaning of `status`.
 pub fn give_up(cause: CrashCause, status: u32) -> ! {
     cortex_m::interrupt::disable();
-    end(Crash { status, ..Crash::of(cause, scarab_disable_all()) })
+    end(Crash { status, ..Crash::new(cause, scarab_disable_all()) })
 }
 
 /// Passes the frame's address to [`hard_fault`], resetting the stack pointer where less than half a kilobyte
@@ -221,14 +222,14 @@ extern "C" fn hard_fault(frame: u32) -> ! {
     // A frame outside the stack was never stored.
     let stored = stack::word(frame).is_some();
     let cause = if stored { CrashCause::HardFault } else { CrashCause::StackOverflow };
-    let word = |place: u32| stack::word(frame.wrapping_add(4 * place));
+    let word = |index: u32| stack::word(frame.wrapping_add(4 * index));
     let status = load(FAULT_STATUS);
     end(Crash {
         pc: word(6).unwrap_or(0),
         lr: word(5).or_else(deepest_caller).unwrap_or(0),
         status,
         address: if status & ADDRESS_IS_VALID != 0 { load(BUS_FAULT_ADDRESS) } else { u32::MAX },
-        ..Crash::of(cause, released)
+        ..Crash::new(cause, released)
     })
 }
 
@@ -236,7 +237,7 @@ extern "C" fn hard_fault(frame: u32) -> ! {
 fn deepest_caller() -> Option<u32> {
     let code = (&raw const __stext as u32)..(&raw const __etext as u32);
     (0..SEARCHED)
-        .filter_map(|place| stack::word(stack::bottom() + 4 * place))
+        .filter_map(|index| stack::word(stack::bottom() + 4 * index))
         .find(|word| word & 1 == 1 && code.contains(word))
 }
 
@@ -245,7 +246,7 @@ extern "C" fn unhandled() -> ! {
     cortex_m::interrupt::disable();
     let released = scarab_disable_all();
     let number = (load(ACTIVE) & 0x1FF) as i16 - 16;
-    end(Crash { status: number.cast_unsigned().into(), ..Crash::of(CrashCause::Interrupt, released) })
+    end(Crash { status: number.cast_unsigned().into(), ..Crash::new(CrashCause::Interrupt, released) })
 }
 
 fn load(register: *const u32) -> u32 {

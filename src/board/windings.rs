@@ -22,12 +22,12 @@ fn sum(words: [u32; 2]) -> u32 {
 /// Writes both temperatures, degrees Celsius. Called by the housekeeping alone.
 pub fn store(celsius: [f32; 2]) {
     let [first, second] = celsius.map(f32::to_bits);
-    let place = (&raw mut STORED).cast::<u32>();
+    let address = (&raw mut STORED).cast::<u32>();
     // A reset between two of these stores leaves a wrong checksum, and the windings are assumed warm.
     for (word, value) in [first, second, sum([first, second])].into_iter().enumerate() {
         // SAFETY: the static exists, is aligned and has so many words. Only this function writes it, at one
         // priority level, and `stored` reads it before that level runs.
-        unsafe { ptr::write_volatile(place.wrapping_add(word), value) };
+        unsafe { ptr::write_volatile(address.wrapping_add(word), value) };
     }
 }
 
@@ -35,11 +35,12 @@ pub fn store(celsius: [f32; 2]) {
 /// housekeeping runs.
 #[must_use]
 pub fn stored() -> Option<[f32; 2]> {
-    let place = (&raw mut STORED).cast::<u32>();
+    let address = (&raw mut STORED).cast::<u32>();
     // SAFETY: as above; any bit pattern is a valid word. The read is volatile because the content was written
     // before this image began.
-    let [first, second, check] =
-        core::array::from_fn::<u32, WORDS, _>(|word| unsafe { ptr::read_volatile(place.wrapping_add(word)) });
+    let [first, second, check] = core::array::from_fn::<u32, WORDS, _>(|word| unsafe {
+        ptr::read_volatile(address.wrapping_add(word))
+    });
     let celsius = [first, second].map(f32::from_bits);
     let is_sound = check == sum([first, second]) && celsius.iter().all(|celsius| celsius.is_finite());
     is_sound.then_some(celsius)

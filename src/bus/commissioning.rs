@@ -30,7 +30,7 @@ impl CommissioningStep {
 
     /// Returns the step with this number.
     #[must_use]
-    pub fn of(number: u32) -> Option<Self> {
+    pub fn from_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|step| *step as u32 == number)
     }
 }
@@ -127,7 +127,7 @@ pub struct StepReport {
 impl StepReport {
     /// Report without a refused axis.
     #[must_use]
-    pub const fn of(result: StepResult) -> Self {
+    pub const fn new(result: StepResult) -> Self {
         Self { result: result as u8, axis: 0, reason: 0, detail: 0 }
     }
 }
@@ -170,7 +170,7 @@ impl<const N: usize> BoardStatus<N> {
     /// State before the first report.
     pub const NONE: Self = Self {
         state: BoardState(0),
-        report: StepReport::of(StepResult::None),
+        report: StepReport::new(StepResult::None),
         causes: 0,
         bridge_c: [f32::NAN; N],
         winding_c: [f32::NAN; N],
@@ -202,7 +202,7 @@ impl<const N: usize> BoardObjects<N> {
     pub fn update(&mut self, status: &BoardStatus<N>) {
         self.status = *status;
         if self.asked.is_some() {
-            self.status.report = StepReport::of(StepResult::UnderWay);
+            self.status.report = StepReport::new(StepResult::UnderWay);
         }
     }
 
@@ -227,14 +227,14 @@ impl<const N: usize> BoardObjects<N> {
 
     /// Writes 2160:1; 0 asks for nothing.
     pub(super) fn ask(&mut self, sub: u8, value: u32) -> Result<(), Abort> {
-        let step = CommissioningStep::of(value);
+        let step = CommissioningStep::from_number(value);
         if sub != 1 || value != 0 && step.is_none() {
             return Err(Abort::Range);
         }
         self.command = value as u8;
         if step.is_some() {
             self.asked = step;
-            self.status.report = StepReport::of(StepResult::UnderWay);
+            self.status.report = StepReport::new(StepResult::UnderWay);
         }
         Ok(())
     }
@@ -270,16 +270,16 @@ mod tests {
         for (number, result) in StepResult::ALL.into_iter().enumerate() {
             assert_eq!(result as usize, number);
         }
-        assert_eq!(CommissioningStep::of(0), None);
+        assert_eq!(CommissioningStep::from_number(0), None);
         for step in CommissioningStep::ALL {
-            assert_eq!(CommissioningStep::of(step as u32), Some(step));
+            assert_eq!(CommissioningStep::from_number(step as u32), Some(step));
         }
     }
 
     #[test]
     fn a_command_is_passed_on_once_and_hides_the_result_of_the_one_before() {
         let mut board = BoardObjects::<2>::NEW;
-        let done = BoardStatus { report: StepReport::of(StepResult::Done), ..BoardStatus::NONE };
+        let done = BoardStatus { report: StepReport::new(StepResult::Done), ..BoardStatus::NONE };
         board.update(&done);
         assert_eq!(board.commissioning(3), Ok(StepResult::Done as u32));
         assert_eq!(board.ask(1, 4), Err(Abort::Range));

@@ -58,7 +58,7 @@ impl Identity {
 
     /// Identity of a joint's node. The nodes of a board differ in the product code only.
     #[must_use]
-    pub const fn of(self, joint: usize) -> Self {
+    pub const fn for_joint(self, joint: usize) -> Self {
         Self { product: self.product + joint as u32, ..self }
     }
 }
@@ -90,15 +90,15 @@ impl Communication {
     /// Creates the state after the start.
     #[must_use]
     pub fn new(node: NodeId, identity: Identity) -> Self {
-        let base = |first: u16, place: usize| node.on(first + 0x100 * place as u16);
-        let receive = |place: usize| {
-            let mapped = RECEIVED.get(place).copied().unwrap_or(0);
-            Receive::new(Parameters::new(Mapping::Receive, base(0x200, place), 255, 0, &[mapped]))
+        let base = |first: u16, pdo: usize| node.on(first + 0x100 * pdo as u16);
+        let receive = |pdo: usize| {
+            let mapped = RECEIVED.get(pdo).copied().unwrap_or(0);
+            Receive::new(Parameters::new(Mapping::Receive, base(0x200, pdo), 255, 0, &[mapped]))
         };
-        let transmit = |place: usize| {
-            let mapped: &[u32] = SENT.get(place).copied().unwrap_or(&[]);
-            let kind = if place == 0 { 255 } else { 1 };
-            Transmit::new(Parameters::new(Mapping::Transmit, base(0x180, place), kind, 10, mapped))
+        let transmit = |pdo: usize| {
+            let mapped: &[u32] = SENT.get(pdo).copied().unwrap_or(&[]);
+            let kind = if pdo == 0 { 255 } else { 1 };
+            Transmit::new(Parameters::new(Mapping::Transmit, base(0x180, pdo), kind, 10, mapped))
         };
         Self {
             node,
@@ -164,17 +164,17 @@ impl Communication {
             (0x1014, _) if self.may_be_emergency(value) => self.emergency.identifier = value,
             (0x1015, _) => self.emergency.inhibit = value as u16,
             (0x1016, 1..) => {
-                let place = sub - 1;
+                let number = sub - 1;
                 let watches = |setting: u32| (setting & 0xFFFF != 0).then_some(setting >> 16);
                 let mut others =
-                    self.consumers.iter().enumerate().filter(|(other, _)| *other != usize::from(place));
+                    self.consumers.iter().enumerate().filter(|(other, _)| *other != usize::from(number));
                 let is_taken = others.any(|(_, other)| watches(other.setting()) == watches(value));
                 if is_taken && watches(value).is_some() {
                     return Err(Abort::Incompatible);
                 }
-                self.consumers.get_mut(usize::from(place)).ok_or(Abort::NoSubindex)?.set(value)?;
+                self.consumers.get_mut(usize::from(number)).ok_or(Abort::NoSubindex)?.set(value)?;
                 // Monitoring restarts, so an earlier loss is no longer active.
-                self.emergency.set(Source::Heartbeat(place), None);
+                self.emergency.set(Source::Heartbeat(number), None);
             }
             (0x1017, _) => (self.heartbeat_ms, self.heartbeat) = (value as u16, Clock::NEW),
             (0x1019, _) if matches!(value, 0 | 2..=240) => {
@@ -214,8 +214,8 @@ impl Communication {
 
     /// Copies the bytes of a text; see [`Objects::bytes`](super::Objects::bytes).
     pub(super) fn text(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
-        let place = usize::from(object.index.wrapping_sub(0x1008));
-        let text = self.identity.texts.get(place).ok_or(Abort::NoObject)?.as_bytes();
+        let number = usize::from(object.index.wrapping_sub(0x1008));
+        let text = self.identity.texts.get(number).ok_or(Abort::NoObject)?.as_bytes();
         for (to, from) in into.iter_mut().zip(text.iter().skip(offset as usize)) {
             *to = *from;
         }

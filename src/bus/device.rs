@@ -98,7 +98,7 @@ impl<const N: usize> LegStatus<N> {
     }
 
     /// First reason that applies, or `None`.
-    fn stands_against(&self) -> Option<RefusalReason> {
+    fn blocking_reason(&self) -> Option<RefusalReason> {
         use RefusalReason::{Blocked, NoReference, NotCalibrated, SwitchOpen};
         [NotCalibrated, NoReference, Blocked, SwitchOpen].into_iter().find(|reason| self.has(*reason))
     }
@@ -180,7 +180,7 @@ pub struct Device<const N: usize, const LOG: usize> {
     /// State of the store.
     storing: Storing,
     /// Time of the last call.
-    looked_us: u64,
+    last_call_us: u64,
     /// Pending reset of each node, whose stored parameters must be recalled.
     pending_reset: [Option<Reset>; N],
 }
@@ -197,7 +197,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     ) -> Self {
         let mut joints = 0..N;
         Self {
-            nodes: own.map(|number| Node::new(number, identity.of(joints.next().unwrap_or_default()))),
+            nodes: own.map(|number| Node::new(number, identity.for_joint(joints.next().unwrap_or_default()))),
             axes: constants.map(Axis::new),
             leg: LegObjects::new(plan, seed, 0, identity.checksum),
             coupling: Coupling::default(),
@@ -213,7 +213,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             request: None,
             controller: Controller::Active,
             storing: Storing::Done,
-            looked_us: 0,
+            last_call_us: 0,
             pending_reset: [None; N],
         }
     }
@@ -234,7 +234,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         sender: Option<usize>,
         results: &R,
     ) -> bool {
-        self.look_back(now_us);
+        self.check_gap(now_us);
         let mut concerns = false;
         for joint in (0..N).filter(|joint| Some(*joint) != sender) {
             let received = self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
@@ -272,9 +272,9 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Restarts all timeouts if the board could not receive since the last call.
-    pub fn look_back(&mut self, now_us: u64) {
-        let since_us = now_us.saturating_sub(self.looked_us);
-        self.looked_us = self.looked_us.max(now_us);
+    pub fn check_gap(&mut self, now_us: u64) {
+        let since_us = now_us.saturating_sub(self.last_call_us);
+        self.last_call_us = self.last_call_us.max(now_us);
         if since_us > STOOD_US {
             self.nodes.iter_mut().for_each(|node| node.stood_still(now_us));
         }
@@ -284,9 +284,9 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// the timeouts.
     pub fn watch<R: Results>(&mut self, now_us: u64, results: &R) {
         self.recall_reset();
-        self.look_back(now_us);
+        self.check_gap(now_us);
         for joint in 0..N {
-            self.with(joint, results, |node, objects| node.look_around(now_us, objects));
+            self.with(joint, results, |node, objects| node.check_timeouts(now_us, objects));
         }
     }
 
@@ -334,7 +334,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             axis.hosted = self.hosted && (axis.is_commanded() || axis.hosted);
         }
         if !self.hosted {
-            self.coupling.look_on(self.axes.each_mut(), drive);
+            self.coupling.follow_leg(self.axes.each_mut(), drive);
         }
         let power = self.coupling.power(self.axes.each_mut(), drive, refused).filter(|_| self.hosted);
         // A step of the drive goes first; other requests wait for the next tick. An identification requested
@@ -345,7 +345,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             Some(_) => None,
         };
         self.request = match (power, requested) {
-            (Some(power), _) if power.enables() && status.stands_against().is_some() => {
+            (Some(power), _) if power.enables() && status.blocking_reason().is_some() => {
                 self.refused = true;
                 None
             }
@@ -397,7 +397,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         let order = order.filter(|_| self.hosted);
         let lasts = |refusal: &Refusal| Some(*refusal) == order || self.hosted && still(status, *refusal);
         let before = self.refusal.filter(lasts);
-        let own = status.stands_against().filter(|_| requested && self.hosted);
+        let own = status.blocking_reason().filter(|_| requested && self.hosted);
         let own = own.map(|reason| Refusal { joint: Refusal::LEG, reason });
         self.refusal = status.refused.filter(|_| self.hosted).or(own).or(before).or(order);
         if self.refusal.is_none() || self.refusal != before {
@@ -414,10 +414,10 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             });
         }
         let reported = self.axes.first().and_then(|axis| axis.refused);
-        let is_due = self.report.is_none() || self.looked_us >= self.report_us;
+        let is_due = self.report.is_none() || self.last_call_us >= self.report_us;
         if self.report != reported && is_due {
             if self.report.is_some() {
-                self.report_us = self.looked_us.saturating_add(REFUSAL_US);
+                self.report_us = self.last_call_us.saturating_add(REFUSAL_US);
             }
             self.axes.iter_mut().for_each(|axis| axis.refused = self.report);
         }
@@ -461,7 +461,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// a board's clock did not advance.
     pub fn update_program(&mut self, status: ProgramStatus) {
         if self.leg.program.update(status) {
-            self.nodes.iter_mut().for_each(|node| node.stood_still(self.looked_us));
+            self.nodes.iter_mut().for_each(|node| node.stood_still(self.last_call_us));
         }
     }
 

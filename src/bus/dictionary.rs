@@ -148,12 +148,12 @@ mod tests {
     #[test]
     fn every_object_is_in_exactly_one_row_and_has_a_name() {
         assert_eq!(ROWS.len(), NAMES.len());
-        for (place, row) in ROWS.iter().enumerate() {
+        for (index, row) in ROWS.iter().enumerate() {
             for object in objects(row) {
                 assert_eq!(ROWS.iter().filter(|other| other.holds(object)).count(), 1, "{object:x?}");
                 assert_eq!(find(object), Ok(row));
             }
-            assert!(!NAMES[place].is_empty() && NAMES[place].is_ascii());
+            assert!(!NAMES[index].is_empty() && NAMES[index].is_ascii());
         }
     }
 

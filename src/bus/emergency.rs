@@ -45,7 +45,7 @@ pub enum Source {
 const SOURCES: usize = 7 + PDOS;
 
 impl Source {
-    const fn place(self) -> usize {
+    const fn index(self) -> usize {
         match self {
             Self::Drive => 0,
             Self::Heartbeat(0) => 1,
@@ -125,18 +125,18 @@ impl Emergency {
 
     /// Sets or clears the error of a source; a change queues a message.
     pub fn set(&mut self, source: Source, error: Option<ErrorReport>) {
-        let Some(place) = self.active.get_mut(source.place()) else { return };
-        if *place == error {
+        let Some(slot) = self.active.get_mut(source.index()) else { return };
+        if *slot == error {
             return;
         }
-        *place = error;
+        *slot = error;
         let message = self.message(error);
         // Behind one that waits for space, later changes wait as well.
         let is_full = self.unsent.contains(&true);
         match self.waiting.iter_mut().find(|message| message.is_none()).filter(|_| !is_full) {
             Some(free) => *free = Some(message),
             None => {
-                if let Some(unsent) = self.unsent.get_mut(source.place()) {
+                if let Some(unsent) = self.unsent.get_mut(source.index()) {
                     *unsent = true;
                 }
             }
@@ -161,9 +161,9 @@ impl Emergency {
     fn take_unsent(&mut self) -> Option<[u8; 8]> {
         let sources = || self.active.iter().zip(&self.unsent).enumerate().filter(|(_, (_, unsent))| **unsent);
         let ended = sources().find(|(_, (error, _))| error.is_none());
-        let (place, (error, _)) = ended.or_else(|| sources().next())?;
+        let (index, (error, _)) = ended.or_else(|| sources().next())?;
         let message = self.message(*error);
-        *self.unsent.get_mut(place)? = false;
+        *self.unsent.get_mut(index)? = false;
         Some(message)
     }
 
@@ -182,8 +182,8 @@ impl Emergency {
     pub(super) fn history(&self, sub: u8) -> Result<u32, Abort> {
         match sub.checked_sub(1) {
             None => Ok(u32::from(self.recorded)),
-            Some(place) if place < self.recorded => {
-                self.history.get(usize::from(place)).copied().ok_or(Abort::NoData)
+            Some(index) if index < self.recorded => {
+                self.history.get(usize::from(index)).copied().ok_or(Abort::NoData)
             }
             Some(_) => Err(Abort::NoData),
         }

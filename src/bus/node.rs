@@ -125,10 +125,10 @@ impl Node {
                         return FrameEffect::Nothing;
                     }
                     Some(Command::Reset(reset)) => {
-                        self.obey(Command::Reset(reset), objects);
+                        self.apply_command(Command::Reset(reset), objects);
                         return FrameEffect::Reset(reset);
                     }
-                    Some(command) => self.obey(command, objects),
+                    Some(command) => self.apply_command(command, objects),
                 }
             }
             lss::REQUEST => match frame.full() {
@@ -147,13 +147,13 @@ impl Node {
             }
             id @ 0x701..=0x77F => {
                 let mut received = FrameEffect::Nothing;
-                for place in 0..self.communication.consumers.len() {
-                    let consumer = self.communication.consumers.get_mut(place);
+                for index in 0..self.communication.consumers.len() {
+                    let consumer = self.communication.consumers.get_mut(index);
                     let change = consumer.and_then(|consumer| consumer.received((id & 0x7F) as u8, now_us));
                     if change.is_some() {
                         received = FrameEffect::Something;
                     }
-                    self.watch(place as u8, change, objects);
+                    self.watch(index as u8, change, objects);
                 }
                 return received;
             }
@@ -170,7 +170,7 @@ impl Node {
             self.pending_reset = None;
             return Some(Frame::new(node.on(nmt::HEARTBEAT), &[0]));
         }
-        self.look_around(now_us, objects);
+        self.check_timeouts(now_us, objects);
         let communication = &mut self.communication;
         // A stopped node holds its emergency messages back until it leaves the state.
         let emergency =
@@ -237,7 +237,7 @@ impl Node {
         self.on_store(storing);
     }
 
-    fn obey<O: Objects>(&mut self, command: Command, objects: &mut O) {
+    fn apply_command<O: Objects>(&mut self, command: Command, objects: &mut O) {
         let Communication { node, identity, state, .. } = self.communication;
         match command {
             Command::Go(next) if next == state || state == NmtState::Initialising => {}
@@ -301,9 +301,9 @@ impl Node {
         };
         self.receive_cycle(Kind::Sync, now_us);
         self.communication.emergency.set(Source::Sync, None);
-        for place in 0..PDOS {
-            if self.communication.receive.get_mut(place).is_some_and(|receive| receive.at_sync(now_us)) {
-                self.apply_received(place, now_us, objects);
+        for index in 0..PDOS {
+            if self.communication.receive.get_mut(index).is_some_and(|receive| receive.at_sync(now_us)) {
+                self.apply_received(index, now_us, objects);
             }
         }
         objects.synchronise();
@@ -319,38 +319,38 @@ impl Node {
             return FrameEffect::Nothing;
         }
         let mut found = self.communication.receive.iter_mut().enumerate();
-        let Some((place, receive)) = found.find(|(_, pdo)| pdo.parameters.identifier() == Some(id)) else {
+        let Some((index, receive)) = found.find(|(_, pdo)| pdo.parameters.identifier() == Some(id)) else {
             return FrameEffect::Nothing;
         };
         let received = receive.take(frame, now_us);
         match received {
-            Received::Now => self.apply_received(place, now_us, objects),
+            Received::Now => self.apply_received(index, now_us, objects),
             // Values that wait for a SYNC command nothing yet, and those of a short frame never do.
             Received::AtSync => {}
             Received::TooShort => {
                 let error = ErrorReport::code(NoticeCode::ShortPdo.number());
-                self.communication.emergency.set(Source::Receive(place as u8), Some(error));
+                self.communication.emergency.set(Source::Receive(index as u8), Some(error));
             }
         }
         FrameEffect::Something
     }
 
     /// Handles a received PDO whose values are valid now.
-    fn apply_received<O: Objects>(&mut self, place: usize, now_us: u64, objects: &mut O) {
-        self.receive_cycle(Kind::Receive(place as u8), now_us);
-        self.communication.emergency.set(Source::Receive(place as u8), None);
-        self.write_received(place, objects);
+    fn apply_received<O: Objects>(&mut self, index: usize, now_us: u64, objects: &mut O) {
+        self.receive_cycle(Kind::Receive(index as u8), now_us);
+        self.communication.emergency.set(Source::Receive(index as u8), None);
+        self.write_received(index, objects);
     }
 
     /// Writes the objects of a received PDO. An object that rejects its value keeps the old one.
-    fn write_received<O: Objects>(&mut self, place: usize, objects: &mut O) {
-        let Some(receive) = self.communication.receive.get(place) else { return };
+    fn write_received<O: Objects>(&mut self, index: usize, objects: &mut O) {
+        let Some(receive) = self.communication.receive.get(index) else { return };
         let (parameters, data) = (receive.parameters, receive.data());
         let mut bytes = data.into_iter();
         for mapped in parameters.mapped() {
             let mut value = [0; 4];
-            for (place, byte) in value.iter_mut().zip(bytes.by_ref().take(usize::from(mapped.size))) {
-                *place = byte;
+            for (slot, byte) in value.iter_mut().zip(bytes.by_ref().take(usize::from(mapped.size))) {
+                *slot = byte;
             }
             if !mapped.is_dummy() {
                 // The host sees the old value of an object that it maps to be sent.
@@ -364,23 +364,23 @@ impl Node {
             return None;
         }
         for _ in 0..PDOS {
-            let place = self.next_pdo;
-            self.next_pdo = (place + 1) % PDOS;
-            let transmit = self.communication.transmit.get_mut(place)?;
+            let index = self.next_pdo;
+            self.next_pdo = (index + 1) % PDOS;
+            let transmit = self.communication.transmit.get_mut(index)?;
             if !transmit.is_wanted(now_us) {
                 continue;
             }
             let parameters = transmit.parameters;
             let dictionary = Dictionary { communication: &mut self.communication, objects: &mut *objects };
             let mut data = [0; 8];
-            let mut places = data.iter_mut();
+            let mut free = data.iter_mut();
             for mapped in parameters.mapped() {
                 let bytes = dictionary.value(mapped.object).unwrap_or(0).to_le_bytes();
-                for (to, from) in places.by_ref().take(usize::from(mapped.size)).zip(bytes) {
+                for (to, from) in free.by_ref().take(usize::from(mapped.size)).zip(bytes) {
                     *to = from;
                 }
             }
-            let transmit = self.communication.transmit.get_mut(place)?;
+            let transmit = self.communication.transmit.get_mut(index)?;
             if let Some(frame) = transmit.frame(data, now_us) {
                 return Some(frame);
             }
@@ -389,23 +389,23 @@ impl Node {
     }
 
     /// Checks all timeouts; [`Node::poll`] does so too.
-    pub fn look_around<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
-        for place in 0..self.communication.consumers.len() {
-            let consumer = self.communication.consumers.get_mut(place);
+    pub fn check_timeouts<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
+        for index in 0..self.communication.consumers.len() {
+            let consumer = self.communication.consumers.get_mut(index);
             let change = consumer.and_then(|consumer| consumer.poll(now_us));
-            self.watch(place as u8, change, objects);
+            self.watch(index as u8, change, objects);
         }
-        for place in 0..PDOS {
-            if self.communication.receive.get_mut(place).is_some_and(|pdo| pdo.is_missed(now_us)) {
+        for index in 0..PDOS {
+            if self.communication.receive.get_mut(index).is_some_and(|pdo| pdo.is_missed(now_us)) {
                 let late = ErrorReport::code(FaultCode::LatePdo.number());
-                self.communication.emergency.set(Source::Receive(place as u8), Some(late));
+                self.communication.emergency.set(Source::Receive(index as u8), Some(late));
                 self.fail(Lost::ReceivedPdo, objects);
             }
         }
-        self.look_for_silence(now_us, objects);
+        self.check_silence(now_us, objects);
     }
 
-    fn look_for_silence<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
+    fn check_silence<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
         if self.communication.silence.begins(now_us) && objects.misses_host() {
             let silent = ErrorReport::code(FaultCode::HostSilent.number());
             self.communication.emergency.set(Source::Silence, Some(silent));
@@ -436,8 +436,8 @@ impl Node {
     fn fail<O: Objects>(&mut self, why: Lost, objects: &mut O) {
         objects.lost(why);
         match (self.communication.on_error, self.communication.state) {
-            (0, NmtState::Operational) => self.obey(Command::Go(NmtState::PreOperational), objects),
-            (2, _) => self.obey(Command::Go(NmtState::Stopped), objects),
+            (0, NmtState::Operational) => self.apply_command(Command::Go(NmtState::PreOperational), objects),
+            (2, _) => self.apply_command(Command::Go(NmtState::Stopped), objects),
             _ => {}
         }
     }

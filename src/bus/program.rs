@@ -43,7 +43,7 @@ pub enum ProgramCommand {
 impl ProgramCommand {
     /// Command with this number.
     #[must_use]
-    pub const fn of(number: u32) -> Option<Self> {
+    pub const fn from_number(number: u32) -> Option<Self> {
         Some(match number {
             0 => Self::Stop,
             1 => Self::Start,
@@ -192,7 +192,7 @@ impl ProgramObjects {
 
     /// Writes 1F51:1. `is_off`: the drive is off.
     pub(super) fn command(&mut self, value: u32, is_off: bool) -> Result<(), Abort> {
-        let command = ProgramCommand::of(value).ok_or(Abort::Range)?;
+        let command = ProgramCommand::from_number(value).ok_or(Abort::Range)?;
         let is_stopped = self.status.has(ProgramStatus::STOPPED);
         // While an image is on trial, the space of the new one holds the one that comes back.
         let is_on_trial = self.status.has(ProgramStatus::ON_TRIAL);
@@ -242,9 +242,9 @@ mod tests {
     #[test]
     fn numbers_are_those_of_cia_302() {
         for number in 0..4 {
-            assert_eq!(ProgramCommand::of(number).map(|command| command as u32), Some(number));
+            assert_eq!(ProgramCommand::from_number(number).map(|command| command as u32), Some(number));
         }
-        assert_eq!(ProgramCommand::of(4), None);
+        assert_eq!(ProgramCommand::from_number(4), None);
         assert_eq!(ProgramStatus((ProgramError::Checksum as u32) << 1 | 1).error(), 3);
     }
 
@@ -271,14 +271,14 @@ mod tests {
     #[test]
     fn bytes_wait_in_their_order_and_none_is_lost_unnoticed() {
         let mut objects = stopped();
-        for place in 0..WAITING {
-            assert_eq!(objects.room(), WAITING - place);
-            assert_eq!(objects.push(place as u8), Ok(()));
+        for number in 0..WAITING {
+            assert_eq!(objects.room(), WAITING - number);
+            assert_eq!(objects.push(number as u8), Ok(()));
         }
         assert_eq!(objects.push(0), Err(Abort::Sequence));
         assert!(objects.status().has(ProgramStatus::UNDER_WAY));
-        for place in 0..WAITING {
-            assert_eq!(objects.take_byte(), Some(place as u8));
+        for number in 0..WAITING {
+            assert_eq!(objects.take_byte(), Some(number as u8));
         }
         assert_eq!(objects.take_byte(), None);
         assert!(WAITING > 7 * (usize::from(BLOCK) + 1));

@@ -51,7 +51,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    const fn place(self) -> usize {
+    const fn index(self) -> usize {
         match self {
             Self::Sync => 0,
             Self::Word => 1,
@@ -108,7 +108,7 @@ pub struct Silence {
 impl Silence {
     /// Handles a frame of a kind.
     pub fn received(&mut self, kind: Kind, now_us: u64) {
-        let Some(cycle) = self.cycles.get_mut(kind.place()) else { return };
+        let Some(cycle) = self.cycles.get_mut(kind.index()) else { return };
         cycle.received(now_us);
         if cycle.is_armed() {
             // The host still sends, so a kind that is late was given up.

@@ -34,7 +34,7 @@ impl StoredNode {
 
     /// Copies `bytes`; those beyond [`LONGEST`] are discarded.
     #[must_use]
-    pub fn of(bytes: &[u8]) -> Self {
+    pub fn from_bytes(bytes: &[u8]) -> Self {
         let mut stored = Self::NOTHING;
         for (to, from) in stored.bytes.iter_mut().zip(bytes) {
             *to = *from;

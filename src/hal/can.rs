@@ -14,8 +14,8 @@ impl Frame {
     pub fn new(id: u16, data: &[u8]) -> Self {
         let mut bytes = [0; 8];
         let mut length = 0;
-        for (place, byte) in bytes.iter_mut().zip(data) {
-            *place = *byte;
+        for (slot, byte) in bytes.iter_mut().zip(data) {
+            *slot = *byte;
             length += 1;
         }
         Self { id: id & 0x7FF, length, data: bytes }

@@ -114,9 +114,9 @@ pub struct Contacts {
     pub start: bool,
 }
 
-/// Place of an absolute encoder.
+/// Side of the gear at which an absolute encoder is mounted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EncoderPlace {
+pub enum AbsoluteEncoderSide {
     /// At the rotor.
     Rotor,
     /// At the joint.
@@ -156,7 +156,7 @@ pub trait Hardware<const N: usize> {
     /// Quadrature counter of an axis.
     fn encoder_count(&self, axis: usize) -> u16;
     /// Frame with the angle of an absolute encoder; all ones without one.
-    fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16;
+    fn encoder_frame(&mut self, axis: usize, side: AbsoluteEncoderSide) -> u16;
     /// Temperature of a bridge, degrees Celsius; `None` if its thermistor is open or shorted.
     fn temperature(&self, axis: usize) -> Option<f32>;
     /// Starts a conversion of the thermistor in an axis' motor.

@@ -277,7 +277,7 @@ impl<const N: usize> Control<N> {
         }
         let took_update = !refused && matches!(request, Some(ControlRequest::TakeUpdate));
         let power = self.accept(request.filter(|_| !refused), gravity);
-        let commanded = self.obey(host.as_mut());
+        let commanded = self.apply_commands(host.as_mut());
         let assisted = self.assist();
         let motion = match &commanded {
             Some(commanded) => commanded.motion,

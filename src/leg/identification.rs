@@ -13,8 +13,8 @@ use crate::ident::{
     Progress, Reason, Record, Recorder, Residual, RowModel, SearchState, Solver, Thresholds, Unused, Verdict,
     no_stribeck,
 };
+use crate::in_place::{Slot, each, empty_slot, fill, made};
 use crate::model::friction::Stribeck;
-use crate::place::{Slot, each, empty_slot, fill, made};
 
 /// Message from identification to control.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,12 +105,12 @@ where
     /// See [`Identification::new`].
     pub fn with_window(configuration: &LegConfiguration<N, B>, window: W) -> Result<Self, LegError> {
         let filters = Filters::new(configuration.bandwidth_hz)?;
-        Ok(made(|slot| Self::place(slot, configuration, &filters, window)))
+        Ok(made(|slot| Self::new_in(slot, configuration, &filters, window)))
     }
 
     /// Creates an identification in place, because it is larger than the device's stack. The filters must
     /// fit.
-    pub fn place<'a>(
+    pub fn new_in<'a>(
         slot: &'a mut MaybeUninit<Self>,
         configuration: &LegConfiguration<N, B>,
         filters: &Filters<f32, N, B, TAPS, PENDING>,
@@ -133,7 +133,7 @@ where
         }, {
             solver: empty_slot,
             validation: |records| each(records, || None),
-            recorder: |recorder| Recorder::place(recorder, filters, configuration.estimator, window),
+            recorder: |recorder| Recorder::new_in(recorder, filters, configuration.estimator, window),
         })
     }
 
@@ -166,11 +166,11 @@ where
         if logged.segment.is_some() {
             let sample = &logged.sample;
             let progress = self.recorder.push(&self.model, &sample.position_rad, &sample.torque_nm);
-            self.look_at(logged.segment, progress);
+            self.take_progress(logged.segment, progress);
         }
     }
 
-    fn look_at(&mut self, segment: Option<Segment>, progress: Option<Progress<f32, N, B>>) {
+    fn take_progress(&mut self, segment: Option<Segment>, progress: Option<Progress<f32, N, B>>) {
         match (segment, progress) {
             (Some(Segment::Validation(_)), Some(progress)) => self.held_out.take(&self.model, &progress),
             // At the first samples, or after one that was not finite, the windows restart.
@@ -215,7 +215,7 @@ where
             return;
         }
         while let Some(progress) = self.recorder.flush(&self.model) {
-            self.look_at(Some(segment), progress);
+            self.take_progress(Some(segment), progress);
         }
         self.held_out.break_off();
         let record = self.recorder.finish();
@@ -240,7 +240,7 @@ where
     #[inline(never)]
     fn begin_solving(&mut self, record: Record<f32, N, B>) {
         let (model, prior) = (&self.model, self.prior.as_ref());
-        self.solver.fill(|slot| Solver::place(slot, model, record, self.plan, prior, self.swarm_seed));
+        self.solver.fill(|slot| Solver::new_in(slot, model, record, self.plan, prior, self.swarm_seed));
         self.work = Work::Solving;
     }
 
@@ -287,7 +287,7 @@ where
         Some(Finding::Updated {
             cause: update.cause,
             verdict: update.verdict,
-            model: model.then(|| IdentifiedModel::of_estimate(&self.model, &update.estimate)),
+            model: model.then(|| IdentifiedModel::from_estimate(&self.model, &update.estimate)),
         })
     }
 
@@ -305,7 +305,7 @@ where
         let verdict = self.judge_with(&mut |_| {});
         self.verdict = Some(verdict);
         let estimate = self.solver.as_ref().map(Solver::estimate).filter(|_| verdict.is_accepted());
-        let model = estimate.map(|estimate| IdentifiedModel::of_estimate(&self.model, &estimate));
+        let model = estimate.map(|estimate| IdentifiedModel::from_estimate(&self.model, &estimate));
         Finding::Judged { verdict, model }
     }
 
@@ -317,7 +317,7 @@ where
     pub fn took_result(&mut self) -> Option<IdentifiedModel<N>> {
         let solver = self.solver.as_ref().filter(|_| self.verdict.is_some_and(Verdict::is_accepted))?;
         let estimate = solver.estimate();
-        let model = IdentifiedModel::of_estimate(&self.model, &estimate);
+        let model = IdentifiedModel::from_estimate(&self.model, &estimate);
         let others = self.validation.iter().flatten();
         self.model_monitor.accept(Baseline::new(estimate, solver.record(), others));
         self.accepted_stribeck = self.model.stribeck;

@@ -36,7 +36,7 @@ impl<const N: usize> IdentifiedModel<N> {
 
     /// Creates the model of an estimate, with its lower confidence bounds.
     #[must_use]
-    pub fn of_estimate<const B: usize>(model: &RowModel<f32, N, B>, estimate: &Estimate<f32, B>) -> Self {
+    pub fn from_estimate<const B: usize>(model: &RowModel<f32, N, B>, estimate: &Estimate<f32, B>) -> Self {
         Self { assured: assured(model, estimate), ..Self::new(model, &estimate.values) }
     }
 
@@ -85,7 +85,7 @@ impl<const N: usize> IdentifiedModel<N> {
     }
 
     /// Creates the model from equivalent parameters. The caller has checked that they belong to this chain.
-    pub(super) fn of_parameters(
+    pub(super) fn from_parameters(
         chain: Chain<f32, N>,
         parameters: LegParameters<f32, N>,
         stribeck: [Stribeck<f32>; N],

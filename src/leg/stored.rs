@@ -71,7 +71,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
     /// Fingerprint of this leg, which a model must carry.
     #[must_use]
     pub fn fingerprint(&self) -> Fingerprint {
-        Fingerprint::of(
+        Fingerprint::new(
             &self.model.chain,
             &self.joints.map(|joint| joint.scale.anatomy),
             &self.joints.map(|joint| {
@@ -127,7 +127,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
             return Err(RestoreError::InertiaShare);
         }
         let (chain, StoredModel { parameters, stribeck, constant, .. }) = (self.model.chain, *stored);
-        let model = IdentifiedModel::of_parameters(chain, parameters, stribeck, constant);
+        let model = IdentifiedModel::from_parameters(chain, parameters, stribeck, constant);
         Ok(model.with_assured(stored.assured))
     }
 }

@@ -79,8 +79,8 @@ impl<T: Real> AnatomicalJoint<T> {
     #[must_use]
     pub fn convert<U: Real>(&self) -> AnatomicalJoint<U> {
         AnatomicalJoint {
-            direction: U::of(self.direction.to_double()),
-            zero_offset: U::of(self.zero_offset.to_double()),
+            direction: U::from_double(self.direction.to_double()),
+            zero_offset: U::from_double(self.zero_offset.to_double()),
         }
     }
 

@@ -79,7 +79,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
                 return Err(ChainError::NotFinite { joint });
             }
         }
-        let exact = |value: T| if abs(value) < T::EPSILON * T::of(4.0) { T::zero() } else { value };
+        let exact = |value: T| if abs(value) < T::EPSILON * T::from_double(4.0) { T::zero() } else { value };
         let placements = geometry.map(|numbers| {
             let (sin_alpha, cos_alpha) = sin_cos(numbers.alpha);
             Placement { sin_alpha: exact(sin_alpha), cos_alpha: exact(cos_alpha), a: numbers.a, d: numbers.d }
@@ -90,7 +90,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
     /// Converts to another precision, each number rounded once.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Chain<U, N> {
-        let convert = |value: T| U::of(value.to_double());
+        let convert = |value: T| U::from_double(value.to_double());
         Chain {
             placements: self.placements.map(|placement| Placement {
                 sin_alpha: convert(placement.sin_alpha),

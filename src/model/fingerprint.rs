@@ -45,7 +45,7 @@ impl Fingerprint {
     /// Computes the fingerprint. The torque constants (N m/A at the joint) are negative where the drive is
     /// mounted mirrored.
     #[must_use]
-    pub fn of<const N: usize>(
+    pub fn new<const N: usize>(
         chain: &Chain<f32, N>,
         anatomy: &[AnatomicalJoint<f32>; N],
         torque_per_ampere: &[f32; N],
@@ -94,7 +94,7 @@ mod tests {
     const OFFSETS: [f32; 2] = [0.0, 0.1];
     const CONSTANTS: [f32; 2] = [1.5, 1.5];
 
-    fn of(
+    fn fingerprint(
         geometry: [DenavitHartenberg<f64>; 2],
         directions: [i32; 2],
         offsets: [f32; 2],
@@ -102,11 +102,11 @@ mod tests {
     ) -> Fingerprint {
         let anatomy =
             core::array::from_fn(|joint| AnatomicalJoint::new(directions[joint], offsets[joint]).unwrap());
-        Fingerprint::of(&Chain::new(&geometry).unwrap().convert(), &anatomy, &constants)
+        Fingerprint::new(&Chain::new(&geometry).unwrap().convert(), &anatomy, &constants)
     }
 
     fn own() -> Fingerprint {
-        of(GEOMETRY, DIRECTIONS, OFFSETS, CONSTANTS)
+        fingerprint(GEOMETRY, DIRECTIONS, OFFSETS, CONSTANTS)
     }
 
     #[test]
@@ -114,7 +114,7 @@ mod tests {
         let changed = |joint: usize, change: &dyn Fn(&mut DenavitHartenberg<f64>)| {
             let mut geometry = GEOMETRY;
             change(&mut geometry[joint]);
-            of(geometry, DIRECTIONS, OFFSETS, CONSTANTS)
+            fingerprint(geometry, DIRECTIONS, OFFSETS, CONSTANTS)
         };
         let mut others = std::vec::Vec::new();
         for joint in 0..2 {
@@ -124,18 +124,18 @@ mod tests {
             others.push(changed(joint, &|numbers| numbers.d += 1e-6));
             let mut directions = DIRECTIONS;
             directions[joint] = -directions[joint];
-            others.push(of(GEOMETRY, directions, OFFSETS, CONSTANTS));
+            others.push(fingerprint(GEOMETRY, directions, OFFSETS, CONSTANTS));
             let mut offsets = OFFSETS;
             offsets[joint] += 1e-6;
-            others.push(of(GEOMETRY, DIRECTIONS, offsets, CONSTANTS));
+            others.push(fingerprint(GEOMETRY, DIRECTIONS, offsets, CONSTANTS));
             let mut constants = CONSTANTS;
             constants[joint] *= 1.000_001;
-            others.push(of(GEOMETRY, DIRECTIONS, OFFSETS, constants));
+            others.push(fingerprint(GEOMETRY, DIRECTIONS, OFFSETS, constants));
         }
-        others.push(of([GEOMETRY[1], GEOMETRY[0]], DIRECTIONS, OFFSETS, CONSTANTS));
+        others.push(fingerprint([GEOMETRY[1], GEOMETRY[0]], DIRECTIONS, OFFSETS, CONSTANTS));
         others.push(own());
-        for (place, one) in others.iter().enumerate() {
-            assert!(!others[..place].contains(one), "change {place} is not seen");
+        for (index, one) in others.iter().enumerate() {
+            assert!(!others[..index].contains(one), "change {index} is not seen");
         }
     }
 
@@ -154,7 +154,7 @@ mod tests {
             Chain::new(&GEOMETRY).unwrap().convert(),
             "the sines differ, or this tests nothing"
         );
-        assert_eq!(Fingerprint::of(&chain, &anatomy, &CONSTANTS), own());
+        assert_eq!(Fingerprint::new(&chain, &anatomy, &CONSTANTS), own());
     }
 
     #[test]

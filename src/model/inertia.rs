@@ -123,8 +123,9 @@ mod tests {
 
     /// Parameters of point masses by their definition, the integrals as sums.
     fn cloud(points: &[(f64, Vector3<f64>)]) -> InertialParameters<f64> {
-        let sum =
-            |of: &dyn Fn(&Vector3<f64>) -> f64| points.iter().map(|(mass, place)| mass * of(place)).sum();
+        let sum = |of: &dyn Fn(&Vector3<f64>) -> f64| {
+            points.iter().map(|(mass, position)| mass * of(position)).sum()
+        };
         [
             sum(&|p| p.y * p.y + p.z * p.z),
             sum(&|p| -p.x * p.y),
@@ -142,8 +143,8 @@ mod tests {
     fn points(seed: u64) -> [(f64, Vector3<f64>); 12] {
         let mut random = TestRandom::new(seed);
         [(); 12].map(|()| {
-            let place = Vector3::new(0.3 + random.within(0.2), random.within(0.2), random.within(0.1));
-            (0.5 + random.within(0.4), place)
+            let position = Vector3::new(0.3 + random.within(0.2), random.within(0.2), random.within(0.1));
+            (0.5 + random.within(0.4), position)
         })
     }
 
@@ -154,7 +155,7 @@ mod tests {
             let about_origin = cloud(&points);
             let mass = about_origin[9];
             let centre = Vector3::new(about_origin[6], about_origin[7], about_origin[8]) / mass;
-            let centred = cloud(&points.map(|(mass, place)| (mass, place - centre)));
+            let centred = cloud(&points.map(|(mass, position)| (mass, position - centre)));
             let [xx, xy, xz, yy, yz, zz, ..] = centred;
             let body = RigidBody {
                 mass,

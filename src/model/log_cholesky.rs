@@ -52,7 +52,7 @@ impl<T: Real> LogCholesky<T> {
         if !(mass > T::zero() && parameters.iter().all(|value| is_finite(*value))) {
             return None;
         }
-        let half = T::of(0.5) / mass;
+        let half = T::from_double(0.5) / mass;
         let (second_x, second_y, second_z) =
             ((yy + zz - xx) * half, (xx + zz - yy) * half, (xx + yy - zz) * half);
         let (t1, t2, t3) = (hx / mass, hy / mass, hz / mass);
@@ -62,7 +62,7 @@ impl<T: Real> LogCholesky<T> {
         let extent_y = extent(second_y - t2 * t2 - s23 * s23, second_y)?;
         let s12 = (-xy / mass - t1 * t2 - s13 * s23) / extent_y;
         let extent_x = extent(second_x - t1 * t1 - s12 * s12 - s13 * s13, second_x)?;
-        let alpha = ln(mass) * T::of(0.5);
+        let alpha = ln(mass) * T::from_double(0.5);
         Some(Self([alpha, ln(extent_x), ln(extent_y), ln(extent_z), s12, s23, s13, t1, t2, t3]))
     }
 
@@ -72,8 +72,8 @@ impl<T: Real> LogCholesky<T> {
     #[must_use]
     pub fn to_parameters(&self) -> InertialParameters<T> {
         let [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = self.0;
-        let logarithm = T::of(LOGARITHM_LIMIT);
-        let length = T::of(LENGTH_LIMIT_M);
+        let logarithm = T::from_double(LOGARITHM_LIMIT);
+        let length = T::from_double(LENGTH_LIMIT_M);
         let e = |value: T| exp(clamp(value, -logarithm, logarithm));
         let [s12, s23, s13, t1, t2, t3] =
             [s12, s23, s13, t1, t2, t3].map(|value| clamp(value, -length, length));
@@ -101,7 +101,7 @@ impl<T: Real> LogCholesky<T> {
 
 /// Square root of a pivot (m2); `None` unless it exceeds the rounding of the number it was subtracted from.
 fn extent<T: Real>(pivot: T, whole: T) -> Option<T> {
-    (pivot > max(whole, T::zero()) * T::EPSILON * T::of(4.0)).then(|| sqrt(pivot))
+    (pivot > max(whole, T::zero()) * T::EPSILON * T::from_double(4.0)).then(|| sqrt(pivot))
 }
 
 /// True if a body with these parameters can exist: mass, and extent in three directions, beyond rounding.
@@ -114,7 +114,7 @@ pub fn is_physically_consistent<T: Real>(parameters: &InertialParameters<T>) -> 
 #[must_use]
 pub fn pseudo_inertia<T: Real>(parameters: &InertialParameters<T>) -> Matrix4<T> {
     let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
-    let half_trace = (xx + yy + zz) * T::of(0.5);
+    let half_trace = (xx + yy + zz) * T::from_double(0.5);
     let columns = [
         Vector4::new(half_trace - xx, -xy, -xz, hx),
         Vector4::new(-xy, half_trace - yy, -yz, hy),
@@ -134,7 +134,7 @@ mod tests {
         let mut random = TestRandom::new(seed);
         let mut worst = 0.0_f64;
         for _ in 0..200 {
-            let body = LogCholesky(random.body().0.map(T::of));
+            let body = LogCholesky(random.body().0.map(T::from_double));
             let back = LogCholesky::from_parameters(&body.to_parameters()).unwrap();
             for (one, other) in body.0.iter().zip(&back.0) {
                 worst = worst.max((*one - *other).to_double().abs());
@@ -212,9 +212,9 @@ mod tests {
     fn impossible_bodies_are_refused() {
         let good = TestRandom::new(55).body().to_parameters();
         assert!(is_physically_consistent(&good));
-        let changed = |place: usize, value: f64| {
+        let changed = |index: usize, value: f64| {
             let mut parameters = good;
-            parameters[place] = value;
+            parameters[index] = value;
             is_physically_consistent(&parameters)
         };
         assert!(!changed(9, -1.0) && !changed(9, 0.0), "mass");

@@ -78,7 +78,7 @@ pub fn rigid_body_torques<T: Real, const N: usize>(
     // Not `from_fn`: a size-optimised build would call it for each link and pass the wrench through memory.
     for (link, wrench) in wrenches.iter_mut().enumerate() {
         motion = motion.next(frames[link], state.qd[link], state.qdd[link]);
-        *wrench = Wrench::of_link(&parameters[link], &motion);
+        *wrench = Wrench::from_link(&parameters[link], &motion);
     }
 
     let mut torques = [T::zero(); N];
@@ -101,7 +101,7 @@ struct Wrench<T> {
 impl<T: Real> Wrench<T> {
     /// Wrench that the link's own mass needs.
     #[inline(always)]
-    fn of_link(parameters: &JointParameters<T>, motion: &LinkMotion<T>) -> Self {
+    fn from_link(parameters: &JointParameters<T>, motion: &LinkMotion<T>) -> Self {
         let (w, wd, a) = (motion.angular_velocity, motion.angular_acceleration, motion.acceleration);
         let (h, mass) = (first_moment(parameters), parameters[Parameter::M.index()]);
         Self {
@@ -137,16 +137,16 @@ mod tests {
         q: &[f64; N],
     ) -> [(nalgebra::Matrix3<f64>, Vector3<f64>); N] {
         let frames = chain.frames(q);
-        let (mut turn, mut place) = (nalgebra::Matrix3::identity(), Vector3::zeros());
+        let (mut turn, mut position) = (nalgebra::Matrix3::identity(), Vector3::zeros());
         core::array::from_fn(|link| {
-            place += turn * frames[link].origin;
+            position += turn * frames[link].origin;
             let axis = |x: f64, y: f64, z: f64| frames[link].to_parent(&Vector3::new(x, y, z));
             turn *= nalgebra::Matrix3::from_columns(&[
                 axis(1.0, 0.0, 0.0),
                 axis(0.0, 1.0, 0.0),
                 axis(0.0, 0.0, 1.0),
             ]);
-            (turn, place)
+            (turn, position)
         })
     }
 

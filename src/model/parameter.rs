@@ -118,7 +118,7 @@ impl Parameter {
 /// Converts parameters from double precision, each rounded once.
 #[must_use]
 pub fn rounded<T: Real, const N: usize>(parameters: &LegParameters<f64, N>) -> LegParameters<T, N> {
-    parameters.map(|joint| joint.map(T::of))
+    parameters.map(|joint| joint.map(T::from_double))
 }
 
 #[cfg(test)]
@@ -127,8 +127,8 @@ mod tests {
 
     #[test]
     fn every_parameter_stands_where_its_index_says() {
-        for (place, parameter) in Parameter::ALL.iter().enumerate() {
-            assert_eq!(parameter.index(), place);
+        for (index, parameter) in Parameter::ALL.iter().enumerate() {
+            assert_eq!(parameter.index(), index);
         }
         let symbols = ["XX", "XY", "XZ", "YY", "YZ", "ZZ", "HX", "HY", "HZ", "M", "IA", "FC", "FV", "OFF"];
         assert_eq!(Parameter::ALL.map(Parameter::symbol), symbols);

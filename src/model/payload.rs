@@ -31,7 +31,7 @@ pub struct Payload<T> {
     /// Mass, kg.
     pub mass: T,
     /// Position in the joint's frame, m.
-    pub place: Vector3<T>,
+    pub position: Vector3<T>,
 }
 
 impl<T: Real> Payload<T> {
@@ -39,7 +39,7 @@ impl<T: Real> Payload<T> {
     #[must_use]
     pub fn parameters<const N: usize>(&self) -> LegParameters<T, N> {
         let mut parameters = [[T::zero(); PARAMETERS_PER_JOINT]; N];
-        let body = RigidBody { mass: self.mass, centre_of_mass: self.place, inertia: Matrix3::zeros() };
+        let body = RigidBody { mass: self.mass, centre_of_mass: self.position, inertia: Matrix3::zeros() };
         if let Some(joint) = parameters.get_mut(self.joint) {
             for (slot, value) in joint.iter_mut().zip(body.to_parameters()).take(INERTIAL_PARAMETERS) {
                 *slot = value;
@@ -53,8 +53,8 @@ impl<T: Real> Payload<T> {
     pub fn convert<U: Real>(&self) -> Payload<U> {
         Payload {
             joint: self.joint,
-            mass: U::of(self.mass.to_double()),
-            place: self.place.map(|element| U::of(element.to_double())),
+            mass: U::from_double(self.mass.to_double()),
+            position: self.position.map(|element| U::from_double(element.to_double())),
         }
     }
 
@@ -80,9 +80,9 @@ mod tests {
         let (mut random, chain) = (TestRandom::new(91), paper_chain::<f64>());
         let gravity = Vector3::new(0.3, -0.2, -9.7);
         for joint in 0..3 {
-            let payload = Payload { joint, mass: 2.5, place: Vector3::new(0.2, -0.05, 0.03) };
-            let place = |q: &[f64; 3]| {
-                (0..=joint).rev().fold(payload.place, |point, at| {
+            let payload = Payload { joint, mass: 2.5, position: Vector3::new(0.2, -0.05, 0.03) };
+            let point_at = |q: &[f64; 3]| {
+                (0..=joint).rev().fold(payload.position, |point, at| {
                     let frame = chain.frames(q)[at];
                     frame.to_parent(&point) + frame.origin
                 })
@@ -94,7 +94,8 @@ mod tests {
                 })
             };
             let step = 1e-4;
-            let acceleration = (place(&at(step)) - place(&at(0.0)) * 2.0 + place(&at(-step))) / (step * step);
+            let acceleration =
+                (point_at(&at(step)) - point_at(&at(0.0)) * 2.0 + point_at(&at(-step))) / (step * step);
             let mut loaded = [[0.0; PARAMETERS_PER_JOINT]; 3];
             payload.add_to(&mut loaded);
             let torque = joint_torques(&chain, &loaded, &state, &gravity);
@@ -102,7 +103,7 @@ mod tests {
                 let mut moved = [state.q, state.q];
                 moved[0][axis] += step;
                 moved[1][axis] -= step;
-                let lever = (place(&moved[0]) - place(&moved[1])) / (2.0 * step);
+                let lever = (point_at(&moved[0]) - point_at(&moved[1])) / (2.0 * step);
                 let expected = payload.mass * lever.dot(&(acceleration - gravity));
                 // Second differences over 1e-4 s round at 1e-8 of numbers near 1, times mass and lever.
                 assert!((torque[axis] - expected).abs() < 1e-5, "{} {expected}", torque[axis]);
@@ -113,7 +114,7 @@ mod tests {
     #[test]
     fn a_load_taken_off_leaves_the_leg_and_a_joint_that_is_not_there_carries_nothing() {
         let parameters = TestRandom::new(92).leg::<2>();
-        let payload = Payload { joint: 1, mass: 3.0, place: Vector3::new(0.3, 0.1, 0.0) };
+        let payload = Payload { joint: 1, mass: 3.0, position: Vector3::new(0.3, 0.1, 0.0) };
         let mut loaded = parameters;
         payload.add_to(&mut loaded);
         assert!(loaded[1][9] > parameters[1][9] + 2.9 && loaded[0] == parameters[0]);

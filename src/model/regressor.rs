@@ -114,7 +114,7 @@ mod tests {
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
         for _ in 0..200 {
             let (chain, leg) = (random.chain::<N>().convert::<T>(), rounded(&random.leg::<N>()));
-            let (state, gravity) = (rounded_state(&random.state()), random.gravity().map(T::of));
+            let (state, gravity) = (rounded_state(&random.state()), random.gravity().map(T::from_double));
             let torques = joint_torques(&chain, &leg, &state, &gravity);
             for (row, torque) in regressor(&chain, &state, &gravity).iter().zip(&torques) {
                 worst = worst.max((row_torque(row, &leg) - *torque).to_double().abs());

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 /// Gravity of the planar leg: straight down along x of the base.
 pub fn down_along_x<T: Real>() -> Vector3<T> {
-    Vector3::new(T::of(9.81), T::zero(), T::zero())
+    Vector3::new(T::from_double(9.81), T::zero(), T::zero())
 }
 
 impl TestRandom {
@@ -66,17 +66,25 @@ impl TestRandom {
 }
 
 pub fn rounded_state<T: Real, const N: usize>(state: &JointState<f64, N>) -> JointState<T, N> {
-    JointState { q: state.q.map(T::of), qd: state.qd.map(T::of), qdd: state.qdd.map(T::of) }
+    JointState {
+        q: state.q.map(T::from_double),
+        qd: state.qd.map(T::from_double),
+        qdd: state.qdd.map(T::from_double),
+    }
 }
 
 /// Hip and knee: parallel axes, thigh of `length` metres.
 pub fn planar_leg<T: Real>(length: f64) -> Chain<T, 2> {
-    let joint = |a: f64| DenavitHartenberg { alpha: T::zero(), a: T::of(a), d: T::zero() };
+    let joint = |a: f64| DenavitHartenberg { alpha: T::zero(), a: T::from_double(a), d: T::zero() };
     Chain::new(&[joint(0.0), joint(length)]).unwrap()
 }
 
 /// The paper's chain: a vertical axis, then two parallel horizontal ones (gravity along -z of the base).
 pub fn paper_chain<T: Real>() -> Chain<T, 3> {
-    let joint = |alpha: f64, a: f64| DenavitHartenberg { alpha: T::of(alpha), a: T::of(a), d: T::zero() };
+    let joint = |alpha: f64, a: f64| DenavitHartenberg {
+        alpha: T::from_double(alpha),
+        a: T::from_double(a),
+        d: T::zero(),
+    };
     Chain::new(&[joint(0.0, 0.0), joint(FRAC_PI_2, 0.0), joint(0.0, 0.45)]).unwrap()
 }

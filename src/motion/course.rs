@@ -85,9 +85,9 @@ impl Course {
         }
     }
 
-    /// Limits the position to at most `window` from `place`.
-    pub fn keep_within(&mut self, window: f32, place: f32) {
-        self.position = clamp(self.position, place - window, place + window);
+    /// Limits the position to at most `window` from `centre`.
+    pub fn keep_within(&mut self, window: f32, centre: f32) {
+        self.position = clamp(self.position, centre - window, centre + window);
     }
 
     /// Limits the position to a range.

@@ -75,7 +75,7 @@ impl GaitJoint {
     /// Equation (31), or (32) with a tenth of its two large amplitudes: degrees at `percent` of the cycle.
     #[must_use]
     pub fn repaired_deg<T: Real>(self, percent: T) -> T {
-        let of = T::of;
+        let of = T::from_double;
         let bell = |height: f64, centre: f64, width: f64| {
             let x = (percent - of(centre)) / of(width);
             of(height) * exp(-(x * x))
@@ -91,9 +91,9 @@ impl GaitJoint {
     /// Repaired curve without its jump (step 2), degrees at `percent` of the cycle.
     #[must_use]
     pub fn closed_deg<T: Real>(self, percent: T) -> T {
-        let hundred = T::of(100.0);
+        let hundred = T::from_double(100.0);
         let jump = self.repaired_deg(hundred) - self.repaired_deg(T::zero());
-        self.repaired_deg(percent) - jump * (percent / hundred - T::of(0.5))
+        self.repaired_deg(percent) - jump * (percent / hundred - T::from_double(0.5))
     }
 }
 

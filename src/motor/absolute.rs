@@ -44,7 +44,7 @@ impl AbsoluteAngle {
     /// Angle in a frame; `None` with wrong parity or a set error flag. A line without a chip reads as all
     /// ones, which has the error flag.
     #[must_use]
-    pub const fn of_frame(frame: u16) -> Option<Self> {
+    pub const fn from_frame(frame: u16) -> Option<Self> {
         let is_valid = frame.count_ones().is_multiple_of(2) && frame & ERROR == 0;
         if is_valid { Some(Self(frame & ANGLE)) } else { None }
     }
@@ -87,14 +87,14 @@ mod tests {
         for steps in 0..1 << 14 {
             let angle = AbsoluteAngle::from_steps(steps);
             let frame = angle.to_frame();
-            assert_eq!(AbsoluteAngle::of_frame(frame).map(AbsoluteAngle::steps), Some(steps));
-            assert!((0..16).all(|bit| AbsoluteAngle::of_frame(frame ^ 1 << bit).is_none()), "{steps}");
+            assert_eq!(AbsoluteAngle::from_frame(frame).map(AbsoluteAngle::steps), Some(steps));
+            assert!((0..16).all(|bit| AbsoluteAngle::from_frame(frame ^ 1 << bit).is_none()), "{steps}");
         }
         // No chip, and a chip that reports an error.
-        assert_eq!(AbsoluteAngle::of_frame(0xFFFF), None);
-        assert_eq!(AbsoluteAngle::of_frame(0xC000), None);
+        assert_eq!(AbsoluteAngle::from_frame(0xFFFF), None);
+        assert_eq!(AbsoluteAngle::from_frame(0xC000), None);
         // Data sheet: the answer to a read command has the parity in the highest bit.
-        assert_eq!(AbsoluteAngle::of_frame(0x8001), Some(AbsoluteAngle(1)));
+        assert_eq!(AbsoluteAngle::from_frame(0x8001), Some(AbsoluteAngle(1)));
     }
 
     #[test]

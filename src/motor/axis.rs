@@ -367,7 +367,7 @@ impl Axis {
             if let Some(at) = sample.index_count {
                 let since =
                     constants.counter_sign * i32::from(sample.encoder_count.wrapping_sub(at).cast_signed());
-                self.index.came(self.position - since, step);
+                self.index.on_pulse(self.position - since, step);
             }
         }
         let angle = self.angle();
@@ -535,12 +535,12 @@ impl Axis {
                 position: self.position,
                 angle,
             };
-            let mut found = self.model_watch.look(&self.constants.model, &shown);
+            let mut found = self.model_watch.check(&self.constants.model, &shown);
             if self.first_motion.is_limited() {
                 let model = &self.constants.model;
                 let watch = &self.model_watch;
                 let volts = [model.back_emf(&shown), watch.residual(), watch.tolerance()];
-                self.first_motion.look(&self.constants.scale, self.counts, volts);
+                self.first_motion.advance(&self.constants.scale, self.counts, volts);
                 let greatest = SPEED_SHARE * model.frozen_speed(Ampere(self.current_limit));
                 // A wrong angle looks like an open phase.
                 if found == Some(AxisFault::OpenPhase)

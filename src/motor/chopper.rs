@@ -79,7 +79,7 @@ pub struct BrakeBudget {
 
 impl BrakeBudget {
     const WHOLE_S: f32 = 0.5;
-    const GIVEN_BACK: f32 = 0.02;
+    const REFILL_SHARE: f32 = 0.02;
     const TICK_S: f32 = 1.0 / CURRENT_RATE_HZ as f32;
 
     /// The full budget.
@@ -96,7 +96,7 @@ impl BrakeBudget {
     #[must_use]
     pub fn spend(&mut self, wanted: f32) -> f32 {
         let duty = if self.used_up { 0.0 } else { wanted };
-        self.left_s = clamp(self.left_s + (Self::GIVEN_BACK - duty) * Self::TICK_S, 0.0, Self::WHOLE_S);
+        self.left_s = clamp(self.left_s + (Self::REFILL_SHARE - duty) * Self::TICK_S, 0.0, Self::WHOLE_S);
         self.used_up = !(self.left_s > if self.used_up { 0.5 * Self::WHOLE_S } else { 0.0 });
         duty
     }

@@ -217,7 +217,7 @@ impl Constants {
         calibration: &Calibration,
     ) -> Result<Self, AxisError> {
         configuration.check()?;
-        if calibration.encoder() != EncoderSetting::of(configuration) {
+        if calibration.encoder() != EncoderSetting::new(configuration) {
             return Err(AxisError::Calibration);
         }
         let motor = MotorConstants {

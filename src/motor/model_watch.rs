@@ -241,7 +241,7 @@ struct Stop {
 
 impl Stop {
     /// Runs one servo period; returns whether the counter has stopped as no rotor can.
-    fn look(&mut self, limits: &ModelLimits, position: i32) -> bool {
+    fn check(&mut self, limits: &ModelLimits, position: i32) -> bool {
         let turn = limits.scale.counts_per_turn();
         let way = limits.scale.within_turn(position - self.before);
         let step = if 2 * way > turn { way - turn } else { way };
@@ -306,7 +306,7 @@ impl ModelWatch {
 
     /// Runs one servo period and returns the fault, if any.
     #[must_use]
-    pub fn look(&mut self, limits: &ModelLimits, now: &Shown<'_>) -> Option<AxisFault> {
+    pub fn check(&mut self, limits: &ModelLimits, now: &Shown<'_>) -> Option<AxisFault> {
         let residual = residual(limits, now);
         let square = residual.d * residual.d + residual.q * residual.q;
         self.square = square;
@@ -327,7 +327,7 @@ impl ModelWatch {
                 return Some(if frozen { AxisFault::EncoderFrozen } else { AxisFault::OpenPhase });
             }
         }
-        if self.stop.look(limits, now.position) {
+        if self.stop.check(limits, now.position) {
             self.stop = Self::EMPTY.stop;
             return Some(AxisFault::EncoderFrozen);
         }
@@ -424,7 +424,7 @@ mod tests {
             let now = shown(&current_loop, current, ElectricalAngle::default());
             // The counter moves: a change of the current at a standing one would be a fault of its own.
             let seen = (0..3 * i32::from(PATIENCE))
-                .find_map(|period| watch.look(&limits, &Shown { position: 10 * period, ..now }));
+                .find_map(|period| watch.check(&limits, &Shown { position: 10 * period, ..now }));
             assert_eq!(seen, None, "{d} {q}");
         }
     }
@@ -455,7 +455,7 @@ mod tests {
         ];
         for (case, (way, expected)) in cases.into_iter().enumerate() {
             let mut stop = ModelWatch::EMPTY.stop;
-            let seen = (1..400).find(|period| stop.look(&limits, 8191 & way(*period)));
+            let seen = (1..400).find(|period| stop.check(&limits, 8191 & way(*period)));
             assert_eq!(seen, expected, "case {case}");
         }
     }
@@ -470,7 +470,7 @@ mod tests {
             let now = Shown { speed_rad_per_s, ..shown(&current_loop, current, ElectricalAngle::default()) };
             let mut watch = ModelWatch::EMPTY;
             let seen = (0..3 * i32::from(PATIENCE))
-                .find_map(|period| watch.look(&limits, &Shown { position: 10 * period, ..now }));
+                .find_map(|period| watch.check(&limits, &Shown { position: 10 * period, ..now }));
             assert_eq!(seen, expected, "{speed_rad_per_s}");
         }
     }
@@ -490,7 +490,7 @@ mod tests {
                 let held = Rotating { d: Volt(residual.d), q: Volt(residual.q) };
                 let none = Rotating { d: Ampere::ZERO, q: Ampere::ZERO };
                 let current_loop = CurrentLoop::holding(held);
-                watch.look(&limits, &shown(&current_loop, none, angle)) == Some(AxisFault::CurrentOffset)
+                watch.check(&limits, &shown(&current_loop, none, angle)) == Some(AxisFault::CurrentOffset)
             })
         });
         assert!(seen[0].is_some() && seen[0] == seen[1], "{seen:?}");

@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn dead_time_is_given_back_with_the_sign_of_each_phase_and_smoothly_through_zero() {
+    fn dead_time_compensation_follows_the_sign_of_each_phase_smoothly_through_zero() {
         let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, DeadTime::Compensated { band: Ampere(0.5) })
             .expect("usual");
         let duties = |current| modulator.duties(at(0.0, 0), 1.0 / 48.0, current);

@@ -19,7 +19,7 @@ pub enum Order {
     /// Control the current.
     Run(Axis),
     /// Set the joint's position to these counts.
-    Place(i32),
+    SetCounts(i32),
     /// Count the rotor position as lost: an absolute encoder contradicts it.
     LosePosition,
     /// Set the bandwidth of the current loop.
@@ -51,8 +51,8 @@ pub enum Outcome {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Doing {
-    Nothing,
+enum AxisMode {
+    Off,
     Calibrating(Calibrator),
     Running(Axis),
 }
@@ -60,7 +60,7 @@ enum Doing {
 /// State of one axis; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisState {
-    doing: Doing,
+    mode: AxisMode,
     /// Fault that was already reported.
     faulted: Option<AxisFault>,
     /// Index pulses since the axis was last calibrated, for the next calibration.
@@ -69,63 +69,63 @@ pub struct AxisState {
 
 impl AxisState {
     /// Initial state: outputs off.
-    pub const OFF: Self = Self { doing: Doing::Nothing, faulted: None, search: IndexSearch::EMPTY };
+    pub const OFF: Self = Self { mode: AxisMode::Off, faulted: None, search: IndexSearch::EMPTY };
 
     /// A running axis that was calibrated elsewhere.
     #[must_use]
     pub const fn running(axis: Axis) -> Self {
-        Self { doing: Doing::Running(axis), ..Self::OFF }
+        Self { mode: AxisMode::Running(axis), ..Self::OFF }
     }
 
     /// Returns whether the axis has a calibration.
     #[must_use]
     pub const fn is_running(&self) -> bool {
-        matches!(self.doing, Doing::Running(_))
+        matches!(self.mode, AxisMode::Running(_))
     }
 
     /// The axis, if it runs.
     #[inline(always)]
     pub fn axis_mut(&mut self) -> Option<&mut Axis> {
-        match &mut self.doing {
-            Doing::Running(axis) => Some(axis),
-            Doing::Nothing | Doing::Calibrating(_) => None,
+        match &mut self.mode {
+            AxisMode::Running(axis) => Some(axis),
+            AxisMode::Off | AxisMode::Calibrating(_) => None,
         }
     }
 
     /// The fault of a running axis.
     #[must_use]
     pub fn fault(&self) -> Option<AxisFault> {
-        match &self.doing {
-            Doing::Running(axis) => axis.fault(),
-            Doing::Nothing | Doing::Calibrating(_) => None,
+        match &self.mode {
+            AxisMode::Running(axis) => axis.fault(),
+            AxisMode::Off | AxisMode::Calibrating(_) => None,
         }
     }
 
     /// Square of the motor's current vector at this tick, A^2.
     #[inline(always)]
     pub const fn square_a2(&self) -> f32 {
-        match &self.doing {
-            Doing::Nothing => 0.0,
-            Doing::Calibrating(calibrator) => calibrator.square_a2(),
-            Doing::Running(axis) => axis.square_a2(),
+        match &self.mode {
+            AxisMode::Off => 0.0,
+            AxisMode::Calibrating(calibrator) => calibrator.square_a2(),
+            AxisMode::Running(axis) => axis.square_a2(),
         }
     }
 
     /// Executes an order. Returns a calibration that it interrupts, or a lost rotor position.
     #[inline(never)]
-    pub fn obey(&mut self, order: Order) -> Option<Outcome> {
+    pub fn apply_order(&mut self, order: Order) -> Option<Outcome> {
         match order {
             Order::Off => {
-                let measuring = matches!(self.doing, Doing::Calibrating(_));
-                self.doing = Doing::Nothing;
+                let measuring = matches!(self.mode, AxisMode::Calibrating(_));
+                self.mode = AxisMode::Off;
                 return measuring.then_some(Outcome::Interrupted);
             }
             Order::Calibrate(mut calibrator) => {
                 calibrator.take_index(&self.search);
-                self.doing = Doing::Calibrating(calibrator);
+                self.mode = AxisMode::Calibrating(calibrator);
             }
             Order::Run(axis) => *self = Self::running(axis),
-            Order::Place(counts) => {
+            Order::SetCounts(counts) => {
                 if let Some(axis) = self.axis_mut() {
                     axis.set_counts(counts);
                 }
@@ -147,7 +147,7 @@ impl AxisState {
                 let is_lost = self.axis_mut().is_some_and(|axis| !axis.clear_fault());
                 self.faulted = None;
                 if is_lost {
-                    self.doing = Doing::Nothing;
+                    self.mode = AxisMode::Off;
                     return fault.map(|fault| Outcome::Fault { fault, lost: true });
                 }
             }
@@ -179,7 +179,7 @@ impl AxisState {
         target: AxisRequest,
         react: impl FnOnce(Outcome, bool, AxisCommand) -> AxisCommand,
     ) -> AxisCommand {
-        let Doing::Running(running) = &mut self.doing else {
+        let AxisMode::Running(running) = &mut self.mode else {
             return match self.tick_before(sample, bridges) {
                 (command, None) => command,
                 (command, Some(outcome)) => react(outcome, false, command),
@@ -206,9 +206,9 @@ impl AxisState {
     #[inline(never)]
     fn tick_before(&mut self, sample: &AxisSample, bridges: Bridges) -> (AxisCommand, Option<Outcome>) {
         // Also during a calibration: an interrupted check at standstill can be repeated at once.
-        let came = self.search.follow(sample);
-        let Doing::Calibrating(calibrator) = &mut self.doing else {
-            return (AxisCommand::OFF, came.then_some(Outcome::Index(self.search)));
+        let has_pulse = self.search.follow(sample);
+        let AxisMode::Calibrating(calibrator) = &mut self.mode else {
+            return (AxisCommand::OFF, has_pulse.then_some(Outcome::Index(self.search)));
         };
         let outcome = if bridges == Bridges::Follow {
             match calibrator.tick(sample) {
@@ -219,7 +219,7 @@ impl AxisState {
         } else {
             Outcome::Interrupted
         };
-        self.doing = Doing::Nothing;
+        self.mode = AxisMode::Off;
         (AxisCommand::OFF, Some(outcome))
     }
 }

@@ -138,7 +138,7 @@ impl BusRound {
             if is_watching {
                 device.watch(now_us, results);
             } else {
-                device.look_back(now_us);
+                device.check_gap(now_us);
             }
             Self::store(device, storage);
             device.update_board(&signals.board_status());

@@ -206,13 +206,13 @@ impl Operator {
 
     /// Next of the steps shutdown, switch on, enable; each once per closing.
     fn next_step(&mut self, drive: DriveState) -> Option<OperatorRequest> {
-        let (place, request) = match drive {
+        let (step, request) = match drive {
             DriveState::SwitchOnDisabled => (0, PowerRequest::Shutdown),
             DriveState::ReadyToSwitchOn => (1, PowerRequest::SwitchOn),
             DriveState::SwitchedOn => (2, PowerRequest::EnableOperation),
             _ => return None,
         };
-        (self.steps == place).then(|| {
+        (self.steps == step).then(|| {
             self.steps += 1;
             OperatorRequest::Power(request)
         })

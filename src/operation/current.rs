@@ -147,7 +147,7 @@ impl<const N: usize> CurrentLoops<N> {
         if axis == 0 {
             self.brake(tick, signals, hardware);
         }
-        self.look_at_the_others(axis, tick.now, signals);
+        self.check_other_axes(axis, tick.now, signals);
         let all_run = self.axes.iter().all(|axis| axis.stage.is_running());
         let period = self.period;
         let Some(this) = self.axes.get_mut(axis) else { return };
@@ -155,7 +155,7 @@ impl<const N: usize> CurrentLoops<N> {
             this.unsent = send(axis, outcome, ends);
         }
         let mut sample = tick.sample;
-        if let Some(stood) = this.look(axis, tick, period, signals) {
+        if let Some(stood) = this.check(axis, tick, period, signals) {
             if stood > 0 {
                 this.late = LATE_TICKS;
             }
@@ -168,13 +168,13 @@ impl<const N: usize> CurrentLoops<N> {
                 report(axis, Outcome::StoodStill, &mut this.unsent, ends, signals);
             }
         }
-        let bridges = Bridges::of(signals.inhibit.causes());
+        let bridges = Bridges::from_causes(signals.inhibit.causes());
         if bridges == Bridges::Off {
             hardware.disable_all();
         }
         if ends.orders.get(axis).is_some_and(|orders| orders.ready()) {
             let order = ends.orders.get_mut(axis).and_then(|orders| orders.dequeue());
-            if let Some(outcome) = order.and_then(|order| this.stage.obey(order)) {
+            if let Some(outcome) = order.and_then(|order| this.stage.apply_order(order)) {
                 report(axis, outcome, &mut this.unsent, ends, signals);
             }
         }
@@ -204,7 +204,7 @@ impl<const N: usize> CurrentLoops<N> {
                 let _ = samples.enqueue(running.joint_sample());
             }
             if axis + 1 == N {
-                let (missed, forbids) = self.servo.look(signals.statistics.servo_ticks.get());
+                let (missed, forbids) = self.servo.check(signals.statistics.servo_ticks.get());
                 signals.inhibit.raise_bits(forbids);
                 if missed {
                     signals.statistics.servo_missed.add();
@@ -262,7 +262,7 @@ impl<const N: usize> CurrentLoops<N> {
     /// Checks the other axes' ticks. A stopped axis cannot report itself, and its bridge repeats its last
     /// command.
     #[inline(always)]
-    fn look_at_the_others(&self, axis: usize, now: u32, signals: &Signals<N>) {
+    fn check_other_axes(&self, axis: usize, now: u32, signals: &Signals<N>) {
         let late = LATE_PERIODS.wrapping_mul(self.period.get());
         let stands = signals.inhibit.is_storing();
         for (other, that) in self.axes.iter().enumerate() {
@@ -287,7 +287,7 @@ fn apply<const N: usize, H: Hardware<N>>(
     }
     hardware.set_duty(axis, &command.duty);
     hardware.masked(|hardware| {
-        if Bridges::of(signals.inhibit.causes()) != Bridges::Off {
+        if Bridges::from_causes(signals.inhibit.causes()) != Bridges::Off {
             hardware.enable(axis);
         }
     });
@@ -297,7 +297,7 @@ impl AxisLoop {
     /// Sets inhibit reasons from contacts, conversion and the time since the last tick. During a flash write
     /// missing ticks and conversions are no fault; returns the number of missed periods then.
     #[inline(always)]
-    fn look<const N: usize>(
+    fn check<const N: usize>(
         &mut self,
         axis: usize,
         tick: &Tick,
@@ -319,7 +319,7 @@ impl AxisLoop {
             complete: tick.complete || stood.is_some(),
             missed,
         };
-        let (forbids, damp) = self.watch.look(&state);
+        let (forbids, damp) = self.watch.check(&state);
         signals.inhibit.raise_bits(forbids);
         if damp {
             signals.report(BoardFault::CurrentTicks, axis);
@@ -341,9 +341,9 @@ fn react<const N: usize, H: Hardware<N>>(
     let mut command = command;
     if let Outcome::Fault { fault, .. } = *outcome {
         let code = axis_code(fault);
-        signals.inhibit.raise(InhibitReason::of_axis(axis, code, switching));
+        signals.inhibit.raise(InhibitReason::from_axis_fault(axis, code, switching));
         signals.report_axis(code, axis);
-        match Bridges::of(signals.inhibit.causes()) {
+        match Bridges::from_causes(signals.inhibit.causes()) {
             Bridges::Follow => {}
             Bridges::Brake => {
                 command = AxisCommand::BRAKE;

@@ -49,7 +49,7 @@ impl<T> Handover<T> {
     }
 
     /// Passes the value back to the requesting side.
-    pub fn give_back(&self) {
+    pub fn return_value(&self) {
         self.turn.set(RETURNED);
     }
 
@@ -85,7 +85,7 @@ mod tests {
         handover.give();
         assert!(handover.idle().is_none() && handover.take_back().is_none());
         assert_eq!(handover.given().map(|value| *value), Some(2));
-        handover.give_back();
+        handover.return_value();
         assert!(handover.idle().is_none() && handover.given().is_none());
         assert_eq!(handover.take_back().map(|value| *value), Some(2));
         assert!(handover.take_back().is_none() && handover.idle().is_some());

@@ -178,7 +178,7 @@ impl<const N: usize> Housekeeper<N> {
             joint_zeros: [None; N],
             resetting: None,
             step: None,
-            failure: StepReport::of(StepResult::Interrupted),
+            failure: StepReport::new(StepResult::Interrupted),
             drive: None,
             windings: settings.windings.map(|rating| Winding::new(rating, None)),
             assumed: [true; N],
@@ -218,7 +218,7 @@ impl<const N: usize> Housekeeper<N> {
             let (stored, axis, encoders) =
                 (stored.get(axis)?.as_ref()?, axes.get(axis)?, encoders.get(axis)?);
             let zero = stored.joint_zero.filter(|zero| zero.setting == encoders.joint_setting());
-            zero.filter(|_| encoders.absolute.joint.is_some() && stored.encoder == EncoderSetting::of(axis))
+            zero.filter(|_| encoders.absolute.joint.is_some() && stored.encoder == EncoderSetting::new(axis))
         });
         Self { stored, joint_zeros, ..self }
     }
@@ -235,7 +235,7 @@ impl<const N: usize> Housekeeper<N> {
         signals.set_permits(self.permits());
         self.report_step(signals);
         signals.set_board_state(self.board_state(signals));
-        hardware.set_status_light(StatusLight::of(&self.light_inputs(signals)).is_lit(self.round));
+        hardware.set_status_light(StatusLight::from_inputs(&self.light_inputs(signals)).is_lit(self.round));
     }
 
     fn act(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
@@ -245,7 +245,7 @@ impl<const N: usize> Housekeeper<N> {
         if self.advance_reset(level) {
             return;
         }
-        self.look(level);
+        self.check_board(level);
         self.send_passed(level);
         self.set_bandwidths(level);
         let situation = self.situation(level);
@@ -326,10 +326,10 @@ impl<const N: usize> Housekeeper<N> {
     fn take_step(&mut self, situation: &Situation, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         let Some(step) = level.signals.take_step().filter(|_| self.step.is_none()) else { return };
         match self.operator.refusal(step, situation) {
-            Some(why) => level.signals.set_report(StepReport::of(why)),
+            Some(why) => level.signals.set_report(StepReport::new(why)),
             None => {
                 self.step = Some(step);
-                self.failure = StepReport::of(StepResult::Interrupted);
+                self.failure = StepReport::new(StepResult::Interrupted);
                 self.accept(step.into(), level);
             }
         }
@@ -338,16 +338,16 @@ impl<const N: usize> Housekeeper<N> {
     /// Reports the result of a host's step once it has ended.
     fn report_step(&mut self, signals: &Signals<N>) {
         let done =
-            |is_done: bool, otherwise| if is_done { StepReport::of(StepResult::Done) } else { otherwise };
+            |is_done: bool, otherwise| if is_done { StepReport::new(StepResult::Done) } else { otherwise };
         let report = match self.step {
             Some(CommissioningStep::Calibrate) if self.calibrating.is_none() => {
                 done(self.is_calibrated(), self.failure)
             }
             Some(CommissioningStep::Reference) if self.reference.is_none() && !self.placed => {
-                done(signals.has_begun(), StepReport::of(StepResult::JointMoved))
+                done(signals.has_begun(), StepReport::new(StepResult::JointMoved))
             }
             Some(CommissioningStep::Reset) if self.resetting.is_none() => {
-                done(signals.inhibit.is_clear(), StepReport::of(StepResult::Inhibited))
+                done(signals.inhibit.is_clear(), StepReport::new(StepResult::Inhibited))
             }
             _ => return,
         };
@@ -372,7 +372,7 @@ impl<const N: usize> Housekeeper<N> {
         self.calibrated.iter().all(|calibrated| *calibrated)
     }
 
-    fn look(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+    fn check_board(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         while let Some(drive) = level.ends.drive.dequeue() {
             self.drive = Some(drive);
         }
@@ -441,7 +441,7 @@ impl<const N: usize> Housekeeper<N> {
         match outcome {
             Outcome::Calibrated(_) if self.is_contradicted(axis) => {
                 level.record(refused(joint, "absolute_encoder", 0, None));
-                self.failure = StepReport { axis: joint, ..StepReport::of(StepResult::JointMoved) };
+                self.failure = StepReport { axis: joint, ..StepReport::new(StepResult::JointMoved) };
                 self.calibrating = None;
             }
             Outcome::Calibrated(calibration) => {
@@ -567,8 +567,8 @@ impl<const N: usize> Housekeeper<N> {
 
     /// Sets whether the index of an axis is certain.
     fn set_certain(&mut self, axis: usize, certain: bool) {
-        if let Some(place) = self.certain.get_mut(axis) {
-            *place = certain;
+        if let Some(slot) = self.certain.get_mut(axis) {
+            *slot = certain;
         }
     }
 
@@ -632,7 +632,7 @@ impl<const N: usize> Housekeeper<N> {
             Some(Ok(_)) if is_contradicted || is_absolute && position.is_none() => {
                 self.calibrating = None;
                 let joint = axis as u8 + 1;
-                self.failure = StepReport { axis: joint, ..StepReport::of(StepResult::JointMoved) };
+                self.failure = StepReport { axis: joint, ..StepReport::new(StepResult::JointMoved) };
                 level.record(refused(joint, "absolute_encoder", 0, None));
             }
             Some(Ok(calibrator)) => {
@@ -648,7 +648,7 @@ impl<const N: usize> Housekeeper<N> {
             }
             _ => {
                 self.calibrating = None;
-                self.failure = StepReport::of(StepResult::Inhibited);
+                self.failure = StepReport::new(StepResult::Inhibited);
                 level.signals.inhibit.raise(InhibitReason::Configuration);
             }
         }

@@ -54,10 +54,10 @@ impl TxScheduler {
         results: &R,
     ) {
         let waiting = hardware.mailboxes_waiting();
-        let waits = |place: usize| waiting & 1 << place != 0;
-        for (place, given) in self.given.iter_mut().enumerate() {
+        let waits = |index: usize| waiting & 1 << index != 0;
+        for (index, given) in self.given.iter_mut().enumerate() {
             // Drops frames that have left their mailbox.
-            given.take_if(|_| !waits(place));
+            given.take_if(|_| !waits(index));
         }
         let is_passive = controller == Controller::Passive;
         let since_us = *self.since_us.get_or_insert(now_us);
@@ -71,15 +71,15 @@ impl TxScheduler {
             self.take_back();
             return;
         }
-        let places = match controller {
+        let usable = match controller {
             Controller::Passive if waiting != 0 => 0,
             Controller::Passive => 1,
             _ => MAILBOXES,
         };
-        for place in (0..places).filter(|place| !waits(*place)) {
+        for index in (0..usable).filter(|index| !waits(*index)) {
             let Some(frame) = self.next(now_us, device, results) else { break };
-            hardware.send(place as u32, &frame);
-            if let Some(given) = self.given.get_mut(place) {
+            hardware.send(index as u32, &frame);
+            if let Some(given) = self.given.get_mut(index) {
                 *given = device.reports_once(&frame).then_some((self.count, frame));
                 self.count = self.count.wrapping_add(1);
             }
@@ -89,14 +89,14 @@ impl TxScheduler {
     /// Moves the frames of all mailboxes, in their order, before those that wait to be sent again.
     fn take_back(&mut self) {
         let mut back = [None; MAILBOXES];
-        let mut places = back.iter_mut();
+        let mut slots = back.iter_mut();
         for _ in 0..MAILBOXES {
             let oldest = self.given.iter_mut().filter(|given| given.is_some());
             let oldest = oldest.min_by_key(|given| given.map(|(number, _)| number)).and_then(Option::take);
             let next = oldest.map(|(_, frame)| frame);
             let next = next.or_else(|| self.again.iter_mut().find_map(Option::take));
-            if let Some(place) = places.next() {
-                *place = next;
+            if let Some(slot) = slots.next() {
+                *slot = next;
             }
         }
         self.again = back;

@@ -163,11 +163,11 @@ fn split_all<'a, T, const L: usize, const N: usize>(
     queues: &'a mut [Queue<T, L>; N],
 ) -> ([Producer<'a, T>; N], [Consumer<'a, T>; N]) {
     let mut consumers = [const { None }; N];
-    let mut places = consumers.iter_mut();
+    let mut slots = consumers.iter_mut();
     let producers = queues.each_mut().map(|queue| {
         let (producer, consumer) = queue.split();
-        if let Some(place) = places.next() {
-            *place = Some(consumer);
+        if let Some(slot) = slots.next() {
+            *slot = Some(consumer);
         }
         producer
     });

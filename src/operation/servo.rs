@@ -152,7 +152,7 @@ impl<const N: usize> ServoLevel<N> {
         while let Some(torque) = ends.assist.as_mut().and_then(|assist| assist.torques.dequeue()) {
             control.receive_torque(&torque);
         }
-        self.look_around(control, signals);
+        self.pass_board_state(control, signals);
         self.set_bandwidths(control, signals);
         let (request, by_hand) = self.next_request(control, ends, signals, hardware);
         // Until the brake is open the drive holds its pose.
@@ -316,14 +316,14 @@ impl<const N: usize> ServoLevel<N> {
     }
 
     /// Passes faults, bus voltage and temperature from the rest of the board to control.
-    fn look_around(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
+    fn pass_board_state(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
         self.pass_faults(control, signals);
         self.tick = self.tick.wrapping_add(1);
         if self.tick & CHECKSUM_MASK == 0 && !self.is_sound(control) {
             control.report(Fault { code: FaultCode::Parameters, joint: 0 });
         }
         let bus = self.volt_per_code * signals.statistics.bus[0].get() as f32;
-        if self.supply.look(bus) {
+        if self.supply.check(bus) {
             control.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
         }
         let joints = array::from_fn(|joint| JointShares {

@@ -463,8 +463,8 @@ impl<const N: usize> Signals<N> {
         if self.asked.get() == 0 {
             return None;
         }
-        self.set_report(StepReport::of(StepResult::UnderWay));
-        CommissioningStep::of(self.asked.swap(0))
+        self.set_report(StepReport::new(StepResult::UnderWay));
+        CommissioningStep::from_number(self.asked.swap(0))
     }
 
     /// Passes a command for the program on, from the bus.
@@ -479,7 +479,7 @@ impl<const N: usize> Signals<N> {
         }
         // Shown as under way until its outcome is set.
         self.program[1].set_bits(ProgramStatus::UNDER_WAY);
-        ProgramCommand::of(self.program[0].swap(0).wrapping_sub(1))
+        ProgramCommand::from_number(self.program[0].swap(0).wrapping_sub(1))
     }
 
     /// Status of a new image; under way while a command waits.
@@ -511,7 +511,7 @@ impl<const N: usize> Signals<N> {
         let is_asked = self.asked.get() != 0;
         let [result, axis, reason, detail] = self.report.get().to_le_bytes();
         let report = if is_asked {
-            StepReport::of(StepResult::UnderWay)
+            StepReport::new(StepResult::UnderWay)
         } else {
             StepReport { result, axis, reason, detail }
         };

@@ -51,7 +51,7 @@ pub struct LightInputs {
 impl StatusLight {
     /// Chooses what to show.
     #[must_use]
-    pub const fn of(inputs: &LightInputs) -> Self {
+    pub const fn from_inputs(inputs: &LightInputs) -> Self {
         let LightInputs { is_on, is_calibrating, is_inhibited, is_on_trial, is_calibrated, is_referenced } =
             *inputs;
         match () {
@@ -92,7 +92,7 @@ mod tests {
 
     /// Number of times that the light goes on in a cycle, and its share of the time in percent.
     fn seen(inputs: LightInputs) -> (usize, usize) {
-        let light = StatusLight::of(&inputs);
+        let light = StatusLight::from_inputs(&inputs);
         let rounds = CYCLE_MS * RATE_HZ / 1000;
         // The cycle repeats, so the round before the first is the last one.
         let rises =

@@ -63,7 +63,7 @@ impl Purpose {
     const fn permits(self, causes: u32) -> bool {
         match self {
             Self::Parameters => causes == 0,
-            Self::Program => !matches!(Bridges::of(causes), Bridges::Brake),
+            Self::Program => !matches!(Bridges::from_causes(causes), Bridges::Brake),
         }
     }
 }
@@ -83,7 +83,7 @@ impl Default for Storing {
 }
 
 impl Storing {
-    /// State after the start. The watchdog may still have the start's period, until [`Self::look_after`] has
+    /// State after the start. The watchdog may still have the start's period, until [`Self::supervise`] has
     /// checked.
     #[must_use]
     pub const fn new() -> Self {
@@ -145,7 +145,7 @@ impl Storing {
     }
 
     /// Call regularly while no write is in progress: tries again to set the watchdog's usual period.
-    pub fn look_after<const N: usize>(&mut self, inhibit: &Inhibit, hardware: &mut impl Hardware<N>) {
+    pub fn supervise<const N: usize>(&mut self, inhibit: &Inhibit, hardware: &mut impl Hardware<N>) {
         self.loose = self.loose && !hardware.tighten_watchdog();
         self.forbid_while_loose(inhibit);
     }

@@ -18,7 +18,7 @@ use crate::bus::device::{Device, LegStatus};
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::identification::ResultsCopy;
 use crate::bus::{Identity, NodeId};
-use crate::hal::{AxisCommand, Contacts, Controller, EncoderPlace, Frame, Hardware};
+use crate::hal::{AbsoluteEncoderSide, AxisCommand, Contacts, Controller, Frame, Hardware};
 use crate::leg::{DriveState, JointCommand, JointStatus, Plan};
 use crate::safety::InhibitReason;
 use crate::units::{Ampere, Hertz, NewtonMetre};
@@ -95,7 +95,7 @@ impl Reception {
         self.queue.len() + self.arriving.len()
     }
 
-    fn look(&mut self) -> u64 {
+    fn deliver(&mut self) -> u64 {
         self.spent_us += (self.queued - self.queue.len()) as u64 * self.frame_us;
         while self.queue.ready()
             && let Some(frame) = self.arriving.pop_front()
@@ -306,8 +306,8 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
     fn encoder_count(&self, axis: usize) -> u16 {
         self.encoder_counts[axis]
     }
-    fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16 {
-        self.encoder_frames[axis][place as usize]
+    fn encoder_frame(&mut self, axis: usize, side: AbsoluteEncoderSide) -> u16 {
+        self.encoder_frames[axis][side as usize]
     }
     fn temperature(&self, axis: usize) -> Option<f32> {
         self.temperatures[axis]
@@ -333,7 +333,7 @@ impl<const N: usize> Hardware<N> for TestHardware<N> {
         self.gates_configure
     }
     fn now_us(&self) -> u64 {
-        self.now_us + self.reception.as_ref().map_or(0, |reception| reception.borrow_mut().look())
+        self.now_us + self.reception.as_ref().map_or(0, |reception| reception.borrow_mut().deliver())
     }
     fn controller(&mut self) -> Controller {
         if core::mem::take(&mut self.can.overrun) { Controller::Overrun } else { self.can.controller }

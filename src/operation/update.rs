@@ -148,7 +148,7 @@ impl Update {
                 false
             }
             Stage::Waits => match signals.take_program_command() {
-                Some(command) => self.obey(command, memory),
+                Some(command) => self.apply_command(command, memory),
                 None => false,
             },
             Stage::Clears(sector) => {
@@ -166,7 +166,7 @@ impl Update {
         resumes
     }
 
-    fn obey(&mut self, command: ProgramCommand, memory: &mut impl ProgramMemory) -> bool {
+    fn apply_command(&mut self, command: ProgramCommand, memory: &mut impl ProgramMemory) -> bool {
         match command {
             ProgramCommand::Stop => {}
             ProgramCommand::Clear => {

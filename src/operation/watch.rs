@@ -7,7 +7,7 @@ use crate::hal::Hardware;
 use crate::safety::{CheckIns, GUARD_RATE_HZ, InhibitReason, TickGuard};
 
 /// Checks of the ticks per check of the counters: 4 ms.
-const LOOKS: u32 = GUARD_RATE_HZ / 250;
+const CHECKS_PER_FEED: u32 = GUARD_RATE_HZ / 250;
 
 /// State between two checks, [`GUARD_RATE_HZ`] a second.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,20 +15,20 @@ pub struct Watch<const N: usize> {
     guard: TickGuard<N>,
     /// Ticks of the axes; servo ticks and rounds of the housekeeping.
     check_ins: CheckIns<N, 2>,
-    looks: u32,
+    checks: u32,
 }
 
 impl<const N: usize> Watch<N> {
     /// Starts from the present counts.
     #[must_use]
     pub fn new(signals: &Signals<N>) -> Self {
-        Self { guard: TickGuard::new(), check_ins: CheckIns::new(counts(signals)), looks: 0 }
+        Self { guard: TickGuard::new(), check_ins: CheckIns::new(counts(signals)), checks: 0 }
     }
 
     /// Runs one check.
-    pub fn look(&mut self, signals: &Signals<N>, hardware: &mut impl Hardware<N>) {
+    pub fn check(&mut self, signals: &Signals<N>, hardware: &mut impl Hardware<N>) {
         let counts = counts(signals);
-        if self.guard.look(counts.0) {
+        if self.guard.check(counts.0) {
             hardware.disable_all();
             // Interrupts are masked, because the late tick would otherwise set the two sides of the half
             // bridge in between.
@@ -38,8 +38,8 @@ impl<const N: usize> Watch<N> {
                 signals.inhibit.raise(InhibitReason::CurrentTicks);
             }
         }
-        self.looks = (self.looks + 1) % LOOKS;
-        if self.looks == 0 && self.check_ins.all(counts) {
+        self.checks = (self.checks + 1) % CHECKS_PER_FEED;
+        if self.checks == 0 && self.check_ins.all(counts) {
             hardware.feed_watchdog();
         }
     }

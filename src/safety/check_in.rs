@@ -32,7 +32,7 @@ impl<const N: usize, const M: usize> CheckIns<N, M> {
     }
 }
 
-/// Rate at which [`TickGuard::look`] is called.
+/// Rate at which [`TickGuard::check`] is called.
 pub const GUARD_RATE_HZ: u32 = 2000;
 
 /// Checks from a lower priority level that the current ticks of `N` axes go on. If all of them stop, no code
@@ -51,7 +51,7 @@ impl<const N: usize> TickGuard<N> {
     }
 
     /// Returns whether any axis has not ticked since the last call. Counters wrap.
-    pub fn look(&mut self, ticks: [u32; N]) -> bool {
+    pub fn check(&mut self, ticks: [u32; N]) -> bool {
         let before = self.before.replace(ticks);
         before.is_some_and(|before| before.iter().zip(&ticks).any(|(before, now)| before == now))
     }
@@ -64,8 +64,8 @@ mod tests {
     #[test]
     fn a_stopped_axis_is_detected_at_the_next_check() {
         let mut guard = TickGuard::new();
-        let looks = [[u32::MAX, 0], [11, 12], [23, 24], [35, 24], [47, 36], [47, 36]];
-        assert_eq!(looks.map(|ticks| guard.look(ticks)), [false, false, false, true, false, true]);
+        let counts = [[u32::MAX, 0], [11, 12], [23, 24], [35, 24], [47, 36], [47, 36]];
+        assert_eq!(counts.map(|ticks| guard.check(ticks)), [false, false, false, true, false, true]);
     }
 
     #[test]
@@ -74,14 +74,14 @@ mod tests {
             let mut counts = [u32::MAX - 1; 4];
             let split = |[first, second, servo, rounds]: [u32; 4]| ([first, second], [servo, rounds]);
             let mut check_ins = CheckIns::new(split(counts));
-            let mut look = |hangs: bool| {
-                for (place, count) in counts.iter_mut().enumerate() {
-                    *count = count.wrapping_add(u32::from(!(hangs && place == hung)));
+            let mut check = |hangs: bool| {
+                for (index, count) in counts.iter_mut().enumerate() {
+                    *count = count.wrapping_add(u32::from(!(hangs && index == hung)));
                 }
                 check_ins.all(split(counts))
             };
             // The counters wrap; the hang lasts two checks, then the counter runs again.
-            let fed = [false, false, false, true, true, false, false].map(&mut look);
+            let fed = [false, false, false, true, true, false, false].map(&mut check);
             assert_eq!(fed, [true, true, true, false, false, true, true], "{hung}");
         }
     }

@@ -110,7 +110,7 @@ impl LimitCodes {
     /// Codes of the limits that reduced a joint's request.
     #[must_use]
     #[inline(never)]
-    pub fn of<const N: usize>(
+    pub fn new<const N: usize>(
         limited: &Limited,
         limits: &JointLimits,
         derating: &Derating<N>,
@@ -270,7 +270,7 @@ pub struct SupplyWatch {
 
 impl SupplyWatch {
     /// Runs one servo tick and returns whether the supply is failing; true once per drop.
-    pub fn look(&mut self, bus: Volt) -> bool {
+    pub fn check(&mut self, bus: Volt) -> bool {
         const SHARE: f32 = 1.0 / 4096.0;
         const LOST: f32 = 0.8;
         const PATIENCE: u8 = 4;
@@ -345,11 +345,11 @@ pub(crate) mod tests {
         let usual = [JointShares::ALL];
         let hot = RAMPS.at(90.0, Volt(48.0), usual);
         let of =
-            |limited: Limited, derating: &Derating<1>| LimitCodes::of(&limited, &HIP, derating, 0).bits();
+            |limited: Limited, derating: &Derating<1>| LimitCodes::new(&limited, &HIP, derating, 0).bits();
         assert_eq!(of(none, &hot), 0, "nothing was limited");
         assert_eq!(of(Limited { torque: true, ..none }, &Derating::NONE), 1 << 1);
         let weak = JointLimits { current: crate::units::Ampere(40.0), ..HIP };
-        let codes = LimitCodes::of(&Limited { torque: true, ..none }, &weak, &Derating::<1>::NONE, 0);
+        let codes = LimitCodes::new(&Limited { torque: true, ..none }, &weak, &Derating::<1>::NONE, 0);
         assert!(codes.contains(LimitCode::Current) && !codes.contains(LimitCode::Torque));
         assert_eq!(of(Limited { speed: true, range: true, ..none }, &Derating::NONE), 1 << 3 | 1 << 4);
         assert_eq!(of(Limited { derated: true, ..none }, &hot), 1 << 5);
@@ -369,18 +369,18 @@ pub(crate) mod tests {
     #[test]
     fn a_failing_supply_is_detected_and_a_load_is_not() {
         let mut watch = SupplyWatch::default();
-        assert!((0..8000).all(|_| !watch.look(Volt(48.0))));
+        assert!((0..8000).all(|_| !watch.check(Volt(48.0))));
         // 40 A at 50 mOhm, and the rise after a stop.
-        assert!([46.0, 54.0, 48.0, 44.0].into_iter().all(|bus| (0..400).all(|_| !watch.look(Volt(bus)))));
+        assert!([46.0, 54.0, 48.0, 44.0].into_iter().all(|bus| (0..400).all(|_| !watch.check(Volt(bus)))));
         // 3 V per millisecond.
         let mut bus = 48.0;
         let mut ticks = 0;
-        while !watch.look(Volt(bus)) {
+        while !watch.check(Volt(bus)) {
             bus -= 0.75;
             ticks += 1;
             assert!(ticks < 40);
         }
         assert!((34.0..38.5).contains(&bus), "{bus} V");
-        assert!((0..400).all(|_| !watch.look(Volt(20.0))), "reported once");
+        assert!((0..400).all(|_| !watch.check(Volt(20.0))), "reported once");
     }
 }

@@ -50,7 +50,7 @@ pub fn stays_active(mut is_active: impl FnMut() -> bool) -> bool {
 /// Missed ticks, or unanswered requests to the servo, in a row that are a fault.
 const PATIENCE: u8 = 3;
 /// Missed ticks after which damping ends too: one millisecond.
-const HOPELESS: u8 = 24;
+const DAMPING_ENDS_AFTER_TICKS: u8 = 24;
 
 /// Inhibit reason: keeps the drive off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -165,7 +165,7 @@ impl InhibitReason {
 
     /// Reason that an axis (from 0) sets for its own fault. Only a switching axis leads to braking.
     #[must_use]
-    pub const fn of_axis(axis: usize, code: FaultCode, switching: bool) -> Self {
+    pub const fn from_axis_fault(axis: usize, code: FaultCode, switching: bool) -> Self {
         match (code, axis) {
             (FaultCode::EncoderFrozen, _) if switching => Self::EncoderFrozen,
             (FaultCode::EncoderPosition, _) if switching => Self::EncoderPosition,
@@ -203,7 +203,7 @@ impl Bridges {
     /// Derives the operation from the inhibit word. The bridges brake only where no other reason is set.
     #[inline(always)]
     #[must_use]
-    pub const fn of(causes: u32) -> Self {
+    pub const fn from_causes(causes: u32) -> Self {
         if causes == 0 { Self::Follow } else { Self::while_inhibited(causes) }
     }
 
@@ -241,25 +241,25 @@ impl TickWatch {
     /// Returns the inhibit bits from this tick on, and whether enough ticks are missing that the servo must
     /// damp.
     #[inline(always)]
-    pub fn look(&mut self, now: &TickState) -> (u32, bool) {
+    pub fn check(&mut self, now: &TickState) -> (u32, bool) {
         if now.missed == 0 && now.complete && !now.emergency_stop && !now.gate_fault {
             self.missed = 0;
             return (0, false);
         }
-        self.look_closer(*now)
+        self.handle_fault(*now)
     }
 
     /// Handles a tick with a fault.
     #[cold]
     #[inline(never)]
-    fn look_closer(&mut self, now: TickState) -> (u32, bool) {
+    fn handle_fault(&mut self, now: TickState) -> (u32, bool) {
         let before = self.missed;
         self.missed = if now.missed > 0 { self.missed.saturating_add(now.missed) } else { 0 };
         let bit = |holds: bool, cause: InhibitReason| if holds { cause.bit() } else { 0 };
         let forbids = bit(now.emergency_stop, InhibitReason::EmergencyStop)
             | bit(now.gate_fault, InhibitReason::GateFault)
             | bit(!now.complete, InhibitReason::Conversion)
-            | bit(self.missed >= HOPELESS, InhibitReason::CurrentTicks);
+            | bit(self.missed >= DAMPING_ENDS_AFTER_TICKS, InhibitReason::CurrentTicks);
         (forbids, before < PATIENCE && self.missed >= PATIENCE)
     }
 }
@@ -275,7 +275,7 @@ pub struct ServoWatch {
 impl ServoWatch {
     /// Call before each request with the servo's tick count. Returns whether the last request was not
     /// answered, and the inhibit bit that follows.
-    pub fn look(&mut self, ticks: u32) -> (bool, u32) {
+    pub fn check(&mut self, ticks: u32) -> (bool, u32) {
         let missed = self.ticks == Some(ticks);
         self.unanswered = if missed { self.unanswered.saturating_add(1) } else { 0 };
         self.ticks = Some(ticks);
@@ -298,7 +298,7 @@ mod tests {
         ];
         for (state, cause) in cases {
             let mut watch = TickWatch::default();
-            assert_eq!((watch.look(&GOOD), watch.look(&state)), ((0, false), (cause.bit(), false)));
+            assert_eq!((watch.check(&GOOD), watch.check(&state)), ((0, false), (cause.bit(), false)));
         }
     }
 
@@ -322,14 +322,14 @@ mod tests {
     fn three_missed_ticks_are_a_fault_and_sparser_ones_are_not() {
         let mut watch = TickWatch::default();
         let late = TickState { missed: 1, ..GOOD };
-        let seen = [late, late, GOOD, late, late, late].map(|state| watch.look(&state));
+        let seen = [late, late, GOOD, late, late, late].map(|state| watch.check(&state));
         assert_eq!(seen.map(|(_, damp)| damp), [false, false, false, false, false, true]);
         assert!(seen.iter().all(|(forbids, _)| *forbids == 0));
-        let gap = |missed| TickWatch::default().look(&TickState { missed, ..GOOD });
+        let gap = |missed| TickWatch::default().check(&TickState { missed, ..GOOD });
         assert_eq!([gap(2), gap(3)], [(0, false), (0, true)]);
         // Reported once, then off if the misses continue.
         assert_eq!(
-            [1, 17, 1].map(|missed| watch.look(&TickState { missed, ..GOOD })).map(|(_, damp)| damp),
+            [1, 17, 1].map(|missed| watch.check(&TickState { missed, ..GOOD })).map(|(_, damp)| damp),
             [false; 3]
         );
         assert_eq!(gap(24), (InhibitReason::CurrentTicks.bit(), true));
@@ -338,7 +338,7 @@ mod tests {
     #[test]
     fn a_servo_that_misses_three_requests_inhibits() {
         let mut watch = ServoWatch::default();
-        let seen = [1, 2, 2, 2, 3, 3, 3, 3].map(|ticks| watch.look(ticks));
+        let seen = [1, 2, 2, 2, 3, 3, 3, 3].map(|ticks| watch.check(ticks));
         let given_up = InhibitReason::ServoTicks.bit();
         let expected = [false, false, true, true, false, true, true, true];
         assert_eq!(seen.map(|(missed, _)| missed), expected);
@@ -348,7 +348,7 @@ mod tests {
     #[test]
     fn the_first_request_after_the_start_is_not_a_miss() {
         let mut watch = ServoWatch::default();
-        assert_eq!([0, 0].map(|ticks| watch.look(ticks).0), [false, true]);
+        assert_eq!([0, 0].map(|ticks| watch.check(ticks).0), [false, true]);
     }
 
     #[test]
@@ -357,12 +357,16 @@ mod tests {
             [InhibitReason::EncoderFrozen, InhibitReason::EncoderPosition, InhibitReason::ChargeCurrent]
                 .map(InhibitReason::bit);
         let all = brakes.iter().fold(0, |bits, bit| bits | bit);
-        assert_eq!(Bridges::of(0), Bridges::Follow);
-        assert_eq!(brakes.map(Bridges::of), [Bridges::Brake; 3]);
-        assert_eq!(Bridges::of(all), Bridges::Brake);
+        assert_eq!(Bridges::from_causes(0), Bridges::Follow);
+        assert_eq!(brakes.map(Bridges::from_causes), [Bridges::Brake; 3]);
+        assert_eq!(Bridges::from_causes(all), Bridges::Brake);
         for cause in InhibitReason::ALL.into_iter().filter(|cause| cause.bit() & all == 0) {
-            let with_each = brakes.map(|brake| Bridges::of(cause.bit() | brake));
-            assert_eq!((Bridges::of(cause.bit()), with_each), (Bridges::Off, [Bridges::Off; 3]), "{cause:?}");
+            let with_each = brakes.map(|brake| Bridges::from_causes(cause.bit() | brake));
+            assert_eq!(
+                (Bridges::from_causes(cause.bit()), with_each),
+                (Bridges::Off, [Bridges::Off; 3]),
+                "{cause:?}"
+            );
         }
     }
 

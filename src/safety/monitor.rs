@@ -182,7 +182,7 @@ impl<const N: usize> Monitor<N> {
     #[must_use]
     pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
         core::array::from_fn(|joint| {
-            LimitCodes::of(&decision.limited[joint], &self.limits.joints()[joint], &self.derating, joint)
+            LimitCodes::new(&decision.limited[joint], &self.limits.joints()[joint], &self.derating, joint)
         })
     }
 

@@ -107,17 +107,17 @@ mod tests {
     fn means_are_exact_to_an_eighth_of_a_count() {
         let mut averager = LogAverager::EMPTY;
         // Far from the reference and moving: 1.5 million counts are 23 rad.
-        let place = 1_500_000;
+        let origin = 1_500_000;
         let mut logged = None;
         for tick in 0..8 {
             assert!(logged.is_none());
-            let counts = place + tick * tick;
+            let counts = origin + tick * tick;
             logged = averager.push(tick as u32, &sample([counts, -counts], tick as f32), &[HIP, KNEE]);
         }
         let logged = logged.expect("eight ticks make a sample");
         // Squares of 0..=7 sum up to 140; the mean current is 3.5 A.
-        assert_eq!(logged.counts_sum, [8 * place + 140, -(8 * place + 140)]);
-        let mean = place as f32 + 17.5;
+        assert_eq!(logged.counts_sum, [8 * origin + 140, -(8 * origin + 140)]);
+        let mean = origin as f32 + 17.5;
         assert_eq!(logged.position_rad, [HIP.position(mean).0; 2]);
         assert_eq!((logged.torque_nm, logged.tick), ([5.25, -5.25], 7));
     }

@@ -95,7 +95,7 @@ pub struct Permit(());
 impl Permit {
     /// Returns a permit for a drive in this state; `None` where a bridge may switch.
     #[must_use]
-    pub fn of(state: DriveState) -> Option<Self> {
+    pub fn from_state(state: DriveState) -> Option<Self> {
         Self::under(state.permission())
     }
 

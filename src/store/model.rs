@@ -70,13 +70,13 @@ const VERSION: [u8; 3] = version_of(env!("CARGO_PKG_VERSION").as_bytes());
 /// Parses a version: numbers up to 255 each; text after the third is ignored.
 const fn version_of(text: &[u8]) -> [u8; 3] {
     let mut version = [0; 3];
-    let (mut place, mut part) = (0, 0);
-    while place < text.len() && part < version.len() {
-        match text[place] {
+    let (mut index, mut part) = (0, 0);
+    while index < text.len() && part < version.len() {
+        match text[index] {
             digit @ b'0'..=b'9' => version[part] = 10 * version[part] + (digit - b'0'),
             _ => part += 1,
         }
-        place += 1;
+        index += 1;
     }
     version
 }
@@ -93,7 +93,7 @@ impl<const N: usize> ModelRecord<N> {
 
     /// Builds the stored form of a newly accepted model from its identification, with the given generation
     /// and seed; `wearing` is unknown unless the operator set it.
-    pub fn of<const B: usize, const TAPS: usize, const PENDING: usize, W>(
+    pub fn new<const B: usize, const TAPS: usize, const PENDING: usize, W>(
         configuration: &LegConfiguration<N, B>,
         identification: &Identification<N, B, TAPS, PENDING, W>,
         model: &IdentifiedModel<N>,

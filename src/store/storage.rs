@@ -43,8 +43,8 @@ impl<F: NorFlash, const N: usize> Storage<F, N> {
 
     /// Sets the pending calibration of an axis; `None` if the axis passed one that cannot be stored.
     pub fn calibrated(&mut self, axis: usize, calibration: Option<StoredCalibration>) {
-        if let Some(place) = self.calibrations.get_mut(axis) {
-            *place = calibration;
+        if let Some(slot) = self.calibrations.get_mut(axis) {
+            *slot = calibration;
         }
     }
 

@@ -37,9 +37,9 @@ impl<T: Real> Default for BasSettings<T> {
     fn default() -> Self {
         Self {
             first_step: T::one(),
-            step_decay: T::of(0.95),
-            step_offset: T::of(0.005),
-            step_per_whisker: T::of(10.0),
+            step_decay: T::from_double(0.95),
+            step_offset: T::from_double(0.005),
+            step_per_whisker: T::from_double(10.0),
         }
     }
 }
@@ -47,7 +47,7 @@ impl<T: Real> Default for BasSettings<T> {
 /// Next evaluation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage<T> {
-    Place,
+    Initial,
     LeftWhisker,
     RightWhisker { left: T },
     Move { smell: T },
@@ -83,7 +83,7 @@ impl<T: Real, const D: usize> Bas<T, D> {
         for entry in live_mut(&mut point, progress.dimension()) {
             *entry = random.uniform();
         }
-        let position = progress.place(&point);
+        let position = progress.to_position(&point);
         Ok(Self {
             settings,
             progress,
@@ -91,7 +91,7 @@ impl<T: Real, const D: usize> Bas<T, D> {
             position,
             direction: [T::zero(); D],
             step_length: settings.first_step,
-            stage: Stage::Place,
+            stage: Stage::Initial,
         })
     }
 
@@ -118,7 +118,7 @@ impl<T: Real, const D: usize> Bas<T, D> {
     fn step(&mut self, objective: &impl Objective<T>) {
         let whisker = self.step_length / self.settings.step_per_whisker;
         self.stage = match self.stage {
-            Stage::Place => {
+            Stage::Initial => {
                 self.progress.evaluate_position(objective, self.position);
                 Stage::LeftWhisker
             }
@@ -195,9 +195,9 @@ mod tests {
         let mut beetle = Bas::<f64, 1>::new(&slope, BasSettings::default(), 2).expect("a valid box");
         beetle.advance(&slope, 1 + 3 * 20);
         assert_eq!(beetle.iterations(), 20);
-        let places = slope.0.borrow();
-        let (mut at, mut step) = (places[0], 1.0);
-        for iteration in places[1..].chunks(3) {
+        let positions = slope.0.borrow();
+        let (mut at, mut step) = (positions[0], 1.0);
+        for iteration in positions[1..].chunks(3) {
             // Positions up to 1e3 leave 1e-13 of rounding.
             assert!(abs(abs(iteration[0] - iteration[1]) - 0.2 * step) < 1e-12, "Eqs (21), (26)");
             assert!(abs(iteration[0] + iteration[1] - 2.0 * at) < 1e-12, "Eq. (21)");

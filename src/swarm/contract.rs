@@ -92,7 +92,7 @@ impl<T: Real> Objective<T> for Watched {
     }
     fn bounds(&self, coordinate: usize) -> (T, T) {
         let (low, high) = [(-3.0, 0.1), (1e3, 1e6), (-1e-3, 1e-3), (-7.7, -7.3)][coordinate];
-        (T::of(low), T::of(high))
+        (T::from_double(low), T::from_double(high))
     }
     fn evaluate(&self, position: &[T]) -> T {
         assert_eq!(position.len(), 4);
@@ -153,21 +153,21 @@ impl<T: Real> Objective<T> for Holes {
         5
     }
     fn bounds(&self, _coordinate: usize) -> (T, T) {
-        (T::of(-10.0), T::of(10.0))
+        (T::from_double(-10.0), T::from_double(10.0))
     }
     fn evaluate(&self, position: &[T]) -> T {
         let hole = |coordinate: usize| position[coordinate].to_double();
         if hole(0) > 2.0 {
-            return T::of(f64::NAN);
+            return T::from_double(f64::NAN);
         } else if hole(1) < -3.0 {
-            return T::of(f64::INFINITY);
+            return T::from_double(f64::INFINITY);
         } else if hole(2) > 4.0 {
-            return T::of(f64::NEG_INFINITY);
+            return T::from_double(f64::NEG_INFINITY);
         } else if hole(3) > 5.0 {
             return T::LARGEST;
         }
         position.iter().enumerate().fold(T::zero(), |sum, (i, &x)| {
-            sum + T::of([1.0, 10.0, 100.0, 1e3, 1e4][i]) * (x - T::one()) * (x - T::one())
+            sum + T::from_double([1.0, 10.0, 100.0, 1e3, 1e4][i]) * (x - T::one()) * (x - T::one())
         })
     }
 }
@@ -179,7 +179,7 @@ fn costs_that_are_not_finite_do_not_poison_the_adaptive_search() {
             let mut swarm = Bso::<T, 20, CAPACITY>::new(&Holes, BsoSettings::default(), seed).unwrap();
             // Half as many iterations again as the slowest of these seeds needs, 97. A
             // corrupted metric never gets there.
-            assert!(swarm.reach(&Holes, T::of(1e-3), 150), "seed {seed}: {:?}", swarm.best());
+            assert!(swarm.reach(&Holes, T::from_double(1e-3), 150), "seed {seed}: {:?}", swarm.best());
             assert!(swarm.best().is_some_and(|best| best.value >= T::zero()), "minus infinity is no best");
         }
     }
@@ -200,7 +200,7 @@ impl<T: Real> Objective<T> for Nowhere {
         (T::zero(), T::one())
     }
     fn evaluate(&self, position: &[T]) -> T {
-        if self.forbidden.get() { T::of(f64::NAN) } else { position[0] }
+        if self.forbidden.get() { T::from_double(f64::NAN) } else { position[0] }
     }
 }
 
@@ -211,7 +211,7 @@ fn finds_nothing_where_nothing_is<T: Real, S: Search<T>>(new: &impl Fn(u64) -> S
     assert!(search.best().is_none());
     nowhere.forbidden.set(false);
     search.advance(&nowhere, 2_000);
-    assert!(search.best().is_some_and(|best| best.value < T::of(0.5)), "{:?}", search.best());
+    assert!(search.best().is_some_and(|best| best.value < T::from_double(0.5)), "{:?}", search.best());
 }
 
 #[test]
@@ -233,7 +233,7 @@ impl<T: Real> Objective<T> for Shaped {
     }
     fn bounds(&self, coordinate: usize) -> (T, T) {
         let (low, high) = if coordinate + 1 == self.dimension { self.last } else { (0.0, 1.0) };
-        (T::of(low), T::of(high))
+        (T::from_double(low), T::from_double(high))
     }
     fn evaluate(&self, position: &[T]) -> T {
         position[0]

@@ -129,7 +129,7 @@ impl<T: Real> Objective<T> for TestProblem {
     }
 
     fn bounds(&self, _coordinate: usize) -> (T, T) {
-        (T::of(-self.half_width()), T::of(self.half_width()))
+        (T::from_double(-self.half_width()), T::from_double(self.half_width()))
     }
 
     fn evaluate(&self, position: &[T]) -> T {
@@ -148,7 +148,7 @@ impl<T: Real> Objective<T> for TestProblem {
             TestFunction::Rastrigin => rastrigin(position),
             TestFunction::CamelAsPrinted => camel_as_printed(position),
             TestFunction::BraninAsPrinted => branin_as_printed(position),
-            TestFunction::AckleyAsPrinted => ackley(position.iter().copied()) - T::of(E),
+            TestFunction::AckleyAsPrinted => ackley(position.iter().copied()) - T::from_double(E),
         }
     }
 }
@@ -166,20 +166,25 @@ fn plane<T: Real>(position: &[T]) -> (T, T) {
 fn six_hump_camel<T: Real>(position: &[T]) -> T {
     let (x, y) = plane(position);
     let (x2, y2) = (x * x, y * y);
-    (T::of(4.0) - T::of(2.1) * x2 + x2 * x2 / T::of(3.0)) * x2 + x * y + (T::of(4.0) * y2 - T::of(4.0)) * y2
+    (T::from_double(4.0) - T::from_double(2.1) * x2 + x2 * x2 / T::from_double(3.0)) * x2
+        + x * y
+        + (T::from_double(4.0) * y2 - T::from_double(4.0)) * y2
 }
 
 fn camel_as_printed<T: Real>(position: &[T]) -> T {
     let (x, y) = plane(position);
     let (x2, y2) = (x * x, y * y);
-    let power = if x2 > T::zero() { exp(T::of(4.0 / 3.0) * ln(abs(x))) } else { T::zero() };
-    (T::of(4.0) - T::of(2.0) * x2 + power) * x2 + x * y + (T::of(4.0) * y2 - T::of(4.0)) * y2
+    let power = if x2 > T::zero() { exp(T::from_double(4.0 / 3.0) * ln(abs(x))) } else { T::zero() };
+    (T::from_double(4.0) - T::from_double(2.0) * x2 + power) * x2
+        + x * y
+        + (T::from_double(4.0) * y2 - T::from_double(4.0)) * y2
 }
 
 /// Branin's function with the coefficient of the parabola as an argument.
 fn branin_with<T: Real>(x: T, y: T, coefficient: f64) -> T {
-    let valley = y - T::of(coefficient / (4.0 * PI * PI)) * x * x + T::of(5.0 / PI) * x - T::of(6.0);
-    valley * valley + T::of(10.0 * (1.0 - 1.0 / (8.0 * PI))) * sin_cos(x).1 + T::of(10.0)
+    let valley = y - T::from_double(coefficient / (4.0 * PI * PI)) * x * x + T::from_double(5.0 / PI) * x
+        - T::from_double(6.0);
+    valley * valley + T::from_double(10.0 * (1.0 - 1.0 / (8.0 * PI))) * sin_cos(x).1 + T::from_double(10.0)
 }
 
 fn branin<T: Real>(position: &[T]) -> T {
@@ -196,16 +201,18 @@ fn ackley<T: Real>(position: impl Iterator<Item = T>) -> T {
     let (mut squares, mut cosines, mut count) = (T::zero(), T::zero(), T::zero());
     for x in position {
         squares += x * x;
-        cosines += sin_cos(T::of(2.0 * PI) * x).1;
+        cosines += sin_cos(T::from_double(2.0 * PI) * x).1;
         count += T::one();
     }
-    T::of(20.0 + E) - T::of(20.0) * exp(T::of(-0.2) * sqrt(squares / count)) - exp(cosines / count)
+    T::from_double(20.0 + E)
+        - T::from_double(20.0) * exp(T::from_double(-0.2) * sqrt(squares / count))
+        - exp(cosines / count)
 }
 
 fn shifted_rotated_ackley<T: Real>(position: &[T]) -> T {
     let shifted = |(i, &x): (usize, &T)| {
         let centre = 11.0 + 7.0 * ((37 * i % 11) as f64 / 11.0 - 0.5);
-        (sin_cos(T::of(i as f64 + 1.0)).0, x - T::of(centre))
+        (sin_cos(T::from_double(i as f64 + 1.0)).0, x - T::from_double(centre))
     };
     let (along, length) = position
         .iter()
@@ -217,34 +224,33 @@ fn shifted_rotated_ackley<T: Real>(position: &[T]) -> T {
 }
 
 fn shifted_ellipsoid<T: Real>(position: &[T], decades: f64) -> T {
-    let last = T::of(if position.len() > 1 { position.len() as f64 - 1.0 } else { 1.0 });
-    let decades = T::of(decades * core::f64::consts::LN_10) / last;
+    let last = T::from_double(if position.len() > 1 { position.len() as f64 - 1.0 } else { 1.0 });
+    let decades = T::from_double(decades * core::f64::consts::LN_10) / last;
     let sum = position.iter().enumerate().fold(T::zero(), |sum, (i, &x)| {
         let centre = 60.0 - (29 * i % 31) as f64;
-        sum + exp(decades * T::of(i as f64)) * square(x - T::of(centre))
+        sum + exp(decades * T::from_double(i as f64)) * square(x - T::from_double(centre))
     });
-    T::of(1e-4) * sum
+    T::from_double(1e-4) * sum
 }
 
 fn rosenbrock<T: Real>(position: &[T]) -> T {
-    position
-        .iter()
-        .zip(position.iter().skip(1))
-        .fold(T::zero(), |sum, (&x, &next)| sum + T::of(100.0) * square(next - x * x) + square(T::one() - x))
+    position.iter().zip(position.iter().skip(1)).fold(T::zero(), |sum, (&x, &next)| {
+        sum + T::from_double(100.0) * square(next - x * x) + square(T::one() - x)
+    })
 }
 
 fn shifted_griewank<T: Real>(position: &[T]) -> T {
     let (sum, product) =
         position.iter().enumerate().fold((T::zero(), T::one()), |(sum, product), (i, &x)| {
-            let y = x - T::of(123.0);
-            (sum + y * y, product * sin_cos(y / sqrt(T::of(i as f64 + 1.0))).1)
+            let y = x - T::from_double(123.0);
+            (sum + y * y, product * sin_cos(y / sqrt(T::from_double(i as f64 + 1.0))).1)
         });
-    T::one() + sum / T::of(4000.0) - product
+    T::one() + sum / T::from_double(4000.0) - product
 }
 
 fn shifted_schwefel<T: Real>(position: &[T]) -> T {
     let (total, _) = position.iter().fold((T::zero(), T::zero()), |(total, partial), &x| {
-        let partial = partial + x - T::of(13.0);
+        let partial = partial + x - T::from_double(13.0);
         (total + partial * partial, partial)
     });
     total
@@ -252,21 +258,22 @@ fn shifted_schwefel<T: Real>(position: &[T]) -> T {
 
 fn levy<T: Real>(position: &[T]) -> T {
     let Some((&last, others)) = position.split_last() else { return T::zero() };
-    let stretched = |x: T| T::one() + (x - T::one()) / T::of(4.0);
+    let stretched = |x: T| T::one() + (x - T::one()) / T::from_double(4.0);
     let sine = |angle: T| sin_cos(angle).0;
     let first = stretched(others.first().copied().unwrap_or(last));
-    let sum = others.iter().fold(square(sine(T::of(PI) * first)), |sum, &x| {
+    let sum = others.iter().fold(square(sine(T::from_double(PI) * first)), |sum, &x| {
         let u = stretched(x);
-        sum + square(u - T::one()) * (T::one() + T::of(10.0) * square(sine(T::of(PI) * u + T::one())))
+        sum + square(u - T::one())
+            * (T::one() + T::from_double(10.0) * square(sine(T::from_double(PI) * u + T::one())))
     });
     let u = stretched(last);
-    sum + square(u - T::one()) * (T::one() + square(sine(T::of(2.0 * PI) * u)))
+    sum + square(u - T::one()) * (T::one() + square(sine(T::from_double(2.0 * PI) * u)))
 }
 
 fn rastrigin<T: Real>(position: &[T]) -> T {
-    position
-        .iter()
-        .fold(T::zero(), |sum, &x| sum + T::of(10.0) + x * x - T::of(10.0) * sin_cos(T::of(2.0 * PI) * x).1)
+    position.iter().fold(T::zero(), |sum, &x| {
+        sum + T::from_double(10.0) + x * x - T::from_double(10.0) * sin_cos(T::from_double(2.0 * PI) * x).1
+    })
 }
 
 #[cfg(test)]

@@ -32,10 +32,10 @@ pub struct PsoSettings<T> {
 impl<T: Real> Default for PsoSettings<T> {
     fn default() -> Self {
         Self {
-            inertia_weight: InertiaWeight::constant(T::of(0.8)),
-            individual_learning: T::of(1.4),
-            global_learning: T::of(1.4),
-            velocity_limit: T::of(0.2),
+            inertia_weight: InertiaWeight::constant(T::from_double(0.8)),
+            individual_learning: T::from_double(1.4),
+            global_learning: T::from_double(1.4),
+            velocity_limit: T::from_double(0.2),
         }
     }
 }

@@ -110,7 +110,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
                 *entry = random.uniform();
             }
             for entry in live_mut(&mut self.velocity[particle], self.dimension) {
-                *entry = random.signed::<T>() * T::of(FIRST_VELOCITY);
+                *entry = random.signed::<T>() * T::from_double(FIRST_VELOCITY);
             }
             self.personal_best[particle] = self.position[particle];
         }
@@ -169,15 +169,15 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
     /// Sorts by personal best, the best first; equals keep their order.
     pub fn sort(&mut self) {
         for end in 1..N {
-            for place in (0..end).rev() {
-                if self.personal_best_value[place] <= self.personal_best_value[place + 1] {
+            for index in (0..end).rev() {
+                if self.personal_best_value[index] <= self.personal_best_value[index + 1] {
                     break;
                 }
-                self.position.swap(place, place + 1);
-                self.velocity.swap(place, place + 1);
-                self.personal_best.swap(place, place + 1);
-                self.value.swap(place, place + 1);
-                self.personal_best_value.swap(place, place + 1);
+                self.position.swap(index, index + 1);
+                self.velocity.swap(index, index + 1);
+                self.personal_best.swap(index, index + 1);
+                self.value.swap(index, index + 1);
+                self.personal_best_value.swap(index, index + 1);
             }
         }
     }

@@ -40,7 +40,7 @@ impl Random {
     /// for a direction, whose length does not matter.
     pub fn bell<T: Real>(&mut self) -> T {
         let pair: T = self.uniform::<T>() + self.uniform();
-        pair + self.uniform() + self.uniform() - T::of(2.0)
+        pair + self.uniform() + self.uniform() - T::from_double(2.0)
     }
 
     /// Uniform integer in `0..count`; 0 for a `count` of 0. Bias at most count / 2^32.

@@ -112,7 +112,7 @@ impl<T: Real, const D: usize> SearchProgress<T, D> {
     }
 
     /// Converts box coordinates 0..1 to the objective's units; never outside the bounds.
-    pub fn place(&self, point: &[T; D]) -> [T; D] {
+    pub fn to_position(&self, point: &[T; D]) -> [T; D] {
         let mut position = *point;
         for ((entry, &low), &high) in position.iter_mut().zip(&self.low).zip(&self.high) {
             *entry = clamp(low + (high - low) * *entry, low, high);
@@ -122,7 +122,7 @@ impl<T: Real, const D: usize> SearchProgress<T, D> {
 
     /// Evaluates a point given in box coordinates.
     pub fn evaluate(&mut self, objective: &impl Objective<T>, point: &[T; D]) -> T {
-        let position = self.place(point);
+        let position = self.to_position(point);
         self.evaluate_position(objective, position)
     }
 
@@ -134,7 +134,7 @@ impl<T: Real, const D: usize> SearchProgress<T, D> {
         position
     }
 
-    /// Evaluates a position that [`place`](Self::place) or [`nearest`](Self::nearest) put into the box.
+    /// Evaluates a position in the box, from [`Self::to_position`] or [`Self::nearest`].
     ///
     /// Returns the largest finite number for a cost that is not finite: it sorts last and is never a best.
     pub fn evaluate_position(&mut self, objective: &impl Objective<T>, position: [T; D]) -> T {

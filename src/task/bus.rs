@@ -27,8 +27,8 @@ use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::bus::device::Device;
 use crate::bus::identification::ResultsCopy;
 use crate::hal::Frame;
+use crate::in_place::{each, fill};
 use crate::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, StoreJob};
-use crate::place::{each, fill};
 use crate::store::ModelRecord;
 
 /// Length of the log's queue to a host, samples: 384 ms.
@@ -84,7 +84,7 @@ pub static FRAMES_IN: spin::Mutex<Option<Producer<'static, Frame>>> = spin::Mute
 
 impl Memory {
     /// Builds an empty memory in its place.
-    pub fn place(slot: &mut MaybeUninit<Self>) -> &mut Self {
+    pub fn new_in(slot: &mut MaybeUninit<Self>) -> &mut Self {
         fill!(
             slot,
             {

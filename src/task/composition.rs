@@ -80,12 +80,12 @@ fn hand_out(
         calibrated,
     } = QUEUES.take().split(memory::events());
     static LOOPS: StaticCell<current::Current> = StaticCell::new();
-    place(&current::LOOPS, LOOPS.init(current::Current::new(current, divider)));
+    install(&current::LOOPS, LOOPS.init(current::Current::new(current, divider)));
     static ASSIST_QUEUES: ConstStaticCell<AssistQueues<JOINTS>> = ConstStaticCell::new(AssistQueues::new());
     let (servo_assist, assist_ends) = ASSIST_QUEUES.take().split();
     servo_ends.assist = Some(servo_assist);
     static ASSIST: StaticCell<assist::AssistLoop> = StaticCell::new();
-    place(&assist::ASSIST, ASSIST.init(assist::AssistLoop::new(assist_ends)));
+    install(&assist::ASSIST, ASSIST.init(assist::AssistLoop::new(assist_ends)));
 
     let mut control = built.as_ref().and_then(|(configuration, _)| Control::new(configuration).ok());
     let notes = &mut housekeeping_ends.notes;
@@ -105,14 +105,14 @@ fn hand_out(
                 holding_brake::prepare();
             }
             static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
-            place(&servo::SERVO, SERVO.init(servo::ServoLoop { control, level, ends: servo_ends }));
+            install(&servo::SERVO, SERVO.init(servo::ServoLoop { control, level, ends: servo_ends }));
         }
         None => SIGNALS.inhibit.raise(InhibitReason::Configuration),
     }
     let axes = drives::axes(&leg::LEG, divider);
     let calibration = drives::calibrations(&leg::LEG);
     let windings = leg::LEG.joints.map(|joint| joint.motor.winding);
-    let encoders = leg::LEG.joints.map(|joint| EncoderSettings::of(&joint.motor));
+    let encoders = leg::LEG.joints.map(|joint| EncoderSettings::new(&joint.motor));
     let thermistors = leg::LEG.joints.map(|joint| joint.motor.thermistor);
     converter::prepare_thermistors(thermistors.map(|thermistor| thermistor.is_some()));
     let hottest_c = HOTTEST_C;
@@ -160,7 +160,12 @@ fn join(
 ) -> Joined {
     let constants = core::array::from_fn(|joint| {
         let motor = &leg::LEG.joints[joint].motor;
-        AxisConstants::of(&configuration.joints[joint], motor.counts_per_turn, motor.ratio, drives::BANDWIDTH)
+        AxisConstants::new(
+            &configuration.joints[joint],
+            motor.counts_per_turn,
+            motor.ratio,
+            drives::BANDWIDTH,
+        )
     });
     let serial = crate::bus::Identity::serial(identity.unique);
     let checksum = program::checksum();
@@ -201,8 +206,8 @@ fn join(
     }
     let (frames, servo, thread, end, bus) = memory::bus().split(device);
     static BUS: StaticCell<bus::BusLoop> = StaticCell::new();
-    place(&bus::BUS, BUS.init(bus));
-    place(&bus::FRAMES_IN, frames);
+    install(&bus::BUS, BUS.init(bus));
+    install(&bus::FRAMES_IN, frames);
     if let Some(storage) = &mut storage {
         storage.serve(end, calibrated);
     }
@@ -234,7 +239,7 @@ fn judge(board: &Board) {
 }
 
 /// Fills a lock. No other code holds it: the interrupts that take it are not enabled yet.
-fn place<T>(home: &spin::Mutex<Option<T>>, value: T) {
+fn install<T>(home: &spin::Mutex<Option<T>>, value: T) {
     if let Some(mut home) = home.try_lock() {
         *home = Some(value);
     }

@@ -18,7 +18,7 @@ pub async fn watch() -> ! {
         ticker.next().await;
         // Late checks are not made up for: two in a row would read the same count.
         ticker.reset();
-        watch.look(&SIGNALS, &mut Odrive);
+        watch.check(&SIGNALS, &mut Odrive);
     }
 }
 

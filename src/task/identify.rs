@@ -156,7 +156,7 @@ impl Thread {
                 state.report = Some(Report::default());
                 if let (Some((bus, leg)), Some(model)) = (&mut self.bus, &model) {
                     let (seed, wearing) = (state.level.seed(), state.level.wearing());
-                    bus.accept(ModelRecord::of(leg, self.identification, model, 0, seed, wearing));
+                    bus.accept(ModelRecord::new(leg, self.identification, model, 0, seed, wearing));
                 }
                 true
             }

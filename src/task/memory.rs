@@ -27,7 +27,7 @@ pub fn identification() -> Option<(&'static Leg, &'static mut LegIdentification)
     let configuration: &'static Leg = CONFIGURATION.init(LEG.configuration().ok()?);
     let filters = Filters::new(configuration.bandwidth_hz).ok()?;
     let window = WINDOW.take();
-    let built = LegIdentification::place(IDENTIFICATION.uninit(), configuration, &filters, window);
+    let built = LegIdentification::new_in(IDENTIFICATION.uninit(), configuration, &filters, window);
     Some((configuration, built))
 }
 
@@ -53,7 +53,7 @@ static BUS: StaticCell<bus::Memory> = StaticCell::new();
 /// Data exchanged between the bus and the other levels, once.
 #[inline(never)]
 pub fn bus() -> &'static mut bus::Memory {
-    bus::Memory::place(BUS.uninit())
+    bus::Memory::new_in(BUS.uninit())
 }
 
 /// Task state of the storage, once; `None` where the flash has no valid size.

@@ -119,7 +119,7 @@ pub async fn run(storage: &'static mut StorageTask) -> ! {
     let StorageTask { storage, storing, program, update, ends } = storage;
     loop {
         Timer::after_millis(ROUND_MS).await;
-        storing.look_after(&SIGNALS.inhibit, &mut Odrive);
+        storing.supervise(&SIGNALS.inhibit, &mut Odrive);
         let Some((end, calibrated)) = ends else { continue };
         if let Some(model) = end.accepted.dequeue() {
             storage.accept(model);
@@ -160,6 +160,6 @@ pub async fn run(storage: &'static mut StorageTask) -> ! {
             }
         };
         drop(job);
-        end.storage.give_back();
+        end.storage.return_value();
     }
 }

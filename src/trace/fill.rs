@@ -50,8 +50,8 @@ impl Value for &str {
 impl<V: Value, const N: usize> Value for [V; N] {
     fn put(&self, out: &mut dyn Write) -> Result {
         out.write_str("[")?;
-        for (place, value) in self.iter().enumerate() {
-            if place > 0 {
+        for (index, value) in self.iter().enumerate() {
+            if index > 0 {
                 out.write_str(", ")?;
             }
             value.put(out)?;
@@ -82,9 +82,9 @@ impl<V, const N: usize> Hint for [V; N] {
 /// Writes `format` with `values` at its placeholders; a placeholder without a value stays empty.
 pub(super) fn fill(format: &str, values: &[&dyn Value], out: &mut dyn Write) -> Result {
     let mut values = values.iter();
-    for (place, piece) in format.split('{').enumerate() {
+    for (index, piece) in format.split('{').enumerate() {
         let text = match piece.split_once('}') {
-            Some((hint, text)) if place > 0 => {
+            Some((hint, text)) if index > 0 => {
                 match values.next() {
                     Some(value) if hint.ends_with(":#x") => value.put_hex(out)?,
                     Some(value) => value.put(out)?,
@@ -130,17 +130,17 @@ pub(super) const fn is_format_of(format: &str, fields: &[(&str, &str)]) -> bool 
     is_right && at == format.len()
 }
 
-/// Place behind `part`, if the text goes on with it; else the same place.
+/// Offset behind `part`, if the text goes on with it; else the same offset.
 const fn after(text: &[u8], at: usize, part: &str) -> (usize, bool) {
     let part = part.as_bytes();
-    let mut place = 0;
-    while place < part.len() {
-        if at + place >= text.len() || text[at + place] != part[place] {
+    let mut offset = 0;
+    while offset < part.len() {
+        if at + offset >= text.len() || text[at + offset] != part[offset] {
             return (at, false);
         }
-        place += 1;
+        offset += 1;
     }
-    (at + place, true)
+    (at + offset, true)
 }
 
 #[cfg(test)]

@@ -129,7 +129,7 @@ fn take_pair(text: &str) -> Result<(&str, &str, &str), LineError<'_>> {
     let whole = text.split(' ').next().unwrap_or(text);
     let (key, rest) = text.split_once('=').ok_or(LineError::Pair(whole))?;
     let end = if rest.starts_with('[') {
-        rest.find(']').map(|place| place + 1).ok_or(LineError::Pair(whole))?
+        rest.find(']').map(|index| index + 1).ok_or(LineError::Pair(whole))?
     } else {
         rest.find(' ').unwrap_or(rest.len())
     };

@@ -128,18 +128,18 @@ where
     }
 
     fn finding(&self, report: &mut Report) -> Option<Record<N>> {
-        let place = report.index % CHUNK;
-        if place == 0 {
+        let index = report.index % CHUNK;
+        if index == 0 {
             report.findings = [None; CHUNK];
             let (first, slots, mut seen) = (report.index, &mut report.findings, 0_usize);
             self.identification.judge_with(&mut |evidence| {
-                if let Some(slot) = seen.checked_sub(first).and_then(|place| slots.get_mut(place)) {
+                if let Some(slot) = seen.checked_sub(first).and_then(|index| slots.get_mut(index)) {
                     *slot = Some(*evidence);
                 }
                 seen += 1;
             });
         }
-        let evidence = (*report.findings.get(place)?)?;
+        let evidence = (*report.findings.get(index)?)?;
         Some(Record::Finding {
             reason: evidence.reason.name(),
             test: evidence.test.name(),
@@ -227,8 +227,8 @@ where
 
     /// One record for each motion, then one for each of its joints.
     fn motion(&self, index: usize) -> Option<Record<N>> {
-        let (motion, place) = (index / (N + 1), index % (N + 1));
-        let Some(joint) = place.checked_sub(1) else {
+        let (motion, part) = (index / (N + 1), index % (N + 1));
+        let Some(joint) = part.checked_sub(1) else {
             let record = self.identification.motion(motion)?;
             return Some(Record::Motion {
                 motion: motion as u8,

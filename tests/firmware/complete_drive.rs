@@ -13,7 +13,7 @@ fn leg() -> LegFile {
 }
 
 fn options(drive: DriveModel) -> SimulationOptions {
-    SimulationOptions { drive, ..SimulationOptions::of_seed(3) }
+    SimulationOptions { drive, ..SimulationOptions::with_seed(3) }
 }
 
 fn identified(options: &SimulationOptions) -> RunReport {
@@ -54,7 +54,7 @@ fn twenty_complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
             .map(|seed| SimulationOptions {
                 drive,
                 perturbations: perturbations.to_vec(),
-                ..SimulationOptions::of_seed(seed)
+                ..SimulationOptions::with_seed(seed)
             })
             .collect();
         identify_many::<2, 13>(&leg(), &options).expect("they run")

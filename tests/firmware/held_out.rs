@@ -55,7 +55,13 @@ struct Found {
 
 /// Identifies with an assumed length (m) and zero errors (rad), and evaluates two held-out motions. On these
 /// `disturbed` adds to the torque of both joints.
-fn look(length_m: f64, zeros: [f64; 2], noise: [f64; 2], seed: u64, disturbed: impl Fn(f64) -> f64) -> Found {
+fn evaluate(
+    length_m: f64,
+    zeros: [f64; 2],
+    noise: [f64; 2],
+    seed: u64,
+    disturbed: impl Fn(f64) -> f64,
+) -> Found {
     let model = believed(length_m);
     let mut random = TestRandom::new(seed);
     let mut sample = |state: &JointState<f64, 2>| -> ([f32; 2], [f32; 2]) {
@@ -93,7 +99,7 @@ fn look(length_m: f64, zeros: [f64; 2], noise: [f64; 2], seed: u64, disturbed: i
     }
 }
 
-fn of(found: &Found, direction: Direction, joint: usize) -> Option<(f64, f64)> {
+fn misalignment(found: &Found, direction: Direction, joint: usize) -> Option<(f64, f64)> {
     let found = found.misalignments.iter().find(|found| (found.direction, found.joint) == (direction, joint));
     found.map(|found| (f64::from(found.delta), f64::from(found.sigma)))
 }
@@ -101,9 +107,9 @@ fn of(found: &Found, direction: Direction, joint: usize) -> Option<(f64, f64)> {
 #[test]
 fn a_wrong_link_length_is_found_with_sign_and_size() {
     for share in [-0.1, 0.1] {
-        let found = look(LENGTH_M * (1.0 + share), [0.0; 2], NOISE_NM, 1, |_| 0.0);
+        let found = evaluate(LENGTH_M * (1.0 + share), [0.0; 2], NOISE_NM, 1, |_| 0.0);
         println!("{:?}", found.misalignments);
-        let (delta, sigma) = of(&found, Direction::Length, 1).expect("seen");
+        let (delta, sigma) = misalignment(&found, Direction::Length, 1).expect("seen");
         let expected = 1.0 / (1.0 + share) - 1.0;
         assert!((delta - expected).abs() < 0.03, "{delta} for {expected}");
         assert!(delta.abs() > 5.2 * sigma, "{delta} {sigma}");
@@ -112,19 +118,19 @@ fn a_wrong_link_length_is_found_with_sign_and_size() {
 
 #[test]
 fn only_the_first_joint_s_zero_error_is_detected() {
-    let found = look(LENGTH_M, [0.087, 0.0], NOISE_NM, 1, |_| 0.0);
+    let found = evaluate(LENGTH_M, [0.087, 0.0], NOISE_NM, 1, |_| 0.0);
     println!("{:?}", found.misalignments);
-    let (delta, sigma) = of(&found, Direction::Zero, 0).expect("seen");
+    let (delta, sigma) = misalignment(&found, Direction::Zero, 0).expect("seen");
     assert!((delta.abs() - 0.087).abs() < 0.03 && delta.abs() > 5.2 * sigma, "{delta} {sigma}");
     // An error of the last joint's zero turns that link's own frame: its first moments absorb it.
-    assert_eq!(of(&found, Direction::Zero, 1), None);
+    assert_eq!(misalignment(&found, Direction::Zero, 1), None);
 }
 
 #[test]
 fn a_correct_leg_shows_no_misalignment() {
     let mut worst = 0.0_f64;
     for seed in 0..20 {
-        let found = look(LENGTH_M, [0.0; 2], NOISE_NM, seed, |_| 0.0);
+        let found = evaluate(LENGTH_M, [0.0; 2], NOISE_NM, seed, |_| 0.0);
         for found in &found.misalignments {
             worst = worst.max(f64::from((found.delta / found.sigma).abs()));
             // A direction may be fully explained by another.
@@ -140,12 +146,12 @@ fn a_correct_leg_shows_no_misalignment() {
 #[test]
 fn the_duration_of_a_disturbance_of_both_joints_is_measured() {
     let pushed = |time: f64| if (4.0..6.0).contains(&time) { 30.0 } else { 0.0 };
-    let found = look(LENGTH_M, [0.0; 2], NOISE_NM, 3, pushed);
+    let found = evaluate(LENGTH_M, [0.0; 2], NOISE_NM, 3, pushed);
     let seen = f64::from(found.residual.longest_common_s);
     println!("{seen} s");
     // Rows of a resting joint are excluded; the filter adds its own length.
     assert!((1.5..=2.6).contains(&seen), "{seen} s");
-    let quiet = look(LENGTH_M, [0.0; 2], NOISE_NM, 3, |_| 0.0);
+    let quiet = evaluate(LENGTH_M, [0.0; 2], NOISE_NM, 3, |_| 0.0);
     assert!(quiet.residual.longest_common_s < 0.1);
 }
 
@@ -155,12 +161,12 @@ fn only_an_unmodelled_swing_counts_as_slow_residual() {
         f64::from(found.residual.joints[joint].slow_by_chance(5.2, Some(NOISE_NM[joint] as f32)))
     };
     for seed in 0..10 {
-        let quiet = look(LENGTH_M, [0.0; 2], NOISE_NM, seed, |_| 0.0);
+        let quiet = evaluate(LENGTH_M, [0.0; 2], NOISE_NM, seed, |_| 0.0);
         for joint in 0..2 {
             assert!(f64::from(quiet.residual.joints[joint].slow(true)) < by_chance(joint, &quiet));
         }
     }
-    let swing = look(LENGTH_M, [0.0; 2], NOISE_NM, 1, |time| 2.0 * sin_cos(1.0 * time).0);
+    let swing = evaluate(LENGTH_M, [0.0; 2], NOISE_NM, 1, |time| 2.0 * sin_cos(1.0 * time).0);
     for joint in 0..2 {
         let residual = &swing.residual.joints[joint];
         let slow = f64::from(residual.slow(true));

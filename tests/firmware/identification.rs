@@ -22,7 +22,7 @@ fn chain() -> Chain<f64, 2> {
 const GRAVITY: Vector3<f64> = Vector3::new(9.81, 0.0, 0.0);
 
 fn model<T: scarab::real::Real>() -> RowModel<T, 2, BASE> {
-    let (chain, gravity) = (chain().convert(), GRAVITY.map(T::of));
+    let (chain, gravity) = (chain().convert(), GRAVITY.map(T::from_double));
     let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen base parameters");
     RowModel::new(chain, gravity, base)
 }

@@ -80,13 +80,13 @@ fn leg() -> (Chain<f64, 2>, LegParameters<f64, 2>, Vector3<f64>) {
 fn deviations<T: Real>() -> (f64, f64) {
     let (chain, parameters, gravity) = leg();
     let chain = chain.convert::<T>();
-    let parameters = parameters.map(|joint| joint.map(T::of));
-    let gravity = gravity.map(T::of);
+    let parameters = parameters.map(|joint| joint.map(T::from_double));
+    let gravity = gravity.map(T::from_double);
     let (mut torque_error, mut largest_torque) = (0.0_f64, 0.0_f64);
     let (mut entry_error, mut largest_entry) = (0.0_f64, 0.0_f64);
     for sample in samples() {
         let [q, qd, qdd] =
-            [sample.state.q, sample.state.qd, sample.state.qdd].map(|values| values.map(T::of));
+            [sample.state.q, sample.state.qd, sample.state.qdd].map(|values| values.map(T::from_double));
         let state = JointState { q, qd, qdd };
         let rigid = rigid_body_torques(&chain, &parameters, &state, &gravity);
         let total = joint_torques(&chain, &parameters, &state, &gravity);

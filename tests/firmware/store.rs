@@ -27,7 +27,7 @@ const BOARD_SECTOR: usize = Region::PARAMETERS.sector_bytes as usize;
 type Board = Flash<BOARD_SECTOR, { Region::PARAMETERS.sectors as usize }>;
 
 fn permit() -> Permit {
-    Permit::of(DriveState::SwitchOnDisabled).expect("the drive is off")
+    Permit::from_state(DriveState::SwitchOnDisabled).expect("the drive is off")
 }
 
 fn calibration(number: u32) -> CalibrationRecord {
@@ -162,14 +162,14 @@ fn writing_needs_a_drive_that_is_off() {
         DriveState::SwitchedOn,
         DriveState::Fault { fault },
     ] {
-        assert!(Permit::of(state).is_some(), "{state:?}");
+        assert!(Permit::from_state(state).is_some(), "{state:?}");
     }
     for state in [
         DriveState::OperationEnabled,
         DriveState::QuickStopActive { remaining_ticks: 1 },
         DriveState::FaultReactionActive { fault, remaining_ticks: 1 },
     ] {
-        assert!(Permit::of(state).is_none(), "{state:?}");
+        assert!(Permit::from_state(state).is_none(), "{state:?}");
     }
 }
 

@@ -97,14 +97,14 @@ fn the_document_lists_every_constant_of_the_default_swarm() {
 #[test]
 fn a_damped_oscillation_is_found_in_either_precision_from_any_seed() {
     fn found<T: scarab::real::Real>(seed: u64) -> bool {
-        let truth = [2.0, 0.8, 9.0, 0.7, 0.2].map(T::of);
+        let truth = [2.0, 0.8, 9.0, 0.7, 0.2].map(T::from_double);
         let samples: Vec<T> =
-            (0..100).map(|index| oscillation(&truth, T::of(0.02 * f64::from(index)))).collect();
-        let cost = DampedOscillation { samples: &samples, interval: T::of(0.02) };
+            (0..100).map(|index| oscillation(&truth, T::from_double(0.02 * f64::from(index)))).collect();
+        let cost = DampedOscillation { samples: &samples, interval: T::from_double(0.02) };
         let mut swarm =
             Bso::<T, 20, UNKNOWNS>::new(&cost, BsoSettings::default(), seed).expect("the box is valid");
         // A cost of 1e-5 V^2 is 3 mV of 2 V: only the right frequency and phase reach it.
-        swarm.reach(&cost, T::of(1e-5), 500)
+        swarm.reach(&cost, T::from_double(1e-5), 500)
     }
     assert!(BOX.iter().all(|&(_, _, low, high)| low < high));
     for seed in 600_000_001..600_000_021 {

@@ -21,7 +21,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn of<T: Real, S: Search<T>>(
+    fn new<T: Real, S: Search<T>>(
         problem: TestProblem,
         tolerance: f64,
         runs: u64,
@@ -30,7 +30,7 @@ impl Tally {
         let mut tally = Self { iterations: Vec::new(), evaluations: Vec::new(), runs: runs as usize };
         for seed in FIRST_SEED..FIRST_SEED + runs {
             let mut search = new(seed);
-            if search.reach(&problem, T::of(problem.minimum() + tolerance), MOST_ITERATIONS) {
+            if search.reach(&problem, T::from_double(problem.minimum() + tolerance), MOST_ITERATIONS) {
                 tally.iterations.push(search.iterations());
                 tally.evaluations.push(search.evaluations());
             }
@@ -57,17 +57,17 @@ impl Tally {
 
 fn bso<T: Real>(problem: TestProblem, tolerance: f64, runs: u64, settings: BsoSettings<T>) -> Tally {
     let new = |seed| Bso::<T, 20, 30>::new(&problem, settings, seed).expect("a valid box");
-    Tally::of(problem, tolerance, runs, new)
+    Tally::new(problem, tolerance, runs, new)
 }
 
 fn pso(problem: TestProblem, runs: u64) -> Tally {
     let new = |seed| Pso::<f64, 20, 30>::new(&problem, PsoSettings::default(), seed).expect("a valid box");
-    Tally::of(problem, 0.1, runs, new)
+    Tally::new(problem, 0.1, runs, new)
 }
 
 fn bas(problem: TestProblem, runs: u64) -> Tally {
     let new = |seed| Bas::<f64, 30>::new(&problem, BasSettings::default(), seed).expect("a valid box");
-    Tally::of(problem, 0.1, runs, new)
+    Tally::new(problem, 0.1, runs, new)
 }
 
 /// Checks median and 95th percentile against limits, and that all runs succeed, in one precision.

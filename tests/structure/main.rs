@@ -17,7 +17,7 @@ use tokens::{Token, tokens};
 const FIRMWARE: [(&str, &[&str]); 21] = [
     ("units", &[]),
     ("real", &[]),
-    ("place", &[]),
+    ("in_place", &[]),
     ("checksum", &[]),
     ("testing", &[]),
     ("hal", &[]),
@@ -63,7 +63,7 @@ const HOST: [(&str, &[&[&str]]); 4] = [
     (
         "host/rig/src",
         &[
-            &["image", "kept_file", "report", "trace"],
+            &["image", "parameter_file", "report", "trace"],
             &["board", "faulty_board", "operator", "options", "pair", "perturb", "worn"],
             &["bus", "excite", "identified"],
             &["scale", "shaking", "simulate", "watch"],
@@ -75,7 +75,7 @@ const HOST: [(&str, &[&[&str]]); 4] = [
 ];
 
 /// Firmware modules that every other firmware module may use.
-const OPEN: [&str; 5] = ["units", "real", "place", "checksum", "testing"];
+const OPEN: [&str; 5] = ["units", "real", "in_place", "checksum", "testing"];
 
 /// Source folders of all crates.
 const SOURCES: [&str; 13] = [
@@ -105,7 +105,7 @@ const MATHS_MODULES: [&str; 2] = ["src/real.rs", "hal-sim/src/maths.rs"];
 /// that checks the chip model.
 const UNSAFE_ALLOWED: [&str; 8] = [
     "src/real.rs",
-    "src/place.rs",
+    "src/in_place.rs",
     "src/board/",
     "src/task/memory.rs",
     "src/task/vectors.rs",
@@ -154,9 +154,9 @@ fn every_module_uses_only_permitted_modules() {
 
 #[test]
 fn folders_of_ident_are_listed_below_those_they_use() {
-    for (place, (module, allowed)) in IDENT.iter().enumerate() {
+    for (index, (module, allowed)) in IDENT.iter().enumerate() {
         for used in *allowed {
-            assert!(IDENT[..place].iter().any(|(name, _)| name == used), "`{module}` uses `{used}` below it");
+            assert!(IDENT[..index].iter().any(|(name, _)| name == used), "`{module}` uses `{used}` below it");
         }
     }
 }
@@ -441,7 +441,7 @@ fn long_sentences(text: &str) -> Vec<(usize, usize)> {
 fn sentences(paragraph: &str) -> Vec<usize> {
     let mut counts = vec![0];
     let spans = paragraph.split('`').enumerate();
-    let plain: String = spans.map(|(place, text)| if place % 2 == 0 { text } else { "code" }).collect();
+    let plain: String = spans.map(|(index, text)| if index % 2 == 0 { text } else { "code" }).collect();
     for word in plain.split_whitespace().filter(|word| word.contains(char::is_alphanumeric)) {
         *counts.last_mut().expect("never empty") += 1;
         if word.trim_end_matches([')', '*', '_', '"']).ends_with(['.', '!', '?', ':', ';']) {

@@ -264,8 +264,8 @@ fn stored(mut flash: Flash<'_, flash::Blocking>) {
     let mut bytes = [0; 16];
     let blank = flash.blocking_read(SECTOR + 0x1_FFF0, &mut bytes);
     give(bytes.iter().fold(u32::MAX, |all, byte| all & (0xFFFF_FF00 | u32::from(*byte))));
-    for (place, word) in bytes.chunks_exact_mut(4).zip(STORED) {
-        place.copy_from_slice(&word.to_le_bytes());
+    for (slot, word) in bytes.chunks_exact_mut(4).zip(STORED) {
+        slot.copy_from_slice(&word.to_le_bytes());
     }
     let (written, cycles) = timed(|| flash.blocking_write(SECTOR + 0x40, &bytes));
     give(cycles);

@@ -286,11 +286,11 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     send(session, Frame::new(0, &[1, 0]));
     session.run(0.1)?;
     for node in NODES {
-        let place = session.read_object(node, 0x6064, 0)?;
+        let position = session.read_object(node, 0x6064, 0)?;
         let torque = session.read_object(node, 0x6077, 0)?;
         let mut write = |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes);
         write(0x6060, 0, u32::from((mode as i8).cast_unsigned()), 1)?;
-        write(0x607A, 0, place, 4)?;
+        write(0x607A, 0, position, 4)?;
         write(0x60FF, 0, 0, 4)?;
         if matches!(mode, Mode::ProfileTorque | Mode::CyclicTorque) {
             write(0x6071, 0, torque, 2)?;
@@ -299,7 +299,7 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
         write(0x2020, 2, 0xFFFF, 2)?;
     }
     let plant = &session.machine.chip().plant;
-    let (torque, place) = (plant.torque(), plant.position());
+    let (torque, position) = (plant.torque(), plant.position());
     session.forget_frames();
     let mut codes = [const { Vec::new() }; JOINTS];
     let collect = |session: &Session, codes: &mut [Vec<u16>; JOINTS]| {
@@ -315,7 +315,7 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
         let plant = &session.machine.chip().plant;
         for joint in 0..JOINTS {
             let change = plant.torque()[joint] - torque[joint];
-            let moved = plant.position()[joint] - place[joint];
+            let moved = plant.position()[joint] - position[joint];
             if change.abs() > TAKEN_NM || moved.abs() > TAKEN_RAD {
                 return Ok(Err(format!("{mode:?}, joint {joint}: {change:.1} N m, {moved:.3} rad")));
             }

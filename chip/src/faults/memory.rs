@@ -84,7 +84,7 @@ fn of_axes(machines: &Machines<'_>) -> Result<Vec<(&'static str, f32)>, ToolErro
 
 /// Constants of the servo: scales, gains and limits of each joint.
 fn of_servo(session: &Session) -> Result<Vec<(&'static str, f32)>, ToolError> {
-    let context = Context::<JOINTS, BASE>::new(&session.leg, &SimulationOptions::of_seed(1))?;
+    let context = Context::<JOINTS, BASE>::new(&session.leg, &SimulationOptions::with_seed(1))?;
     let mut values = Vec::new();
     for joint in &context.configuration.joints {
         let limits = joint.limits();
@@ -119,10 +119,12 @@ fn find(
     let mut found = Vec::new();
     for (bits, (times, name)) in expected {
         let words = (0..).step_by(4).zip(bytes.chunks_exact(4));
-        let places: Vec<u32> =
-            words.filter(|(_, word)| *word == bits.to_le_bytes()).map(|(place, _)| address + place).collect();
-        if places.len() == times {
-            found.extend(places.into_iter().map(|address| Constant { name, address }));
+        let addresses: Vec<u32> = words
+            .filter(|(_, word)| *word == bits.to_le_bytes())
+            .map(|(offset, _)| address + offset)
+            .collect();
+        if addresses.len() == times {
+            found.extend(addresses.into_iter().map(|address| Constant { name, address }));
         }
     }
     Ok(found)

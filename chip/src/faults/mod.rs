@@ -266,7 +266,7 @@ fn jitter(session: &Session) -> Verdict {
     if lost > 0 {
         return Err(format!("{lost} conversions were lost"));
     }
-    Ok(1e-6 * microseconds(chip.load.of(rows::CURRENT).latency))
+    Ok(1e-6 * microseconds(chip.load.usage(rows::CURRENT).latency))
 }
 
 /// Reaction seen at the pins and in the records.

@@ -124,7 +124,7 @@ impl HostedLeg for ChipLeg<'_> {
 /// The image does not restart, the model has no new findings, and all that holds for the simulated leg holds.
 pub fn played(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let resting = machines.resting()?;
-    let bounds = JointBounds::of(&machines.session.leg)?;
+    let bounds = JointBounds::from_leg(&machines.session.leg)?;
     let mut random = Random::new("B7 of the chip", seed);
     let delay = random.uniform(0.0, DELAY_S);
     let mut hosts = HostSession::draw(&mut random);

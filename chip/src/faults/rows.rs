@@ -184,7 +184,7 @@ pub(super) const ROWS: &[Row] = &[
         }
     })
     .case("bus with full load of foreign and hostile frames"),
-    own(&catalogue::F2, stored::rotten),
+    own(&catalogue::F2, stored::corrupted_records),
     own(&catalogue::F3, stored::requested),
     own(&catalogue::M1, memory::overflow),
     own(&catalogue::M2, memory::upset),

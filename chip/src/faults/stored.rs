@@ -9,8 +9,8 @@ use scarab::store::{Key, ModelRecord};
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_client::bus::{Object, RequestError};
-use scarab_rig::faults::bench::kept::{corrupt, identified, readable, window, worn};
-use scarab_rig::kept_file::memory::Memory;
+use scarab_rig::faults::bench::stored_data::{corrupt, identified, readable, window, worn};
+use scarab_rig::parameter_file::memory::Memory;
 
 use crate::faults::{DAMP_S, Machines, Verdict, begin};
 use crate::machine::Snapshot;
@@ -101,7 +101,7 @@ fn start(session: &mut Session, booted: &Snapshot, flash: &[u8]) -> Result<Start
 
 /// F2: the board takes the newest of its intact records, or its start values; it reports what is lost, and
 /// enables nothing.
-pub fn rotten(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
+pub fn corrupted_records(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let stored = machines.stored()?;
     let mut random = Random::new("F2", seed);
     let way = seed % WAYS;

@@ -16,8 +16,8 @@ pub const SYSTEM_BYTES: usize = 0x8000;
 pub fn system_memory(version: [u8; 3]) -> Vec<u8> {
     let mut bytes = vec![0xFF; SYSTEM_BYTES];
     bytes[0x7803..0x7806].copy_from_slice(&version);
-    for (place, byte) in bytes[0x7A10..0x7A1C].iter_mut().enumerate() {
-        *byte = 0x31 + place as u8;
+    for (index, byte) in bytes[0x7A10..0x7A1C].iter_mut().enumerate() {
+        *byte = 0x31 + index as u8;
     }
     // Kilobytes of flash.
     bytes[0x7A22..0x7A24].copy_from_slice(&1024_u16.to_le_bytes());

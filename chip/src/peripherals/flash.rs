@@ -344,7 +344,7 @@ impl Flash {
     }
 }
 
-/// Place of a region's bytes.
+/// Offsets of a region's bytes.
 const fn range(region: &Region) -> Range<usize> {
     let first = (region.address - FLASH) as usize;
     first..first + region.bytes() as usize

@@ -36,7 +36,7 @@ struct Port {
 
 impl Port {
     /// Computes the levels that the inputs see.
-    fn look(&mut self) {
+    fn update_inputs(&mut self) {
         self.inputs = 0;
         for pin in 0..16 {
             let bit = match self.mode >> (2 * pin) & 3 {
@@ -76,15 +76,15 @@ impl Gpio {
 
     /// Resets the registers; levels from outside stay.
     pub fn reset(&mut self) {
-        for (place, port) in self.ports.iter_mut().enumerate() {
+        for (index, port) in self.ports.iter_mut().enumerate() {
             // The debug port's pins.
-            let (mode, speed, pull) = match place {
+            let (mode, speed, pull) = match index {
                 0 => (0xA800_0000, 0x0C00_0000, 0x6400_0000),
                 1 => (0x0000_0280, 0x0000_00C0, 0x0000_0100),
                 _ => (0, 0, 0),
             };
             *port = Port { mode, speed, pull, driven: port.driven, levels: port.levels, ..Port::default() };
-            port.look();
+            port.update_inputs();
         }
     }
 
@@ -125,7 +125,7 @@ impl Gpio {
         } else {
             state.levels &= !(1 << pin)
         }
-        state.look();
+        state.update_inputs();
         let after = self.level((port, pin));
         (before != after).then_some(after)
     }
@@ -180,7 +180,7 @@ impl Gpio {
             0x24 => port.functions[1] = value,
             other => access.refuse(NO_REGISTER, name(number, other)),
         }
-        port.look();
+        port.update_inputs();
     }
 }
 

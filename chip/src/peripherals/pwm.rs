@@ -92,13 +92,13 @@ impl Outputs {
         }
         let dead = dead_time(timer.main_output()) * timer.dead_time_clock();
         let mut next = NEVER;
-        let place = timer.runs().then(|| timer.place(now));
+        let counter = timer.runs().then(|| timer.counter_state(now));
         for (channel, reference) in self.references.iter().enumerate() {
             if reference.since + dead > now {
                 next = next.min(reference.since + dead);
             }
-            if let (Some(place), Some([rise, fall])) = (&place, timer.edges(channel)) {
-                next = next.min(place.next(if reference.level { fall } else { rise }));
+            if let (Some(counter), Some([rise, fall])) = (&counter, timer.edges(channel)) {
+                next = next.min(counter.next(if reference.level { fall } else { rise }));
             }
         }
         next

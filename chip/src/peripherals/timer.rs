@@ -68,14 +68,14 @@ pub enum Event {
 
 /// State of a running counter: start and phase of the present count.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct CounterState {
     begun: Ticks,
     length: Ticks,
     period: u64,
     phase: u64,
 }
 
-impl Place {
+impl CounterState {
     /// First instant after the present count at which the phase becomes this one.
     #[must_use]
     pub fn next(&self, phase: u64) -> Ticks {
@@ -217,16 +217,16 @@ impl Timer {
     /// First instant after another at which the phase becomes this one.
     #[must_use]
     pub fn next(&self, phase: u64, after: Ticks) -> Ticks {
-        self.place(after).next(phase)
+        self.counter_state(after).next(phase)
     }
 
     /// State of a running counter at an instant, from which several instants are computed.
     #[must_use]
-    pub fn place(&self, at: Ticks) -> Place {
+    pub fn counter_state(&self, at: Ticks) -> CounterState {
         let (length, period) = (self.count_length(), self.period());
         let passed = (at - self.origin) / length;
         let phase = (self.phase + passed) % period;
-        Place { begun: self.origin + passed * length, length, period, phase }
+        CounterState { begun: self.origin + passed * length, length, period, phase }
     }
 
     fn counter_of(&self, phase: u64) -> u32 {
@@ -368,12 +368,12 @@ impl Timer {
             return NEVER;
         }
         let mut due = NEVER;
-        let place = self.place(self.processed);
+        let counter = self.counter_state(self.processed);
         if self.kind == Kind::Advanced || self.dier & 1 != 0 || self.has_buffered() || !self.is_centred() {
-            due = self.next_end(&place);
+            due = self.next_end(&counter);
         }
         if let Some(phase) = self.trigger_phase() {
-            due = due.min(place.next(phase));
+            due = due.min(counter.next(phase));
         }
         for channel in (0..4).filter(|channel| self.dier >> (channel + 1) & 1 == 1) {
             due = due.min(self.next_match(channel, self.processed));
@@ -381,9 +381,9 @@ impl Timer {
         due
     }
 
-    fn next_end(&self, place: &Place) -> Ticks {
-        let zero = place.next(0);
-        if self.is_centred() { zero.min(place.next(self.top())) } else { zero }
+    fn next_end(&self, counter: &CounterState) -> Ticks {
+        let zero = counter.next(0);
+        if self.is_centred() { zero.min(counter.next(self.top())) } else { zero }
     }
 
     /// Next match of a channel; both directions count.
@@ -402,12 +402,12 @@ impl Timer {
 
     /// Processes the events of one instant, at which one is due.
     pub fn pass(&mut self, now: Ticks, mut report: impl FnMut(Event)) {
-        let place = self.place(self.processed);
-        let trigger = self.trigger_phase().is_some_and(|phase| place.next(phase) == now);
+        let counter = self.counter_state(self.processed);
+        let trigger = self.trigger_phase().is_some_and(|phase| counter.next(phase) == now);
         let matches = (0..4).any(|channel| {
             self.dier >> (channel + 1) & 1 == 1 && self.next_match(channel, self.processed) == now
         });
-        let ends = self.next_end(&place) == now;
+        let ends = self.next_end(&counter) == now;
         self.processed = now;
         if matches {
             self.collect_matches(now);

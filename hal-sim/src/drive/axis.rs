@@ -100,9 +100,9 @@ impl Axis {
     }
 
     /// Moves the rotor to an angle, at rest and without current.
-    pub fn place(&mut self, angle: f64) {
+    pub fn move_to(&mut self, angle: f64) {
         self.set_rotor(angle, 0.0);
-        self.motor.place(electrical_angle(&self.description, angle));
+        self.motor.move_to(electrical_angle(&self.description, angle));
         self.slopes = [0.0; 3];
     }
 
@@ -237,5 +237,5 @@ impl Axis {
 }
 
 fn electrical_angle(description: &AxisDescription, angle: f64) -> Direction {
-    Direction::of(f64::from(description.motor.pole_pairs) * angle + description.motor.electrical_zero)
+    Direction::from_angle(f64::from(description.motor.pole_pairs) * angle + description.motor.electrical_zero)
 }

@@ -108,9 +108,9 @@ impl<const N: usize> CompleteDrives<N> {
     }
 
     /// Moves the rotors to these angles, at rest and without current.
-    pub fn place(&mut self, angles: &[f64; N]) {
+    pub fn move_to(&mut self, angles: &[f64; N]) {
         for (axis, angle) in self.axes.iter_mut().zip(angles) {
-            axis.place(*angle);
+            axis.move_to(*angle);
         }
     }
 

@@ -49,7 +49,7 @@ pub struct Direction {
 impl Direction {
     /// Direction of an angle in rad.
     #[must_use]
-    pub fn of(angle: f64) -> Self {
+    pub fn from_angle(angle: f64) -> Self {
         let (sine, cosine) = sin_cos(angle);
         Self { cosine, sine }
     }
@@ -155,7 +155,7 @@ impl Motor {
     }
 
     /// Moves the rotor to an angle, without current.
-    pub fn place(&mut self, angle: Direction) {
+    pub fn move_to(&mut self, angle: Direction) {
         (self.angle, self.flux, self.currents) = (angle, self.of_magnets(&angle), [0.0; 2]);
     }
 
@@ -271,7 +271,7 @@ impl Motor {
             && phases(&start).iter().all(|current| current.abs() < NO_CURRENT)
             && self.stays_dark(terminals, speed)
         {
-            self.place(end);
+            self.move_to(end);
             return Flow::default();
         }
         let mut voltages = terminals.map(|terminal| match terminal {

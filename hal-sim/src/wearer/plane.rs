@@ -128,7 +128,7 @@ pub(super) struct ExoskeletonPlane {
 
 impl ExoskeletonPlane {
     /// Plane of a leg of two joints with parallel horizontal axes, flexion positive at both.
-    pub(super) fn of<const N: usize>(leg: &LegDescription<N>) -> Result<Self, WearerError> {
+    pub(super) fn from_leg<const N: usize>(leg: &LegDescription<N>) -> Result<Self, WearerError> {
         let [hip, knee] = leg.joints.first_chunk().filter(|_| N == 2).ok_or(WearerError::JointCount(N))?;
         let [first, second] = links_at_reference(&[*hip, *knee]);
         let tilt = first.axis.cross(&second.axis).norm();
@@ -155,7 +155,7 @@ impl ExoskeletonPlane {
         Ok(Self {
             chain: TwoLinkChain { hip: [0.0; 2], thigh: length },
             gravity: [gravity.dot(&along), gravity.dot(&forward)],
-            anatomy: [Anatomy::of(hip), Anatomy::of(knee)],
+            anatomy: [Anatomy::from_joint(hip), Anatomy::from_joint(knee)],
         })
     }
 

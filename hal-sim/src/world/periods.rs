@@ -53,8 +53,8 @@ impl<const N: usize> Electric<N> {
     }
 
     /// Sets the rotors to the joints' angles (anatomical, direction of the motors), without current.
-    pub(super) fn place(&mut self, angles: &[f64; N]) {
-        self.drives.place(&core::array::from_fn(|joint| self.ratio[joint] * angles[joint]));
+    pub(super) fn move_to(&mut self, angles: &[f64; N]) {
+        self.drives.move_to(&core::array::from_fn(|joint| self.ratio[joint] * angles[joint]));
     }
 }
 

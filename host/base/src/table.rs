@@ -91,7 +91,7 @@ pub struct Table {
 impl Table {
     /// Table with a style in HTML.
     #[must_use]
-    pub fn of_class(class: &'static str) -> Self {
+    pub fn with_class(class: &'static str) -> Self {
         Self { class: Some(class), ..Self::default() }
     }
 
@@ -222,22 +222,22 @@ impl Table {
     /// Texts of header and rows; a missing cell is empty.
     fn lines(&self) -> Vec<Vec<&str>> {
         let heads = self.of_text().map(|(_, column)| column.head.as_str()).collect();
-        let cells = |row| self.of_text().map(|(place, _)| cell(row, place)).collect();
+        let cells = |row| self.of_text().map(|(index, _)| cell(row, index)).collect();
         core::iter::once(heads).chain(self.rows.iter().map(cells)).collect()
     }
 
     /// Kind and width of each column of a text.
     fn widths(&self, least: usize) -> Vec<(Kind, usize)> {
-        let width = |(place, column): (usize, &Column)| {
-            let cells = self.rows.iter().map(|row| cell(row, place).width());
+        let width = |(index, column): (usize, &Column)| {
+            let cells = self.rows.iter().map(|row| cell(row, index).width());
             (column.kind, cells.fold(column.head.width().max(least), usize::max))
         };
         self.of_text().map(width).collect()
     }
 }
 
-fn cell(row: &Row, place: usize) -> &str {
-    row.cells.get(place).map_or("", Cell::text)
+fn cell(row: &Row, index: usize) -> &str {
+    row.cells.get(index).map_or("", Cell::text)
 }
 
 /// Fills a cell up to the width of its column.

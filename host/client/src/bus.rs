@@ -100,7 +100,7 @@ impl RequestError {
 
     /// Error of the bus as a whole.
     #[must_use]
-    pub fn of_bus(self) -> ToolError {
+    pub fn for_bus(self) -> ToolError {
         match self {
             Self::Failed(why) => ToolError::input(why),
             Self::Silent(_) | Self::Endless | Self::Aborted(_) => ToolError::input("no answer on the bus"),
@@ -109,7 +109,7 @@ impl RequestError {
 
     /// Error with the node and the object.
     #[must_use]
-    pub fn of(self, node: u8, Object(index, sub): Object) -> ToolError {
+    pub fn for_object(self, node: u8, Object(index, sub): Object) -> ToolError {
         let why = match self {
             Self::Aborted(code) => format!("refused with abort code {code:08X}"),
             Self::Silent(patience) => format!(
@@ -119,17 +119,17 @@ impl RequestError {
             Self::Endless => {
                 format!("the value has more than {MOST_BYTES} bytes: this is no node of a Scarab board")
             }
-            Self::Failed(_) => return self.of_bus(),
+            Self::Failed(_) => return self.for_bus(),
         };
         ToolError::input(format!("node {node}, object {index:04X}:{sub}: {why}"))
     }
 
-    /// Like [`Self::of`]; a node that aborts has refused.
+    /// Like [`Self::for_object`]; a node that aborts has refused.
     #[must_use]
     pub fn refused(self, node: u8, object: Object) -> ToolError {
         match self {
-            Self::Aborted(_) => ToolError::Refused(self.of(node, object).to_string()),
-            error => error.of(node, object),
+            Self::Aborted(_) => ToolError::Refused(self.for_object(node, object).to_string()),
+            error => error.for_object(node, object),
         }
     }
 }

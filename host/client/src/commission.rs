@@ -241,8 +241,8 @@ impl<'a> Commission<'a> {
             }
         }
         // Whatever happened, the leg is not left enabled.
-        let given_back = self.give_back();
-        (self.report, result.and(given_back))
+        let restored = self.restore_settings();
+        (self.report, result.and(restored))
     }
 
     fn perform(&mut self, step: Step) -> Result<String, ToolError> {
@@ -272,7 +272,7 @@ impl<'a> Commission<'a> {
     }
 
     fn wait(&mut self, time: Duration) -> Result<(), ToolError> {
-        self.client.wait(time).map_err(RequestError::of_bus)
+        self.client.wait(time).map_err(RequestError::for_bus)
     }
 
     /// Refuses if another host was heard.
@@ -349,9 +349,9 @@ impl<'a> Commission<'a> {
 
     fn find(&mut self) -> Result<String, ToolError> {
         // The operator may hold the switch of a leg that is ready.
-        self.others = Some(OtherHosts::look(&mut self.client, &self.options.nodes, MayBeOn::ByContacts)?);
+        self.others = Some(OtherHosts::listen(&mut self.client, &self.options.nodes, MayBeOn::ByContacts)?);
         for node in self.options.nodes {
-            self.client.manage(node, START).map_err(RequestError::of_bus)?;
+            self.client.manage(node, START).map_err(RequestError::for_bus)?;
         }
         let mut serials = Vec::new();
         for (joint, node) in self.options.nodes.into_iter().enumerate() {
@@ -360,7 +360,7 @@ impl<'a> Commission<'a> {
                 return Err(refused(format!("node {node} is no drive of CiA 402: device type {kind:08X}")));
             }
             let product = self.client.read(node, Object(0x1018, 2))?;
-            if product != Identity::scarab(0, "").of(joint).product {
+            if product != Identity::scarab(0, "").for_joint(joint).product {
                 return Err(refused(format!(
                     "node {node} is not the {}: its product code (1018:2) is {product}; hip has 1, knee 2; --nodes takes hip, then knee",
                     ["hip", "knee"][joint]
@@ -373,7 +373,7 @@ impl<'a> Commission<'a> {
                         "node {node} has no object 2160: other firmware, or too old; flash this one"
                     ))
                 } else {
-                    error.of(node, COMMAND)
+                    error.for_object(node, COMMAND)
                 });
             }
         }
@@ -579,7 +579,7 @@ impl<'a> Commission<'a> {
     fn states(&mut self) -> Result<[Option<JointState>; JOINTS], ToolError> {
         let mut states = [None; JOINTS];
         for (state, node) in states.iter_mut().zip(self.options.nodes) {
-            *state = JointState::of(self.client.read(node, STATUSWORD)? as u16);
+            *state = JointState::from_statusword(self.client.read(node, STATUSWORD)? as u16);
         }
         Ok(states)
     }
@@ -685,7 +685,7 @@ impl<'a> Commission<'a> {
     }
 
     /// Turns the drive off, and restores what [`Self::take_control`] has replaced.
-    fn give_back(&mut self) -> Result<(), ToolError> {
+    fn restore_settings(&mut self) -> Result<(), ToolError> {
         if self.before.is_empty() {
             return Ok(());
         }
@@ -797,7 +797,7 @@ impl<'a> Commission<'a> {
             _ => None,
         };
         let bits = self.read(Object(0x2100, 9))?;
-        let set = Reason::ALL.into_iter().enumerate().filter(|(place, _)| bits & 1 << place != 0);
+        let set = Reason::ALL.into_iter().enumerate().filter(|(index, _)| bits & 1 << index != 0);
         self.report.reasons = set.map(|(_, reason)| reason.name()).collect();
         let first = self.first();
         self.report.base.clear();
@@ -843,14 +843,14 @@ impl<'a> Commission<'a> {
 
     fn store(&mut self) -> Result<String, ToolError> {
         // Before anything is stored.
-        self.give_back()?;
+        self.restore_settings()?;
         let node = self.first();
         self.client.take_emergencies();
         self.ask("let the leg come to rest", |this| {
             match this.client.try_write(node, Object(0x1010, 1), SAVE, 4) {
                 Ok(()) => Ok(true),
                 Err(error) if error.is(Abort::State) => Ok(false),
-                Err(error) => Err(error.of(node, Object(0x1010, 1))),
+                Err(error) => Err(error.for_object(node, Object(0x1010, 1))),
             }
         })?;
         let begun = self.client.now();

@@ -237,7 +237,7 @@ impl<B: Bus> Client<B> {
     /// # Errors
     /// The node refuses or is silent.
     pub fn read(&mut self, node: u8, object: Object) -> Result<u32, ToolError> {
-        self.try_read(node, object).map_err(|error| error.of(node, object))
+        self.try_read(node, object).map_err(|error| error.for_object(node, object))
     }
 
     /// Reads a REAL32; unknown values are NaN.
@@ -253,7 +253,7 @@ impl<B: Bus> Client<B> {
     /// # Errors
     /// The node refuses or is silent.
     pub fn text(&mut self, node: u8, object: Object) -> Result<String, ToolError> {
-        let bytes = self.bytes(node, object).map_err(|error| error.of(node, object))?;
+        let bytes = self.bytes(node, object).map_err(|error| error.for_object(node, object))?;
         Ok(printable(&String::from_utf8_lossy(&bytes)))
     }
 
@@ -326,7 +326,7 @@ impl<B: Bus> Client<B> {
     /// # Errors
     /// The node refuses or is silent.
     pub fn write(&mut self, node: u8, object: Object, value: u32, size: u8) -> Result<(), ToolError> {
-        self.try_write(node, object, value, size).map_err(|error| error.of(node, object))
+        self.try_write(node, object, value, size).map_err(|error| error.for_object(node, object))
     }
 }
 

@@ -62,7 +62,7 @@ impl NodeIds {
     /// # Errors
     /// Another host uses the bus, the bus fails, or answers are lost again and again.
     pub fn find(&mut self) -> Result<Vec<Board>, ToolError> {
-        OtherHosts::look(&mut self.client, &[], MayBeOn::No)?;
+        OtherHosts::listen(&mut self.client, &[], MayBeOn::No)?;
         let mut is_lost = false;
         for _ in 0..TRIALS {
             if self.is_any(ALL, ALL)? {
@@ -92,7 +92,7 @@ impl NodeIds {
         if own.is_empty() {
             return Ok(());
         }
-        OtherHosts::look(&mut self.client, &own, MayBeOn::No).map(drop)
+        OtherHosts::listen(&mut self.client, &own, MayBeOn::No).map(drop)
     }
 
     /// Searches all serial numbers by halving; `None` if an answer was lost.
@@ -148,8 +148,8 @@ impl NodeIds {
         // A node-ID that the other node still has is free after that node's reset.
         let order = if nodes[0] == before[1] { [before[1], before[0]] } else { before };
         for node in order {
-            self.client.manage(node, RESET).map_err(RequestError::of_bus)?;
-            self.client.wait(RESTART).map_err(RequestError::of_bus)?;
+            self.client.manage(node, RESET).map_err(RequestError::for_bus)?;
+            self.client.wait(RESTART).map_err(RequestError::for_bus)?;
         }
         let Board { nodes: found, .. } = self.numbers(board)?;
         if found != nodes {
@@ -190,7 +190,7 @@ impl NodeIds {
         let requests: Vec<_> = (SEARCH..).zip(fields).collect();
         for _ in 0..2 {
             if self.ask(&requests, FOUND, ANSWER)?.is_some() {
-                self.client.wait(LATE).map_err(RequestError::of_bus)?;
+                self.client.wait(LATE).map_err(RequestError::for_bus)?;
                 return Ok(true);
             }
         }
@@ -223,7 +223,7 @@ impl NodeIds {
     /// Selects a node alone.
     fn select(&mut self, joint: usize, board: Board) -> Result<(), ToolError> {
         self.wait()?;
-        let Identity { vendor, product, .. } = self.identity.of(joint);
+        let Identity { vendor, product, .. } = self.identity.for_joint(joint);
         let requests: Vec<_> = (SELECT..).zip([vendor, product, board.revision, board.serial]).collect();
         self.ask(&requests, SELECTED, ANSWER)?.map(drop).ok_or_else(|| silent(board.serial))
     }
@@ -234,7 +234,7 @@ impl NodeIds {
     }
 
     fn ask(&mut self, requests: &[(u8, u32)], answer: u8, time: Duration) -> Result<Option<u32>, ToolError> {
-        self.client.lss(requests, answer, time).map_err(RequestError::of_bus)
+        self.client.lss(requests, answer, time).map_err(RequestError::for_bus)
     }
 }
 

@@ -52,7 +52,11 @@ impl OtherHosts {
     ///
     /// # Errors
     /// [`ToolError::Refused`] with the sign and the next step; or the bus fails.
-    pub fn look<B: Bus>(client: &mut Client<B>, nodes: &[u8], may_be_on: MayBeOn) -> Result<Self, ToolError> {
+    pub fn listen<B: Bus>(
+        client: &mut Client<B>,
+        nodes: &[u8],
+        may_be_on: MayBeOn,
+    ) -> Result<Self, ToolError> {
         let mut signs = vec![
             (0, "network management".into()),
             (0x80, "SYNC".into()),
@@ -67,7 +71,7 @@ impl OtherHosts {
             }
         }
         let mut found = Self { signs };
-        client.wait(LISTENING).map_err(RequestError::of_bus)?;
+        client.wait(LISTENING).map_err(RequestError::for_bus)?;
         found.check(client)?;
         for node in nodes {
             found.add_signs(client, *node)?;
@@ -95,11 +99,11 @@ impl OtherHosts {
     fn add_signs<B: Bus>(&mut self, client: &mut Client<B>, node: u8) -> Result<(), ToolError> {
         // A stopped node answers no SDO.
         if optional(client, node, STATUSWORD).is_err() {
-            client.manage(node, START).map_err(RequestError::of_bus)?;
+            client.manage(node, START).map_err(RequestError::for_bus)?;
         }
-        let pdos = (0..).zip(RECEIVED).map(|(place, base)| {
-            let words = format!("received PDO {} of node {node}", place + 1);
-            (Object(0x1400 + place, 1), u32::from(base) + u32::from(node), words)
+        let pdos = (0..).zip(RECEIVED).map(|(index, base)| {
+            let words = format!("received PDO {} of node {node}", index + 1);
+            (Object(0x1400 + index, 1), u32::from(base) + u32::from(node), words)
         });
         let sync = (SYNC, 0x80, "SYNC".to_owned());
         for (object, default, words) in core::iter::once(sync).chain(pdos) {
@@ -117,14 +121,14 @@ fn optional<B: Bus>(client: &mut Client<B>, node: u8, object: Object) -> Result<
     match client.try_read(node, object) {
         Ok(value) => Ok(Some(value)),
         Err(RequestError::Aborted(_)) => Ok(None),
-        Err(error) => Err(error.of(node, object)),
+        Err(error) => Err(error.for_object(node, object)),
     }
 }
 
 /// Refuses a drive that a host controls, or that is on although it must not be.
 fn check_drive<B: Bus>(client: &mut Client<B>, node: u8, may_be_on: MayBeOn) -> Result<(), ToolError> {
     let controlword = optional(client, node, CONTROLWORD)?.unwrap_or(0);
-    let state = optional(client, node, STATUSWORD)?.and_then(|word| JointState::of(word as u16));
+    let state = optional(client, node, STATUSWORD)?.and_then(|word| JointState::from_statusword(word as u16));
     let name = state.map_or("unknown state", JointState::name);
     if controlword != 0 {
         return Err(ToolError::Refused(format!(

@@ -74,12 +74,12 @@ impl<B: Bus> Update<'_, B> {
     /// # Errors
     /// The board refuses, or the bus fails.
     pub fn run(&mut self, program: &[u8], header: &Header) -> Result<(), ToolError> {
-        OtherHosts::look(&mut self.client, &[self.node], MayBeOn::No)?;
+        OtherHosts::listen(&mut self.client, &[self.node], MayBeOn::No)?;
         let running = self.client.try_read(self.node, SOFTWARE).map_err(|error| {
             if error.is(Abort::NoObject) {
                 ToolError::Refused("this firmware takes no update over the bus; use a debug probe".into())
             } else {
-                error.of(self.node, SOFTWARE)
+                error.for_object(self.node, SOFTWARE)
             }
         })?;
         let serial = self.client.read(self.node, Object(0x1018, 4))?;
@@ -147,7 +147,7 @@ impl<B: Bus> Update<'_, B> {
             }
         };
         let written = self.client.download(self.node, DATA, program, progress);
-        written.map_err(|error| error.of(self.node, DATA))?;
+        written.map_err(|error| error.for_object(self.node, DATA))?;
         let status = self.settled()?;
         if status.error() == 0 { Ok(()) } else { Err(refused("the new image", status)) }
     }
@@ -170,9 +170,9 @@ impl<B: Bus> Update<'_, B> {
                 }
                 // The board swaps the images.
                 Err(RequestError::Silent(_)) => {}
-                Err(error) => return Err(error.of(self.node, STATUS)),
+                Err(error) => return Err(error.for_object(self.node, STATUS)),
             }
-            self.client.wait(POLL).map_err(|error| error.of(self.node, STATUS))?;
+            self.client.wait(POLL).map_err(|error| error.for_object(self.node, STATUS))?;
         }
         let running = self.client.read(self.node, SOFTWARE)?;
         if running == header.checksum {
@@ -196,7 +196,7 @@ impl<B: Bus> Update<'_, B> {
                 let why = "the board refuses it now: turn the drive off, and wait for what is under way";
                 ToolError::Refused(why.into())
             } else {
-                error.of(self.node, CONTROL)
+                error.for_object(self.node, CONTROL)
             }
         })
     }
@@ -216,7 +216,7 @@ impl<B: Bus> Update<'_, B> {
                 let seconds = CLEARING.as_secs();
                 return Err(ToolError::input(format!("still under way after {seconds} s (1F57:1)")));
             }
-            self.client.wait(POLL).map_err(|error| error.of(self.node, STATUS))?;
+            self.client.wait(POLL).map_err(|error| error.for_object(self.node, STATUS))?;
         }
     }
 }
@@ -235,8 +235,8 @@ mod tests {
     #[test]
     fn a_wrong_file_is_refused_before_the_board_is_touched() {
         let mut program = vec![7; 2000];
-        for (place, word) in Header::UNSEALED.into_iter().enumerate() {
-            program[HEADER_AT as usize + 4 * place..][..4].copy_from_slice(&word.to_le_bytes());
+        for (index, word) in Header::UNSEALED.into_iter().enumerate() {
+            program[HEADER_AT as usize + 4 * index..][..4].copy_from_slice(&word.to_le_bytes());
         }
         assert!(check(&program).is_err_and(|why| why.contains("not completed")));
         seal(&mut program).expect("an image");

@@ -18,7 +18,7 @@ const TAIL_BITS: u32 = 1 + 2 + 7 + 3;
 pub fn bits(frame: &Frame) -> u32 {
     let mut bits = vec![false];
     let mut push = |value: u32, count: u32| {
-        bits.extend((0..count).rev().map(|place| value >> place & 1 == 1));
+        bits.extend((0..count).rev().map(|shift| value >> shift & 1 == 1));
     };
     push(u32::from(frame.id()), 11);
     push(0, 3);
@@ -31,7 +31,7 @@ pub fn bits(frame: &Frame) -> u32 {
         let next = sum << 1;
         if *bit == (sum >> 14 & 1 == 1) { next & 0x7FFF } else { (next ^ 0x4599) & 0x7FFF }
     });
-    bits.extend((0..15).rev().map(|place| sum >> place & 1 == 1));
+    bits.extend((0..15).rev().map(|shift| sum >> shift & 1 == 1));
     let (mut stuffed, mut run, mut last) = (0, 0, true);
     for bit in &bits {
         run = if *bit == last { run + 1 } else { 1 };
@@ -113,14 +113,14 @@ impl Mailbox {
 
     /// Index of the frame that takes part in the arbitration at an instant.
     fn first(&self, now_ns: u64) -> Option<usize> {
-        let places = self.waiting.iter().enumerate().filter(|_| !self.is_off);
-        let mut ready = places.filter(|(place, waiting)| {
+        let entries = self.waiting.iter().enumerate().filter(|_| !self.is_off);
+        let mut ready = entries.filter(|(index, waiting)| {
             // In an adapter's queue only the first frame can be ready.
-            waiting.asked_ns <= now_ns && (*place == 0 || !self.in_order)
+            waiting.asked_ns <= now_ns && (*index == 0 || !self.in_order)
         });
         let first =
             if self.in_order { ready.next() } else { ready.min_by_key(|(_, waiting)| waiting.frame.id()) };
-        first.map(|(place, _)| place)
+        first.map(|(index, _)| index)
     }
 }
 
@@ -176,9 +176,9 @@ impl Wire {
         }
         let ready = mailboxes.iter().enumerate();
         let ready = ready.filter_map(|(sender, mailbox)| Some((sender, mailbox.first(earliest)?)));
-        let (sender, place) =
-            ready.min_by_key(|(sender, place)| mailboxes[*sender].waiting[*place].frame.id())?;
-        let Waiting { frame, asked_ns, slot } = mailboxes[sender].waiting.remove(place)?;
+        let (sender, index) =
+            ready.min_by_key(|(sender, index)| mailboxes[*sender].waiting[*index].frame.id())?;
+        let Waiting { frame, asked_ns, slot } = mailboxes[sender].waiting.remove(index)?;
         mailboxes[sender].leaving = Some(slot);
         let length = u64::from(bits(&frame)) * self.bit_ns;
         self.busy_ns += length;

@@ -7,8 +7,8 @@ use crate::activity_words;
 /// State of a joint's drive, as its statusword shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct JointState {
-    /// Place in [`STATES`]: joints that stand lower come first.
-    place: usize,
+    /// Index in [`STATES`]: joints that stand lower come first.
+    index: usize,
 }
 
 /// Mask and value of the statusword's state bits, name, and event that ends the state, the farthest from
@@ -27,27 +27,27 @@ const STATES: [(u16, u16, &str, &str); 8] = [
 impl JointState {
     /// State in a statusword (6041); `None` if its bits are those of no state.
     #[must_use]
-    pub fn of(statusword: u16) -> Option<Self> {
-        let place = STATES.iter().position(|(mask, value, ..)| statusword & mask == *value)?;
-        Some(Self { place })
+    pub fn from_statusword(statusword: u16) -> Option<Self> {
+        let index = STATES.iter().position(|(mask, value, ..)| statusword & mask == *value)?;
+        Some(Self { index })
     }
 
     /// Name of the state.
     #[must_use]
     pub fn name(self) -> &'static str {
-        STATES[self.place].2
+        STATES[self.index].2
     }
 
     /// Event that ends the state.
     #[must_use]
     pub fn waits_for(self) -> &'static str {
-        STATES[self.place].3
+        STATES[self.index].3
     }
 
     /// Whether the joint is enabled.
     #[must_use]
     pub fn is_enabled(self) -> bool {
-        self.place == STATES.len() - 1
+        self.index == STATES.len() - 1
     }
 
     /// Whether the motors may be energised.
@@ -62,7 +62,7 @@ impl JointState {
     /// Whether the state is that of a fault.
     #[must_use]
     pub fn has_fault(self) -> bool {
-        self.place < 2
+        self.index < 2
     }
 }
 
@@ -134,10 +134,10 @@ mod tests {
             (0x021F, "fault reaction active"),
             (0x0218, "fault"),
         ] {
-            assert_eq!(JointState::of(word).map(JointState::name), Some(name), "{word:04X}");
+            assert_eq!(JointState::from_statusword(word).map(JointState::name), Some(name), "{word:04X}");
         }
-        assert_eq!(JointState::of(0x0F | 0x40), None);
-        let [off, on] = [0x0250, 0x0237].map(|word| JointState::of(word).expect("a state"));
+        assert_eq!(JointState::from_statusword(0x0F | 0x40), None);
+        let [off, on] = [0x0250, 0x0237].map(|word| JointState::from_statusword(word).expect("a state"));
         assert!(off < on && on.is_enabled() && !off.is_enabled());
         assert!(on.is_on() && !off.is_on());
     }

@@ -193,7 +193,7 @@ fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSe
         // These motors carry gear and leg.
         let inertia = drives::CALIBRATION.inertia;
         let settings = CalibrationSettings { inertia, ..calibration_settings(&configuration, motor) };
-        let encoders = EncoderSettings::of(&motor.for_firmware(joint));
+        let encoders = EncoderSettings::new(&motor.for_firmware(joint));
         let thermistor = motor.thermistor.map(|fitted| fitted.for_firmware());
         parts.push((configuration, settings, motor.winding(), thermistor, encoders));
     }

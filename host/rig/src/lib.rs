@@ -5,7 +5,7 @@
 //! | [`board`], [`faulty_board`], [`operator`], [`worn`] | the board's levels, its wearer and its operator |
 //! | [`pair`], [`options`], [`perturb`] | leg and plant ticked together |
 //! | [`bus`] | boards on a simulated bus, also behind a port |
-//! | [`kept_file`] | stored data of a board |
+//! | [`parameter_file`] | stored data of a board |
 //! | [`trace`], [`traced`] | records of a trace; the run that they tell of |
 //! | [`simulate`], [`identify`], [`identified`], [`watch`], [`scale`] | a simulated leg is identified |
 //! | [`excite`], [`shaking`] | design of an exciting motion |
@@ -29,12 +29,12 @@ pub mod faulty_board;
 pub mod identified;
 pub mod identify;
 pub mod image;
-pub mod kept_file;
 pub mod monitor;
 pub mod motor;
 pub mod operator;
 pub mod options;
 pub mod pair;
+pub mod parameter_file;
 pub mod perturb;
 pub mod report;
 pub mod scale;

@@ -190,7 +190,7 @@ pub fn watch<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &MonitorOptions,
 ) -> Result<MonitorRun, ToolError> {
-    let simulation = SimulationOptions::of_seed(options.seed);
+    let simulation = SimulationOptions::with_seed(options.seed);
     let context = Context::<N, B>::new(leg, &simulation)?;
     let pair = match identified(leg, &context, options.seed)? {
         Ok(pair) => pair,
@@ -302,7 +302,7 @@ fn disturb<const N: usize, const B: usize>(pair: &mut Pair<N, B>, disturbances: 
     for disturbance in disturbances {
         match *disturbance {
             Disturbance::Payload(payload) if tick == 0 => {
-                pair.world.attach(payload.joint, payload.mass, payload.place.into());
+                pair.world.attach(payload.joint, payload.mass, payload.position.into());
             }
             Disturbance::Payload(_) => {}
             Disturbance::Friction { factor, over_s } => {

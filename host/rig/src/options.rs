@@ -60,7 +60,7 @@ pub struct SimulationOptions {
 impl SimulationOptions {
     /// Options for the unchanged leg file, with both seeds equal.
     #[must_use]
-    pub fn of_seed(seed: u64) -> Self {
+    pub fn with_seed(seed: u64) -> Self {
         Self {
             seed,
             swarm_seed: seed,

@@ -173,7 +173,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             None => World::new(&description, seed),
         };
         world.set_current_noise(&context.current_noise(leg));
-        world.place(&start_position(leg));
+        world.move_to(&start_position(leg));
         let device =
             DeviceLeg::new(&context.configuration).map_err(|error| leg.error(leg_error(leg, error)))?;
         let device = Box::new(device);

@@ -114,7 +114,7 @@ pub fn corrected<const N: usize, const B: usize>(
     let unused = unused
         .each_ref()
         .map(|record| record.as_ref().map(|record| record.corrected(&ratios, &scale.load_base)));
-    let seen = look_again(scale, context, &again, &ratios, log)?;
+    let seen = revalidate(scale, context, &again, &ratios, log)?;
     let held_out = unused
         .iter()
         .zip(&seen.residuals)
@@ -129,7 +129,7 @@ pub fn corrected<const N: usize, const B: usize>(
 /// Passes the unused motions through the firmware's own recorder again with corrected
 /// torques. They are compared with the corrected leg including its load: residuals in their order, and
 /// apparent misalignments.
-fn look_again<const N: usize, const B: usize>(
+fn revalidate<const N: usize, const B: usize>(
     scale: &Scale<N, B>,
     context: &Context<N, B>,
     solver: &Solver<f32, N, B>,
@@ -198,7 +198,7 @@ fn second_run<const N: usize, const B: usize>(
 ) -> Result<Record<f32, N, B>, ToolError> {
     let mut pair = pair.clone();
     pair.evaluations = 0; // only the record is used
-    pair.world.attach(payload.joint, payload.mass, payload.place.into());
+    pair.world.attach(payload.joint, payload.mass, payload.position.into());
     for _ in 0..(ATTACHING_S / TICK_S) as u32 {
         pair.tick(None, gravity);
     }

@@ -112,7 +112,7 @@ fn drive_observed<'a, const N: usize, const B: usize>(
     let wrong = options.perturbations.as_slice();
     let mut pair = Pair::new(simulated, context, options.seed)?;
     if let Some(load) = &options.load {
-        pair.world.attach(load.joint, load.mass, load.place.into());
+        pair.world.attach(load.joint, load.mass, load.position.into());
     }
     perturb::at_start(leg, &mut pair, wrong)?;
     let anatomy = context.configuration.joints.map(|joint| joint.scale.anatomy);

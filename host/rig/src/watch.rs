@@ -74,13 +74,13 @@ fn truth_fit<const N: usize, const B: usize>(
     core::array::from_fn(|joint| {
         // The rows precede the friction curve, so its part comes from other columns.
         let curve = model.stribeck[joint];
-        let places = [Parameter::FC, Parameter::FV].map(|parameter| model.drive(joint, parameter));
-        let surplus = curve.excess * places[0].map_or(0.0, |base| values[base]);
+        let columns = [Parameter::FC, Parameter::FV].map(|parameter| model.drive(joint, parameter));
+        let surplus = curve.excess * columns[0].map_or(0.0, |base| values[base]);
         let made = combination(curve.velocity);
         let bank = made.bank.map(|weight| weight * surplus);
         let mut values = *values;
-        for (place, weight) in places.into_iter().zip(made.friction) {
-            if let Some(base) = place {
+        for (column, weight) in columns.into_iter().zip(made.friction) {
+            if let Some(base) = column {
                 values[base] += weight * surplus;
             }
         }
@@ -395,7 +395,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             self.context.background.report(found, verdict, &[training], &validation, &circumstances);
         let constants =
             self.context.configuration.joints.map(|joint| f64::from(joint.scale.torque_per_ampere.0));
-        report.scale = scale.map_or_else(ScaleReport::default, |scale| ScaleReport::of(&scale, &constants));
+        report.scale = scale.map_or_else(ScaleReport::default, |scale| ScaleReport::new(&scale, &constants));
         Ok(SimulatedRun { report, log: self.log, series })
     }
 }

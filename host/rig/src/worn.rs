@@ -36,10 +36,10 @@ impl<const N: usize> Worn<N> {
     /// # Errors
     /// The leg is not a hip and a knee, does not state its wearer, or cannot be simulated.
     pub fn new<const B: usize>(leg: &LegFile, exercise: Exercise, seed: u64) -> Result<Self, ToolError> {
-        let bodies = TwoBodies::of(leg)?;
+        let bodies = TwoBodies::from_leg(leg)?;
         let exoskeleton = LegFile { assist: leg.assist, ..bodies.exoskeleton.clone() };
         let model = |leg: &LegFile| -> Result<IdentifiedModel<N>, ToolError> {
-            let context = Context::<N, B>::new(leg, &SimulationOptions::of_seed(seed))?;
+            let context = Context::<N, B>::new(leg, &SimulationOptions::with_seed(seed))?;
             let truth = context.background.truth.as_ref().ok_or_else(|| leg.error("has no `truth`"))?;
             Ok(certain(&context, truth))
         };

@@ -48,7 +48,7 @@ fn objects() -> BTreeMap<u16, BTreeMap<u8, Part>> {
 }
 
 fn write_all(out: &mut String, joint: &str) -> fmt::Result {
-    let (identity, [date, time]) = (Identity::scarab(0, "").of(usize::from(joint == "knee")), CHANGED);
+    let (identity, [date, time]) = (Identity::scarab(0, "").for_joint(usize::from(joint == "knee")), CHANGED);
     writeln!(
         out,
         "[FileInfo]\nFileName=scarab-{joint}.eds\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0\nDescription=Scarab joint drive, {joint}\n\

@@ -56,16 +56,16 @@ impl Band {
     /// Quartiles over iterations, up to the length of the shortest curve.
     #[must_use]
     pub fn over_iterations(curves: &[&[f64]]) -> Self {
-        Self::of(curves, 1)
+        Self::new(curves, 1)
     }
 
     /// Quartiles over evaluations, one value per `STRIDE`.
     #[must_use]
     pub fn over_evaluations(curves: &[&[f64]]) -> Self {
-        Self::of(curves, STRIDE)
+        Self::new(curves, STRIDE)
     }
 
-    fn of(curves: &[&[f64]], spacing: usize) -> Self {
+    fn new(curves: &[&[f64]], spacing: usize) -> Self {
         let length = curves.iter().map(|curve| curve.len()).min().unwrap_or(0);
         let mut band = Self { spacing, low: Vec::new(), middle: Vec::new(), high: Vec::new() };
         for index in (0..length).step_by(spacing) {
@@ -91,7 +91,7 @@ pub struct Convergence {
 }
 
 /// Colour, width and dashes of a search; dash and gap in pixels, `None` for a solid line.
-fn look(name: &str) -> (ShapeStyle, Option<(i32, i32)>) {
+fn line_style(name: &str) -> (ShapeStyle, Option<(i32, i32)>) {
     match name {
         "pso" => (line(GREEN, 6), Some((9, 4))),
         "bas" => (line(DARK, 5), Some((2, 4))),
@@ -131,7 +131,7 @@ pub fn figure(
 }
 
 fn key(name: &str) -> Key {
-    let (style, dashes) = look(name);
+    let (style, dashes) = line_style(name);
     dashes.map_or(Key::Curve(style), |(length, gap)| Key::Dashes(style, length, gap))
 }
 
@@ -139,7 +139,7 @@ fn key(name: &str) -> Key {
 fn window(half: f64, minimisers: &[[f64; 2]], walks: &[Walk]) -> [Range<f64>; 2] {
     let positions = || walks.iter().flat_map(|walk| &walk.positions).chain(minimisers);
     let reach = |axis: usize| {
-        let of = |place: &[f64; 2]| place[axis];
+        let of = |position: &[f64; 2]| position[axis];
         let low = positions().map(of).fold(f64::INFINITY, f64::min);
         let high = positions().map(of).fold(f64::NEG_INFINITY, f64::max);
         ((low + high) / 2.0, high - low)
@@ -173,9 +173,9 @@ fn map(
     let mut chart = axes(&area, &Axes { x, y, x_label: "x", y_label: "y", x_ticks: 7, y_ticks: 7 })?;
     contours(&mut chart, problem, window)?;
     let positions = || walk.positions.iter().map(|[x, y]| (*x, *y));
-    chart.draw_series([PathElement::new(positions().collect::<Vec<_>>(), look(walk.name).0)])?;
-    chart.draw_series(positions().skip(1).map(|place| Circle::new(place, px(2), DARK.filled())))?;
-    chart.draw_series(positions().take(1).map(|place| Circle::new(place, px(6), line(DARK, 6))))?;
+    chart.draw_series([PathElement::new(positions().collect::<Vec<_>>(), line_style(walk.name).0)])?;
+    chart.draw_series(positions().skip(1).map(|position| Circle::new(position, px(2), DARK.filled())))?;
+    chart.draw_series(positions().take(1).map(|position| Circle::new(position, px(6), line(DARK, 6))))?;
     let inside = minimisers.iter().filter(|[x, y]| window[0].contains(x) && window[1].contains(y));
     chart.draw_series(inside.map(|[x, y]| Cross::new((*x, *y), px(7), line(DARK, 7))))?;
     Ok(())
@@ -235,10 +235,10 @@ fn trace(area: &Area<'_>, walks: &[Walk]) -> Result<(), DrawingError> {
         },
     )?;
     for walk in walks {
-        let (style, _) = look(walk.name);
+        let (style, _) = line_style(walk.name);
         for axis in 0..2 {
             let points: Vec<_> =
-                (0..).map(f64::from).zip(walk.positions.iter().map(|place| place[axis])).collect();
+                (0..).map(f64::from).zip(walk.positions.iter().map(|position| position[axis])).collect();
             let shown: Vec<_> = points.into_iter().filter(|(iteration, _)| *iteration <= settled).collect();
             if axis == 0 {
                 chart.draw_series([PathElement::new(shown, style)])?;
@@ -253,9 +253,9 @@ fn trace(area: &Area<'_>, walks: &[Walk]) -> Result<(), DrawingError> {
 /// Iteration after which no movement is visible.
 fn settled(positions: &[[f64; 2]]) -> usize {
     let Some(end) = positions.last() else { return 0 };
-    let distance = |place: &[f64; 2]| (place[0] - end[0]).hypot(place[1] - end[1]);
+    let distance = |position: &[f64; 2]| (position[0] - end[0]).hypot(position[1] - end[1]);
     let seen = 0.01 * positions.iter().map(distance).fold(0.0, f64::max);
-    positions.iter().rposition(|place| distance(place) > seen).map_or(0, |last| last + 3)
+    positions.iter().rposition(|position| distance(position) > seen).map_or(0, |last| last + 3)
 }
 
 type LogChart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, LogCoord<f64>>>;
@@ -295,7 +295,7 @@ fn descent(
         .draw()?;
     for curve in convergence {
         let band = band(curve);
-        let (style, dashes) = look(curve.name);
+        let (style, dashes) = line_style(curve.name);
         let points = |values: &[f64]| {
             let positions = (0..).map(|index: usize| (index * band.spacing) as f64);
             positions.zip(values.iter().copied()).collect::<Vec<_>>()

@@ -12,7 +12,7 @@ const ADC2: u32 = BASES[1];
 const ADC3: u32 = BASES[2];
 const TIM1: u32 = timers::BASES[0];
 /// Looks at the timer, of ten cycles or more each: a PWM period and more.
-const LOOKS: u32 = 800;
+const MOST_READS: u32 = 800;
 
 /// Axes with conversions finished since the last call; `Some(true)` where both shunts are. Clears the flags
 /// it returns.
@@ -80,7 +80,7 @@ pub fn prepare_thermistors(fitted: [bool; 2]) {
 /// for the half period without one, 22 us at most. Without running timers it starts nothing.
 pub fn convert_thermistor(axis: usize) {
     let Some(channel) = MOTORS.get(axis) else { return };
-    for _ in 0..LOOKS {
+    for _ in 0..MOST_READS {
         let started = cortex_m::interrupt::free(|_| {
             let idle = is_idle(load(TIM1 + timers::CR1), load(TIM1 + timers::CNT));
             if idle {

@@ -100,7 +100,7 @@ impl SmallSectors {
 
 /// Copies bytes of a region.
 pub fn read(region: &Region, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-    copy(place(region, offset, bytes.len())?, bytes);
+    copy(checked_address(region, offset, bytes.len())?, bytes);
     Ok(())
 }
 
@@ -134,7 +134,7 @@ fn change(control: u32, patience: u32, address: u32, value: u32) -> Result<(), F
 }
 
 /// Address of a range, if it lies within the region.
-fn place(region: &Region, offset: u32, length: usize) -> Result<u32, FlashError> {
+fn checked_address(region: &Region, offset: u32, length: usize) -> Result<u32, FlashError> {
     match offset.checked_add(length as u32) {
         Some(end) if end <= region.bytes() => Ok(region.address + offset),
         _ => Err(FlashError::OutOfBounds),
@@ -148,7 +148,7 @@ fn erase(region: &Region, from: u32, to: u32) -> Result<(), FlashError> {
     if from > to || !from.is_multiple_of(bytes) || !to.is_multiple_of(bytes) {
         return Err(FlashError::NotAligned);
     }
-    place(region, from, (to - from) as usize)?;
+    checked_address(region, from, (to - from) as usize)?;
     for number in region.sector + from / bytes..region.sector + to / bytes {
         // The stretched watchdog covers the time of one sector, perhaps not of two.
         watchdog::feed();
@@ -169,7 +169,7 @@ fn erase(region: &Region, from: u32, to: u32) -> Result<(), FlashError> {
 /// Programs whole words.
 #[inline(never)]
 fn write(region: &Region, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-    let first = place(region, offset, bytes.len())?;
+    let first = checked_address(region, offset, bytes.len())?;
     let (words, rest) = bytes.as_chunks::<4>();
     if !rest.is_empty() || !first.is_multiple_of(4) {
         return Err(FlashError::NotAligned);

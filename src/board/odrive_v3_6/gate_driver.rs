@@ -13,7 +13,7 @@ use super::registers::apply;
 use super::settings::absolute_encoders::{self, ERROR, READ_ANGLE, READ_ERRORS};
 use super::settings::CLOCK_HZ;
 use super::settings::gate_driver::{CONTROL_1, CONTROL_2, Register, TIMES, data, read, write};
-use crate::hal::EncoderPlace;
+use crate::hal::AbsoluteEncoderSide;
 use crate::leg::AbsoluteEncoders;
 
 /// Select lines, on port C (`main.h:77-80`).
@@ -55,9 +55,9 @@ impl GateDrivers {
 
     /// Frame with an encoder's angle; all ones without that encoder. After an error the chip's error register
     /// is read, so that the next frame is valid again.
-    pub fn encoder(&mut self, axis: usize, place: EncoderPlace) -> u16 {
+    pub fn encoder(&mut self, axis: usize, side: AbsoluteEncoderSide) -> u16 {
         let encoders = self.encoders.get(axis).copied();
-        let Some(pin) = encoders.and_then(|encoders| absolute_encoders::select(axis, place, encoders)) else {
+        let Some(pin) = encoders.and_then(|encoders| absolute_encoders::select(axis, side, encoders)) else {
             return u16::MAX;
         };
         let mut ask = |frame| self.exchange(pin.port, pin.number, frame).unwrap_or(u16::MAX);

@@ -7,7 +7,7 @@ use super::flash::supply_is_low;
 use super::gate_driver::GateDrivers;
 use super::settings::analog::temperature_c;
 use super::{brake, bridge, can, contacts, converter, encoder, holding_brake, interrupts, status_light, watchdog};
-use crate::hal::{Contacts, Controller, EncoderPlace, Frame, Hardware};
+use crate::hal::{Contacts, Controller, AbsoluteEncoderSide, Frame, Hardware};
 
 /// Gate drivers, available after the start; only the housekeeping uses them.
 static GATE_DRIVERS: Mutex<Option<GateDrivers>> = Mutex::new(None);
@@ -92,8 +92,8 @@ impl Hardware<2> for Odrive {
         encoder::count(axis)
     }
 
-    fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16 {
-        gates(|gates| gates.encoder(axis, place)).unwrap_or(u16::MAX)
+    fn encoder_frame(&mut self, axis: usize, side: AbsoluteEncoderSide) -> u16 {
+        gates(|gates| gates.encoder(axis, side)).unwrap_or(u16::MAX)
     }
 
     fn temperature(&self, axis: usize) -> Option<f32> {

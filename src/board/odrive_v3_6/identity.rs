@@ -74,7 +74,7 @@ impl Identity {
         for (slot, word) in unique.iter_mut().zip(bytes.as_chunks::<4>().0) {
             *slot = u32::from_le_bytes(*word);
         }
-        let burnt_in = [0, 1, 2].map(|place| byte(VERSION_ADDRESS + place));
+        let burnt_in = [0, 1, 2].map(|index| byte(VERSION_ADDRESS + index));
         let version = if burnt_in == [BLANK; 3] { STATED } else { burnt_in };
         Self { unique, version, reset, brown_out: brown_out_level(load(OPTCR)) }
     }

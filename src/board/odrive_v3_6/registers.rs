@@ -35,7 +35,7 @@ pub(super) fn byte(address: u32) -> u8 {
 
 /// Copies bytes of the flash.
 pub(super) fn copy(address: u32, into: &mut [u8]) {
-    for (place, byte) in into.iter_mut().enumerate() {
-        *byte = self::byte(address + place as u32);
+    for (index, byte) in into.iter_mut().enumerate() {
+        *byte = self::byte(address + index as u32);
     }
 }

@@ -11,7 +11,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// Sets the stored parameters of a node and restarts all nodes with theirs.
     pub fn recall(&mut self, joint: usize, bytes: &[u8]) {
         if let Some(stored) = self.stored.get_mut(joint) {
-            *stored = StoredNode::of(bytes);
+            *stored = StoredNode::from_bytes(bytes);
         }
         // The new node-ID of one node may free the default of another.
         self.pending_reset = [Some(Reset::Node); N];
@@ -59,7 +59,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             };
             // A reset node already has its initial state, except for its node-ID.
             if node.id() != number || node.state() != NmtState::Initialising {
-                *node = Node::new(number, self.identity.of(joint));
+                *node = Node::new(number, self.identity.for_joint(joint));
             }
             node.recall(stored.bytes(), reset, axis);
             node.goes_on(self.controller, self.storing);
@@ -109,7 +109,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
         }
         // No frame was received during the flash write, and a board's clock did not advance.
         for node in &mut self.nodes {
-            node.stood_still(self.looked_us);
+            node.stood_still(self.last_call_us);
             node.stored(done);
         }
         self.storing(if done { Storing::Done } else { Storing::Failed });
@@ -137,6 +137,6 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
 /// Whether no two nodes share a node-ID.
 fn are_distinct(numbers: &[NodeId]) -> bool {
-    let is_other = |place: usize, number| numbers.iter().skip(place + 1).all(|other| other != number);
-    numbers.iter().enumerate().all(|(place, number)| is_other(place, number))
+    let is_other = |index: usize, number| numbers.iter().skip(index + 1).all(|other| other != number);
+    numbers.iter().enumerate().all(|(index, number)| is_other(index, number))
 }

@@ -128,7 +128,7 @@ impl Bench {
 
     /// Performs the pending store request and reports its outcome.
     fn store(&mut self, done: bool) -> Option<(StoreCommand, [StoredNode; 2])> {
-        let mut objects = [StoredNode::of(&[0x55; 9]); 2];
+        let mut objects = [StoredNode::from_bytes(&[0x55; 9]); 2];
         let what = self.device.take_store(&mut objects)?;
         self.device.stored(done, &objects);
         Some((what, objects))

@@ -113,7 +113,7 @@ impl AxisConstants {
     /// Constants of a joint whose encoder has this many counts per motor revolution, behind this gear ratio.
     /// `current_bandwidth` is that of its current loop. All modes are supported.
     #[must_use]
-    pub fn of(
+    pub fn new(
         joint: &JointConfiguration,
         counts_per_turn: u32,
         ratio: f32,
@@ -526,7 +526,7 @@ impl Axis {
         if !self.asks || !self.is_powered() || self.status.mode != mode {
             return;
         }
-        match Mode::of(mode) {
+        match Mode::from_number(mode) {
             Some(Mode::ProfilePosition) => {
                 let immediately = self.controlword & IMMEDIATELY != 0;
                 if self.is_full() && !immediately {
@@ -614,9 +614,9 @@ impl Axis {
     #[must_use]
     pub fn statusword(&self) -> u16 {
         let status = &self.status;
-        let bit = |is_set: bool, place: u16| u16::from(is_set) << place;
+        let bit = |is_set: bool, shift: u16| u16::from(is_set) << shift;
         let is_ready = self.own != DriveState::NotReadyToSwitchOn;
-        let (twelve, thirteen) = match Mode::of(self.mode()) {
+        let (twelve, thirteen) = match Mode::from_number(self.mode()) {
             Some(Mode::ProfilePosition) => {
                 (self.taken || self.is_powered() && self.is_full(), status.deviates)
             }
@@ -654,31 +654,32 @@ impl Axis {
         let velocity = speed(targets.velocity, settings.target_velocity);
         let may_home = settings.homing_method != NO_METHOD
             && (settings.range[0]..=settings.range[1]).contains(&settings.home_offset);
-        let target = match Mode::of(settings.mode).filter(|mode| self.is_powered() && targets.has(*mode)) {
-            None => Target::Hold,
-            Some(Mode::ProfilePosition) => Target::ProfilePosition(self.set_point),
-            Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),
-            Some(Mode::ProfileTorque) => Target::ProfileTorque(target_torque),
-            // An infinite offset is out of range: homing error.
-            Some(Mode::Homing) if !may_home => Target::Homing { offset: Radian(f32::INFINITY) },
-            Some(Mode::Homing) => Target::Homing { offset: radian(settings.home_offset) },
-            Some(Mode::CyclicPosition) => Target::CyclicPosition {
-                position: radian(settings.target_position),
-                velocity_offset,
-                torque_offset,
-            },
-            Some(Mode::CyclicVelocity) => {
-                Target::CyclicVelocity { velocity: velocity + velocity_offset, torque_offset }
-            }
-            Some(Mode::CyclicTorque) => Target::CyclicTorque(target_torque + torque_offset),
-            Some(Mode::Impedance) => Target::Impedance(ImpedanceTarget {
-                position: radian(settings.target_position),
-                velocity,
-                stiffness: f32::from(settings.impedance[0]) * STIFFNESS_UNIT,
-                damping: f32::from(settings.impedance[1]) * DAMPING_UNIT,
-                torque: target_torque,
-            }),
-        };
+        let target =
+            match Mode::from_number(settings.mode).filter(|mode| self.is_powered() && targets.has(*mode)) {
+                None => Target::Hold,
+                Some(Mode::ProfilePosition) => Target::ProfilePosition(self.set_point),
+                Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),
+                Some(Mode::ProfileTorque) => Target::ProfileTorque(target_torque),
+                // An infinite offset is out of range: homing error.
+                Some(Mode::Homing) if !may_home => Target::Homing { offset: Radian(f32::INFINITY) },
+                Some(Mode::Homing) => Target::Homing { offset: radian(settings.home_offset) },
+                Some(Mode::CyclicPosition) => Target::CyclicPosition {
+                    position: radian(settings.target_position),
+                    velocity_offset,
+                    torque_offset,
+                },
+                Some(Mode::CyclicVelocity) => {
+                    Target::CyclicVelocity { velocity: velocity + velocity_offset, torque_offset }
+                }
+                Some(Mode::CyclicTorque) => Target::CyclicTorque(target_torque + torque_offset),
+                Some(Mode::Impedance) => Target::Impedance(ImpedanceTarget {
+                    position: radian(settings.target_position),
+                    velocity,
+                    stiffness: f32::from(settings.impedance[0]) * STIFFNESS_UNIT,
+                    damping: f32::from(settings.impedance[1]) * DAMPING_UNIT,
+                    torque: target_torque,
+                }),
+            };
         let acceleration = |micro: u32| RadianPerSecondSquared(micro as f32 * 1e-6);
         JointCommand {
             target,

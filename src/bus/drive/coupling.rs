@@ -30,7 +30,7 @@ pub struct Coupling {
 
 impl Coupling {
     /// Without a host: every joint takes the leg's state, and pending requests are discarded.
-    pub fn look_on<const N: usize>(&mut self, axes: [&mut Axis; N], drive: DriveState) {
+    pub fn follow_leg<const N: usize>(&mut self, axes: [&mut Axis; N], drive: DriveState) {
         self.before = level(drive);
         for axis in axes {
             (axis.own, axis.resets) = (drive, false);

@@ -31,8 +31,8 @@ impl Axis {
         if range[0] > range[1] {
             return Err(Abort::MaximumBelowMinimum);
         }
-        let place = micro(self.status.position.0) as i32;
-        if self.is_powered() && !(range[0]..=range[1]).contains(&place) {
+        let position = micro(self.status.position.0) as i32;
+        if self.is_powered() && !(range[0]..=range[1]).contains(&position) {
             return Err(Abort::State);
         }
         self.settings.range = range;
@@ -156,7 +156,7 @@ impl Objects for Axis {
             (0x605D, _) if is(&[1]) => {}
             (0x605E, _) if is(&[2]) => {}
             (0x6060, _) => {
-                let is_offered = Mode::of(value as i8)
+                let is_offered = Mode::from_number(value as i8)
                     .map_or(value as i8 == 0, |mode| self.constants.modes & mode.bit() != 0);
                 if !is_offered {
                     return Err(Abort::Range);

@@ -59,8 +59,8 @@ impl<const N: usize, const L: usize> Log<N, L> {
 
     /// Appends a sample; counts it as lost if the queue is full.
     pub fn push(&mut self, logged: &LoggedSample<N>) {
-        let place = (self.first + self.length) % L.max(1);
-        match self.samples.get_mut(place) {
+        let index = (self.first + self.length) % L.max(1);
+        match self.samples.get_mut(index) {
             Some(slot) if self.length < L => {
                 *slot = Entry {
                     tick: logged.sample.tick,
@@ -105,22 +105,22 @@ impl<const N: usize, const L: usize> Log<N, L> {
 
     /// Copies bytes of the held block from `offset` on into `into`; returns the block's size in bytes.
     pub fn bytes(&self, offset: u32, into: &mut [u8]) -> u32 {
-        for (place, byte) in (offset as usize..).zip(into) {
-            let sample = place / Self::BYTES;
+        for (position, byte) in (offset as usize..).zip(into) {
+            let sample = position / Self::BYTES;
             if sample >= self.held {
                 break;
             }
-            let place = place % Self::BYTES;
+            let position = position % Self::BYTES;
             let entry = self.samples.get((self.first + sample) % L.max(1));
-            *byte = entry.and_then(|entry| entry.byte(place)).unwrap_or(0);
+            *byte = entry.and_then(|entry| entry.byte(position)).unwrap_or(0);
         }
         (self.held * Self::BYTES) as u32
     }
 }
 
 impl<const N: usize> Entry<N> {
-    fn byte(&self, place: usize) -> Option<u8> {
-        let word = match place / 4 {
+    fn byte(&self, position: usize) -> Option<u8> {
+        let word = match position / 4 {
             0 => self.tick,
             1 => self.segment,
             word => {
@@ -128,6 +128,6 @@ impl<const N: usize> Entry<N> {
                 angles.chain(torques).nth(word - 2)?.to_bits()
             }
         };
-        word.to_le_bytes().get(place % 4).copied()
+        word.to_le_bytes().get(position % 4).copied()
     }
 }

@@ -145,7 +145,7 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
             8 => verdict.map_or(0, |verdict| if verdict.is_accepted() { 1 } else { 2 }),
             9 => verdict.map_or(0, |verdict| {
                 let bits = Reason::ALL.into_iter().enumerate();
-                bits.fold(0, |bits, (place, reason)| bits | u32::from(verdict.has(reason)) << place)
+                bits.fold(0, |bits, (index, reason)| bits | u32::from(verdict.has(reason)) << index)
             }),
             10 => results.search()[0],
             11 => results.search()[1],
@@ -270,14 +270,14 @@ impl<R: Results, const N: usize, const L: usize> JointObjects<'_, R, N, L> {
     }
 
     fn found(&self, object: Object) -> Result<u32, Abort> {
-        let place = usize::from(object.sub).wrapping_sub(1);
+        let index = usize::from(object.sub).wrapping_sub(1);
         let number = |value: Option<f32>| value.unwrap_or(f32::NAN).to_bits();
         let parameter = || {
-            let parameter = *Parameter::ALL.get(place)?;
+            let parameter = *Parameter::ALL.get(index)?;
             self.results.parameter(self.joint, parameter)
         };
-        let base = || self.results.base_parameter(place);
-        let fit = || self.results.fit(place, self.joint);
+        let base = || self.results.base_parameter(index);
+        let fit = || self.results.fit(index, self.joint);
         Ok(match object.index {
             0x2110 => number(parameter().and_then(|found| found.value)),
             0x2111 => number(parameter().and_then(|found| found.sigma)),

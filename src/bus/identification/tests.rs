@@ -172,12 +172,12 @@ fn the_log_delivers_each_sample_once_and_counts_lost_ones() {
         let size = log.bytes(0, &mut []);
         assert_eq!(size as usize, log.held() as usize * Log::<2, 8>::BYTES);
         let mut block = std::vec![0; size as usize];
-        for (place, piece) in block.chunks_mut(7).enumerate() {
-            assert_eq!(log.bytes(7 * place as u32, piece), size);
+        for (index, piece) in block.chunks_mut(7).enumerate() {
+            assert_eq!(log.bytes(7 * index as u32, piece), size);
         }
         for sample in block.chunks(24) {
             let word =
-                |place: usize| u32::from_le_bytes(sample[place..place + 4].try_into().expect("four bytes"));
+                |index: usize| u32::from_le_bytes(sample[index..index + 4].try_into().expect("four bytes"));
             assert_eq!(
                 (word(4), f32::from_bits(word(8)), f32::from_bits(word(16))),
                 (5, word(0) as f32, -1.0)

@@ -54,7 +54,7 @@ pub struct Mapped {
 }
 
 impl Mapped {
-    const fn of(entry: u32) -> Self {
+    const fn from_entry(entry: u32) -> Self {
         Self { object: Object::at((entry >> 16) as u16, (entry >> 8) as u8), size: entry as u8 / 8 }
     }
 
@@ -83,8 +83,8 @@ impl Parameters {
     #[must_use]
     pub fn new(direction: Mapping, identifier: u16, kind: u8, inhibit: u16, mapped: &[u32]) -> Self {
         let mut map = [0; MAPPED];
-        for (place, entry) in map.iter_mut().zip(mapped) {
-            *place = *entry;
+        for (slot, entry) in map.iter_mut().zip(mapped) {
+            *slot = *entry;
         }
         let count = mapped.len().min(MAPPED) as u8;
         let identifier = u32::from(identifier);
@@ -105,7 +105,7 @@ impl Parameters {
 
     /// Mapped objects in the order of their bytes.
     pub fn mapped(&self) -> impl Iterator<Item = Mapped> + use<> {
-        self.map.into_iter().take(usize::from(self.count)).map(Mapped::of)
+        self.map.into_iter().take(usize::from(self.count)).map(Mapped::from_entry)
     }
 
     /// Length of the frame in bytes.
@@ -164,7 +164,7 @@ impl Parameters {
     pub(super) fn mapping(&self, sub: u8) -> Result<u32, Abort> {
         match usize::from(sub).checked_sub(1) {
             None => Ok(u32::from(self.count)),
-            Some(place) => self.map.get(place).copied().ok_or(Abort::NoSubindex),
+            Some(index) => self.map.get(index).copied().ok_or(Abort::NoSubindex),
         }
     }
 
@@ -173,14 +173,14 @@ impl Parameters {
         if self.identifier().is_some() {
             return Err(Abort::Access);
         }
-        let Some(place) = usize::from(sub).checked_sub(1) else { return self.set_count(value) };
+        let Some(index) = usize::from(sub).checked_sub(1) else { return self.set_count(value) };
         if self.count != 0 {
             return Err(Abort::Access);
         }
         if value != 0 {
             self.check(value)?;
         }
-        *self.map.get_mut(place).ok_or(Abort::NoSubindex)? = value;
+        *self.map.get_mut(index).ok_or(Abort::NoSubindex)? = value;
         Ok(())
     }
 
@@ -191,7 +191,7 @@ impl Parameters {
         let mut bytes = 0;
         for entry in self.map.iter().take(value as usize) {
             self.check(*entry)?;
-            bytes += Mapped::of(*entry).size;
+            bytes += Mapped::from_entry(*entry).size;
         }
         if bytes > 8 {
             return Err(Abort::PdoLength);
@@ -201,9 +201,9 @@ impl Parameters {
     }
 
     fn check(&self, entry: u32) -> Result<(), Abort> {
-        let Mapped { object, size } = Mapped::of(entry);
+        let Mapped { object, size } = Mapped::from_entry(entry);
         let bits = entry as u8;
-        if Mapped::of(entry).is_dummy() {
+        if Mapped::from_entry(entry).is_dummy() {
             let fits = match object.index {
                 2 | 5 => bits == 8,
                 3 | 6 => bits == 16,

@@ -38,8 +38,8 @@ impl Receive {
         if frame.data().len() < self.parameters.length() {
             return Received::TooShort;
         }
-        for (place, byte) in self.data.iter_mut().zip(frame.data()) {
-            *place = *byte;
+        for (slot, byte) in self.data.iter_mut().zip(frame.data()) {
+            *slot = *byte;
         }
         self.waits = self.parameters.is_synchronous();
         if !self.waits {

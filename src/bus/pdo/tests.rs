@@ -55,8 +55,8 @@ fn only_mappable_objects_of_the_right_size_are_mapped() {
 #[test]
 fn a_pdo_holds_eight_bytes() {
     let mut parameters = open(Mapping::Transmit);
-    for place in 1..=3 {
-        assert_eq!(parameters.set_mapping(place, 0x6064_0020), Ok(()));
+    for sub in 1..=3 {
+        assert_eq!(parameters.set_mapping(sub, 0x6064_0020), Ok(()));
     }
     assert_eq!(parameters.set_mapping(0, 3), Err(Abort::PdoLength));
     assert_eq!(parameters.set_mapping(0, 9), Err(Abort::PdoLength));

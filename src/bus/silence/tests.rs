@@ -22,7 +22,7 @@ fn begins(frames: &[(Kind, u64)], until_us: u64) -> Option<u64> {
 }
 
 fn cyclic(kind: Kind, from_us: u64, period_us: u64, count: u64) -> Vec<(Kind, u64)> {
-    (0..count).map(|place| (kind, from_us + place * period_us)).collect()
+    (0..count).map(|index| (kind, from_us + index * period_us)).collect()
 }
 
 fn sorted(parts: &[Vec<(Kind, u64)>]) -> Vec<(Kind, u64)> {
@@ -211,8 +211,8 @@ fn a_host_that_stops_on_purpose_is_not_reported() {
     let mut board = Board::moving();
     board.cycles(0x80, &[], 50);
     board.now_us += 3000 * MS;
-    for place in 0..2 {
-        board.nodes[place].stood_still(board.now_us);
+    for index in 0..2 {
+        board.nodes[index].stood_still(board.now_us);
     }
     board.run(380);
     assert_eq!(board.drive, DriveState::OperationEnabled);

@@ -3,24 +3,24 @@
 use super::*;
 
 /// Writes to the node at this position on the board.
-fn set(board: &mut Board, place: usize, index: u16, sub: u8, value: u32, size: u8) {
-    board.nodes.rotate_left(place);
-    board.axes.rotate_left(place);
+fn set(board: &mut Board, joint: usize, index: u16, sub: u8, value: u32, size: u8) {
+    board.nodes.rotate_left(joint);
+    board.axes.rotate_left(joint);
     assert_eq!(board.write(index, sub, value, size), Ok(()), "{index:x} {sub}");
-    board.nodes.rotate_right(place);
-    board.axes.rotate_right(place);
+    board.nodes.rotate_right(joint);
+    board.axes.rotate_right(joint);
 }
 
-fn map(board: &mut Board, place: usize, communication: u16, cob: u32, kind: u32, mapped: &[u32]) {
+fn map(board: &mut Board, joint: usize, communication: u16, cob: u32, kind: u32, mapped: &[u32]) {
     let mapping = communication + 0x200;
-    set(board, place, communication, 1, 0x8000_0000 | cob, 4);
-    set(board, place, mapping, 0, 0, 1);
-    set(board, place, communication, 2, kind, 1);
+    set(board, joint, communication, 1, 0x8000_0000 | cob, 4);
+    set(board, joint, mapping, 0, 0, 1);
+    set(board, joint, communication, 2, kind, 1);
     for (sub, entry) in (1..).zip(mapped) {
-        set(board, place, mapping, sub, *entry, 4);
+        set(board, joint, mapping, sub, *entry, 4);
     }
-    set(board, place, mapping, 0, mapped.len() as u32, 1);
-    set(board, place, communication, 1, cob, 4);
+    set(board, joint, mapping, 0, mapped.len() as u32, 1);
+    set(board, joint, communication, 1, cob, 4);
 }
 
 /// Compact mapping of nodes 1 and 2 (docs/bus.md).
@@ -28,17 +28,17 @@ fn compact() -> Board {
     let mut board = Board::started(1);
     board.receive(0, &[1, 0]);
     board.frames();
-    for place in 0..2 {
-        let node = 1 + place as u32;
+    for joint in 0..2 {
+        let node = 1 + joint as u32;
         // Statusword, position and short velocity at every SYNC; the other PDOs are disabled.
-        map(&mut board, place, 0x1800, 0x180 + node, 1, &[0x6041_0010, 0x6064_0020, 0x2010_0010]);
+        map(&mut board, joint, 0x1800, 0x180 + node, 1, &[0x6041_0010, 0x6064_0020, 0x2010_0010]);
         for communication in 0x1801..=0x1803 {
             let default = 0x180 + 0x100 * (u32::from(communication) - 0x1800) + node;
-            set(&mut board, place, communication, 1, 0x8000_0000 | default, 4);
+            set(&mut board, joint, communication, 1, 0x8000_0000 | default, 4);
         }
         // Both joints' targets in one frame; each node skips the other's bytes.
-        let targets = [[0x607A_0020, 0x0007_0020], [0x0007_0020, 0x607A_0020]][place];
-        map(&mut board, place, 0x1401, 0x301, 1, &targets);
+        let targets = [[0x607A_0020, 0x0007_0020], [0x0007_0020, 0x607A_0020]][joint];
+        map(&mut board, joint, 0x1401, 0x301, 1, &targets);
     }
     board
 }

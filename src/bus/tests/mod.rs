@@ -18,10 +18,10 @@ use crate::units::{Ampere, NewtonMetre};
 pub const LONG: usize = 5003;
 const BYTES: [u8; LONG] = {
     let mut bytes = [0; LONG];
-    let mut place = 0;
-    while place < LONG {
-        bytes[place] = b'!' + (place * 7 % 89) as u8;
-        place += 1;
+    let mut index = 0;
+    while index < LONG {
+        bytes[index] = b'!' + (index * 7 % 89) as u8;
+        index += 1;
     }
     bytes
 };

@@ -60,8 +60,8 @@ fn replay(session: impl Iterator<Item = (u64, u16, Vec<u8>)>) -> Replay {
         }
         if (0x581..=0x584).contains(&id) {
             match ours.iter().position(|frame| frame.id() == id) {
-                Some(place) => {
-                    assert_eq!(ours.remove(place).data(), data, "{id:x} at {time_us}");
+                Some(index) => {
+                    assert_eq!(ours.remove(index).data(), data, "{id:x} at {time_us}");
                     result.answered += 1;
                 }
                 None => result.unasked.push((id, data)),

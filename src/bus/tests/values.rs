@@ -122,9 +122,9 @@ fn profile_objects_have_the_units_of_cia_402() {
     assert_eq!([1, 2, 3, 4, 5, 6].map(|sub| read(0x2021, sub)), [0, 150, 300, 0, 500, 1000]);
     assert_eq!(axis.bandwidths(), LoopBandwidths::default());
     for (sub, values) in [(1, [149, 301, 150, 300, 0, 225]), (4, [499, 1001, 500, 1000, 0, 750])] {
-        for (place, value) in values.into_iter().enumerate() {
+        for (number, value) in values.into_iter().enumerate() {
             let written = axis.write(Object::at(0x2021, sub), value);
-            assert_eq!(written, if place < 2 { Err(Abort::Range) } else { Ok(()) }, "{value}");
+            assert_eq!(written, if number < 2 { Err(Abort::Range) } else { Ok(()) }, "{value}");
         }
     }
     let set = LoopBandwidths { position: Some(Hertz(2.25)), current: Some(Hertz(750.0)) };

@@ -196,7 +196,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
     }
 
     fn hold(&mut self, values: &[T; B], rows: &FilteredRows<T, N, B>, directions: [[T; N]; DIRECTIONS]) {
-        let used = rows.still.map(|still| !(still > T::of(LARGEST_STILL_SHARE)));
+        let used = rows.still.map(|still| !(still > T::from_double(LARGEST_STILL_SHARE)));
         let mut residual = rows.torque;
         for joint in 0..N {
             let row = rows.regressor[joint].iter().zip(values);
@@ -251,7 +251,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         for (column, row) in packed::rows(&self.factor, Self::COLUMNS) {
             let right = row.last().copied().unwrap_or(T::zero());
             for direction in 0..DIRECTIONS {
-                let element = (B + direction).checked_sub(column).and_then(|place| row.get(place));
+                let element = (B + direction).checked_sub(column).and_then(|position| row.get(position));
                 let element = element.copied().unwrap_or(T::zero());
                 power[direction] += element * element;
                 if column >= B {
@@ -263,7 +263,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         let beside = self.beside(&power);
         core::array::from_fn(|index| {
             let (direction, joint) = subject::<N>(index)?;
-            if !(power[index] > T::zero() && seen[index] > T::of(SEEN_SHARE) * power[index]) {
+            if !(power[index] > T::zero() && seen[index] > T::from_double(SEEN_SHARE) * power[index]) {
                 return None;
             }
             Some(Misalignment {
@@ -294,7 +294,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         let mut seen = [false; DIRECTIONS];
         for direction in (0..DIRECTIONS).rev() {
             let pivot = triangle[direction][direction];
-            seen[direction] = pivot * pivot > T::of(SEEN_SHARE) * power[direction];
+            seen[direction] = pivot * pivot > T::from_double(SEEN_SHARE) * power[direction];
             let mut rest = solved[direction];
             for later in direction + 1..DIRECTIONS {
                 for (element, &known) in rest.iter_mut().zip(&solved[later]) {
@@ -346,16 +346,17 @@ fn directions<T: Real, const N: usize, const B: usize>(
         rigid_body_torques(chain, &parameters, state, &model.gravity)
     };
     let here = torques(&model.chain, &state);
-    let slope = |there: [T; N]| core::array::from_fn(|joint| (there[joint] - here[joint]) / T::of(STEP));
+    let slope =
+        |there: [T; N]| core::array::from_fn(|joint| (there[joint] - here[joint]) / T::from_double(STEP));
     for (index, slot) in slots.iter_mut().enumerate() {
         *slot = match subject::<N>(index) {
             Some((Direction::Zero, joint)) => {
                 let mut turned = state;
-                turned.q[joint] += T::of(STEP);
+                turned.q[joint] += T::from_double(STEP);
                 slope(torques(&model.chain, &turned))
             }
             Some((Direction::Length, joint)) if model.chain.has_length(joint) => {
-                slope(torques(&model.chain.with_length(joint, T::of(1.0 + STEP)), &state))
+                slope(torques(&model.chain.with_length(joint, T::from_double(1.0 + STEP)), &state))
             }
             _ => [T::zero(); N],
         };

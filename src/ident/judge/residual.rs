@@ -46,7 +46,7 @@ impl<T: Real> Neighbours<T> {
     fn take(&mut self, mean: Option<T>) {
         if let (Some(before), Some(mean)) = (self.before, mean) {
             self.products += before * mean;
-            self.squares += T::of(0.5) * (before * before + mean * mean);
+            self.squares += T::from_double(0.5) * (before * before + mean * mean);
             self.pairs = self.pairs.saturating_add(1);
         }
         self.before = mean;
@@ -101,7 +101,7 @@ impl<T: Real> JointResidual<T> {
     #[must_use]
     pub fn slow(&self, forgiven: bool) -> T {
         let judged = self.judged(forgiven);
-        let mean = judged.products / T::of(f64::from(judged.pairs.max(1)));
+        let mean = judged.products / T::from_double(f64::from(judged.pairs.max(1)));
         real::sqrt(real::max(mean, T::zero()))
     }
 
@@ -111,9 +111,9 @@ impl<T: Real> JointResidual<T> {
     #[must_use]
     pub fn slow_by_chance(&self, quantile: T, noise: Option<T>) -> T {
         let judged = self.judged(noise.is_some());
-        let pairs = T::of(f64::from(judged.pairs.max(1)));
+        let pairs = T::from_double(f64::from(judged.pairs.max(1)));
         let variance = match noise {
-            Some(noise) => noise * noise / T::of(f64::from(LEAST_FILLED) * DECIMATION as f64),
+            Some(noise) => noise * noise / T::from_double(f64::from(LEAST_FILLED) * DECIMATION as f64),
             None => judged.squares / pairs,
         };
         real::sqrt(quantile * variance / real::sqrt(pairs))
@@ -146,7 +146,7 @@ impl<T: Real> JointResidual<T> {
         if self.age < BLOCK_ROWS {
             return;
         }
-        let mean = (self.filled >= LEAST_FILLED).then(|| self.block / T::of(f64::from(self.filled)));
+        let mean = (self.filled >= LEAST_FILLED).then(|| self.block / T::from_double(f64::from(self.filled)));
         self.all.take(mean);
         self.undisturbed.take(mean.filter(|_| !self.is_disturbed));
         (self.block, self.age, self.filled, self.is_disturbed) = (T::zero(), 0, 0, false);
@@ -192,7 +192,7 @@ impl<T: Real, const N: usize> Residual<T, N> {
         let mut missed = 0;
         let mut expected = 0;
         for joint in 0..N {
-            if rows.still[joint] > T::of(LARGEST_STILL_SHARE) {
+            if rows.still[joint] > T::from_double(LARGEST_STILL_SHARE) {
                 self.joints[joint].skip();
                 continue;
             }
@@ -203,7 +203,7 @@ impl<T: Real, const N: usize> Residual<T, N> {
         }
         self.common = if missed > 0 && expected == 0 { self.common.saturating_add(1) } else { 0 };
         self.longest_common_s =
-            real::max(self.longest_common_s, T::of(f64::from(self.common)) * T::of(ROW_S));
+            real::max(self.longest_common_s, T::from_double(f64::from(self.common)) * T::from_double(ROW_S));
     }
 }
 

@@ -54,7 +54,7 @@ impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
     #[must_use]
     pub fn noise(&self, joint: usize) -> T {
         let variance = self.row_variance.get(joint).copied().unwrap_or(T::one());
-        real::sqrt(variance / real::max(self.row_information, T::of(1e-3)))
+        real::sqrt(variance / real::max(self.row_information, T::from_double(1e-3)))
     }
 
     /// Normalised square `e^2` of one joint's residual.

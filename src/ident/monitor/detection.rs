@@ -71,13 +71,13 @@ impl<T: Real> Default for MonitorSettings<T> {
     fn default() -> Self {
         Self {
             // Weeks of therapy with some hours each.
-            time_between_false_alarms_s: T::of(100.0 * 3600.0),
+            time_between_false_alarms_s: T::from_double(100.0 * 3600.0),
             // A torque error as large as the noise of a row: 0.3 kg on the shank of the default leg.
-            energy_ratio: T::of(2.0),
+            energy_ratio: T::from_double(2.0),
             // 22 s of motion determine a variance to 5 % (one standard deviation).
-            noise_margin: T::of(1.1),
+            noise_margin: T::from_double(1.1),
             // Two cycles of a gait of 3 s: one spasm or stumble is shorter.
-            persistence_s: T::of(6.0),
+            persistence_s: T::from_double(6.0),
         }
     }
 }
@@ -135,12 +135,13 @@ impl<T: Real, const N: usize> Monitor<T, N> {
     #[must_use]
     pub fn new<const TAPS: usize>(low_pass: &LowPass<T, TAPS>, settings: &MonitorSettings<T>) -> Self {
         let ratio = settings.energy_ratio;
-        let blocks = settings.time_between_false_alarms_s / T::of(BLOCK_S) * T::of(N as f64);
+        let blocks =
+            settings.time_between_false_alarms_s / T::from_double(BLOCK_S) * T::from_double(N as f64);
         let limit = real::ln(real::max(blocks, T::one())) / exponent(ratio, settings.noise_margin);
-        let persistent = real::max(settings.persistence_s / T::of(BLOCK_S), T::one());
+        let persistent = real::max(settings.persistence_s / T::from_double(BLOCK_S), T::one());
         Self {
             charts: [Chart::new(); N],
-            half_freedom: block_freedom(low_pass.weights()) * T::of(0.5),
+            half_freedom: block_freedom(low_pass.weights()) * T::from_double(0.5),
             slope: T::one() - T::one() / ratio,
             intercept: real::ln(ratio),
             limit,
@@ -170,7 +171,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
     #[must_use]
     pub fn delay_s(&self, energy: T) -> Option<T> {
         let step = real::min(self.step(energy), self.largest_step);
-        (step > T::zero()).then(|| self.limit / step * T::of(BLOCK_S))
+        (step > T::zero()).then(|| self.limit / step * T::from_double(BLOCK_S))
     }
 
     fn step(&self, energy: T) -> T {
@@ -186,7 +187,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         if !rows.is_finite() {
             return None;
         }
-        let moving = rows.still.map(|still| still <= T::of(LARGEST_STILL_SHARE));
+        let moving = rows.still.map(|still| still <= T::from_double(LARGEST_STILL_SHARE));
         self.take(&core::array::from_fn(|joint| {
             moving[joint].then(|| baseline.normalised_square(rows, joint))
         }))
@@ -204,7 +205,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
             if chart.rows < ROWS_PER_BLOCK {
                 continue;
             }
-            let energy = chart.energy / T::of(f64::from(ROWS_PER_BLOCK));
+            let energy = chart.energy / T::from_double(f64::from(ROWS_PER_BLOCK));
             let step = real::min(self.step(energy), self.largest_step);
             let chart = &mut self.charts[joint];
             (chart.energy, chart.rows) = (T::zero(), 0);
@@ -212,13 +213,13 @@ impl<T: Real, const N: usize> Monitor<T, N> {
             if !(chart.sum > T::zero()) {
                 chart.age = 0;
             }
-            if chart.sum >= self.limit * T::of(ALMOST) {
+            if chart.sum >= self.limit * T::from_double(ALMOST) {
                 alarm = alarm.max(Some(chart.age));
             }
         }
         alarm.map(|age| Change {
-            since_s: T::of(f64::from(age)) / T::of(ROW_RATE_HZ),
-            joints: self.charts.map(|chart| chart.sum > self.limit * T::of(0.5)),
+            since_s: T::from_double(f64::from(age)) / T::from_double(ROW_RATE_HZ),
+            joints: self.charts.map(|chart| chart.sum > self.limit * T::from_double(0.5)),
             statistic: self.statistic(),
             limit: self.limit,
         })
@@ -236,12 +237,12 @@ fn exponent<T: Real>(ratio: T, margin: T) -> T {
         if inside > T::zero() { t * intercept + real::ln(inside) } else { -T::one() }
     };
     // The function is concave and zero at t = 0: positive up to the root.
-    let (mut low, mut high) = (T::of(1e-3), T::one());
+    let (mut low, mut high) = (T::from_double(1e-3), T::one());
     if margin <= T::one() {
         return high;
     }
     for _ in 0..HALVINGS {
-        let middle = (low + high) * T::of(0.5);
+        let middle = (low + high) * T::from_double(0.5);
         if balance(middle) > T::zero() { low = middle } else { high = middle }
     }
     low
@@ -252,12 +253,12 @@ fn block_freedom<T: Real>(weights: &[T]) -> T {
     let product = |lag: usize| {
         weights.iter().zip(weights.get(lag..).unwrap_or(&[])).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
     };
-    let (energy, rows) = (product(0), T::of(f64::from(ROWS_PER_BLOCK)));
+    let (energy, rows) = (product(0), T::from_double(f64::from(ROWS_PER_BLOCK)));
     let mut spread = T::one();
     for behind in 1..ROWS_PER_BLOCK as usize {
         let correlation = product(behind * DECIMATION) / energy;
-        let share = T::one() - T::of(behind as f64) / rows;
-        spread += T::of(2.0) * share * correlation * correlation;
+        let share = T::one() - T::from_double(behind as f64) / rows;
+        spread += T::from_double(2.0) * share * correlation * correlation;
     }
     rows / spread
 }

@@ -205,9 +205,9 @@ fn payload_can_exist<T: Real, const B: usize>(
     thresholds: &Thresholds<T>,
 ) -> bool {
     let payload = &explanation.hypothesis;
-    let place = |wanted: Parameter| PAYLOAD_PARAMETERS.iter().position(|&parameter| parameter == wanted);
+    let find = |wanted: Parameter| PAYLOAD_PARAMETERS.iter().position(|&parameter| parameter == wanted);
     let (Some(m), Some(x), Some(y), Some(zz)) =
-        (place(Parameter::M), place(Parameter::HX), place(Parameter::HY), place(Parameter::ZZ))
+        (find(Parameter::M), find(Parameter::HX), find(Parameter::HY), find(Parameter::ZZ))
     else {
         return true;
     };
@@ -218,7 +218,7 @@ fn payload_can_exist<T: Real, const B: usize>(
     let surplus = value(m) * value(zz) - value(x) * value(x) - value(y) * value(y);
     let mut gradient = [T::zero(); DIRECTIONS];
     (gradient[m], gradient[zz]) = (value(zz), value(m));
-    (gradient[x], gradient[y]) = (-T::of(2.0) * value(x), -T::of(2.0) * value(y));
+    (gradient[x], gradient[y]) = (-T::from_double(2.0) * value(x), -T::from_double(2.0) * value(y));
     // Near zero mass the gradient vanishes too; the curvature of the product then dominates.
     let curvature = payload.sigma(m).unwrap_or(T::zero()) * payload.sigma(zz).unwrap_or(T::zero());
     let spread = real::sqrt(explanation.variance_of(&gradient) + curvature * curvature);

@@ -71,14 +71,14 @@ pub(super) fn assemble<T: Real, const N: usize, const B: usize, const NUMBERS: u
         let divisor = real::max(rows, T::one());
         assembly.torque[joint].mean_absolute = absolute / divisor;
         assembly.torque[joint].root_mean_square = real::sqrt(power / divisor);
-        assembly.rows[joint] = (rows + T::of(0.5)).to_count();
+        assembly.rows[joint] = (rows + T::from_double(0.5)).to_count();
         assembly.outliers.whole_error_share[joint] = whole_error_share(window, joint, &joints[joint]);
-        let free = rows - T::of(columns as f64) / real::max(information, T::of(1e-3));
+        let free = rows - T::from_double(columns as f64) / real::max(information, T::from_double(1e-3));
         let variance = packed::residual(&joints[joint], columns)
             / real::max(free, T::one())
-            / real::max(information, T::of(1e-3));
-        let floor = T::of(SMALLEST_NOISE_SHARE) * assembly.torque[joint].root_mean_square;
-        noise[joint] = real::max(real::sqrt(variance), real::max(floor, T::of(1e-9)));
+            / real::max(information, T::from_double(1e-3));
+        let floor = T::from_double(SMALLEST_NOISE_SHARE) * assembly.torque[joint].root_mean_square;
+        noise[joint] = real::max(real::sqrt(variance), real::max(floor, T::from_double(1e-9)));
     }
     disturbed(window, &weights, &mut assembly.outliers);
 
@@ -98,8 +98,8 @@ pub(super) fn assemble<T: Real, const N: usize, const B: usize, const NUMBERS: u
         }
         let wanted = match choices[joint] {
             Choice::Auto => {
-                let share = T::of(SMALLEST_SURPLUS_SHARE);
-                (T::of(SMALLEST_GAIN), share * assembly.torque[joint].root_mean_square)
+                let share = T::from_double(SMALLEST_SURPLUS_SHARE);
+                (T::from_double(SMALLEST_GAIN), share * assembly.torque[joint].root_mean_square)
             }
             Choice::On | Choice::Off => (T::zero(), T::zero()),
         };
@@ -129,7 +129,7 @@ pub(super) struct Choices<const N: usize> {
 
 impl<const N: usize> Choices<N> {
     /// Takes the rank and the Stribeck choices from a model.
-    pub(super) fn of<T: Real, const B: usize>(model: &RowModel<T, N, B>) -> Self {
+    pub(super) fn from_model<T: Real, const B: usize>(model: &RowModel<T, N, B>) -> Self {
         Self { rank: model.base.rank(), stribeck: core::array::from_fn(|joint| model.stribeck_choice(joint)) }
     }
 
@@ -163,7 +163,7 @@ fn whole_error_share<T: Real, const N: usize, const B: usize, const NUMBERS: usi
     weighted: &[T; LARGEST_SIZE],
 ) -> T {
     let columns = window.columns()[joint].all();
-    let parameters = packed::solve(weighted, columns, T::of(INDEPENDENT_SHARE));
+    let parameters = packed::solve(weighted, columns, T::from_double(INDEPENDENT_SHARE));
     let parts = (0..window.blocks()).filter_map(|block| window.part(block, joint));
     let (error, power) = parts.fold((T::zero(), T::zero()), |(error, power), part| {
         let of = |parameters: &[T]| packed::cost(part.factor, columns, parameters);
@@ -181,12 +181,12 @@ fn disturbed<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
     let (mut all, mut hit) = ([T::zero(); N], [T::zero(); N]);
     let (mut state, mut stretch, mut common) = ([false; N], [T::zero(); N], T::zero());
     for block in 0..window.blocks() {
-        let seconds = T::of(f64::from(window.outputs(block))) / T::of(ROW_RATE_HZ);
+        let seconds = T::from_double(f64::from(window.outputs(block))) / T::from_double(ROW_RATE_HZ);
         for joint in 0..N {
             let rows = window.part(block, joint).map_or(T::zero(), |part| part.rows);
             all[joint] += rows;
             if rows > T::zero() {
-                state[joint] = weights[joint][block] < T::of(DISTURBED_BELOW);
+                state[joint] = weights[joint][block] < T::from_double(DISTURBED_BELOW);
             }
             if state[joint] {
                 hit[joint] += rows;

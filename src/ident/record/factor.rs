@@ -117,12 +117,12 @@ impl<T: Real, const B: usize> Factor<T, B> {
         // Element by element: the compiler expands a large array by value at great cost.
         let mut converted = Factor::new();
         for (to, from) in converted.r.iter_mut().flatten().zip(self.r.iter().flatten()) {
-            *to = U::of(from.to_double());
+            *to = U::from_double(from.to_double());
         }
         for (to, from) in converted.z.iter_mut().zip(&self.z) {
-            *to = U::of(from.to_double());
+            *to = U::from_double(from.to_double());
         }
-        converted.residual = U::of(self.residual.to_double());
+        converted.residual = U::from_double(self.residual.to_double());
         converted.rows = self.rows;
         converted
     }

@@ -46,7 +46,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Record<U, N, B> {
-        let convert = |value: T| U::of(value.to_double());
+        let convert = |value: T| U::from_double(value.to_double());
         Record {
             factors: core::array::from_fn(|joint| self.factors[joint].convert()),
             torque: self.torque.map(|size| TorqueSize {
@@ -67,7 +67,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     /// Standard deviation of one joint's filtered torque due to noise alone, N m; `None` if unknown.
     #[must_use]
     pub fn filtered_noise(&self, joint: usize) -> Option<T> {
-        let energy = self.row_information / T::of(DECIMATION as f64); // sum h^2
+        let energy = self.row_information / T::from_double(DECIMATION as f64); // sum h^2
         self.noise.get(joint).filter(|&&noise| noise > T::zero()).map(|&noise| noise * real::sqrt(energy))
     }
 
@@ -79,7 +79,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
         if rows == 0 {
             return None;
         }
-        let mean = (factor.excess(base) + factor.residual()) / T::of(f64::from(rows));
+        let mean = (factor.excess(base) + factor.residual()) / T::from_double(f64::from(rows));
         Some(real::sqrt(mean))
     }
 }
@@ -121,7 +121,7 @@ impl<T: Real, const N: usize> Outliers<T, N> {
     /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Outliers<U, N> {
-        let convert = |value: T| U::of(value.to_double());
+        let convert = |value: T| U::from_double(value.to_double());
         Outliers {
             samples: self.samples,
             replaced: self.replaced,
@@ -169,7 +169,7 @@ impl<T: Real, const N: usize, const B: usize> Selection<T, N, B> {
     /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Selection<U, N, B> {
-        let convert = |value: T| U::of(value.to_double());
+        let convert = |value: T| U::from_double(value.to_double());
         Selection {
             is_made: self.is_made,
             dropped: self.dropped,

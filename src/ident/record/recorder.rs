@@ -22,7 +22,7 @@ use crate::ident::signal::hampel::{self, Hampel, Quantity};
 use crate::ident::signal::kernel::{Kernel, KernelError, LowPass};
 use crate::ident::signal::noise::NoiseLevel;
 use crate::ident::signal::smoothing::{Smoothed, Smoother};
-use crate::place::{fill, made};
+use crate::in_place::{fill, made};
 use crate::real::{self, Real};
 
 /// Bandwidth of the smoothing over that of the rows. The smoothing must leave the motion unchanged in the
@@ -65,12 +65,12 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     /// [`KernelError`] when the bandwidth is invalid or its kernel does not fit `TAPS` and `PENDING`.
     #[inline(never)]
     pub fn new(bandwidth_hz: T) -> Result<Self, KernelError> {
-        let rate = T::of(SAMPLE_RATE_HZ);
+        let rate = T::from_double(SAMPLE_RATE_HZ);
         let low_pass = LowPass::new(bandwidth_hz, rate)?;
         if RowFilter::<T, N, B, PENDING>::outputs_needed(low_pass.taps()) > PENDING {
             return Err(KernelError::TooLong { needed: low_pass.taps() });
         }
-        let smoothing = Kernel::new(T::of(SMOOTHING_BANDWIDTHS) * bandwidth_hz, rate)?;
+        let smoothing = Kernel::new(T::from_double(SMOOTHING_BANDWIDTHS) * bandwidth_hz, rate)?;
         Ok(Self { smoothing, low_pass })
     }
 
@@ -146,11 +146,11 @@ where
     #[inline]
     pub fn with_window(bandwidth_hz: T, window: W) -> Result<Self, KernelError> {
         let filters = Filters::new(bandwidth_hz)?;
-        Ok(made(|slot| Self::place(slot, &filters, Estimator::Robust, window)))
+        Ok(made(|slot| Self::new_in(slot, &filters, Estimator::Robust, window)))
     }
 
     /// Builds a recorder in place, from filters that already fit.
-    pub fn place<'a>(
+    pub fn new_in<'a>(
         slot: &'a mut MaybeUninit<Self>,
         filters: &Filters<T, N, B, TAPS, PENDING>,
         estimator: Estimator,
@@ -257,7 +257,7 @@ where
             self.rejected = self.rejected.saturating_add(1);
             return;
         }
-        let taken = rows.still.map(|still| !(still > T::of(LARGEST_STILL_SHARE)));
+        let taken = rows.still.map(|still| !(still > T::from_double(LARGEST_STILL_SHARE)));
         if !self.window.borrow_mut().insert(rows, &taken) {
             self.rejected = self.rejected.saturating_add(1);
             return;
@@ -304,7 +304,7 @@ where
             noise.push(torque);
         }
         if self.choices.is_none() {
-            let choices = Choices::of(model);
+            let choices = Choices::from_model(model);
             self.choices = Some(if self.ends == Ends::Cut { choices } else { choices.without_stribeck() });
             self.window.borrow_mut().lay_out(model);
         }
@@ -349,10 +349,10 @@ where
     }
 
     fn record(&self) -> Record<T, N, B> {
-        let information = T::of(DECIMATION as f64) * self.low_pass.energy();
+        let information = T::from_double(DECIMATION as f64) * self.low_pass.energy();
         let estimator = if self.reweights { self.estimator } else { Estimator::Plain };
         let assembly = assemble(self.window.borrow(), self.choices.as_ref(), estimator, information);
-        let instants = T::of(f64::from(self.instants.max(1)));
+        let instants = T::from_double(f64::from(self.instants.max(1)));
         Record {
             factors: assembly.factors,
             torque: core::array::from_fn(|joint| TorqueSize {

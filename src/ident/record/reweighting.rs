@@ -88,13 +88,13 @@ pub fn weigh<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
         power += packed::cost(part.factor, columns, &[]);
         rows += part.rows;
     }
-    if !(rows * information >= T::of(INDEPENDENT_ROWS_PER_COLUMN) * T::of(columns as f64)) {
+    if !(rows * information >= T::from_double(INDEPENDENT_ROWS_PER_COLUMN) * T::from_double(columns as f64)) {
         return weights;
     }
-    let harmless = T::of(HARMLESS_SHARE * HARMLESS_SHARE) * power / rows;
+    let harmless = T::from_double(HARMLESS_SHARE * HARMLESS_SHARE) * power / rows;
     for round in 0..ROUNDS {
-        let parameters = packed::solve(&all, columns, T::of(INDEPENDENT_SHARE));
-        let blocks = Residuals::of(window, joint, &parameters);
+        let parameters = packed::solve(&all, columns, T::from_double(INDEPENDENT_SHARE));
+        let blocks = Residuals::new(window, joint, &parameters);
         let scale = real::max(real::median(blocks.means().pushed()), harmless);
         let before = weights;
         if round < NORM_ROUNDS {
@@ -104,7 +104,8 @@ pub fn weigh<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
         } else {
             redescend(&mut weights, &blocks, scale, information);
         }
-        let moved = weights.iter().zip(&before).any(|(new, old)| real::abs(*new - *old) > T::of(1e-3));
+        let moved =
+            weights.iter().zip(&before).any(|(new, old)| real::abs(*new - *old) > T::from_double(1e-3));
         if round > NORM_ROUNDS && !moved {
             break;
         }
@@ -126,7 +127,7 @@ struct Residuals<T> {
 }
 
 impl<T: Real> Residuals<T> {
-    fn of<const N: usize, const B: usize, const NUMBERS: usize>(
+    fn new<const N: usize, const B: usize, const NUMBERS: usize>(
         window: &Window<T, N, B, NUMBERS>,
         joint: usize,
         parameters: &[T],
@@ -178,9 +179,9 @@ impl<T: Real> List<T> {
 /// Score of a block: standard normal if its residuals are noise of variance `scale`.
 fn normal_score<T: Real>(block: &Block<T>, scale: T, information: T) -> T {
     let freedom = real::max(block.rows * information, T::one());
-    let spread = T::of(2.0 / 9.0) / freedom;
-    let ratio = real::max(block.mean / scale, T::of(1e-9));
-    (real::exp(real::ln(ratio) / T::of(3.0)) - (T::one() - spread)) / real::sqrt(spread)
+    let spread = T::from_double(2.0 / 9.0) / freedom;
+    let ratio = real::max(block.mean / scale, T::from_double(1e-9));
+    (real::exp(real::ln(ratio) / T::from_double(3.0)) - (T::one() - spread)) / real::sqrt(spread)
 }
 
 fn redescend<T: Real>(weights: &mut Weights<T>, blocks: &Residuals<T>, scale: T, information: T) {
@@ -190,18 +191,19 @@ fn redescend<T: Real>(weights: &mut Weights<T>, blocks: &Residuals<T>, scale: T,
     for score in &mut scores.values {
         *score = real::abs(*score - centre);
     }
-    let spread = real::max(real::median(scores.pushed()) / T::of(0.6745), T::one());
+    let spread = real::max(real::median(scores.pushed()) / T::from_double(0.6745), T::one());
     let score = |block: Option<&Block<T>>| {
         let block = block.filter(|block| block.rows > T::zero());
         block.map_or(T::zero(), |block| (normal_score(block, scale, information) - centre) / spread)
     };
-    for (place, weight) in weights.iter_mut().enumerate().take(blocks.count) {
-        let lost = |place: Option<usize>| {
-            place.is_some_and(|place| score(blocks.blocks.get(place)) > T::of(LIMITS.1))
+    for (index, weight) in weights.iter_mut().enumerate().take(blocks.count) {
+        let lost = |index: Option<usize>| {
+            index.is_some_and(|index| score(blocks.blocks.get(index)) > T::from_double(LIMITS.1))
         };
-        let beside = lost(place.checked_sub(1)) || lost(place.checked_add(1));
+        let beside = lost(index.checked_sub(1)) || lost(index.checked_add(1));
         let (full, nothing) = if beside { LIMITS_BESIDE } else { LIMITS };
-        let fallen = (score(blocks.blocks.get(place)) - T::of(full)) / (T::of(nothing) - T::of(full));
+        let fallen = (score(blocks.blocks.get(index)) - T::from_double(full))
+            / (T::from_double(nothing) - T::from_double(full));
         let fallen = real::clamp(fallen, T::zero(), T::one());
         let remaining = T::one() - fallen * fallen;
         *weight = remaining * remaining;

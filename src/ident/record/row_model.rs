@@ -49,14 +49,16 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
             drive_choice: [DriveChoice::ALL; N],
             stribeck: no_stribeck(),
             pulse: [T::zero(); N],
-            still_speed: [T::of(STILL_SPEED); N],
+            still_speed: [T::from_double(STILL_SPEED); N],
         }
     }
 
     /// Sets the angles of the encoders' counts, rad, for rows of this bandwidth.
     pub fn set_encoders(&mut self, step_rad: &[T; N], bandwidth_hz: T) {
-        self.pulse = step_rad.map(|step| T::of(PULSE_COUNTS) * step * bandwidth_hz);
-        self.still_speed = self.pulse.map(|pulse| real::max(T::of(STILL_SPEED), T::of(STILL_PULSES) * pulse));
+        self.pulse = step_rad.map(|step| T::from_double(PULSE_COUNTS) * step * bandwidth_hz);
+        self.still_speed = self
+            .pulse
+            .map(|pulse| real::max(T::from_double(STILL_SPEED), T::from_double(STILL_PULSES) * pulse));
     }
 
     /// Whether to search for Stribeck friction of a joint. With `auto` only where the encoder's pulses are
@@ -64,7 +66,7 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
     #[must_use]
     pub fn stribeck_choice(&self, joint: usize) -> Choice {
         match self.stribeck_choice[joint] {
-            Choice::Auto if self.pulse[joint] > T::of(LARGEST_PULSE) => Choice::Off,
+            Choice::Auto if self.pulse[joint] > T::from_double(LARGEST_PULSE) => Choice::Off,
             choice => choice,
         }
     }

@@ -58,14 +58,14 @@ impl<T: Real, const N: usize, const B: usize> Stretches<T, N, B> {
         let start = core::array::from_fn(|joint| {
             let size = record.torque[joint].root_mean_square;
             let error = record.torque_error(joint, values).unwrap_or(size);
-            T::of(START_ERRORS) * error + T::of(START_TORQUE_SHARE) * size
+            T::from_double(START_ERRORS) * error + T::from_double(START_TORQUE_SHARE) * size
         });
         Self {
             values: *values,
             start,
             friction: core::array::from_fn(|joint| {
                 let coulomb = model.drive(joint, Parameter::FC).map_or(T::zero(), |base| values[base]);
-                T::of(2.0) * real::abs(coulomb) * (T::one() + model.stribeck[joint].excess)
+                T::from_double(2.0) * real::abs(coulomb) * (T::one() + model.stribeck[joint].excess)
             }),
             own: [0; N],
             has_started: [false; N],
@@ -92,13 +92,13 @@ impl<T: Real, const N: usize, const B: usize> Stretches<T, N, B> {
         for joint in 0..N {
             let row = rows.regressor[joint].iter().zip(&self.values);
             let error = row.fold(rows.torque[joint], |rest, (&element, &value)| rest - element * value);
-            let is_at_rest = rows.still[joint] > T::of(LARGEST_STILL_SHARE);
+            let is_at_rest = rows.still[joint] > T::from_double(LARGEST_STILL_SHARE);
             let start = self.start[joint];
             let (continued, start) = if is_at_rest {
                 let start = start + rows.still[joint] * self.friction[joint];
                 (start, start)
             } else {
-                (T::of(CONTINUED_SHARE) * start, start)
+                (T::from_double(CONTINUED_SHARE) * start, start)
             };
             let error = real::abs(error);
             if error > continued {
@@ -129,5 +129,5 @@ impl<T: Real, const N: usize, const B: usize> Stretches<T, N, B> {
 }
 
 fn seconds<T: Real>(rows: u32) -> T {
-    T::of(f64::from(rows)) * T::of(ROW_S)
+    T::from_double(f64::from(rows)) * T::from_double(ROW_S)
 }

@@ -100,7 +100,7 @@ impl<T: Real, const B: usize> StribeckFit<T, B> {
     /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> StribeckFit<U, B> {
-        let convert = |value: T| U::of(value.to_double());
+        let convert = |value: T| U::from_double(value.to_double());
         StribeckFit {
             speed: convert(self.speed),
             speed_sigma: convert(self.speed_sigma),
@@ -132,17 +132,17 @@ fn reordered<T: Real, const B: usize, const K: usize>(
     let (base, all) = (joint.columns.base().len(), joint.columns.all());
     for (column, stored) in packed::rows(joint.factor, all) {
         let mut row: Row<T> = [T::zero(); LARGEST_COLUMNS + 1];
-        let at = |place: usize| place.checked_sub(column).and_then(|place| stored.get(place)).copied();
+        let at = |number: usize| number.checked_sub(column).and_then(|number| stored.get(number)).copied();
         for (slot, combination) in row.iter_mut().zip(front) {
             for (index, &weight) in combination.bank.iter().enumerate() {
                 *slot += weight * at(base + index).unwrap_or(T::zero());
             }
-            for (place, &weight) in joint.columns.friction.iter().zip(&combination.friction) {
-                *slot += weight * place.and_then(at).unwrap_or(T::zero());
+            for (number, &weight) in joint.columns.friction.iter().zip(&combination.friction) {
+                *slot += weight * number.and_then(at).unwrap_or(T::zero());
             }
         }
-        for (place, slot) in row.iter_mut().skip(K).take(base).enumerate() {
-            *slot = at(place).unwrap_or(T::zero());
+        for (number, slot) in row.iter_mut().skip(K).take(base).enumerate() {
+            *slot = at(number).unwrap_or(T::zero());
         }
         if let (Some(slot), Some(&right)) = (row.get_mut(K + base), stored.last()) {
             *slot = right;
@@ -199,7 +199,7 @@ struct Reduced<T> {
 }
 
 impl<T: Real> Reduced<T> {
-    fn of<const B: usize>(joint: &JointRows<'_, T, B>, others: &Factor<T, B>, rank: usize) -> Self {
+    fn new<const B: usize>(joint: &JointRows<'_, T, B>, others: &Factor<T, B>, rank: usize) -> Self {
         let mut all = [T::zero(); LARGEST_SIZE];
         let columns = (rank + BANK).min(LARGEST_COLUMNS);
         for (elements, &right) in others.triangle().iter().zip(others.right()) {
@@ -213,8 +213,8 @@ impl<T: Real> Reduced<T> {
         let (base, own) = (joint.columns.base(), joint.columns.all());
         for (column, stored) in packed::rows(joint.factor, own) {
             let mut row: Row<T> = [T::zero(); LARGEST_COLUMNS + 1];
-            for (place, &element) in (column..own).zip(stored) {
-                let target = base.get(place).copied().unwrap_or(rank + place - base.len());
+            for (number, &element) in (column..own).zip(stored) {
+                let target = base.get(number).copied().unwrap_or(rank + number - base.len());
                 if let Some(slot) = row.get_mut(target) {
                     *slot = element / joint.noise;
                 }
@@ -250,12 +250,12 @@ impl<T: Real> Reduced<T> {
 
     /// Speed of the largest gain: a grid in ln vs, then two finer ones around the best point.
     fn best_speed(&self) -> T {
-        let (slowest, fastest) = (T::of(SPEEDS_RAD_S.0), T::of(SPEEDS_RAD_S.1));
-        let mut step = real::ln(fastest / slowest) / T::of((GRID - 1) as f64);
+        let (slowest, fastest) = (T::from_double(SPEEDS_RAD_S.0), T::from_double(SPEEDS_RAD_S.1));
+        let mut step = real::ln(fastest / slowest) / T::from_double((GRID - 1) as f64);
         let (mut low, mut count, mut best) = (slowest, GRID, (T::zero(), slowest));
         for _ in 0..3 {
             for index in 0..count {
-                let speed = low * real::exp(step * T::of(index as f64));
+                let speed = low * real::exp(step * T::from_double(index as f64));
                 let speed = real::clamp(speed, slowest, fastest);
                 let (gain, _) = self.gain(speed);
                 if gain > best.0 {
@@ -263,7 +263,7 @@ impl<T: Real> Reduced<T> {
                 }
             }
             low = best.1 * real::exp(-step);
-            step /= T::of(4.0);
+            step /= T::from_double(4.0);
             count = 9;
         }
         best.1
@@ -292,7 +292,7 @@ pub fn strongest<T: Real, const B: usize>(
     others: &Factor<T, B>,
     rank: usize,
 ) -> Strongest<T> {
-    let reduced = Reduced::of(joint, others, rank);
+    let reduced = Reduced::new(joint, others, rank);
     let speed = reduced.best_speed();
     let (gain, surplus) = reduced.gain(speed);
     Strongest { reduced, speed, gain, surplus }
@@ -315,7 +315,7 @@ pub fn eliminate<T: Real, const B: usize>(
     let slope = slope(speed).scaled(surplus);
     // Information matrix of surplus and ln vs, the latter with its prior.
     let (one, other) = (reduced.image(&curve.bank), reduced.image(&slope.bank));
-    let belief = T::one() / T::of(LOG_SPEED_SIGMA * LOG_SPEED_SIGMA);
+    let belief = T::one() / T::from_double(LOG_SPEED_SIGMA * LOG_SPEED_SIGMA);
     let (a, b, c) = (dot(&one, &one), dot(&one, &other), dot(&other, &other) + belief);
     let determinant = a * c - b * b;
     if !(determinant > T::zero()) {
@@ -325,7 +325,7 @@ pub fn eliminate<T: Real, const B: usize>(
     let mut front = reordered(joint, &[curve, slope]);
     let count = 2 + joint.columns.base().len();
     let mut prior: Row<T> = [T::zero(); LARGEST_COLUMNS + 1];
-    prior[1] = joint.noise / T::of(LOG_SPEED_SIGMA);
+    prior[1] = joint.noise / T::from_double(LOG_SPEED_SIGMA);
     packed::rotate(&mut front, count, &mut prior);
     let mut rows = packed::rows(&front, count).map(|(_, row)| row);
     let (first, second) = (rows.next()?, rows.next()?);

@@ -149,11 +149,11 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
                     count += 1;
                 }
             }
-            let place = |parameter| {
+            let find = |parameter| {
                 let seen = base.iter().take(count);
                 seen.copied().position(|index| model.base.independent(index) == Some((joint, parameter)))
             };
-            let friction = [place(Parameter::FC), place(Parameter::FV)];
+            let friction = [find(Parameter::FC), find(Parameter::FV)];
             let bank = if model.stribeck_choice(joint).is_possible() { BANK } else { 0 };
             *columns = Columns { base, count, friction, bank, start: 0 };
         }
@@ -162,7 +162,7 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
 
     /// Window for tests: every joint has the first `count` columns and the given friction columns.
     #[cfg(test)]
-    pub(super) fn of_columns(count: usize, friction: [Option<usize>; 2], bank: usize) -> Self {
+    pub(super) fn with_columns(count: usize, friction: [Option<usize>; 2], bank: usize) -> Self {
         let mut window = Self::new();
         let base = core::array::from_fn(|column| column);
         window.arrange([Columns { base, count, friction, bank, start: 0 }; N]);
@@ -194,8 +194,8 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
         (self.level[slot], self.outputs[slot]) = (0, 0);
     }
 
-    fn slot(&self, place: usize) -> usize {
-        usize::from(self.order[place.min(LARGEST_BLOCKS - 1)])
+    fn slot(&self, index: usize) -> usize {
+        usize::from(self.order[index.min(LARGEST_BLOCKS - 1)])
     }
 
     /// Takes one output of the row filter; `taken` marks the joints whose row is
@@ -211,10 +211,10 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
             let mut row: Row<T> = [T::zero(); LARGEST_COLUMNS + 1];
             let elements = columns.base().iter().map(|&base| rows.regressor[joint][base]);
             let bank = rows.stribeck[joint].iter().copied().take(columns.bank);
-            for (place, element) in
+            for (target, element) in
                 row.iter_mut().zip(elements.chain(bank).chain(core::iter::once(rows.torque[joint])))
             {
-                *place = element;
+                *target = element;
             }
             let Some(part) = self.part_mut(slot, joint) else { return false };
             packed::rotate(part, columns.all(), &mut row);
@@ -242,7 +242,7 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
     fn end_block(&mut self) {
         self.closed += 1;
         if self.closed >= self.capacity {
-            self.joining = self.pair_to_join().map(|place| (place as u8, 0));
+            self.joining = self.pair_to_join().map(|index| (index as u8, 0));
         } else {
             self.empty(self.slot(self.closed));
         }
@@ -250,31 +250,31 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
 
     /// Pair of neighbours to merge by the header's rule; where all levels differ, the shortest pair.
     fn pair_to_join(&self) -> Option<usize> {
-        let pair = |place: &usize| (self.slot(*place), self.slot(*place + 1));
+        let pair = |index: &usize| (self.slot(*index), self.slot(*index + 1));
         let equal = (0..self.closed - 1)
-            .filter(|place| self.level[pair(place).0] == self.level[pair(place).1])
-            .min_by_key(|place| self.level[pair(place).0]);
+            .filter(|index| self.level[pair(index).0] == self.level[pair(index).1])
+            .min_by_key(|index| self.level[pair(index).0]);
         equal.or_else(|| {
             (0..self.closed - 1)
-                .min_by_key(|place| self.outputs[pair(place).0].saturating_add(self.outputs[pair(place).1]))
+                .min_by_key(|index| self.outputs[pair(index).0].saturating_add(self.outputs[pair(index).1]))
         })
     }
 
     /// Continues a pending merge by one joint's part of two blocks; true if there was work to do.
     /// [`Self::insert`] does the rest.
     pub fn tidy(&mut self) -> bool {
-        let Some((place, joint)) = self.joining else { return false };
-        let (place, joint) = (usize::from(place), usize::from(joint));
-        let (merged, freed) = (self.slot(place), self.slot(place + 1));
+        let Some((index, joint)) = self.joining else { return false };
+        let (index, joint) = (usize::from(index), usize::from(joint));
+        let (merged, freed) = (self.slot(index), self.slot(index + 1));
         self.merge(merged, freed, joint);
         if joint + 1 < N {
-            self.joining = Some((place as u8, joint as u8 + 1));
+            self.joining = Some((index as u8, joint as u8 + 1));
             return true;
         }
         self.level[merged] = self.level[merged].max(self.level[freed]).saturating_add(1);
         self.outputs[merged] = self.outputs[merged].saturating_add(self.outputs[freed]);
         // The freed slot goes behind the closed ones.
-        if let Some(younger) = self.order.get_mut(place + 1..self.closed) {
+        if let Some(younger) = self.order.get_mut(index + 1..self.closed) {
             younger.rotate_left(1);
         }
         self.closed -= 1;

@@ -131,8 +131,8 @@ impl<T: Real> Hampel<T> {
         let Some(predicted) = self.predict(first, end) else { return Cleaned { value, outlier: false } };
         let deviation = real::abs(value - predicted);
         let (floor, factor) = match self.quantity {
-            Quantity::Angle => (T::of(ANGLE_FLOOR_RAD), T::of(FACTOR)),
-            Quantity::Torque => (T::of(TORQUE_FLOOR_SHARE) * self.size, T::of(FACTOR)),
+            Quantity::Angle => (T::from_double(ANGLE_FLOOR_RAD), T::from_double(FACTOR)),
+            Quantity::Torque => (T::from_double(TORQUE_FLOOR_SHARE) * self.size, T::from_double(FACTOR)),
         };
         let limit = real::max(factor * self.deviation, floor);
         let settled = self.seen >= SETTLED;
@@ -149,34 +149,35 @@ impl<T: Real> Hampel<T> {
 
     fn learn(&mut self, deviation: T, predicted: T) {
         self.seen = self.seen.saturating_add(1);
-        let step = real::max(T::of(STEP), T::one() / T::of(f64::from(self.seen)));
+        let step = real::max(T::from_double(STEP), T::one() / T::from_double(f64::from(self.seen)));
         if self.deviation > T::zero() {
             let change = real::exp(if deviation > self.deviation { step } else { -step });
-            self.deviation = real::max(self.deviation * change, T::of(1e-9));
+            self.deviation = real::max(self.deviation * change, T::from_double(1e-9));
         } else {
             self.deviation = deviation;
         }
         self.size += (real::abs(predicted) - self.size)
-            * real::max(step * T::of(0.1), T::one() / T::of(f64::from(self.seen)));
+            * real::max(step * T::from_double(0.1), T::one() / T::from_double(f64::from(self.seen)));
     }
 
     /// Prediction from the neighbours; `None` with too few.
     fn predict(&self, first: usize, end: usize) -> Option<T> {
-        let at = |place: usize| self.window[place];
+        let at = |index: usize| self.window[index];
         if first > 0 || end < WINDOW {
             return self.extrapolate(first, end);
         }
-        let mean = |distance: usize| T::of(0.5) * (at(REACH - distance) + at(REACH + distance));
+        let mean = |distance: usize| T::from_double(0.5) * (at(REACH - distance) + at(REACH + distance));
         Some(match self.quantity {
             Quantity::Torque => {
                 let mut means = [mean(1), mean(2), mean(3), mean(4)];
                 sort(&mut means);
-                T::of(0.5) * (means[1] + means[2])
+                T::from_double(0.5) * (means[1] + means[2])
             }
             Quantity::Angle => {
-                let near = (T::of(4.0) * mean(1) - mean(2)) / T::of(3.0);
-                let far = (T::of(16.0) * mean(3) - T::of(9.0) * mean(4)) / T::of(7.0);
-                let past = T::of(3.0) * (at(REACH - 1) - at(REACH - 2)) + at(REACH - 3);
+                let near = (T::from_double(4.0) * mean(1) - mean(2)) / T::from_double(3.0);
+                let far =
+                    (T::from_double(16.0) * mean(3) - T::from_double(9.0) * mean(4)) / T::from_double(7.0);
+                let past = T::from_double(3.0) * (at(REACH - 1) - at(REACH - 2)) + at(REACH - 3);
                 let mut all = [near, far, past];
                 sort(&mut all);
                 all[1]
@@ -193,7 +194,7 @@ impl<T: Real> Hampel<T> {
             return None;
         }
         Some(match self.quantity {
-            Quantity::Angle => T::of(3.0) * (side(1) - side(2)) + side(3),
+            Quantity::Angle => T::from_double(3.0) * (side(1) - side(2)) + side(3),
             Quantity::Torque => {
                 let mut three = [side(1), side(2), side(3)];
                 sort(&mut three);
@@ -206,8 +207,8 @@ impl<T: Real> Hampel<T> {
     fn range(&self, first: usize, end: usize) -> (T, T) {
         let mut neighbours = [T::zero(); WINDOW];
         let mut count = 0;
-        for place in (first..end).filter(|&place| place != REACH) {
-            neighbours[count] = self.window[place];
+        for index in (first..end).filter(|&index| index != REACH) {
+            neighbours[count] = self.window[index];
             count += 1;
         }
         let Some(present) = neighbours.get_mut(..count) else { return (T::zero(), T::zero()) };
@@ -226,10 +227,10 @@ const SETTLED: u32 = 25;
 /// Insertion sort: a handful of numbers.
 fn sort<T: Real>(values: &mut [T]) {
     for end in 1..values.len() {
-        let mut place = end;
-        while place > 0 && values[place] < values[place - 1] {
-            values.swap(place, place - 1);
-            place -= 1;
+        let mut index = end;
+        while index > 0 && values[index] < values[index - 1] {
+            values.swap(index, index - 1);
+            index -= 1;
         }
     }
 }

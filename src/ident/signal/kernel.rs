@@ -63,7 +63,7 @@ impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
         if !(bandwidth_hz > T::zero() && real::is_finite(bandwidth_hz)) {
             return Err(KernelError::Bandwidth);
         }
-        let half_width = T::of(REACH_IN_PERIODS) * sample_rate_hz / bandwidth_hz;
+        let half_width = T::from_double(REACH_IN_PERIODS) * sample_rate_hz / bandwidth_hz;
         let reach = whole_samples_below(half_width, TAPS);
         if reach < SMALLEST_REACH {
             return Err(KernelError::TooShort);
@@ -113,16 +113,16 @@ impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
 /// `h`, `h'` and `h''` at `offset` samples from the centre. The derivatives have the sign of a correlation:
 /// positive for a rising ramp.
 fn function_and_derivatives<T: Real>(offset: T, half_width: T, sample_rate_hz: T) -> (T, T, T) {
-    let fundamental = T::of(core::f64::consts::PI) / half_width; // rad per sample
+    let fundamental = T::from_double(core::f64::consts::PI) / half_width; // rad per sample
     let (sine_one, cosine_one) = real::sin_cos(fundamental * offset);
     let (mut sine, mut cosine) = (T::zero(), T::one());
-    let (mut value, mut slope, mut curvature) = (T::of(0.5 * GAINS[0]), T::zero(), T::zero());
+    let (mut value, mut slope, mut curvature) = (T::from_double(0.5 * GAINS[0]), T::zero(), T::zero());
     for (order, &gain) in GAINS.iter().enumerate().skip(1) {
         (sine, cosine) = (sine * cosine_one + cosine * sine_one, cosine * cosine_one - sine * sine_one);
-        let angular = T::of(order as f64) * fundamental * sample_rate_hz;
-        value += T::of(gain) * cosine;
-        slope += T::of(gain) * angular * sine;
-        curvature -= T::of(gain) * angular * angular * cosine;
+        let angular = T::from_double(order as f64) * fundamental * sample_rate_hz;
+        value += T::from_double(gain) * cosine;
+        slope += T::from_double(gain) * angular * sine;
+        curvature -= T::from_double(gain) * angular * angular * cosine;
     }
     (value / half_width, slope / half_width, curvature / half_width)
 }
@@ -164,7 +164,7 @@ impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
             let time = signed::<T>(index, self.reach()) / sample_rate_hz;
             self.second_derivative[index] -= constant * self.low_pass.weights[index];
             ramp += self.first_derivative[index] * time;
-            parabola += self.second_derivative[index] * time * time * T::of(0.5);
+            parabola += self.second_derivative[index] * time * time * T::from_double(0.5);
         }
         for index in 0..taps {
             self.first_derivative[index] /= ramp;
@@ -214,7 +214,7 @@ fn whole_samples_below<T: Real>(length: T, limit: usize) -> usize {
 }
 
 fn signed<T: Real>(index: usize, centre: usize) -> T {
-    T::of(index as f64) - T::of(centre as f64)
+    T::from_double(index as f64) - T::from_double(centre as f64)
 }
 
 fn sum<T: Real>(values: &[T]) -> T {
@@ -228,15 +228,15 @@ mod tests {
     extern crate std;
 
     fn response<T: Real>(bandwidth: f64, frequency: f64) -> (f64, f64, f64) {
-        let kernel = Kernel::<T, 512>::new(T::of(bandwidth), T::of(500.0)).expect("fits");
+        let kernel = Kernel::<T, 512>::new(T::from_double(bandwidth), T::from_double(500.0)).expect("fits");
         let omega = 2.0 * core::f64::consts::PI * frequency;
         let mut window = [T::zero(); 512];
         let mut sine_window = [T::zero(); 512];
         for index in 0..kernel.taps() {
             let time = (index as f64 - kernel.reach() as f64) / 500.0;
             let (sine, cosine) = real::sin_cos(omega * time);
-            window[index] = T::of(cosine);
-            sine_window[index] = T::of(sine);
+            window[index] = T::from_double(cosine);
+            sine_window[index] = T::from_double(sine);
         }
         let (value, _, curvature) = kernel.apply(&window[..kernel.taps()], &[], T::one());
         let (_, slope, _) = kernel.apply(&sine_window[..kernel.taps()], &[], T::zero());

@@ -58,15 +58,15 @@ impl<T: Real> Median<T> {
     fn adjust(&mut self, marker: usize) {
         // In whole quarters: exact for a stream of any length, without double precision on the device.
         let wanted = u64::from(self.seen - 1) * marker as u64;
-        let place = u64::from(self.positions[marker]) * 4;
+        let position = u64::from(self.positions[marker]) * 4;
         let (before, after) = (self.gap(marker - 1), self.gap(marker));
-        let forward = wanted >= place + 4 && after > 1;
-        let backward = wanted + 4 <= place && before > 1;
+        let forward = wanted >= position + 4 && after > 1;
+        let backward = wanted + 4 <= position && before > 1;
         if !forward && !backward {
             return;
         }
         let step = if forward { T::one() } else { -T::one() };
-        let (before, after) = (T::of(f64::from(before)), T::of(f64::from(after)));
+        let (before, after) = (T::from_double(f64::from(before)), T::from_double(f64::from(after)));
         let (low, height, high) = (self.heights[marker - 1], self.heights[marker], self.heights[marker + 1]);
         let parabola = height
             + step / (before + after)
@@ -130,7 +130,7 @@ impl<T: Real> NoiseLevel<T> {
         if self.filled < 3 {
             self.filled += 1;
         } else {
-            self.scatter.push(real::abs(sample - oldest + T::of(3.0) * (middle - newest)));
+            self.scatter.push(real::abs(sample - oldest + T::from_double(3.0) * (middle - newest)));
         }
         self.last = [sample, newest, middle];
     }
@@ -138,7 +138,7 @@ impl<T: Real> NoiseLevel<T> {
     /// Standard deviation of the noise of one sample; zero before the fifth difference.
     #[must_use]
     pub fn sigma(&self) -> T {
-        self.scatter.value().map_or(T::zero(), |median| median / T::of(0.674_490 * 4.472_136))
+        self.scatter.value().map_or(T::zero(), |median| median / T::from_double(0.674_490 * 4.472_136))
     }
 }
 

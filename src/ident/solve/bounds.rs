@@ -82,7 +82,7 @@ impl<T: Real> LinkPrior<T> {
     /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> LinkPrior<U> {
-        let convert = |value: T| U::of(value.to_double());
+        let convert = |value: T| U::from_double(value.to_double());
         LinkPrior {
             body: RigidBody {
                 mass: convert(self.body.mass),
@@ -98,15 +98,15 @@ impl<T: Real> LinkPrior<T> {
 
     /// Ranges of the fourteen parameters for a segment of this length.
     fn ranges(&self, length: T) -> [Interval<T>; PARAMETERS_PER_JOINT] {
-        let share = (T::of(SHARE.0), T::of(SHARE.1));
+        let share = (T::from_double(SHARE.0), T::from_double(SHARE.1));
         let most = share.1;
         let mass = Interval::shares(self.body.mass, share);
-        let reach = T::of(0.5) * length;
+        let reach = T::from_double(0.5) * length;
         let centre: [_; 3] =
             core::array::from_fn(|axis| Interval::around(self.body.centre_of_mass[axis], reach));
         let inertia = &self.body.inertia;
         let largest = real::max(inertia.m11, real::max(inertia.m22, inertia.m33));
-        let product_reach = T::of(0.5) * most * largest;
+        let product_reach = T::from_double(0.5) * most * largest;
         let diagonal = |value: T, one: usize, other: usize| {
             Interval::shares(value, share).add(mass.times(centre[one].square().add(centre[other].square())))
         };
@@ -192,10 +192,10 @@ pub(super) fn segment_length<T: Real, const N: usize, const B: usize>(
     prior: &[LinkPrior<T>; N],
     joint: usize,
 ) -> T {
-    let suggested =
-        T::of(2.0) * real::sqrt(prior[joint].body.centre_of_mass.dot(&prior[joint].body.centre_of_mass));
+    let suggested = T::from_double(2.0)
+        * real::sqrt(prior[joint].body.centre_of_mass.dot(&prior[joint].body.centre_of_mass));
     let to_next = model.chain.distance_to(joint + 1).unwrap_or(T::zero());
-    real::max(to_next, real::max(suggested, T::of(SHORTEST_SEGMENT_M)))
+    real::max(to_next, real::max(suggested, T::from_double(SHORTEST_SEGMENT_M)))
 }
 
 /// Box from the measured torque: each bound is the torque's size over the column's, least of all joints.
@@ -207,14 +207,14 @@ pub(super) fn measured_box<T: Real, const N: usize, const B: usize>(
     for base in 0..model.base.rank() {
         let mut reach = None;
         for ((factor, size), &rows) in record.factors.iter().zip(&record.torque).zip(&record.rows) {
-            let rows = real::sqrt(T::of(f64::from(rows)));
+            let rows = real::sqrt(T::from_double(f64::from(rows)));
             let length = factor.column_length(base);
             if length > T::zero() {
                 let here = size.root_mean_square * rows / length;
                 reach = Some(reach.map_or(here, |least| real::min(least, here)));
             }
         }
-        bounds.high[base] = T::of(TORQUE_SHARE) * reach.unwrap_or(T::zero());
+        bounds.high[base] = T::from_double(TORQUE_SHARE) * reach.unwrap_or(T::zero());
         let never_negative =
             model.base.independent(base).is_some_and(|(_, parameter)| parameter.is_never_negative());
         bounds.low[base] = if never_negative { T::zero() } else { -bounds.high[base] };

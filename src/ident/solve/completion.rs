@@ -56,8 +56,8 @@ pub fn is_weak<T: Real, const N: usize, const B: usize>(
 ) -> bool {
     let Some(sigma) = estimate.sigma(base) else { return true };
     record.factors.iter().zip(&record.torque).zip(&record.rows).any(|((factor, size), &rows)| {
-        let rows = real::sqrt(T::of(f64::from(rows.max(1))));
-        sigma * factor.column_length(base) / rows > T::of(WEAK_SHARE) * size.root_mean_square
+        let rows = real::sqrt(T::from_double(f64::from(rows.max(1))));
+        sigma * factor.column_length(base) / rows > T::from_double(WEAK_SHARE) * size.root_mean_square
     })
 }
 
@@ -137,7 +137,7 @@ pub(super) fn prior_deviations<T: Real, const N: usize>(prior: &LegParameters<T,
         9 => 2,
         _ => 3,
     };
-    let mut largest = [T::of(1e-3); 4];
+    let mut largest = [T::from_double(1e-3); 4];
     for parameters in prior {
         for (index, &value) in parameters.iter().enumerate() {
             largest[kind(index)] = real::max(largest[kind(index)], real::abs(value));
@@ -146,7 +146,10 @@ pub(super) fn prior_deviations<T: Real, const N: usize>(prior: &LegParameters<T,
     let mut deviations = *prior;
     for parameters in &mut deviations {
         for (index, value) in parameters.iter_mut().enumerate() {
-            *value = real::max(T::of(0.5) * real::abs(*value), T::of(0.01) * largest[kind(index)]);
+            *value = real::max(
+                T::from_double(0.5) * real::abs(*value),
+                T::from_double(0.01) * largest[kind(index)],
+            );
         }
     }
     deviations

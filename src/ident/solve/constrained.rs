@@ -111,7 +111,7 @@ fn release_one<T: Real, const B: usize>(
         // Gain of moving this parameter alone: g^2 / |column|^2. Rounding stays below this share of the cost.
         let length = factor.column_length(index);
         let gain = if length > T::zero() { real::abs(downhill) / length } else { T::zero() };
-        let least = T::EPSILON * T::of(100.0) * (T::one() + real::sqrt(factor.excess(values)));
+        let least = T::EPSILON * T::from_double(100.0) * (T::one() + real::sqrt(factor.excess(values)));
         if inside && gain > least && best.is_none_or(|(_, most)| gain > most) {
             best = Some((index, gain));
         }

@@ -47,11 +47,12 @@ pub fn noise<T: Real, const N: usize, const B: usize>(record: &Record<T, N, B>) 
     core::array::from_fn(|joint| {
         let factor = &record.factors[joint];
         let fitted = (0..B).filter(|&column| factor.triangle()[column][column] != T::zero()).count();
-        let information = real::max(record.row_information, T::of(1e-3));
-        let free = T::of(f64::from(record.rows[joint])) - T::of(fitted as f64) / information;
+        let information = real::max(record.row_information, T::from_double(1e-3));
+        let free =
+            T::from_double(f64::from(record.rows[joint])) - T::from_double(fitted as f64) / information;
         let variance = factor.residual() / real::max(free, T::one()) / information;
-        let floor = T::of(SMALLEST_NOISE_SHARE) * record.torque[joint].root_mean_square;
-        real::max(real::sqrt(variance), real::max(floor, T::of(1e-9)))
+        let floor = T::from_double(SMALLEST_NOISE_SHARE) * record.torque[joint].root_mean_square;
+        real::max(real::sqrt(variance), real::max(floor, T::from_double(1e-9)))
     })
 }
 
@@ -75,7 +76,7 @@ impl<T: Real, const B: usize> Stage<T, B> {
         let all = source.restricted(columns.get(..count).unwrap_or(&[]), held, weight);
         let mut free = 0;
         for index in 0..count {
-            let share = T::of(DETERMINED_SHARE) * all.column_length(index);
+            let share = T::from_double(DETERMINED_SHARE) * all.column_length(index);
             if real::abs(all.triangle()[index][index]) > share {
                 columns[free] = columns[index];
                 free += 1;
@@ -138,7 +139,7 @@ const POWER_ITERATIONS: usize = 40;
 fn spectral_norm<T: Real, const B: usize>(matrix: &[[T; B]; B]) -> T {
     let mut vector = [T::one(); B];
     for (index, element) in vector.iter_mut().enumerate() {
-        *element += T::of(0.1) * T::of(index as f64);
+        *element += T::from_double(0.1) * T::from_double(index as f64);
     }
     let mut norm = T::zero();
     for _ in 0..POWER_ITERATIONS {
@@ -227,7 +228,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
                 }
             }
         }
-        real::sqrt(real::max(sum, T::zero()) / T::of(f64::from(rows.max(1))))
+        real::sqrt(real::max(sum, T::zero()) / T::from_double(f64::from(rows.max(1))))
     }
 }
 
@@ -345,21 +346,21 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
             }
         }
         let old = estimate.covariance;
-        for (place, &row) in stage.columns().iter().enumerate() {
+        for (number, &row) in stage.columns().iter().enumerate() {
             for base in 0..B {
-                let passed = (0..B).fold(T::zero(), |sum, held| sum + gain[place][held] * old[held][base]);
+                let passed = (0..B).fold(T::zero(), |sum, held| sum + gain[number][held] * old[held][base]);
                 estimate.covariance[row][base] = passed;
                 estimate.covariance[base][row] = passed;
             }
         }
-        for (place, &row) in stage.columns().iter().enumerate() {
+        for (number, &row) in stage.columns().iter().enumerate() {
             for (other, &column) in stage.columns().iter().enumerate() {
                 let own =
-                    (0..B).fold(T::zero(), |sum, inner| sum + inverse[place][inner] * inverse[other][inner]);
+                    (0..B).fold(T::zero(), |sum, inner| sum + inverse[number][inner] * inverse[other][inner]);
                 let mut passed = T::zero();
                 for (held, weights) in old.iter().enumerate() {
                     for (against, &covariance) in weights.iter().enumerate() {
-                        passed += gain[place][held] * covariance * gain[other][against];
+                        passed += gain[number][held] * covariance * gain[other][against];
                     }
                 }
                 estimate.covariance[row][column] = own + passed;

@@ -61,15 +61,15 @@ impl<T: Real> ConstantRatio<T> {
     /// chi-square, where correct runs have eight.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
-        let freedom = T::of(f64::from(self.freedom));
+        let freedom = T::from_double(f64::from(self.freedom));
         let spread = real::sqrt(freedom + freedom);
-        self.mismatch <= freedom + T::of(LARGEST_MISMATCH_SPREADS) * spread
+        self.mismatch <= freedom + T::from_double(LARGEST_MISMATCH_SPREADS) * spread
     }
 
     /// True if the mass is heavy enough to determine this joint's constant.
     #[must_use]
     pub fn is_determined(&self) -> bool {
-        self.ratio > T::zero() && self.sigma <= T::of(LARGEST_SIGMA_SHARE) * self.ratio
+        self.ratio > T::zero() && self.sigma <= T::from_double(LARGEST_SIGMA_SHARE) * self.ratio
     }
 }
 
@@ -97,13 +97,13 @@ pub fn torque_constant_ratio<T: Real, const N: usize, const B: usize>(
     let mut together = first.clone();
     together.merge(&second.with_right(T::one(), &scaled_load));
     let columns = (0..B).filter(|&column| together.triangle()[column][column] != T::zero()).count();
-    let information = real::max(without.row_information, T::of(1e-3));
+    let information = real::max(without.row_information, T::from_double(1e-3));
     let apart = first.residual() + second.residual();
     let rows = without.rows[joint].saturating_add(with.rows[joint]);
-    let free = T::of(f64::from(rows)) - T::of((2 * columns) as f64) / information;
-    let floor = T::of(1e-5) * without.torque[joint].root_mean_square;
+    let free = T::from_double(f64::from(rows)) - T::from_double((2 * columns) as f64) / information;
+    let floor = T::from_double(1e-5) * without.torque[joint].root_mean_square;
     let variance = apart / real::max(free, T::one()) / information;
-    let noise = real::max(real::sqrt(variance), real::max(floor, T::of(1e-9)));
+    let noise = real::max(real::sqrt(variance), real::max(floor, T::from_double(1e-9)));
     Some(ConstantRatio {
         ratio,
         sigma: noise / real::sqrt(both.load_squared),
@@ -172,7 +172,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
         for (joint, (factor, &ratio)) in record.factors.iter_mut().zip(ratios).enumerate() {
             *factor = factor.with_right(T::one() / ratio, load);
             let size = &mut record.torque[joint];
-            let rows = T::of(f64::from(self.rows[joint].max(1)));
+            let rows = T::from_double(f64::from(self.rows[joint].max(1)));
             let squared = factor.right().iter().fold(factor.residual(), |sum, &right| sum + right * right);
             let root_mean_square = real::sqrt(squared / rows);
             if size.root_mean_square > T::zero() {

@@ -8,7 +8,7 @@ use core::mem::MaybeUninit;
 
 use super::constrained::ParameterBox;
 use super::estimate::{Plan, Problem, Stage};
-use crate::place::{Slot, empty_slot, fill};
+use crate::in_place::{Slot, empty_slot, fill};
 use crate::real::{self, Real};
 use crate::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
 
@@ -74,7 +74,7 @@ pub struct SwarmSearch<T: Real, const B: usize> {
 impl<T: Real, const B: usize> SwarmSearch<T, B> {
     /// Builds a cold search in place. The first [`Self::advance`] scatters the
     /// beetles uniformly over the box.
-    pub fn place<'a, const N: usize>(
+    pub fn new_in<'a, const N: usize>(
         slot: &'a mut MaybeUninit<Self>,
         problem: &Problem<'_, T, N, B>,
         plan: Plan,
@@ -167,7 +167,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
 
     fn stage_ends(&mut self, iterations: u32) -> bool {
         let value = self.stage_excess().unwrap_or(T::LARGEST);
-        if value < self.watched_value - T::of(SMALLEST_GAIN) {
+        if value < self.watched_value - T::from_double(SMALLEST_GAIN) {
             (self.watched_value, self.watched_iteration) = (value, iterations);
         }
         iterations >= LARGEST_ITERATIONS || iterations >= self.watched_iteration + PATIENCE

@@ -69,8 +69,8 @@ pub fn step<T: Real, const N: usize, const B: usize>(
     let count = stage.columns().len();
     let (values, inverse) = (stage.factor().solve(count), stage.factor().inverse(count));
     let gain = |base: usize| {
-        let place = stage.columns().iter().position(|&column| column == base)?;
-        let (&value, row) = (values.get(place)?, inverse.get(place)?);
+        let index = stage.columns().iter().position(|&column| column == base)?;
+        let (&value, row) = (values.get(index)?, inverse.get(index)?);
         let variance = row.iter().fold(T::zero(), |sum, &element| sum + element * element);
         Some(value * value / variance)
     };
@@ -87,7 +87,7 @@ pub fn step<T: Real, const N: usize, const B: usize>(
     }
     match weakest {
         // A gain of NaN is left for the verdict.
-        Some((base, gain)) if gain < T::of(SMALLEST_GAIN) => record.selection.dropped[base] = true,
+        Some((base, gain)) if gain < T::from_double(SMALLEST_GAIN) => record.selection.dropped[base] = true,
         _ => record.selection.is_made = true,
     }
     record.selection.is_made

@@ -18,9 +18,9 @@ use crate::ident::record::motion_record::Record;
 use crate::ident::record::row_model::RowModel;
 use crate::ident::record::row_model::no_stribeck;
 use crate::ident::record::stretch::Stretches;
+use crate::in_place::{fill, made};
 use crate::model::friction::Stribeck;
 use crate::model::{LegParameters, Parameter};
-use crate::place::{fill, made};
 use crate::real::{self, Real};
 use crate::swarm::BsoSettings;
 
@@ -65,11 +65,11 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         prior: Option<&[LinkPrior<T>; N]>,
         swarm_seed: u64,
     ) -> Self {
-        made(|slot| Self::place(slot, model, record, plan, prior, swarm_seed))
+        made(|slot| Self::new_in(slot, model, record, plan, prior, swarm_seed))
     }
 
     /// Builds a solver in place, see [`Self::new`]: by value it would take a third of the device's stack.
-    pub fn place<'a>(
+    pub fn new_in<'a>(
         slot: &'a mut MaybeUninit<Self>,
         model: &RowModel<T, N, B>,
         mut record: Record<T, N, B>,
@@ -94,7 +94,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
             given: None,
             record: record.clone(),
         }, {
-            search: |search| SwarmSearch::place(
+            search: |search| SwarmSearch::new_in(
                 search, &problem, plan, &bounds, BsoSettings::default(), swarm_seed,
             ),
         })
@@ -323,7 +323,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         core::array::from_fn(|joint| {
             let size = self.record.torque[joint].root_mean_square;
             let error = self.record.torque_error(joint, &values).unwrap_or(size);
-            T::of(6.0) * error + T::of(0.05) * size
+            T::from_double(6.0) * error + T::from_double(0.05) * size
         })
     }
 

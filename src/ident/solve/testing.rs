@@ -27,7 +27,7 @@ pub fn model<T: Real>(choice: Choice, off: &[(usize, Parameter)]) -> Model<T> {
     let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
     let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
     let chain = Chain::<f64, 2>::new(&geometry).unwrap().convert();
-    let gravity = Vector3::new(T::of(9.81), T::zero(), T::zero());
+    let gravity = Vector3::new(T::from_double(9.81), T::zero(), T::zero());
     let mut mask: ColumnMask<2> = [[true; 14]; 2];
     off.iter().for_each(|(joint, parameter)| mask[*joint][parameter.index()] = false);
     let mut model = RowModel::new(chain, gravity, BaseParameters::analyse(&chain, &gravity, &mask).unwrap());
@@ -54,7 +54,7 @@ pub fn record_on<T: Real>(
 ) -> Record<T, 2, B> {
     let mut random = TestRandom::new(seed);
     let exact = self::model::<f64>(Choice::On, &[]);
-    let mut record = Recorder::<T, 2, B, 256, 26>::new(T::of(8.0)).unwrap().finish();
+    let mut record = Recorder::<T, 2, B, 256, 26>::new(T::from_double(8.0)).unwrap().finish();
     let mut squares = [0.0; 2];
     for _ in 0..STATES {
         let mut many = |bound: f64| core::array::from_fn(|_| random.within(bound));
@@ -63,17 +63,17 @@ pub fn record_on<T: Real>(
         let rows = regressor(&exact.chain, &state, &exact.gravity);
         for (joint, full) in rows.iter().enumerate() {
             let mut row = [T::zero(); B];
-            model.base.select(&full.map(|block| block.map(T::of)), &mut row);
+            model.base.select(&full.map(|block| block.map(T::from_double)), &mut row);
             // Twelve uniform numbers: variance 12 a^2 / 3.
             let noise: f64 = (0..12).map(|_| random.within(SIGMA / 2.0)).sum();
             let torque = crate::model::row_torque(full, leg) + noise;
-            record.factors[joint].insert(&row, T::of(torque));
+            record.factors[joint].insert(&row, T::from_double(torque));
             squares[joint] += torque * torque;
         }
     }
     for (joint, size) in record.torque.iter_mut().enumerate() {
         let mean = squares[joint] / f64::from(STATES);
-        (size.root_mean_square, size.speed) = (T::of(crate::real::sqrt(mean)), T::of(1.2));
+        (size.root_mean_square, size.speed) = (T::from_double(crate::real::sqrt(mean)), T::from_double(1.2));
     }
     (record.rows, record.row_information) = ([STATES; 2], T::one());
     record

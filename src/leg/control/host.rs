@@ -21,7 +21,7 @@ pub struct Host<'a, const N: usize> {
 
 impl<const N: usize> Control<N> {
     /// Follows the host's commands if the drive is enabled and no other activity runs.
-    pub(super) fn obey(&mut self, host: Option<&mut Host<'_, N>>) -> Option<Commanded<N>> {
+    pub(super) fn apply_commands(&mut self, host: Option<&mut Host<'_, N>>) -> Option<Commanded<N>> {
         let Host { following, commands, cancel, waits } = host?;
         let Some(commands) = *commands else {
             if self.activity.follows_host() {

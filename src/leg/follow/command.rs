@@ -49,7 +49,7 @@ impl Mode {
 
     /// Returns the mode with this number.
     #[must_use]
-    pub fn of(number: i8) -> Option<Self> {
+    pub fn from_number(number: i8) -> Option<Self> {
         Self::ALL.into_iter().find(|mode| *mode as i8 == number)
     }
 }

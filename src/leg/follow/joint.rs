@@ -419,9 +419,9 @@ impl Follower {
     fn track_position(&mut self, position: f32, tick: &Tick<'_>) -> bool {
         let Tick { command, measured, bounds, rates, range, .. } = tick;
         let target = self.bounded(position, range[0], range[1]);
-        let place = measured.position.0;
+        let actual = measured.position.0;
         // For a joint outside its range: the end of the range that it returns to.
-        let from = if measured.returns { clamp(place, bounds.range[0], bounds.range[1]) } else { place };
+        let from = if measured.returns { clamp(actual, bounds.range[0], bounds.range[1]) } else { actual };
         let is_far = abs(target - from) > command.following_window.0;
         self.waits |= tick.starts || measured.returns && is_far;
         if self.waits && is_far {
@@ -445,7 +445,7 @@ impl Follower {
         if self.gap != Course::at_rest(0.0) {
             self.gap.approach(0.0, rates, TICK_S);
         }
-        self.reach(abs(target - place) <= command.position_window.0, command.position_time);
+        self.reach(abs(target - actual) <= command.position_window.0, command.position_time);
         true
     }
 
@@ -464,8 +464,8 @@ impl Follower {
     fn conclude(&mut self, demand: Demand, tick: &Tick<'_>) -> Demand {
         let Tick { command, measured, bounds, .. } = tick;
         if measured.returns {
-            let ([low, high], place) = (bounds.range, measured.position.0);
-            self.course.keep_between(min(low, place), max(high, place));
+            let ([low, high], actual) = (bounds.range, measured.position.0);
+            self.course.keep_between(min(low, actual), max(high, actual));
         }
         Demand { course: self.course(), failed: self.deviated(command, measured), ..demand }
     }
@@ -508,10 +508,10 @@ impl Follower {
         let [stiffest, strongest] = bounds.impedance;
         let stiffness = self.bounded(target.stiffness, 0.0, stiffest);
         let damping = self.bounded(target.damping, DELAY_S * stiffness, strongest);
-        let place = measured.position.0 + DELAY_S * measured.velocity.0;
+        let predicted = measured.position.0 + DELAY_S * measured.velocity.0;
         let position = self.bounded(target.position.0, low, high);
         let velocity = self.bounded(target.velocity.0, -bounds.speed, bounds.speed);
-        let spring = stiffness * (position - place) + target.torque.0;
+        let spring = stiffness * (position - predicted) + target.torque.0;
         (spring, damping * (velocity - measured.velocity.0))
     }
 
@@ -592,11 +592,11 @@ impl Follower {
 
     /// Whether the following error has lasted too long.
     fn deviated(&mut self, command: &JointCommand, measured: &Measured) -> bool {
-        let place = match self.mode {
+        let expected = match self.mode {
             Some(Mode::CyclicPosition) if !measured.returns && !self.waits && !self.halted => self.target,
             _ => self.course().position(),
         };
-        let is_outside = abs(place - measured.position.0) > command.following_window.0;
+        let is_outside = abs(expected - measured.position.0) > command.following_window.0;
         self.outside = if is_outside { self.outside.saturating_add(1) } else { 0 };
         if self.mode != Some(Mode::Homing) {
             self.deviates = is_outside || self.waits;

@@ -92,9 +92,9 @@ impl<const N: usize> Following<N> {
     pub fn begin(&mut self, commands: &[JointCommand; N], motion: &MotionState<N>) {
         for joint in 0..N {
             let anatomy = &self.anatomy[joint];
-            let place = anatomy.angle_from_chain(motion.position_rad[joint]);
+            let angle = anatomy.angle_from_chain(motion.position_rad[joint]);
             let velocity = anatomy.from_chain(motion.velocity_rad_per_s[joint]);
-            self.joints[joint].start(&commands[joint], Course::moving(place, velocity));
+            self.joints[joint].start(&commands[joint], Course::moving(angle, velocity));
         }
     }
 

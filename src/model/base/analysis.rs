@@ -118,11 +118,11 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         }
 
         let tolerance = tolerance();
-        let shortest = largest * tolerance * T::of(ROUNDINGS);
+        let shortest = largest * tolerance * T::from_double(ROUNDINGS);
         let lengths = norms.map(|joint| joint.map(|norm| max(norm, shortest)));
         let mut independent = [(0, Parameter::XX); B];
-        let echelon = factor.reduce(tolerance, &lengths, |place, joint, parameter| {
-            if let Some(slot) = independent.get_mut(place) {
+        let echelon = factor.reduce(tolerance, &lengths, |index, joint, parameter| {
+            if let Some(slot) = independent.get_mut(index) {
                 *slot = (joint, parameter);
             }
         });
@@ -130,8 +130,8 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         if rank > B {
             return Err(BaseError::TooMany { rank });
         }
-        for (place, (joint, parameter)) in independent.iter().enumerate().take(rank).rev() {
-            factor.substitute(place, *joint, *parameter);
+        for (index, (joint, parameter)) in independent.iter().enumerate().take(rank).rev() {
+            factor.substitute(index, *joint, *parameter);
         }
 
         let mut base = Self {
@@ -145,13 +145,13 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
                 largest_dropped: echelon.largest_dropped,
             },
         };
-        for (place, (terms, row)) in base.terms.iter_mut().zip(factor.rows()).enumerate().take(rank) {
+        for (index, (terms, row)) in base.terms.iter_mut().zip(factor.rows()).enumerate().take(rank) {
             let columns = base.independent.get(..rank).unwrap_or_default();
             let own =
-                columns.get(place).map_or(T::zero(), |(joint, parameter)| entry(&norms, *joint, *parameter));
+                columns.get(index).map_or(T::zero(), |(joint, parameter)| entry(&norms, *joint, *parameter));
             *terms = cleaned(
                 row,
-                place,
+                index,
                 columns,
                 own,
                 &lengths.map(|joint| joint.map(|length| tolerance * length)),
@@ -263,7 +263,8 @@ fn collect<T: Real, const N: usize>(
     // From the middle of all integers, so that single precision suffices.
     let mut within = |bound: f64| {
         let number = random.next_u32() ^ (1 << 31);
-        T::of(f64::from(number.cast_signed())) * (T::of(bound) / T::of(2_147_483_648.0))
+        T::from_double(f64::from(number.cast_signed()))
+            * (T::from_double(bound) / T::from_double(2_147_483_648.0))
     };
     for _ in 0..STATES {
         let state = JointState {
@@ -288,7 +289,7 @@ fn collect<T: Real, const N: usize>(
 /// column; up to that column's entry in `least` it is rounding.
 fn cleaned<T: Real, const N: usize>(
     row: &RegressorRow<T, N>,
-    place: usize,
+    index: usize,
     independent: &[(usize, Parameter)],
     own: T,
     least: &LegParameters<T, N>,
@@ -301,7 +302,7 @@ fn cleaned<T: Real, const N: usize>(
     }
     for (other, (joint, parameter)) in independent.iter().enumerate() {
         if let Some(block) = terms.get_mut(*joint) {
-            block[parameter.index()] = if other == place { T::one() } else { T::zero() };
+            block[parameter.index()] = if other == index { T::one() } else { T::zero() };
         }
     }
     terms

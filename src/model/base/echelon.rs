@@ -121,9 +121,9 @@ impl<T: Real, const N: usize> Factor<T, N> {
 
     /// Back-substitution for one retained column: divides its row by the pivot and
     /// clears the column in earlier rows.
-    pub fn substitute(&mut self, place: usize, joint: usize, parameter: Parameter) {
+    pub fn substitute(&mut self, index: usize, joint: usize, parameter: Parameter) {
         let Some((pivot_row, before)) =
-            self.rows.as_flattened_mut().get_mut(..=place).and_then(<[RegressorRow<T, N>]>::split_last_mut)
+            self.rows.as_flattened_mut().get_mut(..=index).and_then(<[RegressorRow<T, N>]>::split_last_mut)
         else {
             return;
         };

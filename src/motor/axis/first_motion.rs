@@ -63,7 +63,7 @@ impl FirstMotion {
     }
 
     /// Runs one servo period with the back-EMF, the residual and the tolerance of the model watch, V.
-    pub(super) fn look(
+    pub(super) fn advance(
         &mut self,
         scale: &CountScale,
         counts: i32,
@@ -93,7 +93,7 @@ mod tests {
         (1..=400_u32).find(|period| {
             // To and fro: travel in either direction counts. The counts wrap.
             let way = 100 - (*period % 200).abs_diff(100);
-            motion.look(&scale, (i32::MAX - 400).wrapping_add(10 * way as i32), volts(*period));
+            motion.advance(&scale, (i32::MAX - 400).wrapping_add(10 * way as i32), volts(*period));
             !motion.is_limited()
         })
     }

@@ -59,7 +59,7 @@ impl IndexWatch {
 
     /// Records a pulse at a rotor position, in a period in which the counter moved by `step`.
     #[inline(always)]
-    pub(super) fn came(&mut self, position: i32, step: i32) {
+    pub(super) fn on_pulse(&mut self, position: i32, step: i32) {
         self.pulse = Some(Pulse { position, late: step.abs() / LATENCY });
     }
 
@@ -132,18 +132,18 @@ mod tests {
             let mut lost = false;
             while self.counts != end {
                 self.counts += (end - self.counts).clamp(-50, 50);
-                lost |= self.look();
+                lost |= self.check();
             }
             lost
         }
 
         /// One pulse at a position, in a period of so many counts.
         fn pulse(&mut self, position: i32, step: i32) -> bool {
-            self.watch.came(position, step);
-            self.look()
+            self.watch.on_pulse(position, step);
+            self.check()
         }
 
-        fn look(&mut self) -> bool {
+        fn check(&mut self) -> bool {
             self.watch.is_lost(self.counts, &self.scale, LONGEST)
         }
 
@@ -201,21 +201,21 @@ mod tests {
     fn a_rotor_that_stands_has_no_wrong_pulses() {
         let mut rotor = Turning::new();
         assert!(!rotor.turn(300));
-        for look in 0..40 {
+        for period in 0..40 {
             // The encoder may flicker between two counts.
-            rotor.counts = 300 + look % 2;
-            assert!(!rotor.look());
+            rotor.counts = 300 + period % 2;
+            assert!(!rotor.check());
         }
         assert!(!rotor.pulse(300, 0) && !rotor.is_suspicious());
         // A pulse at the suspect's position is ignored as well. Its own check is the last of 16, or of 15.
         let mut rotor = Turning::new();
-        for (looks, lost) in [(REST_SAMPLES - 1, false), (REST_SAMPLES - 2, true)] {
+        for (checks, lost) in [(REST_SAMPLES - 1, false), (REST_SAMPLES - 2, true)] {
             rotor = Turning::new();
             assert!(!rotor.turn(300) && !rotor.pulse(300, 0) && !rotor.turn(TURN));
-            assert!((0..looks).all(|_| !rotor.look()));
-            assert_eq!(rotor.pulse(300, 0), lost, "{looks}");
+            assert!((0..checks).all(|_| !rotor.check()));
+            assert_eq!(rotor.pulse(300, 0), lost, "{checks}");
         }
-        assert!((0..REST_SAMPLES).all(|_| !rotor.look()) && !rotor.pulse(300, 0));
+        assert!((0..REST_SAMPLES).all(|_| !rotor.check()) && !rotor.pulse(300, 0));
         // Two counts further the rotor turns again.
         rotor.counts += 2;
         assert!(rotor.pulse(300, 0));
@@ -238,7 +238,7 @@ mod tests {
         assert!(!rotor.turn(300) && !rotor.pulse(300, 0));
         rotor.counts -= 1_000_000;
         rotor.watch.shift(-1_000_000);
-        assert!(!rotor.look() && !rotor.watch.left, "it never left");
+        assert!(!rotor.check() && !rotor.watch.left, "it never left");
         assert!(!rotor.turn(TURN) && rotor.pulse(300, 0));
     }
 }

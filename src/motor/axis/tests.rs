@@ -125,7 +125,7 @@ fn the_voltage_is_turned_to_where_the_rotor_will_be_in_the_middle_of_its_period(
 }
 
 #[test]
-fn dead_time_given_back_leaves_less_of_the_sixth_harmonic() {
+fn dead_time_compensation_leaves_less_of_the_sixth_harmonic() {
     let ripple = |dead_time| {
         let mut bench = Bench::at(60.0, &AxisConfiguration { dead_time, ..CONFIGURATION });
         bench.motor.noise_codes = 0.0;

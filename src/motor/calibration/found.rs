@@ -20,7 +20,7 @@ pub struct EncoderSetting {
 impl EncoderSetting {
     /// Encoder setting of an axis.
     #[must_use]
-    pub const fn of(configuration: &AxisConfiguration) -> Self {
+    pub const fn new(configuration: &AxisConfiguration) -> Self {
         Self {
             counter: configuration.counter,
             pole_pairs: configuration.pole_pairs,

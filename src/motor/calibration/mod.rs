@@ -281,7 +281,7 @@ impl Calibrator {
             pole_pairs: configuration.pole_pairs,
             direction: configuration.counter,
             index: configuration.index,
-            encoder: EncoderSetting::of(configuration),
+            encoder: EncoderSetting::new(configuration),
             greatest_step: configuration.greatest_step()?,
             bus_codes: configuration.bus_codes(),
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
@@ -323,7 +323,7 @@ impl Calibrator {
         if !configuration.index && !configuration.absolute {
             return Err(AxisError::Encoder);
         }
-        if stored.encoder != EncoderSetting::of(configuration) {
+        if stored.encoder != EncoderSetting::new(configuration) {
             return Err(AxisError::Calibration);
         }
         Ok(Self { stored: Some(stored), may_stand: true, ..Self::new(configuration, settings)? })

@@ -151,7 +151,7 @@ struct Round {
 
 impl Round {
     /// Evaluates the motions of a round with this direct current. `difference_h` is L_d - L_q.
-    fn of(works: &[[Work; 2]; 2], bench: &Bench, direct: f32, difference_h: f32) -> Self {
+    fn new(works: &[[Work; 2]; 2], bench: &Bench, direct: f32, difference_h: f32) -> Self {
         let [plus, minus] = works.each_ref().map(|[forth, back]| [forth.motion(bench), back.motion(bench)]);
         let flux = [0.5 * (plus[0].linkage + minus[0].linkage), 0.5 * (plus[1].linkage + minus[1].linkage)];
         // A flux this wrong is refused at the end.
@@ -188,9 +188,9 @@ struct BothEnds {
 impl BothEnds {
     /// Evaluates two rounds `apart` electrical turns from each other. The path that is measured forwards lies
     /// `ahead` electrical turns of the one measured backwards.
-    fn of([begin, end]: [Round; 2], apart: f32, ahead: f32) -> Self {
+    fn new([begin, end]: [Round; 2], apart: f32, ahead: f32) -> Self {
         let growth = if abs(apart) < LEAST_APART { 0.0 } else { (end.load - begin.load) / apart };
-        let four = |[one, two]: [f32; 2], [three, four]: [f32; 2]| Repeated::of(&[one, two, three, four]);
+        let four = |[one, two]: [f32; 2], [three, four]: [f32; 2]| Repeated::new(&[one, two, three, four]);
         let mut friction = four(begin.friction, end.friction);
         friction.mean -= 0.5 * growth * ahead;
         let ways = end.one_way - begin.one_way;
@@ -214,7 +214,7 @@ enum Path {
 
 /// Position at the end of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Place {
+enum Waypoint {
     Low(Path),
     High(Path),
     /// Where the calibration began.
@@ -223,11 +223,11 @@ enum Place {
 
 /// One motion, or a ramp of the direct current at rest: position and direct current at its end. The current
 /// is a share of the holding current.
-type Action = (Place, f32);
+type Action = (Waypoint, f32);
 
 /// A round on a path: both ways with a positive direct current, both ways with a negative one, then without.
 const fn round(path: Path, share: f32) -> [Action; 7] {
-    let (low, high) = (Place::Low(path), Place::High(path));
+    let (low, high) = (Waypoint::Low(path), Waypoint::High(path));
     [(low, share), (high, share), (low, share), (low, -share), (high, -share), (low, -share), (low, 0.0)]
 }
 
@@ -323,7 +323,7 @@ impl Refine {
     /// The present action; `None` when the current falls at the end.
     fn action(&self) -> Option<Action> {
         if self.action == ROUNDS.len() * ACTIONS_PER_ROUND {
-            return Some((Place::Home, 0.0));
+            return Some((Waypoint::Home, 0.0));
         }
         ROUNDS.as_flattened().get(self.action).copied()
     }
@@ -333,17 +333,17 @@ impl Refine {
         min((APPROACH_TURNS + PATH_TURNS) * f32::from(bench.pole_pairs), abs(self.scan.path))
     }
 
-    /// Position of a place, electrical turns.
-    fn place(&self, bench: &Bench, place: Place) -> f32 {
+    /// Position of a waypoint, electrical turns.
+    fn position(&self, bench: &Bench, waypoint: Waypoint) -> f32 {
         let length = self.length(bench) * sign(self.scan.path);
         let begin = bench.electrical(self.scan.way);
         let end = begin + self.scan.path;
-        match place {
-            Place::Home => 0.0,
-            Place::Low(Path::First) => begin,
-            Place::High(Path::First) => begin + length,
-            Place::Low(Path::Last) => end - length,
-            Place::High(Path::Last) => end,
+        match waypoint {
+            Waypoint::Home => 0.0,
+            Waypoint::Low(Path::First) => begin,
+            Waypoint::High(Path::First) => begin + length,
+            Waypoint::Low(Path::Last) => end - length,
+            Waypoint::High(Path::Last) => end,
         }
     }
 
@@ -362,7 +362,7 @@ impl Refine {
         let seconds = self.ticks as f32 * TICK_S;
         self.ticks += 1;
         let (to, direct) = match self.action() {
-            Some((place, share)) => (self.place(bench, place), holding * share),
+            Some((waypoint, share)) => (self.position(bench, waypoint), holding * share),
             None => (self.from, 0.0),
         };
         let distance = to - self.from;
@@ -472,9 +472,9 @@ impl Refine {
         let Inductances { direct, quadrature, .. } = self.inductances(bench, seen);
         let found = if is_first {
             // This round's error is too large for a correction by saliency.
-            Round::of(&works, bench, holding * FIRST_SHARE, 0.0)
+            Round::new(&works, bench, holding * FIRST_SHARE, 0.0)
         } else {
-            Round::of(&works, bench, holding, direct.0 - quadrature.0)
+            Round::new(&works, bench, holding, direct.0 - quadrature.0)
         };
         let before = core::mem::replace(&mut self.round, found);
         let Round { error, load, .. } = found;
@@ -487,8 +487,8 @@ impl Refine {
         let mut correction = error;
         if is_last {
             // Centres of both paths, electrical turns apart.
-            let apart =
-                self.place(bench, Place::Low(Path::Last)) - self.place(bench, Place::Low(Path::First));
+            let apart = self.position(bench, Waypoint::Low(Path::Last))
+                - self.position(bench, Waypoint::Low(Path::First));
             if abs(error) > GREATEST_DRIFT + bench.encoder_error {
                 let stated = bench.scale.counts_per_turn() as f32;
                 let drift = error / apart;
@@ -496,7 +496,7 @@ impl Refine {
             }
             correction = 0.5 * error;
             let length = self.length(bench);
-            self.both_ends = BothEnds::of([before, found], apart, approach(length) - run_in(length));
+            self.both_ends = BothEnds::new([before, found], apart, approach(length) - run_in(length));
         }
         let correction = ElectricalAngle::from_turns(correction);
         self.offset = self.offset.minus(correction);
@@ -514,10 +514,10 @@ mod tests {
     fn the_load_s_growth_on_the_path_is_no_friction() {
         // 0.5 A per electrical turn over 4 turns; forwards the load is measured 0.6 turns further on.
         let at = |load: f32, friction: f32| Round { load, friction: [friction; 2], ..Round::default() };
-        let found = BothEnds::of([at(1.0, 2.15), at(3.0, 2.15)], 4.0, 0.6);
+        let found = BothEnds::new([at(1.0, 2.15), at(3.0, 2.15)], 4.0, 0.6);
         assert!((found.friction.mean - 2.0).abs() < 1e-6 && found.load == 2.0, "{found:?}");
         // Paths too close to each other show no growth.
-        let found = BothEnds::of([at(1.0, 2.15), at(3.0, 2.15)], 0.9, 0.6);
+        let found = BothEnds::new([at(1.0, 2.15), at(3.0, 2.15)], 0.9, 0.6);
         assert!((found.friction.mean - 2.15).abs() < 1e-6, "{found:?}");
     }
 
@@ -525,9 +525,9 @@ mod tests {
     fn the_offset_s_sigma_is_that_of_the_ends_and_directions() {
         let round = |error, one_way| Round { error, one_way, ..Round::default() };
         // A difference between the directions that both rounds share says nothing.
-        let found = BothEnds::of([round(0.3, 0.01), round(0.004, 0.01)], 4.0, 0.6);
+        let found = BothEnds::new([round(0.3, 0.01), round(0.004, 0.01)], 4.0, 0.6);
         assert!((found.offset_sigma - 0.004 / sqrt(8.0)).abs() < 1e-7, "{found:?}");
-        let found = BothEnds::of([round(0.3, 0.01), round(0.0, 0.014)], 4.0, 0.6);
+        let found = BothEnds::new([round(0.3, 0.01), round(0.0, 0.014)], 4.0, 0.6);
         assert!((found.offset_sigma - 0.004 / sqrt(8.0)).abs() < 1e-7, "{found:?}");
     }
 }

@@ -228,8 +228,8 @@ mod tests {
 
     #[test]
     fn the_numbers_count_from_one_in_the_order_of_the_list() {
-        for (place, refusal) in (1..).zip(Refusal::ALL) {
-            assert_eq!(refusal.number(), place, "{refusal:?}");
+        for (number, refusal) in (1..).zip(Refusal::ALL) {
+            assert_eq!(refusal.number(), number, "{refusal:?}");
         }
         assert_eq!(Refusal::PhaseOpen(Phase::C).detail(), 3);
         assert_eq!(Refusal::OtherMotor(MotorConstant::QuadratureInductance, UNKNOWN).detail(), 3);

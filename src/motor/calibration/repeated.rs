@@ -19,7 +19,7 @@ pub(super) struct Repeated {
 impl Repeated {
     /// Evaluates at least two measurements; one alone has a sigma of NaN.
     #[inline(never)]
-    pub(super) fn of(measurements: &[f32]) -> Self {
+    pub(super) fn new(measurements: &[f32]) -> Self {
         let count = measurements.len() as f32;
         let mean = measurements.iter().sum::<f32>() / count;
         let squares = measurements.iter().map(|each| (each - mean) * (each - mean)).sum::<f32>();
@@ -34,10 +34,10 @@ mod tests {
     #[test]
     fn sigma_is_that_of_the_mean() {
         // Deviations -2, -1, 0, 3: squares 14, over 4 * 3.
-        let found = Repeated::of(&[3.0, 4.0, 5.0, 8.0]);
+        let found = Repeated::new(&[3.0, 4.0, 5.0, 8.0]);
         assert_eq!(found.mean, 5.0);
         assert!((found.sigma * found.sigma - 14.0 / 12.0).abs() < 1e-6, "{found:?}");
         // Half of the difference of two.
-        assert_eq!(Repeated::of(&[1.0, 4.0]), Repeated { mean: 2.5, sigma: 1.5 });
+        assert_eq!(Repeated::new(&[1.0, 4.0]), Repeated { mean: 2.5, sigma: 1.5 });
     }
 }

@@ -249,7 +249,7 @@ impl ResistanceStage {
     }
 
     fn drop(&self) -> Result<VoltageDrop, Refusal> {
-        let Repeated { mean, sigma } = Repeated::of(&self.found);
+        let Repeated { mean, sigma } = Repeated::new(&self.found);
         if !(1e-3..=10.0).contains(&mean) {
             return Err(Refusal::MotorConstants);
         }

@@ -24,7 +24,7 @@ use crate::motor::{AxisConfiguration, CountScale};
 pub struct IndexSearch {
     counter: Option<u16>,
     /// A pulse has come.
-    came: bool,
+    has_pulse: bool,
     /// Counts since the newest pulse, in the counter's direction.
     since: i32,
     /// Counts from the pulse before to the newest one.
@@ -36,7 +36,7 @@ pub struct IndexSearch {
 impl IndexSearch {
     /// State before the first sample.
     pub const EMPTY: Self =
-        Self { counter: None, came: false, since: 0, distance: None, greatest_steps: [0; 2] };
+        Self { counter: None, has_pulse: false, since: 0, distance: None, greatest_steps: [0; 2] };
 
     /// Follows one PWM period. Returns whether an index pulse came.
     #[inline(never)]
@@ -49,7 +49,7 @@ impl IndexSearch {
         *greatest = (*greatest).max(step.unsigned_abs());
         if let Some(at) = sample.index_count {
             let late = i32::from(now.wrapping_sub(at).cast_signed());
-            self.came(self.since.wrapping_sub(late));
+            self.on_pulse(self.since.wrapping_sub(late));
         }
         sample.index_count.is_some()
     }
@@ -64,15 +64,15 @@ impl IndexSearch {
     /// Takes a pulse that came so many counts after the newest one.
     #[cold]
     #[inline(never)]
-    fn came(&mut self, distance: i32) {
-        if self.came && distance.unsigned_abs() <= INDEX_WIDTH.unsigned_abs() {
+    fn on_pulse(&mut self, distance: i32) {
+        if self.has_pulse && distance.unsigned_abs() <= INDEX_WIDTH.unsigned_abs() {
             return;
         }
         let [_, greatest] = self.greatest_steps;
         self.greatest_steps = [greatest, 0];
-        self.distance = self.came.then_some(distance);
+        self.distance = self.has_pulse.then_some(distance);
         self.since = self.since.wrapping_sub(distance);
-        self.came = true;
+        self.has_pulse = true;
     }
 
     /// Counter of the last sample and its distance from the index in the counter's direction, where the index

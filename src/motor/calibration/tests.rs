@@ -331,8 +331,8 @@ fn what_is_stored_is_found_again_by_the_index() {
 fn constants_that_are_not_the_stored_ones_are_another_motors_and_what_is_used_is_measured() {
     let first = calibrate(&mut TestMotor::default(), &CONFIGURATION).expect("sound");
     let stored = first.stored().expect("an index");
-    type Place = fn(&mut StoredCalibration) -> &mut f32;
-    let changes: [(f32, f32, MotorConstant, Place); 3] = [
+    type FieldOf = fn(&mut StoredCalibration) -> &mut f32;
+    let changes: [(f32, f32, MotorConstant, FieldOf); 3] = [
         (0.37, 0.43, MotorConstant::Resistance, |stored| &mut stored.resistance.0),
         // The two measurements are within 4 % of each other.
         (0.15, 0.25, MotorConstant::DirectInductance, |stored| &mut stored.direct_inductance.0),

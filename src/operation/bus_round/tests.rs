@@ -217,7 +217,7 @@ fn one_store_runs_at_a_time_and_its_result_is_reported() {
         let mut store = bench.storage.given().expect("a store");
         (store.done, store.generation) = (done, 5);
         drop(store);
-        bench.storage.give_back();
+        bench.storage.return_value();
     };
     let mut bench = Bench::new();
     bench.emergencies();

@@ -183,7 +183,7 @@ fn an_ordered_bandwidth_reaches_the_running_axis() {
     let before = *state.axis_mut().expect("running");
     let mut expected = before;
     expected.set_bandwidth(Hertz(600.0));
-    assert_eq!(state.obey(Order::Bandwidth(Hertz(600.0))), None);
+    assert_eq!(state.apply_order(Order::Bandwidth(Hertz(600.0))), None);
     assert_eq!(state.axis_mut(), Some(&mut expected));
     assert_ne!(before, expected);
 }

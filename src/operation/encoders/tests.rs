@@ -32,7 +32,7 @@ impl Rotor {
         (self.travel - self.lost) as u16
     }
 
-    fn look(&mut self) -> Finding {
+    fn check_once(&mut self) -> Finding {
         self.check.follow(&SETTINGS, self.counter());
         let angle = reading(f64::from(self.travel) + 0.5, f64::from(TURN));
         self.check.rotor(&SETTINGS, Some(angle), self.counter())
@@ -45,7 +45,7 @@ fn a_counter_that_follows_is_right_over_many_wraps_of_16_bits_and_turns() {
         let mut rotor = Rotor::new(3000);
         for _ in 0..5000 {
             rotor.travel += step;
-            assert_eq!(rotor.look(), Finding::Sound, "{step} {}", rotor.travel);
+            assert_eq!(rotor.check_once(), Finding::Sound, "{step} {}", rotor.travel);
         }
         let (counter, position) = rotor.check.position().expect("a reading");
         assert_eq!(counter, rotor.counter());
@@ -58,12 +58,12 @@ fn lost_counts_beyond_the_tolerance_contradict_twice() {
     // 4 + 4000 / 512 counts; a count is rounded.
     for (lost, found) in [(10, Finding::Sound), (13, Finding::Contradiction), (-13, Finding::Contradiction)] {
         let mut rotor = Rotor::new(100);
-        assert_eq!(rotor.look(), Finding::Sound);
+        assert_eq!(rotor.check_once(), Finding::Sound);
         rotor.lost = lost;
-        assert_eq!(rotor.look(), Finding::Sound, "once is noise");
-        assert_eq!(rotor.look(), found, "{lost}");
+        assert_eq!(rotor.check_once(), Finding::Sound, "once is noise");
+        assert_eq!(rotor.check_once(), found, "{lost}");
         rotor.lost = 0;
-        assert_eq!((rotor.look(), rotor.look()), (Finding::Sound, Finding::Sound));
+        assert_eq!((rotor.check_once(), rotor.check_once()), (Finding::Sound, Finding::Sound));
     }
 }
 
@@ -71,13 +71,13 @@ fn lost_counts_beyond_the_tolerance_contradict_twice() {
 fn a_frozen_counter_and_a_frozen_encoder_contradict_within_a_few_counts() {
     for is_counter in [true, false] {
         let mut rotor = Rotor::new(100);
-        assert_eq!(rotor.look(), Finding::Sound);
+        assert_eq!(rotor.check_once(), Finding::Sound);
         let frozen = reading(100.5, f64::from(TURN));
         let moved = (1..100).find(|moved| {
             rotor.travel = 100 + moved;
             if is_counter {
                 rotor.lost = *moved;
-                return rotor.look() == Finding::Contradiction;
+                return rotor.check_once() == Finding::Contradiction;
             }
             rotor.check.follow(&SETTINGS, rotor.counter());
             rotor.check.rotor(&SETTINGS, Some(frozen), rotor.counter()) == Finding::Contradiction
@@ -89,7 +89,7 @@ fn a_frozen_counter_and_a_frozen_encoder_contradict_within_a_few_counts() {
 #[test]
 fn motion_while_a_frame_is_read_is_no_contradiction() {
     let mut rotor = Rotor::new(100);
-    assert_eq!(rotor.look(), Finding::Sound);
+    assert_eq!(rotor.check_once(), Finding::Sound);
     for moved in [30, -30] {
         for share in [0.0, 0.5, 1.0] {
             rotor.check.follow(&SETTINGS, rotor.counter());
@@ -111,20 +111,20 @@ fn motion_while_a_frame_is_read_is_no_contradiction() {
 #[test]
 fn five_invalid_frames_in_a_row_are_silence_and_fewer_are_noise() {
     let mut rotor = Rotor::new(0);
-    assert_eq!(rotor.look(), Finding::Sound);
+    assert_eq!(rotor.check_once(), Finding::Sound);
     for invalid in [4, 5, 6] {
         let mut last = Finding::Sound;
         for _ in 0..invalid {
             last = rotor.check.rotor(&SETTINGS, None, rotor.counter());
         }
         assert_eq!(last == Finding::Silent, invalid >= 5, "{invalid}");
-        assert_eq!(rotor.look(), Finding::Sound);
+        assert_eq!(rotor.check_once(), Finding::Sound);
     }
     // An invalid frame between two contradictions neither counts nor ends them.
     rotor.lost = 100;
-    assert_eq!(rotor.look(), Finding::Sound);
+    assert_eq!(rotor.check_once(), Finding::Sound);
     assert_eq!(rotor.check.rotor(&SETTINGS, None, rotor.counter()), Finding::Sound);
-    assert_eq!(rotor.look(), Finding::Contradiction);
+    assert_eq!(rotor.check_once(), Finding::Contradiction);
 }
 
 /// A joint at an angle in degrees, with its rotor and an encoder that errs by some degrees.
@@ -189,7 +189,7 @@ fn a_zero_holds_for_its_direction_and_ratio_only() {
         with(Direction::Up, 6.0),
         with(Direction::Up, 100.0),
     ];
-    for (place, one) in all.iter().enumerate() {
-        assert!(all[..place].iter().all(|other| other != one), "{all:?}");
+    for (index, one) in all.iter().enumerate() {
+        assert!(all[..index].iter().all(|other| other != one), "{all:?}");
     }
 }

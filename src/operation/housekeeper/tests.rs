@@ -251,7 +251,7 @@ fn an_erased_or_foreign_calibration_is_not_used() {
 }
 
 fn carried_out_by(stage: &mut AxisState, motor: &mut TestMotor, order: Order) -> Outcome {
-    stage.obey(order);
+    stage.apply_order(order);
     let mut sample = motor.sample();
     for _ in 0..720_000 {
         let mut event = None;
@@ -293,7 +293,7 @@ fn after_an_erasure_a_reference_has_to_be_taken_again() {
     for _ in 0..6 {
         orders.extend(bench.hold(false, false));
     }
-    assert_eq!(orders, [(0, Order::Place(0)), (1, Order::Place(0))]);
+    assert_eq!(orders, [(0, Order::SetCounts(0)), (1, Order::SetCounts(0))]);
     assert!(bench.signals.has_begun());
 }
 
@@ -315,7 +315,7 @@ fn a_reset_releases_braking_motors_until_gates_are_configured() {
         // The drivers' supply is off, and a current tick would turn the outputs off as well.
         assert!(!bench.hardware.is_enabled());
         while bench.orders.is_empty() {
-            assert_eq!(Bridges::of(bench.signals.inhibit.causes()), Bridges::Off);
+            assert_eq!(Bridges::from_causes(bench.signals.inhibit.causes()), Bridges::Off);
             bench.round();
         }
         assert_eq!(bench.hardware.gates_switched, [false, true]);

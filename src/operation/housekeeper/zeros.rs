@@ -9,7 +9,7 @@ use super::super::axis_state::Order;
 use super::super::contacts::{OperatorRequest, RATE_HZ};
 use super::super::encoders::{EncoderCheck, EncoderSettings, Finding};
 use super::{Calibration, Housekeeper, Level};
-use crate::hal::{EncoderPlace, Hardware, JointSample};
+use crate::hal::{AbsoluteEncoderSide, Hardware, JointSample};
 use crate::leg::StoredCalibration;
 use crate::motor::absolute::within_half_a_turn;
 use crate::motor::reference::{ReferenceStep, StatedPose};
@@ -41,21 +41,21 @@ impl<const N: usize> Reference<N> {
 /// Reading of an absolute encoder.
 fn reading<const N: usize>(
     axis: usize,
-    place: EncoderPlace,
+    side: AbsoluteEncoderSide,
     level: &mut Level<'_, '_, N, impl Hardware<N>>,
 ) -> Option<AbsoluteAngle> {
-    AbsoluteAngle::of_frame(level.hardware.encoder_frame(axis, place))
+    AbsoluteAngle::from_frame(level.hardware.encoder_frame(axis, side))
 }
 
 /// Two readings of an absolute encoder that agree to two steps, of three attempts: one frame may be
 /// disturbed.
 fn steady_reading<const N: usize>(
     axis: usize,
-    place: EncoderPlace,
+    side: AbsoluteEncoderSide,
     level: &mut Level<'_, '_, N, impl Hardware<N>>,
 ) -> Option<AbsoluteAngle> {
     (0..3).find_map(|_| {
-        let (first, second) = (reading(axis, place, level)?, reading(axis, place, level)?);
+        let (first, second) = (reading(axis, side, level)?, reading(axis, side, level)?);
         let apart = i32::from(first.steps()) - i32::from(second.steps());
         (within_half_a_turn(apart, AbsoluteAngle::STEPS).abs() <= 2).then_some(second)
     })
@@ -85,14 +85,14 @@ impl<const N: usize> Housekeeper<N> {
     pub(super) fn check_encoders(&mut self, axis: usize, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         let Some(encoders) = self.settings.encoders.get(axis).copied() else { return };
         if encoders.absolute.rotor {
-            let reading = reading(axis, EncoderPlace::Rotor, level);
+            let reading = reading(axis, AbsoluteEncoderSide::Rotor, level);
             let after = level.hardware.encoder_count(axis);
             let check = |check: &mut EncoderCheck| check.rotor(&encoders, reading, after);
             let finding = self.checks.get_mut(axis).map_or(Finding::Sound, check);
             self.react(axis, finding, "absolute_encoder", level);
         }
         if encoders.absolute.joint.is_some() {
-            let reading = reading(axis, EncoderPlace::Joint, level);
+            let reading = reading(axis, AbsoluteEncoderSide::Joint, level);
             let counts = counts(axis, level);
             let zero = self.joint_zeros.get(axis).and_then(Option::as_ref);
             let zero = zero.filter(|_| level.signals.has_begun());
@@ -188,12 +188,12 @@ impl<const N: usize> Housekeeper<N> {
             // The encoders need no decision of the operator, so they wait for a leg at rest.
             (false, true) => return,
             (true, true) => {
-                let placed = self.place_by_encoders(level);
+                let agrees = self.set_zeros_by_encoders(level);
                 self.reference = None;
-                let Some(placed) = placed else { return };
-                placed
+                let Some(agrees) = agrees else { return };
+                agrees
             }
-            (true, false) => self.place_at_zero(level),
+            (true, false) => self.set_zeros_at_pose(level),
             (false, false) => false,
         };
         self.reference = None;
@@ -211,13 +211,13 @@ impl<const N: usize> Housekeeper<N> {
         level: &mut Level<'_, '_, N, impl Hardware<N>>,
     ) -> Option<Option<AbsoluteAngle>> {
         match self.settings.encoders.get(axis)?.absolute.joint {
-            Some(_) => steady_reading(axis, EncoderPlace::Joint, level).map(Some),
+            Some(_) => steady_reading(axis, AbsoluteEncoderSide::Joint, level).map(Some),
             None => Some(None),
         }
     }
 
     /// Takes the joints' pose as zero, and keeps the readings of their encoders. Returns whether all answer.
-    fn place_at_zero(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
+    fn set_zeros_at_pose(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
         let readings: [_; N] = core::array::from_fn(|axis| self.joint_reading(axis, level));
         let all = readings.iter().all(Option::is_some);
         for (axis, reading) in readings.into_iter().enumerate().filter(|_| all) {
@@ -234,11 +234,11 @@ impl<const N: usize> Housekeeper<N> {
         reading: Option<AbsoluteAngle>,
         level: &mut Level<'_, '_, N, impl Hardware<N>>,
     ) {
-        let rotor = self.place(axis, 0, level);
+        let rotor = self.set_counts(axis, 0, level);
         let setting = self.settings.encoders.get(axis).map_or(0, EncoderSettings::joint_setting);
         let zero = reading.map(|joint| JointZero { rotor, joint, setting });
-        if let Some(place) = self.joint_zeros.get_mut(axis) {
-            *place = zero;
+        if let Some(slot) = self.joint_zeros.get_mut(axis) {
+            *slot = zero;
         }
         if zero.is_some()
             && let Some(passed) = self.passed.get(axis).copied().flatten()
@@ -263,34 +263,34 @@ impl<const N: usize> Housekeeper<N> {
 
     /// Sets the zeros by the joints' encoders. Returns whether all agree with the rotors' positions;
     /// otherwise the operator has to state the pose. `None` where an encoder does not answer now.
-    fn place_by_encoders(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> Option<bool> {
+    fn set_zeros_by_encoders(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> Option<bool> {
         let readings: [_; N] = core::array::from_fn(|axis| self.joint_reading(axis, level));
         if readings.contains(&None) {
             return None;
         }
         let mut readings = readings.into_iter();
-        let places: [_; N] = core::array::from_fn(|axis| {
+        let wanted: [_; N] = core::array::from_fn(|axis| {
             self.counts_from_zero(axis, readings.next().flatten().flatten(), level)
         });
-        if places.contains(&None) {
+        if wanted.contains(&None) {
             self.joint_zeros = [None; N];
             return Some(false);
         }
-        for (axis, counts) in places.into_iter().enumerate() {
-            self.place(axis, counts.unwrap_or_default(), level);
+        for (axis, counts) in wanted.into_iter().enumerate() {
+            self.set_counts(axis, counts.unwrap_or_default(), level);
         }
         Some(true)
     }
 
     /// Sets a joint's present count; returns the rotor's position in the joint's sense.
     #[inline(never)]
-    fn place(&mut self, axis: usize, to: i32, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> i32 {
+    fn set_counts(&mut self, axis: usize, to: i32, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> i32 {
         self.placed = true;
         let Some(origin) = self.origins.get_mut(axis) else { return 0 };
         let rotor = origin.wrapping_add(counts(axis, level));
         *origin = rotor.wrapping_sub(to);
         // There is space: checked before.
-        level.order(axis, Order::Place(to));
+        level.order(axis, Order::SetCounts(to));
         rotor
     }
 }

@@ -46,8 +46,8 @@ impl Bench {
         done
     }
 
-    fn look_after(&mut self, storing: &mut Storing) {
-        storing.look_after(&self.inhibit, &mut self.hardware);
+    fn supervise(&mut self, storing: &mut Storing) {
+        storing.supervise(&self.inhibit, &mut self.hardware);
     }
 
     fn pass(&mut self) {
@@ -87,7 +87,7 @@ fn change_with(storing: &mut Storing, bench: &mut Bench, says: bool) -> (bool, u
 /// State in which the watchdog has taken its usual period at the start.
 fn settled() -> Storing {
     let mut storing = Storing::new();
-    Bench::off().look_after(&mut storing);
+    Bench::off().supervise(&mut storing);
     storing
 }
 
@@ -96,14 +96,14 @@ fn a_watchdog_with_the_starts_period_keeps_the_drive_off() {
     let (mut storing, mut bench) = (Storing::new(), Bench::with_watchdog(None));
     bench.hardware.watchdog.stretched = true;
     for _ in 0..3 {
-        bench.look_after(&mut storing);
+        bench.supervise(&mut storing);
         assert_eq!(bench.causes(), InhibitReason::Watchdog.bit());
         // The operator's reset.
         bench.inhibit = Inhibit::new();
         assert_eq!(change(&mut storing, &mut bench), (false, 0));
     }
     bench.hardware.watchdog = TestWatchdog { takes_ms: Some(3), ..TestWatchdog::default() };
-    bench.look_after(&mut storing);
+    bench.supervise(&mut storing);
     assert_eq!((bench.causes(), change(&mut storing, &mut bench)), (0, (true, 1)));
 }
 
@@ -190,12 +190,12 @@ fn a_watchdog_that_keeps_its_period_prevents_the_write() {
     // The watchdog's period is unknown: the drive stays off until it is known.
     assert_eq!(bench.causes(), InhibitReason::Watchdog.bit());
     bench.inhibit = Inhibit::new();
-    bench.look_after(&mut storing);
+    bench.supervise(&mut storing);
     assert_eq!(bench.causes(), InhibitReason::Watchdog.bit());
     bench.inhibit = Inhibit::new();
     assert_eq!(change(&mut storing, &mut bench), (false, 0));
     bench.hardware.watchdog = TestWatchdog { takes_ms: Some(3), ..TestWatchdog::default() };
-    bench.look_after(&mut storing);
+    bench.supervise(&mut storing);
     assert_eq!((bench.causes(), storing), (0, settled()));
     assert_eq!(change(&mut storing, &mut bench), (true, 1));
 }
@@ -212,10 +212,10 @@ fn the_drive_stays_off_until_the_watchdog_is_tight_again() {
     let mut stuck = Bench::with_watchdog(None);
     stuck.hardware.watchdog.stretched = true;
     let mut storing = Storing::new();
-    stuck.look_after(&mut storing);
+    stuck.supervise(&mut storing);
     assert_eq!(stuck.causes(), InhibitReason::Watchdog.bit());
     stuck.hardware.watchdog.pass(u64::MAX);
-    stuck.look_after(&mut storing);
+    stuck.supervise(&mut storing);
     assert_eq!(storing, settled());
 }
 

@@ -125,9 +125,9 @@ impl Bench {
 }
 
 fn image(length: usize) -> Vec<u8> {
-    let mut image: Vec<u8> = (0..length).map(|place| ((place * 13) >> 3) as u8).collect();
-    for (place, word) in Header::UNSEALED.into_iter().enumerate() {
-        image[HEADER_AT as usize + 4 * place..][..4].copy_from_slice(&word.to_le_bytes());
+    let mut image: Vec<u8> = (0..length).map(|index| ((index * 13) >> 3) as u8).collect();
+    for (index, word) in Header::UNSEALED.into_iter().enumerate() {
+        image[HEADER_AT as usize + 4 * index..][..4].copy_from_slice(&word.to_le_bytes());
     }
     seal(&mut image).expect("an image");
     image

@@ -77,8 +77,8 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
             frame: Frame::new(dimension),
             metric: Metric::identity(dimension),
             gradient: None,
-            whisker: T::of(FIRST_WHISKER),
-            trust: T::of(FIRST_TRUST),
+            whisker: T::from_double(FIRST_WHISKER),
+            trust: T::from_double(FIRST_TRUST),
             convex_share: None,
             leap: Leap::none(),
             round: 0,
@@ -100,8 +100,8 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     pub(super) fn forget(&mut self) {
         self.metric.forget();
         self.gradient = None;
-        self.whisker = T::of(FIRST_WHISKER);
-        self.trust = T::of(FIRST_TRUST);
+        self.whisker = T::from_double(FIRST_WHISKER);
+        self.trust = T::from_double(FIRST_TRUST);
         self.convex_share = None;
         self.round = 0;
         self.progress = T::LARGEST;
@@ -151,7 +151,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         if !self.has(Part::TrustAdaptation) || self.leap.under_way {
             return T::one();
         }
-        let levels = T::of(TRUST_LEVELS);
+        let levels = T::from_double(TRUST_LEVELS);
         let trust = if self.trusts_more(beetle) { self.trust * levels } else { self.trust / levels };
         min(trust, T::one())
     }
@@ -191,7 +191,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
             beetles.sort();
         }
         let best = beetles.personal_best_value[beetles.leader().min(N - 1)];
-        if self.progress - best > T::of(PROGRESS) * abs(best) {
+        if self.progress - best > T::from_double(PROGRESS) * abs(best) {
             self.progress = best;
             self.waited = 0;
         } else {
@@ -255,9 +255,9 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         add_scaled(position, T::one() - share, live(&psi, dimension));
         for entry in position {
             if self.leap.under_way {
-                *entry += T::of(LEAP_SPREAD) * random.signed::<T>();
+                *entry += T::from_double(LEAP_SPREAD) * random.signed::<T>();
             }
-            *entry = clamp(*entry, T::of(-MARGIN), T::of(1.0 + MARGIN));
+            *entry = clamp(*entry, T::from_double(-MARGIN), T::from_double(1.0 + MARGIN));
         }
     }
 

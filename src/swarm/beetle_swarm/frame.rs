@@ -176,7 +176,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     /// where too little remains.
     fn complement(&self, index: usize, mut candidate: [T; D]) -> Option<[T; D]> {
         let rest = live_mut(&mut candidate, self.dimension);
-        if !normalise(rest, T::of(LEAST_LENGTH)) {
+        if !normalise(rest, T::from_double(LEAST_LENGTH)) {
             return None;
         }
         for earlier in self.direction.iter().take(index) {
@@ -184,7 +184,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
             let along = dot(rest, earlier);
             add_scaled(rest, -along, earlier);
         }
-        normalise(rest, T::of(LEAST_REMAINDER)).then_some(candidate)
+        normalise(rest, T::from_double(LEAST_REMAINDER)).then_some(candidate)
     }
 
     /// Fits the parabola of direction `index` through the values at the beetle and at its whiskers.
@@ -212,7 +212,8 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
             slope,
             curvature,
             step: clamp(step, -longest, longest),
-            convex: curvature > -T::of(CURVATURE_ROUNDING) * abs(centre) / square || curvature > T::zero(),
+            convex: curvature > -T::from_double(CURVATURE_ROUNDING) * abs(centre) / square
+                || curvature > T::zero(),
         });
     }
 }

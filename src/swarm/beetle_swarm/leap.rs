@@ -52,13 +52,13 @@ impl<T: Real> Leap<T> {
 
 /// Whisker length of a leap, box coordinates.
 pub(super) fn leap_whisker<T: Real>(random: &mut Random) -> T {
-    T::of(LEAP_WHISKER) + T::of(LEAP_WHISKER_RANGE) * random.uniform()
+    T::from_double(LEAP_WHISKER) + T::from_double(LEAP_WHISKER_RANGE) * random.uniform()
 }
 
 impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     /// Decides at a standstill with this best value: true for a leap. Otherwise the leap state is reset.
     pub(super) fn leaps_from(&mut self, best: T) -> bool {
-        let led_somewhere = self.leap.best - best > T::of(LEAP_PROGRESS) * abs(best);
+        let led_somewhere = self.leap.best - best > T::from_double(LEAP_PROGRESS) * abs(best);
         self.leap.in_vain = if led_somewhere { 0 } else { self.leap.in_vain + 1 };
         self.leap.best = min(best, self.leap.best);
         self.leap.under_way = self.leap.in_vain <= self.settings.leaps && self.settings.leaps > 0;

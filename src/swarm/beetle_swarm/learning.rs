@@ -49,14 +49,14 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
             let (more, less) =
                 if self.trusts_more(0) { (even_gain, odd_gain) } else { (odd_gain, even_gain) };
             if more > less {
-                vote += T::of(TRUST_CHANGE);
+                vote += T::from_double(TRUST_CHANGE);
             } else if more < less {
-                vote -= T::of(TRUST_CHANGE);
+                vote -= T::from_double(TRUST_CHANGE);
             }
         }
         let trust =
             if vote > T::zero() { self.trust * (T::one() + vote) } else { self.trust / (T::one() - vote) };
-        self.trust = clamp(trust, T::of(LEAST_TRUST), T::one());
+        self.trust = clamp(trust, T::from_double(LEAST_TRUST), T::one());
     }
 
     /// Computes the gradient in box coordinates from the slopes along the frame: A^-T sum_j g_j z_j.
@@ -94,7 +94,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         };
         self.convex_share = Some(share);
         let gate = if self.has(Part::ConvexityGate) {
-            (share - T::of(CONVEX_SHARE)) / T::of(1.0 - CONVEX_SHARE)
+            (share - T::from_double(CONVEX_SHARE)) / T::from_double(1.0 - CONVEX_SHARE)
         } else {
             T::one()
         };
@@ -102,9 +102,13 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
             return;
         }
         let mean_curvature = curvature / number(curved);
-        let rate = T::of(METRIC_RATE) * gate;
+        let rate = T::from_double(METRIC_RATE) * gate;
         let stretch = |curvature: T| {
-            let relative = clamp(curvature / mean_curvature, T::of(LEAST_CURVATURE), T::of(MOST_CURVATURE));
+            let relative = clamp(
+                curvature / mean_curvature,
+                T::from_double(LEAST_CURVATURE),
+                T::from_double(MOST_CURVATURE),
+            );
             T::one() + rate * (T::one() / sqrt(relative) - T::one())
         };
         let mean = readings().fold(T::zero(), |sum, reading| sum + stretch(reading.curvature)) / number(read);
@@ -115,7 +119,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         {
             let Some(reading) = whisker.reading else { continue };
             let factor = stretch(reading.curvature) / mean;
-            if factor <= T::one() || factor * whisker.box_length <= T::of(LONGEST_AXIS) {
+            if factor <= T::one() || factor * whisker.box_length <= T::from_double(LONGEST_AXIS) {
                 self.metric.stretch(direction, displacement, covector, factor);
             }
         }
@@ -124,8 +128,11 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     /// Moves the usual whisker length towards the usual step.
     pub(super) fn learn_whisker(&mut self, dimension: usize) {
         if !self.has(Part::WhiskerAdaptation) {
-            self.whisker =
-                clamp(T::of(WHISKER_DECAY) * self.whisker, T::of(SHORTEST_WHISKER), T::of(LONGEST_WHISKER));
+            self.whisker = clamp(
+                T::from_double(WHISKER_DECAY) * self.whisker,
+                T::from_double(SHORTEST_WHISKER),
+                T::from_double(LONGEST_WHISKER),
+            );
             return;
         }
         let mut steps = [T::zero(); N];
@@ -142,10 +149,10 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         let median = median(live_mut(&mut steps, read));
         let root = sqrt(nalgebra::convert::<f32, T>(dimension as f32));
         let length = smoothed(self.whisker, root * median);
-        self.whisker = clamp(length, T::of(SHORTEST_WHISKER), T::of(LONGEST_WHISKER));
+        self.whisker = clamp(length, T::from_double(SHORTEST_WHISKER), T::from_double(LONGEST_WHISKER));
     }
 }
 
 fn smoothed<T: Real>(before: T, now: T) -> T {
-    T::of(1.0 - SMOOTHING) * before + T::of(SMOOTHING) * now
+    T::from_double(1.0 - SMOOTHING) * before + T::from_double(SMOOTHING) * now
 }

@@ -5,7 +5,7 @@
 //! be sliced or cancelled anywhere, even inside an iteration:
 //!
 //! ```text
-//! Place 0..N --> [ Right 0, Left 0, Right 1, Left 1, ... --> Move 0, 1, ... ] --> next round
+//! Initial 0..N --> [ Right 0, Left 0, Right 1, Left 1, ... --> Move 0, 1, ... ] --> next round
 //!     ^                                                                         |
 //!     +------------------- leaps failed: scatter once more ---------------------+
 //! ```
@@ -164,7 +164,7 @@ impl<T: Real, const N: usize, const D: usize> Search<T> for Bso<T, N, D> {
 /// Next evaluation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage<T> {
-    Place { beetle: usize },
+    Initial { beetle: usize },
     Right { beetle: usize },
     Left { beetle: usize, right: T },
     Move { beetle: usize },
@@ -186,7 +186,7 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
         let mut random = Random::new(seed);
         let mut beetles = Particles::new(progress.dimension());
         beetles.scatter(&mut random);
-        Self { progress, random, beetles, found: [T::zero(); N], stage: Stage::Place { beetle: 0 } }
+        Self { progress, random, beetles, found: [T::zero(); N], stage: Stage::Initial { beetle: 0 } }
     }
 
     fn restart(&mut self, progress: SearchProgress<T, D>, seed: u64) {
@@ -195,7 +195,7 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
         self.beetles.scatter(&mut self.random);
         self.progress = progress;
         self.found = [T::zero(); N];
-        self.stage = Stage::Place { beetle: 0 };
+        self.stage = Stage::Initial { beetle: 0 };
     }
 
     fn advance(&mut self, rules: &mut impl Rules<T, N, D>, objective: &impl Objective<T>, evaluations: u32) {
@@ -207,11 +207,11 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
     /// Makes one evaluation and all its consequences.
     fn step(&mut self, rules: &mut impl Rules<T, N, D>, objective: &impl Objective<T>) {
         self.stage = match self.stage {
-            Stage::Place { beetle } => {
+            Stage::Initial { beetle } => {
                 let beetle = beetle.min(N - 1);
                 let value = self.progress.evaluate(objective, &self.beetles.position[beetle]);
                 self.beetles.record(beetle, value);
-                if beetle + 1 < N { Stage::Place { beetle: beetle + 1 } } else { self.open(rules) }
+                if beetle + 1 < N { Stage::Initial { beetle: beetle + 1 } } else { self.open(rules) }
             }
             Stage::Right { beetle } => {
                 rules.aim(beetle, &self.beetles, &mut self.random);
@@ -252,7 +252,7 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
             Opening::Search => Stage::Right { beetle: 0 },
             Opening::Scatter => {
                 self.beetles.scatter(&mut self.random);
-                Stage::Place { beetle: 0 }
+                Stage::Initial { beetle: 0 }
             }
         }
     }

@@ -92,12 +92,12 @@ pub enum Part {
 impl<T: Real> Default for AdaptiveSettings<T> {
     fn default() -> Self {
         Self {
-            inertia_weight: T::of(0.8),
-            individual_learning: T::of(1.4),
-            global_learning: T::of(1.4),
-            velocity_limit: T::of(0.2),
-            velocity_share: T::of(0.2),
-            step_limit: T::of(0.5),
+            inertia_weight: T::from_double(0.8),
+            individual_learning: T::from_double(1.4),
+            global_learning: T::from_double(1.4),
+            velocity_limit: T::from_double(0.2),
+            velocity_share: T::from_double(0.2),
+            step_limit: T::from_double(0.5),
             pair_directions: 12,
             patience: 8,
             leaps: 8,
@@ -145,15 +145,15 @@ pub struct PaperSettings<T> {
 impl<T: Real> Default for PaperSettings<T> {
     fn default() -> Self {
         Self {
-            inertia_weight: InertiaWeight::constant(T::of(0.8)),
-            individual_learning: T::of(1.4),
-            global_learning: T::of(1.4),
-            velocity_limit: T::of(0.2),
-            velocity_share: T::of(0.4),
+            inertia_weight: InertiaWeight::constant(T::from_double(0.8)),
+            individual_learning: T::from_double(1.4),
+            global_learning: T::from_double(1.4),
+            velocity_limit: T::from_double(0.2),
+            velocity_share: T::from_double(0.4),
             first_step: T::one(),
-            step_decay: T::of(0.95),
-            step_offset: T::of(0.005),
-            step_per_whisker: T::of(10.0),
+            step_decay: T::from_double(0.95),
+            step_offset: T::from_double(0.005),
+            step_per_whisker: T::from_double(10.0),
         }
     }
 }

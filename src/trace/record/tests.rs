@@ -8,7 +8,7 @@ struct Text {
 }
 
 impl Text {
-    fn of(record: &Record<2>, number: u32) -> Self {
+    fn new(record: &Record<2>, number: u32) -> Self {
         let mut text = Self { bytes: [0; 512], length: 0 };
         record.write(number, &mut text).expect("512 characters are enough");
         text
@@ -43,12 +43,12 @@ fn every_kind_has_one_format_and_any_values_in_it_are_a_line() {
 #[test]
 fn what_is_written_is_read_back_bit_for_bit() {
     for value in [0.1_f32, -1.0 / 3.0, 1e-30, 3.4e38, f32::MIN_POSITIVE, 0.0, 12_345_679.0] {
-        let text = Text::of(&Record::Covariance { row: 3, column: 2, value }, 9);
+        let text = Text::new(&Record::Covariance { row: 3, column: 2, value }, 9);
         let line = Line::parse(text.as_str()).expect("a line");
         assert_eq!(line.value::<f32>("value").map(f32::to_bits), Ok(value.to_bits()), "{}", text.as_str());
         assert_eq!((line.kind(), line.number(), line.value::<u8>("column")), ("covariance", Ok(9), Ok(2)));
     }
-    let text = Text::of(&Record::Covariance { row: 0, column: 0, value: f32::NAN }, 0);
+    let text = Text::new(&Record::Covariance { row: 0, column: 0, value: f32::NAN }, 0);
     assert!(Line::parse(text.as_str()).and_then(|line| line.value::<f32>("value")).is_ok_and(f32::is_nan));
     let counts = [i32::MIN, 17];
     let log = Record::Log {
@@ -59,7 +59,7 @@ fn what_is_written_is_read_back_bit_for_bit() {
         torque_nm: [f32::NAN, 3.0],
         counts,
     };
-    let text = Text::of(&log, u32::MAX);
+    let text = Text::new(&log, u32::MAX);
     let line = Line::parse(text.as_str()).expect("a line");
     assert_eq!(line.list::<f32, 2>("position_rad"), Ok([0.25, -1e-9]));
     assert_eq!((line.list::<i32, 2>("counts"), line.number()), (Ok(counts), Ok(u32::MAX)));
@@ -68,7 +68,7 @@ fn what_is_written_is_read_back_bit_for_bit() {
 
 #[test]
 fn registers_are_written_in_base_sixteen() {
-    let text = Text::of(
+    let text = Text::new(
         &Record::Crash {
             cause: "panic",
             pc: 0x0800_1234,

@@ -114,14 +114,14 @@ fn bridges_start_off_at_24_khz_with_119_ns_dead_time() {
 fn timers_hold_outputs_off_before_any_pin_or_trigger() {
     let registers = started();
     let order: Vec<_> = registers.record.iter().map(|write| write.register).collect();
-    let place = |name: &str| order.iter().rposition(|register| *register == name).expect(name);
+    let rank = |name: &str| order.iter().rposition(|register| *register == name).expect(name);
     let begins = |name: &str| order.iter().position(|register| *register == name).expect(name);
     // TIM8 waits for TIM1 before TIM1 starts, and is detached before either triggers.
     let lock = timers::LOCK_AND_START;
     assert_eq!((lock[1].register, lock[1].value), ("TIM8_SMCR", 0b110));
     assert_eq!((lock[2].register, lock[2].value & 1), ("TIM1_CR1", 1));
     assert_eq!(registers.at(TIM8 + 0x08), 0);
-    assert!(place("ADC3_CR2") > place("TIM8_CR2") && place("TIM8_CR2") > place("TIM1_CR1"));
+    assert!(rank("ADC3_CR2") > rank("TIM8_CR2") && rank("TIM8_CR2") > rank("TIM1_CR1"));
     assert!(begins("TIM1_BDTR") < begins("TIM1_CCER"));
 }
 
@@ -142,7 +142,7 @@ fn the_converters_sample_the_shunts_of_the_board() {
     // Bus voltage IN6, thermistors IN15, IN4, IN5: four injected conversions in a row.
     let sequence = registers.at(ADC[0] + 0x38);
     assert_eq!(registers.bits(ADC[0] + 0x38, 20, 2), 3);
-    assert_eq!([0, 5, 10, 15].map(|place| sequence >> place & 0x1F), [6, 15, 4, 5]);
+    assert_eq!([0, 5, 10, 15].map(|shift| sequence >> shift & 0x1F), [6, 15, 4, 5]);
     assert_eq!(registers.bits(ADC[0] + 0x04, 8, 1), 1, "scan");
     // Thermistors of the motors on IN0 (PA0) and IN1 (PA1): one regular conversion by software, 480 cycles.
     assert_eq!(converters::MOTORS, [0, 1]);

@@ -66,7 +66,7 @@ fn a_refused_result_does_not_change_the_monitored_friction() {
         joint.stribeck = Some(StribeckFile { static_nm: 6.5, speed_rad_s: 0.1 });
     }
     let context =
-        Context::new(&leg, &SimulationOptions::of_seed(1)).expect("the default leg with another friction");
+        Context::new(&leg, &SimulationOptions::with_seed(1)).expect("the default leg with another friction");
     let mut pair = Pair::new(&leg, &context, 1).expect("the firmware accepts the leg");
     assert!(pair.enable(context.gravity));
     assert!(identify(&mut pair).is_some_and(Verdict::is_accepted));

@@ -41,7 +41,7 @@ fn a_joint_with_a_third_of_its_torque_missing_is_refused() {
 fn pushed(per_minute: f64, torque_nm: f64) -> Result<RunReport, String> {
     let leg =
         LegFile { pushes: Some(PushesFile { per_minute, torque_nm, duration_s: 0.5 }), ..default_leg() };
-    simulate::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(1))
+    simulate::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(1))
         .map(|run| run.report)
         .map_err(|error| error.to_string())
 }
@@ -78,10 +78,10 @@ fn a_leg_outside_the_prior_is_refused_not_clamped() {
     let mut leg = default_leg();
     // The box reaches 5 times the prior's Coulomb friction of 4 N m.
     leg.joints[1].truth.as_mut().expect("simulated").offset = 25.0;
-    let report = simulate::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report;
+    let report = simulate::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report;
     assert_eq!(report.reasons, ["unphysical"]);
     leg.joints[1].truth.as_mut().expect("simulated").offset = 9.0;
     assert!(
-        simulate::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report.accepted()
+        simulate::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report.accepted()
     );
 }

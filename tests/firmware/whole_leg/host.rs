@@ -59,7 +59,7 @@ impl Hosted {
 
     fn resting_at(position: [f64; JOINTS]) -> Self {
         let mut pair = Pair::new(&default_leg(), context(), 1).expect("the firmware accepts the default leg");
-        pair.world.place(&position);
+        pair.world.move_to(&position);
         pair.sample = scarab::hal::LegDrives::sample(&mut pair.world);
         Self { pair, commands: [HOLD; JOINTS], status: [JointStatus::NONE; JOINTS] }
     }
@@ -311,33 +311,33 @@ fn a_target_beyond_the_window_is_not_begun_and_a_fault_later() {
 #[test]
 fn homing_sets_the_position_to_the_offset_without_motion() {
     let mut hosted = Hosted::new();
-    let (place, truth) = (hosted.position(1), hosted.truth(1));
-    hosted.commands[1].target = Target::Homing { offset: Radian(place + 0.05) };
+    let (position, truth) = (hosted.position(1), hosted.truth(1));
+    hosted.commands[1].target = Target::Homing { offset: Radian(position + 0.05) };
     hosted.run(SECOND);
     assert!(!hosted.status[1].homed);
     hosted.commands[1].request_count += 1;
     hosted.run(SECOND);
     assert!(hosted.status[1].homed && !hosted.status[1].deviates);
-    assert!((hosted.position(1) - place - 0.05).abs() < 0.002, "{}", hosted.position(1));
+    assert!((hosted.position(1) - position - 0.05).abs() < 0.002, "{}", hosted.position(1));
     assert!((hosted.truth(1) - truth).abs() < 0.003, "{} {truth}", hosted.truth(1));
     // An offset out of range is an error and has no effect.
     hosted.commands[1].target = Target::Homing { offset: Radian(9.0) };
     hosted.commands[1].request_count += 1;
     hosted.run(SECOND / 10);
     assert!(hosted.status[1].deviates && is_enabled(&hosted.pair));
-    assert!((hosted.position(1) - place - 0.05).abs() < 0.002);
+    assert!((hosted.position(1) - position - 0.05).abs() < 0.002);
 }
 
 #[test]
 fn homing_leaves_the_range_that_the_monitor_guards() {
     // Hosts see a knee 0.4 rad lower than it is, and command it up to what they see as inside the range.
     let mut hosted = Hosted::new();
-    let place = hosted.position(1);
-    hosted.commands[1].target = Target::Homing { offset: Radian(place - 0.4) };
+    let position = hosted.position(1);
+    hosted.commands[1].target = Target::Homing { offset: Radian(position - 0.4) };
     hosted.run(SECOND);
     hosted.commands[1].request_count += 1;
     hosted.run(100);
-    assert!(hosted.status[1].homed && (hosted.position(1) - place + 0.4).abs() < 0.002);
+    assert!(hosted.status[1].homed && (hosted.position(1) - position + 0.4).abs() < 0.002);
     let high = RANGES[1][1];
     hosted.point(1, high as f32, true);
     hosted.run(8 * SECOND);
@@ -357,9 +357,9 @@ fn an_enabled_leg_is_taken_over_without_a_step_in_every_mode() {
             tick(&mut hosted.pair, None);
         });
         let before = tick(&mut hosted.pair, None).servo.decision.torque;
-        let place: [f32; JOINTS] = core::array::from_fn(|joint| hosted.truth(joint) as f32);
+        let start: [f32; JOINTS] = core::array::from_fn(|joint| hosted.truth(joint) as f32);
         for joint in 0..JOINTS {
-            let position = Radian(place[joint]);
+            let position = Radian(start[joint]);
             hosted.commands[joint].target = match number {
                 1 => Target::ProfilePosition(SetPoint::default()),
                 3 => Target::ProfileVelocity(zero.0),
@@ -379,7 +379,7 @@ fn an_enabled_leg_is_taken_over_without_a_step_in_every_mode() {
         for _ in 0..SECOND {
             let torque = hosted.tick(None).servo.decision.torque;
             for joint in 0..JOINTS {
-                let moved = hosted.truth(joint) as f32 - place[joint];
+                let moved = hosted.truth(joint) as f32 - start[joint];
                 // The torque that holds the joint within its friction may drift, but does not step.
                 let step = torque[joint].0 - last[joint].0;
                 assert!(step.abs() < 4.0 && moved.abs() < 0.01, "{number} {joint}: {step} N m, {moved} rad");
@@ -412,10 +412,10 @@ fn a_halt_ends_in_time_whatever_the_host_has_set() {
             command.following_window = Radian(10.0);
         }
         hosted.run(2 * SECOND);
-        let place = hosted.truth(1);
+        let start = hosted.truth(1);
         hosted.run(SECOND);
         let JointStatus { velocity_demand, torque_demand, .. } = hosted.status[1];
-        let moved = (hosted.truth(1) - place).abs();
+        let moved = (hosted.truth(1) - start).abs();
         let has_stopped = velocity_demand.0 == 0.0 && moved < 1e-3;
         assert!(
             if mode == 4 { torque_demand.0 == 0.0 } else { has_stopped && torque_demand.0 != 0.0 },
@@ -651,7 +651,7 @@ fn every_inward_command_returns_a_joint_into_its_range() {
             hosted.commands[joint].target = Target::CyclicTorque(NewtonMetre(16.0 * sign));
         },
     ];
-    for (place, command) in targets.into_iter().enumerate() {
+    for (index, command) in targets.into_iter().enumerate() {
         for (joint, pose, sign) in OUTSIDE {
             let mut hosted = Hosted::enabled_at(pose);
             let from = beyond(joint, hosted.truth(joint));
@@ -664,15 +664,15 @@ fn every_inward_command_returns_a_joint_into_its_range() {
                 let now = watch(&mut hosted, joint, 1);
                 most = [most[0].max(now[0]), most[1].max(now[1])];
                 ticks += 1;
-                assert!(ticks < 4 * SECOND, "{place} {joint}: {most:?} {}", hosted.truth(joint));
+                assert!(ticks < 4 * SECOND, "{index} {joint}: {most:?} {}", hosted.truth(joint));
             }
             // The commanded speed is 0.1 rad/s, more while the knee's weight is taken over. A commanded
             // torque may reach the bound of 0.2 rad/s, plus the weight's share during braking.
-            let fastest = if place == 3 { 0.3 } else { 0.16 };
-            assert!(most[0] < from + 0.002 && most[1] < fastest, "{place} {joint}: {from} {most:?}");
-            if place < 3 {
+            let fastest = if index == 3 { 0.3 } else { 0.16 };
+            assert!(most[0] < from + 0.002 && most[1] < fastest, "{index} {joint}: {from} {most:?}");
+            if index < 3 {
                 let rest = watch(&mut hosted, joint, SECOND);
-                assert!(rest[0] < 0.009, "{place} {joint}: {rest:?}");
+                assert!(rest[0] < 0.009, "{index} {joint}: {rest:?}");
             }
         }
     }
@@ -691,13 +691,13 @@ fn no_host_command_moves_a_joint_farther_out() {
         },
         |hosted, joint, sign| hosted.commands[joint].target = Target::CyclicTorque(NewtonMetre(-60.0 * sign)),
     ];
-    for (place, command) in targets.into_iter().enumerate() {
+    for (index, command) in targets.into_iter().enumerate() {
         for (joint, pose, sign) in OUTSIDE {
             let mut hosted = Hosted::enabled_at(pose);
             let from = beyond(joint, hosted.truth(joint));
             command(&mut hosted, joint, sign);
             let [farthest, _] = watch(&mut hosted, joint, 2 * SECOND);
-            assert!(farthest < from + 0.002, "{place} {joint}: {from} {farthest}");
+            assert!(farthest < from + 0.002, "{index} {joint}: {from} {farthest}");
         }
     }
 }
@@ -883,8 +883,8 @@ fn an_impedance_beyond_its_limits_is_bounded_and_reported() {
     {
         let mut hosted = Hosted::new();
         hosted.run(SECOND);
-        let place = hosted.position(0) + position;
-        impedance(&mut hosted, 0, place, stiffness, damping);
+        let target = hosted.position(0) + position;
+        impedance(&mut hosted, 0, target, stiffness, damping);
         hosted.run(SECOND);
         assert!(hosted.status[0].limited && is_enabled(&hosted.pair), "{position} {stiffness} {damping}");
         assert!(hosted.truth(0) < f64::from(high), "{}", hosted.truth(0));
@@ -895,7 +895,7 @@ fn an_impedance_beyond_its_limits_is_bounded_and_reported() {
 /// plant, rad and rad/s.
 fn shown(samples: &[[f64; 3]]) -> [f64; 2] {
     let count = samples.len() as f64;
-    let mean = |place: usize| samples.iter().map(|sample| sample[place]).sum::<f64>() / count;
+    let mean = |index: usize| samples.iter().map(|sample| sample[index]).sum::<f64>() / count;
     let means = [mean(0), mean(1), mean(2)];
     let product = |a: usize, b: usize| {
         samples.iter().map(|sample| (sample[a] - means[a]) * (sample[b] - means[b])).sum::<f64>()

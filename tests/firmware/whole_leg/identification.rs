@@ -14,7 +14,7 @@ use scarab_rig::simulate::simulate;
 use super::*;
 
 fn run(seed: u64) -> RunReport {
-    simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::of_seed(seed)).expect("it runs").report
+    simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::with_seed(seed)).expect("it runs").report
 }
 
 /// Errors of the base parameters in reported standard deviations.
@@ -73,7 +73,7 @@ fn equal_seeds_give_equal_reports_and_different_seeds_do_not() {
     let first = text(same_swarm.clone());
     assert_eq!(first, text(run(7)));
     assert_ne!(first, text(run(8)));
-    let other_swarm = SimulationOptions { swarm_seed: 8, ..SimulationOptions::of_seed(7) };
+    let other_swarm = SimulationOptions { swarm_seed: 8, ..SimulationOptions::with_seed(7) };
     let other_swarm = simulate::<JOINTS, BASE>(&default_leg(), &other_swarm).expect("it runs").report;
     // The data are identical; the path of the search differs.
     assert_eq!(same_swarm.least_squares, other_swarm.least_squares);
@@ -102,7 +102,7 @@ fn a_cloned_leg_and_world_continue_identically() {
 
 #[test]
 fn the_noise_free_bias_is_below_a_seventh_of_sigma() {
-    let quiet = SimulationOptions { torque_noise_percent: Some(0.0), ..SimulationOptions::of_seed(1) };
+    let quiet = SimulationOptions { torque_noise_percent: Some(0.0), ..SimulationOptions::with_seed(1) };
     let quiet = simulate::<JOINTS, BASE>(&default_leg(), &quiet).expect("it runs").report;
     let noisy = run(1);
     assert!(quiet.accepted(), "{:?}", quiet.reasons);
@@ -121,10 +121,10 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("whole_leg_log.csv");
     let leg = default_leg();
     let (report, _) =
-        identify_one::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(3), Some(&path)).expect("it runs");
+        identify_one::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(3), Some(&path)).expect("it runs");
     let read = Recording::read(&path, &Import::plain(2)).expect("the tool reads its own log");
     let recordings = Recordings { training: vec![read], ..Recordings::default() };
-    let options = ReplayOptions { swarm_seed: 3, ..ReplayOptions::of(&leg) };
+    let options = ReplayOptions { swarm_seed: 3, ..ReplayOptions::from_leg(&leg) };
     let replayed = replay::<JOINTS, BASE>(&leg, &recordings, &options).expect("it is identified");
     for (online, offline) in report.base_parameters.iter().zip(&replayed.run.base_parameters) {
         assert_eq!(online.name, offline.name);
@@ -143,7 +143,7 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
 #[test]
 fn the_paper_s_chain_of_three_joints_is_identified() {
     let leg = LegFile::load("paper-chain").expect("shipped");
-    let report = simulate::<3, 28>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report;
+    let report = simulate::<3, 28>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report;
     assert!(report.accepted(), "{:?}", report.reasons);
     for (name, error) in errors_in_sigma(&report) {
         assert!(error.abs() < 4.0, "{name}: {error:.1} sigma");
@@ -153,7 +153,7 @@ fn the_paper_s_chain_of_three_joints_is_identified() {
 #[test]
 fn the_mujoco_leg_is_identified() {
     let leg = LegFile::load("mujoco-leg").expect("shipped");
-    let report = simulate::<2, 13>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report;
+    let report = simulate::<2, 13>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report;
     assert!(report.accepted(), "{:?}", report.reasons);
     for (name, error) in errors_in_sigma(&report) {
         assert!(error.abs() < 4.0, "{name}: {error:.1} sigma");

@@ -42,7 +42,7 @@ fn default_leg() -> LegFile {
 fn context() -> &'static Context {
     static CONTEXT: OnceLock<Context> = OnceLock::new();
     CONTEXT.get_or_init(|| {
-        Context::new(&default_leg(), &SimulationOptions::of_seed(1))
+        Context::new(&default_leg(), &SimulationOptions::with_seed(1))
             .expect("the default leg can be simulated")
     })
 }

@@ -11,7 +11,7 @@ use super::*;
 
 /// Payload of 3 kg at 0.2 m of the shank.
 const MASS: f64 = 3.0;
-const PLACE: f64 = 0.2;
+const DISTANCE_M: f64 = 0.2;
 
 /// Requests to walk the 3 s gait for three minutes.
 fn walk(pair: &mut Pair, with_model: bool) {
@@ -42,7 +42,7 @@ fn offered() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {
         let mut pair = walking();
-        pair.world.attach(1, MASS, [PLACE, 0.0, 0.0]);
+        pair.world.attach(1, MASS, [DISTANCE_M, 0.0, 0.0]);
         assert!(run_until(&mut pair, |pair| pair.leg.control().is_update_offered()));
         pair
     })
@@ -58,7 +58,7 @@ fn seconds_until(pair: &mut Pair, reached: impl Fn(&Pair) -> bool) -> f64 {
 #[test]
 fn a_payload_is_detected_in_seconds_and_identified() {
     let mut pair = walking();
-    pair.world.attach(1, MASS, [PLACE, 0.0, 0.0]);
+    pair.world.attach(1, MASS, [DISTANCE_M, 0.0, 0.0]);
     let noticed = seconds_until(&mut pair, |pair| pair.leg.control().change().is_some());
     let change = *pair.leg.control().change().expect("noticed");
     println!("detected after {noticed} s, {change:?}");
@@ -74,7 +74,7 @@ fn a_payload_is_detected_in_seconds_and_identified() {
     assert_eq!(update.cause, Cause::Payload { link: 1 });
     let found = &update.payload[1];
     // Mass and moment, the first two parameters of a payload; three standard deviations (1.7 % and 1.8 %).
-    for (index, truth) in [(0, MASS), (1, MASS * PLACE)] {
+    for (index, truth) in [(0, MASS), (1, MASS * DISTANCE_M)] {
         let sigma = f64::from(found.sigma(index).expect("determined"));
         assert!((f64::from(found.values[index]) - truth).abs() < 3.0 * sigma, "{found:?}");
         assert!(sigma < 0.01 * truth, "sigma {sigma} of {truth}");
@@ -130,7 +130,7 @@ fn a_leg_that_was_never_identified_is_not_monitored() {
     let mut pair = enabled(&default_leg(), 1);
     walk(&mut pair, false);
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
-    pair.world.attach(1, MASS, [PLACE, 0.0, 0.0]);
+    pair.world.attach(1, MASS, [DISTANCE_M, 0.0, 0.0]);
     for _ in 0..30 * SECOND {
         tick(&mut pair, None);
         assert_eq!(pair.leg.control().change(), None);
@@ -140,7 +140,7 @@ fn a_leg_that_was_never_identified_is_not_monitored() {
 #[test]
 fn a_stop_discards_the_collected_rows() {
     let mut pair = walking();
-    pair.world.attach(1, MASS, [PLACE, 0.0, 0.0]);
+    pair.world.attach(1, MASS, [DISTANCE_M, 0.0, 0.0]);
     assert!(run_until(&mut pair, |pair| pair.leg.control().change().is_some()));
     tick(&mut pair, Some(ControlRequest::Power(PowerRequest::QuickStop)));
     for _ in 0..30 * SECOND {

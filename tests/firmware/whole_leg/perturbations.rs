@@ -12,7 +12,7 @@ use super::*;
 
 fn perturbed(perturbation: &str, seed: u64) -> RunReport {
     let perturbations = vec![perturbation.parse::<Perturbation>().expect("known")];
-    let options = SimulationOptions { perturbations, ..SimulationOptions::of_seed(seed) };
+    let options = SimulationOptions { perturbations, ..SimulationOptions::with_seed(seed) };
     simulate::<JOINTS, BASE>(&default_leg(), &options).expect("a verdict").report
 }
 
@@ -86,7 +86,7 @@ fn pushed(seeds: RangeInclusive<u64>) {
     let leg = LegFile { pushes: Some(pushes), ..default_leg() };
     for seed in seeds {
         let report =
-            simulate::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(seed)).expect("it ends").report;
+            simulate::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(seed)).expect("it ends").report;
         println!("seed {seed}: {:?}", report.reasons);
         for base in report.base_parameters.iter().filter(|_| report.accepted()) {
             let known = |number: Number| number.known().expect("known");
@@ -112,7 +112,7 @@ fn pushed_during_validation(seeds: RangeInclusive<u64>) {
     let run = |perturbations: &[&str], seed: u64| {
         let perturbations =
             perturbations.iter().map(|word| word.parse::<Perturbation>().expect("known")).collect();
-        let options = SimulationOptions { perturbations, ..SimulationOptions::of_seed(seed) };
+        let options = SimulationOptions { perturbations, ..SimulationOptions::with_seed(seed) };
         simulate::<JOINTS, BASE>(&leg, &options).expect("a verdict").report
     };
     for seed in seeds {
@@ -188,7 +188,7 @@ fn more_valid_runs_are_accepted_far_within_the_limits() {
 
 fn valid(seeds: RangeInclusive<u64>) {
     for seed in seeds {
-        let report = simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::of_seed(seed))
+        let report = simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::with_seed(seed))
             .expect("it runs")
             .report;
         assert!(report.accepted(), "seed {seed}: {:?}", report.reasons);

@@ -12,7 +12,7 @@ use scarab_rig::scale::{self, Corrected};
 
 use super::*;
 
-const ON_THE_KNEE: Payload<f64> = Payload { joint: 1, mass: 5.0, place: Vector3::new(0.2, 0.0, 0.0) };
+const ON_THE_KNEE: Payload<f64> = Payload { joint: 1, mass: 5.0, position: Vector3::new(0.2, 0.0, 0.0) };
 
 /// The default leg with motors that make `factors` times the torque of the firmware's constants.
 fn leg_with_constants(factors: [f64; JOINTS]) -> LegFile {
@@ -119,7 +119,7 @@ fn a_wrong_mass_scales_the_result_a_wrong_position_is_detected() {
     for ratio in heavy.trusted().expect("nothing contradicts") {
         assert!((f64::from(ratio.ratio) * 1.1 - 1.0).abs() < 0.01, "10 % of mass are 10 % of the constant");
     }
-    let far = Payload { place: Vector3::new(0.3, 0.0, 0.0), ..ON_THE_KNEE };
+    let far = Payload { position: Vector3::new(0.3, 0.0, 0.0), ..ON_THE_KNEE };
     let (contradicted, corrected) = corrected(&run, &far);
     assert!(contradicted.trusted().is_none() && corrected.is_none());
 }
@@ -127,7 +127,7 @@ fn a_wrong_mass_scales_the_result_a_wrong_position_is_detected() {
 #[test]
 fn a_mass_on_the_thigh_measures_the_hip_alone_without_correction() {
     let run = first_run([1.2; JOINTS], 6);
-    let thigh = Payload { joint: 0, mass: 5.0, place: Vector3::new(0.3, 0.0, 0.0) };
+    let thigh = Payload { joint: 0, mass: 5.0, position: Vector3::new(0.3, 0.0, 0.0) };
     let scale = second_run(&run.pair, &thigh, &thigh);
     let hip = scale.ratios[0].expect("felt");
     assert!((f64::from(hip.ratio) * 1.2 - 1.0).abs() < 0.02, "{}", hip.ratio);
@@ -136,11 +136,11 @@ fn a_mass_on_the_thigh_measures_the_hip_alone_without_correction() {
 
 #[test]
 fn a_model_with_a_known_load_predicts_like_one_identified_with_it() {
-    let load = Payload { joint: 1, mass: 3.0, place: Vector3::new(0.3, 0.02, 0.0) };
+    let load = Payload { joint: 1, mass: 3.0, position: Vector3::new(0.3, 0.02, 0.0) };
     let pair = identified();
     let model = pair.leg.control().model().expect("accepted");
     let mut carrying = enabled(&default_leg(), 1);
-    carrying.world.attach(load.joint, load.mass, load.place.into());
+    carrying.world.attach(load.joint, load.mass, load.position.into());
     let plant = carrying.world.clone();
     assert!(identify(&mut carrying).is_some_and(Verdict::is_accepted));
     let again = carrying.leg.control().model().expect("accepted");

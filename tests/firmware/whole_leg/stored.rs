@@ -30,7 +30,7 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
     let stored = kept();
     let own = context().configuration.fingerprint();
     let refused = |leg: &LegFile, what: &str| {
-        let other = Context::new(leg, &SimulationOptions::of_seed(1)).expect(what);
+        let other = Context::new(leg, &SimulationOptions::with_seed(1)).expect(what);
         let expected = RestoreError::AnotherLeg { stored: own, own: other.configuration.fingerprint() };
         assert_eq!(other.configuration.restore(&stored), Err(expected), "{what}");
     };

@@ -51,8 +51,8 @@ fn a_report_contains_every_parameter_finding_and_fit_and_its_length() {
     let covariance = of("covariance");
     assert_eq!(covariance.len(), BASE * (BASE + 1) / 2);
     for line in covariance {
-        let place = |key| line.value::<usize>(key).expect(key);
-        assert_eq!(line.value("value"), Ok(estimate.covariance[place("row")][place("column")]));
+        let field = |key| line.value::<usize>(key).expect(key);
+        assert_eq!(line.value("value"), Ok(estimate.covariance[field("row")][field("column")]));
     }
 
     let mut evidence = Vec::new();

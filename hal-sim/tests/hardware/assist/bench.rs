@@ -206,7 +206,7 @@ impl Bench {
         let configuration: LegConfiguration<2, BASE> = super::x2::LEG.configuration().expect("shipped");
         let leg = Box::new(DeviceLeg::new(&configuration).expect("shipped"));
         let mut world = World::new(&exoskeleton(), 1);
-        world.place(&posture);
+        world.move_to(&posture);
         world.wear(wearer).expect("a leg of hip and knee");
         let sample = world.sample();
         Self { leg, world, sample }

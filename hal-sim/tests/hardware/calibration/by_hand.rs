@@ -106,7 +106,7 @@ impl PowerUp {
         calibrator: Calibrator,
         mut hand: impl FnMut(&mut Stand, u32),
     ) -> (Result<Calibration, Refusal>, f64, u32) {
-        self.state.obey(Order::Calibrate(calibrator));
+        self.state.apply_order(Order::Calibrate(calibrator));
         let begin = self.stand.rotor().angle;
         let (mut furthest, mut periods) = (0.0_f64, 0);
         loop {
@@ -136,7 +136,7 @@ impl PowerUp {
     ) -> (bool, Option<AxisFault>, f64) {
         if !self.state.is_running() {
             let axis = Axis::new(&self.trial.configuration, found, &self.sample).expect("sensible");
-            self.state.obey(Order::Run(axis));
+            self.state.apply_order(Order::Run(axis));
             self.run(240);
         }
         let mut fastest = 0.0_f64;
@@ -185,7 +185,7 @@ fn ideal(trial: &Trial) -> StoredCalibration {
         direct_inductance: Henry(axis.motor.inductance_d as f32),
         quadrature_inductance: Henry(axis.motor.inductance_q as f32),
         offset: ElectricalAngle::from_turns((offset - offset.floor()) as f32),
-        encoder: EncoderSetting::of(configuration),
+        encoder: EncoderSetting::new(configuration),
         winding_c: None,
         joint_zero: None,
     }

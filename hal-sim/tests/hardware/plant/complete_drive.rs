@@ -47,7 +47,7 @@ fn axis() -> AxisDescription {
 }
 
 fn cold(angle: f64) -> Motor {
-    Motor::new(&MOTOR, 0.0, Direction::of(angle))
+    Motor::new(&MOTOR, 0.0, Direction::from_angle(angle))
 }
 
 /// Phase quantities of an amplitude at `angle` ahead of a phase's axis.
@@ -270,7 +270,7 @@ fn steps_at_edges_alone_are_fine_enough() {
     let mut impulse = 0.0;
     for number in 0..240 {
         let angle = speed * PERIOD_S * f64::from(number);
-        motor.set_angle(Direction::of(7.0 * angle + MOTOR.electrical_zero));
+        motor.set_angle(Direction::from_angle(7.0 * angle + MOTOR.electrical_zero));
         let electrical = 7.0 * (angle + 0.5 * speed * PERIOD_S) + MOTOR.electrical_zero;
         bridge.begin(&duties(6.6, electrical + 1.95));
         let mut now = 0.0;
@@ -443,7 +443,7 @@ fn a_thermistor_follows_its_winding_with_a_lag() {
     description.motor.thermistor =
         Some(ThermistorDescription { pull_up: 3300.0, at_25_c: 10_000.0, beta: 3435.0, lag: 10.0 });
     let code = |seconds: f64| {
-        let mut motor = Motor::new(&description.motor, 0.0, Direction::of(0.0));
+        let mut motor = Motor::new(&description.motor, 0.0, Direction::from_angle(0.0));
         // 60 K above 20 degrees within a moment, by the time constant of 300 s; then 1 K/W holds them.
         motor.warm(60.0 * 300.0, 0.0);
         for _ in 0..(1e3 * seconds) as u32 {
@@ -513,7 +513,7 @@ fn a_coasting_leg_swings_as_with_ideal_drives_off() {
     let mut ideal = World::new(&worn_leg(), 1);
     let mut complete = World::with_complete_drives(&worn_leg(), &board(), 1);
     for world in [&mut ideal, &mut complete] {
-        world.place(&[1.2, -0.4]);
+        world.move_to(&[1.2, -0.4]);
         for _ in 0..4000 {
             world.advance();
         }

@@ -20,7 +20,7 @@ fn a_falling_leg_ends_at_its_stops_without_gaining_energy() {
     let off = DriveCommand { enabled: false, currents: [Ampere(0.0); 2] };
     for pose in [[1.2, 0.8], [1.8, 2.3], [-0.15, 2.0], [0.9, 0.0]] {
         let mut world = World::new(&leg, 1);
-        world.place(&pose);
+        world.move_to(&pose);
         let mut lowest = mechanism.potential_energy(&pose);
         let begin = lowest;
         let (mut contacts, mut was_inside) = (0, true);

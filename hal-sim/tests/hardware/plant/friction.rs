@@ -24,7 +24,7 @@ fn a_leg_held_by_friction_does_not_move_by_one_bit() {
     held.joints[0].friction = dry(12.0);
     held.joints[1].friction = dry(5.0);
     let mut world = World::new(&held, 3);
-    world.place(&[0.2, 0.1]);
+    world.move_to(&[0.2, 0.1]);
     let before = world.truth();
     // Gravity pulls with 9.7 and 1.9 N m here, below both levels.
     for _ in 0..20_000 {
@@ -173,7 +173,7 @@ fn no_friction_makes_a_step_unstable() {
 #[test]
 fn a_leg_with_bridges_off_swings_out_and_hangs() {
     let mut world = World::new(&worn_leg(), 5);
-    world.place(&[0.9, 0.3]);
+    world.move_to(&[0.9, 0.3]);
     let pushing = DriveCommand { enabled: true, currents: [Ampere(40.0), Ampere(5.0)] };
     for _ in 0..400 {
         world.tick(&pushing);

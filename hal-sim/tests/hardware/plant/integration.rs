@@ -92,7 +92,7 @@ fn driven_motion(description: &LegDescription<2>) -> Record {
                 .map(|joint| sum(joint, |amplitude, speed, angle| -amplitude * speed * speed * sine(angle))),
         )
     };
-    world.place(&reference(0.0).0);
+    world.move_to(&reference(0.0).0);
     (0..80_000)
         .map(|tick| {
             let truth = world.truth();
@@ -133,10 +133,10 @@ fn derivatives(record: &Record, tick: usize) -> ([f64; 2], [f64; 2]) {
     let mut acceleration = at(0).map(|position| SECOND[0] * position / (TICK_S * TICK_S));
     for distance in 1..=4 {
         let (before, after) = (at(-distance), at(distance));
-        let place = distance as usize;
+        let index = distance as usize;
         for joint in 0..2 {
-            rate[joint] += FIRST[place - 1] * (after[joint] - before[joint]) / TICK_S;
-            acceleration[joint] += SECOND[place] * (after[joint] + before[joint]) / (TICK_S * TICK_S);
+            rate[joint] += FIRST[index - 1] * (after[joint] - before[joint]) / TICK_S;
+            acceleration[joint] += SECOND[index] * (after[joint] + before[joint]) / (TICK_S * TICK_S);
         }
     }
     (rate, acceleration)

@@ -86,7 +86,7 @@ fn exoskeleton() -> LegDescription<2> {
 
 fn worn(leg: &LegDescription<2>, wearer: &WearerDescription, posture: [f64; 2]) -> World<2> {
     let mut world = World::new(leg, 1);
-    world.place(&posture);
+    world.move_to(&posture);
     world.wear(wearer).expect("a leg of hip and knee");
     world
 }
@@ -293,7 +293,7 @@ fn with_stiff_cuffs_both_bodies_move_as_one_rigid_leg() {
         let wearer = elastic_person(stiffness, 0.0);
         let mut two = worn(&description, &wearer, [0.6, 0.8]);
         let mut one = World::new(&merged(&description, &wearer), 1);
-        one.place(&[0.6, 0.8]);
+        one.move_to(&[0.6, 0.8]);
         let mut largest = 0.0_f64;
         for tick in 0..8000 {
             one.tick(&driven(tick));
@@ -423,7 +423,7 @@ fn a_wearer_alone_walks_as_intended_by_feedforward() {
 fn an_exoskeleton_with_loose_cuffs_moves_as_without_wearer() {
     let mut loose = worn(&exoskeleton(), &uncoupled(), [0.3, 0.4]);
     let mut empty = World::new(&exoskeleton(), 1);
-    empty.place(&[0.3, 0.4]);
+    empty.move_to(&[0.3, 0.4]);
     let mut starts = 0;
     for tick in 0..12_000 {
         let before = empty.sticking();
@@ -631,7 +631,7 @@ fn a_wearer_walks_alike_with_ideal_and_with_complete_drives_off() {
     let ideal = World::new(&exoskeleton(), 1);
     let complete = World::with_complete_drives(&exoskeleton(), &board(), 1);
     let [ideal, complete] = [ideal, complete].map(|mut world| {
-        world.place(&[0.4, 0.5]);
+        world.move_to(&[0.4, 0.5]);
         world.wear(&person()).expect("a leg of hip and knee");
         world.intend(walking(0.5)).expect("a valid motion");
         (0..16_000).for_each(|_| world.advance());
@@ -651,7 +651,7 @@ fn placing_a_worn_leg_places_the_wearer() {
     let mut world = worn(&exoskeleton(), &person(), [0.4, 0.5]);
     world.intend(walking(1.0)).expect("a valid motion");
     (0..8000).for_each(|_| world.advance());
-    world.place(&[0.7, 0.9]);
+    world.move_to(&[0.7, 0.9]);
     let truth = wearer(&world);
     assert!((truth.position[0] - 0.7).abs() < 1e-12 && (truth.position[1] - 0.9).abs() < 1e-12);
     assert_eq!(truth.velocity, [0.0; 2]);

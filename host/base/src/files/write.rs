@@ -82,15 +82,15 @@ impl NewFile {
             let out = BufWriter::new(OpenOptions::new().append(true).open(path).map_err(cannot)?);
             return Ok(Self { out, named: path.to_owned(), rename: None });
         }
-        let place = resolved(path);
-        let folder = folder_of(&place);
+        let target = resolved(path);
+        let folder = folder_of(&target);
         std::fs::create_dir_all(&folder).map_err(cannot)?;
         let (temporary, file) = temporary_in(&folder).map_err(cannot)?;
         // The permissions of the file stay unchanged.
-        if let Ok(metadata) = place.metadata() {
+        if let Ok(metadata) = target.metadata() {
             let _ = file.set_permissions(metadata.permissions());
         }
-        Ok(Self { out: BufWriter::new(file), named: path.to_owned(), rename: Some((temporary, place)) })
+        Ok(Self { out: BufWriter::new(file), named: path.to_owned(), rename: Some((temporary, target)) })
     }
 
     /// File handle, for another program to write to.
@@ -108,8 +108,8 @@ impl NewFile {
     pub fn finish(mut self) -> Result<(), ToolError> {
         let named = &self.named;
         self.out.flush().map_err(|error| ToolError::cannot_write(named, &error))?;
-        if let Some((temporary, place)) = &self.rename {
-            std::fs::rename(temporary, place).map_err(|error| ToolError::cannot_write(named, &error))?;
+        if let Some((temporary, target)) = &self.rename {
+            std::fs::rename(temporary, target).map_err(|error| ToolError::cannot_write(named, &error))?;
             self.rename = None;
         }
         Ok(())

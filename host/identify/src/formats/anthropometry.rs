@@ -34,7 +34,7 @@ pub struct Wearer {
 impl Wearer {
     /// Person of this mass (kg) and height (m).
     #[must_use]
-    pub fn of_height(mass: f64, height: f64) -> Self {
+    pub fn from_height(mass: f64, height: f64) -> Self {
         Self {
             mass,
             thigh: THIGH_OF_HEIGHT * height,

@@ -115,7 +115,7 @@ pub fn geometry(leg: &LegFile) -> String {
 impl Excitation {
     /// Motion of a leg, without proof or expectation.
     #[must_use]
-    pub fn of<const N: usize>(leg: &LegFile, table: &ExcitationTable<N>) -> Self {
+    pub fn from_table<const N: usize>(leg: &LegFile, table: &ExcitationTable<N>) -> Self {
         let joints = leg.joints.iter().enumerate().take(N).map(|(index, joint)| ExcitedJoint {
             name: joint.name.clone(),
             centre_rad: table.centre_rad[index],

@@ -259,7 +259,7 @@ impl ModelFile {
         }
         let model: Self = toml_file::parse(text, file)?;
         check::model(&model).map_err(|fault| fault.in_file(file, text))?;
-        let found = checksum::of(&raw);
+        let found = checksum::of_table(&raw);
         if model.checksum != found {
             return Err(ToolError::Refused(format!(
                 "{file}: the file was edited or damaged: its checksum is {}, its content has {found}",

@@ -70,7 +70,7 @@ impl MotionSamples {
     ///
     /// # Errors
     /// The motion is invalid, or has another number of joints than the leg.
-    pub fn of(leg: &LegFile, motion: &Excitation, rate: SampleRate) -> Result<Self, ToolError> {
+    pub fn new(leg: &LegFile, motion: &Excitation, rate: SampleRate) -> Result<Self, ToolError> {
         let samples = match leg.joints.len() {
             1 => samples::<1>(leg, &motion.motion()?, rate),
             2 => samples::<2>(leg, &motion.motion()?, rate),

@@ -100,12 +100,12 @@ impl Recording {
     /// # Errors
     /// Names file, line and reason, and where column names are close the complete command.
     pub fn read(file: &Path, import: &Import) -> Result<Read, FileError> {
-        if let Some(foreign) = Foreign::of_folder(file) {
+        if let Some(foreign) = Foreign::detect_folder(file) {
             return foreign.read(file, false, import);
         }
         let mut source = source::open(file)?;
         let begin = source.text.fill_buf().map_err(|error| FileError::unreadable(file, &error))?;
-        if let Some(foreign) = Foreign::of(begin) {
+        if let Some(foreign) = Foreign::detect(begin) {
             return foreign.read(file, source.is_gzip, import);
         }
         let packing = if source.is_gzip { ", gzip" } else { "" };
@@ -117,7 +117,7 @@ impl Recording {
     ///
     /// # Errors
     /// Names the sample and the reason.
-    pub fn of_samples(name: &Path, time_s: &[f64], joints: &[JointSeries]) -> Result<Read, FileError> {
+    pub fn from_samples(name: &Path, time_s: &[f64], joints: &[JointSeries]) -> Result<Read, FileError> {
         decode::samples(name, time_s, joints)
     }
 
@@ -137,7 +137,7 @@ impl Recording {
         self.check_rate(advice)?;
         self.check_gaps()
             .and_then(|()| self.check_turns())
-            .map_err(|(sample, fault)| refuse(&self.file, numbers.of(sample), fault))?;
+            .map_err(|(sample, fault)| refuse(&self.file, numbers.line_of(sample), fault))?;
         self.check_length(advice)
     }
 

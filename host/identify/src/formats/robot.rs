@@ -69,7 +69,7 @@ impl Kind {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertial {
     /// Centre of mass and axes of the tensor in the link's frame, m.
-    pub place: Isometry3<f64>,
+    pub origin: Isometry3<f64>,
     /// Mass, kg.
     pub mass: f64,
     /// Tensor elements about the centre of mass, kg m^2.
@@ -104,7 +104,7 @@ pub struct Joint {
     /// Number of the link that it moves.
     pub child: usize,
     /// Child's frame in the parent's at position 0, m.
-    pub place: Isometry3<f64>,
+    pub origin: Isometry3<f64>,
     /// Axis in the child's frame.
     pub axis: Unit<Vector3<f64>>,
     pub limit: Option<Limit>,
@@ -400,7 +400,7 @@ impl<'a, 'i> Reader<'a, 'i> {
     fn inertial(&self, link: Named<'a, 'i>) -> Result<Option<Inertial>, FileError> {
         let Some(node) = self.child(link, "inertial")? else { return Ok(None) };
         let inside = Named { node, ..link };
-        let place = self.origin(link, inside)?;
+        let origin = self.origin(link, inside)?;
         let needed = |name| {
             self.child(inside, name)?.ok_or_else(|| {
                 self.wrong(link, node, &format!("`inertial` has no `{name}`: state it, or remove `inertial`"))
@@ -414,7 +414,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         let element = |key| self.required(link, inertia, key);
         let (xx, xy, xz) = (element("ixx")?, element("ixy")?, element("ixz")?);
         let (yy, yz, zz) = (element("iyy")?, element("iyz")?, element("izz")?);
-        Ok(Some(Inertial { place, mass, tensor: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) }))
+        Ok(Some(Inertial { origin, mass, tensor: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) }))
     }
 
     fn joint(&self, of: Named<'a, 'i>, links: &HashMap<&str, usize>) -> Result<Joint, FileError> {
@@ -466,7 +466,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             kind: *kind,
             parent,
             child,
-            place: self.origin(of, of)?,
+            origin: self.origin(of, of)?,
             axis,
             limit,
             damping,

@@ -68,7 +68,7 @@ pub struct Program {
 impl Program {
     /// This program, built from sources with this fingerprint.
     #[must_use]
-    pub fn of_sources(sources: &str) -> Self {
+    pub fn from_sources(sources: &str) -> Self {
         let platform = format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS);
         Self { version: env!("CARGO_PKG_VERSION").into(), sources: sources.into(), platform }
     }
@@ -367,7 +367,7 @@ mod tests {
             command: "identify".into(),
             arguments: arguments.iter().map(argument).collect(),
             leg: None,
-            program: Program::of_sources("1"),
+            program: Program::from_sources("1"),
         }
     }
 

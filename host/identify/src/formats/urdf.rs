@@ -48,7 +48,7 @@ pub fn text(model: &ModelFile, file: &str) -> Result<String, ToolError> {
     let refused = |reason: String| ToolError::Refused(format!("{file}: not exported: {reason}"));
     let mut links = Vec::new();
     for (number, joint) in model.leg.joints.iter().enumerate() {
-        links.push(Link::of(model, number, joint).map_err(refused)?);
+        links.push(Link::new(model, number, joint).map_err(refused)?);
     }
     full_set_gives_the_base_set(model).map_err(refused)?;
     write(model, &links)
@@ -67,7 +67,7 @@ struct Link<'a> {
 }
 
 impl<'a> Link<'a> {
-    fn of(model: &ModelFile, number: usize, joint: &'a StoredJoint) -> Result<Self, String> {
+    fn new(model: &ModelFile, number: usize, joint: &'a StoredJoint) -> Result<Self, String> {
         let name = &joint.name;
         let parameters = model.joint_parameters(number).ok_or_else(|| {
             format!(
@@ -195,7 +195,7 @@ fn base(xml: &mut Xml, gravity: &Vector3<f64>) -> io::Result<()> {
 fn joint(xml: &mut Xml, link: &Link<'_>, parent: &str, child: &str) -> io::Result<()> {
     let stored = link.joint;
     let (sine, cosine) = stored.dh.alpha.sin_cos();
-    let place = Vector3::new(stored.dh.a, -stored.dh.d * sine, stored.dh.d * cosine);
+    let position = Vector3::new(stored.dh.a, -stored.dh.d * sine, stored.dh.d * cosine);
     let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), stored.dh.alpha)
         * Rotation3::from_axis_angle(&Vector3::z_axis(), stored.zero_offset_deg.to_radians());
     comment(
@@ -210,7 +210,7 @@ fn joint(xml: &mut Xml, link: &Link<'_>, parent: &str, child: &str) -> io::Resul
     inside(xml, "joint", &[("name", stored.name.as_str().into()), ("type", "revolute".into())], |xml| {
         empty(xml, "parent", &[("link", parent.into())])?;
         empty(xml, "child", &[("link", child.into())])?;
-        origin(xml, &place, &turn)?;
+        origin(xml, &position, &turn)?;
         empty(xml, "axis", &[("xyz", format!("0 0 {}", stored.direction).into())])?;
         let [lower, upper] = stored.range_deg.map(|end| number(end.to_radians()));
         empty(
@@ -251,10 +251,14 @@ fn body(xml: &mut Xml, link: &Link<'_>, name: &str) -> io::Result<()> {
     })
 }
 
-fn origin(xml: &mut Xml, place: &Vector3<f64>, turn: &Rotation3<f64>) -> io::Result<()> {
+fn origin(xml: &mut Xml, position: &Vector3<f64>, turn: &Rotation3<f64>) -> io::Result<()> {
     let (roll, pitch, yaw) = turn.euler_angles();
     let triple = |numbers: [f64; 3]| numbers.map(number).join(" ").into();
-    empty(xml, "origin", &[("xyz", triple([place.x, place.y, place.z])), ("rpy", triple([roll, pitch, yaw]))])
+    empty(
+        xml,
+        "origin",
+        &[("xyz", triple([position.x, position.y, position.z])), ("rpy", triple([roll, pitch, yaw]))],
+    )
 }
 
 type Attribute<'a> = (&'a str, Cow<'a, str>);

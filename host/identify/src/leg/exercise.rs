@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn every_motion_stays_within_ranges_and_speeds() {
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let bodies = TwoBodies::of(&leg).expect("a worn leg");
+        let bodies = TwoBodies::from_leg(&leg).expect("a worn leg");
         let joints = hip_and_knee(&leg).expect("two joints");
         for exercise in [
             Exercise::Gait(0.5),
@@ -142,7 +142,7 @@ mod tests {
             Exercise::Reaching,
         ] {
             let mut world = World::<2>::new(&bodies.exoskeleton.description().expect("simulated"), 1);
-            world.place(&[0.4, 0.8]);
+            world.move_to(&[0.4, 0.8]);
             world.wear(&bodies.wearer(MuscleTone::Insisting)).expect("a hip and a knee");
             world.intend(Intention::Follow(exercise.intended(joints, 3))).expect("permitted");
             let (mut low, mut high, mut fastest) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], [0.0_f64; 2]);

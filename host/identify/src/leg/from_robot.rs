@@ -71,7 +71,7 @@ pub fn leg(robot: &Robot, options: &RobotOptions) -> Result<FromRobot, FileError
     let chosen = chain(robot, &options.joints, &options.locked)?;
     let axes: Vec<_> =
         chosen.iter().map(|one| Axis { along: one.axis.into_inner(), point: one.point }).collect();
-    let dh = DhChain::of(&axes, &options.gravity, options.parallel_rad);
+    let dh = DhChain::from_axes(&axes, &options.gravity, options.parallel_rad);
     let mut remarks = Vec::new();
     let mut joints = Vec::new();
     for (number, (one, frame)) in chosen.iter().zip(&dh.joints).enumerate() {

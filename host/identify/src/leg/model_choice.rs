@@ -16,7 +16,7 @@ pub struct TermSwitches {
 impl TermSwitches {
     /// Reads the request of a joint.
     #[must_use]
-    pub fn of(joint: &JointFile) -> Self {
+    pub fn from_joint(joint: &JointFile) -> Self {
         Self {
             rotor: joint.rotor,
             offset: joint.offset,

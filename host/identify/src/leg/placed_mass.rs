@@ -31,8 +31,8 @@ impl FromStr for PlacedMass {
     fn from_str(text: &str) -> Result<Self, String> {
         let form = || format!("`{text}` is not KG@JOINT:X_M or KG@JOINT:X_M:Y_M, for example 5@knee:0.2");
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
-        let (mass, place) = text.split_once('@').ok_or_else(form)?;
-        let mut parts = place.split(':');
+        let (mass, position) = text.split_once('@').ok_or_else(form)?;
+        let mut parts = position.split(':');
         let (joint, x, y) = (parts.next().unwrap_or(""), parts.next(), parts.next());
         let mass = number(mass).ok_or_else(form)?;
         let x = x.and_then(number).ok_or_else(form)?;
@@ -75,7 +75,7 @@ impl PlacedMass {
                 self.x, self.y, leg.joints[joint].name
             )));
         }
-        Ok(Payload { joint, mass: self.mass, place: Vector3::new(self.x, self.y, 0.0) })
+        Ok(Payload { joint, mass: self.mass, position: Vector3::new(self.x, self.y, 0.0) })
     }
 }
 
@@ -92,10 +92,10 @@ mod tests {
 
     #[test]
     fn a_mass_is_placed_by_name_or_number() {
-        let expected = Payload { joint: 1, mass: 5.0, place: Vector3::new(0.2, 0.0, 0.0) };
+        let expected = Payload { joint: 1, mass: 5.0, position: Vector3::new(0.2, 0.0, 0.0) };
         assert_eq!(on_the_default_leg("5@knee:0.2"), Ok(expected));
         assert_eq!(on_the_default_leg("5@2:0.2:0"), Ok(expected));
-        let forward = Payload { joint: 0, mass: 0.5, place: Vector3::new(0.39, 0.1, 0.0) };
+        let forward = Payload { joint: 0, mass: 0.5, position: Vector3::new(0.39, 0.1, 0.0) };
         assert_eq!(on_the_default_leg("0.5@hip:0.39:0.1"), Ok(forward));
     }
 

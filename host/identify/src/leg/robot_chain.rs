@@ -73,34 +73,34 @@ pub fn chain<'a>(
     let chosen = chosen(robot, names, &positions)?;
     in_one_chain(robot, &chosen)?;
     nothing_loose(robot, &chosen, &positions)?;
-    let place_in_chain: HashMap<usize, usize> =
-        chosen.iter().enumerate().map(|(place, joint)| (*joint, place)).collect();
+    let index_in_chain: HashMap<usize, usize> =
+        chosen.iter().enumerate().map(|(index, joint)| (*joint, index)).collect();
 
     let mut pose = vec![Isometry3::identity(); robot.links.len()];
     let mut owner = vec![Owner::Base; robot.links.len()];
     let mut found: Vec<ChainJoint<'a>> = Vec::new();
     let mut parts: Vec<Vec<LumpedBody>> = vec![Vec::new(); chosen.len()];
     for (number, joint) in robot.joints.iter().enumerate() {
-        let (before, frame) = (owner[joint.parent], pose[joint.parent] * joint.place);
+        let (before, frame) = (owner[joint.parent], pose[joint.parent] * joint.origin);
         let at = positions.get(&number).copied();
         pose[joint.child] = frame * at.map_or_else(Isometry3::identity, |at| moved(joint, at));
-        owner[joint.child] = match place_in_chain.get(&number) {
-            Some(place) => {
+        owner[joint.child] = match index_in_chain.get(&number) {
+            Some(index) => {
                 found.push(ChainJoint {
                     joint,
                     axis: Unit::new_normalize(frame * joint.axis.into_inner()),
                     point: frame.translation.vector,
                     body: LumpedBody::default(),
                 });
-                Owner::Chosen(*place)
+                Owner::Chosen(*index)
             }
             None if joint.kind == Kind::Fixed || at.is_some() => before,
             None => Owner::Aside,
         };
-        if let (Owner::Chosen(place), Some(inertial)) =
+        if let (Owner::Chosen(index), Some(inertial)) =
             (owner[joint.child], &robot.links[joint.child].inertial)
         {
-            parts[place].push(in_root(&pose[joint.child], inertial));
+            parts[index].push(in_root(&pose[joint.child], inertial));
         }
     }
     for (joint, parts) in found.iter_mut().zip(&parts) {
@@ -216,7 +216,7 @@ fn chosen(robot: &Robot, names: &[String], locked: &HashMap<usize, f64>) -> Resu
         };
         return Err(robot.error(reason));
     }
-    for (place, number) in chosen.iter().enumerate() {
+    for (index, number) in chosen.iter().enumerate() {
         let joint = &robot.joints[*number];
         if !joint.kind.turns() {
             let reason = format!(
@@ -234,7 +234,7 @@ fn chosen(robot: &Robot, names: &[String], locked: &HashMap<usize, f64>) -> Resu
         if locked.contains_key(number) {
             return Err(robot.joint_error(joint, "is both chosen (--joints) and held (--lock)"));
         }
-        if chosen[..place].contains(number) {
+        if chosen[..index].contains(number) {
             return Err(robot.joint_error(joint, "is named twice by --joints"));
         }
     }
@@ -303,11 +303,11 @@ fn moved(joint: &Joint, at: f64) -> Isometry3<f64> {
 }
 
 fn in_root(pose: &Isometry3<f64>, inertial: &Inertial) -> LumpedBody {
-    let place = pose * inertial.place;
-    let turn = place.rotation.to_rotation_matrix();
+    let frame = pose * inertial.origin;
+    let turn = frame.rotation.to_rotation_matrix();
     LumpedBody {
         mass: inertial.mass,
-        centre: (place * Point3::origin()).coords,
+        centre: (frame * Point3::origin()).coords,
         tensor: turn.matrix() * inertial.tensor * turn.matrix().transpose(),
     }
 }

@@ -101,7 +101,8 @@ pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
 pub fn encoder_steps<T: Real, const N: usize>(leg: &LegFile) -> [T; N] {
     core::array::from_fn(|joint| {
         leg.joints.get(joint).map_or(T::zero(), |joint| {
-            T::of(TAU) / (T::of(f64::from(joint.encoder.counts)) * T::of(joint.encoder.ratio))
+            T::from_double(TAU)
+                / (T::from_double(f64::from(joint.encoder.counts)) * T::from_double(joint.encoder.ratio))
         })
     })
 }
@@ -113,7 +114,7 @@ fn chosen<T: Real, const N: usize, const B: usize>(
 ) -> RowModel<T, N, B> {
     let drive = |joint: usize| leg.joints.get(joint).map_or(DriveChoice::ALL, drive_choice);
     let stribeck = |joint: usize| leg.joints.get(joint).map_or(Choice::Off, stribeck_choice);
-    model.set_encoders(&encoder_steps(leg), T::of(leg.bandwidth_hz));
+    model.set_encoders(&encoder_steps(leg), T::from_double(leg.bandwidth_hz));
     RowModel {
         stribeck_choice: core::array::from_fn(stribeck),
         drive_choice: core::array::from_fn(drive),
@@ -249,7 +250,7 @@ pub fn background<const N: usize, const B: usize>(
         prior_name,
         truth: truth.map(|truth| prior_parameters(&truth)),
         temperature_c: leg.temperature_c,
-        requested: leg.joints.iter().map(TermSwitches::of).collect(),
+        requested: leg.joints.iter().map(TermSwitches::from_joint).collect(),
         stribeck_truth: core::array::from_fn(|joint| stribeck_truth(leg.joints.get(joint)?)),
     })
 }

@@ -84,7 +84,7 @@ struct Change {
 
 impl Size {
     /// Leg of this size.
-    pub fn of(&self, leg: &LegFile) -> Result<LegFile, ToolError> {
+    pub fn apply_to(&self, leg: &LegFile) -> Result<LegFile, ToolError> {
         if *self == Self::default() {
             return Ok(leg.clone());
         }
@@ -97,7 +97,7 @@ impl Size {
         // The reader of leg files has verified that there are two joints.
         let knee = leg.joints.len().saturating_sub(1);
         let before = old.wearer(leg.link_length(knee.saturating_sub(1)), old.wearer_kg);
-        let tall = self.wearer.map(|person| Wearer::of_height(person.mass, person.height));
+        let tall = self.wearer.map(|person| Wearer::from_height(person.mass, person.height));
         let thigh =
             self.length("thigh", self.thigh, tall.map(|wearer| wearer.thigh), before.thigh, THIGH_RANGE_M)?;
         let shank =

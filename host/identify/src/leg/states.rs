@@ -95,7 +95,7 @@ impl<const N: usize> States<N> {
     /// Error of a row whose torque exceeds the range of the number format.
     #[must_use]
     pub fn out_of_range(&self, row: usize) -> FileError {
-        refuse(&self.file, self.lines.of(row), Fault::OutOfRange)
+        refuse(&self.file, self.lines.line_of(row), Fault::OutOfRange)
     }
 }
 

@@ -32,7 +32,7 @@ fn placed(joint: &DhFile, angle: f64) -> (Matrix3<f64>, Vector3<f64>) {
 impl Stick {
     /// Figure of a leg.
     #[must_use]
-    pub fn of(leg: &LegFile) -> Self {
+    pub fn from_leg(leg: &LegFile) -> Self {
         let joints: Vec<DhFile> = leg.joints.iter().map(|joint| joint.dh).collect();
         let last = leg.joints.last();
         let along = last.and_then(|joint| joint.truth.as_ref().or(joint.prior.as_ref())).map(|link| link.com);
@@ -54,16 +54,16 @@ impl Stick {
 
     /// Joints and tip for angles of the chain, rad.
     pub fn points(&self, angles_rad: &[f64]) -> Vec<[f32; 2]> {
-        let (mut frame, mut place) = (Matrix3::identity(), Vector3::zeros());
+        let (mut frame, mut position) = (Matrix3::identity(), Vector3::zeros());
         let mut points = Vec::with_capacity(self.joints.len() + 1);
-        let seen = |place: &Vector3<f64>| self.view.map(|axis| axis.dot(place) as f32);
+        let seen = |position: &Vector3<f64>| self.view.map(|axis| axis.dot(position) as f32);
         for (joint, angle) in self.joints.iter().zip(angles_rad) {
             let (rotation, offset) = placed(joint, *angle);
-            place += frame * offset;
+            position += frame * offset;
             frame *= rotation;
-            points.push(seen(&place));
+            points.push(seen(&position));
         }
-        points.push(seen(&(place + frame * self.tip)));
+        points.push(seen(&(position + frame * self.tip)));
         points
     }
 }
@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn the_default_leg_hangs_and_bends_forwards_at_the_hip() {
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let stick = Stick::of(&leg);
+        let stick = Stick::from_leg(&leg);
         let thigh = leg.joints[1].dh.a as f32;
         let hanging = stick.points(&[0.0, 0.0]);
         assert_eq!(hanging[..2], [[0.0, 0.0], [0.0, thigh]]);
@@ -89,7 +89,7 @@ mod tests {
     fn every_shipped_leg_has_a_figure_with_links() {
         for (name, _) in SHIPPED_LEGS {
             let leg = LegFile::load(name).expect("shipped");
-            let points = Stick::of(&leg).points(&vec![0.3; leg.joints.len()]);
+            let points = Stick::from_leg(&leg).points(&vec![0.3; leg.joints.len()]);
             assert_eq!(points.len(), leg.joints.len() + 1, "{name}");
             let [.., before, tip] = points[..] else { panic!("{name}: {points:?}") };
             assert!((tip[0] - before[0]).hypot(tip[1] - before[1]) > 0.05, "{name}: {points:?}");

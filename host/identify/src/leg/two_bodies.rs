@@ -87,7 +87,7 @@ impl TwoBodies {
     /// # Errors
     /// The leg is not a hip and a knee, does not state its wearer, cannot be simulated, or has a link that is
     /// no physically consistent body without the wearer.
-    pub fn of(leg: &LegFile) -> Result<Self, ToolError> {
+    pub fn from_leg(leg: &LegFile) -> Result<Self, ToolError> {
         let segments = leg.segments.ok_or_else(|| {
             ToolError::input(format!(
                 "{}: the leg file does not state which part of its links is the wearer's; add the key `segments` \
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn exoskeleton_alone_has_the_parts_of_its_source() {
-        let bodies = TwoBodies::of(&default_leg()).expect("a worn leg");
+        let bodies = TwoBodies::from_leg(&default_leg()).expect("a worn leg");
         // M, HX, HY, ZZ of the parts in CORC's parameter file, about hip and knee.
         let expected = [
             [2.84, 0.70 * 0.0811 + 2.14 * 0.334_36, 0.0, 0.251_94],
@@ -211,7 +211,7 @@ mod tests {
     #[test]
     fn exoskeleton_and_wearer_need_the_leg_files_torque() {
         let leg = default_leg();
-        let bodies = TwoBodies::of(&leg).expect("a worn leg");
+        let bodies = TwoBodies::from_leg(&leg).expect("a worn leg");
         let wearer = bodies.wearer(MuscleTone::Relaxed);
         let mut again = bodies.exoskeleton.description::<2>().expect("simulated");
         for (joint, segment) in again.joints.iter_mut().zip([wearer.thigh, wearer.shank]) {
@@ -237,7 +237,7 @@ mod tests {
         let mut legs: Vec<LegFile> = [45.0, 75.0, 110.0].map(x2::leg_file).into();
         legs.push(on_side(&default_leg(), crate::formats::leg_file::BodySide::Left).expect("parallel axes"));
         for leg in legs {
-            let bodies = TwoBodies::of(&leg).expect("a worn leg");
+            let bodies = TwoBodies::from_leg(&leg).expect("a worn leg");
             let exoskeleton = &bodies.exoskeleton;
             assert_eq!(LegFile::parse(&exoskeleton.to_toml(), "alone").as_ref(), Ok(exoskeleton));
             for tone in [MuscleTone::Relaxed, MuscleTone::Firm, MuscleTone::Insisting] {
@@ -251,7 +251,7 @@ mod tests {
         let reason = |change: fn(&mut LegFile)| {
             let mut leg = default_leg();
             change(&mut leg);
-            TwoBodies::of(&leg).expect_err("refused").to_string()
+            TwoBodies::from_leg(&leg).expect_err("refused").to_string()
         };
         for (found, words) in [
             (reason(|leg| leg.segments = None), "add the key `segments`"),
@@ -269,9 +269,9 @@ mod tests {
     /// Root mean square deviation from the intended motion over that of the intended motion about its mean,
     /// with drives off, and the largest interaction torque, N m.
     fn deviation(motion: IntendedMotion) -> ([f64; 2], f64) {
-        let bodies = TwoBodies::of(&default_leg()).expect("a worn leg");
+        let bodies = TwoBodies::from_leg(&default_leg()).expect("a worn leg");
         let mut world = world(&bodies.exoskeleton);
-        world.place(&[0.4, 0.5]);
+        world.move_to(&[0.4, 0.5]);
         world.wear(&bodies.wearer(MuscleTone::Insisting)).expect("a hip and a knee");
         world.intend(Intention::Follow(motion)).expect("a valid motion");
         (0..8000).for_each(|_| world.advance());

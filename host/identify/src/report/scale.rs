@@ -54,7 +54,7 @@ pub struct MassReport {
 
 impl From<&Payload<f64>> for MassReport {
     fn from(payload: &Payload<f64>) -> Self {
-        Self { mass: payload.mass, joint: payload.joint + 1, place: payload.place.into() }
+        Self { mass: payload.mass, joint: payload.joint + 1, place: payload.position.into() }
     }
 }
 

@@ -62,7 +62,7 @@ pub(super) fn explain(model: &ModelFile, common: &Common) -> Vec<AddedMassReport
             let column = whitened(&|row| common.pairs[row].0.terms.get(&name).copied().unwrap_or(0.0))?;
             (column.norm() > 0.0).then_some((*parameter, column))
         });
-        let fit = Fit::of(&columns.collect::<Vec<_>>(), &difference);
+        let fit = Fit::new(&columns.collect::<Vec<_>>(), &difference);
         (!fit.parameters.is_empty()).then(|| fit.report(joint, rows.len()))
     };
     let mut found: Vec<(f64, AddedMassReport)> = (0..model.leg.joints.len()).filter_map(on_link).collect();
@@ -93,7 +93,7 @@ fn back(upper: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
 }
 
 impl Fit {
-    fn of(columns: &[(Parameter, Column)], difference: &Column) -> Self {
+    fn new(columns: &[(Parameter, Column)], difference: &Column) -> Self {
         let (mut parameters, mut basis, mut upper): (Vec<_>, Vec<Column>, Vec<Vec<f64>>) = Default::default();
         let (mut lengths, mut shared) = (Vec::new(), Vec::new());
         for (parameter, column) in columns {
@@ -136,7 +136,7 @@ impl Fit {
         }
     }
 
-    fn place(&self, parameter: Parameter) -> Option<usize> {
+    fn index_of(&self, parameter: Parameter) -> Option<usize> {
         let index = self.parameters.iter().position(|own| *own == parameter)?;
         self.determined[index].then_some(index)
     }
@@ -144,18 +144,19 @@ impl Fit {
     /// Criterion of Akaike, and the report.
     fn report(&self, joint: usize, rows: usize) -> (f64, AddedMassReport) {
         let known = |parameter| {
-            let index = self.place(parameter)?;
+            let index = self.index_of(parameter)?;
             Some((self.values[index], self.covariance[index][index].sqrt()))
         };
         let mass = known(Parameter::M);
         let moments = [Parameter::HX, Parameter::HY].map(known);
         let is_large = mass.is_some_and(|(mass, sigma)| mass.abs() > LEAST_SIGMAS * sigma);
-        let places = [Parameter::HX, Parameter::HY].map(|parameter| {
-            let (moment, mass) = (self.place(parameter)?, self.place(Parameter::M).filter(|_| is_large)?);
-            let place = self.values[moment] / self.values[mass];
-            let variance = self.covariance[moment][moment] - 2.0 * place * self.covariance[moment][mass]
-                + place * place * self.covariance[mass][mass];
-            Some((place, variance.max(0.0).sqrt() / self.values[mass].abs()))
+        let positions = [Parameter::HX, Parameter::HY].map(|parameter| {
+            let (moment, mass) =
+                (self.index_of(parameter)?, self.index_of(Parameter::M).filter(|_| is_large)?);
+            let position = self.values[moment] / self.values[mass];
+            let variance = self.covariance[moment][moment] - 2.0 * position * self.covariance[moment][mass]
+                + position * position * self.covariance[mass][mass];
+            Some((position, variance.max(0.0).sqrt() / self.values[mass].abs()))
         });
         let first = |pair: Option<(f64, f64)>| Number::from(pair.map(|(value, _)| value));
         let second = |pair: Option<(f64, f64)>| Number::from(pair.map(|(_, sigma)| sigma));
@@ -166,8 +167,8 @@ impl Fit {
             mass_sigma_kg: second(mass),
             moment_kgm: moments.map(first),
             moment_sigma_kgm: moments.map(second),
-            place_m: places.map(first),
-            place_sigma_m: places.map(second),
+            place_m: positions.map(first),
+            place_sigma_m: positions.map(second),
             chi2: self.chi2.max(0.0),
             chi2_limit: if rows > count { quantile(rows - count) } else { 0.0 },
         };

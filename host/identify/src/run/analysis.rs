@@ -194,7 +194,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             stribeck: self.stribeck(solver, &estimate.values),
             selection: record.selection,
             torque_rms: core::array::from_fn(|joint| record.torque[joint].root_mean_square),
-            outliers: OutliersReport::of(record, estimator_name(circumstances.estimator)),
+            outliers: OutliersReport::from_record(record, estimator_name(circumstances.estimator)),
             training: fits(training, &estimate.values),
             validation: fits(validation, &estimate.values),
             least_squares: squares.values.map(Number::from),
@@ -292,7 +292,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     fn stribeck(&self, solver: &Solver<f32, N, B>, values: &[f32; B]) -> Vec<StribeckReport> {
         let found = solver.record().stribeck.iter().enumerate();
-        found.filter_map(|(joint, fit)| Some(StribeckReport::of(joint, fit.as_ref()?, values))).collect()
+        found.filter_map(|(joint, fit)| Some(StribeckReport::new(joint, fit.as_ref()?, values))).collect()
     }
 
     /// Static friction above Coulomb friction, for joints with a true or identified surplus.

@@ -38,14 +38,14 @@ pub(super) struct Common<'a> {
 }
 
 impl<'a> Common<'a> {
-    fn of(stored: &'a BaseSet, found: &BaseSet) -> Self {
+    fn new(stored: &'a BaseSet, found: &BaseSet) -> Self {
         let same = |one: &StoredBase, other: &StoredBase| {
             one.terms.len() == other.terms.len()
                 && one.terms.iter().all(|(name, factor)| {
                     other.terms.get(name).is_some_and(|own| (own - factor).abs() <= 1e-6)
                 })
         };
-        let places: Vec<(usize, usize)> = found
+        let matches: Vec<(usize, usize)> = found
             .parameters
             .iter()
             .enumerate()
@@ -57,22 +57,25 @@ impl<'a> Common<'a> {
             let rest = bases.iter().enumerate().filter(|(index, _)| !compared(*index));
             rest.map(|(_, base)| base.name.clone()).collect()
         };
-        let mut not_compared =
-            alone(&stored.parameters, &|place| places.iter().any(|(other, _)| *other == place));
+        let mut not_compared = alone(&stored.parameters, &|stored_index| {
+            matches.iter().any(|(other, _)| *other == stored_index)
+        });
         not_compared
-            .extend(alone(&found.parameters, &|index| places.iter().any(|(_, other)| *other == index)));
+            .extend(alone(&found.parameters, &|index| matches.iter().any(|(_, other)| *other == index)));
         not_compared.sort();
         not_compared.dedup();
         let element = |one: &(usize, usize), other: &(usize, usize)| {
             stored.covariance[one.0][other.0] + found.covariance[one.1][other.1]
         };
-        let row = |one| places.iter().map(|other| element(one, other)).collect();
+        let row = |one| matches.iter().map(|other| element(one, other)).collect();
         Self {
-            pairs: places
+            pairs: matches
                 .iter()
-                .map(|&(place, index)| (&stored.parameters[place], found.parameters[index].value))
+                .map(|&(stored_index, index)| {
+                    (&stored.parameters[stored_index], found.parameters[index].value)
+                })
                 .collect(),
-            covariance: places.iter().map(row).collect(),
+            covariance: matches.iter().map(row).collect(),
             not_compared,
         }
     }
@@ -86,7 +89,7 @@ pub fn compare(
     found: &BaseSet,
     temperature_c: Option<f64>,
 ) -> Option<ComparisonReport> {
-    let common = Common::of(&model.base_set, found);
+    let common = Common::new(&model.base_set, found);
     let count = common.pairs.len();
     let covariance = |row: usize, column: usize| common.covariance[row][column];
     let sigma: Vec<f64> = (0..count).map(|row| covariance(row, row).sqrt()).collect();

@@ -8,7 +8,10 @@ use crate::report::disturbances::{OutliersReport, StribeckReport};
 impl OutliersReport {
     /// Report of a training motion's record.
     #[must_use]
-    pub fn of<const N: usize, const B: usize>(record: &Record<f32, N, B>, estimator: &'static str) -> Self {
+    pub fn from_record<const N: usize, const B: usize>(
+        record: &Record<f32, N, B>,
+        estimator: &'static str,
+    ) -> Self {
         let outliers = &record.outliers;
         Self {
             estimator,
@@ -24,7 +27,7 @@ impl OutliersReport {
 impl StribeckReport {
     /// Report of an identified Stribeck curve with these base parameters.
     #[must_use]
-    pub fn of<const B: usize>(joint: usize, fit: &StribeckFit<f32, B>, values: &[f32; B]) -> Self {
+    pub fn new<const B: usize>(joint: usize, fit: &StribeckFit<f32, B>, values: &[f32; B]) -> Self {
         Self {
             joint: joint + 1,
             surplus_nm: fit.surplus(values).into(),

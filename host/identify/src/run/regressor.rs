@@ -55,7 +55,7 @@ fn table_of<const N: usize>(
     states: &Path,
     options: &RegressorOptions,
 ) -> Result<String, ToolError> {
-    let bodies = Bodies::<N>::of(leg)?;
+    let bodies = Bodies::<N>::from_leg(leg)?;
     let to_chain = options.angles.to_chain::<N>(leg)?;
     let states = States::read(states, &to_chain)?;
     let mut out = header::<N>();
@@ -92,7 +92,7 @@ struct Bodies<const N: usize> {
 }
 
 impl<const N: usize> Bodies<N> {
-    fn of(leg: &LegFile) -> Result<Self, ToolError> {
+    fn from_leg(leg: &LegFile) -> Result<Self, ToolError> {
         let truth = links::<N>(leg, |joint| joint.truth.as_ref());
         let parameters = truth.or_else(|| links::<N>(leg, |joint| joint.prior.as_ref()));
         Ok(Self {
@@ -105,11 +105,11 @@ impl<const N: usize> Bodies<N> {
     /// Computes one line of the table in precision `T`.
     fn row<T: Real>(&self, state: &JointState<f64, N>) -> Row<N> {
         let chain = self.chain.convert::<T>();
-        let gravity = self.gravity.map(T::of);
-        let [q, qd, qdd] = [state.q, state.qd, state.qdd].map(|numbers| numbers.map(T::of));
+        let gravity = self.gravity.map(T::from_double);
+        let [q, qd, qdd] = [state.q, state.qd, state.qdd].map(|numbers| numbers.map(T::from_double));
         let state = JointState { q, qd, qdd };
         let torques = self.parameters.map(|parameters| {
-            rigid_body_torques(&chain, &parameters.map(|joint| joint.map(T::of)), &state, &gravity)
+            rigid_body_torques(&chain, &parameters.map(|joint| joint.map(T::from_double)), &state, &gravity)
         });
         let elements = regressor(&chain, &state, &gravity)
             .map(|row| row.map(|link| core::array::from_fn(|column| link[column].to_double())));

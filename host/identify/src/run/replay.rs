@@ -86,7 +86,7 @@ pub struct ReplayOptions {
 impl ReplayOptions {
     /// Defaults for a leg: its bandwidth and prior, one-time, robust, nothing held out.
     #[must_use]
-    pub fn of(leg: &LegFile) -> Self {
+    pub fn from_leg(leg: &LegFile) -> Self {
         Self {
             split: None,
             bandwidth_hz: leg.bandwidth_hz,
@@ -160,7 +160,7 @@ pub fn replay<const N: usize, const B: usize>(
     replayed.run.read.get_or_insert_default().extend(read);
     replayed.warnings.extend(warnings);
     let used = core::array::from_fn(|joint| leg.joints[joint].torque_per_ampere);
-    replayed.run.scale = ScaleReport::of(&scale, &used);
+    replayed.run.scale = ScaleReport::new(&scale, &used);
     Ok(replayed)
 }
 
@@ -190,7 +190,7 @@ fn identified<const N: usize, const B: usize>(
     encoders.describe(leg, options.bandwidth_hz, &mut background.device);
     let noise = [&parts.training, &parts.held_out].map(|part| noise_density::<N>(part, options.bandwidth_hz));
     let [training, held_out] = [&parts.training, &parts.held_out].map(|part| {
-        let samples = part.iter().map(|file| Samples::of(file, &anatomy, options, &parts.screening));
+        let samples = part.iter().map(|file| Samples::new(file, &anatomy, options, &parts.screening));
         samples.collect::<Vec<_>>()
     });
     let mut warnings = doubts(leg, &parts, training.iter().chain(&held_out));

@@ -91,7 +91,7 @@ impl Resampled {
     /// The first grid point is the first sample, for bin means half a period later. The last one is
     /// the last that the recording covers. A recording already on the grid is returned unchanged,
     /// except for rounding of its stamps.
-    pub fn of(recording: &Recording) -> Self {
+    pub fn new(recording: &Recording) -> Self {
         let time = &recording.time_s;
         let (step, period) = (recording.median_step_s(), 1.0 / GRID_RATE_HZ);
         let method = if step < DENSE_STEP * period { Method::BinMean } else { Method::CatmullRom };

@@ -45,7 +45,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
 impl BaseSet {
     /// Base parameters of a run that have a value and a sigma, without Stribeck friction.
     #[must_use]
-    pub fn of(run: &RunReport) -> Self {
+    pub fn from_run(run: &RunReport) -> Self {
         let detail = &run.detail;
         let stored = run.base_parameters.iter().zip(&detail.carriers).enumerate();
         let (kept, parameters): (Vec<usize>, Vec<StoredBase>) = stored
@@ -70,9 +70,9 @@ impl ModelFile {
     /// Model of an accepted run with its bandwidth (Hz), dated now. `None` if the run was rejected:
     /// a wrong model is not stored.
     #[must_use]
-    pub fn of(leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Option<Self> {
+    pub fn from_run(leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Option<Self> {
         let leg = &with_identified_constants(leg, run);
-        let base_set = BaseSet::of(run);
+        let base_set = BaseSet::from_run(run);
         if !run.accepted() || base_set.parameters.len() != run.detail.carriers.len() {
             return None;
         }

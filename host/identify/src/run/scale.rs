@@ -57,7 +57,7 @@ pub fn loaded<const N: usize, const B: usize>(scale: Option<&Scale<N, B>>, value
 impl ScaleReport {
     /// Results with the torque constants `used`, N m/A.
     #[must_use]
-    pub fn of<const N: usize, const B: usize>(scale: &Scale<N, B>, used: &[f64; N]) -> Self {
+    pub fn new<const N: usize, const B: usize>(scale: &Scale<N, B>, used: &[f64; N]) -> Self {
         let of = |joint: usize, ratio: &Option<ConstantRatio<f32>>| {
             let used = used[joint];
             let (found, sigma) =

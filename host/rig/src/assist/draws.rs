@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn drawn_wearers_and_exoskeletons_are_permitted_and_differ() {
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let bodies = TwoBodies::of(&leg).expect("a worn leg");
+        let bodies = TwoBodies::from_leg(&leg).expect("a worn leg");
         let mut masses = Vec::new();
         for seed in 1..=200 {
             let drawn = exoskeleton(&bodies.exoskeleton, seed);

@@ -63,7 +63,7 @@ fn mistaken<const B: usize>(
     let scale = if variance > 0.0 { MODEL_ERROR_SIGMAS / variance.sqrt() } else { 0.0 };
     let values = core::array::from_fn(|base| values[base] + (scale * moved[base]) as f32);
     let estimate = Estimate { values, ..models.estimate.clone() };
-    IdentifiedModel::of_estimate(&context.configuration.model, &estimate)
+    IdentifiedModel::from_estimate(&context.configuration.model, &estimate)
 }
 
 /// Energy given in one run, J.
@@ -129,7 +129,7 @@ fn oscillates<const B: usize>(
     seed: u64,
 ) -> Result<bool, ToolError> {
     let exoskeleton = draws::exoskeleton(&subject.exoskeleton, seed);
-    let context = Context::<2, B>::new(&exoskeleton, &SimulationOptions::of_seed(seed))?;
+    let context = Context::<2, B>::new(&exoskeleton, &SimulationOptions::with_seed(seed))?;
     let truth = context.background.truth.as_ref().ok_or_else(|| exoskeleton.error("has no `truth`"))?;
     let model = certain(&context, truth);
     let steps: Vec<f64> = exoskeleton.joints.iter().map(|joint| joint.encoder.step_rad()).collect();

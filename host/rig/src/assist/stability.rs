@@ -147,7 +147,7 @@ type SampleMap = SMatrix<f64, STATES, STATES>;
 const HELD_DECAY: f64 = 1000.0;
 
 impl Pair {
-    fn of(self, state: &LoopState) -> Vector2<f64> {
+    fn get(self, state: &LoopState) -> Vector2<f64> {
         state.fixed_rows::<2>(2 * self as usize).into_owned()
     }
 
@@ -220,23 +220,23 @@ impl CompensationLoop {
     /// Runs the eight ticks of a sample.
     fn advance(&self, state: &mut LoopState, compensated: Compensated) {
         for tick in 1..=TICKS {
-            let torque = Pair::Torque.of(state) + Pair::Slope.of(state);
+            let torque = Pair::Torque.get(state) + Pair::Slope.get(state);
             Pair::Torque.set(state, torque);
-            let friction = self.viscous.component_mul(&Pair::Velocity.of(state));
+            let friction = self.viscous.component_mul(&Pair::Velocity.get(state));
             let inertia = self.inertia * led_acceleration(state);
             let target = torque + compensated.friction * friction + compensated.inertia * inertia;
             let angle: Vector2<f64> = state.fixed_rows::<2>(FIRMWARE).into_owned();
             observe(state, angle);
-            let sum = Pair::Sum.of(state) + angle;
+            let sum = Pair::Sum.get(state) + angle;
             Pair::Sum.set(state, sum);
             if tick == TICKS {
                 let weight = self.gravity * sum / TICKS as f64;
-                let wanted = weight + AHEAD_SAMPLES * (weight - Pair::Weight.of(state));
+                let wanted = weight + AHEAD_SAMPLES * (weight - Pair::Weight.get(state));
                 Pair::Weight.set(state, weight);
                 Pair::Slope.set(state, (wanted - torque) / TICKS as f64);
                 Pair::Sum.set(state, Vector2::zeros());
             }
-            let drive = Pair::Drive.of(state);
+            let drive = Pair::Drive.get(state);
             let next = target + self.remainder.component_mul(&(drive - target));
             Pair::Drive.set(state, next);
             let plant = state.fixed_rows::<PLANT>(FIRMWARE).into_owned();
@@ -292,8 +292,8 @@ impl CompensationLoop {
 /// Runs the observers for a tick.
 fn observe(state: &mut LoopState, angle: Vector2<f64>) {
     let beta: f64 = (-TAU * OBSERVER_HZ * TICK_S).exp();
-    let rate = Pair::Velocity.of(state);
-    let predicted = Pair::Position.of(state) + TICK_S * rate;
+    let rate = Pair::Velocity.get(state);
+    let predicted = Pair::Position.get(state) + TICK_S * rate;
     let error = angle - predicted;
     let gain = (1.0 - beta) * (1.0 - beta) / TICK_S;
     Pair::Position.set(state, predicted + (1.0 - beta * beta) * error);
@@ -303,17 +303,17 @@ fn observe(state: &mut LoopState, angle: Vector2<f64>) {
 /// Runs the differentiators for a tick; returns the acceleration with its lead.
 fn led_acceleration(state: &mut LoopState) -> Vector2<f64> {
     let corner = (PI * CORNER_HZ * TICK_S).tan();
-    let (band, low) = (Pair::Band.of(state), Pair::Low.of(state));
+    let (band, low) = (Pair::Band.get(state), Pair::Low.get(state));
     let scale = 1.0 / (1.0 + 2.0 * DAMPING_RATIO * corner + corner * corner);
-    let high = scale * (Pair::Position.of(state) - (2.0 * DAMPING_RATIO + corner) * band - low);
+    let high = scale * (Pair::Position.get(state) - (2.0 * DAMPING_RATIO + corner) * band - low);
     let middle = corner * high + band;
     Pair::Band.set(state, band + 2.0 * corner * high);
     Pair::Low.set(state, low + 2.0 * corner * middle);
     let rate = 2.0 * corner / TICK_S;
     let now = rate * rate * high;
-    let change = (now - Pair::Acceleration.of(state)) / TICK_S;
+    let change = (now - Pair::Acceleration.get(state)) / TICK_S;
     Pair::Acceleration.set(state, now);
-    let jerk = Pair::Jerk.of(state);
+    let jerk = Pair::Jerk.get(state);
     let jerk = change + (-TAU * LEAD_HZ * TICK_S).exp() * (jerk - change);
     Pair::Jerk.set(state, jerk);
     now + f64::from(LEAD_S) * jerk

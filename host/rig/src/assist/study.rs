@@ -100,7 +100,7 @@ struct SeedResult<const B: usize> {
 /// The leg has no wearer to be taken off, cannot be simulated, or its drive stops.
 pub fn study(leg: &LegFile, options: &AssistOptions) -> Result<AssistReport, ToolError> {
     // Before the number of base parameters, whose absence has less telling reasons.
-    let _ = TwoBodies::of(leg)?;
+    let _ = TwoBodies::from_leg(leg)?;
     match base_rank(leg) {
         0..=13 => study_sized::<13>(leg, options),
         _ => study_sized::<18>(leg, options),
@@ -108,7 +108,7 @@ pub fn study(leg: &LegFile, options: &AssistOptions) -> Result<AssistReport, Too
 }
 
 fn study_sized<const B: usize>(leg: &LegFile, options: &AssistOptions) -> Result<AssistReport, ToolError> {
-    let bodies = TwoBodies::of(leg)?;
+    let bodies = TwoBodies::from_leg(leg)?;
     let (first, last) = options.seeds;
     let results: Vec<Result<SeedResult<B>, RefusedReport>> = (first..=last)
         .into_par_iter()

@@ -78,8 +78,8 @@ impl<const B: usize> Subject<B> {
         cuffs: &Cuffs,
         seed: u64,
     ) -> Result<Result<Self, RefusedReport>, ToolError> {
-        let bodies = TwoBodies::of(leg)?;
-        let options = SimulationOptions::of_seed(seed);
+        let bodies = TwoBodies::from_leg(leg)?;
+        let options = SimulationOptions::with_seed(seed);
         let noise = Context::<2, B>::new(leg, &options)?.noise;
         let worn_leg = leg.clone().with_torque_noise(&noise);
         let exoskeleton = bodies.exoskeleton.clone().with_torque_noise(&noise);

@@ -86,7 +86,7 @@ impl<'a, const B: usize> Stage<'a, B> {
         let (leg, context) = (&subject.exoskeleton, &subject.context);
         let mut pair = Pair::new(leg, context, subject.seed)?;
         if let Some(posture) = posture {
-            pair.world.place(&posture);
+            pair.world.move_to(&posture);
             pair.sample = LegDrives::sample(&mut pair.world);
         }
         pair.world.wear(wearer).map_err(|error| leg.error(error.to_string()))?;

@@ -213,8 +213,8 @@ impl<const N: usize> Levels<N> {
             (self.loops.axis_state(one).copied(), self.loops.axis_state(other).copied())
         {
             for (axis, stage) in [(one, second), (other, first)] {
-                if let Some(place) = self.loops.axis_state_mut(axis) {
-                    *place = stage;
+                if let Some(slot) = self.loops.axis_state_mut(axis) {
+                    *slot = stage;
                 }
             }
         }
@@ -297,7 +297,7 @@ impl<const N: usize> Levels<N> {
     /// Watch, level 6, at the end of each period: guard of the current ticks, and the watchdog's check.
     pub fn watch(&mut self, period: u64) {
         if period.is_multiple_of(PERIODS_PER_LOOK) {
-            self.watch.look(&self.signals, &mut self.registers);
+            self.watch.check(&self.signals, &mut self.registers);
         }
     }
 

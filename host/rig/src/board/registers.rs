@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use hal_sim::faults::{Channel, Injector};
 use hal_sim::world::World;
 use scarab::board::odrive_v3_6::settings::analog::temperature_c;
-use scarab::hal::{AxisCommand, Contacts, Controller, EncoderPlace, Frame, Hardware};
+use scarab::hal::{AbsoluteEncoderSide, AxisCommand, Contacts, Controller, Frame, Hardware};
 
 use scarab_client::wire::Mailbox;
 
@@ -205,8 +205,8 @@ impl<const N: usize> Hardware<N> for Registers<N> {
         self.encoders[axis]
     }
 
-    fn encoder_frame(&mut self, axis: usize, place: EncoderPlace) -> u16 {
-        self.encoder_frames[axis][place as usize]
+    fn encoder_frame(&mut self, axis: usize, side: AbsoluteEncoderSide) -> u16 {
+        self.encoder_frames[axis][side as usize]
     }
 
     fn temperature(&self, axis: usize) -> Option<f32> {

@@ -148,11 +148,11 @@ impl Adapter {
         true
     }
 
-    fn remove(&mut self, place: usize) {
-        if let Some(waiting) = self.queue.remove(place) {
+    fn remove(&mut self, index: usize) {
+        if let Some(waiting) = self.queue.remove(index) {
             self.bits -= u64::from(bits(&waiting.frame));
             self.stops -= usize::from(waiting.is_stop);
-            self.leaving -= usize::from(place < self.leaving);
+            self.leaving -= usize::from(index < self.leaving);
         }
     }
 
@@ -339,9 +339,9 @@ mod tests {
         let dropped = bench.adapter.take_dropped();
         assert_eq!(dropped, Dropped { refused: 1, displaced: 1, old: 0 });
         // A stop is never refused, and the queue stays bounded.
-        for place in 0..10_000_u32 {
-            let [low, high, ..] = (place << 4).to_le_bytes();
-            assert!(bench.push(0x201, &[low, high]) && bench.push(0, &[2, (place % 128) as u8]));
+        for number in 0..10_000_u32 {
+            let [low, high, ..] = (number << 4).to_le_bytes();
+            assert!(bench.push(0x201, &[low, high]) && bench.push(0, &[2, (number % 128) as u8]));
         }
         assert!((1000..2000).contains(&bench.adapter.waiting()), "{}", bench.adapter.waiting());
         for (id, data) in [(0x202, &[0, 0][..]), (0x601, &[0x2B, 0x40, 0x60, 0, 0, 0, 0, 0])] {

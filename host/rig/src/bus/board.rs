@@ -31,9 +31,9 @@ use scarab_identify::formats::leg_file::{EncoderFile, LegFile};
 
 use crate::bus::storing::Flashing;
 use crate::faulty_board::Rig;
-use crate::kept_file::memory::{Memory, model_name};
 use crate::operator;
 use crate::pair::Context;
+use crate::parameter_file::memory::{Memory, model_name};
 
 /// Length of a servo tick, ns.
 pub const TICK_NS: u64 = 1_000_000_000 / SERVO_RATE_HZ as u64;
@@ -93,7 +93,7 @@ fn device<const N: usize, const B: usize>(
     let configuration = &context.configuration;
     let constants = core::array::from_fn(|joint| {
         let encoder = &encoders[joint];
-        AxisConstants::of(
+        AxisConstants::new(
             &configuration.joints[joint],
             encoder.counts,
             encoder.ratio as f32,
@@ -255,7 +255,8 @@ impl<const N: usize, const B: usize> Board<N, B> {
             if let Slice::Judged(Some(model)) = core::mem::replace(&mut self.rig.slice, Slice::Idle) {
                 let (identification, level) = (self.rig.leg.identification(), &self.rig.board);
                 let (configuration, seed) = (&self.context.configuration, level.seed());
-                let record = ModelRecord::of(configuration, identification, &model, 0, seed, level.wearing());
+                let record =
+                    ModelRecord::new(configuration, identification, &model, 0, seed, level.wearing());
                 self.flashing.accept(record);
             }
             if self.rig.board.registers.bus_due {

@@ -77,7 +77,7 @@ fn sync_of(mut node: Node, now_us: u64) -> u16 {
 
 impl Effect {
     /// Returns the effect of a frame on these nodes.
-    pub fn of<'a>(frame: &Frame, nodes: impl Iterator<Item = &'a Node>, now_us: u64) -> Self {
+    pub fn from_frame<'a>(frame: &Frame, nodes: impl Iterator<Item = &'a Node>, now_us: u64) -> Self {
         if frame.id() == NMT {
             // Other lengths are no command.
             return if frame.data().len() == 2 { Self::Stop } else { Self::Other };
@@ -135,8 +135,8 @@ mod tests {
         }
     }
 
-    fn of(node: &Node, id: u16, data: &[u8]) -> Effect {
-        Effect::of(&Frame::new(id, data), [node].into_iter(), 0)
+    fn effect_of(node: &Node, id: u16, data: &[u8]) -> Effect {
+        Effect::from_frame(&Frame::new(id, data), [node].into_iter(), 0)
     }
 
     #[test]
@@ -153,21 +153,21 @@ mod tests {
             (0x10F, Effect::SetPoint),
         ] {
             let [low, high] = u16::to_le_bytes(word);
-            assert_eq!(of(&node, 0x201, &[low, high]), effect, "PDO, {word:x}");
+            assert_eq!(effect_of(&node, 0x201, &[low, high]), effect, "PDO, {word:x}");
             let download = [0x2B, 0x40, 0x60, 0, low, high, 0, 0];
-            assert_eq!(of(&node, 0x601, &download), effect, "SDO, {word:x}");
+            assert_eq!(effect_of(&node, 0x601, &download), effect, "SDO, {word:x}");
         }
-        assert_eq!(of(&node, 0, &[129, 0]), Effect::Stop);
-        assert_eq!(of(&node, 0, &[129, 0, 0]), Effect::Other);
-        assert_eq!(of(&node, 0x80, &[]), Effect::Other);
+        assert_eq!(effect_of(&node, 0, &[129, 0]), Effect::Stop);
+        assert_eq!(effect_of(&node, 0, &[129, 0, 0]), Effect::Other);
+        assert_eq!(effect_of(&node, 0x80, &[]), Effect::Other);
         // Reading, a heartbeat, and the controlword of another node have no effect here.
         for (id, data) in [(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0][..]), (0x750, &[5]), (0x202, &[15, 0])]
         {
-            assert_eq!(of(&node, id, data), Effect::Other, "{id:x}");
+            assert_eq!(effect_of(&node, id, data), Effect::Other, "{id:x}");
         }
         // Identification: start, cancel.
-        assert_eq!(of(&node, 0x601, &[0x2F, 0, 0x21, 1, 1, 0, 0, 0]), Effect::SetPoint);
-        assert_eq!(of(&node, 0x601, &[0x2F, 0, 0x21, 1, 2, 0, 0, 0]), Effect::Stop);
+        assert_eq!(effect_of(&node, 0x601, &[0x2F, 0, 0x21, 1, 1, 0, 0, 0]), Effect::SetPoint);
+        assert_eq!(effect_of(&node, 0x601, &[0x2F, 0, 0x21, 1, 2, 0, 0, 0]), Effect::Stop);
     }
 
     #[test]
@@ -182,16 +182,16 @@ mod tests {
         write(&mut node, 0x1600, 2, 0x6040_0010, 4);
         write(&mut node, 0x1600, 0, 2, 1);
         write(&mut node, 0x1400, 1, 0x345, 4);
-        assert_eq!(of(&node, 0x345, &[1, 2, 3, 4, 0, 0]), Effect::Stop);
-        assert_eq!(of(&node, 0x345, &[1, 2, 3, 4, 15, 0]), Effect::SetPoint);
-        assert_eq!(of(&node, 0x201, &[0, 0]), Effect::Other);
-        assert_eq!(of(&node, 0x6A0, &[]), Effect::Other);
+        assert_eq!(effect_of(&node, 0x345, &[1, 2, 3, 4, 0, 0]), Effect::Stop);
+        assert_eq!(effect_of(&node, 0x345, &[1, 2, 3, 4, 15, 0]), Effect::SetPoint);
+        assert_eq!(effect_of(&node, 0x201, &[0, 0]), Effect::Other);
+        assert_eq!(effect_of(&node, 0x6A0, &[]), Effect::Other);
         // A waiting controlword is an effect of the SYNC, not of the next frame.
         receive(&mut node, 0x345, &[1, 2, 3, 4, 15, 0]);
-        assert_eq!(of(&node, 0x6A0, &[]), Effect::SetPoint);
-        assert_eq!(of(&node, 0x80, &[]), Effect::Other);
+        assert_eq!(effect_of(&node, 0x6A0, &[]), Effect::SetPoint);
+        assert_eq!(effect_of(&node, 0x80, &[]), Effect::Other);
         receive(&mut node, 0x345, &[1, 2, 3, 4, 0, 0]);
-        assert_eq!(of(&node, 0x6A0, &[]), Effect::Stop);
-        assert_eq!(of(&node, 0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), Effect::Other);
+        assert_eq!(effect_of(&node, 0x6A0, &[]), Effect::Stop);
+        assert_eq!(effect_of(&node, 0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), Effect::Other);
     }
 }

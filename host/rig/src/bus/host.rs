@@ -66,16 +66,16 @@ pub fn compact_mapping(joint: usize) -> Vec<(u16, u8, u32, u8)> {
     let mut targets = [0x0007_0020; JOINTS];
     targets[joint] = 0x607A_0020;
     let mut writes: Vec<_> = (1..4)
-        .map(|place| (0x1800 + place, 1, UNUSED | u32::from(0x180 + 0x100 * place + node), 4))
+        .map(|index| (0x1800 + index, 1, UNUSED | u32::from(0x180 + 0x100 * index + node), 4))
         .collect();
     let feedback = [0x6041_0010, 0x6064_0020, 0x2010_0010];
-    for (place, identifier, objects) in
+    for (index, identifier, objects) in
         [(0x1800, u32::from(0x180 + node), &feedback[..]), (0x1401, TARGETS.into(), &targets)]
     {
-        let mapping = place + 0x200;
-        writes.extend([(place, 1, UNUSED | identifier, 4), (mapping, 0, 0, 1), (place, 2, 1, 1)]);
+        let mapping = index + 0x200;
+        writes.extend([(index, 1, UNUSED | identifier, 4), (mapping, 0, 0, 1), (index, 2, 1, 1)]);
         writes.extend((1..).zip(objects).map(|(sub, object)| (mapping, sub, *object, 4)));
-        writes.extend([(mapping, 0, objects.len() as u32, 1), (place, 1, identifier, 4)]);
+        writes.extend([(mapping, 0, objects.len() as u32, 1), (index, 1, identifier, 4)]);
     }
     writes
 }
@@ -91,7 +91,7 @@ pub struct Host {
     pub cycle: u64,
     ticks: u64,
     /// Last reported joint positions, start and amplitude of the motion, all in micro-radian.
-    places: [i32; JOINTS],
+    positions: [i32; JOINTS],
     from: Option<[f64; JOINTS]>,
     way: [f64; JOINTS],
     /// End of the last heartbeat and of the last targets on the wire.
@@ -116,7 +116,7 @@ impl Host {
             network: Network::new(vec![board], 1_000_000),
             speaks: Speaks { targets: false, words: false, heartbeat: 0 },
             ticks: 0,
-            places: [0; JOINTS],
+            positions: [0; JOINTS],
             from: None,
             way: [0.0; JOINTS],
             cycle: CYCLE,
@@ -150,7 +150,7 @@ impl Host {
             let share = 0.5 - 0.5 * (TAU * RATE_HZ * seconds).cos();
             // Until the leg is enabled, the targets are the present positions.
             let targets = match self.from {
-                None => self.places,
+                None => self.positions,
                 Some(from) => [0, 1].map(|joint| (from[joint] + share * self.way[joint]) as i32),
             };
             let targets = targets.map(i32::to_le_bytes).concat();
@@ -164,7 +164,7 @@ impl Host {
             self.network.send(Frame::new(HEARTBEAT + NUMBER, &[5]));
         }
         let (sent_ns, answers, cyclic_ns) = (&mut self.sent_ns, &mut self.answers, &mut self.cyclic_ns);
-        let (emergencies, places) = (&mut self.emergencies, &mut self.places);
+        let (emergencies, positions) = (&mut self.emergencies, &mut self.positions);
         let show = |sent: &Sent| {
             let id = sent.frame.id();
             match (sent.sender, id) {
@@ -183,10 +183,10 @@ impl Host {
                     }
                 }
                 (_, 0x181 | 0x182) => {
-                    if let ([_, _, a, b, c, d, ..], Some(place)) =
-                        (sent.frame.data(), places.get_mut(usize::from(id - 0x181)))
+                    if let ([_, _, a, b, c, d, ..], Some(position)) =
+                        (sent.frame.data(), positions.get_mut(usize::from(id - 0x181)))
                     {
-                        *place = i32::from_le_bytes([*a, *b, *c, *d]);
+                        *position = i32::from_le_bytes([*a, *b, *c, *d]);
                     }
                 }
                 (_, 0x581..=0x5FF) => answers.push_back(sent.frame),
@@ -225,7 +225,7 @@ impl Host {
     }
 
     /// Sets the targets to the present positions from now on.
-    pub fn follow_places(&mut self) {
+    pub fn follow_positions(&mut self) {
         self.from = None;
     }
 
@@ -282,7 +282,7 @@ impl Host {
             NODES.into_iter().for_each(|node| self.command(node, word));
             self.run(4 * CYCLE);
         }
-        let from = self.places.map(f64::from);
+        let from = self.positions.map(f64::from);
         for ((way, from), joint) in self.way.iter_mut().zip(from).zip(&leg.joints) {
             let [low, high] = joint.range_deg.map(f64::to_radians);
             *way = 1e6 * WAY_RAD * (0.5e6 * (low + high) - from).signum();
@@ -333,15 +333,15 @@ impl Bus for Host {
 mod tests {
     use super::*;
     use crate::bus::board::Label;
-    use crate::kept_file::memory::Memory;
     use crate::options::{DriveModel, SimulationOptions};
     use crate::pair::Context;
+    use crate::parameter_file::memory::Memory;
     use scarab::hal::SERVO_RATE_HZ;
     use scarab::leg::Wearing;
     use scarab_identify::formats::leg_file::DEFAULT_LEG;
 
     fn host(leg: &LegFile) -> Host {
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
         let context = Context::<JOINTS, BASE>::new(leg, &options).expect("a leg");
         Host::new(Board::new(leg, context, 1, Label::SINGLE, Memory::new(None)).expect("a board"))
     }
@@ -425,16 +425,16 @@ mod tests {
         let mut host = host(&leg);
         host.begin().expect("nodes that answer");
         host.move_leg(&leg).expect("a leg that follows");
-        let place = |host: &mut Host| host.rig().world.anatomical_position();
-        let from = place(&mut host);
+        let position = |host: &mut Host| host.rig().world.anatomical_position();
+        let from = position(&mut host);
         host.run(2857 - host.ticks);
-        let there = place(&mut host);
+        let there = position(&mut host);
         for (joint, (from, there)) in from.iter().zip(there).enumerate() {
             assert!((there - from).abs() > 0.9 * WAY_RAD, "joint {joint}: {from} {there}");
         }
         host.speaks.targets = false;
         host.run(1000);
-        let stands = place(&mut host);
+        let stands = position(&mut host);
         assert!(host.is_enabled());
         assert!(there.iter().zip(stands).all(|(there, stands)| (there - stands).abs() < 0.02));
     }
@@ -452,9 +452,9 @@ mod tests {
     }
 
     /// Sends each joint a set-point (micro-radian) in profile position mode.
-    fn point(host: &mut Host, places: [i32; JOINTS]) {
-        for (node, place) in NODES.into_iter().zip(places) {
-            host.write(node, 0x607A, 0, place as u32, 4).expect("a target");
+    fn point(host: &mut Host, targets: [i32; JOINTS]) {
+        for (node, target) in NODES.into_iter().zip(targets) {
+            host.write(node, 0x607A, 0, target as u32, 4).expect("a target");
             host.command(node, ENABLED);
             host.command(node, ENABLED | 0x30);
         }
@@ -500,10 +500,10 @@ mod tests {
             host.emergencies.clear();
             enable_at_rest(&mut host, &words);
             let outside = |host: &mut Host| {
-                let places = host.rig().world.anatomical_position();
+                let positions = host.rig().world.anatomical_position();
                 (0..JOINTS).any(|joint| {
                     let [low, high] = ranges[joint];
-                    places[joint] < low - 0.0088 || places[joint] > high + 0.0088
+                    positions[joint] < low - 0.0088 || positions[joint] > high + 0.0088
                 })
             };
             fallen += u32::from(outside(&mut host));
@@ -515,8 +515,8 @@ mod tests {
                 host.rig().state(),
                 host.emergencies
             );
-            let places = [0, 1].map(|joint| micro(joint, random.uniform(0.02, 0.98)));
-            point(&mut host, places);
+            let positions = [0, 1].map(|joint| micro(joint, random.uniform(0.02, 0.98)));
+            point(&mut host, positions);
             host.run(1 + random.below(5 * SECOND / 4));
             let stop = if random.coin() { 0 } else { 2 };
             NODES.into_iter().for_each(|node| host.command(node, stop));

@@ -59,7 +59,7 @@ impl<const N: usize, const B: usize> Network<N, B> {
     /// Effect that a frame of the host would have on its nodes now.
     #[must_use]
     pub fn effect(&self, frame: &Frame) -> Effect {
-        Effect::of(frame, self.boards.iter().flat_map(|board| board.nodes()), self.now_ns / 1000)
+        Effect::from_frame(frame, self.boards.iter().flat_map(|board| board.nodes()), self.now_ns / 1000)
     }
 
     /// Sets the frame that a faulty node sends as often as the bus allows; `None` stops it.
@@ -94,8 +94,8 @@ impl<const N: usize, const B: usize> Network<N, B> {
             mailboxes.push(&mut self.babbler);
             let Some(sent) = self.wire.advance(end_ns, &mut mailboxes) else { break };
             now_ns = now_ns.max(sent.end_ns);
-            for (place, board) in self.boards.iter_mut().enumerate() {
-                if sent.sender == 1 + place {
+            for (index, board) in self.boards.iter_mut().enumerate() {
+                if sent.sender == 1 + index {
                     board.sent(sent.end_ns);
                 } else {
                     board.receive(&sent.frame, sent.end_ns);

@@ -19,9 +19,9 @@ use crate::bus::board::{Board, Label};
 use crate::bus::network::Network;
 use crate::bus::pace::{BOOT_TICKS, Pace, judge, reachable};
 use crate::bus::server::{Event, Server, What};
-use crate::kept_file::memory::{BYTES, Memory};
 use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
+use crate::parameter_file::memory::{BYTES, Memory};
 use crate::worn::Worn;
 
 /// Ticks between two polls of the port: 1 ms.
@@ -89,7 +89,7 @@ pub fn wearers<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ServeOptions,
 ) -> Result<Vec<Worn<N>>, ToolError> {
-    let worn = |place| Some(Worn::new::<B>(leg, options.wearer?, options.seed + place as u64));
+    let worn = |index| Some(Worn::new::<B>(leg, options.wearer?, options.seed + index as u64));
     (0..options.legs).filter_map(worn).collect()
 }
 
@@ -102,18 +102,18 @@ pub fn network<const N: usize, const B: usize>(
 ) -> Result<Network<N, B>, ToolError> {
     let leg = wearers.first().map_or(leg, |worn| &worn.exoskeleton);
     let simulation =
-        SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(options.seed) };
+        SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(options.seed) };
     let context = Context::<N, B>::new(leg, &simulation)?;
     let mut boards = Vec::new();
-    for place in 0..options.legs {
-        let memory = Memory::new(flash.and_then(|bytes| bytes.get(place * BYTES..(place + 1) * BYTES)));
-        let first = if options.are_new { 1 } else { 1 + place * N };
-        let label = Label { first: first as u8, serial: 1 + place as u32 };
-        let mut board = Board::new(leg, context.clone(), options.seed + place as u64, label, memory)?;
+    for index in 0..options.legs {
+        let memory = Memory::new(flash.and_then(|bytes| bytes.get(index * BYTES..(index + 1) * BYTES)));
+        let first = if options.are_new { 1 } else { 1 + index * N };
+        let label = Label { first: first as u8, serial: 1 + index as u32 };
+        let mut board = Board::new(leg, context.clone(), options.seed + index as u64, label, memory)?;
         if options.beginning == Beginning::Uncalibrated {
             board.forget();
         }
-        if let Some(worn) = wearers.get(place) {
+        if let Some(worn) = wearers.get(index) {
             worn.dress(&mut board.rig)?;
         }
         if options.beginning == Beginning::EnabledByContacts && !board.enable_by_contacts() {

@@ -17,7 +17,7 @@ use scarab::store::{Key, ModelRecord};
 use crate::board::levels::Levels;
 use crate::bus::board::TICK_NS;
 use crate::faulty_board::Rig;
-use crate::kept_file::memory::{Memory, SECTOR};
+use crate::parameter_file::memory::{Memory, SECTOR};
 
 /// Period of the steps of `Storing`.
 const STEP_NS: u64 = 1_000_000;
@@ -164,7 +164,7 @@ impl<const N: usize> Flashing<N> {
         }
         let Some(storage) = bus.as_ref().map(|bus| &bus.storage) else { return };
         let Some(mut keep) = storage.given() else {
-            return self.storing.look_after(inhibit, registers);
+            return self.storing.supervise(inhibit, registers);
         };
         if self.requested.is_none() {
             let mut models = self.accepted;
@@ -198,7 +198,7 @@ impl<const N: usize> Flashing<N> {
         self.requested = None;
         keep.done = done;
         drop(keep);
-        storage.give_back();
+        storage.return_value();
     }
 }
 

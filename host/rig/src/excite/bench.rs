@@ -104,7 +104,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         let simulation = SimulationOptions {
             torque_noise_percent: options.torque_noise_percent,
             estimator: Estimator::Plain,
-            ..SimulationOptions::of_seed(1)
+            ..SimulationOptions::with_seed(1)
         };
         // Noise is a property of the sensors, which already exist and can be measured at rest. The simulated
         // leg's noise is therefore used even if its torque is not.

@@ -46,7 +46,7 @@ pub fn curve<const N: usize>(
     let envelope = raw.envelope();
     let (mut scale, mut offset) = ([1.0; N], [Radian(0.0); N]);
     for joint in 0..N {
-        let [.., share, place] = of(joint)? else { return None };
+        let [.., share, centre] = of(joint)? else { return None };
         let (bound, limit) = (&envelope[joint], &limits[joint]);
         let span = (limit.high.0 - limit.low.0) * (1.0 - 2.0 * RANGE_MARGIN);
         let width = bound.high.0 - bound.low.0;
@@ -59,7 +59,7 @@ pub fn curve<const N: usize>(
             .min(RATE_SHARE * limit.speed.0 / bound.speed.0)
             .min(RATE_SHARE * limit.acceleration.0 / acceleration);
         let free = span - scale[joint] * width;
-        let middle = 0.5 * (limit.low.0 + limit.high.0) + 0.5 * free * place.clamp(-1.0, 1.0) as f32;
+        let middle = 0.5 * (limit.low.0 + limit.high.0) + 0.5 * free * centre.clamp(-1.0, 1.0) as f32;
         offset[joint] = Radian(middle - scale[joint] * 0.5 * (bound.low.0 + bound.high.0));
     }
     raw.mapped(scale, offset).ok()

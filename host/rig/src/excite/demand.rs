@@ -52,7 +52,7 @@ impl Demand {
         let torque = |limit: Limit, value: f64| Obstacle { joint, limit, value, allowed: limit_nm };
         let cut = Obstacle {
             joint,
-            limit: Limit::Stop(self.cut.place),
+            limit: Limit::Stop(self.cut.point),
             value: self.cut.wanted_nm,
             allowed: self.cut.granted_nm,
         };

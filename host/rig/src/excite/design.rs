@@ -277,7 +277,7 @@ fn within_limits<const N: usize, const B: usize>(
         scale *= SHRINK;
         let Ok(motion) = table.motion(SERVO_RATE_HZ) else { continue };
         if let Err(violation) = Motion::Periodic(motion).prove(&frame.configuration.envelope()) {
-            obstacle = Some(Obstacle::of_motion(&violation));
+            obstacle = Some(Obstacle::from_motion(&violation));
             continue;
         }
         let demand = demand(frame.scorer, frame.configuration, &motion);

@@ -29,7 +29,7 @@ use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::excite::Seen;
 
-use crate::excite::obstacle::{Limit, Obstacle, Place, torque_limit};
+use crate::excite::obstacle::{Limit, Obstacle, OperatingPoint, torque_limit};
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair, start_position};
 
@@ -77,8 +77,8 @@ pub fn rehearse<const N: usize, const B: usize>(
 ) -> Result<Rehearsal<N, B>, ToolError> {
     let options = SimulationOptions {
         estimator: Estimator::Plain,
-        excitation: Some(scarab_identify::formats::excitation::Excitation::of(assumed, table)),
-        ..SimulationOptions::of_seed(1)
+        excitation: Some(scarab_identify::formats::excitation::Excitation::from_table(assumed, table)),
+        ..SimulationOptions::with_seed(1)
     };
     let context = Context::<N, B>::new(assumed, &options)?;
     let motion = context.motions.excitation;
@@ -139,7 +139,7 @@ fn stand<const N: usize, const B: usize>(leg: &LegFile, context: &Context<N, B>,
         let anatomy = &context.configuration.joints[joint].scale.anatomy;
         f64::from(anatomy.direction()) * f64::from(start[joint] - anatomy.zero_offset())
     });
-    pair.world.place(&start);
+    pair.world.move_to(&start);
     pair.sample = pair.world.sample();
 }
 
@@ -149,16 +149,16 @@ fn note<const N: usize>(largest: &mut Option<Obstacle>, joint: usize, servo: &Se
     if !limited.any() {
         return;
     }
-    let place = Place {
+    let point = OperatingPoint {
         position_rad: f64::from(servo.position[joint].0),
         velocity_rad_s: f64::from(servo.velocity[joint].0),
     };
     let limit = if limited.range {
-        Limit::Stop(place)
+        Limit::Stop(point)
     } else if limited.speed {
-        Limit::Speed(place)
+        Limit::Speed(point)
     } else {
-        Limit::Loop(place)
+        Limit::Loop(point)
     };
     let [value, allowed] =
         [servo.wanted_torque[joint], servo.decision.torque[joint]].map(|torque| f64::from(torque.0));

@@ -17,16 +17,16 @@ pub enum Limit {
     /// Torque on the way to the motion, margin included.
     Approach,
     /// Torque that the monitor grants towards an end of the range.
-    Stop(Place),
+    Stop(OperatingPoint),
     /// Torque that the monitor grants near the speed limit.
-    Speed(Place),
+    Speed(OperatingPoint),
     /// Torque limit, exceeded by the position loop of the simulated leg.
-    Loop(Place),
+    Loop(OperatingPoint),
 }
 
 /// Where a joint is, and how fast, in D-H angles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Place {
+pub struct OperatingPoint {
     pub position_rad: f64,
     pub velocity_rad_s: f64,
 }
@@ -46,7 +46,7 @@ pub struct Obstacle {
 impl Obstacle {
     /// Obstacle of a motion that is not within its envelope.
     #[must_use]
-    pub fn of_motion(violation: &LimitViolation) -> Self {
+    pub fn from_motion(violation: &LimitViolation) -> Self {
         Self {
             joint: violation.joint,
             limit: Limit::Motion(violation.quantity),
@@ -91,37 +91,37 @@ impl Obstacle {
                 "the way to the motion needs {value:.3} N m, limit {allowed:.3} N m ({key}), because it may begin anywhere in \
                  `range_deg`: {less}"
             ),
-            Limit::Stop(place) => {
-                let (left, end) = to_end(joint, &place);
+            Limit::Stop(point) => {
+                let (left, end) = to_end(joint, &point);
                 format!(
                     "{left:.1} degrees before the {end} end of `range_deg`, at {:.0} degrees/s, it needs {value:.3} N m and the \
                      monitor grants {allowed:.3} N m: half of {:.3} N m ({key}) must stop the inertia of {inertia:.4} kg m2 before \
                      the end. Lower `speed_limit_deg_s` (now {:.0}) or `acceleration_limit_deg_s2` (now {:.0}), widen \
                      `range_deg`, or raise the torque limit",
-                    place.velocity_rad_s.abs().to_degrees(),
+                    point.velocity_rad_s.abs().to_degrees(),
                     torque_limit(joint),
                     joint.speed_limit_deg_s,
                     joint.acceleration_limit_deg_s2
                 )
             }
-            Limit::Speed(place) => format!(
+            Limit::Speed(point) => format!(
                 "at {:.0} degrees/s it needs {value:.3} N m and the monitor grants {allowed:.3} N m, because \
                  `speed_limit_deg_s` is {:.0}: raise it, or lower `acceleration_limit_deg_s2` (now {:.0})",
-                place.velocity_rad_s.abs().to_degrees(),
+                point.velocity_rad_s.abs().to_degrees(),
                 joint.speed_limit_deg_s,
                 joint.acceleration_limit_deg_s2
             ),
-            Limit::Loop(place) if value.abs() > DIVERGED * allowed.abs() => format!(
+            Limit::Loop(point) if value.abs() > DIVERGED * allowed.abs() => format!(
                 "the simulated leg does not follow its command at {:.0} degrees/s with {:.3} N m ({key}): raise it, lower \
                  `speed_limit_deg_s` (now {:.0}), or correct friction and `rotor_inertia` in `prior`",
-                place.velocity_rad_s.abs().to_degrees(),
+                point.velocity_rad_s.abs().to_degrees(),
                 allowed.abs(),
                 joint.speed_limit_deg_s
             ),
-            Limit::Loop(place) => format!(
+            Limit::Loop(point) => format!(
                 "with the position loop it needs {value:.3} N m at {:.0} degrees/s, limit {allowed:.3} N m ({key}): raise it, \
                  lower `speed_limit_deg_s` (now {:.0}), or correct friction and `rotor_inertia` in `prior`",
-                place.velocity_rad_s.abs().to_degrees(),
+                point.velocity_rad_s.abs().to_degrees(),
                 joint.speed_limit_deg_s
             ),
         };
@@ -156,14 +156,14 @@ fn torque_key(joint: &JointFile) -> &'static str {
 }
 
 /// Distance to the end of the range towards which a joint moves, degrees, and its anatomical name.
-fn to_end(joint: &JointFile, place: &Place) -> (f64, &'static str) {
+fn to_end(joint: &JointFile, point: &OperatingPoint) -> (f64, &'static str) {
     let direction = joint.direction as f64;
-    let angle = direction * (place.position_rad.to_degrees() - joint.zero_offset_deg);
+    let angle = direction * (point.position_rad.to_degrees() - joint.zero_offset_deg);
     let [low, high] = joint.range_deg;
-    let grows = if place.velocity_rad_s == 0.0 {
+    let grows = if point.velocity_rad_s == 0.0 {
         high - angle < angle - low
     } else {
-        direction * place.velocity_rad_s > 0.0
+        direction * point.velocity_rad_s > 0.0
     };
     if grows { (high - angle, "upper") } else { (angle - low, "lower") }
 }
@@ -176,7 +176,7 @@ mod tests {
     fn every_obstacle_names_joint_value_limit_and_key() {
         let mut leg = LegFile::load("x2-wearer-75kg").expect("shipped");
         leg.joints[1].torque_limit_nm = 20.0;
-        let place = Place { position_rad: (-90.0_f64).to_radians(), velocity_rad_s: -1.0 };
+        let point = OperatingPoint { position_rad: (-90.0_f64).to_radians(), velocity_rad_s: -1.0 };
         for (limit, value, allowed, words) in [
             (Limit::Torque, 31.25, 20.0, "needs 31.250 N m, limit 20.000 N m (`torque_limit_nm`)"),
             (Limit::Approach, 31.25, 20.0, "may begin anywhere in `range_deg`"),
@@ -187,13 +187,13 @@ mod tests {
                 "its speed reaches 2.0, limit 1.0 degrees/s: widen `speed_limit_deg_s`",
             ),
             (
-                Limit::Stop(place),
+                Limit::Stop(point),
                 5.0,
                 -2.0,
                 "5.5 degrees before the upper end of `range_deg`, at 57 degrees/s, it needs 5.000 N m",
             ),
-            (Limit::Speed(place), 5.0, 2.0, "because `speed_limit_deg_s` is 258: raise it"),
-            (Limit::Loop(place), 25.0, 20.0, "with the position loop it needs 25.000 N m"),
+            (Limit::Speed(point), 5.0, 2.0, "because `speed_limit_deg_s` is 258: raise it"),
+            (Limit::Loop(point), 25.0, 20.0, "with the position loop it needs 25.000 N m"),
         ] {
             let found = Obstacle { joint: 1, limit, value, allowed }.words(&leg, 2.5, 0.2);
             assert!(found.starts_with("joint `knee`: ") && found.contains(words), "{words}: {found}");

@@ -260,7 +260,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         candidate: &Candidate<N>,
         rehearsal: &Rehearsal<N, B>,
     ) -> Excited {
-        let mut motion = Excitation::of(&self.leg, &candidate.table);
+        let mut motion = Excitation::from_table(&self.leg, &candidate.table);
         let expectation = &rehearsal.at_noise(&rehearsal.noise_nm);
         // All motions are compared at one noise; otherwise the motion with less torque would always win.
         let designed = rehearsal.at_noise(&self.scorer.noise_nm);

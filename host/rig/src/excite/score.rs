@@ -29,7 +29,7 @@ use scarab::motion::{Fourier, Phase};
 use scarab::safety::Barrier;
 use scarab::units::{NewtonMetre, Radian, RadianPerSecond};
 
-use crate::excite::obstacle::Place;
+use crate::excite::obstacle::OperatingPoint;
 use crate::pair::TAPS;
 
 /// Rate of the stillness rule, Hz, and instants per row.
@@ -66,7 +66,7 @@ pub struct Cut {
     pub wanted_nm: f64,
     /// Torque that the monitor grants, N m.
     pub granted_nm: f64,
-    pub place: Place,
+    pub point: OperatingPoint,
 }
 
 /// Score of one curve.
@@ -133,8 +133,9 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
             // Differences within single precision do not count as a reduction.
             let by_nm = (wanted_nm - granted_nm).abs() - 1e-5 * wanted_nm.abs();
             if by_nm > worst.by_nm {
-                let place = Place { position_rad: f64::from(position), velocity_rad_s: f64::from(velocity) };
-                worst = Cut { by_nm, wanted_nm, granted_nm, place };
+                let point =
+                    OperatingPoint { position_rad: f64::from(position), velocity_rad_s: f64::from(velocity) };
+                worst = Cut { by_nm, wanted_nm, granted_nm, point };
             }
         }
         worst

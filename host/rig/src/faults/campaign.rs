@@ -204,7 +204,7 @@ fn based(
 
 /// Context of a base; `widened` torque caps are never reached.
 fn context(leg: &LegFile, base: u64, widened: bool) -> Result<Context<JOINTS, BASE>, ToolError> {
-    let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
+    let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(base) };
     let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
     if widened {
         for joint in &mut context.configuration.joints {

@@ -130,9 +130,9 @@ pub static ALL: [&Fault; 54] = [
 /// (`cargo chip faults`), crashes also `cargo chip crashes` with all that a crash must do.
 pub static ON_THE_CHIP: [&Fault; 5] = [&B6, &K2, &K4, &K5, &M1];
 
-/// Place of a fault in the catalogue.
+/// Index of a fault in the catalogue.
 #[must_use]
-pub fn place(id: &str) -> Option<usize> {
+pub fn index_of(id: &str) -> Option<usize> {
     ALL.iter().position(|fault| fault.id == id)
 }
 

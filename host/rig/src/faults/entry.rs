@@ -1,7 +1,7 @@
 //! Rows of the fault table, independent of the way they are run.
 
 use crate::faults::bench::{BENCHES, Bench};
-use crate::faults::catalogue::{Fault, place};
+use crate::faults::catalogue::{Fault, index_of};
 use crate::faults::forks::rows;
 use crate::faults::scenario::Row;
 
@@ -40,7 +40,7 @@ impl Entry {
 #[must_use]
 pub fn entries() -> Vec<Entry> {
     let mut all: Vec<Entry> = rows().map(Entry::Forked).chain(BENCHES.iter().map(Entry::Bench)).collect();
-    all.sort_by_key(|entry| place(entry.fault().id));
+    all.sort_by_key(|entry| index_of(entry.fault().id));
     all
 }
 

@@ -21,10 +21,10 @@ use serde::{Deserialize, Serialize};
 use crate::bus::board::{Board, Label, TICK_NS};
 use crate::bus::host::{Host, NODES};
 use crate::faulty_board::{PERIODS_PER_S, Rig};
-use crate::kept_file::memory::Memory;
 use crate::operator::begin;
 use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
+use crate::parameter_file::memory::Memory;
 use scarab::model::planar::BASE;
 use scarab::model::planar::JOINTS;
 
@@ -117,7 +117,7 @@ pub fn hours(leg: &LegFile, hours: f64, shard: Shard) -> Result<Vec<Stretch>, To
 }
 
 fn context(leg: &LegFile, seed: u64) -> Result<Context<JOINTS, BASE>, ToolError> {
-    Context::new(leg, &SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(seed) })
+    Context::new(leg, &SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(seed) })
 }
 
 /// Text of the fault that ends a stretch, if there is one.

@@ -33,7 +33,7 @@ pub struct Scope {
 
 impl Scope {
     /// Scope of a run with these injections and events.
-    pub fn of<'a>(mut injections: impl Iterator<Item = &'a Injection> + Clone, events: &[Event]) -> Self {
+    pub fn new<'a>(mut injections: impl Iterator<Item = &'a Injection> + Clone, events: &[Event]) -> Self {
         use Channel::{Counter, Index, JointCounts, ShuntB, ShuntC, Target};
         let lies = |injection: &Injection| matches!(injection.channel, ShuntB | ShuntC);
         // With a wrong position or target, the joint cannot be kept in its range.

@@ -167,7 +167,7 @@ impl CampaignReport {
     /// Table of the rows.
     #[must_use]
     pub fn table(&self) -> Table {
-        let mut table = Table::of_class("any")
+        let mut table = Table::with_class("any")
             .text(["fault", "what"])
             .numbers(["runs", "seen"])
             .text(["worst / deadline, ms"])

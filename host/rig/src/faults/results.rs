@@ -65,8 +65,8 @@ impl Campaign {
         for part in parts {
             campaign.add(part.results);
         }
-        let place = |id: &str| rows.iter().position(|entry| entry.fault().id == id);
-        campaign.outcomes.sort_by_key(|outcome| (place(outcome.fault), outcome.seed, outcome.period));
+        let index = |id: &str| rows.iter().position(|entry| entry.fault().id == id);
+        campaign.outcomes.sort_by_key(|outcome| (index(outcome.fault), outcome.seed, outcome.period));
         campaign.trials.sort_by_key(|outcome| (outcome.fault, outcome.seed));
         campaign.join_bases();
         campaign

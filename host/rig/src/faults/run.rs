@@ -127,7 +127,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             rig.injector.add(injection);
         }
         apply(scenario.event, leg, &mut rig);
-        let scope = Scope::of(scenario.injections.iter().flatten(), &[scenario.event]);
+        let scope = Scope::new(scenario.injections.iter().flatten(), &[scenario.event]);
         let onset = match scenario.onset {
             Onset::Injection => Some(begun),
             Onset::ServoTick => Some(next_servo_tick(scenario, begun)),

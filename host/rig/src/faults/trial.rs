@@ -177,7 +177,7 @@ impl Trial {
             rig.injector.add(injection);
         }
         let events: Vec<Event> = self.events.iter().map(|(_, event)| *event).collect();
-        let scope = Scope::of(self.injections.iter(), &events);
+        let scope = Scope::new(self.injections.iter(), &events);
         let mut invariants = Invariants::new(leg, scope, &rig);
         let mut alarm = None;
         let mut safe_since = None;
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn a_lasting_stop_or_gate_fault_is_detected_in_every_run() {
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
         let context = Context::<JOINTS, BASE>::new(&leg, &options).expect("the default leg");
         let mut base = Rig::new(&leg, &context, 1).expect("complete drives");
         begin(&leg, &mut base).expect("it is enabled");

@@ -51,7 +51,7 @@ const QUEUE: [&str; 2] = ["heapless-", "/src/spsc.rs"];
 
 /// A branch to a panic.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Place {
+pub struct PanicSite {
     /// Function that contains the branch.
     pub within: String,
     /// Name of the panic.
@@ -64,7 +64,7 @@ pub struct Place {
     pub address: u32,
 }
 
-impl Place {
+impl PanicSite {
     /// Whether the panic is the remainder of a queue's index by its capacity.
     fn is_of_a_queue(&self) -> bool {
         let [begin, end] = QUEUE;
@@ -76,9 +76,9 @@ impl Place {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Panics {
     /// All locations.
-    pub all: Vec<Place>,
+    pub all: Vec<PanicSite>,
     /// Locations that levels 0 and 1 reach.
-    pub interrupts: Vec<Place>,
+    pub interrupts: Vec<PanicSite>,
     /// Functions that levels 0 and 1 reach.
     pub reached: usize,
     /// Calls by a pointer in those functions.
@@ -104,7 +104,7 @@ struct Branch {
 
 impl Panics {
     /// Finds the locations of an image.
-    pub fn of(image: &Path) -> Result<Self, ToolError> {
+    pub fn read(image: &Path) -> Result<Self, ToolError> {
         let bytes = std::fs::read(image).map_err(|error| FileError::new(image.display(), error))?;
         Self::parse(&bytes, &image.display())
     }
@@ -150,18 +150,24 @@ impl Panics {
         }
         let mut panics = Self { reached: reached.len(), ..Self::default() };
         for (begin, function) in functions.iter().filter(|(begin, _)| !is_panic(functions, **begin)) {
-            let places = callees(functions, *begin).filter(|(callee, _)| is_panic(functions, *callee));
-            let places = places.map(|(callee, branch)| {
+            let sites = callees(functions, *begin).filter(|(callee, _)| is_panic(functions, *callee));
+            let sites = sites.map(|(callee, branch)| {
                 let (file, line) = branch.argument.and_then(&source).unwrap_or_default();
                 let panic = functions.get(&callee).map_or_else(String::new, |callee| callee.name.clone());
-                Place { within: function.name.clone(), panic, file, line, address: branch.at.wrapping_sub(8) }
+                PanicSite {
+                    within: function.name.clone(),
+                    panic,
+                    file,
+                    line,
+                    address: branch.at.wrapping_sub(8),
+                }
             });
-            let places: Vec<Place> = places.collect();
+            let sites: Vec<PanicSite> = sites.collect();
             if reached.contains(begin) {
                 panics.by_pointer += function.by_pointer;
-                panics.interrupts.extend(places.iter().cloned());
+                panics.interrupts.extend(sites.iter().cloned());
             }
-            panics.all.extend(places);
+            panics.all.extend(sites);
         }
         panics
     }
@@ -169,9 +175,9 @@ impl Panics {
     /// Violations in interrupts, in words.
     #[must_use]
     pub fn missed(&self) -> Vec<String> {
-        let others = self.interrupts.iter().filter(|place| !place.is_of_a_queue());
-        let text = |place: &Place| {
-            format!("an interrupt can panic: {} in {} ({})", place.panic, place.within, place.file)
+        let others = self.interrupts.iter().filter(|site| !site.is_of_a_queue());
+        let text = |site: &PanicSite| {
+            format!("an interrupt can panic: {} in {} ({})", site.panic, site.within, site.file)
         };
         others.map(text).collect()
     }
@@ -179,7 +185,7 @@ impl Panics {
     /// Summary.
     #[must_use]
     pub fn text(&self) -> String {
-        let functions: BTreeSet<&str> = self.all.iter().map(|place| &*place.within).collect();
+        let functions: BTreeSet<&str> = self.all.iter().map(|site| &*site.within).collect();
         let mut text = format!(
             "panics: {} places in {} functions; {} of them in the {} functions that the current loops and the servo reach ({} calls by a \
              pointer in these are not followed)\n",
@@ -189,8 +195,8 @@ impl Panics {
             self.reached,
             self.by_pointer
         );
-        for place in &self.interrupts {
-            text += &format!("  {} in {} ({})\n", place.panic, place.within, place.file);
+        for site in &self.interrupts {
+            text += &format!("  {} in {} ({})\n", site.panic, site.within, site.file);
         }
         text
     }
@@ -249,41 +255,41 @@ struct Code<'a> {
 
 impl Code<'_> {
     fn half(&self, address: u32) -> Option<u32> {
-        let place = address.checked_sub(self.base)? as usize;
-        let pair = self.bytes.get(place..place + 2)?;
+        let offset = address.checked_sub(self.base)? as usize;
+        let pair = self.bytes.get(offset..offset + 2)?;
         Some(u32::from(u16::from_le_bytes([pair[0], pair[1]])))
     }
 
     /// Branches of a function, and the number of its calls by a pointer.
     fn branches(&self, begin: u32, end: u32) -> (Vec<Branch>, usize) {
-        let (mut branches, mut by_pointer, mut place) = (Vec::new(), 0, begin);
-        let mut add = |place: u32, way: Option<i32>| {
+        let (mut branches, mut by_pointer, mut address) = (Vec::new(), 0, begin);
+        let mut add = |address: u32, way: Option<i32>| {
             let branch = |way: i32| Branch {
-                at: place,
-                to: place.wrapping_add_signed(4 + way),
-                argument: self.argument(place),
+                at: address,
+                to: address.wrapping_add_signed(4 + way),
+                argument: self.argument(address),
             };
             branches.extend(way.map(branch));
         };
-        while place < end {
-            let after = self.data.partition_point(|(first, _)| *first <= place);
+        while address < end {
+            let after = self.data.partition_point(|(first, _)| *first <= address);
             if let Some((_, last)) = after.checked_sub(1).and_then(|range| self.data.get(range))
-                && *last > place
+                && *last > address
             {
-                place = *last;
+                address = *last;
                 continue;
             }
-            let Some(first) = self.half(place) else { break };
+            let Some(first) = self.half(address) else { break };
             if first >> 11 >= 0b11101 {
-                if let Some(second) = self.half(place + 2) {
-                    add(place, wide(first, second));
+                if let Some(second) = self.half(address + 2) {
+                    add(address, wide(first, second));
                 }
-                place += 4;
+                address += 4;
             } else {
-                add(place, narrow(first));
+                add(address, narrow(first));
                 // BLX to a register.
                 by_pointer += usize::from(first & 0xFF87 == 0x4780);
-                place += 2;
+                address += 2;
             }
         }
         (branches, by_pointer)

@@ -47,13 +47,13 @@ pub fn seal(image: &Path) -> Result<PathBuf, ToolError> {
     };
     let mut program = program(&elf).map_err(refused)?;
     scarab_boot::seal(&mut program).map_err(|error| refused(format!("{error:?}")))?;
-    let place = {
+    let start = {
         let file = ElfFile32::<Endianness>::parse(&*elf).map_err(|error| refused(error.to_string()))?;
         let section = file.section_by_name(SECTION);
         section.and_then(|section| section.file_range()).ok_or_else(|| refused(format!("no {SECTION}")))?.0
     } as usize;
     let at = HEADER_AT as usize;
-    elf[place..place + HEADER_BYTES].copy_from_slice(&program[at..at + HEADER_BYTES]);
+    elf[start..start + HEADER_BYTES].copy_from_slice(&program[at..at + HEADER_BYTES]);
     files::write(image, &elf)?;
     let path = image.with_extension("bin");
     files::write(&path, &program)?;

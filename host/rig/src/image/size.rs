@@ -67,7 +67,7 @@ pub struct ImageSize {
 
 impl ImageSize {
     /// Reads the size of an image.
-    pub fn of(image: &Path) -> Result<Self, ToolError> {
+    pub fn read(image: &Path) -> Result<Self, ToolError> {
         let wrong = |error: &dyn std::fmt::Display| FileError::new(image.display(), error);
         let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
         let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;

@@ -52,7 +52,7 @@ impl Event {
 
 /// Event of a record; `None` for kinds that do not belong to the timeline.
 #[must_use]
-pub fn of(record: &Received, servo_hz: f64) -> Option<Event> {
+pub fn from_record(record: &Received, servo_hz: f64) -> Option<Event> {
     let at = |tick: u32| Some(f64::from(tick) / servo_hz);
     let (time_s, weight, words) = match record {
         Received::Boot(boot) => {
@@ -65,7 +65,7 @@ pub fn of(record: &Received, servo_hz: f64) -> Option<Event> {
             (None, Weight::Fault, format!("the drive may not be enabled: {} ({value:#x})", spaced(why)))
         }
         Received::GateDriver(GateDriver { joint, status, .. }) => {
-            (None, Weight::Fault, format!("gate driver of {}: status {status:#010x}", place(*joint)))
+            (None, Weight::Fault, format!("gate driver of {}: status {status:#010x}", location(*joint)))
         }
         Received::State(state) => {
             let stopped = ["fault", "fault_reaction_active"].contains(&state.drive.as_str());
@@ -81,17 +81,17 @@ pub fn of(record: &Received, servo_hz: f64) -> Option<Event> {
             (at(*tick), Weight::Warning, format!("assistance {event}: {}", spaced(why)))
         }
         Received::NotEnabled(NotEnabled { tick, joint, why }) => {
-            let words = format!("the drive is NOT enabled: {}, {}", place(*joint), spaced(why));
+            let words = format!("the drive is NOT enabled: {}, {}", location(*joint), spaced(why));
             (at(*tick), Weight::Warning, words)
         }
         Received::Fault(Fault { tick, code, name, joint }) => {
-            (at(*tick), Weight::Fault, format!("FAULT {code:#06x} {}: {}", spaced(name), place(*joint)))
+            (at(*tick), Weight::Fault, format!("FAULT {code:#06x} {}: {}", spaced(name), location(*joint)))
         }
         Received::Limit(Limit { tick, name, joint, .. }) => {
-            (at(*tick), Weight::Note, format!("LIMIT {}: {}", spaced(name), place(*joint)))
+            (at(*tick), Weight::Note, format!("LIMIT {}: {}", spaced(name), location(*joint)))
         }
         Received::AxisFault(AxisFault { tick, joint, name }) => {
-            (at(*tick), Weight::Fault, format!("FAULT of the axis, {}: {}", spaced(name), place(*joint)))
+            (at(*tick), Weight::Fault, format!("FAULT of the axis, {}: {}", spaced(name), location(*joint)))
         }
         Received::Calibration(calibration) => {
             let (weight, words) = calibrated(calibration);
@@ -145,7 +145,7 @@ pub fn board(board: &Board) -> String {
 }
 
 fn crashed(crash: &Crash) -> String {
-    let place =
+    let location =
         if crash.file == "-" { String::new() } else { format!(" in {} line {}", crash.file, crash.line) };
     let address = match crash.address {
         u32::MAX => String::new(),
@@ -160,7 +160,7 @@ fn crashed(crash: &Crash) -> String {
         known => format!(", {words} {known:#010x}"),
     };
     format!(
-        "the image CRASHED before this start: {}{place}{}{}{}{address}{kept}",
+        "the image CRASHED before this start: {}{location}{}{}{}{address}{kept}",
         spaced(&crash.cause),
         known("at", crash.pc),
         known("called from", crash.lr),
@@ -234,15 +234,15 @@ fn changed(change: &Change) -> String {
 }
 
 fn updated(update: &Update) -> String {
-    let place = match update.link {
+    let location = match update.link {
         0 => String::new(),
         link => format!(" on link {link}"),
     };
     let offered = if update.offered { ", a new model is offered" } else { ", the old model stays" };
-    format!("the change was taken for: {}{place}; {}{offered}", spaced(&update.cause), update.verdict)
+    format!("the change was taken for: {}{location}; {}{offered}", spaced(&update.cause), update.verdict)
 }
 
-fn place(joint: usize) -> String {
+fn location(joint: usize) -> String {
     match joint {
         0 => "the board".into(),
         joint => format!("joint {joint}"),

@@ -193,7 +193,7 @@ impl Trace {
     }
 
     fn record(&mut self, line: &Line<'_>) -> Result<(), LineError<'static>> {
-        let Some(kind) = Kind::of(line.kind()) else {
+        let Some(kind) = Kind::from_name(line.kind()) else {
             self.unknown += 1;
             return Ok(());
         };
@@ -202,7 +202,7 @@ impl Trace {
             return self.result(kind, received);
         }
         let received = received?;
-        let event = events::of(&received, self.servo_hz());
+        let event = events::from_record(&received, self.servo_hz());
         if kind == Kind::Boot {
             self.restart();
             self.starts += 1;

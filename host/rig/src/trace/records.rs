@@ -118,7 +118,7 @@ macro_rules! readers {
         impl Kind {
             /// Kind of this name; `None` for one that this version does not know.
             #[must_use]
-            pub fn of(name: &str) -> Option<Self> {
+            pub fn from_name(name: &str) -> Option<Self> {
                 $( if is_of_kind($format, name) { return Some(Self::$name); } )*
                 None
             }
@@ -158,7 +158,7 @@ mod tests {
 
     fn read(line: &str) -> Result<Received, LineError<'static>> {
         let line = Line::parse(line).expect(line);
-        Received::read(Kind::of(line.kind()).expect("a kind"), &line)
+        Received::read(Kind::from_name(line.kind()).expect("a kind"), &line)
     }
 
     #[test]
@@ -172,7 +172,7 @@ mod tests {
         assert!(
             matches!(change, Ok(Received::Change(change)) if change.joints == [true, false] && change.statistic.is_empty())
         );
-        assert_eq!(Kind::of("faults"), None);
+        assert_eq!(Kind::from_name("faults"), None);
     }
 
     #[test]

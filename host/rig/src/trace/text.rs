@@ -14,7 +14,7 @@ use crate::trace::records::Kind;
 #[must_use]
 pub fn record(line: &str) -> Option<Cow<'_, str>> {
     let line = without_colours(line);
-    let (start, end) = place(&line)?;
+    let (start, end) = span(&line)?;
     Some(match line {
         Cow::Borrowed(line) => Cow::Borrowed(&line[start..end]),
         Cow::Owned(line) => Cow::Owned(line[start..end].to_owned()),
@@ -22,7 +22,7 @@ pub fn record(line: &str) -> Option<Cow<'_, str>> {
 }
 
 /// Start and end of the record.
-fn place(line: &str) -> Option<(usize, usize)> {
+fn span(line: &str) -> Option<(usize, usize)> {
     let trimmed = line.trim_end();
     for (at, _) in trimmed.match_indices(" n=") {
         let digits = trimmed[at + 3..].split(' ').next().unwrap_or("");
@@ -31,7 +31,11 @@ fn place(line: &str) -> Option<(usize, usize)> {
         let prefix = &before[..before.len() - kind.len()];
         let is_alone = prefix.trim().is_empty();
         let is_apart = is_alone || prefix.ends_with([' ', '\t', ']', ':', '>']);
-        if kind.is_empty() || !is_number(digits) || !is_apart || !(is_alone || Kind::of(kind).is_some()) {
+        if kind.is_empty()
+            || !is_number(digits)
+            || !is_apart
+            || !(is_alone || Kind::from_name(kind).is_some())
+        {
             continue;
         }
         return Some((prefix.len(), end(trimmed, prefix.len())));

@@ -245,12 +245,12 @@ impl<const N: usize, const B: usize> TracedResult<'_, N, B> {
             let found = self.records.stribeck.iter().find(|record| record.joint == joint + 1);
             Some(found.map_or((f32::NAN, f32::NAN), |record| (record.gain_chi2, record.surplus_nm)))
         };
-        let looked_for = |joint: usize| self.background.device.stribeck_choice(joint).is_possible();
+        let is_searched = |joint: usize| self.background.device.stribeck_choice(joint).is_possible();
         Selection {
             is_made: true,
             dropped,
             gain: [f32::NAN; B],
-            stribeck: core::array::from_fn(|joint| gain(joint).filter(|_| looked_for(joint))),
+            stribeck: core::array::from_fn(|joint| gain(joint).filter(|_| is_searched(joint))),
         }
     }
 

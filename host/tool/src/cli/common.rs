@@ -21,7 +21,7 @@ use crate::view::{figures, html, tables};
 /// Program that computes a campaign: this one.
 #[must_use]
 pub fn program() -> Program {
-    Program::of_sources(env!("SCARAB_SOURCES"))
+    Program::from_sources(env!("SCARAB_SOURCES"))
 }
 
 /// Plan of the estimate.
@@ -150,14 +150,14 @@ pub fn draw_into(
 /// Draws the runs of a campaign if requested, and prints the paths.
 pub fn draw_runs(campaign: &CampaignHeader, common: &Common, runs: &[RunReport]) -> Result<(), ToolError> {
     let Some(leg) = campaign.leg.as_ref().filter(|_| common.is_drawn()) else { return Ok(()) };
-    let spreads = Spread::of(runs);
+    let spreads = Spread::from_runs(runs);
     let figure = figures::spread(&leg.name, &spreads)?;
     if let Some(directory) = &common.figures {
         figures::write(directory, std::slice::from_ref(&figure))?;
         output::print(&format!("figures: {}\n", directory.display()))?;
     }
     if let Some(path) = &common.report {
-        let circumstances = html::Circumstances::of_command(leg, campaign.command_line());
+        let circumstances = html::Circumstances::from_command(leg, campaign.command_line());
         let page = html::seeds::page(&circumstances, runs, &spreads, &figure)?;
         files::write(path, page)?;
         output::print(&format!("report: {}\n", path.display()))?;

@@ -96,7 +96,7 @@ pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
         files::write(path, constant::source(&excited.motion))?;
     }
     if arguments.csv.is_some() || arguments.trajectory.is_some() {
-        let samples = MotionSamples::of(leg, &excited.motion, arguments.rate)?;
+        let samples = MotionSamples::new(leg, &excited.motion, arguments.rate)?;
         if let Some(path) = &arguments.csv {
             files::write(path, samples.to_csv())?;
         }

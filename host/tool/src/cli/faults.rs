@@ -127,7 +127,7 @@ fn page(whole: &CampaignHeader, report: &CampaignReport, found: &Campaign) -> Re
         runs: &lines,
         figures: &figures,
     };
-    Ok(html::faults::page(&Circumstances::of_command(leg, whole.command_line()), &campaign))
+    Ok(html::faults::page(&Circumstances::from_command(leg, whole.command_line()), &campaign))
 }
 
 /// Defaults of the full campaign.

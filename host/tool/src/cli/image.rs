@@ -90,9 +90,9 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
         return Ok(EXIT_ACCEPTED);
     }
     let Built { image, program, bootloader } = build(&options)?;
-    let size = ImageSize::of(&image)?;
-    let panics = Panics::of(&image)?;
-    let boot = ImageSize::of(&bootloader)?.flash();
+    let size = ImageSize::read(&image)?;
+    let panics = Panics::read(&image)?;
+    let boot = ImageSize::read(&bootloader)?.flash();
     output::print(&format!(
         "image                     {}\nprogram for an update     {}\nbootloader, {boot} bytes    {}\n\n{}\n{}",
         image.display(),
@@ -111,8 +111,8 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     for goal in &missed {
         eprintln!("too large: {goal}");
     }
-    for place in panics.missed() {
-        eprintln!("{place}");
+    for site in panics.missed() {
+        eprintln!("{site}");
     }
     let kept = missed.is_empty() && panics.missed().is_empty();
     Ok(if kept { EXIT_ACCEPTED } else { EXIT_REFUSED })
@@ -122,7 +122,7 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
 pub fn flash_leg(arguments: &FlashArguments) -> Result<u8, ToolError> {
     arguments.image.leg.require("cargo flash-leg --leg my-leg.toml")?;
     let built = build(&arguments.image.load()?)?;
-    let missed = ImageSize::of(&built.image)?.missed();
+    let missed = ImageSize::read(&built.image)?.missed();
     if !missed.is_empty() {
         return Err(ToolError::Refused(format!("the image is too large: {}", missed.join("; "))));
     }

@@ -60,7 +60,7 @@ impl ImportArguments {
                 DecimalArgument::Comma => Decimal::Comma,
             }),
             command: command(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
-            ..Import::of(leg, &text)
+            ..Import::from_leg(leg, &text)
         };
         import.with(&self.columns, &self.units).map_err(ToolError::input)
     }

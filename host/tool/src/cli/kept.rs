@@ -6,8 +6,8 @@ use std::path::Path;
 use clap::{Args, Subcommand};
 use scarab_base::error::{EXIT_ACCEPTED, EXIT_REFUSED, FileError, ToolError};
 use scarab_base::{files, output};
-use scarab_rig::kept_file::KeptFile;
-use scarab_rig::kept_file::memory::{BYTES, Memory};
+use scarab_rig::parameter_file::ParameterFile;
+use scarab_rig::parameter_file::memory::{BYTES, Memory};
 
 use crate::cli::arguments::{Input, Output, Updated};
 
@@ -79,7 +79,7 @@ fn export(flash: &Path, board: usize, out: Option<&Path>) -> Result<u8, ToolErro
         let boards = bytes.len() / BYTES;
         return Err(ToolError::input(format!("--board {board}: {file} holds the flash of {boards}")));
     };
-    let found = KeptFile::of_flash(&Memory::new(Some(own)));
+    let found = ParameterFile::from_flash(&Memory::new(Some(own)));
     for part in &found.absent {
         eprintln!("absent: {file}: board {board}: {part}");
     }
@@ -104,7 +104,7 @@ fn import(file: &Path, flash: &Path, board: usize) -> Result<u8, ToolError> {
         )
         .into());
     }
-    let kept = KeptFile::parse(&files::read_text(file)?, &name)?;
+    let kept = ParameterFile::parse(&files::read_text(file)?, &name)?;
     let mut bytes = read(flash)?.unwrap_or_default();
     // Boards beyond the end of the file count as erased.
     if bytes.len() < board * BYTES {

@@ -74,7 +74,7 @@ impl LegOptions {
     fn set(&self, mut leg: LegFile) -> Result<LegFile, ToolError> {
         let mut changes = Vec::new();
         let size = Size { thigh: self.thigh, shank: self.shank, wearer: self.wearer };
-        leg = size.of(&leg)?;
+        leg = size.apply_to(&leg)?;
         changes.extend(self.thigh.map(|length| format!(" --thigh {length}")));
         changes.extend(self.shank.map(|length| format!(" --shank {length}")));
         changes.extend(self.wearer.map(|person| format!(" --wearer {},{}", person.mass, person.height)));

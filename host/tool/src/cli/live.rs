@@ -130,7 +130,7 @@ impl LiveArguments {
             let options = SimulationOptions {
                 drive: self.drive.into(),
                 perturbations: self.perturb.clone(),
-                ..SimulationOptions::of_seed(self.seed)
+                ..SimulationOptions::with_seed(self.seed)
             };
             return Ok(Source::Simulated(
                 Box::new(options),
@@ -144,7 +144,7 @@ impl LiveArguments {
             split: self.split,
             swarm_seed: self.seed,
             import: Some(import),
-            ..ReplayOptions::of(leg)
+            ..ReplayOptions::from_leg(leg)
         };
         Ok(Source::Recording(Box::new((recordings, options)), self.speed))
     }
@@ -168,7 +168,7 @@ impl LiveArguments {
         let joints = leg.joints.len();
         let nodes: Vec<u8> =
             if self.nodes.is_empty() { (1..=joints as u8).collect() } else { self.nodes.clone() };
-        let repeated = nodes.iter().enumerate().find(|(place, id)| nodes[..*place].contains(id));
+        let repeated = nodes.iter().enumerate().find(|(index, id)| nodes[..*index].contains(id));
         if let Some((_, id)) = repeated {
             return Err(ToolError::input(format!("--nodes: {id} occurs twice")));
         }

@@ -34,7 +34,7 @@ impl ModelArguments {
     /// Adds the comparison to the report.
     pub fn compare(&self, kept: Option<&ModelFile>, run: &mut RunReport) {
         if let (Some(path), Some(model)) = (&self.compare_model, kept) {
-            let (file, found) = (path.display().to_string(), BaseSet::of(run));
+            let (file, found) = (path.display().to_string(), BaseSet::from_run(run));
             run.compared = comparison::compare(model, &file, &found, run.temperature_c.known());
         }
     }
@@ -42,7 +42,7 @@ impl ModelArguments {
     /// Stores an accepted result, identified with this bandwidth (Hz).
     pub fn save(&self, leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Result<(), ToolError> {
         let Some(path) = &self.save_model else { return Ok(()) };
-        match ModelFile::of(leg, run, bandwidth_hz) {
+        match ModelFile::from_run(leg, run, bandwidth_hz) {
             Some(model) => {
                 model.write(path)?;
                 output::print(&format!("model: {}\n", path.display()))

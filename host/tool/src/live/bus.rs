@@ -224,9 +224,9 @@ fn legs<'a, const N: usize, const B: usize>(
         ids.iter().map(|ids| LegScene { name: leg_name(leg, ids), joints: joints.clone() }).collect();
     out(LiveUpdate::Scene(described));
     let mut legs = Vec::new();
-    for (place, own) in ids.iter().enumerate() {
-        let prefix = if ids.len() > 1 { format!("leg {}: ", place + 1) } else { String::new() };
-        legs.push((prefix, Leg::new(leg, *own, place, source.model.as_ref(), out)?));
+    for (index, own) in ids.iter().enumerate() {
+        let prefix = if ids.len() > 1 { format!("leg {}: ", index + 1) } else { String::new() };
+        legs.push((prefix, Leg::new(leg, *own, index, source.model.as_ref(), out)?));
     }
     Ok(legs)
 }

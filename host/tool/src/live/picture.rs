@@ -54,8 +54,8 @@ pub struct Picture<'a, const N: usize> {
     sums: Sums<N>,
     /// Whether torques come from currents by the leg's torque constants.
     has_currents: bool,
-    /// Place of the leg in the scene.
-    place: usize,
+    /// Index of the leg in the scene.
+    leg_index: usize,
     /// Time of the reports, s: that of the last servo tick.
     pub time_s: f64,
 }
@@ -63,8 +63,8 @@ pub struct Picture<'a, const N: usize> {
 impl<'a, const N: usize> Picture<'a, N> {
     /// Creates the reports of a leg, at time zero.
     pub fn new(leg: &'a LegFile, anatomy: [AnatomicalJoint<f64>; N], out: &'a dyn Fn(LiveUpdate)) -> Self {
-        let stick = Stick::of(leg);
-        Self { leg, out, stick, anatomy, sums: Sums::EMPTY, has_currents: true, place: 0, time_s: 0.0 }
+        let stick = Stick::from_leg(leg);
+        Self { leg, out, stick, anatomy, sums: Sums::EMPTY, has_currents: true, leg_index: 0, time_s: 0.0 }
     }
 
     /// Reports currents as unknown.
@@ -73,16 +73,16 @@ impl<'a, const N: usize> Picture<'a, N> {
         Self { has_currents: false, ..self }
     }
 
-    /// Reports as the leg at this place of the scene.
+    /// Reports as the leg with this index in the scene.
     #[must_use]
-    pub fn at(self, place: usize) -> Self {
-        Self { place, ..self }
+    pub fn at(self, leg_index: usize) -> Self {
+        Self { leg_index, ..self }
     }
 
-    /// Place of the leg in the scene.
+    /// Index of the leg in the scene.
     #[must_use]
-    pub fn place(&self) -> usize {
-        self.place
+    pub fn leg_index(&self) -> usize {
+        self.leg_index
     }
 
     /// Leg of the picture.
@@ -165,7 +165,7 @@ impl<'a, const N: usize> Picture<'a, N> {
             Some((torque / self.leg.joints[joint].torque_per_ampere) as f32)
         };
         let sample = LiveSample {
-            leg: self.place,
+            leg: self.leg_index,
             time_s: rounded(self.time_s - HALF_PERIOD_S),
             angle_rad: (0..N).map(|joint| anatomical(joint, angles[joint])).collect(),
             commanded_rad: (0..N).map(commanded).collect(),
@@ -183,7 +183,7 @@ impl<'a, const N: usize> Picture<'a, N> {
         };
         let measured = row.measured.map(Some);
         let row = LiveRow {
-            leg: self.place,
+            leg: self.leg_index,
             time_s: rounded(self.time_s - HALF_SAMPLE_S - row.age_s),
             measured_nm: measured.iter().enumerate().filter_map(signed).collect(),
             predicted_nm: row.predicted.iter().enumerate().map(signed).collect(),
@@ -201,14 +201,20 @@ impl<'a, const N: usize> Picture<'a, N> {
             truth: base.truth,
         });
         let (time_s, values) = (rounded(self.time_s), values.collect());
-        self.send(LiveUpdate::Estimate(LiveEstimate { leg: self.place, time_s, origin, iterations, values }));
+        self.send(LiveUpdate::Estimate(LiveEstimate {
+            leg: self.leg_index,
+            time_s,
+            origin,
+            iterations,
+            values,
+        }));
     }
 
     /// Reports the end of a run.
     pub fn conclude(&mut self, report: &RunReport) {
         self.estimate(EstimateOrigin::Result, report.bso.iterations, &report.base_parameters);
         self.send(LiveUpdate::Outcome(LiveOutcome {
-            leg: self.place,
+            leg: self.leg_index,
             verdict: report.verdict.into(),
             validated: report.validated,
             reasons: report.reasons.iter().map(|reason| (*reason).into()).collect(),

@@ -82,7 +82,7 @@ struct Player<'a, const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> Player<'_, N, B> {
     /// Plays a part; `first_s` is the recording's first time stamp.
     fn part(&mut self, recording: &Recording, first_s: f64, segment: Segment, plan: Plan) {
-        let grid = Resampled::of(recording);
+        let grid = Resampled::new(recording);
         self.picture.restart();
         for point in 0..grid.len() {
             let (Some(position), Some(torque)) = (grid.position_rad::<N>(point), grid.torque_nm::<N>(point))

@@ -11,17 +11,17 @@ use scarab_base::files;
 
 /// Replaces one section of a document; a document without its markers is an error.
 pub fn replace(path: &Path, kind: &str, name: &str, content: &str) -> Result<(), ToolError> {
-    let text =
-        replaced(&files::read_text(path)?, kind, name, content).ok_or_else(|| no_place(path, kind, name))?;
+    let text = replaced(&files::read_text(path)?, kind, name, content)
+        .ok_or_else(|| no_markers(path, kind, name))?;
     files::write(path, text)
 }
 
 /// Returns an error if the document lacks the markers.
 pub fn check(path: &Path, kind: &str, name: &str) -> Result<(), ToolError> {
-    replaced(&files::read_text(path)?, kind, name, "").map(drop).ok_or_else(|| no_place(path, kind, name))
+    replaced(&files::read_text(path)?, kind, name, "").map(drop).ok_or_else(|| no_markers(path, kind, name))
 }
 
-fn no_place(path: &Path, kind: &str, name: &str) -> ToolError {
+fn no_markers(path: &Path, kind: &str, name: &str) -> ToolError {
     FileError::new(path.display(), format!("has no `<!-- {kind}: {name} -->` with its end")).into()
 }
 

@@ -64,12 +64,12 @@ impl Circumstances {
     /// Command line of this process and the current time ([`time_utc`]).
     #[must_use]
     pub fn now(leg: &LegFile) -> Self {
-        Self::of_command(leg, std::env::args().skip(1).filter(|word| word != BY_CARGO))
+        Self::from_command(leg, std::env::args().skip(1).filter(|word| word != BY_CARGO))
     }
 
     /// Command line of these words and the current time, as in [`Self::now`].
     #[must_use]
-    pub fn of_command(leg: &LegFile, words: impl IntoIterator<Item = String>) -> Self {
+    pub fn from_command(leg: &LegFile, words: impl IntoIterator<Item = String>) -> Self {
         let words: Vec<String> = words.into_iter().map(|word| quoted(&word)).collect();
         Self {
             time_utc: time_utc(),

@@ -24,7 +24,7 @@ pub struct Spread {
 impl Spread {
     /// Spread of every base parameter with a truth, in the order of first appearance.
     #[must_use]
-    pub fn of(runs: &[RunReport]) -> Vec<Self> {
+    pub fn from_runs(runs: &[RunReport]) -> Vec<Self> {
         let mut names: Vec<&str> = Vec::new();
         for base in runs.iter().flat_map(|run| &run.base_parameters) {
             if !names.contains(&base.name.as_str()) {

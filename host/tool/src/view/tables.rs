@@ -74,7 +74,7 @@ fn terms(terms: &BTreeMap<String, f64>) -> String {
 /// Table of parameters with their status.
 #[must_use]
 pub fn parameters<'a>(parameters: impl Iterator<Item = &'a ParameterReport>, is_truth_known: bool) -> Table {
-    let mut table = Table::of_class("parameters")
+    let mut table = Table::with_class("parameters")
         .label("parameter")
         .numbers(["value", "sigma"])
         .unit()

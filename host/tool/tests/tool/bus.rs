@@ -87,8 +87,8 @@ impl Bus {
         self.write(node, communication, 1, OFF | cob, 4);
         self.write(node, mapping, 0, 0, 1);
         self.write(node, communication, 2, kind.into(), 1);
-        for (place, object) in (1..).zip(objects) {
-            self.write(node, mapping, place, *object, 4);
+        for (sub, object) in (1..).zip(objects) {
+            self.write(node, mapping, sub, *object, 4);
         }
         self.write(node, mapping, 0, objects.len() as u32, 1);
         self.write(node, communication, 1, cob, 4);
@@ -131,8 +131,8 @@ fn mapped(mapping: Mapping) -> Bus {
             }
             Mapping::Compact => {
                 bus.map(node, 0x1800, 0x180 + node, 1, &[0x6041_0010, 0x6064_0020, 0x2010_0010]);
-                for place in 1..4 {
-                    bus.write(node, 0x1800 + place, 1, OFF | u32::from(0x180 + 0x100 * place + node), 4);
+                for pdo in 1..4 {
+                    bus.write(node, 0x1800 + pdo, 1, OFF | u32::from(0x180 + 0x100 * pdo + node), 4);
                 }
                 let hip = (node - 1) / 2 * 2 + 1;
                 let objects =
@@ -161,14 +161,14 @@ fn cycles(bus: &mut Bus, mapping: Mapping, rate_hz: u64) -> Cycles {
         let begin = start + cycle * period_ns;
         bus.network.send_at(Frame::new(SYNC, &[]), begin);
         for node in NODES {
-            let place = (1_000_000 + cycle as i32 * 17).to_le_bytes();
+            let position = (1_000_000 + cycle as i32 * 17).to_le_bytes();
             match mapping {
                 Mapping::Standard => {
                     bus.network.send_at(Frame::new(0x200 + node, &[0, 0]), begin);
-                    bus.network.send_at(Frame::new(0x300 + node, &place), begin);
+                    bus.network.send_at(Frame::new(0x300 + node, &position), begin);
                 }
                 Mapping::Compact if node % 2 == 1 => {
-                    bus.network.send_at(Frame::new(0x300 + node, &[place, place].concat()), begin);
+                    bus.network.send_at(Frame::new(0x300 + node, &[position, position].concat()), begin);
                 }
                 Mapping::Compact => {}
             }

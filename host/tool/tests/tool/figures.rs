@@ -15,7 +15,7 @@ use scarab::model::Payload;
 
 fn identified() -> (RunReport, Series) {
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
-    let options = SimulationOptions { with_series: true, ..SimulationOptions::of_seed(1) };
+    let options = SimulationOptions { with_series: true, ..SimulationOptions::with_seed(1) };
     identify_one::<2, 13>(&leg, &options, None).expect("it runs")
 }
 
@@ -109,8 +109,8 @@ fn torques_corrected_by_a_known_mass_are_drawn_corrected() {
     let options = SimulationOptions {
         with_series: true,
         perturbations: vec![Perturbation::TorqueConstant(1.2)],
-        payload: Some(Payload { joint: 1, mass: 5.0, place: [0.2, 0.0, 0.0].into() }),
-        ..SimulationOptions::of_seed(1)
+        payload: Some(Payload { joint: 1, mass: 5.0, position: [0.2, 0.0, 0.0].into() }),
+        ..SimulationOptions::with_seed(1)
     };
     let (report, series) = identify_one::<2, 13>(&leg, &options, None).expect("it runs");
     for motion in &series.motions {

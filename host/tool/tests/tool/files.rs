@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use scarab_rig::kept_file::memory::BYTES;
+use scarab_rig::parameter_file::memory::BYTES;
 
 use crate::command::{Folder, scarab};
 

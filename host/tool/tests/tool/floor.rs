@@ -9,7 +9,7 @@ const FOOT: [f64; 3] = [0.4, 0.0, 0.0];
 fn world() -> World<2> {
     let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     let mut world = World::new(&leg.description().expect("two joints with truth"), 1);
-    world.place(&[0.4, 0.9]);
+    world.move_to(&[0.4, 0.9]);
     world
 }
 

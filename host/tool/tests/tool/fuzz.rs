@@ -70,11 +70,11 @@ fn numbers(text: &[u8]) -> Vec<(usize, usize)> {
 
 fn spoilt(good: &str, changes: &[Change]) -> Vec<u8> {
     let mut text = good.as_bytes().to_vec();
-    for &(kind, place, what) in changes {
+    for &(kind, share, what) in changes {
         if text.is_empty() {
             break;
         }
-        let at = ((place * text.len() as f64) as usize).min(text.len() - 1);
+        let at = ((share * text.len() as f64) as usize).min(text.len() - 1);
         let line = |from: usize| {
             let begin = text[..from].iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
             let end =
@@ -103,7 +103,7 @@ fn spoilt(good: &str, changes: &[Change]) -> Vec<u8> {
             }
             _ => {
                 let numbers = numbers(&text);
-                if let Some((begin, end)) = numbers.get((place * numbers.len() as f64) as usize) {
+                if let Some((begin, end)) = numbers.get((share * numbers.len() as f64) as usize) {
                     text.splice(*begin..*end, NUMBERS[what as usize % NUMBERS.len()].bytes());
                 }
             }

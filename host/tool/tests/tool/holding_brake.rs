@@ -22,7 +22,7 @@ impl Braked {
     fn new() -> Self {
         let mut leg = LegFile::load(DEFAULT_LEG).expect("shipped");
         leg.brake = Some(BrakeFile { release_ms: RELEASE_MS as f64, engage_ms: ENGAGE_MS as f64 });
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
         let context = Context::new(&leg, &options).expect("a leg");
         Self(Rig::new(&leg, &context, 1).expect("a board"))
     }

@@ -11,7 +11,7 @@ use crate::command::{Folder, base, scarab};
 use serde_json::Value;
 
 fn runs(leg: &LegFile, seeds: std::ops::RangeInclusive<u64>) -> Vec<RunReport> {
-    let options: Vec<_> = seeds.map(SimulationOptions::of_seed).collect();
+    let options: Vec<_> = seeds.map(SimulationOptions::with_seed).collect();
     identify_many::<2, 13>(leg, &options).expect("it runs")
 }
 

@@ -270,13 +270,13 @@ fn impossible_or_unknown_bodies_are_not_exported() {
         change(&mut changed);
         text(&changed, "model.toml").expect_err("no body").to_string()
     };
-    let place = |joint: usize, parameter: Parameter| 14 * joint + parameter.index();
-    let no_body = refusal(&|model| model.full_set.parameters[place(1, Parameter::XX)].value = Some(-0.1));
+    let index = |joint: usize, parameter: Parameter| 14 * joint + parameter.index();
+    let no_body = refusal(&|model| model.full_set.parameters[index(1, Parameter::XX)].value = Some(-0.1));
     assert!(no_body.starts_with("model.toml: not exported: no body can have the ten inertial"), "{no_body}");
-    let unknown = refusal(&|model| model.full_set.parameters[place(0, Parameter::M)].value = None);
+    let unknown = refusal(&|model| model.full_set.parameters[index(0, Parameter::M)].value = None);
     assert!(unknown.contains("a parameter of joint `hip` is unknown"), "{unknown}");
     let contradiction = refusal(&|model| {
-        let value = &mut model.full_set.parameters[place(1, Parameter::HX)].value;
+        let value = &mut model.full_set.parameters[index(1, Parameter::HX)].value;
         *value = value.map(|value| value + 0.01);
     });
     assert!(contradiction.contains("the bodies' HX2 is +"), "{contradiction}");

@@ -132,14 +132,14 @@ fn curves_of_one_frame_differ_in_colour_or_dashes_and_the_legend_has_each() {
             assert!(words.contains(name), "{file}: no {name} in the legend");
         }
         // Solid curves only; a dash has few points.
-        let mut looks = std::collections::BTreeMap::new();
+        let mut styles = std::collections::BTreeMap::new();
         for node in document.descendants().filter(|node| node.has_tag_name("polyline")) {
             let points = node.attribute("points").map_or(0, |points| points.split_whitespace().count());
             if points > 20 {
-                *looks.entry((node.attribute("stroke"), node.attribute("stroke-width"))).or_insert(0) += 1;
+                *styles.entry((node.attribute("stroke"), node.attribute("stroke-width"))).or_insert(0) += 1;
             }
         }
-        assert!(!looks.is_empty() && looks.values().all(|curves| *curves <= frames), "{file}: {looks:?}");
+        assert!(!styles.is_empty() && styles.values().all(|curves| *curves <= frames), "{file}: {styles:?}");
     }
 }
 

@@ -83,8 +83,8 @@ impl Wire {
 /// Program that passes the checks of a file.
 fn image(folder: &Folder) -> std::path::PathBuf {
     let mut program = vec![7; 2000];
-    for (place, word) in Header::UNSEALED.into_iter().enumerate() {
-        program[HEADER_AT as usize + 4 * place..][..4].copy_from_slice(&word.to_le_bytes());
+    for (index, word) in Header::UNSEALED.into_iter().enumerate() {
+        program[HEADER_AT as usize + 4 * index..][..4].copy_from_slice(&word.to_le_bytes());
     }
     seal(&mut program).expect("an image");
     let path = folder.path("image.bin");

@@ -314,7 +314,7 @@ fn recordings_of_real_machines_are_read_and_resampled() {
         let recording = recording.recording;
         assert_eq!((recording.time_s.len(), recording.joints_in_file), (samples, joints), "{name}");
         assert!((recording.duration_s() - duration).abs() < 1e-6, "{name}: {} s", recording.duration_s());
-        let resampled = Resampled::of(&recording);
+        let resampled = Resampled::new(&recording);
         assert_eq!(resampled.method, method, "{name}");
         let expected = (duration * GRID_RATE_HZ) as usize;
         assert!(

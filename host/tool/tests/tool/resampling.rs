@@ -56,7 +56,7 @@ fn compare(resampled: &Resampled) -> (f64, f64, f64) {
 
 #[test]
 fn a_one_kilohertz_sine_is_attenuated_as_stated_and_not_delayed() {
-    let resampled = Resampled::of(&sine(uniform_stamps(1000.0)));
+    let resampled = Resampled::new(&sine(uniform_stamps(1000.0)));
     let (worst, amplitude, phase) = compare(&resampled);
     assert_eq!(resampled.method, Method::BinMean);
     // sinc(0.006) sinc(0.003)^2 = 1 - 8.9e-5, the -0.01 % of the table.
@@ -67,7 +67,7 @@ fn a_one_kilohertz_sine_is_attenuated_as_stated_and_not_delayed() {
 
 #[test]
 fn a_fifty_hertz_sine_is_interpolated_within_the_stated_error() {
-    let resampled = Resampled::of(&sine(uniform_stamps(50.0)));
+    let resampled = Resampled::new(&sine(uniform_stamps(50.0)));
     let (worst, amplitude, phase) = compare(&resampled);
     assert_eq!(resampled.method, Method::CatmullRom);
     // Half way: 3/8 (0.06 pi)^4 = 4.7e-4. At a quarter the odd cubic term is added: (0.06 pi)^3 8 / 6 * 0.1
@@ -82,7 +82,7 @@ fn a_fifty_hertz_sine_is_interpolated_within_the_stated_error() {
 
 #[test]
 fn a_jittered_sine_is_restored() {
-    let resampled = Resampled::of(&sine(jittered_stamps(1)));
+    let resampled = Resampled::new(&sine(jittered_stamps(1)));
     let (_, amplitude, phase) = compare(&resampled);
     let interior = worst_between(&resampled, 0.01);
     // Untreated, 0.8 ms of jitter are an error of up to 2 pi 3 Hz 0.8 ms = 1.5e-2. A slope over uneven steps
@@ -98,12 +98,12 @@ fn a_jittered_sine_is_restored() {
 #[test]
 fn a_recording_on_the_grid_is_unchanged() {
     let recording = sine((0..2000_u32).map(|sample| f64::from(sample) / GRID_RATE_HZ).collect());
-    let resampled = Resampled::of(&recording);
+    let resampled = Resampled::new(&recording);
     assert_eq!(resampled.joints, recording.joints);
     assert_eq!(resampled.len(), 2000);
     // Stamps rounded to a microsecond and an offset move a grid point by 0.5 us: 2 pi 3 Hz 0.5 us = 1e-5.
     let rounded = recording.time_s.iter().map(|time| ((time + 0.000_333) * 1e6).round() / 1e6).collect();
-    let shifted = Resampled::of(&Recording { time_s: rounded, ..recording.clone() });
+    let shifted = Resampled::new(&Recording { time_s: rounded, ..recording.clone() });
     assert_eq!(shifted.len(), 2000);
     for (one, other) in shifted.joints[0].position_rad.iter().zip(&recording.joints[0].position_rad) {
         assert!((one - other).abs() < 1.0e-5);
@@ -116,7 +116,7 @@ fn noise_of_a_one_kilohertz_recording_drops_by_the_two_sample_mean() {
     let time_s = uniform_stamps(1000.0);
     let torque_nm: Vec<f64> = time_s.iter().map(|_| StandardNormal.sample(&mut random)).collect();
     let position_rad = vec![0.0; time_s.len()];
-    let resampled = Resampled::of(&recording(time_s, JointSeries { position_rad, torque_nm }));
+    let resampled = Resampled::new(&recording(time_s, JointSeries { position_rad, torque_nm }));
     let noise = &resampled.joints[0].torque_nm;
     let deviation = sqrt(noise.iter().map(|value| value * value).sum::<f64>() / noise.len() as f64);
     // Weights 1/4, 1/2, 1/4: sqrt(3/8) = 0.612, below the 1/sqrt(2) of a mean of two samples. 5,000 values.
@@ -131,7 +131,7 @@ fn noise_of_a_one_kilohertz_recording_drops_by_the_two_sample_mean() {
 #[test]
 fn angle_and_torque_go_through_the_same_operator() {
     for stamps in [uniform_stamps(1000.0), uniform_stamps(50.0), jittered_stamps(3)] {
-        let resampled = Resampled::of(&sine(stamps));
+        let resampled = Resampled::new(&sine(stamps));
         for point in 0..resampled.len() {
             let [angle] = resampled.position_rad::<1>(point).expect("a grid point");
             let [torque] = resampled.torque_nm::<1>(point).expect("a grid point");
@@ -153,7 +153,7 @@ fn stamps_in_bursts_do_not_amplify_noise() {
         if expected == Method::BinMean {
             sparse.time_s.iter_mut().for_each(|time| *time /= 4.0);
         }
-        let resampled = Resampled::of(&sparse);
+        let resampled = Resampled::new(&sparse);
         assert_eq!(resampled.method, expected);
         let largest =
             resampled.joints[0].position_rad.iter().fold(0.0_f64, |worst, value| worst.max(value.abs()));
@@ -164,7 +164,7 @@ fn stamps_in_bursts_do_not_amplify_noise() {
 
 #[test]
 fn too_large_a_bandwidth_gives_a_warning() {
-    let resampled = Resampled::of(&sine(uniform_stamps(50.0)));
+    let resampled = Resampled::new(&sine(uniform_stamps(50.0)));
     assert_eq!(resampled.bandwidth_warning(8.0), None);
     assert_eq!(
         resampled.bandwidth_warning(12.0).expect("a warning").to_string(),
@@ -174,11 +174,11 @@ fn too_large_a_bandwidth_gives_a_warning() {
 
 #[test]
 fn points_and_joints_beyond_the_last_have_no_value() {
-    let resampled = Resampled::of(&sine(uniform_stamps(500.0)));
+    let resampled = Resampled::new(&sine(uniform_stamps(500.0)));
     assert_eq!(resampled.position_rad::<1>(resampled.len()), None);
     assert_eq!(resampled.torque_nm::<2>(0), None);
-    assert!(Resampled::of(&sine(Vec::new())).is_empty());
-    assert!(Resampled::of(&sine(vec![1.0])).is_empty());
+    assert!(Resampled::new(&sine(Vec::new())).is_empty());
+    assert!(Resampled::new(&sine(vec![1.0])).is_empty());
 }
 
 /// Largest difference from the sine, without `margin_s` at both ends.

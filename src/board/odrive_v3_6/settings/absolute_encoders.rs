@@ -14,7 +14,7 @@
 use super::Write;
 use super::external::{INDEX_LINES, masked};
 use super::pins::{Mode, Pin, pin};
-use crate::hal::EncoderPlace;
+use crate::hal::AbsoluteEncoderSide;
 use crate::leg::AbsoluteEncoders;
 
 /// Command to read the angle (register 0x3FFF, bit 14 read, bit 15 even parity); the answer comes with the
@@ -33,13 +33,13 @@ const SECOND: [Pin; 2] =
 
 /// Select line of an encoder, low while it is selected; `None` without that encoder.
 #[must_use]
-pub fn select(axis: usize, place: EncoderPlace, encoders: AbsoluteEncoders) -> Option<Pin> {
-    let lines = match place {
-        EncoderPlace::Rotor if encoders.rotor => &FIRST,
-        EncoderPlace::Joint if encoders.joint.is_none() => return None,
-        EncoderPlace::Joint if encoders.rotor => &SECOND,
-        EncoderPlace::Joint => &FIRST,
-        EncoderPlace::Rotor => return None,
+pub fn select(axis: usize, side: AbsoluteEncoderSide, encoders: AbsoluteEncoders) -> Option<Pin> {
+    let lines = match side {
+        AbsoluteEncoderSide::Rotor if encoders.rotor => &FIRST,
+        AbsoluteEncoderSide::Joint if encoders.joint.is_none() => return None,
+        AbsoluteEncoderSide::Joint if encoders.rotor => &SECOND,
+        AbsoluteEncoderSide::Joint => &FIRST,
+        AbsoluteEncoderSide::Rotor => return None,
     };
     lines.get(axis).copied()
 }
@@ -55,9 +55,9 @@ pub fn mask_index(axis: usize, encoders: AbsoluteEncoders, mut write: impl FnMut
 
 /// Deselects an axis' encoders. Before the first transfer: an encoder whose line floats answers as well.
 pub fn deselect(axis: usize, encoders: AbsoluteEncoders, mut write: impl FnMut(&[Write])) {
-    for pin in [EncoderPlace::Rotor, EncoderPlace::Joint]
+    for pin in [AbsoluteEncoderSide::Rotor, AbsoluteEncoderSide::Joint]
         .into_iter()
-        .filter_map(|place| select(axis, place, encoders))
+        .filter_map(|side| select(axis, side, encoders))
     {
         write(&pin.writes());
     }

@@ -58,7 +58,7 @@ impl Receiver {
 }
 
 fn program() -> Vec<u8> {
-    (0..3001_u32).map(|place| ((place * 31) >> 2) as u8).collect()
+    (0..3001_u32).map(|index| ((index * 31) >> 2) as u8).collect()
 }
 
 #[test]
@@ -71,12 +71,12 @@ fn blocks_arrive_complete_however_slow_their_consumer_is() {
         assert_eq!(begun[0], 0xA4);
         let block = usize::from(begun[4]);
         let mut waited = 0;
-        for (place, part) in program.chunks(7 * block).enumerate() {
+        for (index, part) in program.chunks(7 * block).enumerate() {
             let mut sent = None;
             let count = part.len().div_ceil(7);
             for (number, segment) in part.chunks(7).enumerate() {
                 assert_eq!(sent, None, "an answer within a block");
-                let is_last = 7 * block * (place + 1) >= program.len() && number + 1 == count;
+                let is_last = 7 * block * (index + 1) >= program.len() && number + 1 == count;
                 let mut data = [0; 8];
                 data[0] = (number as u8 + 1) | (u8::from(is_last) << 7);
                 data[1..=segment.len()].copy_from_slice(segment);

@@ -70,9 +70,9 @@ fn parameters_that_do_not_fit_are_refused_and_reported() {
     bench.save(1);
     assert!(bench.store(true).is_some());
     // Every PDO with eight objects: dummies received, modes of operation sent.
-    for place in 0..4 {
-        for (mapping, object) in [(0x1600 + place, 0x0005_0008), (0x1A00 + place, 0x6061_0008)] {
-            let (parameters, identifier) = (mapping - 0x200, 0x4000_0181 + u32::from(place));
+    for pdo in 0..4 {
+        for (mapping, object) in [(0x1600 + pdo, 0x0005_0008), (0x1A00 + pdo, 0x6061_0008)] {
+            let (parameters, identifier) = (mapping - 0x200, 0x4000_0181 + u32::from(pdo));
             bench.write(1, parameters, 1, 1 << 31 | identifier, 4);
             bench.write(1, mapping, 0, 0, 1);
             for sub in 1..=8 {

@@ -35,7 +35,7 @@ impl<T: Real> Thresholds<T> {
         outliers: &Outliers<T, N>,
         builder: &mut VerdictBuilder<'_, T>,
     ) {
-        let mostly = outliers.disturbed_share.iter().any(|&share| share > T::of(0.5));
+        let mostly = outliers.disturbed_share.iter().any(|&share| share > T::from_double(0.5));
         builder.note(Evidence {
             reason: Reason::Contact,
             test: Test::CommonDisturbance,
@@ -56,9 +56,9 @@ impl<T: Real> Thresholds<T> {
         motion: Option<usize>,
         builder: &mut VerdictBuilder<'_, T>,
     ) {
-        let samples = real::max(T::of(f64::from(outliers.samples)), T::one());
+        let samples = real::max(T::from_double(f64::from(outliers.samples)), T::one());
         for joint in 0..N {
-            let replaced = T::of(f64::from(outliers.replaced[joint])) / samples;
+            let replaced = T::from_double(f64::from(outliers.replaced[joint])) / samples;
             let limit = self.largest_replaced_share;
             builder.at_most(Reason::Outliers, Test::ReplacedShare, Some(joint), motion, replaced, limit);
             let (share, limit) = (outliers.disturbed_share[joint], self.largest_disturbed_share);

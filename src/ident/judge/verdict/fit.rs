@@ -54,7 +54,8 @@ impl<T: Real> Thresholds<T> {
         expected: T,
         harmless: T,
     ) -> T {
-        let freedom = T::of(f64::from(record.rows[joint])) * real::min(record.row_information, T::one());
+        let freedom =
+            T::from_double(f64::from(record.rows[joint])) * real::min(record.row_information, T::one());
         let systematic = harmless * record.torque[joint].root_mean_square;
         real::sqrt(expected * self.variance_ratio(freedom) + systematic * systematic)
     }
@@ -74,7 +75,7 @@ impl<T: Real> Thresholds<T> {
             Test::NotFinite,
             None,
             at,
-            T::of(f64::from(record.rejected)),
+            T::from_double(f64::from(record.rejected)),
             T::zero(),
         );
         for joint in 0..N {
@@ -119,7 +120,7 @@ impl<T: Real> Thresholds<T> {
             }
         }
         for (joint, size) in training.torque.iter().enumerate() {
-            let rows = T::of(f64::from(training.rows[joint].max(1)));
+            let rows = T::from_double(f64::from(training.rows[joint].max(1)));
             let part = real::sqrt(training.factors[joint].without_right().excess(&dynamic) / rows);
             let value =
                 if size.root_mean_square > T::zero() { part / size.root_mean_square } else { T::zero() };

@@ -44,7 +44,8 @@ impl<T: Real> Thresholds<T> {
             .iter()
             .fold((0_u32, 0_u32), |(outliers, rows), joint| (outliers + joint.outliers, rows + joint.rows));
         // A wrong model has errors everywhere: that is not contact.
-        let elsewhere = T::of(f64::from(rows)) * T::of(0.5) < T::of(f64::from(outliers));
+        let elsewhere =
+            T::from_double(f64::from(rows)) * T::from_double(0.5) < T::from_double(f64::from(outliers));
         let value = residual.longest_common_s;
         let limit = self.longest_disturbance_s;
         builder.note(Evidence {
@@ -74,7 +75,7 @@ impl<T: Real> Thresholds<T> {
             Direction::Length => (Test::LinkLength, self.largest_length_error),
             Direction::Zero => (Test::EncoderZero, self.largest_zero_error),
         };
-        let tolerance = if noise_is_known { tolerance } else { T::of(3.0) * tolerance };
+        let tolerance = if noise_is_known { tolerance } else { T::from_double(3.0) * tolerance };
         let limit = |sigma: T| real::max(tolerance, self.noise_quantile * sigma);
         let (mut value, mut allowed) = (found.delta, limit(found.sigma));
         if let Some((delta, sigma)) = found.beside

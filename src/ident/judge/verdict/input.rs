@@ -15,7 +15,7 @@ impl<T: Real> Thresholds<T> {
         builder: &mut VerdictBuilder<'_, T>,
     ) {
         let needed = (model.base.rank() as u32).saturating_mul(self.rows_per_parameter);
-        let count = |rows: u32| T::of(f64::from(rows));
+        let count = |rows: u32| T::from_double(f64::from(rows));
         // Without samples no joint has a speed.
         let seen = record.rows.iter().any(|&rows| rows > 0)
             || record.torque.iter().any(|size| size.speed > T::zero());
@@ -26,7 +26,13 @@ impl<T: Real> Thresholds<T> {
             let reason = if still { Reason::Unexcited } else { Reason::Input };
             builder.at_least(reason, Test::Rows, at, count(rows), count(needed));
             if rows > 0 {
-                builder.at_least(Reason::Input, Test::Torque, at, size.root_mean_square, T::of(1e-9));
+                builder.at_least(
+                    Reason::Input,
+                    Test::Torque,
+                    at,
+                    size.root_mean_square,
+                    T::from_double(1e-9),
+                );
             }
             if seen {
                 builder.at_least(Reason::Unexcited, Test::Speed, at, size.speed, self.smallest_speed);
@@ -47,8 +53,8 @@ impl<T: Real> Thresholds<T> {
         determined: usize,
         builder: &mut VerdictBuilder<'_, T>,
     ) {
-        let rank = T::of(stage.requested() as f64);
-        let determined = T::of(stage.columns().len().min(determined) as f64);
+        let rank = T::from_double(stage.requested() as f64);
+        let determined = T::from_double(stage.columns().len().min(determined) as f64);
         builder.at_least(Reason::Unexcited, Test::Determined, None, determined, rank);
         let condition = stage.condition().unwrap_or(T::LARGEST);
         builder.at_most(Reason::Unexcited, Test::Condition, None, None, condition, self.largest_condition);

@@ -65,7 +65,7 @@ impl<T: Real> Thresholds<T> {
     /// Judges the loss of fit of the physically consistent leg against least squares. Beyond the noise of its
     /// degrees of freedom, the data contradict every leg that the prior allows.
     pub fn judge_consistency(&self, consistency: &Consistency<T>, builder: &mut VerdictBuilder<'_, T>) {
-        let limit = self.chance(T::of(consistency.degrees_of_freedom as f64));
+        let limit = self.chance(T::from_double(consistency.degrees_of_freedom as f64));
         builder.at_most(Reason::Unphysical, Test::PriorBox, None, None, consistency.excess, limit);
     }
 
@@ -148,7 +148,8 @@ fn posture<T: Real, const N: usize>(index: usize) -> [T; N] {
         // Multiples of the golden ratio's powers in units of 2^-32 turns (Kronecker sequence).
         let step = [2_654_435_769_u32, 1_640_531_527, 1_013_904_243][joint % 3];
         let turn = (index as u32).wrapping_add(1).wrapping_mul(step) ^ (1 << 31);
-        T::of(f64::from(turn.cast_signed())) * T::of(core::f64::consts::PI / 2_147_483_648.0)
+        T::from_double(f64::from(turn.cast_signed()))
+            * T::from_double(core::f64::consts::PI / 2_147_483_648.0)
     })
 }
 

@@ -64,24 +64,24 @@ impl<T: Real> Default for Thresholds<T> {
     fn default() -> Self {
         Self {
             rows_per_parameter: 5,
-            smallest_speed: T::of(0.05),
-            largest_pulse_share: T::of(0.2),
-            largest_condition: T::of(1000.0),
-            search_excess: T::of(0.25),
-            largest_negative_sigmas: T::of(3.0),
-            largest_excess_spreads: T::of(5.0),
-            noise_quantile: T::of(5.2),
-            largest_error_ratio: T::of(2.0),
-            harmless_error_share: T::of(0.05),
-            largest_misfit_share: T::of(0.10),
-            largest_error_share: T::of(0.7),
-            largest_uncertainty_share: T::of(0.3),
-            smallest_dynamic_share: T::of(0.02),
-            largest_length_error: T::of(0.03),
-            largest_zero_error: T::of(0.035),
-            longest_disturbance_s: T::of(1.0),
-            largest_replaced_share: T::of(0.1),
-            largest_disturbed_share: T::of(1.0 / 3.0),
+            smallest_speed: T::from_double(0.05),
+            largest_pulse_share: T::from_double(0.2),
+            largest_condition: T::from_double(1000.0),
+            search_excess: T::from_double(0.25),
+            largest_negative_sigmas: T::from_double(3.0),
+            largest_excess_spreads: T::from_double(5.0),
+            noise_quantile: T::from_double(5.2),
+            largest_error_ratio: T::from_double(2.0),
+            harmless_error_share: T::from_double(0.05),
+            largest_misfit_share: T::from_double(0.10),
+            largest_error_share: T::from_double(0.7),
+            largest_uncertainty_share: T::from_double(0.3),
+            smallest_dynamic_share: T::from_double(0.02),
+            largest_length_error: T::from_double(0.03),
+            largest_zero_error: T::from_double(0.035),
+            longest_disturbance_s: T::from_double(1.0),
+            largest_replaced_share: T::from_double(0.1),
+            largest_disturbed_share: T::from_double(1.0 / 3.0),
         }
     }
 }
@@ -98,7 +98,7 @@ impl<T: Real> Thresholds<T> {
     /// by chance of a measured over an expected variance (Wilson and Hilferty 1931).
     #[must_use]
     pub fn variance_ratio(&self, freedom: T) -> T {
-        let part = T::of(2.0 / 9.0) / crate::real::max(freedom, T::one());
+        let part = T::from_double(2.0 / 9.0) / crate::real::max(freedom, T::one());
         let root = T::one() - part + self.noise_quantile * crate::real::sqrt(part);
         root * root * root
     }

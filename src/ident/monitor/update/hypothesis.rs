@@ -88,7 +88,7 @@ impl<T: Real> Hypothesis<T> {
     #[must_use]
     pub fn score(&self) -> T {
         let free = self.determined.iter().filter(|determined| **determined).count();
-        self.chi_square + T::of((2 * free) as f64)
+        self.chi_square + T::from_double((2 * free) as f64)
     }
 }
 
@@ -147,7 +147,7 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
     /// Chi-square and degrees of freedom of the old model.
     #[must_use]
     pub fn unchanged(&self) -> (T, T) {
-        (dot(&self.whitened, &self.whitened), T::of(self.rank as f64))
+        (dot(&self.whitened, &self.whitened), T::from_double(self.rank as f64))
     }
 
     /// Fits a hypothesis with these free parameters.
@@ -187,7 +187,7 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
             chosen[count] = candidate;
             let tried = self.triangularised(columns, chosen.get(..=count).unwrap_or(&[]));
             let own = real::abs(tried.triangle()[count][count]);
-            if own > T::of(DETERMINED_SHARE) * tried.column_length(count) {
+            if own > T::from_double(DETERMINED_SHARE) * tried.column_length(count) {
                 (factor, count) = (tried, count + 1);
             }
         }
@@ -195,14 +195,14 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
         let mut covariance = [[T::zero(); DIRECTIONS]; DIRECTIONS];
         let mut hypothesis = Hypothesis {
             chi_square: if count > 0 { factor.residual() } else { dot(&self.whitened, &self.whitened) },
-            freedom: T::of(self.rank.saturating_sub(count).max(1) as f64),
+            freedom: T::from_double(self.rank.saturating_sub(count).max(1) as f64),
             ..Hypothesis::nothing()
         };
-        for (place, &index) in chosen.iter().enumerate().take(count) {
-            hypothesis.values[index] = solved[place];
+        for (number, &index) in chosen.iter().enumerate().take(count) {
+            hypothesis.values[index] = solved[number];
             hypothesis.determined[index] = true;
             for (other, &column) in chosen.iter().enumerate().take(count) {
-                covariance[index][column] = dot(&inverse[place], &inverse[other]);
+                covariance[index][column] = dot(&inverse[number], &inverse[other]);
             }
             hypothesis.sigmas[index] = real::sqrt(covariance[index][index]);
         }

@@ -22,7 +22,7 @@ const TRUTH: LegParameters<f64, 2> = [
 fn model<T: Real>() -> RowModel<T, 2, BASE> {
     let link = |a| DenavitHartenberg { alpha: 0.0, a, d: 0.0 };
     let chain = Chain::<f64, 2>::new(&[link(0.0), link(0.45)]).expect("finite").convert();
-    let gravity = Vector3::new(9.81, 0.0, 0.0).map(T::of);
+    let gravity = Vector3::new(9.81, 0.0, 0.0).map(T::from_double);
     let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen base parameters");
     RowModel::new(chain, gravity, base)
 }
@@ -50,17 +50,21 @@ fn record<T: Real>(
             model.base.select(row, &mut selected);
             let exact: f64 = selected.iter().zip(&values).map(|(element, value)| element * value).sum();
             let torque = exact + bias * state.q[0] * state.q[0] + SIGMA * random.normal();
-            factors[joint].insert(&selected.map(T::of), T::of(torque));
+            factors[joint].insert(&selected.map(T::from_double), T::from_double(torque));
         }
     }
-    let size = TorqueSize { mean_absolute: T::of(10.0), root_mean_square: T::of(12.0), speed: T::of(speed) };
+    let size = TorqueSize {
+        mean_absolute: T::from_double(10.0),
+        root_mean_square: T::from_double(12.0),
+        speed: T::from_double(speed),
+    };
     Record {
         factors,
         torque: [size; 2],
         rows: [states; 2],
         rejected: 0,
         row_information: T::one(),
-        noise: [T::of(SIGMA); 2],
+        noise: [T::from_double(SIGMA); 2],
         outliers: Outliers::none(),
         stribeck: [None; 2],
         selection: Selection::all(),
@@ -75,12 +79,12 @@ fn updated<T: Real>(after: &LegParameters<f64, 2>, motion: [f64; 3], seed: u64) 
     let estimate = Problem::new(&training, &model).least_squares(Plan::OneTime);
     let baseline = Baseline::new(estimate, &training, core::iter::empty());
     let rows = record::<T>(after, 400, motion, seed + 5000);
-    Update::new(&model, &baseline, &rows, &Thresholds::default(), T::of(1.386))
+    Update::new(&model, &baseline, &rows, &Thresholds::default(), T::from_double(1.386))
 }
 
-fn loaded(joint: usize, mass: f64, place: [f64; 3]) -> LegParameters<f64, 2> {
+fn loaded(joint: usize, mass: f64, position: [f64; 3]) -> LegParameters<f64, 2> {
     let mut leg = TRUTH;
-    Payload { joint, mass, place: place.into() }.add_to(&mut leg);
+    Payload { joint, mass, position: position.into() }.add_to(&mut leg);
     leg
 }
 
@@ -139,12 +143,12 @@ fn no_body_of_negative_inertia_is_ever_a_payload() {
 
 #[test]
 fn the_sigma_of_a_payload_counts_the_models_own_error() {
-    let place = |parameter| PAYLOAD_PARAMETERS.iter().position(|known| *known == parameter).expect("listed");
+    let find = |parameter| PAYLOAD_PARAMETERS.iter().position(|known| *known == parameter).expect("listed");
     let truth = [(Parameter::M, 3.0), (Parameter::HX, 0.6), (Parameter::HY, 0.15), (Parameter::ZZ, 0.1275)];
     let after = loaded(1, 3.0, [0.2, 0.05, 0.0]);
     let runs: Vec<_> = (0..150).map(|seed| updated::<f64>(&after, WALKING, 100 + seed)).collect();
     for (parameter, truth) in truth {
-        let index = place(parameter);
+        let index = find(parameter);
         let squares = runs.iter().map(|run| {
             let off = (run.payload[1].values[index] - truth) / run.payload[1].sigma(index).expect("known");
             off * off

@@ -21,7 +21,7 @@ fn columns(time: f64) -> [f64; COLUMNS] {
 /// Independent rows with noise of one N m, plus `disturbance` at each row's time.
 fn motion(rows: u32, seed: u64, disturbance: impl Fn(f64) -> f64) -> Blocks {
     let mut random = TestRandom::new(seed);
-    let mut window = Blocks::of_columns(COLUMNS, [None; 2], 0);
+    let mut window = Blocks::with_columns(COLUMNS, [None; 2], 0);
     for index in 0..rows {
         let time = ROW_S * f64::from(index);
         let row = columns(time);

@@ -14,8 +14,8 @@ fn the_bank_makes_the_curve_of_any_speed_in_its_range() {
         let speed = 0.06 * real::exp(real::ln(4.0) * f64::from(index) / 40.0);
         let Combination { bank, friction } = combination(speed);
         let mut sum = 0.0;
-        for place in 0..1500 {
-            let velocity = 1e-3 * (0.5 + f64::from(place));
+        for step in 0..1500 {
+            let velocity = 1e-3 * (0.5 + f64::from(step));
             let ratio = velocity / speed;
             let made = dot(&bank_columns(velocity), &bank) + friction[0] + friction[1] * velocity;
             let error = made - real::exp(-(ratio * ratio));
@@ -54,7 +54,7 @@ const VISCOUS: f64 = 3.3;
 /// least gain and surplus are those of `auto`.
 fn found(surplus: f64, speed: f64, seed: u64) -> Option<(StribeckFit<f32, COLUMNS>, [f32; COLUMNS])> {
     let mut random = TestRandom::new(seed);
-    let mut window = Window::<f32, 1, COLUMNS, 8192>::of_columns(COLUMNS, [Some(1), Some(2)], BANK);
+    let mut window = Window::<f32, 1, COLUMNS, 8192>::with_columns(COLUMNS, [Some(1), Some(2)], BANK);
     for index in 0..1000 {
         let (sine, cosine) = real::sin_cos(1.3 * 0.02 * f64::from(index));
         let velocity = 1.2 * cosine;
@@ -95,18 +95,18 @@ fn surplus_and_speed_come_back_from_rows_with_the_sigma_they_claim() {
                 (f64::from(fit.speed) - speed) / f64::from(fit.speed_sigma),
                 (f64::from(values[1]) - COULOMB_NM) / coulomb_sigma,
             ];
-            for (place, error) in errors.into_iter().enumerate() {
-                squares[place] += error * error / SEEDS as f64;
-                biases[place] += error / SEEDS as f64;
+            for (index, error) in errors.into_iter().enumerate() {
+                squares[index] += error * error / SEEDS as f64;
+                biases[index] += error / SEEDS as f64;
             }
         }
         std::println!("{surplus} N m, {speed} rad/s: mean square {squares:.2?}, mean {biases:.2?} sigma");
-        for place in 0..3 {
+        for index in 0..3 {
             // 60 squares of standard normal numbers scatter by 0.18 about one; speed and surplus are not
             // linear in the rows.
-            assert!(place == 2 || (0.4..1.9).contains(&squares[place]), "{}", squares[place]);
+            assert!(index == 2 || (0.4..1.9).contains(&squares[index]), "{}", squares[index]);
             // Their mean scatters by 0.13; the bank's own error (3.2 % of the surplus) adds to it.
-            assert!(biases[place].abs() < 0.6, "{}", biases[place]);
+            assert!(biases[index].abs() < 0.6, "{}", biases[index]);
         }
     }
 }

@@ -9,7 +9,7 @@ const COLUMNS: usize = 6;
 type Blocks = Window<f32, 1, COLUMNS, 1500>;
 
 fn blocks() -> Blocks {
-    Blocks::of_columns(COLUMNS, [None; 2], 0)
+    Blocks::with_columns(COLUMNS, [None; 2], 0)
 }
 
 fn row(index: u32) -> FilteredRows<f64, 1, COLUMNS> {
@@ -93,7 +93,7 @@ fn a_window_without_room_says_so() {
 
 #[test]
 fn blocks_say_the_same_before_while_and_after_two_of_them_are_joined() {
-    let mut window = Window::<f64, 2, COLUMNS, 1500>::of_columns(COLUMNS, [None; 2], 0);
+    let mut window = Window::<f64, 2, COLUMNS, 1500>::with_columns(COLUMNS, [None; 2], 0);
     let (mut joined, parameters) = (0, [0.5; COLUMNS]);
     for index in 0..2000 {
         let [one, torque] = [row(index), row(index)].map(|rows| (rows.regressor[0], rows.torque[0]));

@@ -76,14 +76,14 @@ fn three_percent_of_outliers_are_found_and_leave_errors_of_the_noise() {
 fn three_outliers_in_a_row_are_found_and_a_step_is_not() {
     let mut random = TestRandom::new(3);
     let mut samples: Vec<f64> = (0..4000).map(|index| torque(index) + 0.3 * gaussian(&mut random)).collect();
-    for place in [1000, 1001, 1002, 2500, 2501] {
-        samples[place] += 25.0;
+    for number in [1000, 1001, 1002, 2500, 2501] {
+        samples[number] += 25.0;
     }
     samples.iter_mut().skip(3200).for_each(|value| *value += 25.0);
     let outlier: Vec<usize> = run(Quantity::Torque, &samples)
         .iter()
         .enumerate()
-        .filter_map(|(place, cleaned)| cleaned.outlier.then_some(place))
+        .filter_map(|(number, cleaned)| cleaned.outlier.then_some(number))
         .collect();
     assert_eq!(outlier, [1000, 1001, 1002, 2500, 2501]);
 }
@@ -99,12 +99,12 @@ fn a_smooth_angle_passes_bit_for_bit_and_an_outlier_is_replaced() {
     let mut samples: Vec<f64> = (0..5000).map(angle).collect();
     let untouched = run(Quantity::Angle, &samples);
     assert!(untouched.iter().zip(&samples).all(|(cleaned, sample)| cleaned.value == *sample as f32));
-    for place in (200..4900).step_by(37) {
-        samples[place] += 0.02;
+    for number in (200..4900).step_by(37) {
+        samples[number] += 0.02;
     }
-    for (place, cleaned) in run(Quantity::Angle, &samples).iter().enumerate() {
-        assert_eq!(cleaned.outlier, (200..4900).contains(&place) && (place - 200) % 37 == 0, "{place}");
+    for (number, cleaned) in run(Quantity::Angle, &samples).iter().enumerate() {
+        assert_eq!(cleaned.outlier, (200..4900).contains(&number) && (number - 200) % 37 == 0, "{number}");
         // An extrapolated parabola is at most seven errors of an eighth of a count off.
-        assert!((f64::from(cleaned.value) - angle(place)).abs() < count, "{place}");
+        assert!((f64::from(cleaned.value) - angle(number)).abs() < count, "{number}");
     }
 }

@@ -46,13 +46,16 @@ impl<T: Real> Effort<T> {
     /// Settings for single precision. Without a prior the pull to a neutral leg only makes the answer unique.
     #[must_use]
     pub fn device(with_prior: bool) -> Self {
-        Self { pull: T::of(if with_prior { 1e-3 } else { 1e-4 }), last_barrier: T::of(1e-5) }
+        Self {
+            pull: T::from_double(if with_prior { 1e-3 } else { 1e-4 }),
+            last_barrier: T::from_double(1e-5),
+        }
     }
 
     /// Settings for double precision, as a reference.
     #[must_use]
     pub fn reference() -> Self {
-        Self { pull: T::of(1e-5), last_barrier: T::of(1e-8) }
+        Self { pull: T::from_double(1e-5), last_barrier: T::from_double(1e-8) }
     }
 }
 
@@ -73,7 +76,7 @@ pub struct Completion<T: Real, const N: usize> {
     limits: Limits<T, N>,
     cost: LegCost<T, N>,
     effort: Effort<T>,
-    place: LegParameters<T, N>,
+    point: LegParameters<T, N>,
     barrier: T,
     steps: u32,
     steps_here: u32,
@@ -92,13 +95,13 @@ impl<T: Real, const N: usize> Completion<T, N> {
     ) -> Self {
         let limits = Limits::new(model, record, prior);
         let cost = LegCost::new(&limits);
-        let place = cost.place(&limits.inside());
+        let point = cost.scaled_point(&limits.inside());
         let barrier = effort.last_barrier;
         Self {
             limits,
             cost,
             effort,
-            place,
+            point,
             barrier,
             steps: 0,
             steps_here: 0,
@@ -111,7 +114,7 @@ impl<T: Real, const N: usize> Completion<T, N> {
     pub fn hold<const B: usize>(&mut self, model: &RowModel<T, N, B>, selection: &Selection<T, N, B>) {
         self.limits.hold(model, selection);
         self.cost = LegCost::new(&self.limits);
-        self.place = self.cost.place(&self.limits.inside());
+        self.point = self.cost.scaled_point(&self.limits.inside());
     }
 
     /// Starts from the base values found on `stage`. If no consistent leg has these values, the cost of
@@ -133,16 +136,16 @@ impl<T: Real, const N: usize> Completion<T, N> {
         }
         let closed = complete_within(model, &wanted, self.limits.origin(), self.limits.deviations());
         if let Some(closed) = closed.filter(|closed| self.limits.allow(closed)) {
-            self.place = self.cost.place(&closed);
+            self.point = self.cost.scaled_point(&closed);
             // Rounding in the scaling must not lead outside.
             if Limits::consistent(&self.parameters()) {
                 (self.phase, self.converged) = (Phase::Done, true);
                 return;
             }
         }
-        self.place = self.cost.place(&self.limits.inside());
-        let first = self.cost.excess(&self.place) / T::of(BARRIERS_PER_JOINT * N as f64);
-        self.barrier = real::clamp(first, self.effort.last_barrier, T::of(1e9));
+        self.point = self.cost.scaled_point(&self.limits.inside());
+        let first = self.cost.excess(&self.point) / T::from_double(BARRIERS_PER_JOINT * N as f64);
+        self.barrier = real::clamp(first, self.effort.last_barrier, T::from_double(1e9));
         self.phase = Phase::Stepping;
     }
 
@@ -151,7 +154,7 @@ impl<T: Real, const N: usize> Completion<T, N> {
         if self.phase != Phase::Stepping {
             return self.phase == Phase::Done;
         }
-        let step = interior::step(&self.cost, &self.limits, &mut self.place, self.barrier);
+        let step = interior::step(&self.cost, &self.limits, &mut self.point, self.barrier);
         self.steps += 1;
         self.steps_here += 1;
         if step.settled || self.steps_here >= STEPS_PER_BARRIER {
@@ -160,7 +163,7 @@ impl<T: Real, const N: usize> Completion<T, N> {
                 self.phase = Phase::Done;
             }
             self.steps_here = 0;
-            self.barrier = real::max(self.barrier * T::of(0.1), self.effort.last_barrier);
+            self.barrier = real::max(self.barrier * T::from_double(0.1), self.effort.last_barrier);
         }
         if self.steps >= LARGEST_STEPS {
             self.phase = Phase::Done;
@@ -195,7 +198,7 @@ impl<T: Real, const N: usize> Completion<T, N> {
     /// Current parameters; physically consistent at any time.
     #[must_use]
     pub fn parameters(&self) -> LegParameters<T, N> {
-        self.cost.parameters(&self.place)
+        self.cost.parameters(&self.point)
     }
 
     /// Allowed set of the parameters.

@@ -101,14 +101,14 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         for joint in 0..N {
             for parameter in Parameter::ALL {
                 let mut row = zeros(T::zero());
-                let place = (joint, parameter.index());
+                let entry = (joint, parameter.index());
                 let drive = parameter.index().checked_sub(INERTIAL_PARAMETERS);
                 if drive.is_some_and(|drive| !self.estimated[joint][drive]) {
-                    row[place.0][place.1] = T::one();
+                    row[entry.0][entry.1] = T::one();
                 } else {
-                    row[place.0][place.1] = weight;
+                    row[entry.0][entry.1] = weight;
                     for other in &seen {
-                        add_scaled(&mut row, other, -weight * other[place.0][place.1]);
+                        add_scaled(&mut row, other, -weight * other[entry.0][entry.1]);
                     }
                 }
                 self.insert(&mut row, T::zero());
@@ -140,12 +140,12 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         }
     }
 
-    /// Shifts the origin to `place`: the unknown becomes the step from there.
-    pub(super) fn shift(&mut self, place: &LegParameters<T, N>) {
-        let place = place.as_flattened();
+    /// Shifts the origin to `point`: the unknown becomes the step from there.
+    pub(super) fn shift(&mut self, point: &LegParameters<T, N>) {
+        let point = point.as_flattened();
         let rows = self.triangle.as_flattened().iter().zip(self.right.as_flattened_mut());
         for (index, (row, right)) in rows.enumerate() {
-            for (&element, &value) in row.as_flattened().iter().zip(place).skip(index) {
+            for (&element, &value) in row.as_flattened().iter().zip(point).skip(index) {
                 *right -= element * value;
             }
         }
@@ -177,11 +177,11 @@ impl<T: Real, const N: usize> LegCost<T, N> {
 
     /// `F` above its unconstrained minimum.
     #[must_use]
-    pub fn excess(&self, place: &LegParameters<T, N>) -> T {
-        let place = place.as_flattened();
+    pub fn excess(&self, point: &LegParameters<T, N>) -> T {
+        let point = point.as_flattened();
         let rows = self.triangle.as_flattened().iter().zip(self.right.as_flattened());
         rows.enumerate().fold(T::zero(), |total, (index, (row, &right))| {
-            let known = row.as_flattened().iter().zip(place).skip(index);
+            let known = row.as_flattened().iter().zip(point).skip(index);
             let error = known.fold(-right, |error, (&element, &value)| error + element * value);
             total + error * error
         })
@@ -189,8 +189,8 @@ impl<T: Real, const N: usize> LegCost<T, N> {
 
     /// Converts scaled coordinates to parameters.
     #[must_use]
-    pub fn parameters(&self, place: &LegParameters<T, N>) -> LegParameters<T, N> {
-        let mut parameters = *place;
+    pub fn parameters(&self, point: &LegParameters<T, N>) -> LegParameters<T, N> {
+        let mut parameters = *point;
         multiply(&mut parameters, &self.scale);
         add_scaled(&mut parameters, &self.origin, T::one());
         parameters
@@ -198,13 +198,13 @@ impl<T: Real, const N: usize> LegCost<T, N> {
 
     /// Converts parameters to scaled coordinates.
     #[must_use]
-    pub fn place(&self, parameters: &LegParameters<T, N>) -> LegParameters<T, N> {
-        let mut place = *parameters;
-        add_scaled(&mut place, &self.origin, -T::one());
-        for (value, &scale) in place.as_flattened_mut().iter_mut().zip(self.scale.as_flattened()) {
+    pub fn scaled_point(&self, parameters: &LegParameters<T, N>) -> LegParameters<T, N> {
+        let mut point = *parameters;
+        add_scaled(&mut point, &self.origin, -T::one());
+        for (value, &scale) in point.as_flattened_mut().iter_mut().zip(self.scale.as_flattened()) {
             *value /= scale;
         }
-        place
+        point
     }
 
     /// Standard deviations that scale the parameters.

@@ -69,9 +69,9 @@ impl<'a, T: Real, const N: usize> FullObjective<'a, T, N> {
         }
         for (joint, link) in coordinates.iter_mut().zip(&self.limits.links) {
             let mut body = LogCholesky(crate::model::inertia::inertial(joint)).to_parameters();
-            let ball = T::of(EXTENTS.0) * link.gyration;
+            let ball = T::from_double(EXTENTS.0) * link.gyration;
             for axis in [Parameter::XX, Parameter::YY, Parameter::ZZ] {
-                body[axis.index()] += T::of(2.0) * body[Parameter::M.index()] * ball * ball;
+                body[axis.index()] += T::from_double(2.0) * body[Parameter::M.index()] * ball * ball;
             }
             for (slot, value) in joint.iter_mut().zip(body) {
                 *slot = value;
@@ -89,14 +89,14 @@ impl<T: Real, const N: usize> Objective<T> for FullObjective<'_, T, N> {
     fn bounds(&self, coordinate: usize) -> (T, T) {
         let Some((joint, index)) = self.coordinates().nth(coordinate) else { return (T::zero(), T::zero()) };
         let link = &self.limits.links[joint];
-        let half = T::of(0.5);
-        let size = T::of(EXTENTS.1) * link.gyration;
+        let half = T::from_double(0.5);
+        let size = T::from_double(EXTENTS.1) * link.gyration;
         match index {
             0 => {
-                let low = real::max(link.mass.0, T::of(SMALLEST_MASS_SHARE) * link.mass.1);
+                let low = real::max(link.mass.0, T::from_double(SMALLEST_MASS_SHARE) * link.mass.1);
                 (half * real::ln(low), half * real::ln(link.mass.1))
             }
-            1..=3 => (real::ln(T::of(EXTENTS.0) * link.gyration), real::ln(size)),
+            1..=3 => (real::ln(T::from_double(EXTENTS.0) * link.gyration), real::ln(size)),
             4..=6 => (-size, size),
             7..=9 => {
                 let centre = link.centre[index - 7];
@@ -105,7 +105,7 @@ impl<T: Real, const N: usize> Objective<T> for FullObjective<'_, T, N> {
             _ => {
                 let (low, high) = link.drive[(index - INERTIAL_PARAMETERS).min(3)];
                 if index < PARAMETERS_PER_JOINT - 1 {
-                    (real::ln(T::of(SMALLEST_DRIVE_SHARE) * high), real::ln(high))
+                    (real::ln(T::from_double(SMALLEST_DRIVE_SHARE) * high), real::ln(high))
                 } else {
                     (low, high)
                 }
@@ -114,7 +114,7 @@ impl<T: Real, const N: usize> Objective<T> for FullObjective<'_, T, N> {
     }
 
     fn evaluate(&self, position: &[T]) -> T {
-        self.cost.excess(&self.cost.place(&self.parameters(position)))
+        self.cost.excess(&self.cost.scaled_point(&self.parameters(position)))
     }
 }
 
@@ -152,7 +152,7 @@ impl<T: Real, const D: usize> FullSearch<T, D> {
             let iterations = self.swarm.iterations();
             if iterations > before {
                 let value = self.swarm.best().map_or(T::LARGEST, |best| best.value);
-                if value < self.watched_value - T::of(SMALLEST_GAIN) {
+                if value < self.watched_value - T::from_double(SMALLEST_GAIN) {
                     (self.watched_value, self.watched_iteration) = (value, iterations);
                 }
                 self.done |=

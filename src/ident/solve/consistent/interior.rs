@@ -22,14 +22,14 @@ use crate::real::{self, Real};
 /// Most halvings of a step until it stays inside and raises the merit by no more than rounding.
 const HALVINGS: usize = 24;
 
-/// `G` at `place`; `None` outside.
+/// `G` at `point`; `None` outside.
 pub(super) fn merit<T: Real, const N: usize>(
     cost: &LegCost<T, N>,
     limits: &Limits<T, N>,
-    place: &LegParameters<T, N>,
+    point: &LegParameters<T, N>,
     barrier: T,
 ) -> Option<T> {
-    let parameters = cost.parameters(place);
+    let parameters = cost.parameters(point);
     if !Limits::consistent(&parameters) {
         return None;
     }
@@ -44,12 +44,12 @@ pub(super) fn merit<T: Real, const N: usize>(
             sum -= real::ln(slack);
         }
     }
-    let merit = cost.excess(place) + T::of(2.0) * barrier * sum;
+    let merit = cost.excess(point) + T::from_double(2.0) * barrier * sum;
     real::is_finite(merit).then_some(merit)
 }
 
 pub(super) struct Step {
-    /// `place` minimises `G`, within what matters or can be resolved.
+    /// `point` minimises `G`, within what matters or can be resolved.
     pub settled: bool,
     /// False where the start has no finite merit: outside, or overflow. Such a step is not a valid end.
     pub inside: bool,
@@ -59,32 +59,32 @@ pub(super) struct Step {
 /// twentieth of `mu` of the minimum.
 const SETTLED: f64 = 0.05;
 
-/// Takes one damped Newton step from `place`, which must be inside.
+/// Takes one damped Newton step from `point`, which must be inside.
 #[inline(never)]
 pub(super) fn step<T: Real, const N: usize>(
     cost: &LegCost<T, N>,
     limits: &Limits<T, N>,
-    place: &mut LegParameters<T, N>,
+    point: &mut LegParameters<T, N>,
     barrier: T,
 ) -> Step {
     let mut newton = cost.clone();
-    newton.shift(place);
-    insert_barriers(&mut newton, limits, place, barrier);
+    newton.shift(point);
+    insert_barriers(&mut newton, limits, point, barrier);
     let direction = newton.solve();
     let decrement = newton.right_squared() / barrier;
-    let Some(before) = merit(cost, limits, place, barrier) else {
+    let Some(before) = merit(cost, limits, point, barrier) else {
         return Step { settled: true, inside: false };
     };
-    let largest = before + T::of(8.0) * T::EPSILON * real::abs(before);
+    let largest = before + T::from_double(8.0) * T::EPSILON * real::abs(before);
     let mut share = T::one();
     for _ in 0..HALVINGS {
-        let mut tried = *place;
+        let mut tried = *point;
         add_scaled(&mut tried, &direction, share);
         if merit(cost, limits, &tried, barrier).is_some_and(|after| after <= largest) {
-            *place = tried;
-            return Step { settled: decrement < T::of(SETTLED), inside: true };
+            *point = tried;
+            return Step { settled: decrement < T::from_double(SETTLED), inside: true };
         }
-        share *= T::of(0.5);
+        share *= T::from_double(0.5);
     }
     // Rounding hides any further decrease.
     Step { settled: true, inside: true }
@@ -93,10 +93,10 @@ pub(super) fn step<T: Real, const N: usize>(
 fn insert_barriers<T: Real, const N: usize>(
     newton: &mut LegCost<T, N>,
     limits: &Limits<T, N>,
-    place: &LegParameters<T, N>,
+    point: &LegParameters<T, N>,
     barrier: T,
 ) {
-    let parameters = newton.parameters(place);
+    let parameters = newton.parameters(point);
     let scale = *newton.scale();
     let weight = real::sqrt(barrier);
     for (number, (link, joint)) in limits.links.iter().zip(&parameters).enumerate() {

@@ -78,13 +78,13 @@ impl<T: Real, const N: usize> Limits<T, N> {
         let believed = prior.unwrap_or(&neutral);
         let links = core::array::from_fn(|joint| {
             let link = &believed[joint];
-            let (low, high) = (T::of(SHARE.0), T::of(SHARE.1));
+            let (low, high) = (T::from_double(SHARE.0), T::from_double(SHARE.1));
             let length = match prior {
                 Some(prior) => segment_length(model, prior, joint),
-                None => T::of(2.0) * known_length(model, joint),
+                None => T::from_double(2.0) * known_length(model, joint),
             };
             let inertia = link.body.inertia.trace();
-            let shape = real::sqrt(real::max(inertia, T::zero()) / (T::of(2.0) * link.body.mass));
+            let shape = real::sqrt(real::max(inertia, T::zero()) / (T::from_double(2.0) * link.body.mass));
             let most = |parameter, value: T| {
                 let share = high * value;
                 if share > T::zero() {
@@ -99,11 +99,11 @@ impl<T: Real, const N: usize> Limits<T, N> {
                 mass: if prior.is_some() {
                     (low * link.body.mass, high * link.body.mass)
                 } else {
-                    (T::zero(), link.body.mass / T::of(NEUTRAL_SHARE))
+                    (T::zero(), link.body.mass / T::from_double(NEUTRAL_SHARE))
                 },
                 centre: core::array::from_fn(|axis| link.body.centre_of_mass[axis]),
-                reach: T::of(0.5) * length,
-                gyration: real::max(shape, T::of(SMALLEST_SHAPE) * length),
+                reach: T::from_double(0.5) * length,
+                gyration: real::max(shape, T::from_double(SMALLEST_SHAPE) * length),
                 drive: [
                     positive(Parameter::IA, link.rotor_inertia),
                     positive(Parameter::FC, link.coulomb_friction),
@@ -153,15 +153,15 @@ impl<T: Real, const N: usize> Limits<T, N> {
     pub fn inside(&self) -> LegParameters<T, N> {
         core::array::from_fn(|joint| {
             let link = &self.links[joint];
-            let extent = real::ln(T::of(ROUND) * link.gyration);
-            let mass = T::of(0.5) * real::ln(self.origin[joint][Parameter::M.index()]);
+            let extent = real::ln(T::from_double(ROUND) * link.gyration);
+            let mass = T::from_double(0.5) * real::ln(self.origin[joint][Parameter::M.index()]);
             let [x, y, z] = link.centre;
             let zero = T::zero();
             let body = LogCholesky([mass, extent, extent, extent, zero, zero, zero, x, y, z]).to_parameters();
             let drive: [T; 4] = core::array::from_fn(|index| {
                 let (low, high) = link.drive[index];
                 if link.estimated[index] {
-                    low + T::of(SHARE.0) * (high - low)
+                    low + T::from_double(SHARE.0) * (high - low)
                 } else {
                     self.origin[joint][INERTIAL_PARAMETERS + index]
                 }
@@ -234,10 +234,10 @@ impl<T: Real> LinkLimits<T> {
                 let squared = self.centre.iter().fold(T::zero(), |sum, &c| sum + c * c);
                 gradient[mass] = self.largest_extent_squared() - squared;
                 for axis in 0..3 {
-                    gradient[Parameter::HX.index() + axis] = T::of(2.0) * self.centre[axis];
+                    gradient[Parameter::HX.index() + axis] = T::from_double(2.0) * self.centre[axis];
                 }
                 for parameter in [Parameter::XX, Parameter::YY, Parameter::ZZ] {
-                    gradient[parameter.index()] = T::of(-0.5);
+                    gradient[parameter.index()] = T::from_double(-0.5);
                 }
             }
             9..CONDITIONS => {
@@ -256,7 +256,7 @@ impl<T: Real> LinkLimits<T> {
     }
 
     fn largest_extent_squared(&self) -> T {
-        T::of(15.0) * self.gyration * self.gyration + T::of(3.0) * self.reach * self.reach
+        T::from_double(15.0) * self.gyration * self.gyration + T::from_double(3.0) * self.reach * self.reach
     }
 }
 
@@ -270,7 +270,7 @@ fn known_length<T: Real, const N: usize, const B: usize>(model: &RowModel<T, N, 
     } else if longest > T::zero() {
         longest
     } else {
-        T::of(UNKNOWN_LENGTH_M)
+        T::from_double(UNKNOWN_LENGTH_M)
     }
 }
 
@@ -294,15 +294,17 @@ fn neutral<T: Real, const N: usize, const B: usize>(
         };
         most = real::max(most, mass);
     }
-    let mass = T::of(NEUTRAL_SHARE) * real::max(most, T::of(1e-3));
+    let mass = T::from_double(NEUTRAL_SHARE) * real::max(most, T::from_double(1e-3));
     core::array::from_fn(|joint| {
         let length = known_length(model, joint);
-        let share = |parameter| T::of(NEUTRAL_SHARE) * widest(model, record, high, joint, parameter);
+        let share = |parameter| T::from_double(NEUTRAL_SHARE) * widest(model, record, high, joint, parameter);
         LinkPrior {
             body: RigidBody {
                 mass,
                 centre_of_mass: nalgebra::Vector3::zeros(),
-                inertia: nalgebra::Matrix3::from_diagonal_element(T::of(0.05) * mass * length * length),
+                inertia: nalgebra::Matrix3::from_diagonal_element(
+                    T::from_double(0.05) * mass * length * length,
+                ),
             },
             rotor_inertia: share(Parameter::IA),
             coulomb_friction: share(Parameter::FC),
@@ -336,5 +338,5 @@ fn widest<T: Real, const N: usize, const B: usize>(
     let carrier = model.base.carriers(joint, parameter).next();
     let measured = carrier.and_then(|base| high.get(base)).copied().unwrap_or(T::zero());
     let torque = record.torque.get(joint).map_or(T::zero(), |size| size.root_mean_square);
-    real::max(measured, real::max(torque, T::of(1e-3)))
+    real::max(measured, real::max(torque, T::from_double(1e-3)))
 }

@@ -15,7 +15,7 @@ type Matrix<T> = [[T; 4]; 4];
 /// Pseudo-inertia of a joint's inertial parameters.
 fn matrix<T: Real>(parameters: &[T; INERTIAL_PARAMETERS]) -> Matrix<T> {
     let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
-    let half = (xx + yy + zz) * T::of(0.5);
+    let half = (xx + yy + zz) * T::from_double(0.5);
     [[half - xx, -xy, -xz, hx], [-xy, half - yy, -yz, hy], [-xz, -yz, half - zz, hz], [hx, hy, hz, mass]]
 }
 
@@ -78,7 +78,7 @@ impl<T: Real> Factored<T> {
             for row in 0..4 {
                 rows[row][parameter] = image[row][row];
                 for column in 0..row {
-                    rows[beside][parameter] = image[row][column] * T::of(core::f64::consts::SQRT_2);
+                    rows[beside][parameter] = image[row][column] * T::from_double(core::f64::consts::SQRT_2);
                     beside += 1;
                 }
             }

@@ -58,7 +58,7 @@ fn model<T: Real, const N: usize>(mask: &ColumnMask<N>) -> RowModel<T, N, B> {
     let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
     let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
     let chain = Chain::<f64, N>::new(&geometry).unwrap().convert();
-    let gravity = Vector3::new(T::of(9.81), T::zero(), T::zero());
+    let gravity = Vector3::new(T::from_double(9.81), T::zero(), T::zero());
     RowModel::new(chain, gravity, BaseParameters::analyse(&chain, &gravity, mask).unwrap())
 }
 
@@ -212,8 +212,8 @@ fn a_closed_form_that_is_a_leg_is_taken_as_it_is() {
         assert!((found - closed).abs() < 1e-12);
     }
     // The result is also the unconstrained minimum of the cost that steps would lower.
-    let place = completion.cost().place(&closed);
-    assert!(completion.cost().excess(&place) < 1e-12);
+    let point = completion.cost().scaled_point(&closed);
+    assert!(completion.cost().excess(&point) < 1e-12);
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn no_allowed_leg_is_better_than_the_completion() {
         let (completion, _) = complete::<f64, 2>(&ALL, &record, Some(&prior), Effort::reference());
         let (cost, best) = (completion.cost(), completion.parameters());
         let (objective, least) =
-            (FullObjective::new(completion.limits(), cost), cost.excess(&cost.place(&best)));
+            (FullObjective::new(completion.limits(), cost), cost.excess(&cost.scaled_point(&best)));
         for _ in 0..200 {
             let position: [f64; 28] = core::array::from_fn(|coordinate| {
                 let (low, high) = objective.bounds(coordinate);
@@ -246,7 +246,7 @@ fn no_allowed_leg_is_better_than_the_completion() {
                     })
                 })
             };
-            let near = cost.excess(&cost.place(&toward(1e-4)));
+            let near = cost.excess(&cost.scaled_point(&toward(1e-4)));
             assert!(near > least - 2e-6 - 1e-10 * least, "{near} below {least}");
         }
     }

@@ -14,9 +14,9 @@ extern crate std;
 use std::vec::Vec;
 
 fn model<T: Real>() -> RowModel<T, 2, BASE> {
-    let link = |a: f64| DenavitHartenberg { alpha: T::zero(), a: T::of(a), d: T::zero() };
+    let link = |a: f64| DenavitHartenberg { alpha: T::zero(), a: T::from_double(a), d: T::zero() };
     let chain = Chain::new(&[link(0.0), link(0.39)]).expect("finite");
-    let gravity = Vector3::new(T::of(9.81), T::zero(), T::zero());
+    let gravity = Vector3::new(T::from_double(9.81), T::zero(), T::zero());
     let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen");
     RowModel::new(chain, gravity, base)
 }
@@ -26,11 +26,11 @@ const LEG: LegParameters<f64, 2> = [
     [0.03, 0.0, 0.0, 0.58, 0.0, 0.585, 2.04, 0.02, 0.0, 10.3, 1.9, 4.6, 5.0, 0.4],
     [0.05, -0.08, 0.0, 0.59, 0.0, 0.633, 1.76, 0.20, 0.0, 6.9, 1.9, 4.7, 3.3, -0.2],
 ];
-const ON_THE_KNEE: Payload<f64> = Payload { joint: 1, mass: 5.0, place: Vector3::new(0.2, 0.0, 0.0) };
-const ON_THE_HIP: Payload<f64> = Payload { joint: 0, mass: 5.0, place: Vector3::new(0.3, 0.0, 0.0) };
+const ON_THE_KNEE: Payload<f64> = Payload { joint: 1, mass: 5.0, position: Vector3::new(0.2, 0.0, 0.0) };
+const ON_THE_HIP: Payload<f64> = Payload { joint: 0, mass: 5.0, position: Vector3::new(0.3, 0.0, 0.0) };
 
 fn base_of<T: Real>(payload: &Payload<f64>) -> [T; BASE] {
-    model::<f64>().base.project(&payload.parameters::<2>()).map(T::of)
+    model::<f64>().base.project(&payload.parameters::<2>()).map(T::from_double)
 }
 
 /// 500 independent rows; torque in true N m times `ratios`, with white noise of `noise` times that.
@@ -56,20 +56,20 @@ fn record<T: Real>(
         };
         let rows = exact.rows(&instant);
         let device = rounded.rows(&Smoothed {
-            position: instant.position.map(T::of),
-            velocity: instant.velocity.map(T::of),
-            acceleration: instant.acceleration.map(T::of),
+            position: instant.position.map(T::from_double),
+            velocity: instant.velocity.map(T::from_double),
+            acceleration: instant.acceleration.map(T::from_double),
             torque: [T::zero(); 2],
         });
         for joint in 0..2 {
             let real: f64 = rows.regressor[joint].iter().zip(&values).map(|(left, right)| left * right).sum();
             let logged = ratios[joint] * (real + noise * random.normal());
-            factors[joint].insert(&device.regressor[joint], T::of(logged));
+            factors[joint].insert(&device.regressor[joint], T::from_double(logged));
             squares[joint] += logged * logged / 500.0;
         }
     }
     let torque = squares.map(|square| {
-        let size = T::of(real::sqrt(square));
+        let size = T::from_double(real::sqrt(square));
         TorqueSize { mean_absolute: size, root_mean_square: size, speed: T::one() }
     });
     record_of(factors, torque)
@@ -141,11 +141,11 @@ fn the_reported_sigma_of_the_ratio_is_its_spread_and_honest_runs_are_consistent(
 }
 
 #[test]
-fn a_wrong_mass_scales_the_constant_unnoticed_and_a_wrong_place_is_noticed() {
+fn a_wrong_mass_scales_the_constant_unnoticed_and_a_wrong_position_is_noticed() {
     let (without, with) =
         (record::<f64>(None, RATIOS, 0.3, 1), record::<f64>(Some(&ON_THE_KNEE), RATIOS, 0.3, 2));
     let stated = |mass: f64, x: f64| {
-        let load = base_of(&Payload { mass, place: Vector3::new(x, 0.0, 0.0), ..ON_THE_KNEE });
+        let load = base_of(&Payload { mass, position: Vector3::new(x, 0.0, 0.0), ..ON_THE_KNEE });
         torque_constant_ratio(&without, &with, 1, &load).expect("felt")
     };
     let right = stated(5.0, 0.2);

@@ -19,7 +19,7 @@ fn all_but<const N: usize>(off: &[Parameter]) -> ColumnMask<N> {
 
 /// Gravity along -z of the base: the paper chain's first axis is parallel to it.
 fn down_along_z<T: Real>() -> Vector3<T> {
-    Vector3::new(T::zero(), T::zero(), T::of(-9.81))
+    Vector3::new(T::zero(), T::zero(), T::from_double(-9.81))
 }
 
 fn rank<T: Real, const N: usize>(chain: &Chain<T, N>, gravity: Vector3<T>, off: &[Parameter]) -> usize {
@@ -28,8 +28,8 @@ fn rank<T: Real, const N: usize>(chain: &Chain<T, N>, gravity: Vector3<T>, off: 
     // Measured on these legs: retained 0.43 of a column or more; dropped up to 4e-10 (f64) and 1e-5 (f32).
     // The tolerances are 1.5e-8 and 3.5e-4.
     let tolerance = sqrt(T::EPSILON);
-    assert!(separation.smallest_retained > T::of(0.3), "{separation:?}");
-    assert!(separation.largest_dropped < tolerance * T::of(0.05), "{separation:?}");
+    assert!(separation.smallest_retained > T::from_double(0.3), "{separation:?}");
+    assert!(separation.largest_dropped < tolerance * T::from_double(0.05), "{separation:?}");
     base.rank()
 }
 
@@ -159,7 +159,7 @@ fn the_paper_chain_has_the_set_of_table_six_with_minus_yy_in_xx() {
 fn ranks_without_special_angles<T: Real, const N: usize>() {
     let mut random = TestRandom::new(21);
     for _ in 0..100 {
-        let (chain, gravity) = (random.chain::<N>().convert::<T>(), random.gravity().map(T::of));
+        let (chain, gravity) = (random.chain::<N>().convert::<T>(), random.gravity().map(T::from_double));
         let base = BaseParameters::<T, N, 42>::analyse(&chain, &gravity, &all_but(&[FC, FV, OFF])).unwrap();
         let separation = base.separation();
         // Three parameters of the first link, seven of every other, rotors of all but the first.
@@ -167,7 +167,7 @@ fn ranks_without_special_angles<T: Real, const N: usize>() {
         // Measured over 600 chains in f32: retained 6e-4 or more, on a nearly special chain; dropped 5e-7 or
         // less. The tolerance is 3.5e-4.
         let tolerance = sqrt(T::EPSILON);
-        assert!(separation.largest_dropped < tolerance * T::of(0.05), "{separation:?}");
+        assert!(separation.largest_dropped < tolerance * T::from_double(0.05), "{separation:?}");
     }
 }
 
@@ -192,7 +192,7 @@ fn gravity_off_the_first_axis_by_a_thousandth_shows_the_first_centre_of_mass() {
 
 fn torque_from_base_values<T: Real>(bound: f64) {
     let mut random = TestRandom::new(22);
-    let (chain, gravity) = (random.chain::<3>().convert::<T>(), random.gravity().map(T::of));
+    let (chain, gravity) = (random.chain::<3>().convert::<T>(), random.gravity().map(T::from_double));
     let base = BaseParameters::<T, 3, 32>::analyse(&chain, &gravity, &all_but(&[])).unwrap();
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
     for _ in 0..50 {

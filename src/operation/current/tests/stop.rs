@@ -65,7 +65,7 @@ impl Scene {
         }
         let calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
         let stage = scene.loops.axis_state_mut(axis).expect("two axes");
-        assert_eq!(stage.obey(Order::Calibrate(calibrator)), None);
+        assert_eq!(stage.apply_order(Order::Calibrate(calibrator)), None);
         for _ in 0..CURRENT_RATE_HZ {
             scene.run(1);
             if scene.hardware.bridges[axis].enabled {

@@ -2,7 +2,7 @@
 
 use super::second_day::{Machine, second_day};
 use super::*;
-use crate::hal::EncoderPlace;
+use crate::hal::AbsoluteEncoderSide;
 use crate::motor::{AbsoluteAngle, Direction};
 use crate::safety::BoardFault;
 
@@ -195,17 +195,17 @@ fn a_contradiction_of_an_axis_that_is_off_makes_its_motor_turn_next() {
 
 #[test]
 fn a_silent_encoder_is_reported_and_forbids_a_calibration() {
-    for place in [EncoderPlace::Rotor, EncoderPlace::Joint] {
+    for side in [AbsoluteEncoderSide::Rotor, AbsoluteEncoderSide::Joint] {
         let mut bench = Bench::new(Housekeeper::new(settings()));
         let valid = AbsoluteAngle::from_steps(77).to_frame();
         bench.hardware.encoder_frames = [[valid; 2]; 2];
         bench.signals.begin_servo();
         bench.hold(false, false);
         (0..2).for_each(|axis| bench.signals.take_reported(axis).for_each(drop));
-        bench.hardware.encoder_frames[1][place as usize] = 0xFFFF;
+        bench.hardware.encoder_frames[1][side as usize] = 0xFFFF;
         bench.hold(false, false);
         assert!(bench.signals.take_reported(0).next().is_none());
-        assert!(bench.signals.take_reported(1).eq([BoardFault::AbsoluteEncoder]), "{place:?}");
+        assert!(bench.signals.take_reported(1).eq([BoardFault::AbsoluteEncoder]), "{side:?}");
     }
     let mut bench = Bench::new(Housekeeper::new(settings()));
     assert_eq!(bench.press(), []);

@@ -136,8 +136,8 @@ fn a_reference_is_refused_while_a_joint_moves() {
         let stands = moving.is_none();
         let expected: &[bool] = if stands { &[true] } else { &[true, false] };
         assert_eq!((&answers[..], bench.signals.has_begun()), (expected, stands), "{moving:?}");
-        let places =
-            if stands { Vec::from([(0, Order::Place(0)), (1, Order::Place(0))]) } else { Vec::new() };
-        assert_eq!(bench.orders, places, "{moving:?}");
+        let set =
+            if stands { Vec::from([(0, Order::SetCounts(0)), (1, Order::SetCounts(0))]) } else { Vec::new() };
+        assert_eq!(bench.orders, set, "{moving:?}");
     }
 }

@@ -343,8 +343,8 @@ fn a_stall_or_a_lost_axis_forgets_the_index() {
     }
     turned(&mut state, &mut motor);
     let axis = Axis::new(&CONFIGURATION, &calibration, &motor.sample()).expect("usual");
-    state.obey(Order::Run(axis));
+    state.apply_order(Order::Run(axis));
     turned(&mut state, &mut motor);
-    state.obey(Order::Off);
+    state.apply_order(Order::Off);
     assert_eq!(state, AxisState::OFF);
 }

@@ -81,7 +81,7 @@ fn too_much_current_into_the_supply_shorts_the_motors() {
     assert!((bench.signals.wanted_brake() - 0.135).abs() < 1e-3, "{}", bench.signals.wanted_brake());
     let mut bench = supplied([-100.0, -200.0], 0.22);
     assert_eq!(bench.fault(), Some(Fault { code: FaultCode::ChargeCurrent, joint: 0 }));
-    assert_eq!(Bridges::of(bench.signals.inhibit.causes()), Bridges::Brake);
+    assert_eq!(Bridges::from_causes(bench.signals.inhibit.causes()), Bridges::Brake);
     assert_eq!(bench.signals.permission(), Permission::Off);
     // Shorted motors take nothing from the bus, whatever the axes last published.
     bench.run(100);

@@ -37,12 +37,12 @@ pub const LARGEST_CURRENT_A: f64 = 300.0;
 const LONGEST_BRAKE_MS: f64 = 500.0;
 
 /// Position of a value; creates faults.
-pub(super) struct Place<'a> {
+pub(super) struct KeyLocation<'a> {
     pub joint: Option<(usize, &'a str)>,
     pub table: Option<&'static str>,
 }
 
-impl Place<'_> {
+impl KeyLocation<'_> {
     pub(super) fn fault(&self, key: &'static str, complaint: &str) -> Fault {
         let keys: Vec<&'static str> = self.table.into_iter().chain([key]).collect();
         let path = keys.join(".");
@@ -90,7 +90,7 @@ pub(super) fn joint_steps(number: usize) -> Vec<Step> {
 }
 
 pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
-    let top = Place { joint: None, table: None };
+    let top = KeyLocation { joint: None, table: None };
     top.named("name", &leg.name)?;
     for component in leg.gravity {
         top.inside("gravity", component, GRAVITY)?;
@@ -103,17 +103,17 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
         top.within("temperature_c", celsius, low, high)?;
     }
     if let Some(pushes) = &leg.pushes {
-        let place = Place { joint: None, table: Some("pushes") };
-        place.positive("per_minute", pushes.per_minute, 600.0)?;
-        place.positive("torque_nm", pushes.torque_nm, 1000.0)?;
-        place.positive("duration_s", pushes.duration_s, 60.0)?;
+        let location = KeyLocation { joint: None, table: Some("pushes") };
+        location.positive("per_minute", pushes.per_minute, 600.0)?;
+        location.positive("torque_nm", pushes.torque_nm, 1000.0)?;
+        location.positive("duration_s", pushes.duration_s, 60.0)?;
     }
     if let Some(segments) = &leg.segments {
-        let place = Place { joint: None, table: Some("segments") };
-        place.within("shank_m", segments.shank_m, 0.1, 1.0)?;
-        place.within("foot_m", segments.foot_m, 0.05, 0.6)?;
-        place.within("wearer_kg", segments.wearer_kg, 10.0, 300.0)?;
-        place.within("prior_wearer_kg", segments.prior_wearer_kg, 10.0, 300.0)?;
+        let location = KeyLocation { joint: None, table: Some("segments") };
+        location.within("shank_m", segments.shank_m, 0.1, 1.0)?;
+        location.within("foot_m", segments.foot_m, 0.05, 0.6)?;
+        location.within("wearer_kg", segments.wearer_kg, 10.0, 300.0)?;
+        location.within("prior_wearer_kg", segments.prior_wearer_kg, 10.0, 300.0)?;
         if leg.joints.len() < 2 {
             return Err(top.fault("segments", "needs two joints, a hip and a knee"));
         }
@@ -128,22 +128,22 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
         }
     }
     if let Some(assist) = &leg.assist {
-        let place = Place { joint: None, table: Some("assist") };
+        let location = KeyLocation { joint: None, table: Some("assist") };
         let (inertia, periodic) = (f64::from(LARGEST_INERTIA), f64::from(LARGEST_PERIODIC));
-        place.within("friction", assist.friction, 0.0, 1.0)?;
-        place.within("inertia", assist.inertia, 0.0, inertia)?;
-        place.within("weight", assist.weight, 0.0, 1.0)?;
-        place.within("periodic", assist.periodic, -periodic, periodic)?;
+        location.within("friction", assist.friction, 0.0, 1.0)?;
+        location.within("inertia", assist.inertia, 0.0, inertia)?;
+        location.within("weight", assist.weight, 0.0, 1.0)?;
+        location.within("periodic", assist.periodic, -periodic, periodic)?;
     }
     if let Some(brake) = &leg.brake {
-        let place = Place { joint: None, table: Some("brake") };
-        place.within("release_ms", brake.release_ms, 0.0, LONGEST_BRAKE_MS)?;
-        place.within("engage_ms", brake.engage_ms, 0.0, LONGEST_BRAKE_MS)?;
+        let location = KeyLocation { joint: None, table: Some("brake") };
+        location.within("release_ms", brake.release_ms, 0.0, LONGEST_BRAKE_MS)?;
+        location.within("engage_ms", brake.engage_ms, 0.0, LONGEST_BRAKE_MS)?;
     }
     joints(&top, &leg.joints)
 }
 
-fn joints(top: &Place<'_>, joints: &[JointFile]) -> Result<(), Fault> {
+fn joints(top: &KeyLocation<'_>, joints: &[JointFile]) -> Result<(), Fault> {
     if !(1..=3).contains(&joints.len()) {
         return Err(top.fault("joint", &format!("occurs {} times; a leg has 1 to 3", joints.len())));
     }
@@ -151,34 +151,34 @@ fn joints(top: &Place<'_>, joints: &[JointFile]) -> Result<(), Fault> {
     for (number, description) in joints.iter().enumerate() {
         joint(number, description)?;
         if !names.insert(description.name.as_str()) {
-            let place = Place { joint: Some((number, &description.name)), table: None };
-            return Err(place.fault("name", "is the name of an earlier joint"));
+            let location = KeyLocation { joint: Some((number, &description.name)), table: None };
+            return Err(location.fault("name", "is the name of an earlier joint"));
         }
     }
     Ok(())
 }
 
 fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
-    let place = Place { joint: Some((number, &joint.name)), table: None };
-    let inside = |table| Place { joint: Some((number, joint.name.as_str())), table: Some(table) };
-    place.named("name", &joint.name)?;
+    let location = KeyLocation { joint: Some((number, &joint.name)), table: None };
+    let inside = |table| KeyLocation { joint: Some((number, joint.name.as_str())), table: Some(table) };
+    location.named("name", &joint.name)?;
     let frame = inside("dh");
     frame.inside("alpha", joint.dh.alpha, TWIST)?;
     frame.inside("a", joint.dh.a, LENGTH)?;
     frame.inside("d", joint.dh.d, LENGTH)?;
     if !matches!(joint.direction, 1 | -1) {
-        return Err(place.fault("direction", &format!("is {}; it must be 1 or -1", joint.direction)));
+        return Err(location.fault("direction", &format!("is {}; it must be 1 or -1", joint.direction)));
     }
-    place.inside("zero_offset_deg", joint.zero_offset_deg, ZERO_OFFSET)?;
-    range(&place, joint.range_deg)?;
-    place.positive("speed_limit_deg_s", joint.speed_limit_deg_s, LARGEST_SPEED)?;
-    place.positive("acceleration_limit_deg_s2", joint.acceleration_limit_deg_s2, 1e5)?;
-    place.positive("torque_limit_nm", joint.torque_limit_nm, LARGEST_TORQUE)?;
-    place.within("torque_per_ampere", joint.torque_per_ampere, 0.001, 100.0)?;
+    location.inside("zero_offset_deg", joint.zero_offset_deg, ZERO_OFFSET)?;
+    range(&location, joint.range_deg)?;
+    location.positive("speed_limit_deg_s", joint.speed_limit_deg_s, LARGEST_SPEED)?;
+    location.positive("acceleration_limit_deg_s2", joint.acceleration_limit_deg_s2, 1e5)?;
+    location.positive("torque_limit_nm", joint.torque_limit_nm, LARGEST_TORQUE)?;
+    location.within("torque_per_ampere", joint.torque_per_ampere, 0.001, 100.0)?;
     if let Some(limit) = joint.current_limit_a {
-        place.positive("current_limit_a", limit, LARGEST_CURRENT_A)?;
+        location.positive("current_limit_a", limit, LARGEST_CURRENT_A)?;
     }
-    place.within("drive_lag_s", joint.drive_lag_s, 0.0, 0.1)?;
+    location.within("drive_lag_s", joint.drive_lag_s, 0.0, 0.1)?;
     let encoder = inside("encoder");
     encoder.positive("counts", f64::from(joint.encoder.counts), f64::from(1 << 24))?;
     encoder.positive("ratio", joint.encoder.ratio, 1000.0)?;
@@ -187,18 +187,18 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         let words = format!("times `ratio` make {step:.3e} rad of the joint per count, outside 1e-7..0.1");
         return Err(encoder.fault("counts", &words));
     }
-    place.within("current_noise_a", joint.current_noise_a, 0.0, 1000.0)?;
-    place.within("current_offset_a", joint.current_offset_a, -1000.0, 1000.0)?;
-    place.within("current_step_a", joint.current_step_a, 0.0, 100.0)?;
+    location.within("current_noise_a", joint.current_noise_a, 0.0, 1000.0)?;
+    location.within("current_offset_a", joint.current_offset_a, -1000.0, 1000.0)?;
+    location.within("current_step_a", joint.current_step_a, 0.0, 100.0)?;
     if let Some(outliers) = &joint.outliers {
-        let place = inside("outliers");
-        place.within("percent", outliers.percent, 0.0, 100.0)?;
-        place.positive("torque_nm", outliers.torque_nm, 1000.0)?;
+        let location = inside("outliers");
+        location.within("percent", outliers.percent, 0.0, 100.0)?;
+        location.positive("torque_nm", outliers.torque_nm, 1000.0)?;
     }
     if (joint.offset, joint.asymmetric_coulomb) == (Switch::On, Switch::On) {
         let complaint = "is on and so is `offset`: while the joint moves a torque offset and a difference of Coulomb \
                          friction between the directions are the same column; one of them must be off";
-        return Err(place.fault("asymmetric_coulomb", complaint));
+        return Err(location.fault("asymmetric_coulomb", complaint));
     }
     if let Some(motor) = &joint.motor {
         motor.check(number, joint)?;
@@ -209,34 +209,34 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         }
     }
     if let Some(stribeck) = &joint.stribeck {
-        let place = inside("stribeck");
+        let location = inside("stribeck");
         let coulomb = joint.truth.map_or(0.0, |truth| truth.coulomb);
-        place.within("static_nm", stribeck.static_nm, coulomb, 1000.0)?;
-        place.positive("speed_rad_s", stribeck.speed_rad_s, 100.0)?;
+        location.within("static_nm", stribeck.static_nm, coulomb, 1000.0)?;
+        location.positive("speed_rad_s", stribeck.speed_rad_s, 100.0)?;
     }
     Ok(())
 }
 
-fn range(place: &Place<'_>, [lower, upper]: [f64; 2]) -> Result<(), Fault> {
-    place.inside("range_deg", lower, RANGE_END)?;
-    place.inside("range_deg", upper, RANGE_END)?;
+fn range(location: &KeyLocation<'_>, [lower, upper]: [f64; 2]) -> Result<(), Fault> {
+    location.inside("range_deg", lower, RANGE_END)?;
+    location.inside("range_deg", upper, RANGE_END)?;
     if lower >= upper {
-        return Err(place.fault("range_deg", &format!("is inverted or empty: {lower} to {upper}")));
+        return Err(location.fault("range_deg", &format!("is inverted or empty: {lower} to {upper}")));
     }
     if upper - lower < SMALLEST_RANGE_DEG {
         let words = format!("is {} degrees wide; at least {SMALLEST_RANGE_DEG} are needed", upper - lower);
-        return Err(place.fault("range_deg", &words));
+        return Err(location.fault("range_deg", &words));
     }
     Ok(())
 }
 
-fn link(place: &Place<'_>, link: &LinkParameters) -> Result<(), Fault> {
-    place.positive("mass", link.mass, 500.0)?;
+fn link(location: &KeyLocation<'_>, link: &LinkParameters) -> Result<(), Fault> {
+    location.positive("mass", link.mass, 500.0)?;
     for component in link.com {
-        place.within("com", component, -5.0, 5.0)?;
+        location.within("com", component, -5.0, 5.0)?;
     }
     for element in link.inertia_com {
-        place.within("inertia_com", element, -500.0, 500.0)?;
+        location.within("inertia_com", element, -500.0, 500.0)?;
     }
     let [xx, xy, xz, yy, yz, zz] = link.inertia_com;
     let mut moments: [f64; 3] =
@@ -244,7 +244,7 @@ fn link(place: &Place<'_>, link: &LinkParameters) -> Result<(), Fault> {
     moments.sort_by(f64::total_cmp);
     let [least, middle, largest] = moments;
     if least <= 0.0 {
-        return Err(place
+        return Err(location
             .fault("inertia_com", &format!("is not positive definite: a principal moment is {least:.6}")));
     }
     if largest >= least + middle {
@@ -252,12 +252,12 @@ fn link(place: &Place<'_>, link: &LinkParameters) -> Result<(), Fault> {
             "is impossible: a principal moment of {largest:.6} is not below the sum {:.6} of the two others",
             least + middle
         );
-        return Err(place.fault("inertia_com", &complaint));
+        return Err(location.fault("inertia_com", &complaint));
     }
-    place.within("rotor_inertia", link.rotor_inertia, 0.0, 100.0)?;
-    place.within("coulomb", link.coulomb, 0.0, 1000.0)?;
-    place.within("viscous", link.viscous, 0.0, 1000.0)?;
-    place.within("offset", link.offset, -1000.0, 1000.0)?;
+    location.within("rotor_inertia", link.rotor_inertia, 0.0, 100.0)?;
+    location.within("coulomb", link.coulomb, 0.0, 1000.0)?;
+    location.within("viscous", link.viscous, 0.0, 1000.0)?;
+    location.within("offset", link.offset, -1000.0, 1000.0)?;
     // Friction must dissipate energy in both directions.
-    place.within("asymmetry", link.asymmetry, -link.coulomb, link.coulomb)
+    location.within("asymmetry", link.asymmetry, -link.coulomb, link.coulomb)
 }

@@ -32,16 +32,16 @@ pub fn anatomy<const N: usize>(leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N
 
 /// Fingerprint of a leg as the board computes it, sixteen hexadecimal digits.
 pub fn fingerprint(leg: &LegFile) -> Result<String, FileError> {
-    fn of<const N: usize>(leg: &LegFile) -> Result<Fingerprint, FileError> {
+    fn with_joints<const N: usize>(leg: &LegFile) -> Result<Fingerprint, FileError> {
         let mounting = if leg.side == BodySide::Left { -1.0 } else { 1.0 };
         let constants = core::array::from_fn(|joint| mounting * leg.joints[joint].torque_per_ampere as f32);
         let anatomy = anatomy::<N>(leg)?.map(|joint| joint.convert());
-        Ok(Fingerprint::of(&chain::<N>(leg)?.convert(), &anatomy, &constants))
+        Ok(Fingerprint::new(&chain::<N>(leg)?.convert(), &anatomy, &constants))
     }
     let fingerprint = match leg.joints.len() {
-        1 => of::<1>(leg),
-        2 => of::<2>(leg),
-        _ => of::<3>(leg),
+        1 => with_joints::<1>(leg),
+        2 => with_joints::<2>(leg),
+        _ => with_joints::<3>(leg),
     }?;
     Ok(format!("{:016x}", fingerprint.0))
 }

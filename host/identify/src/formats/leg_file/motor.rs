@@ -19,7 +19,7 @@ use scarab_base::error::FileError;
 use scarab_base::toml_file::Fault;
 use serde::{Deserialize, Serialize};
 
-use crate::formats::leg_file::check::Place;
+use crate::formats::leg_file::check::KeyLocation;
 use crate::formats::leg_file::{JointFile, LegFile, Side};
 
 /// Least time constant of a winding, s; below it the board cannot measure an inductance within its
@@ -199,18 +199,18 @@ impl SupplyFile {
     }
 
     pub(super) fn check(&self) -> Result<(), Fault> {
-        let place = Place { joint: None, table: Some("supply") };
+        let location = KeyLocation { joint: None, table: Some("supply") };
         let [low, high] = SUPPLY_V;
         if !(low..=high).contains(&self.voltage_v) {
             let complaint = format!(
                 "is {}, outside {low}..{high}: the board's bridges switch from 20 V on, and from 50 V on its brake resistor would dissipate the supply's power",
                 self.voltage_v
             );
-            return Err(place.fault("voltage_v", &complaint));
+            return Err(location.fault("voltage_v", &complaint));
         }
-        place.within("resistance_ohm", self.resistance_ohm, 0.001, 10.0)?;
-        place.within("capacitance_uf", self.capacitance_uf, 50.0, 1e6)?;
-        place.within("brake_ohm", self.brake_ohm, 0.1, 1000.0)
+        location.within("resistance_ohm", self.resistance_ohm, 0.001, 10.0)?;
+        location.within("capacitance_uf", self.capacitance_uf, 50.0, 1e6)?;
+        location.within("brake_ohm", self.brake_ohm, 0.1, 1000.0)
     }
 }
 
@@ -238,45 +238,45 @@ impl MotorFile {
     };
 
     pub(super) fn check(&self, number: usize, joint: &JointFile) -> Result<(), Fault> {
-        let place = Place { joint: Some((number, &joint.name)), table: Some("motor") };
-        place.within("pole_pairs", f64::from(self.pole_pairs), 1.0, 64.0)?;
-        place.within("resistance_ohm", self.resistance_ohm, 0.001, 10.0)?;
+        let location = KeyLocation { joint: Some((number, &joint.name)), table: Some("motor") };
+        location.within("pole_pairs", f64::from(self.pole_pairs), 1.0, 64.0)?;
+        location.within("resistance_ohm", self.resistance_ohm, 0.001, 10.0)?;
         let millisecond = 1e3 * LEAST_TIME_CONSTANT_S;
         for (key, inductance) in
             [("inductance_d_uh", self.inductance_d_uh), ("inductance_q_uh", self.inductance_q_uh)]
         {
-            place.within(key, inductance, 1.0, 1e5)?;
+            location.within(key, inductance, 1.0, 1e5)?;
             if inductance * 1e-6 / self.resistance_ohm < LEAST_TIME_CONSTANT_S {
                 let complaint = format!(
                     "is {inductance}: with {} ohm its time constant is below {millisecond} ms, too short for the board to measure",
                     self.resistance_ohm
                 );
-                return Err(place.fault(key, &complaint));
+                return Err(location.fault(key, &complaint));
             }
         }
-        place.within("cogging_nm", self.cogging_nm, 0.0, 10.0)?;
-        place.within("cogging_periods", f64::from(self.cogging_periods), 1.0, 10_000.0)?;
-        place.within("electrical_zero_deg", self.electrical_zero_deg, -360.0, 360.0)?;
-        place.within("index_deg", self.index_deg, -360.0, 360.0)?;
-        place.within("thermal_resistance_k_w", self.thermal_resistance_k_w, 0.01, 100.0)?;
-        place.within("thermal_time_s", self.thermal_time_s, 1.0, 1e5)?;
-        place.within("ambient_c", self.ambient_c, -40.0, 100.0)?;
+        location.within("cogging_nm", self.cogging_nm, 0.0, 10.0)?;
+        location.within("cogging_periods", f64::from(self.cogging_periods), 1.0, 10_000.0)?;
+        location.within("electrical_zero_deg", self.electrical_zero_deg, -360.0, 360.0)?;
+        location.within("index_deg", self.index_deg, -360.0, 360.0)?;
+        location.within("thermal_resistance_k_w", self.thermal_resistance_k_w, 0.01, 100.0)?;
+        location.within("thermal_time_s", self.thermal_time_s, 1.0, 1e5)?;
+        location.within("ambient_c", self.ambient_c, -40.0, 100.0)?;
         // The derating takes the last 20 degrees.
-        place.within("winding_limit_c", self.winding_limit_c, self.ambient_c + 30.0, 250.0)?;
+        location.within("winding_limit_c", self.winding_limit_c, self.ambient_c + 30.0, 250.0)?;
         if let Some(thermistor) = &self.thermistor {
-            thermistor.check(&place, self.winding_limit_c)?;
+            thermistor.check(&location, self.winding_limit_c)?;
         }
         if let Some(turns) = self.calibration_turns {
             // Rounded for the message.
             let least = (1e3 * f64::from(drives::least_travel_turns(self.pole_pairs as u8))).round() / 1e3;
-            place.within("calibration_turns", turns, least, 2.0)?;
+            location.within("calibration_turns", turns, least, 2.0)?;
         }
-        let whole = Place { joint: place.joint, table: None };
+        let whole = KeyLocation { joint: location.joint, table: None };
         if joint.encoder.side != Side::Motor || joint.encoder.counts > MOST_COUNTS {
             let complaint = format!("needs an encoder at the motor with at most {MOST_COUNTS} counts");
             return Err(whole.fault("motor", &complaint));
         }
-        self.check_encoders(&place, joint)?;
+        self.check_encoders(&location, joint)?;
         let flux = self.flux(joint);
         if !(1e-4..=1.0).contains(&flux) {
             let complaint = format!(
@@ -287,29 +287,29 @@ impl MotorFile {
         Ok(())
     }
 
-    fn check_encoders(&self, place: &Place<'_>, joint: &JointFile) -> Result<(), Fault> {
+    fn check_encoders(&self, location: &KeyLocation<'_>, joint: &JointFile) -> Result<(), Fault> {
         let (counts, ratio, pairs) = (joint.encoder.counts, joint.encoder.ratio, self.pole_pairs);
         if self.absolute_encoder && !AS5047P_COUNTS.contains(&counts) {
             let complaint = format!(
                 "is true, but `encoder.counts` is {counts}: an AS5047P has 4000 counts per turn, or 4096"
             );
-            return Err(place.fault("absolute_encoder", &complaint));
+            return Err(location.fault("absolute_encoder", &complaint));
         }
         if self.absolute_encoder && pairs > AS5047P_PAIRS {
             let complaint = format!(
                 "is true, but `pole_pairs` is {pairs}: the encoder's error of 0.8 degrees permits at most {AS5047P_PAIRS}"
             );
-            return Err(place.fault("absolute_encoder", &complaint));
+            return Err(location.fault("absolute_encoder", &complaint));
         }
         if self.joint_encoder.is_some() && ratio > MOST_RATIO {
             let complaint =
                 format!("cannot tell the motor turns apart at `encoder.ratio` {ratio}: at most {MOST_RATIO}");
-            return Err(place.fault("joint_encoder", &complaint));
+            return Err(location.fault("joint_encoder", &complaint));
         }
         if self.joint_encoder.is_some() && joint.range_deg.iter().any(|end| end.abs() > MOST_RANGE_DEG) {
             let complaint =
                 format!("measures within a turn: `range_deg` must lie within {MOST_RANGE_DEG} degrees");
-            return Err(place.fault("joint_encoder", &complaint));
+            return Err(location.fault("joint_encoder", &complaint));
         }
         Ok(())
     }
@@ -406,7 +406,7 @@ impl MotorFile {
 }
 
 impl ThermistorFile {
-    fn check(&self, place: &Place<'_>, limit_c: f64) -> Result<(), Fault> {
+    fn check(&self, location: &KeyLocation<'_>, limit_c: f64) -> Result<(), Fault> {
         let limits = [
             // Less heats the thermistor, more lets the pin's leakage current read as a temperature.
             ("pull_up_ohm", self.pull_up_ohm, 1e3, 5e4),
@@ -415,7 +415,9 @@ impl ThermistorFile {
         ];
         for (key, value, low, high) in limits {
             if !(low..=high).contains(&value) {
-                return Err(place.fault("thermistor", &format!("has `{key}` {value}, outside {low}..{high}")));
+                return Err(
+                    location.fault("thermistor", &format!("has `{key}` {value}, outside {low}..{high}"))
+                );
             }
         }
         // A cold motor must not look like an open wire, nor a hot one like a short.
@@ -430,7 +432,7 @@ impl ThermistorFile {
         };
         let range =
             format!("reads {coldest:.0} to {hottest:.0} degrees, needs {COLDEST_C} to {needed:.0}: {advice}");
-        Err(place.fault("thermistor", &range))
+        Err(location.fault("thermistor", &range))
     }
 
     /// Constants for the firmware.
@@ -460,10 +462,10 @@ impl LegFile {
     #[must_use]
     pub fn with_absolute_encoders(&self) -> Self {
         let mut leg = self.clone();
-        for (place, joint) in leg.joints.iter_mut().enumerate() {
+        for (index, joint) in leg.joints.iter_mut().enumerate() {
             joint.encoder.counts = AS5047P_COUNTS[1];
             if let Some(motor) = joint.motor.as_mut() {
-                let first = place == 0;
+                let first = index == 0;
                 let direction = if first { JointEncoder::WithCounter } else { JointEncoder::AgainstCounter };
                 (motor.absolute_encoder, motor.joint_encoder) = (true, Some(direction));
             }

@@ -70,7 +70,8 @@ impl LegFile {
             return segments.shank_m;
         }
         let link = self.joints.get(joint).and_then(|joint| joint.prior.as_ref().or(joint.truth.as_ref()));
-        let reach = link.map_or(0.0, |link| link.com.iter().map(|place| place * place).sum::<f64>().sqrt());
+        let reach = link
+            .map_or(0.0, |link| link.com.iter().map(|component| component * component).sum::<f64>().sqrt());
         (2.0 * reach).max(SHORTEST_LINK_M)
     }
 }

@@ -82,13 +82,13 @@ fn known(model: &ModelFile, name: &str, steps: &[Step]) -> Result<(usize, Parame
 
 fn base_set(model: &ModelFile) -> Checked {
     let set = &model.base_set;
-    let place = |number| [Step::Key("base_set"), Step::Key("parameters"), Step::Entry(number)];
+    let path = |number| [Step::Key("base_set"), Step::Key("parameters"), Step::Entry(number)];
     if !(1..=LARGEST_BASE_SET).contains(&set.parameters.len()) {
         let reason = format!("{} base parameters; allowed are 1 to {LARGEST_BASE_SET}", set.parameters.len());
-        return Err(fault(&place(0)[..2], reason));
+        return Err(fault(&path(0)[..2], reason));
     }
     for (number, base) in set.parameters.iter().enumerate() {
-        let steps = place(number);
+        let steps = path(number);
         let carrier = known(model, &base.carrier, &steps)?;
         if set.parameters[..number].iter().any(|other| model.parameter(&other.carrier) == Some(carrier)) {
             return Err(fault(&steps, format!("`{}` carries two base parameters", base.carrier)));
@@ -128,27 +128,27 @@ fn base_set(model: &ModelFile) -> Checked {
 
 fn covariance(set: &BaseSet) -> Checked {
     let (rows, count) = (&set.covariance, set.parameters.len());
-    let place = |row| [Step::Key("base_set"), Step::Key("covariance"), Step::Entry(row)];
+    let path = |row| [Step::Key("base_set"), Step::Key("covariance"), Step::Entry(row)];
     if rows.len() != count {
         let reason = format!("`covariance` has {} rows for {count} base parameters", rows.len());
-        return Err(fault(&place(0)[..2], reason));
+        return Err(fault(&path(0)[..2], reason));
     }
     for (row, (elements, base)) in rows.iter().zip(&set.parameters).enumerate() {
         if elements.len() != count {
             let reason = format!("{} elements in a row for {count} base parameters", elements.len());
-            return Err(fault(&place(row), reason));
+            return Err(fault(&path(row), reason));
         }
         if let Some(element) = elements.iter().find(|element| !element.is_finite()) {
-            return Err(fault(&place(row), format!("an element of `covariance` is {element}")));
+            return Err(fault(&path(row), format!("an element of `covariance` is {element}")));
         }
-        own_variance(elements[row], base).map_err(|reason| fault(&place(row), reason))?;
+        own_variance(elements[row], base).map_err(|reason| fault(&path(row), reason))?;
     }
     for row in 0..count {
         if let Some(column) = (0..row).find(|&column| rows[row][column] != rows[column][row]) {
             let (one, other) = (&set.parameters[column].name, &set.parameters[row].name);
             let reason =
                 format!("`covariance` is not symmetric: {one} with {other} differs from the reverse");
-            return Err(fault(&place(row), reason));
+            return Err(fault(&path(row), reason));
         }
     }
     let correlations =
@@ -158,7 +158,7 @@ fn covariance(set: &BaseSet) -> Checked {
         let reason = format!(
             "`covariance` is invalid: some sum of base parameters would have a negative variance (eigenvalue {smallest:.2e})"
         );
-        return Err(fault(&place(0)[..2], reason));
+        return Err(fault(&path(0)[..2], reason));
     }
     Ok(())
 }
@@ -174,19 +174,19 @@ fn own_variance(variance: f64, base: &StoredBase) -> Result<(), String> {
 }
 
 fn full_set(model: &ModelFile) -> Checked {
-    let place = |number| [Step::Key("full_set"), Step::Key("parameters"), Step::Entry(number)];
+    let path = |number| [Step::Key("full_set"), Step::Key("parameters"), Step::Entry(number)];
     let parameters = &model.full_set.parameters;
     let expected = model.leg.joints.len() * PARAMETERS_PER_JOINT;
     if parameters.len() != expected {
         let reason = format!("{} parameters, expected {expected}", parameters.len());
-        return Err(fault(&place(0)[..2], reason));
+        return Err(fault(&path(0)[..2], reason));
     }
     for (number, parameter) in parameters.iter().enumerate() {
         let (joint, symbol) = (number / PARAMETERS_PER_JOINT, Parameter::ALL[number % PARAMETERS_PER_JOINT]);
         let plain = parameter_name(joint, symbol);
         let other = (symbol == Parameter::OFF).then(|| asymmetry_name(joint));
         let name = other.filter(|other| *other == parameter.name).unwrap_or(plain);
-        one_parameter(parameter, &name, symbol).map_err(|reason| fault(&place(number), reason))?;
+        one_parameter(parameter, &name, symbol).map_err(|reason| fault(&path(number), reason))?;
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ const CODE: Crc<u64, Table<1>> = Crc::<u64, Table<1>>::new(&CRC_64_XZ);
 pub(super) const KEY: &str = "checksum";
 
 /// Checksum of a parsed file, without the checksum itself.
-pub(super) fn of(file: &toml::Table) -> String {
+pub(super) fn of_table(file: &toml::Table) -> String {
     let mut digest = CODE.digest();
     let others: Vec<_> = file.iter().filter(|(key, _)| *key != KEY).collect();
     table(&mut digest, others);

@@ -57,7 +57,7 @@ impl ModelFile {
     pub fn sealed(mut self) -> Self {
         let raw: toml::Table =
             toml::from_str(&self.to_toml()).unwrap_or_else(|fault| unreachable!("own text: {fault}"));
-        self.checksum = checksum::of(&raw);
+        self.checksum = checksum::of_table(&raw);
         self
     }
 }

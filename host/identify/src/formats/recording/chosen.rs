@@ -171,8 +171,8 @@ impl Finder<'_> {
 
     /// Only column of this name.
     fn named(&self, name: &str) -> Result<Option<Column>, Fault> {
-        let mut places = self.names.names.iter().enumerate().filter(|(_, present)| *present == name);
-        match (places.next(), places.next()) {
+        let mut matches = self.names.names.iter().enumerate().filter(|(_, present)| *present == name);
+        match (matches.next(), matches.next()) {
             (Some((index, _)), None) => Ok(Some(Column { index, name: name.to_owned() })),
             (Some(_), Some(_)) => Err(Fault::RepeatedColumn(name.to_owned())),
             (None, _) => Ok(None),

@@ -97,14 +97,14 @@ pub(crate) struct LineNumbers {
 
 impl LineNumbers {
     pub(crate) fn push(&mut self, line: usize) {
-        if self.of(self.samples) != Some(line) {
+        if self.line_of(self.samples) != Some(line) {
             self.breaks.push((self.samples, line));
         }
         self.samples += 1;
     }
 
     /// Line of a sample, or the line after the last one's.
-    pub(crate) fn of(&self, sample: usize) -> Option<usize> {
+    pub(crate) fn line_of(&self, sample: usize) -> Option<usize> {
         let after = self.breaks.partition_point(|(first, _)| *first <= sample);
         let (first, line) = self.breaks.get(after.checked_sub(1)?)?;
         (sample <= self.samples).then(|| line + sample - first)
@@ -125,8 +125,8 @@ pub(crate) struct Column {
 impl Column {
     /// Finds a column; the error names all that are `needed`.
     pub(crate) fn find(header: &StringRecord, name: String, needed: &[String]) -> Result<Self, Fault> {
-        let mut places = header.iter().enumerate().filter(|(_, present)| *present == name);
-        match (places.next(), places.next()) {
+        let mut matches = header.iter().enumerate().filter(|(_, present)| *present == name);
+        match (matches.next(), matches.next()) {
             (Some((index, _)), None) => Ok(Self { index, name }),
             (Some(_), Some(_)) => Err(Fault::RepeatedColumn(name)),
             (None, _) => {

@@ -195,7 +195,7 @@ fn other_time_unit(time_s: &[f64], import: &Import, mut readings: Vec<Reading>) 
     if is_valid(&time.unit) {
         return String::new();
     }
-    let Some(unit) = Unit::of(Quantity::Time).find(is_valid) else { return String::new() };
+    let Some(unit) = Unit::for_quantity(Quantity::Time).find(is_valid) else { return String::new() };
     let factor = unit.factor() / time.unit.factor();
     let rate = rounded(1.0 / (factor * step_s));
     let over = if is_pair { String::new() } else { format!(" over {} s", rounded(factor * duration_s)) };
@@ -257,8 +257,8 @@ pub fn csv(file: &Path, source: impl BufRead, packing: &str, import: &Import) ->
         let reason = "UTF-16 text: save the file as UTF-8".to_owned();
         return Err(refuse(file, None, Fault::Unreadable(reason)));
     }
-    let dialect =
-        Dialect::of(&begin, (import.delimiter, import.decimal)).map_err(|fault| refuse(file, None, fault))?;
+    let dialect = Dialect::detect(&begin, (import.delimiter, import.decimal))
+        .map_err(|fault| refuse(file, None, fault))?;
     drop(begin);
     let mut rows = Rows::new(source, dialect.delimiter);
     let first = match rows.next() {

@@ -74,7 +74,7 @@ impl Dialect {
     ///
     /// # Errors
     /// The first rows allow two readings.
-    pub fn of(begin: &[u8], stated: (Option<Delimiter>, Option<Decimal>)) -> Result<Self, Fault> {
+    pub fn detect(begin: &[u8], stated: (Option<Delimiter>, Option<Decimal>)) -> Result<Self, Fault> {
         let text = String::from_utf8_lossy(begin);
         let mut lines: Vec<&str> =
             text.split_inclusive('\n').filter(|line| !is_skipped(line.as_bytes())).collect();

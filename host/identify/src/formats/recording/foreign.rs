@@ -57,18 +57,18 @@ const KINDS: [(&[u8], Foreign); 11] = [
 
 impl Foreign {
     /// Kind of a file that begins with these bytes.
-    pub(crate) fn of(begin: &[u8]) -> Option<Self> {
+    pub(crate) fn detect(begin: &[u8]) -> Option<Self> {
         KINDS.into_iter().find(|(bytes, _)| begin.starts_with(bytes)).map(|(_, kind)| kind)
     }
 
     /// Kind of a folder that holds a bag of ROS 2.
-    pub(crate) fn of_folder(folder: &Path) -> Option<Self> {
+    pub(crate) fn detect_folder(folder: &Path) -> Option<Self> {
         let names = std::fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
         let extensions: Vec<_> = names.filter_map(|path| path.extension().map(ToOwned::to_owned)).collect();
         let has = |wanted: &str| extensions.iter().any(|extension| extension == wanted);
         match (has("mcap"), has("db3")) {
             (true, _) => Some(Self::Mcap),
-            (false, true) => Self::of(SQLITE),
+            (false, true) => Self::detect(SQLITE),
             _ => None,
         }
     }

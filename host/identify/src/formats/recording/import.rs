@@ -126,7 +126,7 @@ impl Import {
 
     /// Documented format for a leg whose file holds this text.
     #[must_use]
-    pub fn of(leg: &LegFile, text: &str) -> Self {
+    pub fn from_leg(leg: &LegFile, text: &str) -> Self {
         let states_constant = LegFile::joints_that_state(text, "torque_per_ampere");
         let states_encoder = LegFile::joints_that_state(text, "encoder");
         let mounting = if leg.side == BodySide::Left { -1.0 } else { 1.0 };

@@ -108,7 +108,7 @@ impl Unit {
     }
 
     /// Units of a quantity, the SI unit first.
-    pub fn of(quantity: Quantity) -> impl Iterator<Item = Self> {
+    pub fn for_quantity(quantity: Quantity) -> impl Iterator<Item = Self> {
         UNITS.into_iter().filter(move |unit| unit.quantity == quantity)
     }
 

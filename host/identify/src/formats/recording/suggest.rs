@@ -69,7 +69,7 @@ struct Name {
 }
 
 impl Name {
-    fn of(text: &str) -> Self {
+    fn parse(text: &str) -> Self {
         let text = ["N m", "N*m", "N.m", "N·m", "N-m"]
             .iter()
             .fold(text.to_owned(), |text, spelt| text.replace(spelt, "Nm"));
@@ -131,14 +131,14 @@ impl Name {
     }
 
     fn is_of(&self, drive: &Drive) -> bool {
-        let joint = Self::of(&drive.joint);
+        let joint = Self::parse(&drive.joint);
         !joint.words.is_empty() && joint.words.iter().all(|word| self.words.contains(word))
     }
 }
 
 /// Unit that a column's name states for this quantity.
 pub(crate) fn unit_in_name(name: &str, quantity: Quantity) -> Option<Unit> {
-    Name::of(name).unit.into_iter().rev().find(|unit| unit.quantity == quantity)
+    Name::parse(name).unit.into_iter().rev().find(|unit| unit.quantity == quantity)
 }
 
 /// Proposed column of one signal.
@@ -233,7 +233,7 @@ fn proposals(
         .filter(|(_, name)| own(name))
         .filter_map(|(index, text)| {
             let text = if topic.is_empty() { text.as_str() } else { text.get(topic.len() + 1..)? };
-            let name = Name::of(text);
+            let name = Name::parse(text);
             let kind = name.kind()?;
             Some((index, name, kind))
         })

@@ -11,7 +11,7 @@ fn size(thigh: Option<f64>, shank: Option<f64>, wearer: Option<(f64, f64)>) -> S
 }
 
 fn sized(thigh: Option<f64>, shank: Option<f64>, wearer: Option<(f64, f64)>) -> LegFile {
-    size(thigh, shank, wearer).of(&default_leg()).expect("within the ranges")
+    size(thigh, shank, wearer).apply_to(&default_leg()).expect("within the ranges")
 }
 
 /// Sums M, HX, HY, ZZ about the joint.
@@ -26,7 +26,7 @@ fn stretching_is_close_to_a_telescope() {
     // file's body.
     for (mass, height) in [(60.0, 1.65), (75.0, 1.75), (95.0, 2.05)] {
         let ruled = sized(None, None, Some((mass, height)));
-        let derived = x2::leg_file_of(&Wearer::of_height(mass, height), 70.0 / 75.0 * mass);
+        let derived = x2::leg_file_of(&Wearer::from_height(mass, height), 70.0 / 75.0 * mass);
         assert!((ruled.joints[1].dh.a - derived.joints[1].dh.a).abs() < 1e-12);
         for (ruled, derived) in ruled.joints.iter().zip(&derived.joints) {
             for (ruled, derived) in [(ruled.truth, derived.truth), (ruled.prior, derived.prior)] {
@@ -92,12 +92,12 @@ fn every_size_in_the_range_gives_a_valid_leg_file() {
 
 #[test]
 fn without_options_the_leg_is_unchanged() {
-    assert_eq!(Size::default().of(&default_leg()).expect("unchanged"), default_leg());
+    assert_eq!(Size::default().apply_to(&default_leg()).expect("unchanged"), default_leg());
 }
 
 #[test]
 fn impossible_sizes_are_refused_with_option_and_range() {
-    let refusal = |size: Size, leg: &LegFile| size.of(leg).expect_err("refused").to_string();
+    let refusal = |size: Size, leg: &LegFile| size.apply_to(leg).expect_err("refused").to_string();
     let leg = default_leg();
     for (size, reason) in [
         (size(Some(0.39), None, None), "--thigh 0.39 is outside 0.402..0.505 m"),

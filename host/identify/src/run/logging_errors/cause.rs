@@ -85,7 +85,7 @@ pub fn likely<const N: usize, const B: usize>(
     // Damage resembles friction at rest and columns without effect: the refused fit's choice of both is not
     // used.
     let plain = question.with_all_columns();
-    let again = plain.as_ref().and_then(|plain| LoggingErrors::of(plain).ok().flatten());
+    let again = plain.as_ref().and_then(|plain| LoggingErrors::fit(plain).ok().flatten());
     let (question, errors) = match (&plain, &again) {
         (Some(plain), Some(again)) => (plain, again),
         _ => (question, errors),
@@ -156,7 +156,7 @@ fn encoder_steps<const N: usize, const B: usize>(
     } else {
         let hz = question.calmer_hz().ok()??;
         let calmer = question.at(hz);
-        let errors = LoggingErrors::of(&calmer).ok()??;
+        let errors = LoggingErrors::fit(&calmer).ok()??;
         let is_right = errors.directions.iter().all(|direction| direction.passed)
             && !errors.midway.as_ref().is_some_and(Midway::refuses)
             && !errors.encoder.is_some_and(|bias| bias.refuses())
@@ -529,7 +529,7 @@ fn quality<const N: usize, const B: usize>(
     equations: &Equations<N, B>,
 ) -> Quality {
     let fit = equations.fit(&equations.columns, &equations.torque, false);
-    let segments: Vec<usize> = equations.places.iter().map(|place| place.cluster).collect();
+    let segments: Vec<usize> = equations.sources.iter().map(|source| source.cluster).collect();
     let scatter = crate::run::logging_errors::fit::segment_sigma(
         &fit,
         &equations.columns,
@@ -539,9 +539,9 @@ fn quality<const N: usize, const B: usize>(
     );
     let sigma = core::array::from_fn(|base| fit.inverse[base][base].max(0.0).sqrt().max(scatter[base]));
     let shares = (0..N).map(|joint| {
-        let torques = equations.places.iter().zip(&equations.torque);
+        let torques = equations.sources.iter().zip(&equations.torque);
         let of: Vec<f64> =
-            torques.filter(|(place, _)| place.joint == joint).map(|(_, torque)| torque * torque).collect();
+            torques.filter(|(source, _)| source.joint == joint).map(|(_, torque)| torque * torque).collect();
         let power = of.iter().sum::<f64>() / of.len().max(1) as f64;
         equations.row_sigma[joint].powi(2) * equations.information() / power.max(1e-300)
     });
@@ -572,16 +572,16 @@ fn agrees<const N: usize, const B: usize>(
     columns: &[[f64; B]],
     torque: &[f64],
 ) -> bool {
-    let rows = || equations.places.iter().zip(torque).zip(columns);
+    let rows = || equations.sources.iter().zip(torque).zip(columns);
     let Some(prior) = question.prior else {
-        return rows().all(|((place, torque), _)| torque.abs() < 3.0 * question.torque_limit[place.joint]);
+        return rows().all(|((source, torque), _)| torque.abs() < 3.0 * question.torque_limit[source.joint]);
     };
     let (mut along, mut measured, mut expected) = (0.0, [0.0; N], [0.0; N]);
-    for ((place, torque), row) in rows() {
+    for ((source, torque), row) in rows() {
         let guess: f64 = row.iter().zip(&prior).map(|(element, value)| element * value).sum();
         along += guess * torque;
-        measured[place.joint] += torque * torque;
-        expected[place.joint] += guess * guess;
+        measured[source.joint] += torque * torque;
+        expected[source.joint] += guess * guess;
     }
     along > 0.0
         && measured.iter().zip(expected).all(|(measured, expected)| {

@@ -224,9 +224,9 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
             Kind::Delay(joint) => (Cow::Borrowed(&all.columns), Cow::Owned(all.delayed(Some(joint), value))),
             Kind::EncoderScale(joint) => (Cow::Owned(self.scaled(joint, 1.0 / (1.0 + value))), plain),
             Kind::TorqueScale(joint) => {
-                let pairs = all.columns.iter().zip(&all.places);
-                let columns = pairs.map(|(row, place)| {
-                    if place.joint == joint { row.map(|element| (1.0 + value) * element) } else { *row }
+                let pairs = all.columns.iter().zip(&all.sources);
+                let columns = pairs.map(|(row, source)| {
+                    if source.joint == joint { row.map(|element| (1.0 + value) * element) } else { *row }
                 });
                 (Cow::Owned(columns.collect()), plain)
             }
@@ -258,14 +258,14 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
         match kind {
             Kind::Delay(joint) => {
                 let rates = all.rate_of(&predicted);
-                let pairs = rates.iter().zip(&all.places);
-                pairs.map(|(rate, place)| if place.joint == joint { -rate } else { 0.0 }).collect()
+                let pairs = rates.iter().zip(&all.sources);
+                pairs.map(|(rate, source)| if source.joint == joint { -rate } else { 0.0 }).collect()
             }
             Kind::TorqueScale(joint) => {
-                let pairs = predicted.iter().zip(&all.places);
+                let pairs = predicted.iter().zip(&all.sources);
                 let factor = 1.0 / (1.0 + value);
                 pairs
-                    .map(|(torque, place)| if place.joint == joint { factor * torque } else { 0.0 })
+                    .map(|(torque, source)| if source.joint == joint { factor * torque } else { 0.0 })
                     .collect()
             }
             Kind::EncoderScale(_) | Kind::Gravity => {
@@ -279,7 +279,7 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     fn score(&self, kind: Kind, value: f64, system: &System<'_, B>, fit: &Fit<B>) -> Score {
         let all = self.equations;
         let z = self.column(kind, value, &system.0, fit);
-        let segments: Vec<usize> = all.places.iter().map(|place| place.cluster).collect();
+        let segments: Vec<usize> = all.sources.iter().map(|source| source.cluster).collect();
         score(fit, &system.0, &system.1, &z, &all.weight, &segments)
     }
 

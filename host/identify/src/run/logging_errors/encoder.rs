@@ -67,7 +67,7 @@ impl Encoder {
     /// Encoder of a column of angles; `None` for a continuous one. `described_rad` is the step by the leg
     /// file, which distinguishes a mean of readings from finer counts.
     #[must_use]
-    pub fn of(angle: &[f64], described_rad: f64) -> Option<Self> {
+    pub fn detect(angle: &[f64], described_rad: f64) -> Option<Self> {
         let mut changes: Vec<f64> =
             angle.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|&change| change > 1e-12).collect();
         changes.sort_by(f64::total_cmp);
@@ -152,16 +152,16 @@ impl<const N: usize> Encoders<N> {
         model: &mut RowModel<T, N, B>,
     ) {
         let described = encoder_steps::<T, N>(leg);
-        let seen = self.joints.map(|joint| T::of(joint.map_or(0.0, |encoder| encoder.step_rad)));
+        let seen = self.joints.map(|joint| T::from_double(joint.map_or(0.0, |encoder| encoder.step_rad)));
         let coarser =
             core::array::from_fn(
                 |joint| {
                     if seen[joint] > described[joint] { seen[joint] } else { described[joint] }
                 },
             );
-        model.set_encoders(&coarser, T::of(bandwidth_hz));
+        model.set_encoders(&coarser, T::from_double(bandwidth_hz));
         let pulse = model.pulse;
-        model.set_encoders(&described, T::of(bandwidth_hz));
+        model.set_encoders(&described, T::from_double(bandwidth_hz));
         model.pulse = pulse;
     }
 
@@ -189,9 +189,9 @@ impl<const N: usize> Encoders<N> {
                 return Ok(None);
             };
             let weight: Vec<f64> = again
-                .places
+                .sources
                 .iter()
-                .map(|place| if place.training { 1.0 / equations.row_sigma[place.joint] } else { 0.0 })
+                .map(|source| if source.training { 1.0 / equations.row_sigma[source.joint] } else { 0.0 })
                 .collect();
             let values = solve(&again.columns, &again.torque, &weight, &again.active).values;
             Ok(Some((again, values)))
@@ -202,7 +202,7 @@ impl<const N: usize> Encoders<N> {
             let Some((read, values)) = refit(Some(phase as f64 / PHASES as f64))? else { return Ok(None) };
             shifts.push(core::array::from_fn::<f64, B, _>(|base| values[base] - before[base]));
             if phase == 0 {
-                let before_steps = smooth.columns_at(&read.places);
+                let before_steps = smooth.columns_at(&read.sources);
                 noise = column_noise(&before_steps, &read);
                 predicted = prediction_noise(&before_steps, &read, fit);
             }
@@ -216,8 +216,9 @@ impl<const N: usize> Encoders<N> {
         });
         let torque_share = core::array::from_fn(|joint| {
             let (mut missed, mut all) = (0.0, 0.0);
-            let rows = equations.places.iter().zip(&equations.columns).zip(&equations.torque);
-            for ((_, row), torque) in rows.filter(|((place, _), _)| place.joint == joint && place.training) {
+            let rows = equations.sources.iter().zip(&equations.columns).zip(&equations.torque);
+            for ((_, row), torque) in rows.filter(|((source, _), _)| source.joint == joint && source.training)
+            {
                 missed += row.iter().zip(&mean).map(|(element, bias)| element * bias).sum::<f64>().powi(2);
                 all += torque * torque;
             }
@@ -306,7 +307,7 @@ impl<const N: usize> Encoders<N> {
         });
         let recording =
             Recording { file: PathBuf::new(), joints: joints.collect(), time_s, joints_in_file: N };
-        let grid = Resampled::of(&recording);
+        let grid = Resampled::new(&recording);
         Motion {
             training_s: training_s - grid.start_s,
             position: (0..grid.len()).filter_map(|point| grid.position_rad::<N>(point)).collect(),
@@ -332,8 +333,8 @@ fn column_noise<const N: usize, const B: usize>(before: &[[f64; B]], read: &Equa
         });
         let share = |base: usize| {
             let (mut noise, mut power) = (0.0, 0.0);
-            for ((place, before), after) in read.places.iter().zip(before).zip(&read.columns) {
-                if place.joint == joint && place.training {
+            for ((source, before), after) in read.sources.iter().zip(before).zip(&read.columns) {
+                if source.joint == joint && source.training {
                     noise += (after[base] - before[base]).powi(2);
                     power += before[base].powi(2);
                 }
@@ -353,8 +354,8 @@ fn prediction_noise<const N: usize, const B: usize>(
     let (smooth, read_torque) = (fit.predictions(smooth), fit.predictions(&read.columns));
     core::array::from_fn(|joint| {
         let (mut noise, mut power) = (0.0, 0.0);
-        let rows = read.places.iter().zip(smooth.iter().zip(&read_torque));
-        for (_, (smooth, read)) in rows.filter(|(place, _)| place.joint == joint && place.training) {
+        let rows = read.sources.iter().zip(smooth.iter().zip(&read_torque));
+        for (_, (smooth, read)) in rows.filter(|(source, _)| source.joint == joint && source.training) {
             noise += (read - smooth).powi(2);
             power += smooth * smooth;
         }
@@ -413,11 +414,11 @@ mod tests {
 
     #[test]
     fn steps_are_found_in_a_column_and_a_continuous_angle_has_none() {
-        let found = Encoder::of(&swing(1.5e-3), 1e-4).expect("an encoder");
+        let found = Encoder::detect(&swing(1.5e-3), 1e-4).expect("an encoder");
         assert!((found.step_rad / 1.5e-3 - 1.0).abs() < 1e-6 && found.readings == 1, "{found:?}");
         let smooth: Vec<f64> = (0..5000).map(|k| (k as f64 * 0.002 * 3.0).sin()).collect();
-        assert_eq!(Encoder::of(&smooth, 1e-4), None);
-        assert_eq!(Encoder::of(&[0.0; 100], 1e-4), None);
+        assert_eq!(Encoder::detect(&smooth, 1e-4), None);
+        assert_eq!(Encoder::detect(&[0.0; 100], 1e-4), None);
     }
 
     #[test]
@@ -425,9 +426,9 @@ mod tests {
         let fine: Vec<f64> =
             (0..40_000).map(|k| ((k as f64 * 0.000_25).sin() / 1.6e-3).floor() * 1.6e-3).collect();
         let means: Vec<f64> = fine.chunks_exact(8).map(|chunk| chunk.iter().sum::<f64>() / 8.0).collect();
-        let found = Encoder::of(&means, 1.6e-3).expect("an encoder");
+        let found = Encoder::detect(&means, 1.6e-3).expect("an encoder");
         assert_eq!((found.step_rad, found.readings), (1.6e-3, 8));
-        let without = Encoder::of(&means, 0.1).expect("an encoder");
+        let without = Encoder::detect(&means, 0.1).expect("an encoder");
         assert!((without.step_rad / 2e-4 - 1.0).abs() < 1e-6 && without.readings == 1, "{without:?}");
     }
 }

@@ -113,12 +113,12 @@ impl<const N: usize, const B: usize> Search<'_, N, B> {
                 beside.iter().zip(&predicted).map(|(beside, here)| (beside - here) / step_s).collect()
             }
         };
-        let segments: Vec<usize> = all.places.iter().map(|place| place.cluster).collect();
+        let segments: Vec<usize> = all.sources.iter().map(|source| source.cluster).collect();
         let scored = score(&fit, &columns, &torque, &slope, &all.weight, &segments);
         let remaining = (fit.cost / plain.max(1e-300)).min(1.0);
-        let rows = fit.residuals(&columns, &torque).into_iter().zip(&all.weight).zip(&all.places);
+        let rows = fit.residuals(&columns, &torque).into_iter().zip(&all.weight).zip(&all.sources);
         let own_cost = rows
-            .filter(|(_, place)| joint.is_none_or(|joint| joint == place.joint))
+            .filter(|(_, source)| joint.is_none_or(|joint| joint == source.joint))
             .map(|((residual, weight), _)| (residual * weight).powi(2))
             .sum();
         let sigma_s = (remaining.sqrt() * scored.noise_sigma).max(scored.segment_sigma);

@@ -11,7 +11,7 @@
 
 use crate::run::logging_errors::directions::CHANCE;
 use crate::run::logging_errors::fit::{Fit, score};
-use crate::run::logging_errors::rows::{Equations, Place};
+use crate::run::logging_errors::rows::{Equations, RowSource};
 
 /// Change of the gain that is tolerated beside chance: the temperature of a drive changes it by 5 %.
 const LARGEST_CHANGE: f64 = 0.05;
@@ -62,11 +62,11 @@ struct Sums<const B: usize> {
 }
 
 impl<const B: usize> Sums<B> {
-    fn of<const N: usize>(all: &Equations<N, B>, mut chosen: impl FnMut(&Place) -> bool) -> Self {
+    fn new<const N: usize>(all: &Equations<N, B>, mut chosen: impl FnMut(&RowSource) -> bool) -> Self {
         let mut sums = Self { right: [0.0; B], power: 0.0 };
-        let rows = all.columns.iter().zip(&all.torque).zip(all.weight.iter().zip(&all.places));
-        for ((row, torque), (weight, place)) in rows {
-            if chosen(place) {
+        let rows = all.columns.iter().zip(&all.torque).zip(all.weight.iter().zip(&all.sources));
+        for ((row, torque), (weight, source)) in rows {
+            if chosen(source) {
                 let scaled = weight * weight * torque;
                 sums.power += scaled * torque;
                 for (slot, element) in sums.right.iter_mut().zip(row) {
@@ -101,7 +101,7 @@ fn change<const B: usize>(plain: &Fit<B>, whole: &Sums<B>, after: &Sums<B>) -> (
 /// Searches once with the robust weights, which ignore a push, and once with every row: after a change of
 /// sign, robust weights exclude the rows after it.
 #[must_use]
-pub fn look<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
+pub fn find<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
     let robust = strongest(all);
     let whole = strongest(&all.with_equal_weights())
         .filter(|found| found.refuses() && found.change < -1.0 && found.explained > EXPLAINED_BY_SIGN);
@@ -113,8 +113,8 @@ pub fn look<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Mid
 
 fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
     let plain = all.fit(&all.columns, &all.torque, false);
-    let whole = Sums::of(all, |_| true);
-    let motions = all.places.iter().map(|place| place.motion).max()? + 1;
+    let whole = Sums::new(all, |_| true);
+    let motions = all.sources.iter().map(|source| source.motion).max()? + 1;
     let mut scopes: Vec<Option<usize>> = vec![None];
     if motions > 1 {
         scopes.extend((0..motions).map(Some));
@@ -126,12 +126,12 @@ fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Mi
     let mut best: Option<(Midway, Option<usize>, f64)> = None;
     for scope in scopes {
         for joint in joints.iter().copied() {
-            let own = Sums::of(all, |place| is_after(place, scope, joint, -1.0));
+            let own = Sums::new(all, |source| is_after(source, scope, joint, -1.0));
             // A gain of the whole recording is another error: a torque scale, or another machine.
             let always = if own.power < 0.999 * whole.power { change(&plain, &whole, &own).1 } else { 0.0 };
             for point in 1..=POINTS {
                 let share = point as f64 / (POINTS + 1) as f64;
-                let after = Sums::of(all, |place| is_after(place, scope, joint, share));
+                let after = Sums::new(all, |source| is_after(source, scope, joint, share));
                 if !(SMALLEST_SIDE..1.0 - SMALLEST_SIDE).contains(&(after.power / own.power.max(1e-300))) {
                     continue;
                 }
@@ -147,25 +147,26 @@ fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Mi
     }
     let (mut found, scope, factor) = best?;
     // Uncertainty of the factor: the torque after the change as a further column.
-    let is_changed = |place: &Place| is_after(place, scope, found.joint, found.share);
-    let changed = |(place, torque): (&Place, &f64)| if is_changed(place) { factor * torque } else { *torque };
-    let torque: Vec<f64> = all.places.iter().zip(&all.torque).map(changed).collect();
+    let is_changed = |source: &RowSource| is_after(source, scope, found.joint, found.share);
+    let changed =
+        |(source, torque): (&RowSource, &f64)| if is_changed(source) { factor * torque } else { *torque };
+    let torque: Vec<f64> = all.sources.iter().zip(&all.torque).map(changed).collect();
     let fit = all.fit(&all.columns, &torque, false);
     let predicted = fit.predictions(&all.columns);
-    let column = |(place, torque): (&Place, &f64)| if is_changed(place) { *torque } else { 0.0 };
-    let z: Vec<f64> = all.places.iter().zip(&predicted).map(column).collect();
-    let segments: Vec<usize> = all.places.iter().map(|place| place.cluster).collect();
+    let column = |(source, torque): (&RowSource, &f64)| if is_changed(source) { *torque } else { 0.0 };
+    let z: Vec<f64> = all.sources.iter().zip(&predicted).map(column).collect();
+    let segments: Vec<usize> = all.sources.iter().map(|source| source.cluster).collect();
     let scored = score(&fit, &all.columns, &torque, &z, &all.weight, &segments);
     // Chi-square of one for each independent row, independent of the previous misfit.
-    let rows = all.places.len() as f64 * all.information().min(1.0) - fit.rank as f64;
+    let rows = all.sources.len() as f64 * all.information().min(1.0) - fit.rank as f64;
     let noise = scored.noise_sigma * (fit.cost / rows.max(1.0)).sqrt();
     // The change is 1 / s - 1, and the column has the size of s times the torque.
     found.sigma = noise.max(scored.segment_sigma) * (1.0 + found.change).abs();
     Some(found)
 }
 
-fn is_after(place: &Place, scope: Option<usize>, joint: Option<usize>, share: f64) -> bool {
-    place.share > share
-        && scope.is_none_or(|motion| place.motion == motion)
-        && joint.is_none_or(|joint| place.joint == joint)
+fn is_after(source: &RowSource, scope: Option<usize>, joint: Option<usize>, share: f64) -> bool {
+    source.share > share
+        && scope.is_none_or(|motion| source.motion == motion)
+        && joint.is_none_or(|joint| source.joint == joint)
 }

@@ -205,7 +205,7 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
     ///
     /// # Errors
     /// The filter cannot be built for the bandwidth.
-    pub fn of(question: &Question<N, B>) -> Result<Option<Self>, KernelError> {
+    pub fn fit(question: &Question<N, B>) -> Result<Option<Self>, KernelError> {
         let Some(equations) = question.equations(&question.motions)? else { return Ok(None) };
         let found = Directions { equations: &equations, zero: question.zero(), axis: question.axis }.all();
         let fit = equations.fit(&equations.columns, &equations.torque, true);
@@ -230,13 +230,13 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
         let systematic = systematic(&misfit_over_noise, &equations.rows);
         let parameters = sigma.map(|sigma| sigma.total());
         let directions: Vec<DirectionReport> =
-            found.iter().map(|found| DirectionReport::of(found, &parameters, systematic)).collect();
+            found.iter().map(|found| DirectionReport::new(found, &parameters, systematic)).collect();
         for (found, _) in found.iter().zip(&directions).filter(|(_, report)| report.passed) {
             for (sigma, variance) in sigma.iter_mut().zip(found.variance()) {
                 sigma.logging = sigma.logging.hypot(variance.sqrt());
             }
         }
-        let midway = midway::look(&equations);
+        let midway = midway::find(&equations);
         Ok(Some(Self { equations, found, directions, midway, misfit_over_noise, sigma, encoder, better_hz }))
     }
 

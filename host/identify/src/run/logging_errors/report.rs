@@ -11,7 +11,7 @@ impl DirectionReport {
     /// Judges a direction. `sigma` is that of the parameters, `systematic` the part of the misfit that is not
     /// noise.
     #[must_use]
-    pub fn of<const B: usize>(found: &Found<B>, sigma: &[f64; B], systematic: f64) -> Self {
+    pub fn new<const B: usize>(found: &Found<B>, sigma: &[f64; B], systematic: f64) -> Self {
         let (unit, factor) = found.kind.unit();
         let shifts = found.shift.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
         let largest = shifts.map(|(shift, sigma)| (shift / sigma).abs()).fold(0.0, f64::max);

@@ -166,7 +166,7 @@ impl<const N: usize> Part<N> {
 
 /// Origin of an equation.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct RowSource {
     part: usize,
     row: usize,
     /// Joint, from 0.
@@ -181,7 +181,7 @@ pub struct Place {
     pub motion: usize,
 }
 
-impl Place {
+impl RowSource {
     /// Index of the row in its motion, at 50 Hz.
     #[must_use]
     pub fn row(&self) -> usize {
@@ -198,7 +198,7 @@ pub struct Equations<const N: usize, const B: usize> {
     /// Columns that are estimated.
     pub active: [bool; B],
     /// Origin of each equation.
-    pub places: Vec<Place>,
+    pub sources: Vec<RowSource>,
     /// Regressor columns.
     pub columns: Vec<[f64; B]>,
     /// Low-passed torque, N m.
@@ -228,7 +228,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             parts,
             model: model.clone(),
             active: *active,
-            places: Vec::new(),
+            sources: Vec::new(),
             columns: Vec::new(),
             torque: Vec::new(),
             weight: Vec::new(),
@@ -239,7 +239,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         all.collect();
         let columns = active.iter().filter(|on| **on).count();
         let enough = (0..N).all(|joint| {
-            all.places.iter().filter(|place| place.joint == joint && place.training).count()
+            all.sources.iter().filter(|source| source.joint == joint && source.training).count()
                 >= ROWS_PER_PARAMETER * columns
         });
         if !enough {
@@ -283,7 +283,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
                         continue;
                     }
                     let time_s = start_s + row as f64 * row_s;
-                    self.places.push(Place {
+                    self.sources.push(RowSource {
                         part: number,
                         row,
                         joint,
@@ -309,7 +309,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         change: &dyn Fn(&mut Smoothed<f64, N>),
     ) -> Vec<[f64; B]> {
         let parts: Vec<_> = self.parts.iter().map(|part| part.rows(&self.filters, model, change)).collect();
-        self.places.iter().map(|place| parts[place.part][place.row].regressor[place.joint]).collect()
+        self.sources.iter().map(|source| parts[source.part][source.row].regressor[source.joint]).collect()
     }
 
     /// Smoothed motion of every recording on the 500 Hz grid, with the duration of its training part, s.
@@ -321,16 +321,16 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     /// Standard deviations of the parameters of a fit to the training motion, by the scatter of its segments.
     #[must_use]
     pub fn scatter(&self, fit: &Fit<B>) -> [f64; B] {
-        let segments: Vec<usize> = self.places.iter().map(|place| place.cluster).collect();
+        let segments: Vec<usize> = self.sources.iter().map(|source| source.cluster).collect();
         segment_sigma(fit, &self.columns, &self.torque, &self.training_weight(), &segments)
     }
 
     /// Columns for the equations of a motion with the same number of samples.
     #[must_use]
-    pub fn columns_at(&self, places: &[Place]) -> Vec<[f64; B]> {
+    pub fn columns_at(&self, sources: &[RowSource]) -> Vec<[f64; B]> {
         let rows: Vec<_> =
             self.parts.iter().map(|part| part.rows(&self.filters, &self.model, &|_| {})).collect();
-        places.iter().map(|place| rows[place.part][place.row].regressor[place.joint]).collect()
+        sources.iter().map(|source| rows[source.part][source.row].regressor[source.joint]).collect()
     }
 
     /// Unchanged row model.
@@ -342,11 +342,11 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     /// Torque of all equations; that of `joint`, or of all joints, taken `late_s` after the angle.
     #[must_use]
     pub fn delayed(&self, joint: Option<usize>, late_s: f64) -> Vec<f64> {
-        let pairs = self.places.iter().zip(&self.torque);
+        let pairs = self.sources.iter().zip(&self.torque);
         pairs
-            .map(|(place, &torque)| {
-                if joint.is_none_or(|joint| joint == place.joint) {
-                    self.parts[place.part].torque(place.joint, place.row, late_s)
+            .map(|(source, &torque)| {
+                if joint.is_none_or(|joint| joint == source.joint) {
+                    self.parts[source.part].torque(source.joint, source.row, late_s)
                 } else {
                     torque
                 }
@@ -387,16 +387,16 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             behind
         });
         let behind: Vec<_> = behind.collect();
-        self.places.iter().map(|place| behind[place.part][place.row][place.joint]).collect()
+        self.sources.iter().map(|source| behind[source.part][source.row][source.joint]).collect()
     }
 
     /// Torque of all equations in another order of the joints: the equation of joint `j` gets that of
     /// `of[j]`.
     #[must_use]
     pub fn exchanged(&self, of: &[usize; N]) -> Vec<f64> {
-        self.places
+        self.sources
             .iter()
-            .map(|place| self.parts[place.part].torque(of[place.joint], place.row, 0.0))
+            .map(|source| self.parts[source.part].torque(of[source.joint], source.row, 0.0))
             .collect()
     }
 
@@ -411,25 +411,25 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             starts.push(slots.len());
             slots.resize(slots.len() + part.instants.len() / DECIMATION + 2, [usize::MAX; N]);
         }
-        for (index, place) in self.places.iter().enumerate() {
-            slots[starts[place.part] + place.row][place.joint] = index;
+        for (index, source) in self.sources.iter().enumerate() {
+            slots[starts[source.part] + source.row][source.joint] = index;
         }
-        let at = |place: &Place, offset: isize| -> Option<f64> {
-            let row = place.row.checked_add_signed(offset)?;
-            let end = starts.get(place.part + 1).copied().unwrap_or(slots.len());
-            let slot = starts[place.part] + row;
-            let index = *slots.get(slot).filter(|_| slot < end)?.get(place.joint)?;
+        let at = |source: &RowSource, offset: isize| -> Option<f64> {
+            let row = source.row.checked_add_signed(offset)?;
+            let end = starts.get(source.part + 1).copied().unwrap_or(slots.len());
+            let slot = starts[source.part] + row;
+            let index = *slots.get(slot).filter(|_| slot < end)?.get(source.joint)?;
             series.get(index).copied()
         };
-        let rate = |place: &Place| -> f64 {
-            let [two_back, back, on, two_on] = [-2, -1, 1, 2].map(|offset| at(place, offset));
+        let rate = |source: &RowSource| -> f64 {
+            let [two_back, back, on, two_on] = [-2, -1, 1, 2].map(|offset| at(source, offset));
             match (two_back, back, on, two_on) {
                 (Some(a), Some(b), Some(c), Some(d)) => (8.0 * (c - b) - (d - a)) / (12.0 * step),
                 (_, Some(b), Some(c), _) => (c - b) / (2.0 * step),
                 _ => 0.0,
             }
         };
-        self.places.iter().map(rate).collect()
+        self.sources.iter().map(rate).collect()
     }
 
     /// Least squares with these columns and torques, all equations or those of the training motion.
@@ -444,15 +444,15 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     /// Copy in which every equation has the weight of its joint.
     #[must_use]
     pub fn with_equal_weights(&self) -> Self {
-        let weight = self.places.iter().map(|place| 1.0 / self.row_sigma[place.joint]).collect();
+        let weight = self.sources.iter().map(|source| 1.0 / self.row_sigma[source.joint]).collect();
         Self { weight, ..self.clone() }
     }
 
     /// Weights of the equations of the training motion; zero for the others.
     #[must_use]
     pub fn training_weight(&self) -> Vec<f64> {
-        let pairs = self.weight.iter().zip(&self.places);
-        pairs.map(|(&weight, place)| if place.training { weight } else { 0.0 }).collect()
+        let pairs = self.weight.iter().zip(&self.sources);
+        pairs.map(|(&weight, source)| if source.training { weight } else { 0.0 }).collect()
     }
 
     /// Computes weights from the residual: first the scales of the joints, then the blocks with a large
@@ -466,10 +466,10 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         }
         for round in 0..10 {
             self.weight = self
-                .places
+                .sources
                 .iter()
                 .zip(&trust)
-                .map(|(place, trust): (&Place, &f64)| trust.sqrt() / self.row_sigma[place.joint])
+                .map(|(source, trust): (&RowSource, &f64)| trust.sqrt() / self.row_sigma[source.joint])
                 .collect();
             let fit = solve(&self.columns, &self.torque, &self.weight, &self.active);
             let residual = fit.residuals(&self.columns, &self.torque);
@@ -481,14 +481,14 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     fn of_joint(&self, joint: usize) -> impl Iterator<Item = usize> + '_ {
-        (0..self.places.len()).filter(move |&index| self.places[index].joint == joint)
+        (0..self.sources.len()).filter(move |&index| self.sources[index].joint == joint)
     }
 
     fn trust(&self, joint: usize, residual: &[f64], gently: bool, trust: &mut [f64]) {
         let mut blocks: Vec<(usize, usize, Vec<usize>)> = Vec::new();
         for index in self.of_joint(joint) {
-            let place = &self.places[index];
-            let key = (place.part, place.row / BLOCK_ROWS);
+            let source = &self.sources[index];
+            let key = (source.part, source.row / BLOCK_ROWS);
             match blocks.last_mut() {
                 Some((part, block, list)) if (*part, *block) == key => list.push(index),
                 _ => blocks.push((key.0, key.1, vec![index])),

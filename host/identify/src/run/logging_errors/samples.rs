@@ -83,19 +83,19 @@ pub struct Screened {
 /// either side of an excluded stretch.
 #[must_use]
 pub fn screen(recordings: &[&Recording], described_rad: &[f64], reach_s: f64) -> Vec<Screened> {
-    let mut looks: Vec<Look> =
-        recordings.iter().map(|recording| Look::new(recording, described_rad)).collect();
-    for look in &mut looks {
-        look.find_limits();
+    let mut examinations: Vec<Examination> =
+        recordings.iter().map(|recording| Examination::new(recording, described_rad)).collect();
+    for examination in &mut examinations {
+        examination.find_limits();
     }
-    if looks.len() > 1 {
-        find_common_limits(&mut looks);
+    if examinations.len() > 1 {
+        find_common_limits(&mut examinations);
     }
-    looks.into_iter().map(|look| look.finish(reach_s)).collect()
+    examinations.into_iter().map(|examination| examination.finish(reach_s)).collect()
 }
 
 /// One recording under examination.
-struct Look<'a> {
+struct Examination<'a> {
     recording: &'a Recording,
     /// Step of each joint's angle, rad.
     angle_steps: Vec<f64>,
@@ -113,20 +113,20 @@ struct Limit {
     is_at: Vec<bool>,
 }
 
-impl<'a> Look<'a> {
+impl<'a> Examination<'a> {
     fn new(recording: &'a Recording, described_rad: &[f64]) -> Self {
         let angles = recording.joints.iter().map(|joint| &joint.position_rad);
         let angle_steps: Vec<f64> = angles
             .clone()
             .zip(described_rad)
             .map(|(values, &described_rad)| {
-                let encoder = Encoder::of(values, described_rad).map_or(0.0, |encoder| encoder.step_rad);
+                let encoder = Encoder::detect(values, described_rad).map_or(0.0, |encoder| encoder.step_rad);
                 step(values).max(level_step(values)).max(encoder)
             })
             .collect();
         let is_moving = moving(recording, &angle_steps);
         let mut is_frozen = vec![false; recording.time_s.len()];
-        let mut look = Self {
+        let mut examination = Self {
             recording,
             angle_steps: angle_steps.clone(),
             is_moving,
@@ -134,15 +134,15 @@ impl<'a> Look<'a> {
             limits: Vec::new(),
         };
         for (values, &u) in angles.zip(&angle_steps) {
-            if look.held(values, u, &[]).share > HELD_ANGLE {
+            if examination.held(values, u, &[]).share > HELD_ANGLE {
                 continue;
             }
             for run in frozen_runs(recording, values).filter(|run| ends_in_jump(values, run, u)) {
                 is_frozen[run].fill(true);
             }
         }
-        look.is_frozen = is_frozen;
-        look
+        examination.is_frozen = is_frozen;
+        examination
     }
 
     /// Samples with valid neighbours and motion on both sides; the edges of a rest are excluded.
@@ -418,30 +418,32 @@ fn coarse(values: &[f64], column: &str, unit: &'static str) -> Option<SampleFind
 }
 
 /// Finds limits of the torque that only all recordings together show.
-fn find_common_limits(looks: &mut [Look]) {
-    let joints = looks.iter().map(|look| look.recording.joints.len()).min().unwrap_or(0);
-    let usable: Vec<Vec<bool>> = looks.iter().map(Look::usable).collect();
+fn find_common_limits(examinations: &mut [Examination]) {
+    let joints = examinations.iter().map(|examination| examination.recording.joints.len()).min().unwrap_or(0);
+    let usable: Vec<Vec<bool>> = examinations.iter().map(Examination::usable).collect();
     for joint in 0..joints {
-        let is_held =
-            |look: &Look| look.held_torque(&look.recording.joints[joint].torque_nm, &[]).share > HELD_TORQUE;
-        if looks.iter().any(is_held) {
+        let is_held = |examination: &Examination| {
+            examination.held_torque(&examination.recording.joints[joint].torque_nm, &[]).share > HELD_TORQUE
+        };
+        if examinations.iter().any(is_held) {
             continue;
         }
-        let parts: Vec<Part> = looks
+        let parts: Vec<Part> = examinations
             .iter()
             .zip(&usable)
-            .map(|(look, usable)| Part {
-                values: &look.recording.joints[joint].torque_nm,
+            .map(|(examination, usable)| Part {
+                values: &examination.recording.joints[joint].torque_nm,
                 usable,
-                rate_hz: look.rate_hz(),
+                rate_hz: examination.rate_hz(),
             })
             .collect();
         for upper in [true, false] {
             let Some((limit_nm, at)) = limit(&parts, upper) else { continue };
-            for (look, is_at) in looks.iter_mut().zip(at) {
-                let is_known = look.limits.iter().any(|limit| limit.joint == joint && limit.upper == upper);
+            for (examination, is_at) in examinations.iter_mut().zip(at) {
+                let is_known =
+                    examination.limits.iter().any(|limit| limit.joint == joint && limit.upper == upper);
                 if !is_known && is_at.contains(&true) {
-                    look.limits.push(Limit { joint, upper, limit_nm, is_at });
+                    examination.limits.push(Limit { joint, upper, limit_nm, is_at });
                 }
             }
         }

@@ -94,7 +94,7 @@ fn question(motions: Vec<Motion<2>>) -> Question<2, BASE> {
 }
 
 fn errors(question: &Question<2, BASE>) -> LoggingErrors<2, BASE> {
-    LoggingErrors::of(question).expect("a bandwidth").expect("enough rows")
+    LoggingErrors::fit(question).expect("a bandwidth").expect("enough rows")
 }
 
 /// Refused directions by name and joint.
@@ -251,5 +251,5 @@ fn a_motion_with_too_few_rows_has_no_result() {
     let mut short = motion([0.0; 2], 1);
     short.position.truncate(600);
     short.torque.truncate(600);
-    assert!(LoggingErrors::of(&question(vec![short])).expect("a bandwidth").is_none());
+    assert!(LoggingErrors::fit(&question(vec![short])).expect("a bandwidth").is_none());
 }

@@ -31,15 +31,15 @@ pub(super) fn judge<const N: usize, const B: usize>(
 ) -> Judged<N, B> {
     let (values, model) = (solved.values(), &background.device);
     let Solved { solver, recorder, load, noise_is_known, .. } = solved;
-    let mut looked_at = Box::new(HeldOut::<f32, N, B, PENDING>::new(recorder.reach()));
+    let mut evaluation = Box::new(HeldOut::<f32, N, B, PENDING>::new(recorder.reach()));
     let dropped = &solver.record().selection.dropped;
-    looked_at.begin(&values, &solver.unexpected(), &solver.row_noise(), dropped);
+    evaluation.begin(&values, &solver.unexpected(), &solver.row_noise(), dropped);
     let (mut predictions, mut continuity) = (Vec::new(), Continuity::default());
     let sources = feed(recorder, background, held_out, "validation", |file, time_s, progress| {
         if continuity.breaks(file, time_s) {
-            looked_at.break_off();
+            evaluation.break_off();
         }
-        looked_at.take(model, progress);
+        evaluation.take(model, progress);
         let rows = model.rows(&progress.instant);
         predictions.push(Prediction {
             file,
@@ -50,7 +50,7 @@ pub(super) fn judge<const N: usize, const B: usize>(
             }),
         });
     });
-    looked_at.break_off();
+    evaluation.break_off();
     let mut unused = recorder.finish();
     if let Some(load) = load {
         unused = unused.corrected(&[1.0; N], load);
@@ -63,8 +63,8 @@ pub(super) fn judge<const N: usize, const B: usize>(
     let verdict = solver.judge(
         model,
         &thresholds,
-        unused.iter().map(|record| Unused { record, residual: looked_at.residual() }),
-        &looked_at.alignment().misalignments(),
+        unused.iter().map(|record| Unused { record, residual: evaluation.residual() }),
+        &evaluation.alignment().misalignments(),
         &mut |piece| findings.push(FindingReport::new(piece, &["recording"])),
     );
     Judged { verdict, findings, unused, predictions, sources }

@@ -88,7 +88,7 @@ fn record<const N: usize, const B: usize>(
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
     let samples: Vec<Samples<N>> =
-        training.iter().map(|recording| Samples::of(recording, &anatomy, options, &screening)).collect();
+        training.iter().map(|recording| Samples::new(recording, &anatomy, options, &screening)).collect();
     feed(&mut recorder, background, &samples, "training", |_, _, _| {});
     let warnings = samples.iter().filter_map(Samples::warning).collect();
     Ok((settled(background, recorder.finish(), options).record().clone(), warnings))

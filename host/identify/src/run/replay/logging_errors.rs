@@ -72,7 +72,7 @@ fn motions<const N: usize>(
 ) -> (Vec<Motion<N>>, Vec<usize>) {
     let parts = |(file, whole): (usize, &Whole)| {
         let clean = if robust { cleaned::<N>(&whole.recording).0 } else { whole.recording.clone() };
-        let grid = Resampled::of(&clean);
+        let grid = Resampled::new(&clean);
         let chain = |values: [f64; N], of: fn(&AnatomicalJoint<f64>, f64) -> f64| {
             core::array::from_fn(|joint| of(&anatomy[joint], values[joint]))
         };
@@ -109,9 +109,9 @@ pub(super) fn encoders<const N: usize>(wholes: &[Whole], leg: &LegFile) -> Encod
     let steps_s = wholes.iter().map(|whole| whole.recording.median_step_s()).collect();
     let joints = core::array::from_fn(|joint| {
         let described_rad = leg.joints.get(joint)?.encoder.step_rad();
-        let found = wholes
-            .iter()
-            .filter_map(|whole| Encoder::of(&whole.recording.joints.get(joint)?.position_rad, described_rad));
+        let found = wholes.iter().filter_map(|whole| {
+            Encoder::detect(&whole.recording.joints.get(joint)?.position_rad, described_rad)
+        });
         found.max_by(|one, other| one.step_rad.total_cmp(&other.step_rad))
     });
     Encoders { joints, sample_s: quantile(steps_s, 0.5) }
@@ -162,7 +162,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
     pub(super) fn examine(&self, run: &mut RunReport) -> Result<Option<String>, ToolError> {
         let samples = self.screening.findings();
         let (question, file_of) = self.question();
-        let mut errors = LoggingErrors::of(&question)
+        let mut errors = LoggingErrors::fit(&question)
             .map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
         let mut report = errors.as_ref().map(LoggingErrors::report).unwrap_or_default();
         if let Some(errors) = &mut errors {

@@ -111,7 +111,7 @@ pub(super) fn parts(
     wholes.extend(held_out.iter().map(|file| whole(file, 0.0)));
     refuse_copies(&training, &held_out, "--validate")?;
     let all: Vec<&Recording> = training.iter().chain(&held_out).collect();
-    let screening = Screening::of(&all, leg, options.bandwidth_hz);
+    let screening = Screening::new(&all, leg, options.bandwidth_hz);
     if let Some(fraction) = options.split {
         let parts = training.iter().map(|whole| whole.split(fraction)).collect::<Result<Vec<_>, _>>()?;
         let (first, rest): (Vec<_>, Vec<_>) = parts.into_iter().unzip();

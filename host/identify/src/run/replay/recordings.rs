@@ -18,7 +18,7 @@ pub(super) fn leave_one_out<const N: usize, const B: usize>(
     file_of: &[usize],
 ) -> (usize, Option<[f64; B]>) {
     let weight = equations.training_weight();
-    let of_rows: Vec<usize> = equations.places.iter().map(|place| file_of[place.motion]).collect();
+    let of_rows: Vec<usize> = equations.sources.iter().map(|source| file_of[source.motion]).collect();
     let trains = |file: &usize| of_rows.iter().zip(&weight).any(|(own, weight)| own == file && *weight > 0.0);
     let files: Vec<usize> = (0..=file_of.iter().copied().max().unwrap_or(0)).filter(trains).collect();
     if files.len() < 2 {

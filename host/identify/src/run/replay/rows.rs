@@ -42,7 +42,7 @@ pub(super) struct Samples<const N: usize> {
 }
 
 impl<const N: usize> Samples<N> {
-    pub(super) fn of(
+    pub(super) fn new(
         recording: &Recording,
         anatomy: &[AnatomicalJoint<f64>; N],
         options: &ReplayOptions,
@@ -53,7 +53,7 @@ impl<const N: usize> Samples<N> {
             Estimator::Robust => (&clean, replaced),
             Estimator::Plain => (recording, [0; N]),
         };
-        let grid = Resampled::of(recording);
+        let grid = Resampled::new(recording);
         // Unit: samples of the grid, as in the recorder.
         let share = grid.len() as f64 / recording.time_s.len() as f64;
         let replaced = replaced.map(|count| (f64::from(count) * share).round() as u32);

@@ -22,7 +22,7 @@ pub(super) struct Screening {
 
 impl Screening {
     /// Examines whole recordings for rows with this bandwidth.
-    pub(super) fn of(recordings: &[&Recording], leg: &LegFile, bandwidth_hz: f64) -> Self {
+    pub(super) fn new(recordings: &[&Recording], leg: &LegFile, bandwidth_hz: f64) -> Self {
         let (mut findings, mut spans) = (Vec::new(), Vec::new());
         let described_rad: Vec<f64> = leg.joints.iter().map(|joint| joint.encoder.step_rad()).collect();
         let screened = samples::screen(recordings, &described_rad, REACH_PERIODS / bandwidth_hz);

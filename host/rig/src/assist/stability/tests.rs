@@ -10,7 +10,7 @@ use super::*;
 /// Exoskeleton without Coulomb friction, and a wearer whose tissue holds the limb off the end stops.
 fn bodies() -> (LegFile, WearerDescription) {
     let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-    let bodies = TwoBodies::of(&leg).expect("a worn leg");
+    let bodies = TwoBodies::from_leg(&leg).expect("a worn leg");
     let mut exoskeleton = bodies.exoskeleton.clone();
     for joint in &mut exoskeleton.joints {
         joint.truth.as_mut().expect("simulated").coulomb = 0.0;
@@ -78,7 +78,7 @@ impl Compensation {
         let description = exoskeleton.description::<2>().expect("simulated");
         let mut world = World::new(&description, 1);
         let posture = [0.4, 0.7];
-        world.place(&posture);
+        world.move_to(&posture);
         world.wear(wearer).expect("a hip and a knee");
         let exoskeleton = World::new(&description, 1);
         let weight = exoskeleton.inverse_dynamics(&posture, &[0.0; 2], &[0.0; 2]);

@@ -27,7 +27,7 @@ use crate::faults::bench::hosted::{Fork, context, forked_within};
 use crate::faults::catalogue::{self, ENCODER_CHECK, ENCODER_CHECK_MS, Fault, TICK_MS};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
-use crate::kept_file::memory::Memory;
+use crate::parameter_file::memory::Memory;
 
 /// Ticks of a run: three strokes of the motion.
 const PATIENCE: u64 = 12_000;
@@ -145,8 +145,8 @@ fn apart(one: f64, other: f64) -> f64 {
 
 fn contradicts(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     let joint = fork.random.below(JOINTS as u64) as usize;
-    let place = fork.random.below(2) as usize;
-    let channel = [Channel::RotorEncoder, Channel::JointEncoder][place];
+    let side = fork.random.below(2) as usize;
+    let channel = [Channel::RotorEncoder, Channel::JointEncoder][side];
     let offset = fork.random.sign() * fork.random.logarithmic(1.0, 0.5 * STEPS).round();
     let kind = match fork.random.below(6) {
         0 => Kind::Frozen,
@@ -164,7 +164,7 @@ fn contradicts(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
         Kind::FrozenCounter => inject(&mut fork, Channel::Counter, joint, Form::Stuck, u64::MAX),
     }
     // A frozen counter is compared at the rotor; a frozen reading is up to a check older than the fork.
-    let at = if kind == Kind::FrozenCounter { 0 } else { place };
+    let at = if kind == Kind::FrozenCounter { 0 } else { side };
     let slack = if kind == Kind::Frozen { [16.0 * COUNT, 20.0][at] } else { 0.0 };
     let (mut since, mut longest, mut most) = (None, 0, 0.0_f64);
     let (mut state, mut after_ms) = (None, None);

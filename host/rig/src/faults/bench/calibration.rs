@@ -135,10 +135,10 @@ fn loose(
     // Blind: the checks pass for every motor.
     let (_, found) = if blind { (at, sound) } else { measure(Some((at, &loose)))? };
     let is_right = found.zip(sound).is_some_and(|(found, sound)| is_like(&found, &sound));
-    let mut came = outcome(fault, seed, found.is_none().then_some("Refuse"));
-    came.period = at;
-    came.undetectable = is_right && !blind;
-    Ok(came)
+    let mut result = outcome(fault, seed, found.is_none().then_some("Refuse"));
+    result.period = at;
+    result.undetectable = is_right && !blind;
+    Ok(result)
 }
 
 /// Returns whether two calibrations agree within the tolerance of a running axis: 5 electrical degrees, 1 A

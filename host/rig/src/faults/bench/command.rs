@@ -30,7 +30,7 @@ pub(super) const BENCH: Bench = Bench { fault: &catalogue::J1_COMMANDED, run: co
 const WIDENED: Radian = Radian(2.0);
 
 fn command(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    let mut context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
+    let mut context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::with_seed(1))?;
     if blind {
         for joint in &mut context.configuration.joints {
             (joint.low, joint.high) = (joint.low - WIDENED, joint.high + WIDENED);
@@ -48,7 +48,7 @@ fn one(
     let mut random = Random::new(fault.id, seed);
     let mut world = World::<JOINTS>::new(&leg.description()?, seed);
     world.set_current_noise(&context.current_noise(leg));
-    world.place(&start_position(leg));
+    world.move_to(&start_position(leg));
     let unfit = |_| leg.error("the servo rejects its joint configuration");
     let mut servo = Servo::new(context.configuration.joints).map_err(unfit)?;
     let mut sample = world.sample();

@@ -13,7 +13,7 @@ use crate::faults::bench::Bench;
 use crate::faults::bench::hosted::{Fork, forked, started};
 use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::kept_file::memory::Memory;
+use crate::parameter_file::memory::Memory;
 use scarab::model::planar::JOINTS;
 
 /// Servo ticks until the bus voltage must be zero, of operated contacts, and of an opened switch.

@@ -67,7 +67,7 @@ fn judge(
     blind: bool,
 ) -> Result<Outcome, ToolError> {
     let estimator = if blind { Estimator::Plain } else { Estimator::Robust };
-    let options = SimulationOptions { perturbations, estimator, ..SimulationOptions::of_seed(seed) };
+    let options = SimulationOptions { perturbations, estimator, ..SimulationOptions::with_seed(seed) };
     let wrong = options.perturbations.as_slice();
     let (believed, simulated) = (perturb::believed(leg, wrong)?, perturb::simulated(leg, wrong)?);
     let mut context = Context::<JOINTS, BASE>::new(&believed, &options)?;

@@ -17,10 +17,10 @@ use crate::faults::catalogue::{Fault, TICK_MS};
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
 use crate::faulty_board::Rig;
-use crate::kept_file::memory::Memory;
 use crate::operator::begin;
 use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
+use crate::parameter_file::memory::Memory;
 use scarab::model::planar::BASE;
 use scarab::model::planar::JOINTS;
 
@@ -38,7 +38,7 @@ pub(super) fn board(leg: &LegFile) -> Result<Board<JOINTS, BASE>, ToolError> {
 
 /// Context of such a board.
 pub(super) fn context(leg: &LegFile) -> Result<Context<JOINTS, BASE>, ToolError> {
-    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
     Context::new(leg, &options)
 }
 

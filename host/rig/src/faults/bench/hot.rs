@@ -41,7 +41,7 @@ use crate::faults::catalogue::{self, Fault, THERMISTOR_MS};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
 use crate::faulty_board::PERIOD_MS;
-use crate::kept_file::memory::Memory;
+use crate::parameter_file::memory::Memory;
 
 /// Codes of a partial short, hotter than 120 degrees.
 const PARTIAL: [u16; 2] = [SHORTED + 1, 640];

@@ -11,7 +11,6 @@ mod disturbed;
 mod hosted;
 pub mod hostile;
 mod hot;
-pub mod kept;
 mod lost;
 pub mod offsets;
 mod outside;
@@ -22,6 +21,7 @@ mod silent;
 mod stall;
 mod start;
 mod stopped;
+pub mod stored_data;
 mod supply;
 
 use scarab::safety::FaultCode;
@@ -70,9 +70,9 @@ pub static BENCHES: [Bench; 28] = [
     hostile::BABBLE,
     random_sessions::BENCH,
     cut::BENCH,
-    kept::CUT,
-    kept::ROT,
-    kept::ARMED,
+    stored_data::CUT,
+    stored_data::CORRUPTION,
+    stored_data::ARMED,
 ];
 
 /// Outcome of a run: `state` if it was made safe, `None` otherwise.

@@ -115,8 +115,8 @@ fn shift(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec
 
 /// Blind: a count that stays at its end instead of wrapping.
 fn one(fault: &Fault, driven: &[Driven], seed: u64, blind: bool) -> Outcome {
-    let place = (seed - 1) % OFFSETS;
-    let begin = if place.is_multiple_of(2) { !(place / 2) as u16 } else { (place / 2) as u16 };
+    let number = (seed - 1) % OFFSETS;
+    let begin = if number.is_multiple_of(2) { !(number / 2) as u16 } else { (number / 2) as u16 };
     let same = driven.iter().all(|driven| {
         let first = driven.first.encoder_count;
         let moved = |count: u16| {

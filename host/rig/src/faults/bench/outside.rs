@@ -25,7 +25,7 @@ use crate::faults::bench::hosted::{Fork, context, forked_within};
 use crate::faults::catalogue::{self, Fault};
 use crate::faults::invariants::{MARGIN_RAD, Scope};
 use crate::faults::run::Outcome;
-use crate::kept_file::memory::Memory;
+use crate::parameter_file::memory::Memory;
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
 
@@ -116,7 +116,7 @@ fn is_refused(fork: &mut Fork<'_>) -> Result<bool, ToolError> {
 }
 
 fn begins(fork: &mut Fork<'_>) -> bool {
-    fork.host.follow_places();
+    fork.host.follow_positions();
     fork.host.speaks = Speaks { targets: true, ..NOTHING };
     fork.run(40);
     // A swinging leg is refused, so the request is repeated.

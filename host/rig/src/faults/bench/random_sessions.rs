@@ -77,7 +77,7 @@ impl HostedLeg for SimulatedLeg {
 }
 
 fn sessions(fault: &Fault, leg: &LegFile, seeds: &[u64], _: bool) -> Result<Vec<Outcome>, ToolError> {
-    let (legs, bounds) = (SimulatedLeg::both(leg)?, JointBounds::of(leg)?);
+    let (legs, bounds) = (SimulatedLeg::both(leg)?, JointBounds::from_leg(leg)?);
     let judged = |session: &HostSession| {
         let leg = legs[usize::from(session.by_hand)].clone();
         catch_unwind(AssertUnwindSafe(|| check_session(leg, bounds, session)))

@@ -52,7 +52,7 @@ fn is_searching(pair: &Pair<JOINTS, BASE>) -> bool {
 impl Searching {
     fn new(leg: &LegFile) -> Result<Self, ToolError> {
         let refused = |words: &str| ToolError::from(leg.error(words.to_owned()));
-        let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
+        let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::with_seed(1))?;
         let mut pair = Pair::new(leg, &context, 1)?;
         let gravity = context.gravity;
         if !pair.enable(gravity) {

@@ -32,7 +32,7 @@ pub(super) const ZEROS: Bench = Bench { fault: &catalogue::C1_AT_ENABLING, run: 
 
 /// A ready machine at rest, drive off.
 pub(super) fn ready(leg: &LegFile) -> Result<Rig<JOINTS, BASE>, ToolError> {
-    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
     let context = Context::<JOINTS, BASE>::new(leg, &options)?;
     Rig::new(leg, &context, 1)
 }
@@ -55,7 +55,7 @@ fn one(fault: &Fault, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, blind
     let offset = Form::Offset(random.sign() * size / AMPERE_PER_CODE);
     let injection = at(channel, joint, offset, Timing::from(0));
     rig.injector.add(injection);
-    let scope = Scope::of([injection].iter(), &[]);
+    let scope = Scope::new([injection].iter(), &[]);
     let mut invariants = Invariants::new(leg, scope, &rig);
     let (mut enabled, mut alarmed, mut switched) = (None, None, false);
     for period in 0..RELEASED + ENABLED {

@@ -144,8 +144,8 @@ fn calibrated(
         let sample = stand.period(&command, 0.0);
         let emergency_stop = pressed.is_some_and(|pressed| tick >= pressed) && !blind;
         let state = TickState { emergency_stop, gate_fault: false, complete: true, missed: 0 };
-        let (forbids, _) = watch.look(&state);
-        if Bridges::of(forbids) != Bridges::Follow {
+        let (forbids, _) = watch.check(&state);
+        if Bridges::from_causes(forbids) != Bridges::Follow {
             return Ok((tick + 1, true));
         }
         match calibrator.tick(&sample) {

@@ -30,7 +30,7 @@ use crate::faults::bench::hosted::{Fork, context, forked_within};
 use crate::faults::catalogue::{self, Fault};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
-use crate::kept_file::memory::Memory;
+use crate::parameter_file::memory::Memory;
 
 /// Servo ticks per second, and per millisecond.
 const SECOND: u64 = SERVO_RATE_HZ as u64;

@@ -92,7 +92,7 @@ mod tests {
 
     /// The default leg with its drive off, holding its pose, and during an identification's motion.
     fn machines(leg: &LegFile) -> [Rig<JOINTS, BASE>; 3] {
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
         let context = Context::<JOINTS, BASE>::new(leg, &options).expect("the default leg");
         let mut rig = Rig::new(leg, &context, 1).expect("complete drives");
         let advance = |rig: &mut Rig<JOINTS, BASE>| (0..PERIODS_PER_S / 2).for_each(|_| rig.advance());

@@ -68,7 +68,7 @@ const fn asks_for_a_step(mode: i8, index: u16) -> bool {
 
 /// The joint that a step means, or all.
 fn meant(joint: usize) -> impl Iterator<Item = usize> {
-    (0..JOINTS).filter(move |place| joint == JOINTS || *place == joint)
+    (0..JOINTS).filter(move |other| joint == JOINTS || *other == joint)
 }
 
 /// Limits of a joint.
@@ -85,8 +85,8 @@ impl JointBounds {
     ///
     /// # Errors
     /// The firmware cannot move this leg.
-    pub fn of(leg: &LegFile) -> Result<[Self; JOINTS], ToolError> {
-        let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
+    pub fn from_leg(leg: &LegFile) -> Result<[Self; JOINTS], ToolError> {
+        let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::with_seed(1))?;
         Ok(core::array::from_fn(|joint| Self {
             range: leg.joints[joint].range_deg.map(f64::to_radians),
             cap: context.configuration.joints[joint].limits().torque_cap().0.into(),
@@ -525,10 +525,10 @@ impl<L: HostedLeg> Play<L> {
 
     /// Commands a joint to a place so far from its present one.
     fn near(&mut self, joint: usize, by: i32) -> Result<(), String> {
-        let Some(place) = self.read(joint, 0x6064)? else { return Ok(()) };
+        let Some(position) = self.read(joint, 0x6064)? else { return Ok(()) };
         self.aim();
         self.expect(joint, 0x607A);
-        self.write(joint, (0x607A, 0, 4), place.wrapping_add(by))
+        self.write(joint, (0x607A, 0, 4), position.wrapping_add(by))
     }
 
     fn nmt(&mut self, command: u8, node: u8) -> Result<(), String> {
@@ -734,7 +734,7 @@ mod tests {
             ("words", |state| state.is_enabled = false),
         ];
         let leg = LegFile::load(DEFAULT_LEG).expect("a shipped leg");
-        let bounds = JointBounds::of(&leg).expect("a leg that can be moved");
+        let bounds = JointBounds::from_leg(&leg).expect("a leg that can be moved");
         for (kind, errs) in errs {
             let leg = FakeLeg { ticks: 0, travel: 0.0, moves: false, errs, answer: None };
             let steps = vec![Step::Wait(4900), Step::Wait(1000)];

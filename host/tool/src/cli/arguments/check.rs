@@ -34,15 +34,15 @@ struct Named {
     path: PathBuf,
     role: Role,
     /// Resolved path; equal for every spelling.
-    place: PathBuf,
+    resolved: PathBuf,
     /// Device and number of an existing file.
     number: Option<(u64, u64)>,
 }
 
 impl Named {
     fn new(argument: &str, path: &Path, role: Role) -> Self {
-        let (place, number) = (resolved(path), number(path));
-        Self { argument: argument.to_owned(), path: path.to_owned(), role, place, number }
+        let (resolved, number) = (resolved(path), number(path));
+        Self { argument: argument.to_owned(), path: path.to_owned(), role, resolved, number }
     }
 
     fn is_written(&self) -> bool {
@@ -50,14 +50,14 @@ impl Named {
     }
 
     fn is_same_file(&self, other: &Self) -> bool {
-        self.place == other.place || self.number.is_some() && self.number == other.number
+        self.resolved == other.resolved || self.number.is_some() && self.number == other.number
     }
 
     /// Whether the command may write this file into its folder under its own name.
     fn may_lie_in(&self, folder: &Self) -> bool {
-        let kind = self.place.extension().and_then(|extension| extension.to_str()).unwrap_or("");
+        let kind = self.resolved.extension().and_then(|extension| extension.to_str()).unwrap_or("");
         folder.role == Role::Folder
-            && self.place.parent() == Some(&folder.place)
+            && self.resolved.parent() == Some(&folder.resolved)
             && WRITTEN_INTO_FOLDERS.contains(&kind.to_ascii_lowercase().as_str())
     }
 
@@ -164,21 +164,21 @@ fn check_apart(files: &[Named]) -> Result<(), ToolError> {
 /// Checks that the file can be written, without leaving anything behind.
 fn check_writable(file: &Named, files: &[Named]) -> Result<(), ToolError> {
     let cannot = |reason: &str| file.refused(&format!("cannot be written: {reason}"));
-    let place = &file.place;
+    let resolved = &file.resolved;
     let is_folder = file.role == Role::Folder;
-    match place.metadata() {
+    match resolved.metadata() {
         Ok(found) if is_folder && !found.is_dir() => return Err(cannot("it is a file, not a folder")),
         Ok(found) if !is_folder && found.is_dir() => return Err(cannot("it is a folder")),
         Ok(found) if !is_folder && found.permissions().readonly() => {
             return Err(cannot("it is write-protected"));
         }
-        Ok(_) if !is_folder => can_write_over(place).map_err(|error| cannot(&error.to_string()))?,
+        Ok(_) if !is_folder => can_write_over(resolved).map_err(|error| cannot(&error.to_string()))?,
         _ => {}
     }
     // Folders that the command creates need not exist.
-    let mut folder = if is_folder { place.clone() } else { folder_of(place) };
-    let is_made =
-        is_folder || files.iter().any(|other| other.role == Role::Folder && folder.starts_with(&other.place));
+    let mut folder = if is_folder { resolved.clone() } else { folder_of(resolved) };
+    let is_made = is_folder
+        || files.iter().any(|other| other.role == Role::Folder && folder.starts_with(&other.resolved));
     while is_made && !folder.exists() && folder_of(&folder) != folder {
         folder = folder_of(&folder);
     }

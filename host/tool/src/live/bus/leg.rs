@@ -98,7 +98,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     pub fn new(
         leg: &'a LegFile,
         ids: [u8; N],
-        place: usize,
+        index: usize,
         model: Option<&ModelFile>,
         out: &'a dyn Fn(LiveUpdate),
     ) -> Result<Self, ToolError> {
@@ -114,7 +114,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             progress.use_named(&background, value, curves);
         }
         Ok(Self {
-            picture: Picture::new(leg, anatomy::<N>(leg)?, out).at(place),
+            picture: Picture::new(leg, anatomy::<N>(leg)?, out).at(index),
             progress,
             background,
             anatomy: anatomy::<N>(leg)?,
@@ -288,17 +288,17 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     fn report_parameters(&mut self) {
         let node = &self.nodes[0];
         let rank = self.background.model.base.rank();
-        let base = |place: usize| {
-            let sub = u8::try_from(place + 1).ok()?;
+        let base = |index: usize| {
+            let sub = u8::try_from(index + 1).ok()?;
             Some([node.real(BASE, sub)?, node.real(BASE_SIGMA, sub)?])
         };
         let Some(base) = (0..rank).map(base).collect::<Option<Vec<[f32; 2]>>>() else { return };
         if base != self.base {
             let mut estimate = Estimate::nothing();
-            for (place, [value, sigma]) in base.iter().enumerate() {
-                estimate.values[place] = *value;
-                estimate.covariance[place][place] = sigma * sigma;
-                estimate.determined[place] = true;
+            for (index, [value, sigma]) in base.iter().enumerate() {
+                estimate.values[index] = *value;
+                estimate.covariance[index][index] = sigma * sigma;
+                estimate.determined[index] = true;
             }
             self.progress.use_result(&self.background.device, &estimate.values);
             let reports = self.background.base_parameters(&[false; B], &estimate, None);
@@ -319,7 +319,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         if let Some((verdict, bits)) = verdict.filter(|_| verdict != self.verdict) {
             let reasons = Reason::ALL.into_iter().filter(|reason| bits >> *reason as u8 & 1 == 1);
             self.picture.send(LiveUpdate::Outcome(LiveOutcome {
-                leg: self.picture.place(),
+                leg: self.picture.leg_index(),
                 verdict: if verdict == 1 { "accepted" } else { "refused" }.into(),
                 validated: true,
                 reasons: reasons.map(|reason| reason.name().into()).collect(),
@@ -335,7 +335,9 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         let now_s = self.picture.time_s;
         let is_heard = |node: &Node| !bus.has_ended && node.heard_s().is_some_and(|at| now_s - at < SILENT_S);
         let states = self.nodes.each_ref().map(|node| {
-            node.raw(STATUSWORD, 0).filter(|_| is_heard(node)).and_then(|word| JointState::of(word as u16))
+            node.raw(STATUSWORD, 0)
+                .filter(|_| is_heard(node))
+                .and_then(|word| JointState::from_statusword(word as u16))
         });
         let is_same = states.iter().all(|state| *state == states[0]);
         let name = |state: Option<JointState>| state.map_or("unknown", JointState::name);
@@ -374,7 +376,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             self.nodes[*joint].raw(STATUSWORD, 0).is_some_and(|word| word & INTERNAL_LIMIT != 0)
         });
         LiveStatus {
-            leg: self.picture.place(),
+            leg: self.picture.leg_index(),
             time_s: self.picture.time_s,
             run: 1,
             drive,

@@ -40,7 +40,7 @@ pub enum NmtState {
 }
 
 impl NmtState {
-    const fn of(byte: u8) -> Option<Self> {
+    const fn from_byte(byte: u8) -> Option<Self> {
         match byte & 0x7F {
             0 => Some(Self::BootUp),
             4 => Some(Self::Stopped),
@@ -212,7 +212,7 @@ impl Node {
     }
 
     fn heartbeat(&mut self, frame: &Frame) -> Option<Event> {
-        let state = NmtState::of(*frame.data().first()?)?;
+        let state = NmtState::from_byte(*frame.data().first()?)?;
         if state == NmtState::BootUp {
             self.values.retain(|(index, _), _| !COMMUNICATION.contains(index));
             self.unmapped.clear();

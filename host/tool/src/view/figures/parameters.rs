@@ -79,8 +79,8 @@ fn dots(
         let end = (largest + 0.3).min(20.0);
         let mut chart = frame(area, margins).build_cartesian_2d(-end..end, 0.0..rows)?;
         sigma_axis(&mut chart, rows)?;
-        let place = |base: &BaseReport| error(base).map(|error| error.clamp(-end, end));
-        rows_of(area, &mut chart, bases, margins, &place, values)
+        let position = |base: &BaseReport| error(base).map(|error| error.clamp(-end, end));
+        rows_of(area, &mut chart, bases, margins, &position, values)
     } else {
         let mut chart =
             frame(area, margins).build_cartesian_2d((PERCENT.0..PERCENT.1).log_scale(), 0.0..rows)?;
@@ -90,8 +90,9 @@ fn dots(
         mesh(&mut chart, "sigma, % of the value (bands: below 5 % and below 100 %)", &|value| {
             format!("{value}")
         })?;
-        let place = |base: &BaseReport| uncertainty(base).map(|percent| percent.clamp(PERCENT.0, PERCENT.1));
-        rows_of(area, &mut chart, bases, margins, &place, values)
+        let position =
+            |base: &BaseReport| uncertainty(base).map(|percent| percent.clamp(PERCENT.0, PERCENT.1));
+        rows_of(area, &mut chart, bases, margins, &position, values)
     }
 }
 
@@ -143,13 +144,13 @@ fn rows_of<X: Ranged<ValueType = f64>>(
     chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, RangedCoordf64>>,
     bases: &[BaseReport],
     margins: (i32, i32),
-    place: &dyn Fn(&BaseReport) -> Option<f64>,
+    position: &dyn Fn(&BaseReport) -> Option<f64>,
     values: &dyn Fn(&BaseReport) -> String,
 ) -> Result<(), DrawingError> {
     let rows = bases.len().max(1) as f64;
     for (row, base) in bases.iter().enumerate() {
         let middle = rows - row as f64 - 0.5;
-        let at = place(base);
+        let at = position(base);
         let (_, y) = chart.backend_coord(&(at.unwrap_or(1.0), middle));
         if let Some(at) = at {
             chart.draw_series([Circle::new((at, middle), px(4), DARK.filled())])?;

@@ -59,8 +59,8 @@ fn density(residuals: &[Vec<Option<f64>>], sigma: f64) -> Vec<f64> {
     let bars = (2.0 * WIDEST / BAR) as usize;
     let mut counts = vec![0_u32; bars];
     for residual in residuals.iter().flatten().flatten() {
-        let place = ((residual / sigma + WIDEST) / BAR).floor().clamp(0.0, (bars - 1) as f64);
-        counts[place as usize] += 1;
+        let bar = ((residual / sigma + WIDEST) / BAR).floor().clamp(0.0, (bars - 1) as f64);
+        counts[bar as usize] += 1;
     }
     let all = counts.iter().sum::<u32>().max(1);
     counts.into_iter().map(|count| f64::from(count) / f64::from(all) / BAR).collect()

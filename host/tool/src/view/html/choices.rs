@@ -11,7 +11,7 @@ use crate::view::html::{exact, joint_name, measured, number, sigma, signed};
 
 /// Terms of each joint's model, with identified Stribeck and directional friction.
 pub fn model(run: &RunReport, leg: &LegFile) -> Markup {
-    let mut terms = Table::of_class("choices")
+    let mut terms = Table::with_class("choices")
         .text(["joint", "term", "leg file", "used"])
         .numbers(["explains, chi-square units", "limit"])
         .text(["why"])
@@ -74,7 +74,7 @@ pub fn outliers(run: &RunReport, leg: &LegFile) -> Markup {
     let percent = |share: Option<&Number>| {
         number(Number(share.and_then(|share| share.known()).map(|share| 100.0 * share)))
     };
-    let mut table = Table::of_class("outliers").text(["joint"]).numbers([
+    let mut table = Table::with_class("outliers").text(["joint"]).numbers([
         "samples replaced",
         "rows disturbed, %",
         "longest stretch, s",

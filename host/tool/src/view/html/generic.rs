@@ -101,7 +101,7 @@ pub fn content(value: &Value, depth: usize) -> Markup {
     match value {
         Value::Array(items) if depth < DEEPEST && items.iter().any(Value::is_object) => rows(items, depth),
         Value::Object(keys) if depth < DEEPEST => {
-            let mut table = Table::of_class("any").label("").text([""]);
+            let mut table = Table::with_class("any").label("").text([""]);
             keys.iter()
                 .for_each(|(key, value)| table.row(cells![words(key), html_cell(content(value, depth + 1))]));
             table.to_html()
@@ -132,7 +132,7 @@ fn rows(items: &[Value], depth: usize) -> Markup {
     }
     let is_number =
         |column: &str| items.iter().all(|item| item.get(column).is_none_or(|v| v.is_number() || v.is_null()));
-    let mut table = columns.iter().fold(Table::of_class("any"), |table, column| match is_number(column) {
+    let mut table = columns.iter().fold(Table::with_class("any"), |table, column| match is_number(column) {
         true => table.numbers([words(column)]),
         false => table.text([words(column)]),
     });

@@ -94,7 +94,7 @@ pub fn numbers(run: &RunReport, leg: &LegFile) -> Markup {
         known.max_by(|one, other| one.0.total_cmp(&other.0))
     };
     let percent = |found: Option<(f64, String)>| match found {
-        Some((value, place)) => (format!("{} %", number(value.into())), place),
+        Some((value, note)) => (format!("{} %", number(value.into())), note),
         None => ("\u{2013}".into(), "no motion was held out".into()),
     };
     let measured = percent(worst(&|fit| fit.percent_of_mean_abs.known()));
@@ -108,8 +108,8 @@ pub fn numbers(run: &RunReport, leg: &LegFile) -> Markup {
     let mut cards =
         vec![("worst torque error on unused motions, of mean absolute torque", measured.0, measured.1)];
     if noise_free.is_some() {
-        let (value, place) = percent(noise_free);
-        cards.push(("the same against the noise-free torque", value, place));
+        let (value, note) = percent(noise_free);
+        cards.push(("the same against the noise-free torque", value, note));
     }
     cards.push((
         "combinations of parameters that the data determine",
@@ -119,8 +119,8 @@ pub fn numbers(run: &RunReport, leg: &LegFile) -> Markup {
     if let Some((sigmas, name)) = farthest {
         cards.push(("largest error of a base parameter", format!("{} sigma", signed(sigmas)), name));
     }
-    html! { dl.cards { @for (what, value, place) in cards {
-        div { dt { (what) } dd { span.value { (value) } span.place { (place) } } }
+    html! { dl.cards { @for (what, value, note) in cards {
+        div { dt { (what) } dd { span.value { (value) } span.place { (note) } } }
     } } }
 }
 

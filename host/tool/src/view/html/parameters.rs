@@ -76,14 +76,14 @@ pub fn bar(parameter: &ParameterReport) -> Markup {
     let half = half_range(parameter, value);
     let (width, height) = BAR;
     let (middle, margin) = (height / 2.0, 7.0);
-    let place = |x: f64| {
+    let to_x = |x: f64| {
         let share = ((x - value) / half).clamp(-1.0, 1.0);
         width / 2.0 + share * (width / 2.0 - margin)
     };
     let whisker = |sigmas: f64, thickness: f64| {
         let reach = parameter.sigma.known().map(|sigma| sigmas * sigma);
         html! { @if let Some(reach) = reach {
-            line.sigma x1=(short(place(value - reach))) x2=(short(place(value + reach))) y1=(middle) y2=(middle)
+            line.sigma x1=(short(to_x(value - reach))) x2=(short(to_x(value + reach))) y1=(middle) y2=(middle)
                 stroke-width=(thickness) {}
         } }
     };
@@ -99,12 +99,12 @@ pub fn bar(parameter: &ParameterReport) -> Markup {
             (whisker(3.0, 1.5))
             (whisker(1.0, 6.0))
             @if let Some(prior) = parameter.prior.known() {
-                path.prior d={ "M" (short(place(prior))) " " (middle + 1.0) "l3.5 6h-7z" } {}
+                path.prior d={ "M" (short(to_x(prior))) " " (middle + 1.0) "l3.5 6h-7z" } {}
             }
             @if let Some(truth) = parameter.truth.known() {
-                path.truth d={ "M" (short(place(truth))) " " (middle - 8.0) "l3 4l-3 4l-3 -4z" } {}
+                path.truth d={ "M" (short(to_x(truth))) " " (middle - 8.0) "l3 4l-3 4l-3 -4z" } {}
             }
-            circle.value.open[parameter.sigma.known().is_none()] cx=(short(place(value))) cy=(middle) r="2.6" {}
+            circle.value.open[parameter.sigma.known().is_none()] cx=(short(to_x(value))) cy=(middle) r="2.6" {}
         }
     }
 }

@@ -99,7 +99,7 @@ const SEEDS_SHOWN: usize = 20;
 
 fn parameters(spreads: &[Spread]) -> Markup {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-    let mut table = Table::of_class("spread").label("name").numbers(["truth", "sigma"]).unit().numbers([
+    let mut table = Table::with_class("spread").label("name").numbers(["truth", "sigma"]).unit().numbers([
         "mean",
         "spread",
         "within 1",

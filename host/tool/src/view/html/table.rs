@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn numbers_units_and_marked_rows_are_typeset_and_text_is_escaped() {
-        let mut table = Table::of_class("c")
+        let mut table = Table::with_class("c")
             .label("name")
             .numbers(["value"])
             .numbers_if(false, ["hidden"])

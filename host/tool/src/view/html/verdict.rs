@@ -155,7 +155,7 @@ pub fn tests(findings: &[FindingReport], leg: &LegFile) -> Markup {
         }
     }
     kinds.sort_by_key(|(reason, _)| findings.iter().position(|finding| finding.reason == *reason));
-    let mut table = Table::of_class("tests")
+    let mut table = Table::with_class("tests")
         .text(["against", "what is tested"])
         .styled("what")
         .numbers(["value", "limit"])
@@ -196,7 +196,7 @@ fn add_row(table: &mut Table, findings: &[FindingReport], (reason, test): (&str,
             words,
             value,
             limit,
-            place(nearest, leg),
+            location(nearest, leg),
             format!("{passed} of {all}")
         ],
     );
@@ -213,7 +213,7 @@ fn whole(value: Number) -> String {
     }
 }
 
-fn place(finding: &FindingReport, leg: &LegFile) -> String {
+fn location(finding: &FindingReport, leg: &LegFile) -> String {
     let joint = finding.joint.map(|joint| joint_name(leg, joint));
     let parts: Vec<String> = joint.into_iter().chain(finding.motion.clone()).collect();
     parts.join(", ")

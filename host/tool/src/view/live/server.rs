@@ -75,10 +75,10 @@ struct Guest {
     has_asked: Arc<AtomicBool>,
 }
 
-/// Counted place of a page; freed when dropped.
-struct Place(Arc<AtomicUsize>);
+/// Counted slot of a page; freed when dropped.
+struct PageSlot(Arc<AtomicUsize>);
 
-impl Place {
+impl PageSlot {
     fn take(count: &Arc<AtomicUsize>) -> Option<Self> {
         let add = |taken: usize| (taken < MOST_PAGES).then_some(taken + 1);
         count.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add).ok()?;
@@ -86,7 +86,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for PageSlot {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
@@ -194,13 +194,13 @@ fn respond(shared: &Shared, request: &Request<Incoming>, polled: &Arc<AtomicU64>
         Answer::File(kind, text) => response(StatusCode::OK, kind, Content::Text(Some(text))),
         Answer::Refused(status, why) => refusal(status, why),
         Answer::Events(cursor) => {
-            let Some(place) = Place::take(&shared.pages) else {
+            let Some(slot) = PageSlot::take(&shared.pages) else {
                 return refusal(
                     StatusCode::SERVICE_UNAVAILABLE,
                     "all 16 places for pages are taken: close another page, this one will try again",
                 );
             };
-            let events = Events::new(shared, cursor, Arc::clone(polled), place);
+            let events = Events::new(shared, cursor, Arc::clone(polled), slot);
             response(StatusCode::OK, "text/event-stream", Content::Events(Box::new(events)))
         }
     }
@@ -265,15 +265,15 @@ struct Events {
     /// Milliseconds from `begin` to the last poll.
     polled: Arc<AtomicU64>,
     begin: Instant,
-    _place: Place,
+    _slot: PageSlot,
 }
 
 impl Events {
-    fn new(shared: &Shared, cursor: Cursor, polled: Arc<AtomicU64>, place: Place) -> Self {
+    fn new(shared: &Shared, cursor: Cursor, polled: Arc<AtomicU64>, slot: PageSlot) -> Self {
         let mut interval = interval(PERIOD);
         interval.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (hub, begin) = (Arc::clone(&shared.hub), shared.begin);
-        Self { hub, cursor, interval, last: None, polled, begin, _place: place }
+        Self { hub, cursor, interval, last: None, polled, begin, _slot: slot }
     }
 
     /// Next message, or a comment after a silence.

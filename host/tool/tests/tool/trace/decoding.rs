@@ -102,9 +102,9 @@ fn value(hint: &str, text: &str, out: &mut Vec<u8>) {
 fn frame(line: &str) -> Vec<u8> {
     let read = Line::parse(line).expect(line);
     let own = |format: &str| format.split(' ').next() == Some(read.kind());
-    let place = Record::<2>::FORMATS.iter().position(|format| own(format)).expect("a kind");
-    let mut bytes = (FIRST + place as u16).to_le_bytes().to_vec();
-    for pair in Record::<2>::FORMATS[place].split(' ').skip(1) {
+    let index = Record::<2>::FORMATS.iter().position(|format| own(format)).expect("a kind");
+    let mut bytes = (FIRST + index as u16).to_le_bytes().to_vec();
+    for pair in Record::<2>::FORMATS[index].split(' ').skip(1) {
         let (key, hint) = pair.split_once('=').expect("key=value");
         value(hint.trim_matches(['{', '}']), read.text(key).expect(key), &mut bytes);
     }
@@ -169,7 +169,7 @@ fn decoding_resumes_at_the_next_frame_after_lost_bytes() {
     let whole = stream(&lines);
     // Rest of a frame, noise, then everything.
     let mut late = frame(&lines[2])[9..].to_vec();
-    late.extend((0..300_u32).map(|place| (place * 37 % 251) as u8));
+    late.extend((0..300_u32).map(|offset| (offset * 37 % 251) as u8));
     late.push(0);
     let first = late.len() as u64;
     late.extend(&whole);
@@ -181,12 +181,12 @@ fn decoding_resumes_at_the_next_frame_after_lost_bytes() {
 
     let shortest = lines.iter().map(|line| frame(line).len()).min().expect("frames");
     // Truncated, lost or inverted bytes at any position: no panic, and the rest is read.
-    for place in (0..whole.len()).step_by(whole.len() / 200) {
-        let (cut, mut decoder) = decoded(&whole[..place], 64);
+    for offset in (0..whole.len()).step_by(whole.len() / 200) {
+        let (cut, mut decoder) = decoded(&whole[..offset], 64);
         assert!(cut.len() <= lines.len());
         let lost = decoder.finish();
-        assert!(lost.frames == 0 && (lost.cut_bytes > 0 || whole[..place].ends_with(&[0]) || place == 0));
-        let hole = [&whole[..place], &whole[(place + 90).min(whole.len())..]].concat();
+        assert!(lost.frames == 0 && (lost.cut_bytes > 0 || whole[..offset].ends_with(&[0]) || offset == 0));
+        let hole = [&whole[..offset], &whole[(offset + 90).min(whole.len())..]].concat();
         let left = decoded(&hole, 64).0.len();
         assert!(
             left + 90 / shortest + 2 >= lines.len(),
@@ -194,7 +194,7 @@ fn decoding_resumes_at_the_next_frame_after_lost_bytes() {
             lines.len()
         );
         let mut turned = whole.clone();
-        turned[place] ^= 0x55;
+        turned[offset] ^= 0x55;
         assert!(decoded(&turned, 64).0.len() + 3 >= lines.len());
     }
     // Without the end of a frame memory stays bounded, and the next frame is found.

@@ -107,7 +107,7 @@ impl RecordWriter {
 
 /// Identifies the leg `simulated`, assumed to be the default one, and returns all records.
 fn told_by(simulated: &LegFile, seed: u64) -> Vec<String> {
-    let context = Context::new(&default_leg(), &SimulationOptions::of_seed(seed))
+    let context = Context::new(&default_leg(), &SimulationOptions::with_seed(seed))
         .expect("the default leg is simulated");
     let mut pair = Pair::new(simulated, &context, seed).expect("the firmware accepts the default leg");
     let mut writer = RecordWriter::default();

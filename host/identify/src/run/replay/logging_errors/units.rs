@@ -123,7 +123,7 @@ pub(super) fn current<const N: usize, const B: usize>(
 /// Unit of a current that the stated torque constants explain: with them all ratios are near 1, and one is
 /// nearer than as a torque in N m or mN m.
 fn explained_unit(scales: &[Scale], constants: &[f64]) -> Option<Unit> {
-    Unit::of(Quantity::Current).find(|unit| {
+    Unit::for_quantity(Quantity::Current).find(|unit| {
         let ratios =
             scales.iter().zip(constants).map(|(scale, constant)| scale.ratio * unit.factor() * constant);
         let after: Vec<f64> = ratios.map(|ratio| ratio.ln().abs()).collect();
@@ -131,13 +131,14 @@ fn explained_unit(scales: &[Scale], constants: &[f64]) -> Option<Unit> {
             let before = scales.iter().map(|scale| (scale.ratio * torque.factor()).ln().abs());
             before.zip(&after).any(|(before, after)| before > after + NEARER.ln())
         };
-        after.iter().all(|after| *after < PRIOR_ERROR.ln()) && Unit::of(Quantity::Torque).all(is_no_torque)
+        after.iter().all(|after| *after < PRIOR_ERROR.ln())
+            && Unit::for_quantity(Quantity::Torque).all(is_no_torque)
     })
 }
 
 /// Unit of a current with unknown torque constants, by the size of the ratios.
 fn fitting_unit(scales: &[Scale]) -> Option<Unit> {
-    Unit::of(Quantity::Current).find(|unit| {
+    Unit::for_quantity(Quantity::Current).find(|unit| {
         let mut ratios = scales.iter().map(|scale| scale.ratio * unit.factor());
         if unit.factor() == 1.0 {
             return ratios.all(|ratio| ratio < CURRENT_RATIO);
@@ -159,8 +160,9 @@ struct Scale {
 fn scales<const N: usize, const B: usize>(equations: &Equations<N, B>, prior: &[f64; B]) -> [Scale; N] {
     core::array::from_fn(|joint| {
         let (mut along, mut measured, mut expected) = (0.0, 0.0, 0.0);
-        for ((place, torque), row) in equations.places.iter().zip(&equations.torque).zip(&equations.columns) {
-            if place.joint == joint {
+        for ((source, torque), row) in equations.sources.iter().zip(&equations.torque).zip(&equations.columns)
+        {
+            if source.joint == joint {
                 let guess: f64 = row.iter().zip(prior).map(|(element, value)| element * value).sum();
                 along += guess * torque;
                 measured += torque * torque;

@@ -75,7 +75,7 @@ impl Memory {
 
     /// Stores any model under its key.
     pub fn keep_any<const N: usize>(&mut self, state: DriveState, kept: &ModelRecord<N>) -> bool {
-        let Some(permit) = Permit::of(state) else { return false };
+        let Some(permit) = Permit::from_state(state) else { return false };
         self.with(|store| block_on(store.save(&permit, kept.key(), kept))).is_some_and(|saved| saved.is_ok())
     }
 
@@ -104,7 +104,7 @@ impl Memory {
 
     /// Stores the objects of a node; returns whether this succeeded.
     pub fn keep_objects(&mut self, state: DriveState, joint: usize, bytes: &[u8]) -> bool {
-        let (Some(permit), Some(key)) = (Permit::of(state), KEYS.get(joint)) else { return false };
+        let (Some(permit), Some(key)) = (Permit::from_state(state), KEYS.get(joint)) else { return false };
         self.with(|store| block_on(store.save_bytes(&permit, *key, bytes))).is_some_and(|saved| saved.is_ok())
     }
 
@@ -127,7 +127,7 @@ impl Memory {
 
     /// Erases everything; returns whether this succeeded.
     pub fn forget(&mut self, state: DriveState) -> bool {
-        let Some(permit) = Permit::of(state) else { return false };
+        let Some(permit) = Permit::from_state(state) else { return false };
         self.with(|store| block_on(store.forget_all(&permit))).is_some_and(|forgotten| forgotten.is_ok())
     }
 }

@@ -11,7 +11,7 @@ use scarab::bus::{Abort, Identity, LONGEST, Node, NodeId, stored_entries, stored
 use scarab::units::{Ampere, NewtonMetre};
 use scarab_identify::formats::leg_file::POSITION_BANDWIDTH;
 
-use crate::kept_file::{Joint, ObjectValue};
+use crate::parameter_file::{Joint, ObjectValue};
 
 const LEAST: Object = Object::at(0x607D, 1);
 const MOST: Object = Object::at(0x607D, 2);

@@ -8,7 +8,7 @@ use scarab::leg::{Assured, Wearing};
 use scarab_identify::formats::leg_file::geometry::fingerprint;
 use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_rig::bus::serve::{ServeOptions, network};
-use scarab_rig::kept_file::memory::{BYTES, Memory};
+use scarab_rig::parameter_file::memory::{BYTES, Memory};
 
 use crate::command::{Folder, Run, scarab};
 
@@ -217,7 +217,7 @@ fn damaged_parts_are_reported_and_the_rest_is_exported() {
 
     // Unrelated data: nothing is read, and nothing is overwritten.
     let noise: Vec<u8> =
-        (0..BYTES as u32).map(|place| (place.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        (0..BYTES as u32).map(|index| (index.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     fs::write(&flash, &noise).expect("a temporary file");
     let run = export(&flash).ends_with(3);
     assert_eq!((content(&run.printed), run.errors.matches("damaged: ").count()), ("schema = 1\n", 1));

@@ -6,9 +6,9 @@ use scarab::store::{
     CalibrationRecord, Key, LoadError, ModelRecord, Permit, RecordError, SaveError, Saved, Storable, Store,
 };
 
-use crate::kept_file::memory::{Cells, Memory};
-use crate::kept_file::{
-    AxisCalibration, Joint, KEPT_SCHEMA, KeptFile, ModelPart, NodeObjects, objects, of_node,
+use crate::parameter_file::memory::{Cells, Memory};
+use crate::parameter_file::{
+    AxisCalibration, Joint, ModelPart, NodeObjects, PARAMETER_SCHEMA, ParameterFile, objects, of_node,
 };
 
 const OBJECTS: [(Joint, Key); 2] = [(Joint::Hip, Key::Objects1), (Joint::Knee, Key::Objects2)];
@@ -21,7 +21,7 @@ const LONGEST: usize = 402;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlashContents {
     /// All readable and valid data.
-    pub file: KeptFile,
+    pub file: ParameterFile,
     /// Parts that were never stored, or have been erased.
     pub absent: Vec<String>,
     /// Rejected parts, and why.
@@ -57,7 +57,7 @@ fn load<R: Storable>(memory: &mut Memory, key: Key) -> Result<Option<R>, LoadErr
 }
 
 fn model<const N: usize>(memory: &mut Memory, key: Key) -> Result<Option<ModelPart>, LoadError> {
-    Ok(load::<ModelRecord<N>>(memory, key)?.map(|kept| ModelPart::of_kept(&kept)))
+    Ok(load::<ModelRecord<N>>(memory, key)?.map(|kept| ModelPart::from_record(&kept)))
 }
 
 /// Model with as many joints as the length of its record.
@@ -84,8 +84,8 @@ fn node(memory: &mut Memory, joint: Joint, key: Key) -> Result<Option<NodeObject
 fn calibration(memory: &mut Memory, joint: Joint, key: Key) -> Result<Option<AxisCalibration>, String> {
     let kept = load::<CalibrationRecord>(memory, key).map_err(load_words)?;
     kept.map(|kept| {
-        let part = AxisCalibration::of_kept(joint, &kept);
-        part.to_kept().map(|_| part)
+        let part = AxisCalibration::from_record(joint, &kept);
+        part.to_record().map(|_| part)
     })
     .transpose()
 }
@@ -119,13 +119,13 @@ fn foreign(memory: &Memory) -> Option<String> {
     (!readable).then(|| "the flash is not empty, but no record in it can be read".into())
 }
 
-impl KeptFile {
+impl ParameterFile {
     /// Contents of a board's flash. Each part is read from a copy, so repairs by the store neither hide
     /// another part nor are written.
     #[must_use]
-    pub fn of_flash(memory: &Memory) -> FlashContents {
+    pub fn from_flash(memory: &Memory) -> FlashContents {
         let mut found = FlashContents {
-            file: Self { schema: KEPT_SCHEMA, ..Self::default() },
+            file: Self { schema: PARAMETER_SCHEMA, ..Self::default() },
             ..FlashContents::default()
         };
         for (joint, key) in OBJECTS {
@@ -157,7 +157,7 @@ impl KeptFile {
         if let Some(why) = foreign(memory) {
             return Err(format!("{why}: nothing was written"));
         }
-        let permit = Permit::of(DriveState::SwitchOnDisabled).ok_or("a drive that is off")?;
+        let permit = Permit::from_state(DriveState::SwitchOnDisabled).ok_or("a drive that is off")?;
         for (joint, key) in CALIBRATIONS {
             let given = |joint| self.calibration.iter().any(|axis| axis.joint == joint);
             let other_is_older =
@@ -178,7 +178,7 @@ impl KeptFile {
         }
         for (joint, key) in CALIBRATIONS {
             for part in self.calibration.iter().filter(|axis| axis.joint == joint) {
-                let kept = part.to_kept()?;
+                let kept = part.to_record()?;
                 let what = format!("calibration of the {}", joint.name());
                 saved(memory.with(|store| block_on(store.save(&permit, key, &kept))), &what)?;
             }
@@ -186,9 +186,9 @@ impl KeptFile {
         for ((what, _), model) in MODELS.into_iter().zip([&self.model, &self.worn_model]) {
             let Some(model) = model else { continue };
             match model.joint.len() {
-                1 => keep_model(memory, &permit, &model.to_kept::<1>()?, what)?,
-                3 => keep_model(memory, &permit, &model.to_kept::<3>()?, what)?,
-                _ => keep_model(memory, &permit, &model.to_kept::<2>()?, what)?,
+                1 => keep_model(memory, &permit, &model.to_record::<1>()?, what)?,
+                3 => keep_model(memory, &permit, &model.to_record::<3>()?, what)?,
+                _ => keep_model(memory, &permit, &model.to_record::<2>()?, what)?,
             }
         }
         Ok(())

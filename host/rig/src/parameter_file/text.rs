@@ -3,10 +3,10 @@
 use scarab_base::toml_file::quoted;
 use std::fmt::Display;
 
-use crate::kept_file::objects::{is_pattern, is_wide};
-use crate::kept_file::{
-    AxisCalibration, ConstantPart, Counter, FrictionBound, JointZeroPart, KeptFile, ModelJoint, ModelPart,
-    NodeObjects, ObjectValue,
+use crate::parameter_file::objects::{is_pattern, is_wide};
+use crate::parameter_file::{
+    AxisCalibration, ConstantPart, Counter, FrictionBound, JointZeroPart, ModelJoint, ModelPart, NodeObjects,
+    ObjectValue, ParameterFile,
 };
 
 const HEAD: &str = "\
@@ -14,8 +14,8 @@ const HEAD: &str = "\
 # the motor, a model against the leg's fingerprint, whatever stands here.
 ";
 
-impl KeptFile {
-    /// TOML text that [`KeptFile::parse`] reads back unchanged.
+impl ParameterFile {
+    /// TOML text that [`ParameterFile::parse`] reads back unchanged.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut out = String::from(HEAD);

@@ -8,7 +8,7 @@
 
 use core::mem::MaybeUninit;
 
-/// `fill!(slot, { field: value, ... }, { field: |place| fill(place), ... })` in an `impl` of the struct.
+/// `fill!(slot, { field: value, ... }, { field: |slot| fill(slot), ... })` in an `impl` of the struct.
 /// Writes each of the first fields, builds each of the second in place, and returns the struct.
 macro_rules! fill {
     ($slot:expr, { $($field:ident: $value:expr),* $(,)? }, { $($inner:ident: $build:expr),* $(,)? }) => {{
@@ -19,20 +19,20 @@ macro_rules! fill {
         let slot: &mut core::mem::MaybeUninit<Self> = $slot;
         let whole = slot.as_mut_ptr();
         $(
-            #[expect(unsafe_code, reason = "see `place`")]
+            #[expect(unsafe_code, reason = "see `in_place`")]
             // SAFETY: `whole` points to memory for a `Self` with no other reference
             // to it, so to that of its field.
             unsafe {
-                $crate::place::write(&raw mut (*whole).$field, || $value);
+                $crate::in_place::write(&raw mut (*whole).$field, || $value);
             }
         )*
         $(
-            #[expect(unsafe_code, reason = "see `place`")]
+            #[expect(unsafe_code, reason = "see `in_place`")]
             // SAFETY: as above; a `MaybeUninit` may be uninitialised.
-            let inner = unsafe { &mut *$crate::place::slot(&raw mut (*whole).$inner) };
-            $crate::place::build(inner, $build);
+            let inner = unsafe { &mut *$crate::in_place::slot(&raw mut (*whole).$inner) };
+            $crate::in_place::build(inner, $build);
         )*
-        #[expect(unsafe_code, reason = "see `place`")]
+        #[expect(unsafe_code, reason = "see `in_place`")]
         // SAFETY: every field was written above: the destructuring names each, the fields handed out were
         // returned filled.
         unsafe {
@@ -46,7 +46,7 @@ pub(crate) use fill;
 ///
 /// # Safety
 /// `field` points to memory for the value, with no other reference to it.
-#[expect(unsafe_code, reason = "see `place`")]
+#[expect(unsafe_code, reason = "see `in_place`")]
 #[inline(always)]
 pub unsafe fn write<T>(field: *mut T, make: impl FnOnce() -> T) {
     /// Largest value written inline, bytes. A size-optimising compiler gives every value of an unsplit
@@ -56,7 +56,7 @@ pub unsafe fn write<T>(field: *mut T, make: impl FnOnce() -> T) {
     unsafe { if const { size_of::<T>() > SMALL } { write_apart(field, make) } else { field.write(make()) } }
 }
 
-#[expect(unsafe_code, reason = "see `place`")]
+#[expect(unsafe_code, reason = "see `in_place`")]
 #[inline(never)]
 unsafe fn write_apart<T>(field: *mut T, make: impl FnOnce() -> T) {
     // SAFETY: the caller's contract is that of `write`.
@@ -70,13 +70,13 @@ pub const fn slot<T>(field: *mut T) -> *mut MaybeUninit<T> {
 
 /// Builds a value in place; panics if the builder returns another address.
 pub fn build<'a, T>(slot: &'a mut MaybeUninit<T>, build: impl FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) {
-    let place = slot.as_mut_ptr();
+    let address = slot.as_mut_ptr();
     let built: *mut T = build(slot);
-    assert!(core::ptr::eq(place, built), "what was built lies elsewhere");
+    assert!(core::ptr::eq(address, built), "what was built lies elsewhere");
 }
 
 /// Builds an array, element by element.
-#[expect(unsafe_code, reason = "see `place`")]
+#[expect(unsafe_code, reason = "see `in_place`")]
 pub fn each<T, const N: usize>(slot: &mut MaybeUninit<[T; N]>, make: impl Fn() -> T) -> &mut [T; N] {
     let first = slot.as_mut_ptr().cast::<T>();
     for index in 0..N {
@@ -88,7 +88,7 @@ pub fn each<T, const N: usize>(slot: &mut MaybeUninit<[T; N]>, make: impl Fn() -
 }
 
 /// Builds a value in local memory and moves it from there; for callers with enough stack.
-#[expect(unsafe_code, reason = "see `place`")]
+#[expect(unsafe_code, reason = "see `in_place`")]
 pub fn made<T>(build_in: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) -> T {
     let mut slot = MaybeUninit::uninit();
     build(&mut slot, build_in);
@@ -121,14 +121,14 @@ impl<T> Slot<T> {
     }
 
     /// Value, if there is one.
-    #[expect(unsafe_code, reason = "see `place`")]
+    #[expect(unsafe_code, reason = "see `in_place`")]
     pub fn as_ref(&self) -> Option<&T> {
         // SAFETY: only `fill` sets `full`, after `build` has verified that the value was built here.
         self.full.then(|| unsafe { self.value.assume_init_ref() })
     }
 
     /// Mutable value, if there is one.
-    #[expect(unsafe_code, reason = "see `place`")]
+    #[expect(unsafe_code, reason = "see `in_place`")]
     pub fn as_mut(&mut self) -> Option<&mut T> {
         // SAFETY: as above.
         self.full.then(|| unsafe { self.value.assume_init_mut() })
@@ -136,7 +136,7 @@ impl<T> Slot<T> {
 }
 
 /// Builds an empty [`Slot`] in place.
-#[expect(unsafe_code, reason = "see `place`")]
+#[expect(unsafe_code, reason = "see `in_place`")]
 pub fn empty_slot<T>(slot: &mut MaybeUninit<Slot<T>>) -> &mut Slot<T> {
     const { assert!(!core::mem::needs_drop::<T>(), "a value that is overwritten is not dropped") };
     let whole = slot.as_mut_ptr();
@@ -183,7 +183,7 @@ mod tests {
     }
 
     impl Outer {
-        fn place(slot: &mut MaybeUninit<Self>) -> &mut Self {
+        fn new_in(slot: &mut MaybeUninit<Self>) -> &mut Self {
             fill!(slot, { name: Some(3) }, { inner: empty_slot, none: |slot| each(slot, || None) })
         }
     }
@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn a_value_built_in_place_equals_the_value() {
         let mut slot = MaybeUninit::uninit();
-        let outer = Outer::place(&mut slot);
+        let outer = Outer::new_in(&mut slot);
         assert_eq!(*outer, Outer { name: Some(3), none: [None; 3], inner: made(|slot| empty_slot(slot)) });
         outer.inner.fill(|slot| slot.write([0.5; 100]));
         let copy = outer.clone();

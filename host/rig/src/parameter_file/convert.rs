@@ -10,7 +10,7 @@ use scarab::store::{CalibrationRecord, JointProvenance, Key, ModelRecord, Proven
 use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
 use scarab_identify::formats::temperature::RANGE_C;
 
-use crate::kept_file::{
+use crate::parameter_file::{
     AxisCalibration, ConstantPart, Counter, Encoder, FrictionBound, Joint, JointZeroPart, ModelJoint,
     ModelPart, Parameters, StribeckPart,
 };
@@ -43,7 +43,7 @@ fn not_below_zero(name: &str, value: f64) -> Result<f32, String> {
 }
 
 impl AxisCalibration {
-    pub(super) fn of_kept(joint: Joint, kept: &CalibrationRecord) -> Self {
+    pub(super) fn from_record(joint: Joint, kept: &CalibrationRecord) -> Self {
         let StoredCalibration {
             resistance,
             direct_inductance,
@@ -77,7 +77,7 @@ impl AxisCalibration {
         }
     }
 
-    pub(super) fn to_kept(&self) -> Result<CalibrationRecord, String> {
+    pub(super) fn to_record(&self) -> Result<CalibrationRecord, String> {
         let units = (self.offset_rad * UNITS_PER_RAD).round();
         if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&units) {
             return Err(format!("`offset_rad` is {}; it must be from -pi to pi", self.offset_rad));
@@ -122,7 +122,7 @@ impl AxisCalibration {
 }
 
 impl Parameters {
-    fn of_array(of: [f64; 14]) -> Self {
+    fn from_array(of: [f64; 14]) -> Self {
         let [xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ia, fc, fv, off] = of;
         Self { xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ia, fc, fv, off }
     }
@@ -136,7 +136,7 @@ impl Parameters {
 }
 
 /// Data of one joint of a model in the store.
-struct KeptJoint {
+struct JointRecord {
     parameters: [f32; 14],
     stribeck: Stribeck<f32>,
     constant: Constant,
@@ -146,7 +146,7 @@ struct KeptJoint {
 }
 
 impl ModelJoint {
-    fn to_kept(&self) -> Result<KeptJoint, String> {
+    fn to_record(&self) -> Result<JointRecord, String> {
         let mut parameters = [0.0; 14];
         let symbols = scarab::model::Parameter::ALL.map(scarab::model::Parameter::symbol);
         for ((to, from), symbol) in parameters.iter_mut().zip(self.parameters.to_array()).zip(symbols) {
@@ -154,7 +154,7 @@ impl ModelJoint {
         }
         let unknown =
             |name, value: Option<f64>| value.map_or(Ok(f32::NAN), |value| not_below_zero(name, value));
-        Ok(KeptJoint {
+        Ok(JointRecord {
             parameters,
             stribeck: Stribeck {
                 excess: not_below_zero("excess", self.stribeck.excess)?,
@@ -190,23 +190,23 @@ fn fingerprint(text: &str) -> Option<Fingerprint> {
 }
 
 impl ModelPart {
-    pub(super) fn of_kept<const N: usize>(kept: &ModelRecord<N>) -> Self {
+    pub(super) fn from_record<const N: usize>(kept: &ModelRecord<N>) -> Self {
         let ModelRecord { model, provenance } = kept;
         let [major, minor, patch] = provenance.firmware;
         let known = |value: f32| (!value.is_nan()).then_some(f64::from(value));
-        let joint = |(place, joint): (usize, Joint)| {
-            let (curve, from) = (model.stribeck.get(place)?, provenance.joints.get(place)?);
+        let joint = |(index, joint): (usize, Joint)| {
+            let (curve, from) = (model.stribeck.get(index)?, provenance.joints.get(index)?);
             Some(ModelJoint {
                 joint,
-                parameters: Parameters::of_array(model.parameters.get(place)?.map(f64::from)),
+                parameters: Parameters::from_array(model.parameters.get(index)?.map(f64::from)),
                 stribeck: StribeckPart { excess: curve.excess.into(), velocity_rad_s: curve.velocity.into() },
-                constant: match model.constant.get(place)? {
+                constant: match model.constant.get(index)? {
                     Constant::Offset => ConstantPart::Offset,
                     Constant::Asymmetry => ConstantPart::Asymmetry,
                 },
                 friction_lower_bound: FrictionBound {
-                    coulomb_nm: (*model.assured.coulomb_nm.get(place)?).into(),
-                    viscous_nm_s_rad: (*model.assured.viscous.get(place)?).into(),
+                    coulomb_nm: (*model.assured.coulomb_nm.get(index)?).into(),
+                    viscous_nm_s_rad: (*model.assured.viscous.get(index)?).into(),
                 },
                 length_m: from.length.0.into(),
                 torque_per_ampere: from.torque_per_ampere.0.into(),
@@ -226,7 +226,7 @@ impl ModelPart {
         }
     }
 
-    pub(super) fn to_kept<const N: usize>(&self) -> Result<ModelRecord<N>, String> {
+    pub(super) fn to_record<const N: usize>(&self) -> Result<ModelRecord<N>, String> {
         let mut joints = Vec::new();
         for (part, expected) in self.joint.iter().zip(Joint::ALL) {
             let name = part.joint.name();
@@ -236,9 +236,9 @@ impl ModelPart {
                     expected.name()
                 ));
             }
-            joints.push(part.to_kept().map_err(|why| format!("{name}: {why}"))?);
+            joints.push(part.to_record().map_err(|why| format!("{name}: {why}"))?);
         }
-        let joints: [KeptJoint; N] = joints.try_into().map_err(|_| "`joint`: 1 to 3 joints make a leg")?;
+        let joints: [JointRecord; N] = joints.try_into().map_err(|_| "`joint`: 1 to 3 joints make a leg")?;
         let (low, high) = RANGE_C;
         if let Some(celsius) = self.bridge_temperature_c.filter(|celsius| !(low..=high).contains(celsius)) {
             return Err(format!("`bridge_temperature_c` is {celsius}; it must be from {low} to {high}"));
@@ -283,9 +283,9 @@ impl ModelPart {
             _ => {}
         }
         match self.joint.len() {
-            1 => self.to_kept::<1>().map(drop),
-            3 => self.to_kept::<3>().map(drop),
-            _ => self.to_kept::<2>().map(drop),
+            1 => self.to_record::<1>().map(drop),
+            3 => self.to_record::<3>().map(drop),
+            _ => self.to_record::<2>().map(drop),
         }
     }
 }

@@ -5,8 +5,8 @@
 //! leg's fingerprint.
 //!
 //! ```text
-//! flash image --Store::load, checks--> KeptFile --to_toml--> text   damaged or invalid parts: omitted
-//! flash image <--Store::save (drive off)-- KeptFile <--parse, checks-- text   all or nothing
+//! flash image --Store::load, checks--> ParameterFile --to_toml--> text   damaged or invalid parts: omitted
+//! flash image <--Store::save (drive off)-- ParameterFile <--parse, checks-- text   all or nothing
 //! ```
 //!
 //! An export reports the parts that it omits. An import does not change the parts that its file does not
@@ -31,13 +31,13 @@ use scarab_base::error::FileError;
 use scarab_base::toml_file;
 
 /// Version of the keys.
-pub const KEPT_SCHEMA: i64 = 1;
+pub const PARAMETER_SCHEMA: i64 = 1;
 
 /// Contents of a file; parts not named stay unchanged.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct KeptFile {
-    /// [`KEPT_SCHEMA`].
+pub struct ParameterFile {
+    /// [`PARAMETER_SCHEMA`].
     pub schema: i64,
     /// Objects of the nodes.
     #[serde(default)]
@@ -263,7 +263,7 @@ pub enum ConstantPart {
     Asymmetry,
 }
 
-impl KeptFile {
+impl ParameterFile {
     /// Parses and checks a text; `file` is its name in error messages.
     ///
     /// # Errors
@@ -271,9 +271,9 @@ impl KeptFile {
     pub fn parse(text: &str, file: &str) -> Result<Self, FileError> {
         let raw: toml::Table = toml_file::parse(text, file)?;
         match raw.get("schema") {
-            Some(toml::Value::Integer(KEPT_SCHEMA)) => {}
+            Some(toml::Value::Integer(PARAMETER_SCHEMA)) => {}
             Some(schema) => {
-                let reason = format!("schema {schema} is unknown; this program reads {KEPT_SCHEMA}");
+                let reason = format!("schema {schema} is unknown; this program reads {PARAMETER_SCHEMA}");
                 return Err(FileError::new(file, reason));
             }
             None => return Err(FileError::new(file, "has no `schema`: not a file of stored data")),
@@ -290,7 +290,7 @@ impl KeptFile {
             objects::to_bytes(&node.objects, node.joint).map_err(|why| of_node(node.joint, &why))?;
         }
         for axis in &self.calibration {
-            axis.to_kept().map_err(|why| format!("calibration of the {}: {why}", axis.joint.name()))?;
+            axis.to_record().map_err(|why| format!("calibration of the {}: {why}", axis.joint.name()))?;
         }
         for (table, key, model) in
             [("model", Key::Model, &self.model), ("worn_model", Key::WornModel, &self.worn_model)]

@@ -37,9 +37,9 @@ use crate::faults::bench::stall::stall;
 use crate::faults::bench::{Bench, outcome};
 use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
-use crate::kept_file::memory::{Memory, SECTOR};
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
+use crate::parameter_file::memory::{Memory, SECTOR};
 use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::BASE;
 use scarab::model::planar::JOINTS;
@@ -60,7 +60,7 @@ const LOST: u16 = NoticeCode::StoreFailed.number();
 
 pub(super) const CUT: Bench = Bench { fault: &catalogue::F1, run: cuts };
 
-pub(super) const ROT: Bench = Bench { fault: &catalogue::F2, run: rots };
+pub(super) const CORRUPTION: Bench = Bench { fault: &catalogue::F2, run: corruptions };
 
 pub(super) const ARMED: Bench = Bench { fault: &catalogue::F3, run: armed };
 
@@ -70,7 +70,7 @@ pub(super) const ARMED: Bench = Bench { fault: &catalogue::F3, run: armed };
 /// The leg cannot be identified.
 pub fn identified(leg: &LegFile, seed: u64) -> Result<ModelRecord<JOINTS>, ToolError> {
     let refused = || leg.error("its identification is refused");
-    let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(seed))?;
+    let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::with_seed(seed))?;
     let mut pair = Pair::new(leg, &context, seed)?;
     if !pair.enable(context.gravity) {
         return Err(refused().into());
@@ -81,7 +81,7 @@ pub fn identified(leg: &LegFile, seed: u64) -> Result<ModelRecord<JOINTS>, ToolE
         if let Some(model) = pair.leg.control().model() {
             let identification = pair.leg.identification();
             let configuration = &context.configuration;
-            return Ok(ModelRecord::of(configuration, identification, model, seed as u32, seed, None));
+            return Ok(ModelRecord::new(configuration, identification, model, seed as u32, seed, None));
         }
     }
     Err(refused().into())
@@ -103,7 +103,7 @@ struct All {
 }
 
 impl All {
-    fn of(memory: &mut Memory) -> Self {
+    fn read(memory: &mut Memory) -> Self {
         Self {
             objects: [0, 1].map(|joint| memory.objects(joint).ok().flatten()),
             models: Key::MODELS.map(|key| memory.any_model(key)),
@@ -182,12 +182,12 @@ fn filled(model: &ModelRecord<JOINTS>) -> Vec<Filled> {
             break;
         }
     }
-    let erases: Vec<usize> = (0..all.len()).filter(|place| all[*place].work > SECTOR as u64).collect();
+    let erases: Vec<usize> = (0..all.len()).filter(|index| all[*index].work > SECTOR as u64).collect();
     let step = (all.len() / LEVELS as usize).max(1);
-    let mut place = 0;
+    let mut index = 0;
     all.retain(|_| {
-        place += 1;
-        (place - 1) % step == 0 || erases.contains(&(place - 1))
+        index += 1;
+        (index - 1) % step == 0 || erases.contains(&(index - 1))
     });
     all
 }
@@ -208,10 +208,10 @@ fn cut(fault: &Fault, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
     memory.fail_after(None);
     if random.below(4) == 0 {
         memory.fail_after(Some(1 + random.below(3000)));
-        All::of(&mut memory);
+        All::read(&mut memory);
         memory.fail_after(None);
     }
-    let mut read = All::of(&mut memory);
+    let mut read = All::read(&mut memory);
     if blind && let [Some(old), Some(new)] = [&old.objects[0], &new.objects[0]] {
         let cut = random.below(new.len() as u64) as usize;
         read.objects[0] = Some(new[..cut].iter().chain(old.iter().skip(cut)).copied().collect());
@@ -223,7 +223,7 @@ fn cut(fault: &Fault, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
     }
     let mut again = old.clone();
     again.objects.reverse();
-    if !again.keep(&mut memory) || All::of(&mut memory) != again {
+    if !again.keep(&mut memory) || All::read(&mut memory) != again {
         found.broken.push("nothing can be stored after a power cut".into());
     }
     found.magnitude = Some(bytes as f64);
@@ -231,7 +231,7 @@ fn cut(fault: &Fault, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
 }
 
 /// A board whose memory holds older and newer objects and models, and the models that may be used.
-struct Rotting {
+struct FilledBoard {
     board: Board<JOINTS, BASE>,
     /// All stored objects of each node.
     objects: [Vec<Vec<u8>>; 2],
@@ -241,7 +241,7 @@ struct Rotting {
     other: ModelRecord<JOINTS>,
 }
 
-impl Rotting {
+impl FilledBoard {
     /// Model that the leg derives from one of its stored models.
     fn own(&self, kept: &ModelRecord<JOINTS>) -> Option<IdentifiedModel<JOINTS>> {
         self.models.into_iter().find(|(record, _)| record.model == kept.model).map(|(_, model)| model)
@@ -286,40 +286,39 @@ impl Rotting {
     }
 }
 
-fn rots(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    let rotting = Rotting::new(leg)?;
-    seeds.par_iter().map(|seed| rot(fault, &rotting, *seed, blind)).collect()
+fn corruptions(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    let stored = FilledBoard::new(leg)?;
+    seeds.par_iter().map(|seed| corruption(fault, &stored, *seed, blind)).collect()
 }
 
 /// Blind: one of two checks is skipped. Either another leg's model is taken as its own, or corrupt data as if
 /// its checksum were correct.
-fn rot(fault: &Fault, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
+fn corruption(fault: &Fault, stored: &FilledBoard, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
     let mut random = Random::new(fault.id, seed);
-    let mut board = rotting.board.clone();
+    let mut board = stored.board.clone();
     let way = if blind { 4 } else { random.below(6) };
-    corrupt(board.memory(), &rotting.other, way, &mut random);
+    corrupt(board.memory(), &stored.other, way, &mut random);
     let told_apart = readable(board.memory());
     // Only the store can decide which of its records are intact: each value it reads was stored once, or is
     // absent.
-    let after = All::of(board.memory());
+    let after = All::read(board.memory());
     if blind && random.coin() {
-        let mut own = rotting.kept;
-        own.model.parameters = rotting.other.model.parameters;
+        let mut own = stored.kept;
+        own.model.parameters = stored.other.model.parameters;
         board.memory().keep_any(OFF, &own);
     } else if blind && let Some(mut bytes) = after.objects[0].clone() {
-        let place = random.below(bytes.len() as u64) as usize;
-        bytes[place] ^= 1 << random.below(8);
+        let index = random.below(bytes.len() as u64) as usize;
+        bytes[index] ^= 1 << random.below(8);
         board.memory().keep_objects(OFF, 0, &bytes);
     }
     board.power_on();
     let control = board.rig.leg.control();
     let used = [control.model().copied(), control.model_of(Wearing::Worn).copied()];
-    let was_kept = (0..2).all(|joint| {
-        after.objects[joint].as_ref().is_none_or(|bytes| rotting.objects[joint].contains(bytes))
-    });
-    let belongs = |kept: &ModelRecord<JOINTS>| kept.model.fingerprint == rotting.kept.model.fingerprint;
+    let was_kept = (0..2)
+        .all(|joint| after.objects[joint].as_ref().is_none_or(|bytes| stored.objects[joint].contains(bytes)));
+    let belongs = |kept: &ModelRecord<JOINTS>| kept.model.fingerprint == stored.kept.model.fingerprint;
     let is_foreign = !after.models.iter().flatten().all(belongs);
-    let is_own = used == after.models.map(|kept| rotting.own(&kept.filter(belongs)?));
+    let is_own = used == after.models.map(|kept| stored.own(&kept.filter(belongs)?));
     let mut host = Host::new(board);
     host.run(20);
     let windows = [host.read(1, WINDOW, 0)?, host.read(2, WINDOW, 0)?];
