@@ -135,7 +135,7 @@ pub struct Follower {
     halted: bool,
     /// The host's limits (607D) as stated, and the range that they leave. When they come into force, at the
     /// beginning of a mode or by a change, they are extended to the joint: they must not pull it.
-    stated: [Radian; 2],
+    stated: Option<[Radian; 2]>,
     range: [f32; 2],
     /// Whether the joint returned in the previous tick.
     returned: bool,
@@ -229,7 +229,7 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
-        stated: [Radian(f32::NAN); 2],
+        stated: None,
         range: [0.0; 2],
         returned: false,
         outside: 0,
@@ -286,7 +286,7 @@ impl Follower {
         self.stand(command, measured);
         let ends = core::mem::replace(&mut self.returned, measured.returns) && !measured.returns;
         self.limited = false;
-        if command.range != self.stated {
+        if self.stated != Some(command.range) {
             self.limit_range(command, measured, bounds);
         }
         let starts = begins || was_halted && !command.halt || ends;
@@ -360,7 +360,7 @@ impl Follower {
     fn limit_range(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) {
         let within = |angle: Radian| clamp(angle.0, bounds.range[0], bounds.range[1]);
         let ([low, high], position) = (command.range.map(within), within(measured.position));
-        (self.stated, self.range) = (command.range, [min(low, position), max(high, position)]);
+        (self.stated, self.range) = (Some(command.range), [min(low, position), max(high, position)]);
     }
 
     /// Updates whether the joint stands.
@@ -478,8 +478,8 @@ impl Follower {
         (self.goal, self.next, self.left) = (None, None, 0);
         (self.arrived, self.waits) = (false, false);
         (self.outside, self.inside, self.reached, self.deviates) = (0, 0, false, false);
-        // NaN: the first target of a cyclic mode always starts a period, the host's limits come into force.
-        (self.target, self.stated) = (f32::NAN, [Radian(f32::NAN); 2]);
+        // NaN: the first target of a cyclic mode always starts a period.
+        (self.target, self.stated) = (f32::NAN, None);
     }
 
     /// Continues with no more than the joint's own velocity. A cyclic target that has jumped leaves the
