@@ -780,7 +780,7 @@ fn limits_that_exclude_a_joint_when_it_is_enabled_pull_it_nowhere() {
             }
         }
     }
-    // It moves into them at any speed, and is then held by the other one.
+    // The joint moves into them at any speed, and is then held by the other one.
     for is_cyclic in [true, false] {
         let mut hosted = Hosted::new();
         hosted.run(SECOND);
