@@ -85,7 +85,7 @@ fn bias_warning(expected: &ExpectedBase) -> Option<String> {
     })
 }
 
-/// Warning about a joint whose range nobody has stated, or that moves far.
+/// Warning about a joint without a stated range, or one that moves far.
 fn range_warning(file: &JointFile, joint: &JointReport) -> Option<String> {
     let ([low, high], [least, most]) = (joint.angle_deg, DEFAULT_RANGE_DEG);
     if file.range_deg == DEFAULT_RANGE_DEG {
