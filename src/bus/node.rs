@@ -21,7 +21,7 @@ use super::nmt::{self, Command, NmtState, Reset};
 use super::node_id::NodeId;
 use super::objects::{Lost, Objects};
 use super::pdo::PDOS;
-use super::pdo::receive::Received;
+use super::pdo::receive::{Receive, Received};
 use super::sdo::Server;
 use super::silence::{Kind, Silence};
 use crate::hal::{Controller, Frame};
@@ -204,9 +204,9 @@ impl Node {
     pub fn on_controller<O: Objects>(&mut self, controller: Controller, objects: &mut O) {
         match controller {
             Controller::Active => {}
-            Controller::Passive => objects.lost(Lost::Bus(false)),
+            Controller::Passive => self.lose(Lost::Bus(false), objects),
             // The lost frame may have been a stop command.
-            Controller::Off | Controller::Overrun => objects.lost(Lost::Bus(true)),
+            Controller::Off | Controller::Overrun => self.lose(Lost::Bus(true), objects),
         }
         self.communication.emergency.set(Source::Controller, controller.error());
     }
@@ -432,9 +432,15 @@ impl Node {
         }
     }
 
+    /// Reacts to a lost host. Its values that wait for a SYNC are void, as those that have become valid are.
+    fn lose<O: Objects>(&mut self, why: Lost, objects: &mut O) {
+        self.communication.receive.iter_mut().for_each(Receive::discard);
+        objects.lost(why);
+    }
+
     /// Stops the drive by its option code and changes the NMT state by 1029:1.
     fn fail<O: Objects>(&mut self, why: Lost, objects: &mut O) {
-        objects.lost(why);
+        self.lose(why, objects);
         match (self.communication.on_error, self.communication.state) {
             (0, NmtState::Operational) => self.apply_command(Command::Go(NmtState::PreOperational), objects),
             (2, _) => self.apply_command(Command::Go(NmtState::Stopped), objects),

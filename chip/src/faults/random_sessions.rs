@@ -110,7 +110,14 @@ impl HostedLeg for ChipLeg<'_> {
             })
         };
         let (returns, bounded) = (is_near_end(0.0), is_near_end(BOUNDED_RAD));
-        self.waiting.push_back(LegState { torque: plant.torque(), position, returns, bounded, ..self.state });
+        self.waiting.push_back(LegState {
+            torque: plant.torque(),
+            position,
+            speed: None,
+            returns,
+            bounded,
+            ..self.state
+        });
         if self.waiting.len() <= DELAY as usize {
             return Ok(None);
         }

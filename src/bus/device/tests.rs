@@ -232,6 +232,31 @@ fn a_host_that_a_reset_left_in_control_is_missed_without_a_controlword() {
 }
 
 #[test]
+fn a_value_that_waits_for_a_sync_is_void_once_its_host_is_lost() {
+    for is_lost in [false, true] {
+        let mut bench = Bench::new();
+        bench.send(0, &[1, 0]);
+        // The leg stays enabled without its host, and the node operational.
+        for (index, sub, value, size) in
+            [(0x6007, 0, 0, 2), (0x1029, 1, 1, 1), (0x1402, 2, 1, 1), (0x6060, 0, 3, 1)]
+        {
+            bench.write(1, index, sub, value, size);
+        }
+        bench.enable();
+        if is_lost {
+            bench.write(1, 0x1016, 1, 0x7F << 16 | 20, 4);
+            bench.send(0x77F, &[5]);
+        }
+        bench.send(0x401, &[0, 0, 1, 0]);
+        bench.run(100);
+        bench.send(0x80, &[]);
+        assert_eq!(bench.drive, DriveState::OperationEnabled);
+        let command = bench.device.axes[0].command();
+        assert_eq!(command.target == crate::leg::Target::Hold, is_lost);
+    }
+}
+
+#[test]
 fn settings_of_the_next_identification_and_assistance_end_with_the_session() {
     use crate::leg::{AssistShares, Wearing};
     let settings = |bench: &Bench| (bench.device.leg.wearing, bench.device.leg.shares);

@@ -77,9 +77,15 @@ impl Receive {
         1000 * u64::from(self.parameters.event_ms)
     }
 
+    /// Discards waiting values.
+    pub fn discard(&mut self) {
+        self.waits = false;
+    }
+
     /// Discards waiting values and stops the event timer.
     pub fn stop(&mut self) {
-        (self.waits, self.due_us) = (false, None);
+        self.discard();
+        self.due_us = None;
     }
 
     /// Returns the bytes of the last frame.

@@ -6,6 +6,8 @@
 //! [`check_session`] plays it on a leg and checks what must hold after every tick; [`HostSession::reduced`]
 //! finds the steps that fail.
 
+mod commanded;
+mod play;
 mod witness;
 
 use std::fmt;
@@ -19,9 +21,9 @@ pub use witness::{HostedLeg, JointBounds, LegState, check_session, is_like};
 /// Most steps of a session.
 const MOST_STEPS: u64 = 40;
 
-/// Object that hosts write: index, subindex, bytes, whether it is a target or an offset.
+/// Object that hosts write: index, subindex, bytes.
 #[derive(Clone, Copy)]
-struct Object(u16, u8, u8, bool);
+struct Object(u16, u8, u8);
 
 impl fmt::Debug for Object {
     fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -30,84 +32,125 @@ impl fmt::Debug for Object {
 }
 
 impl Object {
-    /// A value that has an effect, where few have one.
-    fn sensible(&self, value: i32) -> i32 {
-        let pair = match self.0 {
+    /// Values that have an effect, where few have one.
+    const fn usual_values(&self) -> &'static [i32] {
+        match (self.0, self.1) {
+            (0x1005, _) => &[0x80, 0x90],
             // "save", "load".
-            0x1010 => [0x6576_6173, value],
-            0x1011 => [0x6461_6F6C, value],
+            (0x1010, _) => &[0x6576_6173],
+            (0x1011, _) => &[0x6461_6F6C],
+            (0x1019, _) => &[0, 10],
             // By the next SYNC, and at once.
-            0x1400..=0x1403 => [1, 255],
+            (0x1400..=0x1403, 2) => &[1, 255],
+            (0x1400..=0x1403, _) => &[0, 5, 20, 200],
             // Stop, clear. Others may restart the board.
-            0x1F51 => [0, 3],
-            _ => [value; 2],
-        };
-        pair[value.rem_euclid(2) as usize]
+            (0x1F51, _) => &[0, 3],
+            (0x1029, _) => &[0, 1, 2],
+            (0x2011..=0x2013, _) => &[0, 1],
+            // Of the leg's own; units of 0.01 Hz and Hz.
+            (0x2021, 1) => &[0, 300, 600],
+            (0x2021, _) => &[0, 500, 1000],
+            (0x2100, 1) => &[0, 1, 2, 3, 4, 5],
+            (0x2100, _) => &[0, 1, 2],
+            (0x2150, _) => &[0, 100, 500],
+            // The reference (2) believes the operator's pose.
+            (0x2160, _) => &[1, 3],
+            (0x6007, _) => &[0, 1, 2, 3],
+            (0x605A, _) => &[0, 2],
+            (0x6098, _) => &[0, 35, 37],
+            (0x60C2, 1) => &[1, 2, 10],
+            (0x60C2, _) => &[-3],
+            (0x60F2, _) => &[0, 1, 2],
+            _ => &[],
+        }
+    }
+
+    /// Draws a value: one of the usual ones mostly, if there are any.
+    fn draw_value(&self, random: &mut Random) -> i32 {
+        let usual = self.usual_values();
+        let takes_any = !matches!(self.0, 0x1F51 | 0x2160);
+        if usual.is_empty() || takes_any && random.below(4) == 0 {
+            value(random)
+        } else {
+            any_of(random, usual)
+        }
     }
 }
 
 /// Objects with values inside and outside their ranges.
-const OBJECTS: [Object; 46] = [
-    Object(0x6071, 0, 2, true),
-    Object(0x607A, 0, 4, true),
-    Object(0x60B1, 0, 4, true),
-    Object(0x60B2, 0, 2, true),
-    Object(0x60FF, 0, 4, true),
-    Object(0x6072, 0, 2, true),
-    Object(0x2020, 1, 2, true),
-    Object(0x2020, 2, 2, true),
-    Object(0x6007, 0, 2, false),
-    Object(0x605A, 0, 2, false),
-    Object(0x6065, 0, 4, false),
-    Object(0x6066, 0, 2, false),
-    Object(0x6067, 0, 4, false),
-    Object(0x6068, 0, 2, false),
-    Object(0x606D, 0, 2, false),
-    Object(0x606F, 0, 2, false),
-    Object(0x607C, 0, 4, false),
-    Object(0x607D, 1, 4, true),
-    Object(0x607D, 2, 4, true),
-    Object(0x6081, 0, 4, false),
-    Object(0x6083, 0, 4, false),
-    Object(0x6084, 0, 4, false),
-    Object(0x6087, 0, 4, false),
-    Object(0x6098, 0, 1, false),
-    Object(0x60C2, 1, 1, false),
-    Object(0x60C2, 2, 1, false),
-    Object(0x2011, 0, 1, false),
-    Object(0x2012, 0, 1, false),
-    Object(0x2013, 0, 1, false),
-    Object(0x2021, 1, 2, false),
-    Object(0x1017, 0, 2, false),
-    Object(0x2100, 1, 1, true),
-    Object(0x2160, 1, 1, false),
-    Object(0x60F2, 0, 2, false),
-    Object(0x1010, 1, 4, false),
-    Object(0x1011, 1, 4, false),
-    Object(0x1029, 1, 1, false),
-    Object(0x1F51, 1, 1, false),
-    Object(0x606E, 0, 2, false),
-    Object(0x6070, 0, 2, false),
-    Object(0x2021, 4, 2, false),
-    Object(0x2150, 1, 2, false),
-    Object(0x1400, 2, 1, false),
-    Object(0x1401, 2, 1, false),
-    Object(0x1402, 2, 1, false),
-    Object(0x1403, 2, 1, false),
+const OBJECTS: [Object; 56] = [
+    Object(0x6071, 0, 2),
+    Object(0x607A, 0, 4),
+    Object(0x60B1, 0, 4),
+    Object(0x60B2, 0, 2),
+    Object(0x60FF, 0, 4),
+    Object(0x6072, 0, 2),
+    Object(0x2020, 1, 2),
+    Object(0x2020, 2, 2),
+    Object(0x6007, 0, 2),
+    Object(0x605A, 0, 2),
+    Object(0x6065, 0, 4),
+    Object(0x6066, 0, 2),
+    Object(0x6067, 0, 4),
+    Object(0x6068, 0, 2),
+    Object(0x606D, 0, 2),
+    Object(0x606F, 0, 2),
+    Object(0x607C, 0, 4),
+    Object(0x607D, 1, 4),
+    Object(0x607D, 2, 4),
+    Object(0x6081, 0, 4),
+    Object(0x6083, 0, 4),
+    Object(0x6084, 0, 4),
+    Object(0x6087, 0, 4),
+    Object(0x6098, 0, 1),
+    Object(0x60C2, 1, 1),
+    Object(0x60C2, 2, 1),
+    Object(0x2011, 0, 1),
+    Object(0x2012, 0, 1),
+    Object(0x2013, 0, 1),
+    Object(0x2021, 1, 2),
+    Object(0x1017, 0, 2),
+    Object(0x2100, 1, 1),
+    Object(0x2160, 1, 1),
+    Object(0x60F2, 0, 2),
+    Object(0x1010, 1, 4),
+    Object(0x1011, 1, 4),
+    Object(0x1029, 1, 1),
+    Object(0x1F51, 1, 1),
+    Object(0x606E, 0, 2),
+    Object(0x6070, 0, 2),
+    Object(0x2021, 4, 2),
+    Object(0x2150, 1, 2),
+    Object(0x1400, 2, 1),
+    Object(0x1401, 2, 1),
+    Object(0x1402, 2, 1),
+    Object(0x1403, 2, 1),
+    Object(0x1005, 0, 4),
+    Object(0x1019, 0, 1),
+    Object(0x1400, 5, 2),
+    Object(0x1401, 5, 2),
+    Object(0x1402, 5, 2),
+    Object(0x1403, 5, 2),
+    Object(0x2100, 13, 1),
+    Object(0x2150, 2, 2),
+    Object(0x2150, 3, 2),
+    Object(0x2150, 4, 2),
 ];
 /// Objects that hosts map into received PDOs.
 const MAPPED: [Object; 10] = [
-    Object(0x6040, 0, 2, false),
-    Object(0x6060, 0, 1, false),
-    Object(0x607A, 0, 4, true),
-    Object(0x60FF, 0, 4, true),
-    Object(0x6071, 0, 2, true),
-    Object(0x6072, 0, 2, true),
-    Object(0x60B1, 0, 4, true),
-    Object(0x60B2, 0, 2, true),
-    Object(0x2020, 1, 2, true),
-    Object(0x2020, 2, 2, true),
+    Object(0x6040, 0, 2),
+    Object(0x6060, 0, 1),
+    Object(0x607A, 0, 4),
+    Object(0x60FF, 0, 4),
+    Object(0x6071, 0, 2),
+    Object(0x6072, 0, 2),
+    Object(0x60B1, 0, 4),
+    Object(0x60B2, 0, 2),
+    Object(0x2020, 1, 2),
+    Object(0x2020, 2, 2),
 ];
+/// The controlword and the mode in one PDO.
+const WORD_AND_MODE: [Object; 2] = [Object(0x6040, 0, 2), Object(0x6060, 0, 1)];
 const MODES: [i8; 9] = [0, 1, 3, 4, 6, 8, 9, 10, -1];
 const WORDS: [u16; 14] = [0, 2, 6, 7, 0xB, 0xF, 0x1F, 0x3F, 0x5F, 0x7F, 0x10F, 0x11F, 0x80, 0x8F];
 const LSS_SERVICES: [u8; 7] = [0x04, 0x04, 0x13, 0x40, 0x46, 0x5A, 0x5E];
@@ -126,21 +169,30 @@ enum Step {
     Mode(usize, i8),
     /// Target position near the joint: micro-radian from its actual position.
     Near(usize, i32),
+    /// Every target names the present position, speed 0 and torque 0.
+    Stay(usize),
     /// Homing to this offset, micro-radian.
     Home(usize, i32),
     /// A received PDO, from 1, with these bytes.
     Pdo(usize, u16, [u8; 8]),
     /// Objects of a received PDO, from 1.
     Map(usize, u16, [Object; 2]),
+    /// Controlword and mode in one received PDO, from 1, which is mapped for them.
+    WordAndMode(usize, u16, u16, i8),
     /// The first PDO to every node with a controlword for each, so many times at this distance, ticks.
     Cycle([u16; JOINTS], u8, u8),
-    /// SYNCs at this distance, ticks.
-    Sync(u8, u8),
+    /// SYNCs at this distance, ticks, with a counter or without.
+    Sync(u8, u8, bool),
+    /// Both nodes are enabled by a host that sends its PDOs and SYNC at this distance, ticks. Then SYNC ends,
+    /// and the PDOs go on.
+    StopSync(u8),
+    /// An enabled joint moves at this speed, micro-radian/s, and goes on without its host, which is lost.
+    LoseHost(usize, i32),
     Nmt(u8, u8),
     /// LSS service, with its first byte of data.
     Lss(u8, u8),
-    /// A host's heartbeat, after its time in milliseconds was written to the node.
-    Watch(usize, u8),
+    /// A host's heartbeat, after its time in milliseconds was written to the node, as entry 1 or 2.
+    Watch(usize, u8, u8),
     Contacts(bool, bool),
     Plug(bool),
     /// Ticks without a frame, then the statuswords are compared.
@@ -170,10 +222,10 @@ impl Step {
         let joint = random.below(JOINTS as u64) as usize;
         let some = random.below(JOINTS as u64 + 1) as usize;
         let byte = |random: &mut Random| random.below(256) as u8;
-        match random.below(40) {
+        match random.below(44) {
             0..8 => {
                 let object = any_of(random, &OBJECTS);
-                Self::Write(joint, object, object.sensible(value(random)))
+                Self::Write(joint, object, object.draw_value(random))
             }
             8 => Self::Word(some, random.below(1 << 16) as u16),
             9..13 => Self::Word(some, any_of(random, &WORDS)),
@@ -183,8 +235,8 @@ impl Step {
             23 => Self::Home(joint, value(random)),
             24..26 => Self::Pdo(joint, 1 + random.below(4) as u16, [(); 8].map(|()| byte(random))),
             26 => Self::Lss(any_of(random, &LSS_SERVICES), random.below(2) as u8),
-            27 => Self::Watch(joint, random.below(250) as u8),
-            28 => Self::Sync(1 + random.below(39) as u8, 1 + random.below(19) as u8),
+            27 => Self::Watch(joint, 1 + random.below(2) as u8, random.below(250) as u8),
+            28 => Self::Sync(1 + random.below(39) as u8, 1 + random.below(19) as u8, random.coin()),
             29 => Self::Nmt(any_of(random, &NMT_COMMANDS), random.below(3) as u8),
             30 => Self::Contacts(random.coin(), random.coin()),
             31 => Self::Plug(random.coin()),
@@ -193,6 +245,13 @@ impl Step {
                 let words = [(); JOINTS].map(|()| any_of(random, &WORDS));
                 Self::Cycle(words, 1 + random.below(30) as u8, 1 + random.below(19) as u8)
             }
+            35 => {
+                let pdo = 1 + random.below(4) as u16;
+                Self::WordAndMode(joint, pdo, any_of(random, &WORDS), any_of(random, &MODES))
+            }
+            36 => Self::StopSync(4 + random.below(16) as u8),
+            37 => Self::LoseHost(joint, between(random, -200_000, 200_000)),
+            38..40 => Self::Stay(joint),
             _ => Self::Wait(1 + random.below(1199) as u16),
         }
     }
