@@ -43,8 +43,9 @@ pub fn torque_words(run: &RunReport) -> Markup {
     html! { p {
         "Measured and predicted torque, both through the filter of the identification. The blue band is two standard \
         deviations of the filtered noise to both sides, as the identification estimates it: nineteen of twenty residuals \
-        of a perfect model lie within it. Grey: the joint is at rest, and the row is excluded."
-        @if run.seed.is_some() { " The noise-free torque is known because the leg is simulated." }
+        of a perfect model lie within it. Grey: the joint is at rest, and the row is excluded. Below each motion the blue \
+        curve is measured less predicted torque"
+        @if run.seed.is_some() { ", the orange one noise-free less predicted, known because the leg is simulated" } "."
     } }
 }
 
