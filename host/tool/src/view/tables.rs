@@ -343,7 +343,7 @@ fn search_line(run: &RunReport) -> String {
 #[must_use]
 pub fn excess(units: Number) -> String {
     match units.known() {
-        Some(units) if units < 1e-6 => "< 1e-6".into(),
+        Some(units) if units.abs() < 1e-6 => "< 1e-6".into(),
         _ => plain(units),
     }
 }

@@ -60,13 +60,7 @@ pub fn whole(
     sigma: Option<f64>,
     motions: &[MotionSeries],
 ) -> Result<(), DrawingError> {
-    text(
-        area,
-        (12, 14),
-        13,
-        HPos::Left,
-        format!("{name}: torque through the filter, and its residual below"),
-    )?;
+    text(area, (12, 14), 13, HPos::Left, format!("{name}: torque through the filter, and residual below"))?;
     let curves: Vec<_> =
         motions.iter().filter_map(|motion| Some((motion, motion.joints.get(joint)?))).collect();
     let simulated = curves.iter().any(|(_, curves)| !curves.noise_free_nm.is_empty());
