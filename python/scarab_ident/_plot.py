@@ -52,7 +52,7 @@ def plot(identification, joints, joint=None):
             residual.plot(time, motion.measured_nm[:, index] - moving, color=colour, lw=0.8)
         torque.set_title(name)
         torque.set_ylabel("torque [N m]")
-        residual.set_ylabel("difference [N m]")
+        residual.set_ylabel("measured - predicted [N m]")
         residual.set_xlabel("time of the motions, one after the other [s]; gaps: joint at rest")
         residual.axhline(0.0, color="#999999", lw=0.6)
     figure.suptitle(identification.verdict)

@@ -251,7 +251,7 @@ impl Identification {
     }
 
     fn __str__(&self) -> String {
-        tables::run_text(&self.run)
+        tables::run_text(&self.run, &self.leg)
     }
 
     fn __repr__(&self) -> String {

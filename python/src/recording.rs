@@ -113,7 +113,7 @@ pub fn read_recording<'py>(
     let import = import.with(&columns, &units).map_err(argument)?;
     let Read { recording: read, report } = py.detach(|| Recording::read(&path, &import)).map_err(raised)?;
     let skipped = (report.skipped > 0).then(|| reading_notes(std::slice::from_ref(&report)));
-    warn(py, skipped.into_iter().flatten().chain(of_more_joints(&read, &leg.file)))?;
+    warn(py, skipped.into_iter().flatten().chain(report.warning).chain(of_more_joints(&read, &leg.file)))?;
     recording(py, &read)
 }
 

@@ -380,6 +380,12 @@ impl RunReport {
         self.doubt.is_some()
     }
 
+    /// Whether a prior bounds the search and completes what torque does not determine.
+    #[must_use]
+    pub fn has_prior(&self) -> bool {
+        self.prior != "none"
+    }
+
     /// Whether the result was accepted: exit code 0.
     #[must_use]
     pub fn accepted(&self) -> bool {

@@ -19,6 +19,9 @@ pub struct ReadReport {
     pub skipped: usize,
     /// Reasons for that, with the first line of each.
     pub skipped_why: Vec<SkippedReport>,
+    /// Doubt about the file, in words; printed only.
+    #[serde(skip)]
+    pub warning: Option<String>,
 }
 
 /// Column of one signal.

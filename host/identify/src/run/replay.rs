@@ -235,6 +235,7 @@ fn doubts<'a, const N: usize>(
     files: impl Iterator<Item = &'a Samples<N>>,
 ) -> Vec<String> {
     let mut warnings: Vec<String> = warnings::of_geometry(leg).collect();
+    warnings.extend(parts.read.iter().filter_map(|read| read.warning.clone()));
     warnings.extend(parts.wholes.iter().flat_map(|whole| warnings::of_another_leg(&whole.recording, leg)));
     warnings.extend(parts.screening.warnings());
     warnings.extend(files.filter_map(Samples::warning));

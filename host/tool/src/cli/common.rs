@@ -165,13 +165,13 @@ pub fn draw_runs(campaign: &CampaignHeader, common: &Common, runs: &[RunReport])
     Ok(())
 }
 
-/// Writes and prints the result; `preface` precedes it.
-pub fn finish(run: &RunReport, common: &Common, preface: &str) -> Result<u8, ToolError> {
+/// Writes and prints the result for a leg; `preface` precedes it.
+pub fn finish(leg: &LegFile, run: &RunReport, common: &Common, preface: &str) -> Result<u8, ToolError> {
     if let Some(path) = &common.json {
         write_json(path, run)?;
     }
     output::print(preface)?;
-    tables::print_run(run)?;
+    tables::print_run(run, leg)?;
     if common.parameters {
         output::print(&format!("\n{}", tables::all_parameters(run)))?;
     }

@@ -163,7 +163,7 @@ fn run_once(
     let kept = arguments.model.kept(leg)?;
     let (mut run, series) = with_leg_size!(leg, identify_one(leg, options, log))?;
     arguments.model.compare(kept.as_ref(), &mut run);
-    let code = finish(&run, &arguments.common, "")?;
+    let code = finish(leg, &run, &arguments.common, "")?;
     draw(leg, &arguments.common, &run, &series, &[])?;
     arguments.model.save(leg, &run, leg.bandwidth_hz)?;
     Ok(code)

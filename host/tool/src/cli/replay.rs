@@ -129,7 +129,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         let notes = tables::reading_notes(read).join("\n");
         sources.push_str(&format!("{}{notes}\n\n", table.to_text()));
     }
-    let code = finish(&replayed.run, &arguments.common, &sources)?;
+    let code = finish(leg, &replayed.run, &arguments.common, &sources)?;
     draw(leg, &arguments.common, &replayed.run, &replayed.series, &replayed.sources)?;
     arguments.model.save(leg, &replayed.run, replayed.bandwidth_hz)?;
     Ok(code)

@@ -81,7 +81,7 @@ fn report(arguments: &TraceArguments, trace: &Trace) -> Result<u8, ToolError> {
     if let Some(path) = &arguments.json {
         write_json(path, &run)?;
     }
-    tables::print_run(&run)?;
+    tables::print_run(&run, leg)?;
     if arguments.parameters {
         output::print(&format!("\n{}", tables::all_parameters(&run)))?;
     }

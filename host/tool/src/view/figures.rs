@@ -85,7 +85,7 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
     };
     let shown = shown_motion(series);
     let glance = torque::small_height(joints.len());
-    let title = format!("Torque on one motion and base parameters of {}", run.leg);
+    let title = format!("Filtered torque and residual (grey: at rest), base parameters of {}", run.leg);
     add(Group::Summary, "identify.svg".into(), title, glance, &|area| {
         let (left, right) = area.split_horizontally(canvas::px(480));
         if let Some(motion) = shown {

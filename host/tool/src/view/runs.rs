@@ -33,7 +33,7 @@ fn print_searches(runs: &[RunReport]) -> Result<(), ToolError> {
     ]);
     let searches: [(&str, Search); 2] = [
         ("base values, completed (the result)", |run| Some(&run.consistent.base)),
-        ("whole legs", |run| run.consistent.full.as_ref()),
+        ("whole legs, for comparison", |run| run.consistent.full.as_ref()),
     ];
     for (name, search) in searches {
         let all: Vec<_> = runs.iter().filter_map(search).collect();

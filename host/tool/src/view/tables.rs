@@ -5,16 +5,16 @@ use scarab_base::number::{Number, number};
 use scarab_base::output::print;
 use scarab_base::precision::{exact, plain, sigma, value};
 use scarab_base::table::{Cell, Table, cells};
+use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::disturbances::StribeckReport;
-use scarab_identify::report::findings::untested_lengths;
+use scarab_identify::report::findings::{FindingReport, untested_lengths};
 use scarab_identify::report::series::Role;
 use scarab_identify::report::{
-    AddedMassReport, BaseReport, ComparisonReport, ConsistentSearchReport, FitReport, ParameterReport,
-    RunReport, Source, reading::ReadReport,
+    AddedMassReport, BaseReport, ComparisonReport, ParameterReport, RunReport, Source, reading::ReadReport,
 };
 use std::collections::BTreeMap;
 
-use crate::view::html::parameters::{badge, bar};
+use crate::view::html::parameters::{badge, bar, split};
 use crate::view::html::table::html_cell;
 
 /// Table of the base parameters: value, sigma with its parts, truth and error in sigma.
@@ -104,17 +104,18 @@ pub fn parameters<'a>(parameters: impl Iterator<Item = &'a ParameterReport>, is_
 pub fn all_parameters(run: &RunReport) -> String {
     let truth = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
     parameters(run.parameters.iter(), truth).to_text()
-        + "\nidentified: measured alone. grouped: only sums with the parameters beside it are measured, the prior \
-           splits them.\nweak: measured with little certainty. prior: does not show in the torque.\n"
+        + &format!(
+            "\nidentified: measured alone. grouped: only sums with the parameters beside it are measured, {}.\nweak: measured \
+             with little certainty. prior: does not show in the torque.\n",
+            split(run.has_prior())
+        )
 }
 
-/// Table of the torque errors on all motions; `motion` names that of a fit, `joint` a joint.
+/// Table of the torque errors on all motions; `joint` names a joint.
 #[must_use]
-pub fn fits(
-    run: &RunReport,
-    motion: impl Fn(&FitReport, Role) -> String,
-    joint: impl Fn(usize) -> String,
-) -> Table {
+pub fn fits(run: &RunReport, joint: impl Fn(usize) -> String) -> Table {
+    // Figures use this name for the motion identified from, too: an unused one may have the same course.
+    let is_recorded = run.seed.is_none() && run.trace.is_none();
     let all = || {
         let training = run.training.iter().map(|fit| (fit, Role::Training));
         training.chain(run.validation.iter().map(|fit| (fit, Role::Validation)))
@@ -127,7 +128,7 @@ pub fn fits(
     let percent = |share: Number| number(Number(share.known().map(|share| 100.0 * share)));
     for (fit, role) in all() {
         table.row(cells![
-            motion(fit, role),
+            if role == Role::Training && !is_recorded { "excitation" } else { fit.motion.as_str() },
             role.name(),
             joint(fit.joint),
             number(fit.rms_nm),
@@ -213,14 +214,18 @@ pub fn reading_notes(read: &[ReadReport]) -> Vec<String> {
 pub const SOURCES: &str = "rows: decimated to 50 a second and used for that joint's torque; still: excluded, at rest \
                            or near a reversal, because friction at rest is undetermined.";
 
-/// Prints one run.
-pub fn print_run(run: &RunReport) -> Result<(), ToolError> {
-    print(&run_text(run))
+/// Prints one run of a leg.
+pub fn print_run(run: &RunReport, leg: &LegFile) -> Result<(), ToolError> {
+    print(&run_text(run, leg))
 }
 
-/// Tables and verdict of one run.
+/// Tables and verdict of one run of a leg.
 #[must_use]
-pub fn run_text(run: &RunReport) -> String {
+pub fn run_text(run: &RunReport, leg: &LegFile) -> String {
+    let joint = |number: usize| {
+        let file = number.checked_sub(1).and_then(|index| leg.joints.get(index));
+        file.map_or_else(|| number.to_string(), |file| format!("{number} {}", file.name))
+    };
     let combinations = run.base_parameters.len();
     let determined = if run.rank == combinations {
         "all of them determined".to_owned()
@@ -236,7 +241,7 @@ pub fn run_text(run: &RunReport) -> String {
         ),
         String::new(),
         base_parameters(run).to_text(),
-        fits(run, |fit, _| fit.motion.clone(), |joint| joint.to_string()).to_text(),
+        fits(run, joint).to_text(),
         search_line(run),
     ];
     lines.push(consistent_line(run));
@@ -256,11 +261,8 @@ pub fn run_text(run: &RunReport) -> String {
     lines.push(String::new());
     lines.push(verdict_line(run));
     let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
-    let failed = run
-        .findings
-        .iter()
-        .filter(|finding| !finding.passed && !cause.is_some_and(|cause| cause.says(finding)));
-    lines.extend(failed.map(|finding| format!("  {}: {}", finding.reason, finding.words)));
+    let failed = run.findings.iter().filter(|finding| !finding.passed);
+    lines.extend(failed.map(|finding| format!("  {}: {}", finding.reason, failure(run, finding))));
     lines.extend(cause.map(|cause| format!("  {}", cause.line())));
     if !run.validated && run.seed.is_none() {
         lines.push("  not validated: no motion was held out (--validate, --split)".into());
@@ -270,6 +272,16 @@ pub fn run_text(run: &RunReport) -> String {
     }
     lines.extend(run.compared.iter().flat_map(comparison_lines));
     lines.join("\n") + "\n"
+}
+
+/// Sentence of a failed test, or the name of the likely cause that says the same.
+#[must_use]
+pub fn failure(run: &RunReport, finding: &FindingReport) -> String {
+    let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
+    match cause.filter(|cause| cause.says(finding)) {
+        Some(cause) => format!("{}, see the likely cause", cause.name.replace('_', " ")),
+        None => finding.words.clone(),
+    }
 }
 
 /// Comparison with a stored model, and the mass that explains the difference.
@@ -323,22 +335,22 @@ fn search_line(run: &RunReport) -> String {
     format!(
         "least squares: cost {} chi-square units. {swarm}, ends {} units above the optimum of its box",
         number(run.least_squares.cost),
-        number(run.bso.excess_chi2),
+        excess(run.bso.excess_chi2),
     )
+}
+
+/// Formats chi-square units above an optimum; smaller ones than 1e-6 are rounding.
+#[must_use]
+pub fn excess(units: Number) -> String {
+    match units.known() {
+        Some(units) if units.abs() < 1e-6 => "< 1e-6".into(),
+        _ => plain(units),
+    }
 }
 
 /// Cost of physical consistency, and both searches for it.
 fn consistent_line(run: &RunReport) -> String {
     let found = &run.consistent;
-    let search = |search: &ConsistentSearchReport| {
-        format!(
-            "{} iterations, {} evaluations, {} steps, {} above",
-            search.iterations,
-            search.evaluations,
-            search.steps,
-            number(search.excess_chi2)
-        )
-    };
     let Some(full) = &found.full else {
         return format!(
             "physically consistent legs: the result costs {} chi-square units more than least squares ({} steps)",
@@ -347,11 +359,15 @@ fn consistent_line(run: &RunReport) -> String {
         );
     };
     format!(
-        "physically consistent legs: the best costs {} chi-square units more than least squares. base values, completed \
-         (the result): {}. whole legs: {}",
+        "physically consistent legs: the best costs {} chi-square units more than least squares. the result, base values \
+         completed in {} steps, ends {} units above the best. for comparison, a swarm over whole legs: {} iterations, {} \
+         evaluations, ends {} units above it",
         plain(found.optimum_over_least_squares),
-        search(&found.base),
-        search(full)
+        found.base.steps,
+        excess(found.base.excess_chi2),
+        full.iterations,
+        full.evaluations,
+        excess(full.excess_chi2)
     )
 }
 
@@ -360,7 +376,7 @@ fn consistent_line(run: &RunReport) -> String {
 pub fn explanation(reason: &str) -> &'static str {
     match reason {
         "unphysical" => {
-            "no physically consistent leg has these parameters (friction, inertia, kinetic energy), or none within the prior's limits"
+            "no physically consistent leg has these parameters (friction, inertia, kinetic energy), or none within its limits"
         }
         "unexcited" => "a joint hardly moved, or the motion does not distinguish the parameters",
         "residual" => "the residual of the model is not noise",
@@ -368,7 +384,9 @@ pub fn explanation(reason: &str) -> &'static str {
         "not_a_measurement" => "the torque was computed, not measured",
         "outliers" => "too many outliers",
         "contact" => "the leg touched something",
-        "input" => "too few rows in which the joints move, or a torque that is always zero",
+        "input" => {
+            "too few rows in which the joints move, a torque that is always zero, or values in another unit"
+        }
         _ => "",
     }
 }

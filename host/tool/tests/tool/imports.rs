@@ -282,6 +282,16 @@ fn a_file_without_header_needs_columns_by_number() {
 }
 
 #[test]
+fn a_file_with_too_few_columns_names_how_many_the_leg_needs() {
+    let too_few = "The leg needs 5 columns, the time and each joint's angle and torque, and the file has 4; for a recording of \
+                   fewer joints give a leg file of those joints";
+    let message = refusal("t_s,q1_rad,q2_rad,tau1_Nm\n0,0,0,4\n", &Import::plain(2));
+    assert!(message.ends_with(&format!("No name resembles tau2. {too_few}")), "{message}");
+    let message = refusal("0,0,0,4\n", &Import::plain(2));
+    assert!(message.ends_with(&format!("its first row has 4 numbers (0, 0, 0, 4). {too_few}")), "{message}");
+}
+
+#[test]
 fn semicolons_tabs_and_decimal_commas_are_found_and_reported() {
     let expected = [
         (",", ".", "CSV with commas"),

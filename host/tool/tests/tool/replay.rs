@@ -193,6 +193,17 @@ fn a_file_with_more_joints_than_the_leg_gives_a_warning() {
 }
 
 #[test]
+fn a_last_line_without_line_end_gives_a_warning() {
+    let folder = folder_with("", &[]);
+    let whole = Motion::default().csv();
+    // Cut within the last number.
+    folder.write("a.csv", &whole[..whole.len() - 3]);
+    let (_, run) = replay(&folder, &["a.csv"], "");
+    let words = "a.csv: the last line has no line end: if the file was cut, its last value is wrong";
+    assert!(run.errors.contains(words), "{}", run.errors);
+}
+
+#[test]
 fn angles_outside_the_range_of_the_leg_give_a_warning() {
     let folder = folder_with("", &[("a.csv", Motion { centre: 9.0, ..Motion::default() })]);
     let (_, run) = replay(&folder, &["a.csv"], "");

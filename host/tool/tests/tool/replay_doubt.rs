@@ -305,6 +305,8 @@ fn a_wrong_unit_is_named_once_with_the_options_that_read_it() {
         let cause = report["likely_cause"]["words"].as_str().expect("words");
         assert!(cause.ends_with(&format!("; read it so by {options}")), "{cause}");
         assert_eq!(run.printed.matches(words).count(), 1, "{}", run.printed);
+        let explained = |reason: &&str| run.printed.contains(&format!("\n  {reason}: "));
+        assert!(reasons(&report).iter().all(explained), "{}", run.printed);
         replay(&samples, &options, 0);
     }
 }

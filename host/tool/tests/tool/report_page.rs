@@ -214,6 +214,14 @@ fn values_unknown_without_a_prior_are_dashes() {
         assert!(row.starts_with(&format!("{name}\u{2013}\u{2013}")), "{row}");
     }
     assert!(!page.text.contains("NaN") && !page.text.contains("null"), "an unknown number is printed");
+    // Nothing is attributed to a prior, no key of the JSON is a title, and no test is without a limit.
+    for words in ["come from the prior", "prior splits", "prior's limits", "by the prior", "Bandwidth"] {
+        assert!(!page.text.contains(words), "{words}");
+    }
+    assert!(
+        !page.all("table.tests td").iter().any(|cell| cell.ends_with("\u{a0}\u{2013}")),
+        "a test without a limit"
+    );
     assert!(page.all("table td").iter().any(|cell| cell.ends_with("fourier.csv")), "no source");
 }
 

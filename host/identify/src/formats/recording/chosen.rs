@@ -8,7 +8,7 @@ use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
 use crate::formats::recording::suggest::{
-    Reading, advice, command, example, nearest, readings, unit_in_name,
+    Reading, advice, by_number, command, nearest, readings, unit_in_name,
 };
 use crate::formats::recording::{LARGEST_POSITION_RAD, LARGEST_TIME_S, LARGEST_TORQUE_NM};
 use crate::report::reading::ColumnReport;
@@ -265,11 +265,7 @@ impl Finder<'_> {
         Fault::NoHeader {
             first: self.names.names.join(", "),
             columns: self.names.names.len(),
-            command: format!(
-                "{} --columns {} --units s,rad,Nm",
-                self.import.command,
-                example(self.import.drives.len())
-            ),
+            advice: by_number(self.names.names.len(), self.import),
         }
     }
 

@@ -45,6 +45,11 @@ impl<R: BufRead> Rows<R> {
     pub(crate) fn line(&self) -> usize {
         self.reader.get_ref().record_line()
     }
+
+    /// Whether the last row has no line end.
+    pub(crate) fn is_open(&self) -> bool {
+        self.reader.get_ref().is_open()
+    }
 }
 
 /// Passes the header to `find` and every row after it to `take`; returns the line of each row.

@@ -172,6 +172,7 @@ impl<'a> Decoder<'a> {
             columns: columns.iter().map(Chosen::report).collect(),
             skipped: skipped.rows,
             skipped_why: skipped.kinds.into_iter().map(|(_, why)| why).collect(),
+            warning: None,
         };
         Ok(Read { recording, report })
     }
@@ -293,7 +294,12 @@ pub fn csv(file: &Path, source: impl BufRead, packing: &str, import: &Import) ->
             decoder.skip(line, Fault::FieldCount { found: row.len(), expected })?;
         }
     }
-    decoder.finish(format!("{}{packing}", dialect.words()), names.are_stated)
+    let mut read = decoder.finish(format!("{}{packing}", dialect.words()), names.are_stated)?;
+    if rows.is_open() {
+        let words = "the last line has no line end: if the file was cut, its last value is wrong";
+        read.report.warning = Some(format!("{}: {words}", file.display()));
+    }
+    Ok(read)
 }
 
 /// Whether a first row is data: all its fields, or all those that are chosen by number, are numbers.

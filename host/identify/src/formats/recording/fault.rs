@@ -29,17 +29,14 @@ pub enum Fault {
         advice: String,
     },
     /// The first row has numbers only, and no columns are chosen by number.
-    #[error(
-        "the file has no header: its first row has {columns} numbers ({}). Name the columns by number, for example, if this \
-         is their order:\n  {command}", Excerpt(.first)
-    )]
+    #[error("the file has no header: its first row has {columns} numbers ({}). {advice}", Excerpt(.first))]
     NoHeader {
         /// First row.
         first: String,
         /// Number of its fields.
         columns: usize,
-        /// Example of a complete command.
-        command: String,
+        /// Example of a complete command, or the numbers that are needed.
+        advice: String,
     },
     /// A column is chosen by a number beyond the last one.
     #[error("--columns {signal}={number}: the file has {columns} columns")]
@@ -121,7 +118,7 @@ pub enum Fault {
     #[error("the header has the column `{0}` twice")]
     RepeatedColumn(String),
     /// A truncated line, decimal commas, or a line of another file.
-    #[error("{found} fields, but the header has {expected}: {}",
+    #[error("{found} field{}, but the header has {expected}: {}", if *.found == 1 { "" } else { "s" },
         if .found < .expected { "is the line truncated?" } else { "are these decimal commas?" })]
     FieldCount {
         /// Fields in this line.

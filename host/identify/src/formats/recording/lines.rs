@@ -20,11 +20,13 @@ pub(crate) struct Lines<R> {
     number: usize,
     /// First line passed since [`Lines::begin_record`].
     record: Option<usize>,
+    /// Whether the line passed last has no line end.
+    is_open: bool,
 }
 
 impl<R: BufRead> Lines<R> {
     pub(crate) fn new(source: R) -> Self {
-        Self { source, line: Vec::new(), passed: 0, number: 0, record: None }
+        Self { source, line: Vec::new(), passed: 0, number: 0, record: None, is_open: false }
     }
 
     /// Begins a record: the next line passed is its first.
@@ -35,6 +37,11 @@ impl<R: BufRead> Lines<R> {
     /// Line on which the record began, or at which reading ended.
     pub(crate) fn record_line(&self) -> usize {
         self.record.unwrap_or(self.number).max(1)
+    }
+
+    /// Whether the line passed last has no line end, so that the file may be cut there.
+    pub(crate) fn is_open(&self) -> bool {
+        self.is_open
     }
 
     /// Reads the next line that is neither blank nor a comment; false at the end.
@@ -59,6 +66,7 @@ impl<R: BufRead> Lines<R> {
                 return Err(io::Error::other("not a text file"));
             }
             if !is_skipped(&self.line) {
+                self.is_open = !self.line.ends_with(b"\n");
                 return Ok(true);
             }
         }

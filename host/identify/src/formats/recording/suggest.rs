@@ -162,16 +162,9 @@ pub(crate) fn advice(stated: &Names, import: &Import, certain: &[(Signal, usize)
     let others: Vec<_> =
         complete.map(|(topic, _)| topic.as_str()).filter(|topic| *topic != topics[best]).collect();
     let (mut found, missing) = all.swap_remove(best);
-    let joints = import.drives.len();
     if !missing.is_empty() {
         let missing: Vec<String> = missing.iter().map(ToString::to_string).collect();
-        return format!(
-            ". No name resembles {}. Name the columns by --columns SIGNAL=COLUMN,.. (a name, or a number from 1) and their \
-             units by --units, for example\n  {} --columns {} --units s,rad,Nm",
-            missing.join(", "),
-            import.command,
-            example(joints),
-        );
+        return format!(". No name resembles {}. {}", missing.join(", "), by_number(names.len(), import));
     }
     found.sort_by_key(|found| found.signal);
     let columns: Vec<String> = found
@@ -354,11 +347,26 @@ pub(crate) fn nearest<'a>(names: &'a [String], name: &str) -> Option<&'a str> {
     nearest.map(|(_, other)| other.as_str())
 }
 
-/// Columns of a file without a header, by number.
-pub(crate) fn example(joints: usize) -> String {
+/// Example of a command that names so many columns by number, or why they are too few.
+pub(crate) fn by_number(columns: usize, import: &Import) -> String {
+    let joints = import.drives.len();
+    let needed = 1 + 2 * joints;
+    if columns < needed {
+        let fewer =
+            if joints > 1 { "; for a recording of fewer joints give a leg file of those joints" } else { "" };
+        return format!(
+            "The leg needs {needed} columns, the time and each joint's angle and torque, and the file has {columns}{fewer}"
+        );
+    }
     let angles = (1..=joints).map(|joint| format!("q{joint}={}", joint + 1));
     let torques = (1..=joints).map(|joint| format!("tau{joint}={}", joint + 1 + joints));
-    std::iter::once("t=1".to_owned()).chain(angles).chain(torques).collect::<Vec<_>>().join(",")
+    let numbers: Vec<String> = std::iter::once("t=1".to_owned()).chain(angles).chain(torques).collect();
+    format!(
+        "Name the columns by --columns SIGNAL=COLUMN,.. (a name, or a number from 1) and their units by --units, for \
+         example, if this is their order:\n  {} --columns {} --units s,rad,Nm",
+        import.command,
+        numbers.join(",")
+    )
 }
 
 /// One unit for each quantity, and the exceptions.

@@ -84,12 +84,13 @@ fn record<const N: usize, const B: usize>(
     options: &ReplayOptions,
 ) -> Result<(Record<f32, N, B>, Vec<String>), ToolError> {
     let anatomy = anatomy::<N>(leg)?;
-    let Parts { training, screening, .. } = parts(recordings, options, leg, &[1.0; N])?;
+    let Parts { training, screening, read, .. } = parts(recordings, options, leg, &[1.0; N])?;
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
     let samples: Vec<Samples<N>> =
         training.iter().map(|recording| Samples::new(recording, &anatomy, options, &screening)).collect();
     feed(&mut recorder, background, &samples, "training", |_, _, _| {});
-    let warnings = samples.iter().filter_map(Samples::warning).collect();
+    let of_files = read.into_iter().filter_map(|read| read.warning);
+    let warnings = of_files.chain(samples.iter().filter_map(Samples::warning)).collect();
     Ok((settled(background, recorder.finish(), options).record().clone(), warnings))
 }

@@ -2,7 +2,7 @@
 //!
 //! Left: distribution of the residuals in units of the noise's standard deviation, against the
 //! normal distribution. Right: their autocorrelation, against that of white noise behind the same
-//! Residuals above that curve are not noise.
+//! filter. Residuals above that curve are not noise.
 
 use plotters::element::{PathElement, Rectangle};
 use plotters::style::Color;

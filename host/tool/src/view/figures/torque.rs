@@ -13,8 +13,8 @@ use crate::view::figures::curve;
 
 /// Heights of one motion's title, torque and residual; pixels.
 const CELL: (i32, i32, i32) = (20, 150, 102);
-/// Height of title and legend.
-const HEAD: i32 = 56;
+/// Height of title and two lines of legend.
+const HEAD: i32 = 64;
 /// Height of one joint in the small figure, pixels.
 const JOINT_HEIGHT: i32 = 181;
 /// Height of title and legends in the small figure.
@@ -41,6 +41,12 @@ fn predicted() -> ShapeStyle {
     line(DARK, 4)
 }
 
+/// Entries of the curves in the residual's frame: the noise-free one is known of a simulated leg only.
+fn residuals(is_simulated: bool) -> impl Iterator<Item = (&'static str, Key)> {
+    let noise_free = is_simulated.then(|| ("noise-free \u{2212} predicted", Key::Curve(noise_free())));
+    std::iter::once(("measured \u{2212} predicted", Key::Curve(measured_error()))).chain(noise_free)
+}
+
 /// Style of measured minus predicted torque.
 fn measured_error() -> ShapeStyle {
     line(BLUE, 3)
@@ -62,11 +68,9 @@ pub fn whole(
     if simulated {
         entries.push(("noise-free", Key::Curve(noise_free())));
     }
-    entries.extend([
-        ("residual", Key::Curve(measured_error())),
-        ("\u{b1}2 sigma of the noise", Key::Field(BAND)),
-        ("at rest, excluded", Key::Field(SHADE)),
-    ]);
+    entries.extend(residuals(simulated));
+    entries
+        .extend([("\u{b1}2 sigma of the noise", Key::Field(BAND)), ("at rest, excluded", Key::Field(SHADE))]);
     legend(area, (LEFT, 35), &entries)?;
     let (_, cells) = area.split_vertically(px(HEAD));
     let torque = range(curves.iter().flat_map(|(_, curves)| torques(curves)));
@@ -99,14 +103,15 @@ pub fn whole(
 pub fn small(area: &Area<'_>, joints: &[&str], motion: &MotionSeries) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("Torque on {} ({})", motion.name, motion.role.name()))?;
     let mut entries = vec![("measured", Key::Curve(measured())), ("predicted", Key::Curve(predicted()))];
-    if motion.joints.iter().any(|curves| !curves.noise_free_nm.is_empty()) {
+    let simulated = motion.joints.iter().any(|curves| !curves.noise_free_nm.is_empty());
+    if simulated {
         entries.push(("noise-free", Key::Curve(noise_free())));
     }
+    entries.push(("at rest", Key::Field(SHADE)));
     legend(area, (LEFT, 34), &entries)?;
     let (_, charts) = area.split_vertically(px(44));
     let (charts, foot) = charts.split_vertically(px(JOINT_HEIGHT * joints.len().max(1) as i32));
-    let entries = [("residual", Key::Curve(measured_error())), ("at rest, excluded", Key::Field(SHADE))];
-    legend(&foot, (LEFT, 14), &entries)?;
+    legend(&foot, (LEFT, 14), &residuals(simulated).collect::<Vec<_>>())?;
     let parts = charts.split_evenly((joints.len().max(1), 1));
     for (index, ((part, joint), curves)) in parts.iter().zip(joints).zip(&motion.joints).enumerate() {
         let last = index + 1 == joints.len();

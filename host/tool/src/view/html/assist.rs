@@ -21,8 +21,8 @@ const STABILITY: &str = "Share of the exoskeleton's inertia below which small vi
     acceleration is known late, which feeds slow vibrations; its lead feeds fast ones. \
     The cuffs' damping takes the energy away. Largest share over five knee angles from 10 to 90 degrees, with ";
 const LIMITS: &str = "Simulated legs and wearers, off the ground: swinging, seated or hanging. No force is measured \
-    at the cuffs. Before a person wears the leg, every mode is tried on hardware with a dummy \
-    (docs).";
+    at the cuffs. No person may wear the leg; on hardware every mode is to be tried with a dummy leg \
+    (docs/assist.md).";
 
 /// Section of the page: its title, its sentences, and its tables and figures.
 fn section(title: &str, words: &str, shown: &Markup) -> Markup {

@@ -94,7 +94,7 @@ pub fn page(report: &CommissionReport) -> String {
                         }
                         section {
                             h2 { "All parameters" }
-                            (parameters::statuses())
+                            (parameters::statuses(true))
                             @for (name, joint) in ["hip", "knee"].into_iter().zip(&report.joints) {
                                 h3 { "Parameters of the " (name) }
                                 (table(&joint.parameters).to_html())

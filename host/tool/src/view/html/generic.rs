@@ -14,7 +14,7 @@ use crate::view::html::number;
 use crate::view::html::table::{ToHtml, html_cell};
 
 /// Keys with their own sections on the page.
-const KNOWN: [&str; 39] = [
+const KNOWN: [&str; 44] = [
     "schema",
     "leg",
     "seed",
@@ -53,6 +53,11 @@ const KNOWN: [&str; 39] = [
     "directions",
     "misfit_over_noise",
     "at_prior_limit",
+    "recordings",
+    "bandwidth_hz",
+    "bandwidth_chosen",
+    "bandwidth_proposed_hz",
+    "bandwidth_for_stribeck_hz",
     "read",
 ];
 /// Limit of nesting on the page.

@@ -4,6 +4,7 @@ use maud::{Markup, html};
 use scarab_identify::report::RunReport;
 
 use crate::view::html::count;
+use crate::view::html::parameters::split;
 
 /// Paragraph with the affected parameters.
 pub fn section(run: &RunReport) -> Markup {
@@ -18,12 +19,16 @@ pub fn section(run: &RunReport) -> Markup {
             p {
                 "Joint torque depends on " (count(run.base_parameters.len(), "combination")) " of the "
                 (count(run.columns, "parameter")) " that were estimated, and on nothing else. However long the leg moves, the \
-                rest does not show; its values come from the prior, and a model completed by another prior \
-                predicts the same torque."
+                rest does not show. "
+                @if run.has_prior() {
+                    "Its values come from the prior, and a model completed by another prior predicts the same torque."
+                } @else {
+                    "Without a prior it has no values here; whatever they are, the predicted torque is the same."
+                }
             }
             ul {
                 @if !grouped.is_empty() {
-                    li { strong { "Grouped: " } (grouped.join(", ")) ". Only their sums are measured; the prior splits them." }
+                    li { strong { "Grouped: " } (grouped.join(", ")) ". Only their sums are measured, " (split(run.has_prior())) "." }
                 }
                 @if !prior.is_empty() {
                     li { strong { "Prior: " } (prior.join(", ")) ". Torque does not depend on them, or they were not estimated." }

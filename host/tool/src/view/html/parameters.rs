@@ -32,10 +32,12 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
     let joints = run.parameters.iter().map(|parameter| parameter.joint).max().unwrap_or(0);
     html! {
         h3 { "All parameters" }
-        (statuses())
+        (statuses(run.has_prior()))
         p.note { "Bars, each row on its own scale: dot the value, thick one sigma, thin three; hollow where no sigma is known. "
             span.truth-key { "\u{25c6}" } " truth" @if !truth { " (not known here)" } ", "
-            span.prior-key { "\u{25b2}" } " prior, at the edge where it lies beyond. Values have the digits that sigma supports, three without sigma." }
+            span.prior-key { "\u{25b2}" } " prior"
+            @if run.has_prior() { ", at the edge where it lies beyond" } @else { " (none was given)" }
+            ". Values have the digits that sigma supports, three without sigma." }
         @for joint in 1..=joints {
             h4 { "Joint " (joint) @if let Some(file) = leg.joints.get(joint - 1) { ": " (file.name) } }
             (tables::parameters(run.parameters.iter().filter(|parameter| parameter.joint == joint), truth).to_html())
@@ -43,12 +45,19 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
     }
 }
 
+/// What splits a measured sum of parameters.
+#[must_use]
+pub const fn split(has_prior: bool) -> &'static str {
+    if has_prior { "the prior splits them" } else { "without a prior nothing splits them" }
+}
+
 /// Meaning of each status.
-pub fn statuses() -> Markup {
+pub fn statuses(has_prior: bool) -> Markup {
     html! {
         p { (badge("identified")) " measured alone. " (badge("grouped"))
-            " only sums with the parameters beside it are measured, the prior splits them. " (badge("weak"))
-            " measured, hardly distinguishable from others. " (badge("prior")) " does not show in the torque." }
+            " only sums with the parameters beside it are measured, " (split(has_prior)) ". " (badge("weak"))
+            " measured, hardly distinguishable from others. " (badge("prior")) " does not show in the torque"
+            @if !has_prior { ", so it has no value without a prior" } "." }
     }
 }
 

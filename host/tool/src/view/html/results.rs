@@ -1,10 +1,9 @@
 //! Sections on motions, torques, search and tracking: text and tables beside their figures.
 
 use maud::{Markup, html};
-use scarab_base::table::{Table, cells};
+use scarab_base::table::{Table, cells, typeset};
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::report::series::Role;
-use scarab_identify::report::{FitReport, RunReport, Source, scale};
+use scarab_identify::report::{RunReport, Source, scale};
 
 use crate::view::html::table::ToHtml;
 use crate::view::html::{joint_name, number};
@@ -44,8 +43,9 @@ pub fn torque_words(run: &RunReport) -> Markup {
     html! { p {
         "Measured and predicted torque, both through the filter of the identification. The blue band is two standard \
         deviations of the filtered noise to both sides, as the identification estimates it: nineteen of twenty residuals \
-        of a perfect model lie within it. Grey: the joint is at rest, and the row is excluded."
-        @if run.seed.is_some() { " The noise-free torque is known because the leg is simulated." }
+        of a perfect model lie within it. Grey: the joint is at rest, and the row is excluded. Below each motion the blue \
+        curve is measured less predicted torque"
+        @if run.seed.is_some() { ", the orange one noise-free less predicted, known because the leg is simulated" } "."
     } }
 }
 
@@ -59,13 +59,7 @@ pub fn residual_words() -> Markup {
 
 /// Table of the residuals on every motion.
 pub fn fits(run: &RunReport, leg: &LegFile) -> Markup {
-    // Figures use this name for the motion identified from, too.
-    let is_recorded = run.seed.is_none() && run.trace.is_none();
-    let motion = |fit: &FitReport, role: Role| match role {
-        Role::Training if !is_recorded => "excitation".to_owned(),
-        _ => fit.motion.clone(),
-    };
-    html! { h3 { "Torque errors" } (tables::fits(run, motion, |joint| joint_name(leg, joint)).to_html()) }
+    html! { h3 { "Torque errors" } (tables::fits(run, |joint| joint_name(leg, joint)).to_html()) }
 }
 
 /// Text about the search.
@@ -79,12 +73,11 @@ pub fn search(run: &RunReport) -> Markup {
     let half = run.bso.iterations_to_half_chi2;
     html! { p {
         "The beetle swarm started cold and took " (run.bso.iterations) " iterations and " (run.bso.evaluations)
-        " evaluations. It ends " (number(run.bso.excess_chi2)) " chi-square units above the optimum J"
+        " evaluations. It ends " (typeset(&tables::excess(run.bso.excess_chi2))) " chi-square units above the optimum J"
         sub { "C" } " of its box, which double precision finds exactly; one unit is a shift by one standard deviation in one \
         direction."
         @if let Some(iterations) = half { " Half a unit was reached after " (iterations) " iterations." }
-        " Least squares costs " (number(run.least_squares.cost)) " units; the swarm's cost over that, less one, is "
-        (number(run.bso.cost_over_least_squares)) "."
+        " Least squares costs " (number(run.least_squares.cost)) " units."
     } }
 }
 
@@ -114,15 +107,20 @@ pub fn consistent(run: &RunReport) -> Markup {
             "iterations to half a unit",
         ])
         .text(["consistent"]);
-    let base = ("base values, completed by the prior", "base", &found.base);
-    let full = found.full.as_ref().map(|full| ("whole legs", "full", full));
+    let (limits, completed) = if run.has_prior() {
+        ("the prior's limits", "base values, completed by the prior")
+    } else {
+        ("limits by geometry and torque", "base values, completed by a neutral leg")
+    };
+    let base = (completed, "base", &found.base);
+    let full = found.full.as_ref().map(|full| ("whole legs, for comparison", "full", full));
     for (words, name, search) in core::iter::once(base).chain(full) {
         table.row(cells![
             format!("{words}{}", if found.chosen == name { " (the result)" } else { "" }),
             search.iterations,
             search.evaluations,
             search.steps,
-            number(search.excess_chi2),
+            typeset(&tables::excess(search.excess_chi2)),
             search.iterations_to_half_chi2.map_or("\u{2013}".to_owned(), |half| half.to_string()),
             match search.consistent {
                 Some(true) => "yes",
@@ -134,9 +132,9 @@ pub fn consistent(run: &RunReport) -> Markup {
     html! {
         section {
             h2 { "Physically consistent legs" }
-            p { "Of all legs whose every link has a mass above zero and an inertia that some body has, within the prior's \
-                limits, the best costs " (number(found.optimum_over_least_squares)) " chi-square units more than least squares, \
-                the result " (number(found.result_over_least_squares)) "."
+            p { "Of all legs whose every link has a mass above zero and an inertia that some body has, within " (limits)
+                ", the best costs " (number(found.optimum_over_least_squares)) " chi-square units more than least squares, \
+                the result " (typeset(&tables::excess(found.result_over_least_squares))) "."
                 @if let Some(freedom) = found.degrees_of_freedom { " Of noise alone that is a chi-square of at most " (freedom) " degrees of freedom." } }
             (table.to_html())
         }

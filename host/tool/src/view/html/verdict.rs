@@ -66,12 +66,9 @@ fn passed(run: &RunReport) -> String {
 
 /// Failures for a reason: their sentences, or the general explanation.
 fn sentences(reason: &str, run: &RunReport) -> Markup {
-    let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
-    let failed = run.findings.iter().filter(|finding| {
-        finding.reason == reason && !finding.passed && !cause.is_some_and(|cause| cause.says(finding))
-    });
-    let words: Vec<&str> =
-        failed.map(|finding| finding.words.as_str()).filter(|words| !words.is_empty()).collect();
+    let failed = run.findings.iter().filter(|finding| finding.reason == reason && !finding.passed);
+    let words: Vec<String> =
+        failed.map(|finding| tables::failure(run, finding)).filter(|words| !words.is_empty()).collect();
     let name = html! { strong { (reason.replace('_', " ")) } ": " };
     match words.as_slice() {
         [] => html! { (name) (tables::explanation(reason)) "." },
@@ -93,13 +90,15 @@ fn meaning(test: &str) -> (bool, &str) {
         "shaking" => (false, "rms speed beside the command, rad/s"),
         "drive" => (true, "the drive stayed enabled"),
         "speed" => (true, "rms speed, rad/s"),
+        "encoder_pulse" => (false, "speed of the pulse that one encoder count makes, rad/s"),
+        "encoder_steps" => (false, "share of error that the encoder's steps make"),
         "determined" => (true, "base parameters that are determined"),
         "condition" => (false, "condition of the scaled problem"),
         "predicted_uncertainty" => (false, "uncertainty of the predicted torque over its rms"),
         "finite" => (false, "parameters that are not finite"),
         "negative_parameter" => (false, "sigma by which a parameter is below what a body can have"),
         "negative_energy" => (false, "sigma by which kinetic energy is negative"),
-        "prior_box" => (false, "chi-square that the prior's limits cost"),
+        "prior_box" => (false, "chi-square that physical consistency costs"),
         "dynamic_share" => (true, "share of the torque that inertia and friction make"),
         "training_error" => (false, "rms error on the motion identified from, N m"),
         "whole_error" => (false, "error of all rows over their torque, excluded rows included"),
@@ -146,10 +145,12 @@ fn nearness(finding: &FindingReport) -> f64 {
     if share.is_nan() { 0.0 } else { share }
 }
 
-/// Every kind of test with its case nearest to the limit.
+/// Every kind of test with its case nearest to the limit. A passed test without a limit says nothing.
 pub fn tests(findings: &[FindingReport], leg: &LegFile) -> Markup {
+    let is_tested = |finding: &&FindingReport| finding.limit.known().is_some() || !finding.passed;
+    let findings: Vec<FindingReport> = findings.iter().filter(is_tested).cloned().collect();
     let mut kinds: Vec<(&str, &str)> = Vec::new();
-    for finding in findings {
+    for finding in &findings {
         if !kinds.contains(&(finding.reason, finding.test)) {
             kinds.push((finding.reason, finding.test));
         }
@@ -161,7 +162,7 @@ pub fn tests(findings: &[FindingReport], leg: &LegFile) -> Markup {
         .numbers(["value", "limit"])
         .text(["where"])
         .numbers(["passed"]);
-    kinds.iter().for_each(|kind| add_row(&mut table, findings, *kind, leg));
+    kinds.iter().for_each(|kind| add_row(&mut table, &findings, *kind, leg));
     html! { @if !kinds.is_empty() {
         section {
             h2 { "Tests of the verdict" }
