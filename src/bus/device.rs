@@ -315,18 +315,23 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     pub fn update(&mut self, status: &LegStatus<N>) {
         let drive = status.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
         let inputs = self.inputs(status);
-        for ((axis, status), inputs) in self.axes.iter_mut().zip(&status.joints).zip(inputs) {
-            axis.update(&JointStatus { inputs, ..*status });
-        }
+        let is_other = |activity| !matches!(activity, Activity::Idle | Activity::Follow);
+        let (is_busy, was_busy) = (is_other(status.activity), is_other(self.leg.activity()));
+        self.leg.update(status.activity, status.change);
         let (mut rises, mut stops) = (false, false);
-        for axis in &mut self.axes {
-            rises |= axis.take_rises();
-            stops |= axis.take_stop();
-            if !matches!(status.activity, Activity::Idle | Activity::Follow) {
+        let joints = self.axes.iter_mut().zip(&mut self.nodes).zip(status.joints.iter().zip(inputs));
+        for ((axis, node), (joint, inputs)) in joints {
+            let is_disabled = axis.update(&JointStatus { inputs, ..*joint });
+            if is_disabled || was_busy && !is_busy {
+                node.write_waiting(axis);
                 axis.void_targets();
             }
+            if is_busy {
+                axis.void_targets();
+            }
+            rises |= axis.take_rises();
+            stops |= axis.take_stop();
         }
-        self.leg.update(status.activity, status.change);
         let commanded = self.axes.iter().any(Axis::is_commanded);
         self.hosted = commanded || self.hosted && drive.permission() != Permission::Off;
         let refused = core::mem::take(&mut self.refused) || status.refused.is_some();

@@ -21,7 +21,7 @@ use super::nmt::{self, Command, NmtState, Reset};
 use super::node_id::NodeId;
 use super::objects::{Lost, Objects};
 use super::pdo::PDOS;
-use super::pdo::receive::{Receive, Received};
+use super::pdo::receive::Received;
 use super::sdo::Server;
 use super::silence::{Kind, Silence};
 use crate::hal::{Controller, Frame};
@@ -244,7 +244,7 @@ impl Node {
             Command::Go(next) => {
                 self.communication.state = next;
                 if state == NmtState::Operational || next == NmtState::Stopped {
-                    objects.lost(Lost::Stopped);
+                    self.lose(Lost::Stopped, objects);
                 }
                 if next == NmtState::Stopped {
                     self.server = Server::IDLE;
@@ -258,7 +258,7 @@ impl Node {
                 }
             }
             Command::Reset(reset) => {
-                objects.lost(Lost::Reset);
+                self.lose(Lost::Reset, objects);
                 if reset == Reset::Node {
                     objects.reset();
                 }
@@ -344,7 +344,10 @@ impl Node {
 
     /// Writes the objects of a received PDO. An object that rejects its value keeps the old one.
     fn write_received<O: Objects>(&mut self, index: usize, objects: &mut O) {
-        let Some(receive) = self.communication.receive.get(index) else { return };
+        let Some(receive) = self.communication.receive.get_mut(index) else { return };
+        if !receive.take_unwritten() {
+            return;
+        }
         let (parameters, data) = (receive.parameters, receive.data());
         let mut bytes = data.into_iter();
         for mapped in parameters.mapped() {
@@ -432,9 +435,16 @@ impl Node {
         }
     }
 
-    /// Reacts to a lost host. Its values that wait for a SYNC are void, as those that have become valid are.
+    /// Writes the values that wait for a SYNC, before targets become void: a stop among them acts, and a
+    /// target is void with the others. The SYNC writes nothing then.
+    pub(super) fn write_waiting<O: Objects>(&mut self, objects: &mut O) {
+        for index in 0..PDOS {
+            self.write_received(index, objects);
+        }
+    }
+
     fn lose<O: Objects>(&mut self, why: Lost, objects: &mut O) {
-        self.communication.receive.iter_mut().for_each(Receive::discard);
+        self.write_waiting(objects);
         objects.lost(why);
     }
 

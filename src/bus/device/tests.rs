@@ -6,6 +6,7 @@ use super::super::tests::IDENTITY;
 use super::*;
 use crate::bus::drive::Mode;
 use crate::bus::identification::ResultsCopy;
+use crate::leg::{AssistPhase, Target};
 use crate::units::{Ampere, NewtonMetre};
 
 mod lss;
@@ -28,6 +29,7 @@ struct Bench {
     refuses: Option<Refusal>,
     refused: Option<Refusal>,
     velocity: f32,
+    activity: Activity,
     now_us: u64,
     orders: Vec<LegOrder<2>>,
 }
@@ -57,6 +59,7 @@ impl Bench {
             refuses: None,
             refused: None,
             velocity: 0.0,
+            activity: Activity::Follow,
             now_us: 0,
             orders: Vec::new(),
         };
@@ -95,6 +98,7 @@ impl Bench {
             causes: self.causes,
             calibrated: self.calibrated,
             refused: self.refused.take(),
+            activity: self.activity,
             ..LegStatus::NONE
         });
         let order = self.device.order();
@@ -232,8 +236,8 @@ fn a_host_that_a_reset_left_in_control_is_missed_without_a_controlword() {
 }
 
 #[test]
-fn a_value_that_waits_for_a_sync_is_void_once_its_host_is_lost() {
-    for is_lost in [false, true] {
+fn targets_that_wait_for_a_sync_end_with_their_session() {
+    for end in ["none", "lost", "disabled", "assistance"] {
         let mut bench = Bench::new();
         bench.send(0, &[1, 0]);
         // The leg stays enabled without its host, and the node operational.
@@ -243,16 +247,59 @@ fn a_value_that_waits_for_a_sync_is_void_once_its_host_is_lost() {
             bench.write(1, index, sub, value, size);
         }
         bench.enable();
-        if is_lost {
+        if end == "lost" {
             bench.write(1, 0x1016, 1, 0x7F << 16 | 20, 4);
             bench.send(0x77F, &[5]);
         }
+        bench.activity =
+            if end == "assistance" { Activity::Assist(AssistPhase::Run) } else { Activity::Follow };
+        bench.run(1);
         bench.send(0x401, &[0, 0, 1, 0]);
+        bench.activity = Activity::Follow;
         bench.run(100);
+        if end == "disabled" {
+            bench.write(2, 0x6040, 0, 0, 2);
+            bench.enable();
+        }
         bench.send(0x80, &[]);
-        assert_eq!(bench.drive, DriveState::OperationEnabled);
+        assert_eq!(bench.drive, DriveState::OperationEnabled, "{end}");
         let command = bench.device.axes[0].command();
-        assert_eq!(command.target == crate::leg::Target::Hold, is_lost);
+        assert_eq!(command.target == Target::Hold, end != "none", "{end}");
+    }
+}
+
+#[test]
+fn a_stop_that_waits_for_a_sync_acts_when_another_host_is_lost() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    for (index, sub, value, size) in [(0x6007, 0, 0, 2), (0x1029, 1, 1, 1), (0x1400, 2, 1, 1)] {
+        bench.write(1, index, sub, value, size);
+    }
+    bench.enable();
+    bench.write(1, 0x1016, 1, 0x7F << 16 | 20, 4);
+    bench.send(0x77F, &[5]);
+    bench.send(0x201, &[2, 0]);
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+    bench.run(100);
+    assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+}
+
+#[test]
+fn a_lost_host_s_request_to_enable_does_not_wait_for_the_other_joint() {
+    for why in ["heartbeat", "reset"] {
+        let mut bench = Bench::new();
+        bench.send(0, &[1, 0]);
+        bench.write(1, 0x6007, 0, 0, 2);
+        bench.write(1, 0x1016, 1, 0x7F << 16 | 40, 4);
+        bench.send(0x77F, &[5]);
+        [6, 7, 0xF].into_iter().for_each(|word| bench.write(1, 0x6040, 0, word, 2));
+        if why == "reset" {
+            bench.send(0, &[129, 1]);
+        } else {
+            bench.run(200);
+        }
+        [6, 7, 0xF].into_iter().for_each(|word| bench.write(2, 0x6040, 0, word, 2));
+        assert_ne!(bench.drive, DriveState::OperationEnabled, "{why}");
     }
 }
 
@@ -370,7 +417,7 @@ fn a_target_received_after_the_tick_is_in_the_next_order() {
     bench.enable();
     bench.device.receive(&Frame::new(0x301, &500_000_i32.to_le_bytes()), bench.now_us, None, &NOTHING);
     let commands = bench.device.order().commands.expect("a host has the drive");
-    let crate::leg::Target::CyclicPosition { position, .. } = commands[0].target else {
+    let Target::CyclicPosition { position, .. } = commands[0].target else {
         panic!("{:?}", commands[0].target)
     };
     assert!((position.0 - 0.5).abs() < 1e-6);

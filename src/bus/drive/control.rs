@@ -314,6 +314,8 @@ pub struct Axis {
     stops: bool,
     /// Bit 4 of the last controlword; survives a lost host, so that a bit that stays set is no new request.
     held: bool,
+    /// The leg must leave its mode, because the set-points that it holds are void.
+    leaves_mode: bool,
     /// Bit 4 has risen and is not accepted yet.
     asks: bool,
     /// Bit 4 of the present controlword was accepted: set-point acknowledge or start of homing.
@@ -381,6 +383,7 @@ impl Axis {
             was_powered: false,
             stops: false,
             held: false,
+            leaves_mode: false,
             asks: false,
             taken: false,
             request_count: 0,
@@ -393,14 +396,18 @@ impl Axis {
         }
     }
 
-    /// Takes over the leg's status. Call [`Coupling::power`](super::Coupling::power) afterwards.
-    pub fn update(&mut self, status: &JointStatus) {
+    /// Takes over the leg's status. Call [`Coupling::power`](super::Coupling::power) afterwards. Returns whether
+    /// the joint was disabled, and its targets are void.
+    pub fn update(&mut self, status: &JointStatus) -> bool {
         self.status = *status;
+        self.leaves_mode &= status.mode != 0;
         let is_powered = self.is_powered();
-        if core::mem::replace(&mut self.was_powered, is_powered) && !is_powered {
+        let is_disabled = core::mem::replace(&mut self.was_powered, is_powered) && !is_powered;
+        if is_disabled {
             self.void_targets();
         }
         self.take_request();
+        is_disabled
     }
 
     /// Makes all targets void until they are written again, and a start by bit 4 that was not taken yet.
@@ -484,6 +491,11 @@ impl Axis {
     /// Whether both this joint and the leg are enabled.
     pub(super) fn is_powered(&self) -> bool {
         self.own.is_enabled() && self.status.drive.is_enabled()
+    }
+
+    /// Whether the joint follows targets, if its mode has them.
+    fn follows(&self) -> bool {
+        self.is_powered() && !self.leaves_mode
     }
 
     /// Handles a controlword.
@@ -590,7 +602,11 @@ impl Axis {
             },
             2 => self.own = self.own.after(DriveEvent::Requested(PowerRequest::DisableVoltage), 1),
             3 => self.stop(),
-            _ => {}
+            // A request of the lost host to enable must not wait for the other joint.
+            _ if !self.is_powered() => {
+                self.own = self.own.after(DriveEvent::Requested(PowerRequest::DisableVoltage), 1);
+            }
+            _ => self.leaves_mode = true,
         }
         // Bits held down are cleared, so that the next controlword has rising edges. A halt
         // of an enabled joint goes on.
@@ -655,7 +671,7 @@ impl Axis {
         let may_home = settings.homing_method != NO_METHOD
             && (settings.range[0]..=settings.range[1]).contains(&settings.home_offset);
         let target =
-            match Mode::from_number(settings.mode).filter(|mode| self.is_powered() && targets.has(*mode)) {
+            match Mode::from_number(settings.mode).filter(|mode| self.follows() && targets.has(*mode)) {
                 None => Target::Hold,
                 Some(Mode::ProfilePosition) => Target::ProfilePosition(self.set_point),
                 Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),

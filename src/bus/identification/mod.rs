@@ -116,9 +116,16 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
         (self.activity, self.change) = (activity, change);
     }
 
-    /// Discards what a host said about the next identification and assistance, when its session ends.
+    /// Activity of the leg at the last update.
+    pub const fn activity(&self) -> Activity {
+        self.activity
+    }
+
+    /// Discards what a host said about the next identification and assistance, when its session ends, and its
+    /// request to begin one.
     pub fn end_session(&mut self) {
         (self.wearing, self.shares) = (None, AssistShares::GRAVITY_ONLY);
+        self.requested = self.requested.filter(|_| !self.requests_motion());
     }
 
     /// Takes the pending request.

@@ -21,6 +21,7 @@ pub struct Receive {
     pub parameters: Parameters,
     data: [u8; 8],
     waits: bool,
+    is_written: bool,
     /// Deadline of the event timer, once a frame was received.
     due_us: Option<u64>,
 }
@@ -28,7 +29,7 @@ pub struct Receive {
 impl Receive {
     /// Creates a PDO that has received nothing.
     pub const fn new(parameters: Parameters) -> Self {
-        Self { parameters, data: [0; 8], waits: false, due_us: None }
+        Self { parameters, data: [0; 8], waits: false, is_written: true, due_us: None }
     }
 
     /// Takes over a frame with this PDO's COB-ID. Bytes beyond the mapped ones are ignored. The event timer
@@ -41,7 +42,7 @@ impl Receive {
         for (slot, byte) in self.data.iter_mut().zip(frame.data()) {
             *slot = *byte;
         }
-        self.waits = self.parameters.is_synchronous();
+        (self.waits, self.is_written) = (self.parameters.is_synchronous(), false);
         if !self.waits {
             self.restart_event_timer(now_us);
         }
@@ -77,15 +78,14 @@ impl Receive {
         1000 * u64::from(self.parameters.event_ms)
     }
 
-    /// Discards waiting values.
-    pub fn discard(&mut self) {
-        self.waits = false;
-    }
-
     /// Discards waiting values and stops the event timer.
     pub fn stop(&mut self) {
-        self.discard();
-        self.due_us = None;
+        (self.waits, self.is_written, self.due_us) = (false, true, None);
+    }
+
+    /// Whether the values have not been written to their objects; they are taken as written then.
+    pub fn take_unwritten(&mut self) -> bool {
+        !core::mem::replace(&mut self.is_written, true)
     }
 
     /// Returns the bytes of the last frame.

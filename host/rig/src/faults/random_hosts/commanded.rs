@@ -35,7 +35,7 @@ pub(super) struct Commanded {
     pub mode: Option<i8>,
     /// Commands, each with the tick in which it was sent.
     sent: Vec<(Command, u64)>,
-    /// Whether its targets have not become void unnoticed: by homing, a reset, a lost host.
+    /// Whether each event that makes its targets void is known.
     pub is_certain: bool,
     /// Whether 6072 may be too small to hold the pose.
     pub may_sag: bool,
@@ -44,12 +44,16 @@ pub(super) struct Commanded {
     /// Whether a host may have taken control of the leg.
     pub may_be_hosted: bool,
     /// Whether another mapping may be loaded at a reset.
-    has_saved: bool,
+    pub may_have_saved: bool,
+    /// Whether the node may reject a SYNC.
+    may_reject_sync: bool,
+    /// Whether the node may be stopped when its host is lost, and then reports nothing.
+    pub may_stop: bool,
     /// Objects of each received PDO, and whether they are certain.
     maps: [(Vec<Object>, bool); PDOS],
     /// Whether each received PDO is synchronous, and the bytes that may wait for a SYNC.
     is_synchronous: [Option<bool>; PDOS],
-    waiting: [Option<[u8; 8]>; PDOS],
+    waiting: [Option<([u8; 8], u64)>; PDOS],
 }
 
 /// Whether writing an object is a target or an offset.
@@ -66,7 +70,9 @@ impl Commanded {
             may_sag: false,
             halts: false,
             may_be_hosted: false,
-            has_saved: false,
+            may_have_saved: false,
+            may_reject_sync: false,
+            may_stop: false,
             maps: DEFAULT_MAPS.map(|object| (vec![object], true)),
             is_synchronous: [Some(false); PDOS],
             waiting: [None; PDOS],
@@ -76,8 +82,10 @@ impl Commanded {
     /// An object is on its way.
     pub fn write(&mut self, index: u16, sub: u8, tick: u64) {
         self.may_sag |= index == 0x6072;
-        self.has_saved |= index == 0x1010;
+        self.may_reject_sync |= matches!(index, 0x1005 | 0x1019);
+        self.may_stop |= index == 0x1029;
         if is_target(index) {
+            self.sent.retain(|(command, _)| *command != Command::Stay);
             self.note(Command::Value(index, sub), tick);
         }
         if let (0x1400..=0x1403, 2) = (index, sub) {
@@ -141,7 +149,11 @@ impl Commanded {
 
     /// Commands that were sent before this tick are void, but those that were on their way.
     pub fn void(&mut self, tick: u64, delay: u32) {
-        self.sent.retain(|(_, at)| at + ON_ITS_WAY + u64::from(delay) > tick);
+        let is_recent = |at: u64| at + ON_ITS_WAY + u64::from(delay) > tick;
+        self.sent.retain(|(_, at)| is_recent(*at));
+        for waiting in &mut self.waiting {
+            waiting.take_if(|(_, at)| !is_recent(*at));
+        }
     }
 
     /// The joint was homed: its targets would name other positions.
@@ -149,9 +161,9 @@ impl Commanded {
         self.sent.retain(|(command, _)| *command == Command::Enable);
     }
 
-    /// The host is lost since so many ticks at most: its commands are void, also those that wait for a SYNC.
+    /// The host was lost, `delay` ticks ago at most: its commands are void.
     pub fn lose(&mut self, tick: u64, delay: u32) {
-        (self.is_certain, self.waiting) = (false, [None; PDOS]);
+        self.is_certain = false;
         self.void(tick, delay);
     }
 
@@ -212,29 +224,33 @@ impl Commanded {
         self.set_mode(None);
         self.lose(tick, delay);
         for (map, object) in self.maps.iter_mut().zip(DEFAULT_MAPS) {
-            let saved = if self.has_saved { MAPPED.as_slice() } else { &[] };
-            *map = ([&[object], saved].concat(), !self.has_saved);
+            let saved = if self.may_have_saved { MAPPED.as_slice() } else { &[] };
+            *map = ([&[object], saved].concat(), !self.may_have_saved);
         }
-        self.is_synchronous = [Some(false).filter(|_| !self.has_saved); PDOS];
+        self.is_synchronous = [Some(false).filter(|_| !self.may_have_saved); PDOS];
     }
 
     /// A received PDO is on its way. Returns the objects that it may write now.
     pub fn receive(&mut self, pdo: usize, bytes: [u8; 8], tick: u64) -> Vec<u16> {
         let is_synchronous = self.is_synchronous[pdo];
-        self.waiting[pdo] = Some(bytes).filter(|_| is_synchronous != Some(false));
+        self.waiting[pdo] = Some((bytes, tick)).filter(|_| is_synchronous != Some(false));
         if is_synchronous == Some(true) { Vec::new() } else { self.act(pdo, bytes, tick) }
     }
 
     /// A SYNC is on its way. Returns the objects that it may write.
     pub fn synchronise(&mut self, tick: u64) -> Vec<u16> {
-        let waiting = std::mem::take(&mut self.waiting).into_iter().enumerate();
-        let acting = waiting.filter_map(|(pdo, bytes)| Some((pdo, bytes?)));
+        let waiting = self.waiting;
+        if !self.may_reject_sync {
+            self.waiting = [None; PDOS];
+        }
+        let acting = waiting.into_iter().enumerate().filter_map(|(pdo, waiting)| Some((pdo, waiting?.0)));
         acting.flat_map(|(pdo, bytes)| self.act(pdo, bytes, tick)).collect()
     }
 
-    /// Whether a received PDO may wait for a SYNC.
-    pub fn waits(&self) -> bool {
-        self.waiting.iter().any(Option::is_some)
+    /// Whether a mode may wait for a SYNC.
+    pub fn mode_waits(&self) -> bool {
+        let mut pdos = self.waiting.iter().zip(&self.maps);
+        pdos.any(|(waiting, map)| waiting.is_some() && map.0.iter().any(|object| object.0 == MODE))
     }
 
     fn act(&mut self, pdo: usize, bytes: [u8; 8], tick: u64) -> Vec<u16> {

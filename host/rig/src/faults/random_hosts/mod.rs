@@ -35,7 +35,7 @@ impl Object {
     /// Values that have an effect, where few have one.
     const fn usual_values(&self) -> &'static [i32] {
         match (self.0, self.1) {
-            (0x1005, _) => &[0x80, 0x90],
+            (0x1005, _) => &[0x80, 0x190],
             // "save", "load".
             (0x1010, _) => &[0x6576_6173],
             (0x1011, _) => &[0x6461_6F6C],
@@ -47,7 +47,7 @@ impl Object {
             (0x1F51, _) => &[0, 3],
             (0x1029, _) => &[0, 1, 2],
             (0x2011..=0x2013, _) => &[0, 1],
-            // Of the leg's own; units of 0.01 Hz and Hz.
+            // The leg's own bandwidths; units of 0.01 Hz and Hz.
             (0x2021, 1) => &[0, 300, 600],
             (0x2021, _) => &[0, 500, 1000],
             (0x2100, 1) => &[0, 1, 2, 3, 4, 5],

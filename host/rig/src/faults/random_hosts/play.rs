@@ -30,7 +30,7 @@ const REACHED: i32 = 0x400;
 const HALT: i32 = 0x100;
 
 /// Whether a new value of an object may change the torque at once in a mode. Profiles, homing, a new mode
-/// and a halt may not: they start from the joint's place, velocity and torque.
+/// and a halt may not: they start from the joint's position, velocity and torque.
 fn asks_for_a_step(mode: Option<i8>, index: u16) -> bool {
     let Some(mode) = mode else { return MODES.iter().any(|mode| asks_for_a_step(Some(*mode), index)) };
     match index {
@@ -61,6 +61,9 @@ impl<L: HostedLeg> Play<L> {
     ) -> Result<bool, String> {
         if matches!(index, WORD | MODE) {
             self.stops = [self.ticks + TAKES_OVER; JOINTS];
+        }
+        if index == 0x1010 {
+            self.commanded.iter_mut().for_each(|commanded| commanded.may_have_saved = true);
         }
         self.commanded[joint].write(index, sub, self.ticks);
         self.expect(joint, index);
@@ -169,7 +172,7 @@ impl<L: HostedLeg> Play<L> {
             if (commanded.mode.is_none() || commanded.maps_mode())
                 && let Some(mode) = self.read(joint, MODE, 0)?
             {
-                let mode = Some(mode as i8).filter(|_| !self.commanded[joint].waits());
+                let mode = Some(mode as i8).filter(|_| !self.commanded[joint].mode_waits());
                 if self.commanded[joint].mode != mode {
                     self.commanded[joint].set_mode(mode);
                     self.explain_pending(joint, mode);
@@ -325,7 +328,7 @@ impl<L: HostedLeg> Play<L> {
 
     fn nmt(&mut self, command: u8, node: u8) -> Result<(), String> {
         if command != 1 {
-            // A node that resets or stops says nothing of an earlier fault.
+            // A node that resets or stops does not report an earlier fault.
             self.unheard = None;
             self.commanded.iter_mut().for_each(|commanded| commanded.is_certain = false);
         }
@@ -375,10 +378,14 @@ impl<L: HostedLeg> Play<L> {
         }
         self.mode(joint, 3)?;
         self.enable()?;
-        self.write(joint, (0x1016, 1, 4), 0x7F << 16 | 150)?;
+        let watches = self.write(joint, (0x1016, 1, 4), 0x7F << 16 | 150)?;
         self.send(0x77F, &[5]);
+        let begins = self.ticks;
         self.write(joint, (0x60FF, 0, 4), speed)?;
         self.run(400 * MILLISECOND)?;
+        if watches && self.plugged && !self.commanded[joint].may_stop && self.lost_at[joint] < begins {
+            return Err(format!("targets: joint {joint} does not miss its host"));
+        }
         if self.is_enabled && !self.commanded[joint].may_move() && self.speed[joint].abs() > CREEP {
             return Err(format!("targets: joint {joint} goes on without its host"));
         }
@@ -399,13 +406,13 @@ impl<L: HostedLeg> Play<L> {
     fn sync(&mut self, count: u8, apart: u8, is_counted: bool) -> Result<(), String> {
         for number in 1..=count {
             let counter = [number];
-            self.sstop_sync(&counter[..usize::from(is_counted)]);
+            self.send_sync(&counter[..usize::from(is_counted)]);
             self.run(u32::from(apart))?;
         }
         self.learn_modes()
     }
 
-    fn sstop_sync(&mut self, data: &[u8]) {
+    fn send_sync(&mut self, data: &[u8]) {
         for joint in 0..JOINTS {
             let objects = self.commanded[joint].synchronise(self.ticks);
             self.expect_all(joint, &objects);
@@ -435,7 +442,7 @@ impl<L: HostedLeg> Play<L> {
             for _ in 0..count {
                 (0..JOINTS).for_each(|joint| self.pdo(joint, 1, &[0xF, 0, 0, 0, 0, 0, 0, 0]));
                 if with_sync {
-                    self.sstop_sync(&[]);
+                    self.send_sync(&[]);
                 }
                 self.run(u32::from(apart))?;
                 was_off |= !self.is_enabled || self.moves_itself || !self.plugged;

@@ -19,6 +19,7 @@
 
 use scarab::bus::Frame;
 use scarab::hal::{Contacts, SERVO_RATE_HZ};
+use scarab::leg::{FaultCode, NoticeCode};
 use scarab::model::planar::{BASE, JOINTS};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
@@ -46,7 +47,14 @@ const HEARD: u64 = 200 * MILLISECOND as u64;
 /// Longest time in which a joint slows down, ticks.
 const LONGEST_STOP: u64 = 2000 * MILLISECOND as u64;
 /// Emergencies of a host that is lost: heartbeat, event timer, silence, bus.
-const LOST: [u16; 6] = [0x8130, 0x8250, 0xFF0F, 0x8140, 0x8120, 0x8110];
+const LOST: [u16; 6] = [
+    FaultCode::Heartbeat.number(),
+    FaultCode::LatePdo.number(),
+    FaultCode::HostSilent.number(),
+    FaultCode::BusOff.number(),
+    FaultCode::BusPassive.number(),
+    NoticeCode::Overrun.number(),
+];
 /// Time after an emergency in which the next one waits, ticks.
 const INHIBIT: u64 = 15 * MILLISECOND as u64;
 /// Longest time for which an emergency may have waited, ticks.
@@ -164,9 +172,12 @@ pub(super) struct Play<L> {
     pub unheard: Option<(u16, u64)>,
     /// Code of each node's last emergency message, and its tick.
     pub heard: [(u16, u64); JOINTS],
+    /// Tick in which each node last reported that its host is lost.
+    pub lost_at: [u64; JOINTS],
     pub plugged: bool,
     /// Whether the operator may have enabled the leg.
     by_hand: bool,
+    is_switch_closed: bool,
     pub answer: Option<[u8; 8]>,
 }
 
@@ -193,8 +204,10 @@ impl<L: HostedLeg> Play<L> {
             slows: [(0, f32::INFINITY); JOINTS],
             unheard: None,
             heard: [(0, 0); JOINTS],
+            lost_at: [0; JOINTS],
             plugged: true,
             by_hand: false,
+            is_switch_closed: true,
             answer: None,
         }
     }
@@ -204,7 +217,9 @@ impl<L: HostedLeg> Play<L> {
     }
 
     pub fn hand(&mut self, enabling: bool, start: bool) {
-        self.by_hand |= enabling;
+        // Closing the switch enables the leg.
+        self.by_hand |= enabling && !self.is_switch_closed || start;
+        self.is_switch_closed = enabling;
         self.leg.hold(Contacts { enabling, start });
     }
 
@@ -247,6 +262,7 @@ impl<L: HostedLeg> Play<L> {
             let code = u16::from_le_bytes([*low, *high]);
             self.heard[node] = (code, ticks);
             if LOST.contains(&code) {
+                self.lost_at[node] = ticks;
                 self.commanded[node].lose(ticks, delay);
                 self.stops[node] = ticks + TAKES_OVER;
             }
@@ -261,6 +277,7 @@ impl<L: HostedLeg> Play<L> {
         let torque = core::mem::replace(&mut self.torque, seen.torque);
         self.position = seen.position;
         let moved_itself = core::mem::replace(&mut self.moves_itself, seen.moves_itself);
+        self.by_hand &= !was_enabled || seen.is_enabled;
         if was_enabled && !seen.is_enabled || moved_itself && !seen.moves_itself {
             for (commanded, pending) in self.commanded.iter_mut().zip(&mut self.pending) {
                 // A frame that is on its way belongs to the next session.
@@ -352,7 +369,10 @@ impl<L: HostedLeg> Play<L> {
             self.unheard = Some((fault, self.ticks));
         }
         let Some((code, since)) = self.unheard else { return Ok(()) };
-        if self.heard.iter().all(|heard| heard.0 == code && heard.1 + u64::from(L::DELAY) >= since) {
+        let is_heard = |(heard, commanded): (&(u16, u64), &Commanded)| {
+            commanded.may_stop || heard.0 == code && heard.1 + u64::from(L::DELAY) >= since
+        };
+        if self.heard.iter().zip(&self.commanded).all(is_heard) {
             self.unheard = None;
         } else if self.ticks > since + HEARD {
             return Err(format!("faults: {code:04X} of tick {since}, heard {:04X?}", self.heard));
