@@ -315,16 +315,13 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     pub fn update(&mut self, status: &LegStatus<N>) {
         let drive = status.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
         let inputs = self.inputs(status);
-        let is_other = |activity| !matches!(activity, Activity::Idle | Activity::Follow);
-        let (is_busy, was_busy) = (is_other(status.activity), is_other(self.leg.activity()));
+        let is_busy = !matches!(status.activity, Activity::Idle | Activity::Follow);
         self.leg.update(status.activity, status.change);
         let (mut rises, mut stops) = (false, false);
         let joints = self.axes.iter_mut().zip(&mut self.nodes).zip(status.joints.iter().zip(inputs));
         for ((axis, node), (joint, inputs)) in joints {
-            let is_disabled = axis.update(&JointStatus { inputs, ..*joint });
-            if is_disabled || was_busy && !is_busy {
-                node.write_waiting(axis);
-                axis.void_targets();
+            if axis.update(&JointStatus { inputs, ..*joint }) {
+                node.void_waiting();
             }
             if is_busy {
                 axis.void_targets();

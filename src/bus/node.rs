@@ -21,7 +21,7 @@ use super::nmt::{self, Command, NmtState, Reset};
 use super::node_id::NodeId;
 use super::objects::{Lost, Objects};
 use super::pdo::PDOS;
-use super::pdo::receive::Received;
+use super::pdo::receive::{Receive, Received};
 use super::sdo::Server;
 use super::silence::{Kind, Silence};
 use crate::hal::{Controller, Frame};
@@ -344,10 +344,8 @@ impl Node {
 
     /// Writes the objects of a received PDO. An object that rejects its value keeps the old one.
     fn write_received<O: Objects>(&mut self, index: usize, objects: &mut O) {
-        let Some(receive) = self.communication.receive.get_mut(index) else { return };
-        if !receive.take_unwritten() {
-            return;
-        }
+        let found = self.communication.receive.get(index);
+        let Some(receive) = found.filter(|receive| !receive.is_void()) else { return };
         let (parameters, data) = (receive.parameters, receive.data());
         let mut bytes = data.into_iter();
         for mapped in parameters.mapped() {
@@ -435,16 +433,14 @@ impl Node {
         }
     }
 
-    /// Writes the values that wait for a SYNC, before targets become void: a stop among them acts, and a
-    /// target is void with the others. The SYNC writes nothing then.
-    pub(super) fn write_waiting<O: Objects>(&mut self, objects: &mut O) {
-        for index in 0..PDOS {
-            self.write_received(index, objects);
-        }
+    /// Makes values void that wait for a SYNC, because the session ends in which they were sent.
+    pub(super) fn void_waiting(&mut self) {
+        self.communication.receive.iter_mut().for_each(Receive::void);
     }
 
+    /// Reacts to a lost host.
     fn lose<O: Objects>(&mut self, why: Lost, objects: &mut O) {
-        self.write_waiting(objects);
+        self.void_waiting();
         objects.lost(why);
     }
 

@@ -6,7 +6,7 @@ use super::super::tests::IDENTITY;
 use super::*;
 use crate::bus::drive::Mode;
 use crate::bus::identification::ResultsCopy;
-use crate::leg::{AssistPhase, Target};
+use crate::leg::Target;
 use crate::units::{Ampere, NewtonMetre};
 
 mod lss;
@@ -29,7 +29,6 @@ struct Bench {
     refuses: Option<Refusal>,
     refused: Option<Refusal>,
     velocity: f32,
-    activity: Activity,
     now_us: u64,
     orders: Vec<LegOrder<2>>,
 }
@@ -59,7 +58,6 @@ impl Bench {
             refuses: None,
             refused: None,
             velocity: 0.0,
-            activity: Activity::Follow,
             now_us: 0,
             orders: Vec::new(),
         };
@@ -98,7 +96,6 @@ impl Bench {
             causes: self.causes,
             calibrated: self.calibrated,
             refused: self.refused.take(),
-            activity: self.activity,
             ..LegStatus::NONE
         });
         let order = self.device.order();
@@ -237,7 +234,7 @@ fn a_host_that_a_reset_left_in_control_is_missed_without_a_controlword() {
 
 #[test]
 fn targets_that_wait_for_a_sync_end_with_their_session() {
-    for end in ["none", "lost", "disabled", "assistance"] {
+    for end in ["none", "lost", "disabled"] {
         let mut bench = Bench::new();
         bench.send(0, &[1, 0]);
         // The leg stays enabled without its host, and the node operational.
@@ -251,11 +248,7 @@ fn targets_that_wait_for_a_sync_end_with_their_session() {
             bench.write(1, 0x1016, 1, 0x7F << 16 | 20, 4);
             bench.send(0x77F, &[5]);
         }
-        bench.activity =
-            if end == "assistance" { Activity::Assist(AssistPhase::Run) } else { Activity::Follow };
-        bench.run(1);
         bench.send(0x401, &[0, 0, 1, 0]);
-        bench.activity = Activity::Follow;
         bench.run(100);
         if end == "disabled" {
             bench.write(2, 0x6040, 0, 0, 2);
@@ -269,23 +262,21 @@ fn targets_that_wait_for_a_sync_end_with_their_session() {
 }
 
 #[test]
-fn a_stop_that_waits_for_a_sync_acts_when_another_host_is_lost() {
-    let mut bench = Bench::new();
-    bench.send(0, &[1, 0]);
-    for (index, sub, value, size) in [(0x6007, 0, 0, 2), (0x1029, 1, 1, 1), (0x1400, 2, 1, 1)] {
-        bench.write(1, index, sub, value, size);
+fn a_request_to_begin_ends_with_its_session_and_one_to_end_stays() {
+    for (command, stays) in [(1, false), (4, false), (2, true), (5, true)] {
+        let mut bench = Bench::new();
+        bench.write(1, 0x6007, 0, 0, 2);
+        bench.enable();
+        bench.orders.clear();
+        let frame = Frame::new(0x601, &[0x2F, 0x00, 0x21, 1, command, 0, 0, 0]);
+        bench.device.receive(&frame, bench.now_us, None, &NOTHING);
+        bench.send(0, &[130, 1]);
+        assert_eq!(bench.orders.iter().any(|order| order.request.is_some()), stays, "{command}");
     }
-    bench.enable();
-    bench.write(1, 0x1016, 1, 0x7F << 16 | 20, 4);
-    bench.send(0x77F, &[5]);
-    bench.send(0x201, &[2, 0]);
-    assert_eq!(bench.drive, DriveState::OperationEnabled);
-    bench.run(100);
-    assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
 }
 
 #[test]
-fn a_lost_host_s_request_to_enable_does_not_wait_for_the_other_joint() {
+fn a_request_to_enable_ends_with_its_host() {
     for why in ["heartbeat", "reset"] {
         let mut bench = Bench::new();
         bench.send(0, &[1, 0]);

@@ -396,11 +396,11 @@ impl Axis {
         }
     }
 
-    /// Takes over the leg's status. Call [`Coupling::power`](super::Coupling::power) afterwards. Returns whether
-    /// the joint was disabled, and its targets are void.
+    /// Takes over the leg's status. Call [`Coupling::power`](super::Coupling::power) afterwards. Returns
+    /// whether the joint has just been disabled.
     pub fn update(&mut self, status: &JointStatus) -> bool {
         self.status = *status;
-        self.leaves_mode &= status.mode != 0;
+        self.leaves_mode &= status.mode != 0 || status.requests_seen != self.request_count;
         let is_powered = self.is_powered();
         let is_disabled = core::mem::replace(&mut self.was_powered, is_powered) && !is_powered;
         if is_disabled {
@@ -535,7 +535,7 @@ impl Axis {
     /// Takes a set-point or a start of homing, once the leg is in that mode and can take it.
     fn take_request(&mut self) {
         let mode = self.settings.mode;
-        if !self.asks || !self.is_powered() || self.status.mode != mode {
+        if !self.asks || !self.follows() || self.status.mode != mode {
             return;
         }
         match Mode::from_number(mode) {
@@ -602,8 +602,8 @@ impl Axis {
             },
             2 => self.own = self.own.after(DriveEvent::Requested(PowerRequest::DisableVoltage), 1),
             3 => self.stop(),
-            // A request of the lost host to enable must not wait for the other joint.
-            _ if !self.is_powered() => {
+            // A request of the lost host to enable must not wait for the other joint. A quick stop goes on.
+            _ if !self.is_powered() && !matches!(self.own, DriveState::QuickStopActive { .. }) => {
                 self.own = self.own.after(DriveEvent::Requested(PowerRequest::DisableVoltage), 1);
             }
             _ => self.leaves_mode = true,

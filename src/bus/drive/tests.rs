@@ -347,6 +347,41 @@ fn each_rising_edge_takes_one_set_point() {
 }
 
 #[test]
+fn set_points_end_with_their_host_although_the_leg_stays_enabled() {
+    let mut board = Board::enabled();
+    let status = JointStatus { drive: board.drive, mode: 1, ..JointStatus::NONE };
+    let axis = &mut board.axes[0];
+    axis.write(Object::at(0x6007, 0), 0).expect("no reaction");
+    axis.write(Object::at(0x6060, 0), 1).expect("a mode");
+    axis.update(&status);
+    axis.write(CONTROLWORD, 0x1F).expect("a word");
+    let seen = |count| JointStatus { requests_seen: count, ..status };
+    axis.update(&seen(1));
+    assert!(matches!(axis.command().target, Target::ProfilePosition(_)));
+    axis.lost(Lost::Heartbeat);
+    // Until the leg has left the mode, a new start waits.
+    axis.write(CONTROLWORD, 0xF).expect("a word");
+    axis.write(CONTROLWORD, 0x1F).expect("a word");
+    axis.update(&seen(1));
+    assert_eq!((axis.command().target, axis.command().request_count), (Target::Hold, 1));
+    axis.update(&JointStatus { mode: 0, ..seen(1) });
+    assert_eq!(axis.command().request_count, 1);
+    axis.update(&seen(1));
+    assert!(matches!(axis.command().target, Target::ProfilePosition(_)));
+    assert_eq!(axis.command().request_count, 2);
+}
+
+#[test]
+fn a_quick_stop_goes_on_when_a_lost_host_is_no_reason_to_stop() {
+    let mut board = Board::enabled();
+    let axis = &mut board.axes[0];
+    axis.write(Object::at(0x6007, 0), 0).expect("no reaction");
+    axis.write(CONTROLWORD, 2).expect("a word");
+    axis.lost(Lost::Heartbeat);
+    assert!(matches!(axis.own, DriveState::QuickStopActive { .. }));
+}
+
+#[test]
 fn an_edge_of_bit_4_in_another_mode_starts_nothing() {
     // Homing takes its start at once; `requests_of_one_mode_start_nothing_in_the_next` has 6 to 1.
     for (before, after) in [(3, 1), (8, 1), (3, 6), (1, 6)] {

@@ -116,16 +116,12 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
         (self.activity, self.change) = (activity, change);
     }
 
-    /// Activity of the leg at the last update.
-    pub const fn activity(&self) -> Activity {
-        self.activity
-    }
-
     /// Discards what a host said about the next identification and assistance, when its session ends, and its
-    /// request to begin one.
+    /// request to begin one. A request to end one stays.
     pub fn end_session(&mut self) {
         (self.wearing, self.shares) = (None, AssistShares::GRAVITY_ONLY);
-        self.requested = self.requested.filter(|_| !self.requests_motion());
+        self.requested =
+            self.requested.filter(|command| matches!(command, LegCommand::Cancel | LegCommand::EndAssist));
     }
 
     /// Takes the pending request.

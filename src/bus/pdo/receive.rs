@@ -21,7 +21,8 @@ pub struct Receive {
     pub parameters: Parameters,
     data: [u8; 8],
     waits: bool,
-    is_written: bool,
+    /// The values that wait belong to a session that has ended.
+    is_void: bool,
     /// Deadline of the event timer, once a frame was received.
     due_us: Option<u64>,
 }
@@ -29,7 +30,7 @@ pub struct Receive {
 impl Receive {
     /// Creates a PDO that has received nothing.
     pub const fn new(parameters: Parameters) -> Self {
-        Self { parameters, data: [0; 8], waits: false, is_written: true, due_us: None }
+        Self { parameters, data: [0; 8], waits: false, is_void: false, due_us: None }
     }
 
     /// Takes over a frame with this PDO's COB-ID. Bytes beyond the mapped ones are ignored. The event timer
@@ -42,7 +43,7 @@ impl Receive {
         for (slot, byte) in self.data.iter_mut().zip(frame.data()) {
             *slot = *byte;
         }
-        (self.waits, self.is_written) = (self.parameters.is_synchronous(), false);
+        (self.waits, self.is_void) = (self.parameters.is_synchronous(), false);
         if !self.waits {
             self.restart_event_timer(now_us);
         }
@@ -80,12 +81,17 @@ impl Receive {
 
     /// Discards waiting values and stops the event timer.
     pub fn stop(&mut self) {
-        (self.waits, self.is_written, self.due_us) = (false, true, None);
+        (self.waits, self.due_us) = (false, None);
     }
 
-    /// Whether the values have not been written to their objects; they are taken as written then.
-    pub fn take_unwritten(&mut self) -> bool {
-        !core::mem::replace(&mut self.is_written, true)
+    /// Makes waiting values void. Their SYNC still counts, and writes nothing.
+    pub fn void(&mut self) {
+        self.is_void = true;
+    }
+
+    /// Whether the values of the last frame are void.
+    pub const fn is_void(&self) -> bool {
+        self.is_void
     }
 
     /// Returns the bytes of the last frame.

@@ -171,6 +171,9 @@ enum Step {
     Near(usize, i32),
     /// Every target names the present position, speed 0 and torque 0.
     Stay(usize),
+    /// Limits that exclude a joint by this angle, micro-radian, are written while the leg is off. It is enabled in
+    /// this mode, and every target then names the present position.
+    Exclude(usize, i32, i8),
     /// Homing to this offset, micro-radian.
     Home(usize, i32),
     /// A received PDO, from 1, with these bytes.
@@ -186,8 +189,11 @@ enum Step {
     /// Both nodes are enabled by a host that sends its PDOs and SYNC at this distance, ticks. Then SYNC ends,
     /// and the PDOs go on.
     StopSync(u8),
-    /// An enabled joint moves at this speed, micro-radian/s, and goes on without its host, which is lost.
-    LoseHost(usize, i32),
+    /// An enabled joint is commanded to this velocity, with this limit for profiles, micro-radian/s.
+    Velocity(usize, i32, i32),
+    /// A joint moves at this speed, micro-radian/s, or by two set-points in profile position mode. Then its host
+    /// is lost, and the leg stays enabled.
+    LoseHost(usize, i32, bool),
     Nmt(u8, u8),
     /// LSS service, with its first byte of data.
     Lss(u8, u8),
@@ -250,8 +256,17 @@ impl Step {
                 Self::WordAndMode(joint, pdo, any_of(random, &WORDS), any_of(random, &MODES))
             }
             36 => Self::StopSync(4 + random.below(16) as u8),
-            37 => Self::LoseHost(joint, between(random, -200_000, 200_000)),
-            38..40 => Self::Stay(joint),
+            37 => Self::LoseHost(joint, between(random, -200_000, 200_000), random.coin()),
+            38 => Self::Stay(joint),
+            39 => {
+                let by = between(random, 15_000, 80_000) * if random.coin() { 1 } else { -1 };
+                Self::Exclude(joint, by, any_of(random, &[1, 3, 8, 8, 9]))
+            }
+            40 => Self::Velocity(
+                joint,
+                between(random, -1_500_000, 1_500_000),
+                between(random, 100_000, 2_000_000),
+            ),
             _ => Self::Wait(1 + random.below(1199) as u16),
         }
     }

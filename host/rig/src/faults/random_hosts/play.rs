@@ -249,7 +249,9 @@ impl<L: HostedLeg> Play<L> {
             Step::Enable => self.enable(),
             Step::Mode(joint, mode) => addressed(joint).try_for_each(|joint| self.mode(joint, mode)),
             Step::Near(joint, by) => self.near(joint, by),
+            Step::Velocity(joint, speed, limit) => self.velocity(joint, speed, limit),
             Step::Stay(joint) => self.stay(joint),
+            Step::Exclude(joint, by, mode) => self.exclude(joint, by, mode),
             Step::Home(joint, offset) => self.home(joint, offset),
             Step::Pdo(joint, number, bytes) => {
                 self.pdo(joint, number, &bytes);
@@ -267,7 +269,7 @@ impl<L: HostedLeg> Play<L> {
             Step::Cycle(words, count, apart) => self.cycle(words, count, apart),
             Step::Sync(count, apart, is_counted) => self.sync(count, apart, is_counted),
             Step::StopSync(apart) => self.stop_sync(apart),
-            Step::LoseHost(joint, speed) => self.lose_host(joint, speed),
+            Step::LoseHost(joint, speed, by_position) => self.lose_host(joint, speed, by_position),
             Step::Nmt(command, node) => self.nmt(command, node),
             Step::Lss(service, byte) => {
                 self.send(0x7E5, &[service, byte, 0, 0, 0, 0, 0, 0]);
@@ -326,6 +328,19 @@ impl<L: HostedLeg> Play<L> {
         Ok(())
     }
 
+    /// Enables a joint that its limits exclude: they must not pull it.
+    fn exclude(&mut self, joint: usize, by: i32, mode: i8) -> Result<(), String> {
+        self.disable(JOINTS, 0)?;
+        let Some(position) = self.read(joint, 0x6064, 0)? else { return Ok(()) };
+        let sub = if by > 0 { 1 } else { 2 };
+        self.write(joint, (0x607D, sub, 4), position.wrapping_add(by))?;
+        self.mode(joint, mode)?;
+        self.enable()?;
+        self.run(COMES_TO_REST as u32 * 5 / 4)?;
+        self.stay(joint)?;
+        self.run(100 * MILLISECOND)
+    }
+
     fn nmt(&mut self, command: u8, node: u8) -> Result<(), String> {
         if command != 1 {
             // A node that resets or stops does not report an earlier fault.
@@ -370,18 +385,37 @@ impl<L: HostedLeg> Play<L> {
         Ok(())
     }
 
+    /// Commands a velocity for 0.4 s.
+    fn velocity(&mut self, joint: usize, speed: i32, limit: i32) -> Result<(), String> {
+        self.mode(joint, 3)?;
+        self.write(joint, (0x6081, 0, 4), limit)?;
+        self.enable()?;
+        self.write(joint, (0x60FF, 0, 4), speed)?;
+        self.run(400 * MILLISECOND)?;
+        self.words()
+    }
+
     /// A host moves a joint and is lost; the leg stays enabled and comes to rest.
-    fn lose_host(&mut self, joint: usize, speed: i32) -> Result<(), String> {
+    fn lose_host(&mut self, joint: usize, speed: i32, by_position: bool) -> Result<(), String> {
         self.nmt(1, 0)?;
         for node in 0..JOINTS {
             self.write(node, (0x6007, 0, 2), 0)?;
         }
-        self.mode(joint, 3)?;
+        self.mode(joint, if by_position { 1 } else { 3 })?;
         self.enable()?;
         let watches = self.write(joint, (0x1016, 1, 4), 0x7F << 16 | 150)?;
         self.send(0x77F, &[5]);
         let begins = self.ticks;
-        self.write(joint, (0x60FF, 0, 4), speed)?;
+        if by_position {
+            self.write(joint, (0x6081, 0, 4), speed.abs())?;
+            for by in [speed, speed / 2] {
+                self.near(joint, by)?;
+                self.word(joint, 0x1F)?;
+                self.word(joint, 0x0F)?;
+            }
+        } else {
+            self.write(joint, (0x60FF, 0, 4), speed)?;
+        }
         self.run(400 * MILLISECOND)?;
         if watches && self.plugged && !self.commanded[joint].may_stop && self.lost_at[joint] < begins {
             return Err(format!("targets: joint {joint} does not miss its host"));
