@@ -171,8 +171,8 @@ enum Step {
     Near(usize, i32),
     /// Every target names the present position, speed 0 and torque 0.
     Stay(usize),
-    /// Limits that exclude a joint by this angle, micro-radian, are written while the leg is off. It is enabled in
-    /// this mode, and every target then names the present position.
+    /// Limits that exclude a joint by this angle, micro-radian, are written while the leg is off. The leg is
+    /// enabled in this mode, and every target then names the present position.
     Exclude(usize, i32, i8),
     /// Homing to this offset, micro-radian.
     Home(usize, i32),
@@ -191,8 +191,8 @@ enum Step {
     StopSync(u8),
     /// An enabled joint is commanded to this velocity, with this limit for profiles, micro-radian/s.
     Velocity(usize, i32, i32),
-    /// A joint moves at this speed, micro-radian/s, or by two set-points in profile position mode. Then its host
-    /// is lost, and the leg stays enabled.
+    /// A joint moves at this speed, micro-radian/s, or by two set-points in profile position mode. Then its
+    /// host is lost, and the leg stays enabled.
     LoseHost(usize, i32, bool),
     Nmt(u8, u8),
     /// LSS service, with its first byte of data.
