@@ -85,7 +85,7 @@ impl Commanded {
         self.may_reject_sync |= matches!(index, 0x1005 | 0x1019);
         self.may_stop |= index == 0x1029;
         if is_target(index) {
-            self.sent.retain(|(command, _)| *command != Command::Stay);
+            self.end_stay(tick);
             self.note(Command::Value(index, sub), tick);
         }
         if let (0x1400..=0x1403, 2) = (index, sub) {
@@ -119,6 +119,15 @@ impl Commanded {
     /// Targets that name the present position of a joint at rest are on their way.
     pub fn stay(&mut self, tick: u64) {
         self.note(Command::Stay, tick);
+    }
+
+    /// A new target ends a stay. The other targets that it named may act in other modes from now on.
+    fn end_stay(&mut self, tick: u64) {
+        if self.stays() {
+            self.sent.retain(|(command, _)| *command != Command::Stay);
+            self.note(Command::Value(0x607A, 0), tick);
+            self.note(Command::Value(0x60FF, 0), tick);
+        }
     }
 
     /// Whether the target may be the position in which the joint rests; it may still approach it.
