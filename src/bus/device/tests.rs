@@ -258,7 +258,31 @@ fn targets_that_wait_for_a_sync_end_with_their_session() {
         assert_eq!(bench.drive, DriveState::OperationEnabled, "{end}");
         let command = bench.device.axes[0].command();
         assert_eq!(command.target == Target::Hold, end != "none", "{end}");
+        // What is sent afterwards acts at its SYNC.
+        bench.send(0x401, &[0, 0, 1, 0]);
+        bench.send(0x80, &[]);
+        assert_ne!(bench.device.axes[0].command().target, Target::Hold, "{end}");
     }
+}
+
+#[test]
+fn a_sync_of_void_values_still_restarts_their_event_timer() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    bench.write(1, 0x1402, 2, 1, 1);
+    bench.write(1, 0x1402, 5, 20, 2);
+    bench.enable();
+    bench.send(0x401, &[0, 0, 1, 0]);
+    bench.send(0x80, &[]);
+    bench.send(0x401, &[0, 0, 1, 0]);
+    bench.write(2, 0x6040, 0, 0, 2);
+    assert_ne!(bench.drive, DriveState::OperationEnabled);
+    // 12 ms, SYNC, 12 ms: more than the time since the first SYNC, less than since the second one.
+    let is_late = |frames: &[Frame]| frames.iter().any(|frame| frame.data().starts_with(&[0x50, 0x82]));
+    let before = bench.run(48);
+    bench.send(0x80, &[]);
+    assert!(!is_late(&before) && !is_late(&bench.run(48)));
+    assert!(is_late(&bench.run(48)));
 }
 
 #[test]
