@@ -10,7 +10,9 @@
 //! no mode, halt        comes to rest along the profile and holds; a halted set-point goes on afterwards
 //! ```
 //!
-//! Nothing jumps: a new mode starts from the joint's present position and torque. A trajectory never leaves
+//! Nothing jumps: a new mode starts from the joint's present position and torque. What the demand before it
+//! added to a held trajectory, and a speed that the joint had not reached, fade within [`EASE_TICKS`]; so do
+//! those of a halt, and the offsets of a mode fade in. A trajectory never leaves
 //! the range or exceeds the speed limit. A cyclic position that is out of the following window when it would
 //! begin to be followed is not followed: the joint holds its pose until one within the window comes. Fault
 //! 8611: the distance to the commanded position exceeds the window for too long. In velocity modes a blocked
@@ -46,6 +48,8 @@ const LARGEST_HOME_RAD: f32 = core::f32::consts::TAU;
 /// so late is like one with a negative damper, stiffness times this delay. So the place is extrapolated over
 /// it, and the damping is never less than that.
 const DELAY_S: f32 = 0.0015;
+/// Ticks in which the demand on a held joint passes from one mode to the next, or into a halt: 10 ms.
+const EASE_TICKS: u8 = (SERVO_RATE_HZ / 100) as u8;
 
 /// Limits of a joint, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,6 +137,11 @@ pub struct Follower {
     /// Cyclic position: no target within the window has come yet.
     waits: bool,
     halted: bool,
+    /// Velocity and torque demanded of the held joint in the previous tick, rad/s and N m.
+    demanded: [f32; 2],
+    /// Difference of both to a new mode or a halt when it began, and the ticks in which it still fades.
+    eased: [f32; 2],
+    easing: u8,
     /// The host's limits (607D) as stated, and the range that they leave. When they come into force, at the
     /// beginning of a mode or by a change, they are extended to the joint: they must not pull it.
     stated: Option<[Radian; 2]>,
@@ -229,6 +238,9 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
+        demanded: [0.0; 2],
+        eased: [0.0; 2],
+        easing: 0,
         stated: None,
         range: [0.0; 2],
         returned: false,
@@ -266,7 +278,8 @@ impl Follower {
 
     /// Starts following from `course`. Requests made before are discarded.
     pub fn start(&mut self, command: &JointCommand, course: Course) {
-        *self = Self { seen: command.request_count, course, homed: self.homed, ..Self::NEW };
+        let demanded = [course.velocity(), 0.0];
+        *self = Self { seen: command.request_count, course, homed: self.homed, demanded, ..Self::NEW };
     }
 
     /// Runs one tick.
@@ -282,7 +295,8 @@ impl Follower {
         if command.halt && !was_halted {
             self.brake_from(measured);
         }
-        self.follows = command.target.mode().is_some() && !command.halt;
+        let followed =
+            core::mem::replace(&mut self.follows, command.target.mode().is_some() && !command.halt);
         self.stand(command, measured);
         let ends = core::mem::replace(&mut self.returned, measured.returns) && !measured.returns;
         self.limited = false;
@@ -343,17 +357,19 @@ impl Follower {
             }
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
                 if self.track_position(position.0, &tick) {
-                    Demand { velocity_offset: velocity_offset.0, torque: torque_offset.0, ..demand }
+                    let velocity_offset = self.bounded(velocity_offset.0, -bounds.speed, bounds.speed);
+                    Demand { velocity_offset, torque: self.torque_target(torque_offset.0, &tick), ..demand }
                 } else {
                     demand
                 }
             }
             Target::CyclicVelocity { velocity, torque_offset } => {
                 self.track_velocity(velocity.0, &tick);
-                Demand { torque: torque_offset.0, ..demand }
+                Demand { torque: self.torque_target(torque_offset.0, &tick), ..demand }
             }
         };
-        self.conclude(demand, &tick)
+        let demand = self.conclude(demand, &tick);
+        self.ease(demand, bounds, begins || self.follows != followed)
     }
 
     /// Range that the host's limits leave.
@@ -370,7 +386,7 @@ impl Follower {
         self.stands = self.still > ticks(command.standing_time);
     }
 
-    /// Torque that a torque mode is to give; none in a halt.
+    /// Torque of a torque mode, or the offset of a cyclic one, within its limit; none in a halt.
     fn torque_target(&mut self, target: f32, tick: &Tick<'_>) -> f32 {
         if tick.command.halt { 0.0 } else { self.bounded(target, -tick.largest, tick.largest) }
     }
@@ -470,6 +486,30 @@ impl Follower {
         Demand { course: self.course(), failed: self.deviated(command, measured), ..demand }
     }
 
+    /// Lets the demand on a held joint pass from the previous one to that of a new mode or a halt. Each
+    /// difference is limited to that which asks for the joint's largest torque.
+    fn ease(&mut self, demand: Demand, bounds: &Bounds, is_new: bool) -> Demand {
+        let wanted = [demand.course.velocity() + demand.velocity_offset, demand.torque];
+        if is_new {
+            let ([velocity, torque], [_, damping]) = (self.demanded, bounds.impedance);
+            let fastest = bounds.torque / damping;
+            self.eased = [
+                clamp(velocity - wanted[0], -fastest, fastest),
+                clamp(torque - wanted[1], -bounds.torque, bounds.torque),
+            ];
+            self.easing = EASE_TICKS;
+        }
+        let share = f32::from(self.easing) / f32::from(EASE_TICKS);
+        self.easing = self.easing.saturating_sub(1);
+        let [velocity, torque] = self.eased.map(|part| share * part);
+        self.demanded = [wanted[0] + velocity, wanted[1] + torque];
+        Demand {
+            velocity_offset: demand.velocity_offset + velocity,
+            torque: demand.torque + torque,
+            ..demand
+        }
+    }
+
     /// Starts a new mode from the present position, velocity and torque.
     fn begin(&mut self, command: &JointCommand, measured: &Measured) {
         self.mode = command.target.mode();
@@ -519,6 +559,7 @@ impl Follower {
     fn give(&mut self, demand: Demand, measured: &Measured) -> Demand {
         self.deviates = false;
         self.course = Course::moving(measured.position.0, measured.velocity.0);
+        (self.demanded, self.easing) = ([measured.velocity.0, 0.0], 0);
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 

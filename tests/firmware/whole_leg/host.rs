@@ -390,6 +390,57 @@ fn an_enabled_leg_is_taken_over_without_a_step_in_every_mode() {
     }
 }
 
+/// A leg that its host moves or loads runs on with other commands. Returns the largest step of the torque in
+/// a tick, N m, and the farthest that the joint moves.
+fn largest_step(mut hosted: Hosted, change: impl FnOnce(&mut JointCommand)) -> [f64; 2] {
+    let mut last = hosted.tick(None).servo.decision.torque[1];
+    let start = hosted.truth(1);
+    let mut largest = [0.0_f64; 2];
+    change(&mut hosted.commands[1]);
+    for _ in 0..SECOND / 4 {
+        let torque = hosted.tick(None).servo.decision.torque[1];
+        largest[0] = largest[0].max((torque - last).0.abs().into());
+        largest[1] = largest[1].max((hosted.truth(1) - start).abs());
+        last = torque;
+    }
+    assert!(is_enabled(&hosted.pair), "{:?}", hosted.status[1]);
+    largest
+}
+
+#[test]
+fn the_torque_of_a_mode_or_a_halt_does_not_step() {
+    let mut starting = Hosted::enabled_at([0.5, 0.9]);
+    starting.commands[1].acceleration = RadianPerSecondSquared(100.0);
+    starting.commands[1].target = Target::ProfileVelocity(RadianPerSecond(-0.1));
+    starting.run(10);
+    let mut loaded = Hosted::enabled_at([0.5, 0.9]);
+    let (velocity_offset, torque_offset) = (RadianPerSecond::ZERO, NewtonMetre(-15.0));
+    let position = Radian(loaded.position(1));
+    let target = Target::CyclicPosition { position, velocity_offset, torque_offset };
+    loaded.commands[1].target = target;
+    loaded.run(SECOND);
+    let mut halted = loaded.clone();
+    halted.commands[1].halt = true;
+    halted.run(SECOND);
+    let steps = [
+        (
+            "stop of a joint that starts",
+            largest_step(starting.clone(), |command| command.target = Target::Hold),
+        ),
+        ("halt of a joint that starts", largest_step(starting, |command| command.halt = true)),
+        ("halt of a loaded joint", largest_step(loaded.clone(), |command| command.halt = true)),
+        ("end of its mode", largest_step(loaded, |command| command.target = Target::Hold)),
+        ("end of its halt", largest_step(halted, |command| command.halt = false)),
+        (
+            "a mode with an offset",
+            largest_step(Hosted::enabled_at([0.5, 0.9]), |command| command.target = target),
+        ),
+    ];
+    for (what, [step, moved]) in steps {
+        assert!(step < 2.0 && moved < 0.01, "{what}: {step} N m, {moved} rad");
+    }
+}
+
 #[test]
 fn a_halt_ends_in_time_whatever_the_host_has_set() {
     for mode in [3, 4, 10] {

@@ -160,7 +160,7 @@ impl Commanded {
     pub fn void(&mut self, tick: u64, delay: u32) {
         let is_recent = |at: u64| at + ON_ITS_WAY + u64::from(delay) > tick;
         // The state that a request to enable brings about is seen late, its end at once by a boot-up message.
-        let is_asked = |at: u64| at + ON_ITS_WAY + 4 * u64::from(delay) > tick;
+        let is_asked = |at: u64| at + 2 * ON_ITS_WAY + 4 * u64::from(delay) > tick;
         self.sent.retain(|(command, at)| is_recent(*at) || *command == Command::Enable && is_asked(*at));
         for waiting in &mut self.waiting {
             waiting.take_if(|(_, at)| !is_recent(*at));

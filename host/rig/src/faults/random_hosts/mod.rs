@@ -149,8 +149,8 @@ const MAPPED: [Object; 10] = [
     Object(0x2020, 1, 2),
     Object(0x2020, 2, 2),
 ];
-/// The controlword and the mode in one PDO.
-const WORD_AND_MODE: [Object; 2] = [Object(0x6040, 0, 2), Object(0x6060, 0, 1)];
+const CONTROLWORD: Object = Object(0x6040, 0, 2);
+const MODE: Object = Object(0x6060, 0, 1);
 const MODES: [i8; 9] = [0, 1, 3, 4, 6, 8, 9, 10, -1];
 const WORDS: [u16; 14] = [0, 2, 6, 7, 0xB, 0xF, 0x1F, 0x3F, 0x5F, 0x7F, 0x10F, 0x11F, 0x80, 0x8F];
 const LSS_SERVICES: [u8; 7] = [0x04, 0x04, 0x13, 0x40, 0x46, 0x5A, 0x5E];
@@ -180,8 +180,11 @@ enum Step {
     Pdo(usize, u16, [u8; 8]),
     /// Objects of a received PDO, from 1.
     Map(usize, u16, [Object; 2]),
-    /// Controlword and mode in one received PDO, from 1, which is mapped for them.
-    WordAndMode(usize, u16, u16, i8),
+    /// Controlword and mode, the mode last or first, in one received PDO, from 1, which is mapped for them.
+    WordAndMode(usize, u16, u16, i8, bool),
+    /// Bit 4 rises in this mode, with a target so far from the joint, micro-radian, and stays. Then the mode
+    /// is profile position.
+    StartElsewhere(usize, i32, i8),
     /// The first PDO to every node with a controlword for each, so many times at this distance, ticks.
     Cycle([u16; JOINTS], u8, u8),
     /// SYNCs at this distance, ticks, with a counter or without.
@@ -191,6 +194,9 @@ enum Step {
     StopSync(u8),
     /// An enabled joint is commanded to this velocity, with this limit for profiles, micro-radian/s.
     Velocity(usize, i32, i32),
+    /// An enabled joint is loaded by an offset in cyclic velocity mode, in units of 6076, and set in motion at
+    /// this speed, micro-radian/s. Then it is halted, or its mode ends.
+    Load(usize, i32, i32, bool),
     /// A joint moves at this speed, micro-radian/s, or by two set-points in profile position mode. Then its
     /// host is lost, and the leg stays enabled.
     LoseHost(usize, i32, bool),
@@ -228,7 +234,7 @@ impl Step {
         let joint = random.below(JOINTS as u64) as usize;
         let some = random.below(JOINTS as u64 + 1) as usize;
         let byte = |random: &mut Random| random.below(256) as u8;
-        match random.below(44) {
+        match random.below(46) {
             0..8 => {
                 let object = any_of(random, &OBJECTS);
                 Self::Write(joint, object, object.draw_value(random))
@@ -253,7 +259,8 @@ impl Step {
             }
             35 => {
                 let pdo = 1 + random.below(4) as u16;
-                Self::WordAndMode(joint, pdo, any_of(random, &WORDS), any_of(random, &MODES))
+                let (word, mode) = (any_of(random, &WORDS), any_of(random, &MODES));
+                Self::WordAndMode(joint, pdo, word, mode, random.coin())
             }
             36 => Self::StopSync(4 + random.below(16) as u8),
             37 => Self::LoseHost(joint, between(random, -200_000, 200_000), random.coin()),
@@ -266,6 +273,17 @@ impl Step {
                 joint,
                 between(random, -1_500_000, 1_500_000),
                 between(random, 100_000, 2_000_000),
+            ),
+            41 => Self::StartElsewhere(
+                joint,
+                between(random, -200_000, 200_000),
+                any_of(random, &[0, 3, 4, 9, 10]),
+            ),
+            42 => Self::Load(
+                joint,
+                between(random, -800, 800),
+                between(random, -300_000, 300_000),
+                random.coin(),
             ),
             _ => Self::Wait(1 + random.below(1199) as u16),
         }

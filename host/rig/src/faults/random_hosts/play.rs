@@ -5,7 +5,7 @@ use scarab::model::planar::JOINTS;
 
 use super::commanded::{MODE, WORD};
 use super::witness::{COMES_TO_REST, CREEP, HELD, HostedLeg, MILLISECOND, NODES, Play, TAKES_OVER};
-use super::{MODES, Object, Step, WORD_AND_MODE};
+use super::{CONTROLWORD, MODE as MODE_OBJECT, MODES, Object, Step};
 
 /// Bits of 60FD that say why a leg is not enabled: an inhibit reason, no zeros, no calibration, a joint that
 /// is outside its range, moves, or has no reading.
@@ -24,6 +24,8 @@ const SPEED_CHANGE: u32 = 150_000;
 const ARMING_CYCLES: u32 = 25;
 /// Time in which a silent host stops the leg, ticks.
 const SILENCE_TICKS: u32 = 600 * MILLISECOND;
+/// Longest time for which the leg erases and writes its flash memory, ticks: two sectors.
+const LONGEST_FLASH_WRITE: u64 = 1000 * MILLISECOND as u64;
 /// Bit 10 of the statusword.
 const REACHED: i32 = 0x400;
 /// Halt bit of the controlword.
@@ -42,6 +44,8 @@ fn asks_for_a_step(mode: Option<i8>, index: u16) -> bool {
         0x60B2 => matches!(mode, 8..=10),
         0x2020 => mode == -1,
         0x6072 => true,
+        // A narrower window takes the commanded position to a joint that does not move on.
+        0x6065 => matches!(mode, 3 | 9),
         _ => false,
     }
 }
@@ -61,6 +65,9 @@ impl<L: HostedLeg> Play<L> {
     ) -> Result<bool, String> {
         if matches!(index, WORD | MODE) {
             self.stops = [self.ticks + TAKES_OVER; JOINTS];
+        }
+        if matches!(index, 0x1010 | 0x1011) {
+            self.writes_flash_until = self.ticks + LONGEST_FLASH_WRITE;
         }
         if index == 0x1010 {
             self.commanded.iter_mut().for_each(|commanded| commanded.may_have_saved = true);
@@ -119,7 +126,7 @@ impl<L: HostedLeg> Play<L> {
 
     /// A new value of an object is on its way to a joint.
     fn expect(&mut self, joint: usize, index: u16) {
-        self.pending[joint] |= matches!(index, 0x6071 | 0x60B1 | 0x60B2);
+        self.pending[joint] |= index == 0x6071;
         if asks_for_a_step(self.commanded[joint].mode, index) {
             self.explained[joint] = self.ticks + AFTER_VALUE;
         }
@@ -184,7 +191,7 @@ impl<L: HostedLeg> Play<L> {
 
     /// The value that a joint has in this mode begins to act: the leg is enabled, or the mode is new.
     pub(super) fn explain_pending(&mut self, joint: usize, mode: Option<i8>) {
-        if self.pending[joint] && matches!(mode, None | Some(4 | 8..=10)) {
+        if self.pending[joint] && matches!(mode, None | Some(4 | 10)) {
             self.explained[joint] = self.ticks + AFTER_VALUE;
         }
     }
@@ -250,6 +257,7 @@ impl<L: HostedLeg> Play<L> {
             Step::Mode(joint, mode) => addressed(joint).try_for_each(|joint| self.mode(joint, mode)),
             Step::Near(joint, by) => self.near(joint, by),
             Step::Velocity(joint, speed, limit) => self.velocity(joint, speed, limit),
+            Step::Load(joint, offset, speed, halts) => self.load(joint, offset, speed, halts),
             Step::Stay(joint) => self.stay(joint),
             Step::Exclude(joint, by, mode) => self.exclude(joint, by, mode),
             Step::Home(joint, offset) => self.home(joint, offset),
@@ -259,13 +267,20 @@ impl<L: HostedLeg> Play<L> {
                 self.learn_modes()
             }
             Step::Map(joint, number, objects) => self.map(joint, number, objects),
-            Step::WordAndMode(joint, number, word, mode) => {
-                self.map(joint, number, WORD_AND_MODE)?;
+            Step::WordAndMode(joint, number, word, mode, mode_first) => {
                 let ([low, high], [mode]) = (word.to_le_bytes(), mode.to_le_bytes());
-                self.pdo(joint, number, &[low, high, mode, 0, 0, 0, 0, 0]);
+                let (objects, bytes) = if mode_first {
+                    ([MODE_OBJECT, CONTROLWORD], [mode, low, high])
+                } else {
+                    ([CONTROLWORD, MODE_OBJECT], [low, high, mode])
+                };
+                self.map(joint, number, objects)?;
+                let [a, b, c] = bytes;
+                self.pdo(joint, number, &[a, b, c, 0, 0, 0, 0, 0]);
                 self.run(2)?;
                 self.learn_modes()
             }
+            Step::StartElsewhere(joint, by, mode) => self.start_elsewhere(joint, by, mode),
             Step::Cycle(words, count, apart) => self.cycle(words, count, apart),
             Step::Sync(count, apart, is_counted) => self.sync(count, apart, is_counted),
             Step::StopSync(apart) => self.stop_sync(apart),
@@ -311,14 +326,14 @@ impl<L: HostedLeg> Play<L> {
         self.write(joint, (0x607A, 0, 4), position.wrapping_add(by)).map(|_| ())
     }
 
-    /// Commands a joint to stay where it is. One that is held must not move.
+    /// Commands a joint to stay where it is, without offsets. One that is held must not move.
     fn stay(&mut self, joint: usize) -> Result<(), String> {
         let Some(position) = self.read(joint, 0x6064, 0)? else { return Ok(()) };
         let is_held = self.is_at_rest(joint);
         if is_held {
             self.commanded[joint].stay(self.ticks);
         }
-        for (index, bytes, value) in [(0x607A, 4, position), (0x60FF, 4, 0), (0x60B1, 4, 0), (0x60B2, 2, 0)] {
+        for (index, bytes, value) in [(0x60B1, 4, 0), (0x60B2, 2, 0), (0x607A, 4, position), (0x60FF, 4, 0)] {
             if is_held {
                 self.request(joint, (index, 0, bytes), value)?;
             } else {
@@ -339,6 +354,16 @@ impl<L: HostedLeg> Play<L> {
         self.run(COMES_TO_REST as u32 * 5 / 4)?;
         self.stay(joint)?;
         self.run(100 * MILLISECOND)
+    }
+
+    /// Sets bit 4 in another mode, and then profile position: nothing may start.
+    fn start_elsewhere(&mut self, joint: usize, by: i32, mode: i8) -> Result<(), String> {
+        self.mode(joint, mode)?;
+        self.enable()?;
+        self.near(joint, by)?;
+        self.word(joint, 0x1F)?;
+        self.mode(joint, 1)?;
+        self.run(50 * MILLISECOND)
     }
 
     fn nmt(&mut self, command: u8, node: u8) -> Result<(), String> {
@@ -395,8 +420,26 @@ impl<L: HostedLeg> Play<L> {
         self.words()
     }
 
+    /// Ends the motion of a joint that has just begun, and its load: by a halt, or with its mode.
+    fn load(&mut self, joint: usize, offset: i32, speed: i32, halts: bool) -> Result<(), String> {
+        self.mode(joint, 9)?;
+        self.enable()?;
+        self.write(joint, (0x60B2, 0, 2), offset)?;
+        self.write(joint, (0x60FF, 0, 4), 0)?;
+        self.run(AFTER_VALUE as u32)?;
+        self.write(joint, (0x60FF, 0, 4), speed)?;
+        if halts {
+            self.word(joint, 0xF | HALT as u16)?
+        } else {
+            self.mode(joint, 0)?
+        }
+        self.run(50 * MILLISECOND)
+    }
+
     /// A host moves a joint and is lost; the leg stays enabled and comes to rest.
     fn lose_host(&mut self, joint: usize, speed: i32, by_position: bool) -> Result<(), String> {
+        // The leg is silent while it writes its flash memory, and misses nobody.
+        self.run(self.writes_flash_until.saturating_sub(self.ticks) as u32)?;
         self.nmt(1, 0)?;
         for node in 0..JOINTS {
             self.write(node, (0x6007, 0, 2), 0)?;

@@ -6,7 +6,7 @@
 //! targets   a joint is moved only by a target that its mode needs and that a host has written to it since
 //!           the leg was last disabled, moved by itself or lost its host; by bit 4 only in profile position
 //! steps     no torque changes by a tenth of its limit in a tick, unless the host has just asked for it in
-//!           the joint's mode (`asks_for_a_step`), or a stop, a slower course or the monitor takes it away
+//!           the joint's mode (`asks_for_a_step`), or the monitor or the stop of a torque mode takes it away
 //! stops     a controlword by SDO that does not ask for operation disables the leg
 //! enabled   the leg is enabled by its operator, or by hosts that ask for it after it was disabled
 //! silence   a leg whose host sends no SYNC any more, and synchronous PDOs in vain, is stopped
@@ -156,7 +156,7 @@ pub(super) struct Play<L> {
     pub commanded: [Commanded; JOINTS],
     /// Tick until which a step of each joint's torque is explained.
     pub explained: [u64; JOINTS],
-    /// Whether a torque or an offset was written for it since the leg was last enabled.
+    /// Whether a torque was written for it since the leg was last enabled.
     pub pending: [bool; JOINTS],
     pub returns: [bool; JOINTS],
     bounded: [bool; JOINTS],
@@ -174,6 +174,8 @@ pub(super) struct Play<L> {
     pub heard: [(u16, u64); JOINTS],
     /// Tick in which each node last reported that its host is lost.
     pub lost_at: [u64; JOINTS],
+    /// Tick until which the leg may be writing its flash memory.
+    pub writes_flash_until: u64,
     pub plugged: bool,
     /// Whether the operator may have enabled the leg.
     by_hand: bool,
@@ -205,6 +207,7 @@ impl<L: HostedLeg> Play<L> {
             unheard: None,
             heard: [(0, 0); JOINTS],
             lost_at: [0; JOINTS],
+            writes_flash_until: 0,
             plugged: true,
             by_hand: false,
             is_switch_closed: true,
@@ -307,10 +310,13 @@ impl<L: HostedLeg> Play<L> {
             self.check_held(joint, is_held, seen)?;
             // A joint that returns has less torque.
             let returned = core::mem::replace(&mut self.returns[joint], returns);
-            // A monitor that acts or ends takes torque away, and so does a stop of a driven joint.
+            // A monitor that acts or ends takes torque away, and so does a stop in a torque mode: what braked
+            // the joint ends, or the halt's slope is steep.
             let bounded = core::mem::replace(&mut self.bounded[joint], seen.bounded[joint]);
             let is_slower = seen.speed.is_some_and(|speed| speed[joint].abs() < self.speed[joint].abs());
-            let takes = bounded || seen.bounded[joint] || is_slower || ticks < self.stops[joint];
+            let may_be_free = self.commanded[joint].mode.is_none_or(|mode| matches!(mode, 4 | 10 | -1));
+            let stops = may_be_free && (is_slower || ticks < self.stops[joint]);
+            let takes = bounded || seen.bounded[joint] || stops;
             let is_less = takes && now.abs() < before.abs() && now * before >= -0.01 * cap * cap;
             let explained = ticks < self.explained[joint]
                 || seen.moves_itself
