@@ -194,8 +194,8 @@ enum Step {
     StopSync(u8),
     /// An enabled joint is commanded to this velocity, with this limit for profiles, micro-radian/s.
     Velocity(usize, i32, i32),
-    /// Controlword and mode, the mode last or first, in one received PDO that is mapped for them.
-    /// this speed, micro-radian/s. Then it is halted, or its mode ends.
+    /// A joint in cyclic velocity mode is loaded by an offset, in units of 6076, and set in motion at this
+    /// speed, micro-radian/s. Then it is halted, or its mode ends.
     Load(usize, i32, i32, bool),
     /// A joint moves at this speed, micro-radian/s, or by two set-points in profile position mode. Then its
     /// host is lost, and the leg stays enabled.
