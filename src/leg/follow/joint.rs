@@ -10,10 +10,10 @@
 //! no mode, halt        comes to rest along the profile and holds; a halted set-point goes on afterwards
 //! ```
 //!
-//! Nothing jumps: a new mode starts from the joint's present position and torque. What the demand before it
-//! added to a held trajectory, and a speed that the joint had not reached, fade within [`EASE_TICKS`]; so do
-//! those of a halt, and the offsets of a mode fade in. A trajectory never leaves
-//! the range or exceeds the speed limit. A cyclic position that is out of the following window when it would
+//! A new mode starts from the joint's present position and torque. When a mode or a halt begins or ends,
+//! offsets of a held trajectory pass within [`EASE_TICKS`] from the old ones to the new ones. A commanded
+//! speed that the joint had not reached is an offset then. A trajectory never leaves the range or exceeds the
+//! speed limit. A cyclic position that is out of the following window when it would
 //! begin to be followed is not followed: the joint holds its pose until one within the window comes. Fault
 //! 8611: the distance to the commanded position exceeds the window for too long. In velocity modes a blocked
 //! joint is not a fault: the commanded position stays within the window around the measured one.
@@ -137,10 +137,10 @@ pub struct Follower {
     /// Cyclic position: no target within the window has come yet.
     waits: bool,
     halted: bool,
-    /// Velocity and torque demanded of the held joint in the previous tick, rad/s and N m.
-    demanded: [f32; 2],
-    /// Difference of both to a new mode or a halt when it began, and the ticks in which it still fades.
-    eased: [f32; 2],
+    /// Velocity and torque added to the trajectory in the previous tick, rad/s and N m, if it was held.
+    added: Option<[f32; 2]>,
+    /// Those at the last change of mode or halt, and the ticks for which they still fade.
+    before: [f32; 2],
     easing: u8,
     /// The host's limits (607D) as stated, and the range that they leave. When they come into force, at the
     /// beginning of a mode or by a change, they are extended to the joint: they must not pull it.
@@ -238,8 +238,8 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
-        demanded: [0.0; 2],
-        eased: [0.0; 2],
+        added: None,
+        before: [0.0; 2],
         easing: 0,
         stated: None,
         range: [0.0; 2],
@@ -254,6 +254,11 @@ impl Follower {
         homed: false,
         deviates: false,
     };
+
+    /// Whether the joint is commanded to be at rest, without offsets.
+    pub fn is_still(&self) -> bool {
+        self.course().velocity() == 0.0 && self.added.unwrap_or_default() == [0.0; 2]
+    }
 
     /// Commanded trajectory.
     #[must_use]
@@ -278,25 +283,26 @@ impl Follower {
 
     /// Starts following from `course`. Requests made before are discarded.
     pub fn start(&mut self, command: &JointCommand, course: Course) {
-        let demanded = [course.velocity(), 0.0];
-        *self = Self { seen: command.request_count, course, homed: self.homed, demanded, ..Self::NEW };
+        let (seen, added) = (command.request_count, Some([0.0; 2]));
+        *self = Self { seen, course, homed: self.homed, added, ..Self::NEW };
     }
 
     /// Runs one tick.
     pub fn follow(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) -> Demand {
         let begins = command.target.mode() != self.mode;
         if begins {
-            self.begin(command, measured);
+            self.begin(command, measured, bounds);
         }
         let is_new = core::mem::replace(&mut self.seen, command.request_count) != command.request_count;
         // A request of the mode before starts nothing in the one that begins.
         let is_requested = is_new && !begins;
         let was_halted = core::mem::replace(&mut self.halted, command.halt);
         if command.halt && !was_halted {
-            self.brake_from(measured);
+            self.brake_from(measured, bounds);
+        } else if was_halted && !command.halt {
+            self.ease(bounds);
         }
-        let followed =
-            core::mem::replace(&mut self.follows, command.target.mode().is_some() && !command.halt);
+        self.follows = command.target.mode().is_some() && !command.halt;
         self.stand(command, measured);
         let ends = core::mem::replace(&mut self.returned, measured.returns) && !measured.returns;
         self.limited = false;
@@ -358,18 +364,17 @@ impl Follower {
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
                 if self.track_position(position.0, &tick) {
                     let velocity_offset = self.bounded(velocity_offset.0, -bounds.speed, bounds.speed);
-                    Demand { velocity_offset, torque: self.torque_target(torque_offset.0, &tick), ..demand }
+                    Demand { velocity_offset, torque: self.torque_offset(torque_offset, bounds), ..demand }
                 } else {
                     demand
                 }
             }
             Target::CyclicVelocity { velocity, torque_offset } => {
                 self.track_velocity(velocity.0, &tick);
-                Demand { torque: self.torque_target(torque_offset.0, &tick), ..demand }
+                Demand { torque: self.torque_offset(torque_offset, bounds), ..demand }
             }
         };
-        let demand = self.conclude(demand, &tick);
-        self.ease(demand, bounds, begins || self.follows != followed)
+        self.conclude(demand, &tick)
     }
 
     /// Range that the host's limits leave.
@@ -386,9 +391,15 @@ impl Follower {
         self.stands = self.still > ticks(command.standing_time);
     }
 
-    /// Torque of a torque mode, or the offset of a cyclic one, within its limit; none in a halt.
+    /// Torque that a torque mode is to give; none in a halt.
     fn torque_target(&mut self, target: f32, tick: &Tick<'_>) -> f32 {
         if tick.command.halt { 0.0 } else { self.bounded(target, -tick.largest, tick.largest) }
+    }
+
+    /// Offset of a held joint's torque. The limit is the joint's own: a host's, or that of a return, limits
+    /// the sum with the controller's torque, which answers the offset.
+    fn torque_offset(&mut self, offset: NewtonMetre, bounds: &Bounds) -> f32 {
+        self.bounded(offset.0, -bounds.torque, bounds.torque)
     }
 
     /// Profile torque: changes the torque along its slope.
@@ -439,14 +450,19 @@ impl Follower {
         // For a joint outside its range: the end of the range that it returns to.
         let from = if measured.returns { clamp(actual, bounds.range[0], bounds.range[1]) } else { actual };
         let is_far = abs(target - from) > command.following_window.0;
+        let waited = self.waits;
         self.waits |= tick.starts || measured.returns && is_far;
         if self.waits && is_far {
+            if !waited {
+                self.ease(&tick.bounds);
+            }
             self.close_gap();
             self.stop(tick);
             (self.follows, self.reached) = (false, false);
             return false;
         }
         if core::mem::take(&mut self.waits) {
+            self.ease(&tick.bounds);
             self.gap = Course::moving(self.course.position() - target, self.course.velocity());
             (self.course, self.target) = (Course::at_rest(target), target);
         }
@@ -483,37 +499,31 @@ impl Follower {
             let ([low, high], actual) = (bounds.range, measured.position.0);
             self.course.keep_between(min(low, actual), max(high, actual));
         }
-        Demand { course: self.course(), failed: self.deviated(command, measured), ..demand }
+        let mut added = [demand.velocity_offset, demand.torque];
+        if self.easing > 0 {
+            self.easing -= 1;
+            let share = f32::from(self.easing) / f32::from(EASE_TICKS);
+            let part = |before: f32, now: f32| share * before + (1.0 - share) * now;
+            added = [part(self.before[0], added[0]), part(self.before[1], added[1])];
+        }
+        self.added = Some(added);
+        let [velocity_offset, torque] = added;
+        let failed = self.deviated(command, measured);
+        Demand { course: self.course(), velocity_offset, torque, failed, ..demand }
     }
 
-    /// Lets the demand on a held joint pass from the previous one to that of a new mode or a halt. Each
-    /// difference is limited to that which asks for the joint's largest torque.
-    fn ease(&mut self, demand: Demand, bounds: &Bounds, is_new: bool) -> Demand {
-        let wanted = [demand.course.velocity() + demand.velocity_offset, demand.torque];
-        if is_new {
-            let ([velocity, torque], [_, damping]) = (self.demanded, bounds.impedance);
-            let fastest = bounds.torque / damping;
-            self.eased = [
-                clamp(velocity - wanted[0], -fastest, fastest),
-                clamp(torque - wanted[1], -bounds.torque, bounds.torque),
-            ];
-            self.easing = EASE_TICKS;
-        }
-        let share = f32::from(self.easing) / f32::from(EASE_TICKS);
-        self.easing = self.easing.saturating_sub(1);
-        let [velocity, torque] = self.eased.map(|part| share * part);
-        self.demanded = [wanted[0] + velocity, wanted[1] + torque];
-        Demand {
-            velocity_offset: demand.velocity_offset + velocity,
-            torque: demand.torque + torque,
-            ..demand
-        }
+    /// Lets the present offsets fade, those of the next mode or halt come. A speed beyond the one that asks
+    /// for the joint's largest torque ends at once.
+    fn ease(&mut self, bounds: &Bounds) {
+        let ([velocity, torque], [_, damping]) = (self.added.unwrap_or_default(), bounds.impedance);
+        let fastest = bounds.torque / damping;
+        (self.before, self.easing) = ([clamp(velocity, -fastest, fastest), torque], EASE_TICKS);
     }
 
     /// Starts a new mode from the present position, velocity and torque.
-    fn begin(&mut self, command: &JointCommand, measured: &Measured) {
+    fn begin(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) {
         self.mode = command.target.mode();
-        self.brake_from(measured);
+        self.brake_from(measured, bounds);
         (self.torque, _) = measured.holding_and_braking();
         (self.goal, self.next, self.left) = (None, None, 0);
         (self.arrived, self.waits) = (false, false);
@@ -524,11 +534,13 @@ impl Follower {
 
     /// Continues with no more than the joint's own velocity. A cyclic target that has jumped leaves the
     /// course with a velocity that the joint has not reached, and a stop must not drive it up to that.
-    fn brake_from(&mut self, measured: &Measured) {
+    fn brake_from(&mut self, measured: &Measured, bounds: &Bounds) {
         self.close_gap();
         let velocity = self.course.velocity();
         let own = clamp(measured.velocity.0, min(velocity, 0.0), max(velocity, 0.0));
         self.course = Course::moving(self.course.position(), own);
+        self.added = self.added.map(|[added, torque]| [added + velocity - own, torque]);
+        self.ease(bounds);
     }
 
     /// Merges the gap into the course.
@@ -559,7 +571,7 @@ impl Follower {
     fn give(&mut self, demand: Demand, measured: &Measured) -> Demand {
         self.deviates = false;
         self.course = Course::moving(measured.position.0, measured.velocity.0);
-        (self.demanded, self.easing) = ([measured.velocity.0, 0.0], 0);
+        (self.added, self.easing) = (None, 0);
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 

@@ -98,10 +98,10 @@ impl<const N: usize> Following<N> {
         }
     }
 
-    /// Whether all joints are commanded to be at rest.
+    /// Whether all joints are commanded to be at rest, without offsets.
     #[must_use]
     pub fn is_still(&self) -> bool {
-        self.joints.iter().all(|joint| joint.course().velocity() == 0.0)
+        self.joints.iter().all(Follower::is_still)
     }
 
     /// Takes over the servo's output of the last tick.

@@ -422,7 +422,12 @@ fn the_torque_of_a_mode_or_a_halt_does_not_step() {
     let mut halted = loaded.clone();
     halted.commands[1].halt = true;
     halted.run(SECOND);
+    let mut withdrawn = halted.clone();
+    withdrawn.commands[1].halt = false;
+    withdrawn.run(4);
+    let without = Target::CyclicPosition { position, velocity_offset, torque_offset: NewtonMetre::ZERO };
     let steps = [
+        ("an offset withdrawn while it comes", largest_step(withdrawn, |command| command.target = without)),
         (
             "stop of a joint that starts",
             largest_step(starting.clone(), |command| command.target = Target::Hold),
