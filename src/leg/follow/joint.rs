@@ -81,15 +81,6 @@ pub struct Measured {
     pub returns: bool,
 }
 
-impl Measured {
-    /// Parts of the applied torque that hold the joint and that brake it, N m.
-    fn holding_and_braking(&self) -> (f32, f32) {
-        let NewtonMetre(applied) = self.applied;
-        let holding = clamp((self.wanted - self.braking).0, min(applied, 0.0), max(applied, 0.0));
-        (holding, applied - holding)
-    }
-}
-
 /// Demand on the servo at one tick, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
@@ -107,6 +98,16 @@ pub struct Demand {
     pub failed: bool,
     /// New zero for hosts: what they read where the joint's own angle is zero.
     pub zero: Option<Radian>,
+}
+
+/// What is added to a held trajectory.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Offsets {
+    /// A host's offsets: velocity, rad/s, and torque, N m. The controller's integral may balance them.
+    velocity: f32,
+    torque: f32,
+    /// Speed that the trajectory had and the joint had not reached, rad/s. Only drives the joint.
+    unreached: f32,
 }
 
 /// State of one joint.
@@ -137,11 +138,13 @@ pub struct Follower {
     /// Cyclic position: no target within the window has come yet.
     waits: bool,
     halted: bool,
-    /// Velocity and torque added to the trajectory in the previous tick, rad/s and N m, if it was held.
-    added: Option<[f32; 2]>,
+    /// What the previous tick added to the trajectory; nothing if it was not held.
+    added: Offsets,
     /// Those at the last change of mode or halt, and the ticks for which they still fade.
-    before: [f32; 2],
+    before: Offsets,
     easing: u8,
+    /// Whether the trajectory was held in the previous tick.
+    held: bool,
     /// The host's limits (607D) as stated, and the range that they leave. When they come into force, at the
     /// beginning of a mode or by a change, they are extended to the joint: they must not pull it.
     stated: Option<[Radian; 2]>,
@@ -238,9 +241,10 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
-        added: None,
-        before: [0.0; 2],
+        added: Offsets { velocity: 0.0, torque: 0.0, unreached: 0.0 },
+        before: Offsets { velocity: 0.0, torque: 0.0, unreached: 0.0 },
         easing: 0,
+        held: true,
         stated: None,
         range: [0.0; 2],
         returned: false,
@@ -257,7 +261,7 @@ impl Follower {
 
     /// Whether the joint is commanded to be at rest, without offsets.
     pub fn is_still(&self) -> bool {
-        self.course().velocity() == 0.0 && self.added.unwrap_or_default() == [0.0; 2]
+        self.course().velocity() == 0.0 && self.added == Offsets::default()
     }
 
     /// Commanded trajectory.
@@ -283,8 +287,7 @@ impl Follower {
 
     /// Starts following from `course`. Requests made before are discarded.
     pub fn start(&mut self, command: &JointCommand, course: Course) {
-        let (seen, added) = (command.request_count, Some([0.0; 2]));
-        *self = Self { seen, course, homed: self.homed, added, ..Self::NEW };
+        *self = Self { seen: command.request_count, course, homed: self.homed, ..Self::NEW };
     }
 
     /// Runs one tick.
@@ -364,14 +367,14 @@ impl Follower {
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
                 if self.track_position(position.0, &tick) {
                     let velocity_offset = self.bounded(velocity_offset.0, -bounds.speed, bounds.speed);
-                    Demand { velocity_offset, torque: self.torque_offset(torque_offset, bounds), ..demand }
+                    Demand { velocity_offset, torque: self.limited(torque_offset, bounds.torque), ..demand }
                 } else {
                     demand
                 }
             }
             Target::CyclicVelocity { velocity, torque_offset } => {
                 self.track_velocity(velocity.0, &tick);
-                Demand { torque: self.torque_offset(torque_offset, bounds), ..demand }
+                Demand { torque: self.limited(torque_offset, bounds.torque), ..demand }
             }
         };
         self.conclude(demand, &tick)
@@ -393,13 +396,7 @@ impl Follower {
 
     /// Torque that a torque mode is to give; none in a halt.
     fn torque_target(&mut self, target: f32, tick: &Tick<'_>) -> f32 {
-        if tick.command.halt { 0.0 } else { self.bounded(target, -tick.largest, tick.largest) }
-    }
-
-    /// Offset of a held joint's torque. The limit is the joint's own: a host's, or that of a return, limits
-    /// the sum with the controller's torque, which answers the offset.
-    fn torque_offset(&mut self, offset: NewtonMetre, bounds: &Bounds) -> f32 {
-        self.bounded(offset.0, -bounds.torque, bounds.torque)
+        if tick.command.halt { 0.0 } else { self.limited(NewtonMetre(target), tick.largest) }
     }
 
     /// Profile torque: changes the torque along its slope.
@@ -419,7 +416,7 @@ impl Follower {
         let (spring, damper) = self.spring(target, tick.range, &tick.bounds, measured);
         let damper = clamp(damper, -tick.largest, tick.largest);
         if tick.starts {
-            let (holding, braking) = measured.holding_and_braking();
+            let (holding, braking) = self.holding_and_braking(measured, &tick.bounds);
             (self.carried, self.damper_gap) = (holding - spring, damper - braking);
         }
         let most = max(command.torque_slope_nm_per_s, tick.least_slope) * TICK_S;
@@ -427,7 +424,7 @@ impl Follower {
         self.damper_gap -= clamp(self.damper_gap, -most, most);
         self.damper_gap = clamp(self.damper_gap, min(damper, 0.0), max(damper, 0.0));
         let torque = spring + damper - self.damper_gap + self.carried;
-        self.torque = self.bounded(torque, -tick.largest, tick.largest);
+        self.torque = self.limited(NewtonMetre(torque), tick.largest);
         let near = abs(target.position.0 - measured.position.0) <= command.position_window.0;
         self.reach(near, command.position_time);
     }
@@ -499,32 +496,39 @@ impl Follower {
             let ([low, high], actual) = (bounds.range, measured.position.0);
             self.course.keep_between(min(low, actual), max(high, actual));
         }
-        let mut added = [demand.velocity_offset, demand.torque];
+        let Demand { velocity_offset: velocity, torque, .. } = demand;
+        self.added = Offsets { velocity, torque, unreached: 0.0 };
         if self.easing > 0 {
             self.easing -= 1;
             let share = f32::from(self.easing) / f32::from(EASE_TICKS);
             let part = |before: f32, now: f32| share * before + (1.0 - share) * now;
-            added = [part(self.before[0], added[0]), part(self.before[1], added[1])];
+            self.added = Offsets {
+                velocity: part(self.before.velocity, velocity),
+                torque: part(self.before.torque, torque),
+                unreached: share * self.before.unreached,
+            };
         }
-        self.added = Some(added);
-        let [velocity_offset, torque] = added;
-        let failed = self.deviated(command, measured);
+        self.held = true;
+        let Offsets { velocity, torque, unreached } = self.added;
+        let (velocity_offset, failed) = (velocity + unreached, self.deviated(command, measured));
         Demand { course: self.course(), velocity_offset, torque, failed, ..demand }
     }
 
     /// Lets the present offsets fade, those of the next mode or halt come. A speed beyond the one that asks
     /// for the joint's largest torque ends at once.
     fn ease(&mut self, bounds: &Bounds) {
-        let ([velocity, torque], [_, damping]) = (self.added.unwrap_or_default(), bounds.impedance);
-        let fastest = bounds.torque / damping;
-        (self.before, self.easing) = ([clamp(velocity, -fastest, fastest), torque], EASE_TICKS);
+        let [_, damping] = bounds.impedance;
+        let limited = |speed: f32| clamp(speed, -bounds.torque / damping, bounds.torque / damping);
+        let Offsets { velocity, torque, unreached } = self.added;
+        self.before = Offsets { velocity: limited(velocity), torque, unreached: limited(unreached) };
+        self.easing = EASE_TICKS;
     }
 
     /// Starts a new mode from the present position, velocity and torque.
     fn begin(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) {
         self.mode = command.target.mode();
         self.brake_from(measured, bounds);
-        (self.torque, _) = measured.holding_and_braking();
+        (self.torque, _) = self.holding_and_braking(measured, bounds);
         (self.goal, self.next, self.left) = (None, None, 0);
         (self.arrived, self.waits) = (false, false);
         (self.outside, self.inside, self.reached, self.deviates) = (0, 0, false, false);
@@ -539,8 +543,21 @@ impl Follower {
         let velocity = self.course.velocity();
         let own = clamp(measured.velocity.0, min(velocity, 0.0), max(velocity, 0.0));
         self.course = Course::moving(self.course.position(), own);
-        self.added = self.added.map(|[added, torque]| [added + velocity - own, torque]);
+        let (rest, fading) = (velocity - own, self.added.unreached);
+        // What still fades does not add up with the next.
+        let larger = if abs(fading) > abs(rest) { fading } else { rest };
+        let unreached = if fading * rest > 0.0 { larger } else { fading + rest };
+        self.added.unreached = if self.held { unreached } else { 0.0 };
         self.ease(bounds);
+    }
+
+    /// Parts of the applied torque that hold the joint and that brake it, N m. What drives it to a speed that
+    /// it has not reached does neither.
+    fn holding_and_braking(&self, measured: &Measured, bounds: &Bounds) -> (f32, f32) {
+        let within = |torque: f32, whole: f32| clamp(torque, min(whole, 0.0), max(whole, 0.0));
+        let (NewtonMetre(applied), [_, damping]) = (measured.applied, bounds.impedance);
+        let holding = within((measured.wanted - measured.braking).0, applied);
+        (holding - within(damping * self.added.unreached, holding), applied - holding)
     }
 
     /// Merges the gap into the course.
@@ -571,7 +588,7 @@ impl Follower {
     fn give(&mut self, demand: Demand, measured: &Measured) -> Demand {
         self.deviates = false;
         self.course = Course::moving(measured.position.0, measured.velocity.0);
-        (self.added, self.easing) = (None, 0);
+        (self.added, self.easing, self.held) = (Offsets::default(), 0, false);
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 
@@ -583,12 +600,20 @@ impl Follower {
         let needed = if left > 0.0 { 0.5 * velocity * velocity / left } else { most };
         let rates = Rates { deceleration: min(max(tick.rates.deceleration, needed), most), ..tick.braking() };
         self.course.accelerate(0.0, &rates, tick.bounds.range, TICK_S);
-        self.reached = self.course.velocity() == 0.0 && abs(tick.measured.velocity.0) < STANDING;
+        self.reached = self.is_still() && abs(tick.measured.velocity.0) < STANDING;
+    }
+
+    /// Limits a torque and notes if it was larger. Offsets of a held joint have the joint's own limit: that
+    /// of a host or a return limits the sum with the controller's torque, which answers the offset.
+    fn limited(&mut self, torque: NewtonMetre, most: f32) -> f32 {
+        let limited = torque.limited(NewtonMetre(most));
+        self.limited |= limited != torque;
+        limited.0
     }
 
     /// Clamps a value to bounds and notes if it was outside.
     fn bounded(&mut self, value: f32, low: f32, high: f32) -> f32 {
-        let held = min(max(value, low), high);
+        let held = clamp(value, low, high);
         self.limited |= held != value;
         held
     }

@@ -447,6 +447,33 @@ fn the_torque_of_a_mode_or_a_halt_does_not_step() {
 }
 
 #[test]
+fn a_torque_mode_begins_without_the_torque_that_drives_the_joint() {
+    for ticks_until_free in [2, 6] {
+        let mut hosted = Hosted::enabled_at([0.5, 0.9]);
+        hosted.commands[1].torque_slope_nm_per_s = 85.0;
+        let position = hosted.position(1);
+        hosted.cyclic(1, position);
+        hosted.run(SECOND);
+        hosted.cyclic(1, position + 0.02);
+        hosted.run(2);
+        hosted.commands[1].halt = true;
+        hosted.run(ticks_until_free - 2);
+        hosted.commands[1].halt = false;
+        hosted.commands[1].target = Target::ProfileTorque(NewtonMetre::ZERO);
+        let mut most = 0.0_f32;
+        for _ in 0..SECOND / 10 {
+            hosted.run(1);
+            most = most.max(hosted.status[1].velocity.0);
+        }
+        assert!(
+            is_enabled(&hosted.pair) && most < 0.5,
+            "{ticks_until_free}: {most} rad/s {:?}",
+            hosted.status[1]
+        );
+    }
+}
+
+#[test]
 fn a_halt_ends_in_time_whatever_the_host_has_set() {
     for mode in [3, 4, 10] {
         let mut hosted = Hosted::new();
