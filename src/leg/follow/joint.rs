@@ -170,15 +170,12 @@ struct Tick<'a> {
     measured: &'a Measured,
     /// Limits, narrower while the joint returns into its range.
     bounds: Bounds,
+    /// Limits without a return.
+    whole: &'a Bounds,
     /// Range that the host's own limits leave.
     range: [f32; 2],
-    rates: Rates,
     /// Torque limit, N m.
     largest: f32,
-    /// Least slope of a torque that fades, N m/s.
-    least_slope: f32,
-    /// Period of cyclic targets, ticks.
-    period: u32,
     /// Whether the target begins to apply: new mode, end of a halt or of a return.
     starts: bool,
 }
@@ -187,36 +184,40 @@ impl<'a> Tick<'a> {
     fn new(
         command: &'a JointCommand,
         measured: &'a Measured,
-        whole: &Bounds,
+        whole: &'a Bounds,
         range: [f32; 2],
         starts: bool,
     ) -> Self {
-        let slow =
-            Bounds { speed: min(whole.speed, RETURN_SPEED), torque: RETURN_TORQUE * whole.torque, ..*whole };
-        let bounds = if measured.returns { slow } else { *whole };
+        let mut bounds = *whole;
+        if measured.returns {
+            bounds.speed = min(whole.speed, RETURN_SPEED);
+            bounds.torque *= RETURN_TORQUE;
+        }
         let stops = command.halt || command.target == Target::Hold;
         let least = if stops { LEAST_TORQUE * bounds.torque } else { 0.0 };
+        let largest = clamp(command.largest_torque.0, least, bounds.torque);
+        Self { command, measured, bounds, whole, range, largest, starts }
+    }
+
+    /// Rates of the profile.
+    fn rates(&self) -> Rates {
+        let Self { command, bounds, whole, .. } = self;
         let gentlest = min(whole.speed / LONGEST_STOP_S, whole.acceleration);
-        Self {
-            command,
-            measured,
-            bounds,
-            range,
-            rates: Rates {
-                speed: min(command.velocity.0, bounds.speed),
-                acceleration: min(command.acceleration.0, bounds.acceleration),
-                deceleration: clamp(command.deceleration.0, gentlest, bounds.acceleration),
-            },
-            largest: clamp(command.largest_torque.0, least, bounds.torque),
-            least_slope: whole.torque / LONGEST_STOP_S,
-            period: ticks(command.period).clamp(1, ticks(LONGEST_PERIOD)),
-            starts,
+        Rates {
+            speed: min(command.velocity.0, bounds.speed),
+            acceleration: min(command.acceleration.0, bounds.acceleration),
+            deceleration: clamp(command.deceleration.0, gentlest, bounds.acceleration),
         }
+    }
+
+    /// Slope of a torque that fades, N m/s.
+    fn fading_slope(&self) -> f32 {
+        max(self.command.torque_slope_nm_per_s, self.whole.torque / LONGEST_STOP_S)
     }
 
     /// Rates with the joint's own speed limit instead of the profile's.
     fn braking(&self) -> Rates {
-        Rates { speed: self.bounds.speed, ..self.rates }
+        Rates { speed: self.bounds.speed, ..self.rates() }
     }
 }
 
@@ -366,8 +367,8 @@ impl Follower {
             }
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
                 if self.track_position(position.0, &tick) {
-                    let velocity_offset = self.bounded(velocity_offset.0, -bounds.speed, bounds.speed);
-                    Demand { velocity_offset, torque: self.limited(torque_offset, bounds.torque), ..demand }
+                    let torque = self.limited(torque_offset, bounds.torque);
+                    Demand { velocity_offset: velocity_offset.0, torque, ..demand }
                 } else {
                     demand
                 }
@@ -391,7 +392,7 @@ impl Follower {
     fn stand(&mut self, command: &JointCommand, measured: &Measured) {
         let is_slow = abs(measured.velocity.0) <= command.standing_speed.0;
         self.still = if is_slow { self.still.saturating_add(1) } else { 0 };
-        self.stands = self.still > ticks(command.standing_time);
+        self.stands = is_slow && self.still > ticks(command.standing_time);
     }
 
     /// Torque that a torque mode is to give; none in a halt.
@@ -404,8 +405,7 @@ impl Follower {
         let target = self.torque_target(target, tick);
         let change = target - self.torque;
         let fades = change * self.torque < 0.0;
-        let slope = tick.command.torque_slope_nm_per_s;
-        let most = TICK_S * if fades { max(slope, tick.least_slope) } else { slope };
+        let most = TICK_S * if fades { tick.fading_slope() } else { tick.command.torque_slope_nm_per_s };
         self.torque += clamp(change, -most, most);
         self.reached = self.torque == target;
     }
@@ -419,7 +419,7 @@ impl Follower {
             let (holding, braking) = self.holding_and_braking(measured, &tick.bounds);
             (self.carried, self.damper_gap) = (holding - spring, damper - braking);
         }
-        let most = max(command.torque_slope_nm_per_s, tick.least_slope) * TICK_S;
+        let most = tick.fading_slope() * TICK_S;
         self.carried -= clamp(self.carried, -most, most);
         self.damper_gap -= clamp(self.damper_gap, -most, most);
         self.damper_gap = clamp(self.damper_gap, min(damper, 0.0), max(damper, 0.0));
@@ -441,7 +441,7 @@ impl Follower {
 
     /// Cyclic position: interpolates over the period. Returns whether the target is followed.
     fn track_position(&mut self, position: f32, tick: &Tick<'_>) -> bool {
-        let Tick { command, measured, bounds, rates, range, .. } = tick;
+        let Tick { command, measured, bounds, range, .. } = tick;
         let target = self.bounded(position, range[0], range[1]);
         let actual = measured.position.0;
         // For a joint outside its range: the end of the range that it returns to.
@@ -463,16 +463,16 @@ impl Follower {
             self.gap = Course::moving(self.course.position() - target, self.course.velocity());
             (self.course, self.target) = (Course::at_rest(target), target);
         }
-        self.count(target, tick.period);
+        self.count(target, tick);
         if measured.returns {
             self.close_gap();
-            self.course.approach(target, rates, TICK_S);
+            self.course.approach(target, &tick.rates(), TICK_S);
         } else {
             self.course.interpolate_position(target, self.left, bounds.speed, TICK_S);
         }
         self.left = self.left.saturating_sub(1);
         if self.gap != Course::at_rest(0.0) {
-            self.gap.approach(0.0, rates, TICK_S);
+            self.gap.approach(0.0, &tick.rates(), TICK_S);
         }
         self.reach(abs(target - actual) <= command.position_window.0, command.position_time);
         true
@@ -481,7 +481,7 @@ impl Follower {
     /// Cyclic velocity: interpolates over the period.
     fn track_velocity(&mut self, velocity: f32, tick: &Tick<'_>) {
         let target = self.bounded(velocity, -tick.bounds.speed, tick.bounds.speed);
-        self.count(target, tick.period);
+        self.count(target, tick);
         let (most, rates) = (tick.bounds.acceleration, tick.braking());
         self.course.interpolate_velocity(target, self.left, most, &rates, tick.range, TICK_S);
         self.course.keep_within(tick.command.following_window.0, tick.measured.position.0);
@@ -598,7 +598,8 @@ impl Follower {
         let left = if velocity > 0.0 { high - self.course.position() } else { self.course.position() - low };
         let most = tick.bounds.acceleration;
         let needed = if left > 0.0 { 0.5 * velocity * velocity / left } else { most };
-        let rates = Rates { deceleration: min(max(tick.rates.deceleration, needed), most), ..tick.braking() };
+        let rates = tick.braking();
+        let rates = Rates { deceleration: min(max(rates.deceleration, needed), most), ..rates };
         self.course.accelerate(0.0, &rates, tick.bounds.range, TICK_S);
         self.reached = self.is_still() && abs(tick.measured.velocity.0) < STANDING;
     }
@@ -641,9 +642,9 @@ impl Follower {
         let Some(goal) = self.goal else {
             return self.stop(tick);
         };
-        let Tick { command, measured, rates, range: [low, high], .. } = *tick;
+        let Tick { command, measured, range: [low, high], .. } = *tick;
         let goal = self.bounded(goal, low, high);
-        self.course.approach(goal, &rates, TICK_S);
+        self.course.approach(goal, &tick.rates(), TICK_S);
         let near = self.course == Course::at_rest(goal)
             && abs(goal - measured.position.0) <= command.position_window.0;
         self.reach(near, command.position_time);
@@ -656,8 +657,9 @@ impl Follower {
     }
 
     /// Cyclic modes: a new target starts a new period.
-    fn count(&mut self, target: f32, period: u32) {
+    fn count(&mut self, target: f32, tick: &Tick<'_>) {
         if self.target != target {
+            let period = ticks(tick.command.period).clamp(1, ticks(LONGEST_PERIOD));
             (self.target, self.left) = (target, period);
         }
     }
@@ -679,6 +681,6 @@ impl Follower {
         if self.mode != Some(Mode::Homing) {
             self.deviates = is_outside || self.waits;
         }
-        self.outside > ticks(command.following_time)
+        is_outside && self.outside > ticks(command.following_time)
     }
 }
