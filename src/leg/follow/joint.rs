@@ -81,6 +81,15 @@ pub struct Measured {
     pub returns: bool,
 }
 
+impl Measured {
+    /// Parts of the applied torque that hold the joint and that brake it, N m.
+    fn holding_and_braking(&self) -> (f32, f32) {
+        let NewtonMetre(applied) = self.applied;
+        let holding = clamp((self.wanted - self.braking).0, min(applied, 0.0), max(applied, 0.0));
+        (holding, applied - holding)
+    }
+}
+
 /// Demand on the servo at one tick, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
@@ -98,16 +107,6 @@ pub struct Demand {
     pub failed: bool,
     /// New zero for hosts: what they read where the joint's own angle is zero.
     pub zero: Option<Radian>,
-}
-
-/// What is added to a held trajectory.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Offsets {
-    /// A host's offsets: velocity, rad/s, and torque, N m. The controller's integral may balance them.
-    velocity: f32,
-    torque: f32,
-    /// Speed that the trajectory had and the joint had not reached, rad/s. Only drives the joint.
-    unreached: f32,
 }
 
 /// State of one joint.
@@ -138,10 +137,10 @@ pub struct Follower {
     /// Cyclic position: no target within the window has come yet.
     waits: bool,
     halted: bool,
-    /// What the previous tick added to the trajectory; nothing if it was not held.
-    added: Offsets,
+    /// Velocity and torque added to the trajectory in the previous tick, rad/s and N m; none if it was not held.
+    added: [f32; 2],
     /// Those at the last change of mode or halt, and the ticks for which they still fade.
-    before: Offsets,
+    before: [f32; 2],
     easing: u8,
     /// Whether the trajectory was held in the previous tick.
     held: bool,
@@ -242,8 +241,8 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
-        added: Offsets { velocity: 0.0, torque: 0.0, unreached: 0.0 },
-        before: Offsets { velocity: 0.0, torque: 0.0, unreached: 0.0 },
+        added: [0.0; 2],
+        before: [0.0; 2],
         easing: 0,
         held: true,
         stated: None,
@@ -262,7 +261,16 @@ impl Follower {
 
     /// Whether the joint is commanded to be at rest, without offsets.
     pub fn is_still(&self) -> bool {
-        self.course().velocity() == 0.0 && self.added == Offsets::default()
+        self.course().velocity() == 0.0 && self.added == [0.0; 2]
+    }
+
+    /// Whether the joint is held before this mode begins. A mode without position control begins from the torque
+    /// that holds the joint, and what drives it in the mode before ends first.
+    pub fn settles(&self, mode: Option<Mode>) -> bool {
+        matches!(mode, Some(Mode::ProfileTorque | Mode::Impedance))
+            && self.held
+            && mode != self.mode
+            && (self.mode.is_some() || self.easing > 0)
     }
 
     /// Commanded trajectory.
@@ -416,7 +424,7 @@ impl Follower {
         let (spring, damper) = self.spring(target, tick.range, &tick.bounds, measured);
         let damper = clamp(damper, -tick.largest, tick.largest);
         if tick.starts {
-            let (holding, braking) = self.holding_and_braking(measured, &tick.bounds);
+            let (holding, braking) = measured.holding_and_braking();
             (self.carried, self.damper_gap) = (holding - spring, damper - braking);
         }
         let most = tick.fading_slope() * TICK_S;
@@ -496,39 +504,32 @@ impl Follower {
             let ([low, high], actual) = (bounds.range, measured.position.0);
             self.course.keep_between(min(low, actual), max(high, actual));
         }
-        let Demand { velocity_offset: velocity, torque, .. } = demand;
-        self.added = Offsets { velocity, torque, unreached: 0.0 };
+        self.added = [demand.velocity_offset, demand.torque];
         if self.easing > 0 {
             self.easing -= 1;
             let share = f32::from(self.easing) / f32::from(EASE_TICKS);
             let part = |before: f32, now: f32| share * before + (1.0 - share) * now;
-            self.added = Offsets {
-                velocity: part(self.before.velocity, velocity),
-                torque: part(self.before.torque, torque),
-                unreached: share * self.before.unreached,
-            };
+            self.added = [part(self.before[0], self.added[0]), part(self.before[1], self.added[1])];
         }
         self.held = true;
-        let Offsets { velocity, torque, unreached } = self.added;
-        let (velocity_offset, failed) = (velocity + unreached, self.deviated(command, measured));
+        let [velocity_offset, torque] = self.added;
+        let failed = self.deviated(command, measured);
         Demand { course: self.course(), velocity_offset, torque, failed, ..demand }
     }
 
     /// Lets the present offsets fade, those of the next mode or halt come. A speed beyond the one that asks
     /// for the joint's largest torque ends at once.
     fn ease(&mut self, bounds: &Bounds) {
-        let [_, damping] = bounds.impedance;
-        let limited = |speed: f32| clamp(speed, -bounds.torque / damping, bounds.torque / damping);
-        let Offsets { velocity, torque, unreached } = self.added;
-        self.before = Offsets { velocity: limited(velocity), torque, unreached: limited(unreached) };
-        self.easing = EASE_TICKS;
+        let ([velocity, torque], [_, damping]) = (self.added, bounds.impedance);
+        let fastest = bounds.torque / damping;
+        (self.before, self.easing) = ([clamp(velocity, -fastest, fastest), torque], EASE_TICKS);
     }
 
     /// Starts a new mode from the present position, velocity and torque.
     fn begin(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) {
         self.mode = command.target.mode();
         self.brake_from(measured, bounds);
-        (self.torque, _) = self.holding_and_braking(measured, bounds);
+        (self.torque, _) = measured.holding_and_braking();
         (self.goal, self.next, self.left) = (None, None, 0);
         (self.arrived, self.waits) = (false, false);
         (self.outside, self.inside, self.reached, self.deviates) = (0, 0, false, false);
@@ -543,21 +544,13 @@ impl Follower {
         let velocity = self.course.velocity();
         let own = clamp(measured.velocity.0, min(velocity, 0.0), max(velocity, 0.0));
         self.course = Course::moving(self.course.position(), own);
-        let (rest, fading) = (velocity - own, self.added.unreached);
+        let (rest, [added, _]) = (velocity - own, self.added);
         // What still fades does not add up with the next.
-        let larger = if abs(fading) > abs(rest) { fading } else { rest };
-        let unreached = if fading * rest > 0.0 { larger } else { fading + rest };
-        self.added.unreached = if self.held { unreached } else { 0.0 };
+        let larger = if abs(added) > abs(rest) { added } else { rest };
+        if self.held {
+            self.added[0] = if added * rest > 0.0 { larger } else { added + rest };
+        }
         self.ease(bounds);
-    }
-
-    /// Parts of the applied torque that hold the joint and that brake it, N m. What drives it to a speed that
-    /// it has not reached does neither.
-    fn holding_and_braking(&self, measured: &Measured, bounds: &Bounds) -> (f32, f32) {
-        let within = |torque: f32, whole: f32| clamp(torque, min(whole, 0.0), max(whole, 0.0));
-        let (NewtonMetre(applied), [_, damping]) = (measured.applied, bounds.impedance);
-        let holding = within((measured.wanted - measured.braking).0, applied);
-        (holding - within(damping * self.added.unreached, holding), applied - holding)
     }
 
     /// Merges the gap into the course.
@@ -588,7 +581,7 @@ impl Follower {
     fn give(&mut self, demand: Demand, measured: &Measured) -> Demand {
         self.deviates = false;
         self.course = Course::moving(measured.position.0, measured.velocity.0);
-        (self.added, self.easing, self.held) = (Offsets::default(), 0, false);
+        (self.added, self.easing, self.held) = ([0.0; 2], 0, false);
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 
