@@ -109,6 +109,20 @@ pub struct Demand {
     pub zero: Option<Radian>,
 }
 
+/// What is added to a held trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Added {
+    /// A host's offsets: velocity, rad/s, and torque, N m. The controller's integral may balance them.
+    velocity: f32,
+    torque: f32,
+    /// Speed that the trajectory had and the joint had not reached, rad/s.
+    unreached: f32,
+}
+
+impl Added {
+    const NONE: Self = Self { velocity: 0.0, torque: 0.0, unreached: 0.0 };
+}
+
 /// State of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Follower {
@@ -137,13 +151,15 @@ pub struct Follower {
     /// Cyclic position: no target within the window has come yet.
     waits: bool,
     halted: bool,
-    /// Velocity and torque added to the trajectory in the previous tick, rad/s and N m; none if it was not held.
-    added: [f32; 2],
-    /// Those at the last change of mode or halt, and the ticks for which they still fade.
-    before: [f32; 2],
+    /// What the previous tick added to the trajectory; nothing if it was not held.
+    added: Added,
+    /// The same at the last change of mode or halt, and the ticks for which it still fades.
+    before: Added,
     easing: u8,
     /// Whether the trajectory was held in the previous tick.
     held: bool,
+    /// Whether the joint is held before a mode without position control begins.
+    settles: bool,
     /// The host's limits (607D) as stated, and the range that they leave. When they come into force, at the
     /// beginning of a mode or by a change, they are extended to the joint: they must not pull it.
     stated: Option<[Radian; 2]>,
@@ -241,10 +257,11 @@ impl Follower {
         gap: Course::at_rest(0.0),
         waits: false,
         halted: false,
-        added: [0.0; 2],
-        before: [0.0; 2],
+        added: Added::NONE,
+        before: Added::NONE,
         easing: 0,
         held: true,
+        settles: false,
         stated: None,
         range: [0.0; 2],
         returned: false,
@@ -261,16 +278,23 @@ impl Follower {
 
     /// Whether the joint is commanded to be at rest, without offsets.
     pub fn is_still(&self) -> bool {
-        self.course().velocity() == 0.0 && self.added == [0.0; 2]
+        self.course().velocity() == 0.0 && self.added == Added::NONE
     }
 
-    /// Whether the joint is held before this mode begins. A mode without position control begins from the torque
-    /// that holds the joint, and what drives it in the mode before ends first.
-    pub fn settles(&self, mode: Option<Mode>) -> bool {
-        matches!(mode, Some(Mode::ProfileTorque | Mode::Impedance))
+    /// Holds the joint for [`EASE_TICKS`] before a mode without position control begins: such a mode begins
+    /// from the torque that holds the joint, and a speed that the joint has not reached ends first.
+    pub fn settle(&mut self, command: &mut JointCommand, bounds: &Bounds) {
+        let mode = command.target.mode();
+        let settles = matches!(mode, Some(Mode::ProfileTorque | Mode::Impedance))
             && self.held
             && mode != self.mode
-            && (self.mode.is_some() || self.easing > 0)
+            && (self.mode.is_some() || self.easing > 0);
+        let settled = core::mem::replace(&mut self.settles, settles);
+        if settles {
+            command.target = Target::Hold;
+        } else if settled {
+            self.ease(bounds);
+        }
     }
 
     /// Commanded trajectory.
@@ -309,10 +333,13 @@ impl Follower {
         // A request of the mode before starts nothing in the one that begins.
         let is_requested = is_new && !begins;
         let was_halted = core::mem::replace(&mut self.halted, command.halt);
-        if command.halt && !was_halted {
-            self.brake_from(measured, bounds);
-        } else if was_halted && !command.halt {
-            self.ease(bounds);
+        // A joint that settles comes to rest anyway, and halts must not delay its end.
+        if command.halt != was_halted && !self.settles {
+            if command.halt {
+                self.brake_from(measured, bounds);
+            } else {
+                self.ease(bounds);
+            }
         }
         self.follows = command.target.mode().is_some() && !command.halt;
         self.stand(command, measured);
@@ -504,25 +531,34 @@ impl Follower {
             let ([low, high], actual) = (bounds.range, measured.position.0);
             self.course.keep_between(min(low, actual), max(high, actual));
         }
-        self.added = [demand.velocity_offset, demand.torque];
+        let (kept, before) = (self.added, self.before);
+        self.added = Added { velocity: demand.velocity_offset, torque: demand.torque, unreached: 0.0 };
         if self.easing > 0 {
             self.easing -= 1;
             let share = f32::from(self.easing) / f32::from(EASE_TICKS);
             let part = |before: f32, now: f32| share * before + (1.0 - share) * now;
-            self.added = [part(self.before[0], self.added[0]), part(self.before[1], self.added[1])];
+            self.added = Added {
+                velocity: part(before.velocity, self.added.velocity),
+                torque: part(before.torque, self.added.torque),
+                unreached: share * before.unreached,
+            };
+        }
+        if self.settles {
+            (self.added.velocity, self.added.torque) = (kept.velocity, kept.torque);
         }
         self.held = true;
-        let [velocity_offset, torque] = self.added;
-        let failed = self.deviated(command, measured);
+        let Added { velocity, torque, unreached } = self.added;
+        let (velocity_offset, failed) = (velocity + unreached, self.deviated(command, measured));
         Demand { course: self.course(), velocity_offset, torque, failed, ..demand }
     }
 
     /// Lets the present offsets fade, those of the next mode or halt come. A speed beyond the one that asks
     /// for the joint's largest torque ends at once.
     fn ease(&mut self, bounds: &Bounds) {
-        let ([velocity, torque], [_, damping]) = (self.added, bounds.impedance);
-        let fastest = bounds.torque / damping;
-        (self.before, self.easing) = ([clamp(velocity, -fastest, fastest), torque], EASE_TICKS);
+        let (Added { velocity, torque, unreached }, [_, damping]) = (self.added, bounds.impedance);
+        let limited = |speed: f32| clamp(speed, -bounds.torque / damping, bounds.torque / damping);
+        self.before = Added { velocity: limited(velocity), torque, unreached: limited(unreached) };
+        self.easing = EASE_TICKS;
     }
 
     /// Starts a new mode from the present position, velocity and torque.
@@ -544,11 +580,11 @@ impl Follower {
         let velocity = self.course.velocity();
         let own = clamp(measured.velocity.0, min(velocity, 0.0), max(velocity, 0.0));
         self.course = Course::moving(self.course.position(), own);
-        let (rest, [added, _]) = (velocity - own, self.added);
+        let (rest, fading) = (velocity - own, self.added.unreached);
         // What still fades does not add up with the next.
-        let larger = if abs(added) > abs(rest) { added } else { rest };
+        let larger = if abs(fading) > abs(rest) { fading } else { rest };
         if self.held {
-            self.added[0] = if added * rest > 0.0 { larger } else { added + rest };
+            self.added.unreached = if fading * rest > 0.0 { larger } else { fading + rest };
         }
         self.ease(bounds);
     }
@@ -581,7 +617,7 @@ impl Follower {
     fn give(&mut self, demand: Demand, measured: &Measured) -> Demand {
         self.deviates = false;
         self.course = Course::moving(measured.position.0, measured.velocity.0);
-        (self.added, self.easing, self.held) = ([0.0; 2], 0, false);
+        (self.added, self.easing, self.held) = (Added::NONE, 0, false);
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 
@@ -674,6 +710,6 @@ impl Follower {
         if self.mode != Some(Mode::Homing) {
             self.deviates = is_outside || self.waits;
         }
-        is_outside && self.outside > ticks(command.following_time)
+        is_outside && !self.settles && self.outside > ticks(command.following_time)
     }
 }

@@ -131,9 +131,7 @@ impl<const N: usize> Following<N> {
             Commanded { motion: MotionState::at_rest([0.0; N]), efforts: [Effort::HELD; N], fault: None };
         for joint in 0..N {
             let mut command = commands[joint].seen_from(self.zeros[joint]);
-            if self.joints[joint].settles(command.target.mode()) {
-                command.target = Target::Hold;
-            }
+            self.joints[joint].settle(&mut command, &self.bounds[joint]);
             let Demand { course, velocity_offset, torque, held, largest, failed, zero } =
                 self.joints[joint].follow(&command, &self.measured[joint], &self.bounds[joint]);
             self.zeros[joint] = zero.unwrap_or(self.zeros[joint]);

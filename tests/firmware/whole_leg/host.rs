@@ -447,6 +447,25 @@ fn the_torque_of_a_mode_or_a_halt_does_not_step() {
 }
 
 #[test]
+fn a_load_that_an_offset_carries_is_carried_on_by_a_torque_mode() {
+    for settles_for in [0, 4, 100] {
+        let mut hosted = Hosted::enabled_at([0.5, 0.9]);
+        hosted.run(SECOND);
+        let (position, weight) = (Radian(hosted.position(1)), hosted.status[1].torque_demand);
+        let (velocity_offset, torque_offset) = (RadianPerSecond::ZERO, weight);
+        hosted.commands[1].target = Target::CyclicPosition { position, velocity_offset, torque_offset };
+        hosted.run(3 * SECOND);
+        let from = hosted.truth(1);
+        hosted.commands[1].target = Target::CyclicVelocity { velocity: velocity_offset, torque_offset };
+        hosted.run(settles_for);
+        hosted.commands[1].target = Target::ProfileTorque(weight);
+        hosted.run(SECOND / 2);
+        let moved = (hosted.truth(1) - from).abs();
+        assert!(is_enabled(&hosted.pair) && moved < 0.01, "{settles_for}: {moved} rad of {weight:?}");
+    }
+}
+
+#[test]
 fn a_torque_mode_begins_without_the_torque_that_drives_the_joint() {
     for ticks_until_free in [2, 6] {
         let mut hosted = Hosted::enabled_at([0.5, 0.9]);
