@@ -18,36 +18,30 @@
 
 use super::fault::FaultCode;
 use super::interlock::InhibitReason;
+use crate::listed::listed;
 
-/// Faults that other levels of the board detect and the servo reacts to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum BoardFault {
-    /// Current ticks are missing.
-    CurrentTicks,
-    /// A bridge is too hot.
-    Temperature,
-    /// A thermistor is open or shorted.
-    Thermistor,
-    /// A winding is too hot.
-    Winding,
-    /// An absolute encoder sends no valid frame.
-    AbsoluteEncoder,
-    /// The thermistor of a motor cannot be read.
-    MotorThermistor,
+listed! {
+    /// Faults that other levels of the board detect and the servo reacts to.
+    #[repr(u8)]
+    pub enum BoardFault {
+        /// All faults, in the order of their bits.
+        ALL;
+        /// Current ticks are missing.
+        CurrentTicks;
+        /// A bridge is too hot.
+        Temperature;
+        /// A thermistor is open or shorted.
+        Thermistor;
+        /// A winding is too hot.
+        Winding;
+        /// An absolute encoder sends no valid frame.
+        AbsoluteEncoder;
+        /// The thermistor of a motor cannot be read.
+        MotorThermistor;
+    }
 }
 
 impl BoardFault {
-    /// All faults, in the order of their bits.
-    pub const ALL: [Self; 6] = [
-        Self::CurrentTicks,
-        Self::Temperature,
-        Self::Thermistor,
-        Self::Winding,
-        Self::AbsoluteEncoder,
-        Self::MotorThermistor,
-    ];
-
     /// Bit of the fault.
     #[must_use]
     pub const fn bit(self) -> u32 {
