@@ -243,12 +243,6 @@ impl<const N: usize> Oscillator<N> {
     }
 }
 
-impl<const N: usize> Default for Oscillator<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;

@@ -128,9 +128,3 @@ impl<const N: usize> PeriodicAssist<N> {
         assist
     }
 }
-
-impl<const N: usize> Default for PeriodicAssist<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}

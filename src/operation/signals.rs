@@ -170,12 +170,6 @@ impl Inhibit {
     }
 }
 
-impl Default for Inhibit {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Counters of the levels, reported from the lowest priority.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistics<const N: usize> {
@@ -685,12 +679,6 @@ impl<const N: usize> Signals<N> {
     #[must_use]
     pub fn take_forgotten(&self) -> bool {
         self.forgotten.get() != 0 && self.forgotten.swap(0) != 0
-    }
-}
-
-impl<const N: usize> Default for Signals<N> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

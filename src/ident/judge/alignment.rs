@@ -316,12 +316,6 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
     }
 }
 
-impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Default for Alignment<T, N, B, PENDING> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Kind and joint of a direction: the lengths before joints 1.., then the zeros of joints ..N-1.
 fn subject<const N: usize>(index: usize) -> Option<(Direction, usize)> {
     let others = N.checked_sub(1)?;

@@ -206,9 +206,3 @@ impl<T: Real, const N: usize> Residual<T, N> {
             real::max(self.longest_common_s, T::from_double(f64::from(self.common)) * T::from_double(ROW_S));
     }
 }
-
-impl<T: Real, const N: usize> Default for Residual<T, N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
