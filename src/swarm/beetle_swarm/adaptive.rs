@@ -87,15 +87,6 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
-    /// Resets to the state of [`Self::new`], in place.
-    pub fn restart(&mut self, settings: AdaptiveSettings<T>, dimension: usize) {
-        self.settings = settings;
-        self.frame.restart(dimension);
-        self.metric.restart(dimension);
-        self.leap = Leap::none();
-        self.forget();
-    }
-
     /// Discards all learned values, when the swarm is scattered again or has leapt.
     pub(super) fn forget(&mut self) {
         self.metric.forget();

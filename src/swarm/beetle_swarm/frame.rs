@@ -101,15 +101,6 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         }
     }
 
-    /// Resets to the state of [`Self::new`], in place.
-    pub fn restart(&mut self, dimension: usize) {
-        self.dimension = dimension;
-        self.direction.fill([T::zero(); D]);
-        self.displacement.fill([T::zero(); D]);
-        self.covector.fill([T::zero(); D]);
-        self.whisker.fill(Whisker::unaimed());
-    }
-
     /// Number of directions in use: one per beetle, at most as many as an orthonormal frame can have.
     pub fn count(&self) -> usize {
         self.dimension.min(N)

@@ -34,12 +34,6 @@ impl<T: Real, const D: usize> Metric<T, D> {
         metric
     }
 
-    /// Resets to the state of [`Self::identity`], in place.
-    pub fn restart(&mut self, dimension: usize) {
-        self.dimension = dimension;
-        self.forget();
-    }
-
     /// Resets to box coordinates.
     pub fn forget(&mut self) {
         for matrix in [&mut self.shape, &mut self.inverse] {
