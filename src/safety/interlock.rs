@@ -155,13 +155,7 @@ impl InhibitReason {
         }
     }
 
-    /// Returns whether no reset clears the reason: another board, other constants or a new start are needed.
-    #[must_use]
-    pub const fn is_for_ever(self) -> bool {
-        matches!(self, Self::Timers | Self::BoardVersion | Self::Configuration)
-    }
-
-    /// Bits of the reasons that no reset clears.
+    /// Bits of the reasons that no reset clears: another board, other constants or a new start are needed.
     #[must_use]
     pub const fn for_ever() -> u32 {
         Self::Timers.bit() | Self::BoardVersion.bit() | Self::Configuration.bit()
@@ -356,7 +350,5 @@ mod tests {
         let all = InhibitReason::ALL.iter().fold(0, |bits, cause| bits | cause.bit());
         assert_eq!(all.count_ones() as usize, InhibitReason::ALL.len());
         assert!(InhibitReason::ALL.iter().all(|cause| cause.name() != "-"));
-        let for_ever = InhibitReason::ALL.iter().filter(|cause| cause.is_for_ever());
-        assert_eq!(for_ever.fold(0, |bits, cause| bits | cause.bit()), InhibitReason::for_ever());
     }
 }

@@ -166,14 +166,6 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         self.charts.map(|chart| chart.sum)
     }
 
-    /// Time to an alarm, s, once a joint that is never at rest has a residual with `energy` times that at
-    /// acceptance; `None` for an energy that raises no alarm.
-    #[must_use]
-    pub fn delay_s(&self, energy: T) -> Option<T> {
-        let step = real::min(self.step(energy), self.largest_step);
-        (step > T::zero()).then(|| self.limit / step * T::from_double(BLOCK_S))
-    }
-
     fn step(&self, energy: T) -> T {
         self.half_freedom * (energy * self.slope - self.intercept)
     }
