@@ -167,7 +167,7 @@ impl<const N: usize> ServoLevel<N> {
             // The statement belongs to this identification alone.
             control.set_wearing(self.prepared.and_then(|prepared| prepared.wearing));
         }
-        let output = control.tick_with(&sample, permitted, gravity, host);
+        let output = control.tick(&sample, permitted, gravity, host);
         if let Some(note) = control.take_assist_note() {
             if let (AssistNote::Refused(_), Some(host)) = (note, &mut self.host) {
                 host.refuse(RefusalReason::NoAssistance);

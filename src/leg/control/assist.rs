@@ -193,7 +193,7 @@ impl<const N: usize> Control<N> {
     /// Whether the leg rests and does nothing else: a push or a swing does not count as rest.
     pub(super) fn rests_for_assist(&self) -> bool {
         matches!(self.activity, Activity::Idle | Activity::Follow)
-            && !self.servo.returns().contains(&true)
+            && !self.servo.monitor.returns().contains(&true)
             && self.assistance.velocity.iter().all(|speed| abs(*speed) < FASTEST_REST)
     }
 
