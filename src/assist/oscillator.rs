@@ -24,12 +24,11 @@
 
 use core::f32::consts::TAU;
 
+use super::law::DT;
 use crate::model::JointState;
 use crate::real::{abs, clamp, max, sin_cos, sqrt};
 use crate::servo::LOG_RATE_HZ;
 
-/// Time between two samples, s.
-const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
 /// Harmonics of the waveform.
 pub const HARMONICS: usize = 4;
 /// Learning rate of the waveform per cycle.

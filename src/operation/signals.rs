@@ -630,11 +630,7 @@ impl<const N: usize> Signals<N> {
 
     /// Sets the permission of the drive.
     pub fn set_permission(&self, permission: Permission) {
-        self.permission.set(match permission {
-            Permission::Off => 0,
-            Permission::Follow => 1,
-            Permission::Damp => 2,
-        });
+        self.permission.set(permission as u32);
     }
 
     /// Returns whether a host has the drive; then closing the enabling switch permits but requests nothing.

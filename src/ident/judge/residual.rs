@@ -20,6 +20,7 @@
 
 use crate::ident::record::recorder::LARGEST_STILL_SHARE;
 use crate::ident::record::rows::{DECIMATION, FilteredRows};
+use crate::ident::record::stretch::ROW_S;
 use crate::real::{self, Real};
 
 /// Rows of a block: half a second.
@@ -152,8 +153,6 @@ impl<T: Real> JointResidual<T> {
         (self.block, self.age, self.filled, self.is_disturbed) = (T::zero(), 0, 0, false);
     }
 }
-
-const ROW_S: f64 = 0.02;
 
 /// All joints' residuals on one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -242,9 +242,7 @@ fn exponent<T: Real>(ratio: T, margin: T) -> T {
 
 /// nu: degrees of freedom of a block of rows, white noise through these weights.
 fn block_freedom<T: Real>(weights: &[T]) -> T {
-    let product = |lag: usize| {
-        weights.iter().zip(weights.get(lag..).unwrap_or(&[])).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
-    };
+    let product = |lag: usize| real::dot(weights, weights.get(lag..).unwrap_or(&[]));
     let (energy, rows) = (product(0), T::from_double(f64::from(ROWS_PER_BLOCK)));
     let mut spread = T::one();
     for behind in 1..ROWS_PER_BLOCK as usize {

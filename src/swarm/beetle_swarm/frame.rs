@@ -16,10 +16,10 @@
 //! Cost: per direction two or three products with the metric (2 D^2 each) and 4 D j operations of
 //! Gram-Schmidt, repeated per draw, at most 8 draws; memory N (3 D + 6) scalars.
 
-use crate::real::{Real, abs, clamp, is_finite, min, sign, sqrt};
+use crate::real::{Real, abs, clamp, dot, is_finite, min, sign, sqrt};
 
 use super::super::random::Random;
-use super::super::rows::{add_scaled, dot, live, live_mut, scale};
+use super::super::rows::{add_scaled, live, live_mut, scale};
 use super::super::search::is_usable;
 use super::metric::Metric;
 

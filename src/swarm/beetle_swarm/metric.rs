@@ -14,9 +14,9 @@
 //! Cost: 4 D^2 operations per stretch, 2 D^2 per product; memory 2 D^2 scalars.
 //! Known limits: a stretch that is not finite would corrupt the metric permanently; the caller passes none.
 
-use crate::real::Real;
+use crate::real::{Real, dot};
 
-use super::super::rows::{add_scaled, dot, live, live_mut};
+use super::super::rows::{add_scaled, live, live_mut};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Metric<T, const D: usize> {
