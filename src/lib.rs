@@ -16,7 +16,7 @@
 //! | [`assist`] | torque from the identified model: transparency, weight support, periodic assistance |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
 //! | [`operation`] | work of each axis, signals between tasks, rights of the operator's contacts |
-//! | `in_place` | large values built in place |
+//! | `in_place`, `listed` | large values built in place; enums with the list of their variants |
 //! | [`trace`] | output of the board: records, one line each |
 //! | [`store`] | nonvolatile store: configuration, calibrations, the accepted model |
 //! | [`bus`] | a CANopen node per joint, and a board's device with its nodes, without I/O |
@@ -31,6 +31,7 @@ pub mod hal;
 pub mod ident;
 mod in_place;
 pub mod leg;
+mod listed;
 pub mod model;
 pub mod motion;
 pub mod motor;

@@ -257,6 +257,12 @@ fn eighth_of_a_turn(x: f32) -> (f32, f32) {
     (sine, cosine)
 }
 
+/// Sum of the products of two rows, in their order; a longer one is cut.
+#[inline]
+pub fn dot<T: Real>(one: &[T], other: &[T]) -> T {
+    one.iter().zip(other).fold(T::zero(), |sum, (&left, &right)| sum + left * right)
+}
+
 /// Median of some numbers, the upper one of two; 0 for an empty slice. Sorts the slice.
 pub fn median<T: Real>(values: &mut [T]) -> T {
     for end in 1..values.len() {

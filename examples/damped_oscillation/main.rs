@@ -9,7 +9,7 @@
 mod objective;
 
 use objective::{BOX, DampedOscillation, UNKNOWNS, oscillation};
-use scarab::swarm::{Bso, BsoSettings, Random, SwarmError};
+use scarab::swarm::{Bso, BsoSettings, Random, Search, SwarmError};
 
 const TRUTH: [f32; UNKNOWNS] = [2.0, 0.8, 9.0, 0.7, 0.2];
 const SAMPLES: usize = 100;

@@ -16,7 +16,7 @@
 //! | [`drive`] | ideal: a current with lag; complete: motor, bridge, shunts, counter, supply |
 //! | [`faults`] | faults injected into a board's ports at given ticks |
 //! | [`flash`] | flash memory with a power cut at any byte |
-//! | [`gear`], [`sensors`], [`pushes`] | ratio; encoder and current sensor; pushes of the wearer |
+//! | [`sensors`], [`pushes`] | encoder and current sensor; pushes of the wearer |
 //! | [`wearer`] | a wearer with a body of their own: limb, cuffs, muscles, intended motions |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 
@@ -28,7 +28,6 @@ pub mod faults;
 pub mod flash;
 pub mod floor;
 pub mod friction;
-pub mod gear;
 pub mod grip;
 pub mod leg;
 mod maths;

@@ -12,7 +12,7 @@
 use crate::description::PushDescription;
 use crate::maths::{ln, sin_cos};
 use core::f64::consts::PI;
-use rand_core::Rng;
+use rand_distr::{Distribution, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -71,16 +71,12 @@ impl Pushes {
             self.next = None;
             return;
         };
-        let pause = -ln(1.0 - self.uniform()) / habits.rate;
-        let duration = habits.duration * (0.5 + self.uniform());
-        let peak = habits.torque * (2.0 * self.uniform() - 1.0);
-        let joint = (self.uniform() * joints as f64) as usize;
+        let [pause, duration, peak, joint]: [f64; 4] =
+            core::array::from_fn(|_| StandardUniform.sample(&mut self.generator));
+        let pause = -ln(1.0 - pause) / habits.rate;
+        let duration = habits.duration * (0.5 + duration);
+        let peak = habits.torque * (2.0 * peak - 1.0);
+        let joint = (joint * joints as f64) as usize;
         self.next = Some(Push { start: now + pause, duration, peak, joint });
-    }
-
-    /// Uniform random number in 0..1 with 53 bits.
-    fn uniform(&mut self) -> f64 {
-        const UNIT: f64 = 1.0 / (1_u64 << 53) as f64;
-        (self.generator.next_u64() >> 11) as f64 * UNIT
     }
 }

@@ -7,13 +7,13 @@
 //! sigma   = sqrt(8) * noise    noise is stated for the mean of eight 4 kHz samples, as logged at 500 Hz
 //! ```
 //!
+//! Gear and joint are rigid: inertia on the motor side is stated at the joint (`rotor_inertia`).
 //! Count 0 is centred on the anatomical zero (the reference pose).
 //! Known limits: no missed counts, no eccentricity, no saturation of the converter; other modules inject
 //! faults.
 //! Cost: one random number per joint and tick while noise is on.
 
 use crate::description::{CurrentSensorDescription, EncoderDescription, EncoderSide, OutlierDescription};
-use crate::gear::Gear;
 use crate::maths::nearest;
 use core::f64::consts::{SQRT_2, TAU};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
@@ -25,7 +25,8 @@ const SAMPLES_PER_LOGGED_ROOT: f64 = 2.0 * SQRT_2;
 /// Incremental encoder, counting from the reference pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encoder {
-    gear: Option<Gear>,
+    /// Encoder turns per joint turn.
+    ratio: f64,
     counts_per_radian: f64,
 }
 
@@ -34,19 +35,18 @@ impl Encoder {
     /// the ratio of a faster encoder is part of its counts.
     #[must_use]
     pub fn new(description: &EncoderDescription) -> Self {
-        let (gear, counts) = match description.side {
-            EncoderSide::Motor => (Some(Gear::new(description.ratio)), description.counts),
-            EncoderSide::Joint => (None, description.counts * description.ratio),
+        let (ratio, counts) = match description.side {
+            EncoderSide::Motor => (description.ratio, description.counts),
+            EncoderSide::Joint => (1.0, description.counts * description.ratio),
         };
-        Self { gear, counts_per_radian: counts / TAU }
+        Self { ratio, counts_per_radian: counts / TAU }
     }
 
     /// Counts at an anatomical joint angle in rad.
     #[must_use]
     pub fn read(&self, angle: f64) -> i32 {
-        let turned = self.gear.map_or(angle, |gear| gear.motor_angle(angle));
         // Dropping the upper half is the wrap of a 32-bit counter.
-        nearest(turned * self.counts_per_radian) as i32
+        nearest(self.ratio * angle * self.counts_per_radian) as i32
     }
 }
 

@@ -157,7 +157,7 @@ impl<const N: usize> World<N> {
             last.body.com = foot;
         }
         let foot = links_at_reference(&joints).last().map(|link| link.to_centre);
-        self.floor = foot.map(|foot| Floor::new(foot, self.tick as f64 * TICK_S + delay, duration));
+        self.floor = foot.map(|foot| Floor::new(foot, self.time() + delay, duration));
     }
 
     /// Multiplies every joint's Coulomb level, also at rest, and viscous coefficient from now on.
@@ -175,18 +175,18 @@ impl<const N: usize> World<N> {
     /// Changes the wearer's pushes from now on; `None` stops them.
     pub fn set_pushes(&mut self, pushes: Option<PushDescription>) {
         self.description.pushes = pushes;
-        self.pushes.change_habits(pushes, self.tick as f64 * TICK_S, N);
+        self.pushes.change_habits(pushes, self.time(), N);
     }
 
     /// Lets the wearer push or kick once from now on: half a sine on one joint, peak in N m, anatomical.
     pub fn push(&mut self, joint: usize, peak: f64, duration: f64) {
-        self.pushes.push(joint, peak, self.tick as f64 * TICK_S, duration);
+        self.pushes.push(joint, peak, self.time(), duration);
     }
 
     /// Lets a hand hold a joint at its present angle ([`Grip`]) for `duration` s, with at most `strength` N
     /// m.
     pub fn hold(&mut self, joint: usize, strength: f64, duration: f64) {
-        self.grip = Some(Grip::new(joint, strength, self.tick as f64 * TICK_S, duration));
+        self.grip = Some(Grip::new(joint, strength, self.time(), duration));
     }
 
     /// Torque of the hand at `time`, N m, anatomical.
@@ -218,11 +218,12 @@ impl<const N: usize> World<N> {
             return self.read_sensors();
         }
         self.decide_muscles();
-        let gripped = self.gripped(self.tick as f64 * TICK_S);
+        let now = self.time();
+        let gripped = self.gripped(now);
         let pulse: [f64; N] = self.pushes.torque((self.tick as f64 + 0.5) * TICK_S);
         let pushed: [f64; N] = core::array::from_fn(|joint| pulse[joint] + gripped[joint]);
         let stood: [f64; N] = match &mut self.floor {
-            Some(floor) => floor.torque(self.leg.mechanism(), &self.state, self.tick as f64 * TICK_S),
+            Some(floor) => floor.torque(self.leg.mechanism(), &self.state, now),
             None => [0.0; N],
         };
         let stopped = self.stopped();
@@ -279,7 +280,7 @@ impl<const N: usize> World<N> {
     /// True state now. Costs about as much as a tick.
     #[must_use]
     pub fn truth(&self) -> Truth<N> {
-        let (anatomy, state) = (&self.anatomy, &self.state);
+        let state = &self.state;
         let mut torque = self.joint_torque(&[0.0; N]);
         if let Some(wearer) = &self.wearer {
             let interaction: [f64; N] = wearer.interaction(state);
@@ -287,12 +288,12 @@ impl<const N: usize> World<N> {
         }
         let acceleration = self.leg.forward_dynamics(state, &torque);
         Truth {
-            time_s: self.tick as f64 * TICK_S,
-            position: core::array::from_fn(|joint| anatomy[joint].to_anatomical_angle(state.angles[joint])),
-            velocity: core::array::from_fn(|joint| anatomy[joint].flip(state.rates[joint])),
-            acceleration: core::array::from_fn(|joint| anatomy[joint].flip(acceleration[joint])),
+            time_s: self.time(),
+            position: self.anatomical_position(),
+            velocity: self.velocity(),
+            acceleration: core::array::from_fn(|joint| self.anatomy[joint].flip(acceleration[joint])),
             motor_torque: self.motor_torque(),
-            sticking: state.rates.map(|rate| rate == 0.0),
+            sticking: self.sticking(),
         }
     }
 

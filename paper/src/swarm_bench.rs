@@ -8,7 +8,7 @@ use scarab::ident::{
     Record, SearchState, Solver, least_squares_in_box,
 };
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT};
-use scarab::swarm::{Bso, BsoSettings, Objective};
+use scarab::swarm::{Bso, BsoSettings, Objective, Search};
 use scarab_base::error::ToolError;
 use scarab_base::words::exact;
 use scarab_identify::run::consistent;

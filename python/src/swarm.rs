@@ -3,7 +3,7 @@
 use std::cell::{Cell, RefCell};
 
 use pyo3::prelude::*;
-use scarab::swarm::{Bso, BsoSettings, Objective, SwarmError};
+use scarab::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
 
 use crate::arrays::{Array, Numbers, vector};
 use crate::error::argument;

@@ -46,12 +46,6 @@ impl Gains {
         let scale = 1.0 / (1.0 + 2.0 * DAMPING_RATIO * g + g * g);
         Self { g, w: 2.0 * g * rate_hz as f32, scale }
     }
-
-    /// Delay of value, velocity and acceleration, s.
-    #[must_use]
-    pub const fn delay_s(&self) -> f32 {
-        2.0 * DAMPING_RATIO / self.w
-    }
 }
 
 /// Low-passed value with its derivatives, per s and per s^2.
@@ -136,6 +130,11 @@ mod tests {
         }
     }
 
+    /// Delay of value, velocity and acceleration, s.
+    fn delay_s(gains: &Gains) -> f64 {
+        f64::from(2.0 * DAMPING_RATIO / gains.w)
+    }
+
     #[test]
     fn derivatives_of_a_slow_sine_are_its_own_delayed() {
         let rate = core::f64::consts::TAU * 1.5;
@@ -144,7 +143,7 @@ mod tests {
             for sample in 0..4 * sampling as u32 {
                 let time = f64::from(sample) / sampling;
                 let found = filter.push(&gains, sin_cos(rate * time).0 as f32);
-                let (sine, cosine) = sin_cos(rate * (time - f64::from(gains.delay_s())));
+                let (sine, cosine) = sin_cos(rate * (time - delay_s(&gains)));
                 if time > 0.2 {
                     let errors = [
                         f64::from(found.value) - sine,
@@ -162,7 +161,7 @@ mod tests {
     fn a_led_acceleration_is_late_by_half_as_much() {
         let rate = core::f64::consts::TAU * 4.0;
         let mut led = LedAcceleration::at(0.0);
-        let delay = f64::from(Gains::TICK.delay_s() - LEAD_S);
+        let delay = delay_s(&Gains::TICK) - f64::from(LEAD_S);
         for tick in 0..8000 {
             let time = f64::from(tick) / f64::from(SERVO_RATE_HZ);
             let found = f64::from(led.push(sin_cos(rate * time).0 as f32)) / (rate * rate);

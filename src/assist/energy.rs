@@ -94,9 +94,3 @@ impl<const N: usize> EnergyObserver<N> {
         !(self.given_j < BUDGET_J)
     }
 }
-
-impl<const N: usize> Default for EnergyObserver<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}

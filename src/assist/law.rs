@@ -16,7 +16,8 @@ use crate::model::JointState;
 use crate::real::is_finite;
 use crate::servo::{LOG_RATE_HZ, LogSample};
 
-const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
+/// Time between two samples, s.
+pub(super) const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
 /// Time from the middle of a sample to the middle of the ramp that its torque commands, plus the drive's
 /// lag of 1 ms, s.
 pub const AHEAD_S: f32 = 0.003;

@@ -24,12 +24,11 @@
 
 use core::f32::consts::TAU;
 
+use super::law::DT;
 use crate::model::JointState;
 use crate::real::{abs, clamp, max, sin_cos, sqrt};
 use crate::servo::LOG_RATE_HZ;
 
-/// Time between two samples, s.
-const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
 /// Harmonics of the waveform.
 pub const HARMONICS: usize = 4;
 /// Learning rate of the waveform per cycle.
@@ -240,12 +239,6 @@ impl<const N: usize> Oscillator<N> {
             state.qdd[joint] = self.frequency * self.frequency * bend;
         }
         state
-    }
-}
-
-impl<const N: usize> Default for Oscillator<N> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -16,12 +16,11 @@
 //! The assistance ends within 50 ms, until the next cycle, once its work on the measured motion exceeds its
 //! share of the positive work that the prediction needed in the cycle before.
 
+use super::law::DT;
 use super::model::CompensationModel;
 use super::oscillator::Oscillator;
 use crate::real::{abs, clamp, max};
-use crate::servo::LOG_RATE_HZ;
 
-const DT: f32 = 1.0 / LOG_RATE_HZ as f32;
 /// Predicted share of the motion at which the gate begins to open, and is open.
 const PERIODIC: [f32; 2] = [0.8, 0.9];
 /// Likewise for the wearer's own share, relative to the expected one.
@@ -126,11 +125,5 @@ impl<const N: usize> PeriodicAssist<N> {
         let assist = torque.map(|torque| share * self.gate * torque);
         (self.last_assist, self.last_angle) = (assist, *angles);
         assist
-    }
-}
-
-impl<const N: usize> Default for PeriodicAssist<N> {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -19,6 +19,7 @@
 use super::differentiator::LedAcceleration;
 use super::law::AssistTorque;
 use super::model::Assured;
+use crate::listed::listed;
 use crate::real::{clamp, is_finite};
 use crate::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 
@@ -33,19 +34,24 @@ const LARGEST_STEP: f32 = 0.1;
 /// Largest change of the torque that holds the leg, from one tick to the next, as a share of the cap.
 const HOLD_STEP: f32 = LARGEST_STEP / TICKS_PER_LOG as f32;
 
-/// Reason why a session ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AssistEnd {
-    /// The operator or a host asked for it.
-    Requested,
-    /// The energy budget is used up.
-    Energy,
-    /// A torque of the law is not finite.
-    NotFinite,
-    /// The law is silent.
-    Late,
-    /// The model monitor reports a change.
-    Changed,
+listed! {
+    /// Reason why a session ends.
+    pub enum AssistEnd {
+        /// All reasons, in the order of the enum.
+        ALL,
+        /// Word used in records.
+        name;
+        /// The operator or a host asked for it.
+        Requested, "requested";
+        /// The energy budget is used up.
+        Energy, "energy";
+        /// A torque of the law is not finite.
+        NotFinite, "not_finite";
+        /// The law is silent.
+        Late, "late";
+        /// The model monitor reports a change.
+        Changed, "changed";
+    }
 }
 
 /// Torque of one tick, joint (D-H) sign.

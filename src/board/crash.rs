@@ -32,6 +32,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use super::stack;
 use crate::checksum::Checksum;
+use crate::listed::listed;
 
 /// Active vector of the processor, its fault status and address registers.
 const ACTIVE: *const u32 = 0xE000_ED04 as *const u32;
@@ -82,20 +83,25 @@ pub struct Crash {
 /// Words of a record; the last is its checksum.
 const WORDS: usize = size_of::<Crash>() / 4;
 
-/// Kind of crash.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum CrashCause {
-    /// Rust panic.
-    Panic = 1,
-    /// Hard fault of the processor.
-    HardFault,
-    /// Interrupt without a handler.
-    Interrupt,
-    /// Failure of the crystal.
-    Clock,
-    /// The stack left its memory.
-    StackOverflow,
+listed! {
+    /// Kind of crash.
+    #[repr(u32)]
+    pub enum CrashCause {
+        /// All causes, in the order of their numbers.
+        ALL,
+        /// Word used in records.
+        name;
+        /// Rust panic.
+        Panic = 1, "panic";
+        /// Hard fault of the processor.
+        HardFault, "hard_fault";
+        /// Interrupt without a handler.
+        Interrupt, "interrupt";
+        /// Failure of the crystal.
+        Clock, "clock";
+        /// The stack left its memory.
+        StackOverflow, "stack_overflow";
+    }
 }
 
 impl Crash {
@@ -126,15 +132,8 @@ impl Crash {
 
     /// Name used in records.
     #[must_use]
-    pub const fn cause(&self) -> &'static str {
-        match self.cause {
-            1 => "panic",
-            2 => "hard_fault",
-            3 => "interrupt",
-            4 => "clock",
-            5 => "stack_overflow",
-            _ => "unknown",
-        }
+    pub fn cause(&self) -> &'static str {
+        CrashCause::ALL.get(self.cause.wrapping_sub(1) as usize).map_or("unknown", |cause| cause.name())
     }
 
     /// End of a panic's file name, or `-`.

@@ -11,23 +11,24 @@
 //! stays with the operator.
 
 use super::abort::Abort;
+use crate::listed::listed;
 
-/// Step of commissioning that a host asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum CommissioningStep {
-    /// Calibrate all axes. The motors turn, unless stored values can be checked at standstill.
-    Calibrate = 1,
-    /// Take the joints' present pose as their zero.
-    Reference = 2,
-    /// Clear faults and inhibit reasons.
-    Reset = 3,
+listed! {
+    /// Step of commissioning that a host asks for.
+    #[repr(u8)]
+    pub enum CommissioningStep {
+        /// All steps, in the order of their numbers.
+        ALL;
+        /// Calibrate all axes. The motors turn, unless stored values can be checked at standstill.
+        Calibrate = 1;
+        /// Take the joints' present pose as their zero.
+        Reference = 2;
+        /// Clear faults and inhibit reasons.
+        Reset = 3;
+    }
 }
 
 impl CommissioningStep {
-    /// All steps, in the order of their numbers.
-    pub const ALL: [Self; 3] = [Self::Calibrate, Self::Reference, Self::Reset];
-
     /// Returns the step with this number.
     #[must_use]
     pub fn from_number(number: u32) -> Option<Self> {
@@ -35,79 +36,44 @@ impl CommissioningStep {
     }
 }
 
-/// Progress or result of the last step (2160:3).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum StepResult {
-    /// No step since the start.
-    #[default]
-    None = 0,
-    /// Not ended yet.
-    UnderWay = 1,
-    /// Succeeded.
-    Done = 2,
-    /// Refused: the enabling switch is open.
-    SwitchOpen = 3,
-    /// Refused: the enabling switch is closed.
-    SwitchClosed = 4,
-    /// Refused: since the start or the last reset the operator's contacts were not open at the same time.
-    ContactsNotOpened = 5,
-    /// Refused: an inhibit reason is set.
-    Inhibited = 6,
-    /// Refused: the drive is on.
-    DriveOn = 7,
-    /// Refused: a calibration is under way.
-    Calibrating = 8,
-    /// Refused: the axes are calibrated, or the joints have their zeros.
-    AlreadyDone = 9,
-    /// Refused: an axis is not calibrated.
-    NotCalibrated = 10,
-    /// Failed: the calibration refused an axis (2160:4 and 5 say which, and why).
-    CalibrationRefused = 11,
-    /// Failed: the calibration was interrupted by switch, inhibit reason or fault.
-    Interrupted = 12,
-    /// Failed: a joint moved, or its encoder did not answer.
-    JointMoved = 13,
-}
-
-impl StepResult {
-    /// All results, in the order of their numbers.
-    pub const ALL: [Self; 14] = [
-        Self::None,
-        Self::UnderWay,
-        Self::Done,
-        Self::SwitchOpen,
-        Self::SwitchClosed,
-        Self::ContactsNotOpened,
-        Self::Inhibited,
-        Self::DriveOn,
-        Self::Calibrating,
-        Self::AlreadyDone,
-        Self::NotCalibrated,
-        Self::CalibrationRefused,
-        Self::Interrupted,
-        Self::JointMoved,
-    ];
-
-    /// Words of the data sheet.
-    #[must_use]
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::UnderWay => "under way",
-            Self::Done => "done",
-            Self::SwitchOpen => "the enabling switch is open",
-            Self::SwitchClosed => "the enabling switch is closed",
-            Self::ContactsNotOpened => "the contacts were not open together since the start",
-            Self::Inhibited => "an inhibit reason is set",
-            Self::DriveOn => "the drive is on",
-            Self::Calibrating => "a calibration is under way",
-            Self::AlreadyDone => "done before",
-            Self::NotCalibrated => "an axis is not calibrated",
-            Self::CalibrationRefused => "the calibration refused an axis",
-            Self::Interrupted => "the calibration was interrupted",
-            Self::JointMoved => "a joint moved, or its encoder did not answer",
-        }
+listed! {
+    /// Progress or result of the last step (2160:3).
+    #[derive(Default)]
+    #[repr(u8)]
+    pub enum StepResult {
+        /// All results, in the order of their numbers.
+        ALL,
+        /// Words of the data sheet.
+        words;
+        /// No step since the start.
+        #[default]
+        None = 0, "none";
+        /// Not ended yet.
+        UnderWay = 1, "under way";
+        /// Succeeded.
+        Done = 2, "done";
+        /// Refused: the enabling switch is open.
+        SwitchOpen = 3, "the enabling switch is open";
+        /// Refused: the enabling switch is closed.
+        SwitchClosed = 4, "the enabling switch is closed";
+        /// Refused: since the start or the last reset the operator's contacts were not open at the same time.
+        ContactsNotOpened = 5, "the contacts were not open together since the start";
+        /// Refused: an inhibit reason is set.
+        Inhibited = 6, "an inhibit reason is set";
+        /// Refused: the drive is on.
+        DriveOn = 7, "the drive is on";
+        /// Refused: a calibration is under way.
+        Calibrating = 8, "a calibration is under way";
+        /// Refused: the axes are calibrated, or the joints have their zeros.
+        AlreadyDone = 9, "done before";
+        /// Refused: an axis is not calibrated.
+        NotCalibrated = 10, "an axis is not calibrated";
+        /// Failed: the calibration refused an axis (2160:4 and 5 say which, and why).
+        CalibrationRefused = 11, "the calibration refused an axis";
+        /// Failed: the calibration was interrupted by switch, inhibit reason or fault.
+        Interrupted = 12, "the calibration was interrupted";
+        /// Failed: a joint moved, or its encoder did not answer.
+        JointMoved = 13, "a joint moved, or its encoder did not answer";
     }
 }
 

@@ -186,25 +186,22 @@ impl Communication {
             (0x1400..=0x14FF | 0x1800..=0x18FF, 1) if self.is_message(object, value) => {
                 return Err(Abort::Range);
             }
-            (0x1400..=0x16FF, _) => {
-                let receive = self.receive.get_mut(pdo).ok_or(Abort::NoObject)?;
-                receive.stop();
-                self.emergency.set(Source::Receive(pdo as u8), None);
-                let parameters = &mut receive.parameters;
-                return if index < 0x1600 {
-                    parameters.set_communication(sub, value)
+            (0x1400..=0x16FF | 0x1800..=0x1AFF, _) => {
+                let parameters = if index < 0x1800 {
+                    let receive = self.receive.get_mut(pdo).ok_or(Abort::NoObject)?;
+                    receive.stop();
+                    self.emergency.set(Source::Receive(pdo as u8), None);
+                    &mut receive.parameters
                 } else {
-                    parameters.set_mapping(sub, value)
+                    let transmit = self.transmit.get_mut(pdo).ok_or(Abort::NoObject)?;
+                    transmit.restart();
+                    &mut transmit.parameters
                 };
-            }
-            (0x1800..=0x1AFF, _) => {
-                let transmit = self.transmit.get_mut(pdo).ok_or(Abort::NoObject)?;
-                transmit.restart();
-                let parameters = &mut transmit.parameters;
-                return if index < 0x1A00 {
-                    parameters.set_communication(sub, value)
-                } else {
+                let is_mapping = index & 0x200 != 0;
+                return if is_mapping {
                     parameters.set_mapping(sub, value)
+                } else {
+                    parameters.set_communication(sub, value)
                 };
             }
             _ => return Err(Abort::NoObject),

@@ -19,6 +19,7 @@
 use heapless::Deque;
 
 use super::abort::Abort;
+use crate::listed::listed;
 
 /// Bytes that wait for the level below: one block of [`BLOCK`] segments of seven bytes and the one that is
 /// held back.
@@ -26,81 +27,55 @@ const WAITING: usize = 240;
 /// Segments of a block, as announced to the host.
 pub(super) const BLOCK: u8 = 32;
 
-/// Command of a host (1F51:1), with CiA 302-3's numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum ProgramCommand {
-    /// Stop the program, so that a new one can be written.
-    Stop = 0,
-    /// Start the new program, resume the present one, or confirm one on trial.
-    Start = 1,
-    /// Restart the board.
-    Reset = 2,
-    /// Clear the space of the new program.
-    Clear = 3,
+listed! {
+    /// Command of a host (1F51:1), with CiA 302-3's numbers.
+    #[repr(u8)]
+    pub enum ProgramCommand {
+        /// All commands, in the order of their numbers.
+        ALL;
+        /// Stop the program, so that a new one can be written.
+        Stop = 0;
+        /// Start the new program, resume the present one, or confirm one on trial.
+        Start = 1;
+        /// Restart the board.
+        Reset = 2;
+        /// Clear the space of the new program.
+        Clear = 3;
+    }
 }
 
 impl ProgramCommand {
     /// Command with this number.
     #[must_use]
-    pub const fn from_number(number: u32) -> Option<Self> {
-        Some(match number {
-            0 => Self::Stop,
-            1 => Self::Start,
-            2 => Self::Reset,
-            3 => Self::Clear,
-            _ => return None,
-        })
+    pub fn from_number(number: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|command| *command as u32 == number)
     }
 }
 
-/// Error in 1F57, with CiA 302-3's numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum ProgramError {
-    /// No error.
-    #[default]
-    None = 0,
-    /// What was written has no header of an image.
-    NoProgram = 1,
-    /// The image is for another board, or states an impossible length.
-    Format = 2,
-    /// The check sum differs.
-    Checksum = 3,
-    /// Bytes came before the space was cleared, or more than fit.
-    NotCleared = 4,
-    /// The flash did not take a change.
-    Write = 5,
-    /// The drive is on, motors brake, or the watchdog does not take its longer time.
-    Forbidden = 7,
-}
-
-impl ProgramError {
-    /// All errors.
-    pub const ALL: [Self; 7] = [
-        Self::None,
-        Self::NoProgram,
-        Self::Format,
-        Self::Checksum,
-        Self::NotCleared,
-        Self::Write,
-        Self::Forbidden,
-    ];
-
-    /// Words for a host's display.
-    #[must_use]
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::None => "no error",
-            Self::NoProgram => "no image was written",
-            Self::Format => "the image is for another board, or its length is impossible",
-            Self::Checksum => "the image is damaged: its check sum differs",
-            Self::NotCleared => "bytes came before the space was cleared, or more than fit",
-            Self::Write => "the flash did not take a change",
-            Self::Forbidden => {
-                "not now: the drive is on, motors brake, the watchdog does not take its longer time, or a simulated board"
-            }
-        }
+listed! {
+    /// Error in 1F57, with CiA 302-3's numbers.
+    #[derive(Default)]
+    #[repr(u8)]
+    pub enum ProgramError {
+        /// All errors.
+        ALL,
+        /// Words for a host's display.
+        words;
+        /// No error.
+        #[default]
+        None = 0, "no error";
+        /// What was written has no header of an image.
+        NoProgram = 1, "no image was written";
+        /// The image is for another board, or states an impossible length.
+        Format = 2, "the image is for another board, or its length is impossible";
+        /// The check sum differs.
+        Checksum = 3, "the image is damaged: its check sum differs";
+        /// Bytes came before the space was cleared, or more than fit.
+        NotCleared = 4, "bytes came before the space was cleared, or more than fit";
+        /// The flash did not take a change.
+        Write = 5, "the flash did not take a change";
+        /// The drive is on, motors brake, or the watchdog does not take its longer time.
+        Forbidden = 7, "not now: the drive is on, motors brake, the watchdog does not take its longer time, or a simulated board";
     }
 }
 

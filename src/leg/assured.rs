@@ -15,7 +15,7 @@
 use crate::assist::Assured;
 use crate::ident::{Estimate, RowModel};
 use crate::model::{JointState, Parameter, Standing, regressor};
-use crate::real::{max, min};
+use crate::real::{dot, max, min};
 use nalgebra::Vector3;
 
 /// Postures per turn.
@@ -90,7 +90,7 @@ fn certain_share<const N: usize, const B: usize>(
             *weight += direction[joint] * column;
         }
     }
-    let inertia = weights.iter().zip(&estimate.values).fold(0.0, |sum, (weight, value)| sum + weight * value);
+    let inertia = dot(&weights, &estimate.values);
     if inertia > 0.0 { 1.0 - SIGMAS * estimate.sigma_of(&weights) / inertia } else { 0.0 }
 }
 

@@ -2,7 +2,7 @@
 
 use super::activity::VALIDATION_MOTIONS;
 use crate::ident::{Estimator, KernelError, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds};
-use crate::motion::{JointEnvelope, LimitViolation, Motion, MotionError, Periodic};
+use crate::motion::{JointEnvelope, LimitViolation, Motion, Periodic};
 use crate::servo::{JointConfiguration, ServoError};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
@@ -57,34 +57,8 @@ pub enum LegError {
     Servo(ServoError),
     /// A motion exceeds the limits.
     Limit(LimitViolation),
-    /// A motion is invalid.
-    Motion(MotionError),
     /// The filter cannot be built.
     Kernel(KernelError),
-}
-
-impl From<ServoError> for LegError {
-    fn from(error: ServoError) -> Self {
-        Self::Servo(error)
-    }
-}
-
-impl From<LimitViolation> for LegError {
-    fn from(error: LimitViolation) -> Self {
-        Self::Limit(error)
-    }
-}
-
-impl From<MotionError> for LegError {
-    fn from(error: MotionError) -> Self {
-        Self::Motion(error)
-    }
-}
-
-impl From<KernelError> for LegError {
-    fn from(error: KernelError) -> Self {
-        Self::Kernel(error)
-    }
 }
 
 impl<const N: usize, const B: usize> LegConfiguration<N, B> {
@@ -113,7 +87,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
     /// # Errors
     /// [`LegError::Limit`] names the first joint and quantity that exceed the limits.
     pub fn prove(&self, motion: Periodic<N>) -> Result<ProvedMotion<N>, LegError> {
-        Motion::Periodic(motion).prove(&self.envelope())?;
+        Motion::Periodic(motion).prove(&self.envelope()).map_err(LegError::Limit)?;
         Ok(ProvedMotion(motion))
     }
 }

@@ -119,7 +119,7 @@ impl<const N: usize> Control<N> {
         }
         let (approach_speed, approach_acceleration) = configuration.approach();
         Ok(Self {
-            servo: Servo::new(configuration.joints)?,
+            servo: Servo::new(configuration.joints).map_err(LegError::Servo)?,
             averager: LogAverager::EMPTY,
             tick: 0,
             activity: Activity::Idle,
@@ -183,12 +183,12 @@ impl<const N: usize> Control<N> {
 
     /// Reports a fault detected by the board, for the next tick.
     pub fn report(&mut self, fault: Fault) {
-        self.servo.report(fault);
+        self.servo.monitor.report(fault);
     }
 
     /// Sets which joints may be enabled outside their range, to return into it.
     pub fn permit_return(&mut self, joints: [bool; N]) {
-        self.servo.permit_return(joints);
+        self.servo.monitor.permit_return(joints);
     }
 
     /// Sets the bandwidth of each position loop ([`Servo::set_bandwidths`]).
@@ -200,13 +200,13 @@ impl<const N: usize> Control<N> {
 
     /// Sets the derating of each joint's torque cap by temperatures and bus voltage, from the next tick on.
     pub fn derate(&mut self, derating: &Derating<N>) {
-        self.servo.derate(derating);
+        self.servo.monitor.derate(derating);
     }
 
     /// Codes of the limits that acted on each joint in the tick that returned `output`.
     #[must_use]
     pub fn limit_codes(&self, output: &ControlOutput<N>) -> [LimitCodes; N] {
-        self.servo.limit_codes(&output.servo.decision)
+        self.servo.monitor.limit_codes(&output.servo.decision)
     }
 
     /// Torque by a joint's measured current, with the model's sign.
@@ -251,19 +251,9 @@ impl<const N: usize> Control<N> {
         self.models.model()
     }
 
-    /// Runs one tick.
-    pub fn tick(
-        &mut self,
-        sample: &Sample<N>,
-        request: Option<ControlRequest>,
-        gravity: [f32; 3],
-    ) -> ControlOutput<N> {
-        self.tick_with(sample, request.as_ref(), gravity, None)
-    }
-
     /// Runs one tick, with the commands of a host if there is one.
     #[inline]
-    pub fn tick_with(
+    pub fn tick(
         &mut self,
         sample: &Sample<N>,
         request: Option<&ControlRequest>,
@@ -288,7 +278,7 @@ impl<const N: usize> Control<N> {
         let feedforward = feedforward.as_ref();
         let efforts = commanded.as_ref().map(|commanded| &commanded.efforts).or(assisted.as_ref());
         let command = ServoCommand { motion, feedforward, power };
-        let servo = self.servo.tick_with(sample, &command, efforts, gravity);
+        let servo = self.servo.tick(sample, &command, efforts, gravity);
         // In every tick: a host that takes the leg over begins from this state.
         if let Some(host) = &mut host {
             host.following.measure(&servo);
@@ -504,7 +494,7 @@ impl<const N: usize> Control<N> {
         let start = Motion::Periodic(motion).start_rad();
         let here = self.motion.state_at(self.motion_tick).position_rad;
         let mut speed = self.approach_speed;
-        for (speed, returns) in speed.iter_mut().zip(self.servo.returns()) {
+        for (speed, returns) in speed.iter_mut().zip(self.servo.monitor.returns()) {
             // While a joint returns into its range, the whole approach is limited to the return speed.
             speed.0 = if returns { min(speed.0, RETURN_SPEED) } else { speed.0 };
         }

@@ -158,12 +158,6 @@ pub enum DescriptionError {
     Motion(MotionError),
 }
 
-impl From<MotionError> for DescriptionError {
-    fn from(error: MotionError) -> Self {
-        Self::Motion(error)
-    }
-}
-
 impl JointDescription {
     fn configuration(&self, joint: usize) -> Result<JointConfiguration, DescriptionError> {
         let anatomy = AnatomicalJoint::new(self.direction, self.zero_offset)
@@ -227,10 +221,10 @@ impl<const N: usize> LegDescription<N> {
         for (joint, (slot, description)) in joints.iter_mut().zip(&self.joints).enumerate() {
             *slot = description.configuration(joint)?;
         }
-        let excitation = self.excitation.motion(SERVO_RATE_HZ)?;
+        let excitation = self.excitation.motion(SERVO_RATE_HZ).map_err(DescriptionError::Motion)?;
         let mut validation: [Periodic<N>; VALIDATION_MOTIONS] = [excitation; VALIDATION_MOTIONS];
         for (slot, table) in validation.iter_mut().zip(&self.validation) {
-            *slot = table.motion(SERVO_RATE_HZ)?;
+            *slot = table.motion(SERVO_RATE_HZ).map_err(DescriptionError::Motion)?;
         }
         let mut model = RowModel {
             stribeck_choice: self.joints.map(|joint| joint.stribeck),

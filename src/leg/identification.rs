@@ -104,7 +104,7 @@ where
     /// # Errors
     /// See [`Identification::new`].
     pub fn with_window(configuration: &LegConfiguration<N, B>, window: W) -> Result<Self, LegError> {
-        let filters = Filters::new(configuration.bandwidth_hz)?;
+        let filters = Filters::new(configuration.bandwidth_hz).map_err(LegError::Kernel)?;
         Ok(made(|slot| Self::new_in(slot, configuration, &filters, window)))
     }
 

@@ -117,7 +117,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         let (following, cancel) = (&mut self.following, core::mem::take(&mut self.cancel));
         let host = Some(Host { following, commands: self.commands.as_ref(), cancel, waits: false });
         self.sample = Some(*sample);
-        let output = self.control.tick_with(sample, request.as_ref(), gravity, host);
+        let output = self.control.tick(sample, request.as_ref(), gravity, host);
         if let Some(logged) = &output.logged {
             self.identification.push(logged);
         }

@@ -29,8 +29,6 @@
 //! from parameters loses the digits that the shift to the centre of mass cancels. A body of radius r at
 //! distance c has a relative error of about 1e-7 (c/r)^2.
 
-use nalgebra::{Matrix4, Vector4};
-
 use super::inertia::{INERTIAL_PARAMETERS, InertialParameters};
 use crate::real::{Real, clamp, exp, is_finite, ln, max, sqrt};
 
@@ -110,24 +108,23 @@ pub fn is_physically_consistent<T: Real>(parameters: &InertialParameters<T>) -> 
     LogCholesky::from_parameters(parameters).is_some()
 }
 
-/// Pseudo-inertia of these parameters: second moments (kg m2), first moments (kg m), mass (kg).
-#[must_use]
-pub fn pseudo_inertia<T: Real>(parameters: &InertialParameters<T>) -> Matrix4<T> {
-    let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
-    let half_trace = (xx + yy + zz) * T::from_double(0.5);
-    let columns = [
-        Vector4::new(half_trace - xx, -xy, -xz, hx),
-        Vector4::new(-xy, half_trace - yy, -yz, hy),
-        Vector4::new(-xz, -yz, half_trace - zz, hz),
-        Vector4::new(hx, hy, hz, mass),
-    ];
-    Matrix4::from_columns(&columns)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::testing::TestRandom;
     use super::*;
+    use nalgebra::{Matrix4, Vector4};
+
+    /// Pseudo-inertia of these parameters: second moments (kg m2), first moments (kg m), mass (kg).
+    fn pseudo_inertia(parameters: &InertialParameters<f64>) -> Matrix4<f64> {
+        let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
+        let half_trace = (xx + yy + zz) * 0.5;
+        Matrix4::from_columns(&[
+            Vector4::new(half_trace - xx, -xy, -xz, hx),
+            Vector4::new(-xy, half_trace - yy, -yz, hy),
+            Vector4::new(-xz, -yz, half_trace - zz, hz),
+            Vector4::new(hx, hy, hz, mass),
+        ])
+    }
 
     /// Largest coordinate error after a conversion to parameters and back, over random bodies.
     fn round_trip_error<T: Real>(seed: u64) -> f64 {

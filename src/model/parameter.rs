@@ -2,10 +2,13 @@
 //!
 //! Logs, reports, regressor columns and stored models all use this order, so it never changes.
 
+use crate::listed::listed;
 use crate::real::Real;
 
 /// Parameters of one joint: ten of the link's inertia, rotor inertia, three of friction.
 pub const PARAMETERS_PER_JOINT: usize = 14;
+
+const _: () = assert!(Parameter::ALL.len() == PARAMETERS_PER_JOINT);
 
 /// Parameters of one joint in the order of [`Parameter`].
 pub type JointParameters<T> = [T; PARAMETERS_PER_JOINT];
@@ -16,84 +19,51 @@ pub type LegParameters<T, const N: usize> = [JointParameters<T>; N];
 /// Derivative of one torque by each parameter of each joint.
 pub type RegressorRow<T, const N: usize> = [JointParameters<T>; N];
 
-/// One of the parameters of a joint; the discriminant is its index in [`JointParameters`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum Parameter {
-    /// Inertia tensor element about the joint frame's origin, integral of (y2 + z2) dm.
-    XX,
-    /// Inertia tensor element, minus the integral of x y dm.
-    XY,
-    /// Inertia tensor element, minus the integral of x z dm.
-    XZ,
-    /// Inertia tensor element, integral of (x2 + z2) dm.
-    YY,
-    /// Inertia tensor element, minus the integral of y z dm.
-    YZ,
-    /// Inertia tensor element, integral of (x2 + y2) dm.
-    ZZ,
-    /// First moment of mass along x.
-    HX,
-    /// First moment of mass along y.
-    HY,
-    /// First moment of mass along z.
-    HZ,
-    /// Mass.
-    M,
-    /// Rotor inertia seen at the joint (rotor inertia times gear ratio squared).
-    IA,
-    /// Coulomb friction.
-    FC,
-    /// Viscous friction.
-    FV,
-    /// Torque offset: a constant of the current measurement or of the friction.
-    OFF,
+listed! {
+    /// One of the parameters of a joint; the discriminant is its index in [`JointParameters`].
+    #[derive(PartialOrd, Ord)]
+    #[repr(u8)]
+    pub enum Parameter {
+        /// All parameters, in order.
+        ALL,
+        /// Symbol used in reports and files.
+        symbol;
+        /// Inertia tensor element about the joint frame's origin, integral of (y2 + z2) dm.
+        XX, "XX";
+        /// Inertia tensor element, minus the integral of x y dm.
+        XY, "XY";
+        /// Inertia tensor element, minus the integral of x z dm.
+        XZ, "XZ";
+        /// Inertia tensor element, integral of (x2 + z2) dm.
+        YY, "YY";
+        /// Inertia tensor element, minus the integral of y z dm.
+        YZ, "YZ";
+        /// Inertia tensor element, integral of (x2 + y2) dm.
+        ZZ, "ZZ";
+        /// First moment of mass along x.
+        HX, "HX";
+        /// First moment of mass along y.
+        HY, "HY";
+        /// First moment of mass along z.
+        HZ, "HZ";
+        /// Mass.
+        M, "M";
+        /// Rotor inertia seen at the joint (rotor inertia times gear ratio squared).
+        IA, "IA";
+        /// Coulomb friction.
+        FC, "FC";
+        /// Viscous friction.
+        FV, "FV";
+        /// Torque offset: a constant of the current measurement or of the friction.
+        OFF, "OFF";
+    }
 }
 
 impl Parameter {
-    /// All parameters, in order.
-    pub const ALL: [Self; PARAMETERS_PER_JOINT] = [
-        Self::XX,
-        Self::XY,
-        Self::XZ,
-        Self::YY,
-        Self::YZ,
-        Self::ZZ,
-        Self::HX,
-        Self::HY,
-        Self::HZ,
-        Self::M,
-        Self::IA,
-        Self::FC,
-        Self::FV,
-        Self::OFF,
-    ];
-
     /// Index in [`JointParameters`], 0..14.
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
-    }
-
-    /// Symbol used in reports and files.
-    #[must_use]
-    pub const fn symbol(self) -> &'static str {
-        match self {
-            Self::XX => "XX",
-            Self::XY => "XY",
-            Self::XZ => "XZ",
-            Self::YY => "YY",
-            Self::YZ => "YZ",
-            Self::ZZ => "ZZ",
-            Self::HX => "HX",
-            Self::HY => "HY",
-            Self::HZ => "HZ",
-            Self::M => "M",
-            Self::IA => "IA",
-            Self::FC => "FC",
-            Self::FV => "FV",
-            Self::OFF => "OFF",
-        }
     }
 
     /// True if no physically consistent leg has a negative value of it, regrouped or not.

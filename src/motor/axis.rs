@@ -56,7 +56,7 @@ use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, Shu
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample, SERVO_RATE_HZ};
 use crate::real::{abs, clamp, is_finite, min};
-use crate::units::{Ampere, Hertz, RadianPerSecond};
+use crate::units::{Ampere, Hertz};
 
 mod first_motion;
 mod index;
@@ -265,12 +265,6 @@ impl Axis {
     #[must_use]
     pub fn measured(&self) -> Rotating<Ampere> {
         self.measured
-    }
-
-    /// Electrical speed, rad/s.
-    #[must_use]
-    pub fn electrical_speed(&self) -> RadianPerSecond {
-        RadianPerSecond(self.speed.rad_per_s())
     }
 
     /// The fault that stopped the axis, if any.

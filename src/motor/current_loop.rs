@@ -129,12 +129,6 @@ impl CurrentGains {
             bandwidth.0,
         ])
     }
-
-    /// Phase margin of the open loop, degrees.
-    #[must_use]
-    pub fn phase_margin_deg(&self) -> f32 {
-        90.0 - 360.0 * DELAY_PERIODS * self.bandwidth.0 / CURRENT_RATE_HZ as f32
-    }
 }
 
 /// Proportional gains, `2 pi f T R / (1 - exp(-R T / L))`; `renewal` is the denominator.

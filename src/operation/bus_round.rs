@@ -215,11 +215,5 @@ impl BusRound {
     }
 }
 
-impl Default for BusRound {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests;

@@ -39,7 +39,7 @@ use crate::leg::{
 };
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator, EncoderSetting, JointZero};
 use crate::safety::{
-    BoardFault, CheckClock, InhibitReason, Thermistor, Winding, WindingRating, of_gate_driver, of_temperature,
+    BoardFault, CheckClock, InhibitReason, Thermistor, Winding, WindingRating, of_temperature,
 };
 use crate::trace::{Record, words};
 use crate::units::Hertz;
@@ -379,8 +379,8 @@ impl<const N: usize> Housekeeper<N> {
         let due = self.clock.next();
         if due.gates {
             for axis in 0..N {
-                if let Some(cause) = of_gate_driver(level.hardware.gate_holds(axis)) {
-                    level.signals.inhibit.raise(cause);
+                if !level.hardware.gate_holds(axis) {
+                    level.signals.inhibit.raise(InhibitReason::GateConfiguration);
                 }
             }
         }

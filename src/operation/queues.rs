@@ -272,12 +272,6 @@ impl<const N: usize> Queues<N> {
     }
 }
 
-impl<const N: usize> Default for Queues<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Queues of the assistance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssistQueues<const N: usize> {
@@ -315,12 +309,6 @@ impl<const N: usize> AssistQueues<N> {
         let (torques, take_torque) = self.torques.split();
         let servo = ServoAssistEnds { sessions: give_session, samples: give_sample, torques: take_torque };
         (servo, AssistEnds { sessions, samples, torques })
-    }
-}
-
-impl<const N: usize> Default for AssistQueues<N> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -378,11 +366,5 @@ impl<const N: usize> BusQueues<N> {
         let servo = HostEnds { orders: take_order, status: give_status, logged: give_logged };
         let (program, bytes) = self.program.split();
         (frames_in, servo, BusEnds { frames, orders, status, logged, program }, bytes)
-    }
-}
-
-impl<const N: usize> Default for BusQueues<N> {
-    fn default() -> Self {
-        Self::new()
     }
 }

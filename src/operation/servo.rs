@@ -167,7 +167,7 @@ impl<const N: usize> ServoLevel<N> {
             // The statement belongs to this identification alone.
             control.set_wearing(self.prepared.and_then(|prepared| prepared.wearing));
         }
-        let output = control.tick_with(&sample, permitted, gravity, host);
+        let output = control.tick(&sample, permitted, gravity, host);
         if let Some(note) = control.take_assist_note() {
             if let (AssistNote::Refused(_), Some(host)) = (note, &mut self.host) {
                 host.refuse(RefusalReason::NoAssistance);
@@ -446,7 +446,7 @@ impl<const N: usize> ServoLevel<N> {
         let tick = self.tick;
         let mut record = |record| send(LegEvent::Record(record), ends, signals);
         if let Some(fault) = fault {
-            let (code, name) = (fault.code.number(), words::fault(fault.code));
+            let (code, name) = (fault.code.number(), fault.code.name());
             record(Record::Fault { tick, code, name, joint: fault.joint.saturating_add(1) });
         }
         let (name, phase, motion) = words::activity(activity);
@@ -469,7 +469,7 @@ impl<const N: usize> ServoLevel<N> {
 }
 
 fn not_enabled<const N: usize>(tick: u32, refused: Refusal) -> Record<N> {
-    Record::NotEnabled { tick, joint: refused.number(), why: words::refusal(refused.reason) }
+    Record::NotEnabled { tick, joint: refused.number(), why: refused.reason.name() }
 }
 
 /// Sends a new session and its samples to the law, and requests its run.

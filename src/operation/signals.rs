@@ -170,12 +170,6 @@ impl Inhibit {
     }
 }
 
-impl Default for Inhibit {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Counters of the levels, reported from the lowest priority.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistics<const N: usize> {
@@ -636,11 +630,7 @@ impl<const N: usize> Signals<N> {
 
     /// Sets the permission of the drive.
     pub fn set_permission(&self, permission: Permission) {
-        self.permission.set(match permission {
-            Permission::Off => 0,
-            Permission::Follow => 1,
-            Permission::Damp => 2,
-        });
+        self.permission.set(permission as u32);
     }
 
     /// Returns whether a host has the drive; then closing the enabling switch permits but requests nothing.
@@ -685,12 +675,6 @@ impl<const N: usize> Signals<N> {
     #[must_use]
     pub fn take_forgotten(&self) -> bool {
         self.forgotten.get() != 0 && self.forgotten.swap(0) != 0
-    }
-}
-
-impl<const N: usize> Default for Signals<N> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

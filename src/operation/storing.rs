@@ -76,12 +76,6 @@ pub struct Storing {
     loose: bool,
 }
 
-impl Default for Storing {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Storing {
     /// State after the start. The watchdog may still have the start's period, until [`Self::supervise`] has
     /// checked.

@@ -59,9 +59,3 @@ impl TokenBucket {
         self.left_us > -MOST_US
     }
 }
-
-impl Default for TokenBucket {
-    fn default() -> Self {
-        Self::new()
-    }
-}

@@ -21,54 +21,41 @@
 
 use super::barrier::Limited;
 use super::limits::JointLimits;
+use crate::listed::listed;
 use crate::real::{abs, max};
 use crate::units::Volt;
 
-macro_rules! limit_codes {
-    ($( $(#[doc = $doc:literal])* $code:ident = $number:literal, $name:literal; )*) => {
-        /// A limit that reduces the request. Numbers never change.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u8)]
-        pub enum LimitCode {
-            $( $(#[doc = $doc])* $code = $number, )*
-        }
-
-        impl LimitCode {
-            /// All codes, in the table's order.
-            pub const ALL: [Self; [$( $number, )*].len()] = [$( Self::$code, )*];
-
-            /// Word used in records.
-            #[must_use]
-            pub const fn name(self) -> &'static str {
-                match self { $( Self::$code => $name, )* }
-            }
-        }
-    };
-}
-
-limit_codes! {
-    /// Torque limit of the joint.
-    Torque = 1, "torque";
-    /// Current limit of the motor, where it is reached before the torque limit.
-    Current = 2, "current";
-    /// Speed limit of the joint.
-    Speed = 3, "speed";
-    /// The joint could otherwise not stop within its range.
-    Position = 4, "position";
-    /// A bridge is hot.
-    Temperature = 5, "temperature";
-    /// The bus voltage is low.
-    BusLow = 6, "bus_low";
-    /// The bus voltage is high.
-    BusHigh = 7, "bus_high";
-    /// The motor's winding is hot ([`super::Winding`]).
-    Winding = 8, "winding";
-    /// The motor's rotor angle is stored and has not been proven by a motion (`motor::Axis`).
-    FirstMotion = 9, "first_motion";
-    /// The current from the supply is near its limit ([`super::SupplyCurrent`]).
-    SupplyCurrent = 10, "supply_current";
-    /// The current into the supply is near its limit.
-    ChargeCurrent = 11, "charge_current";
+listed! {
+    /// A limit that reduces the request. Numbers never change.
+    #[repr(u8)]
+    pub enum LimitCode {
+        /// All codes, in the table's order.
+        ALL,
+        /// Word used in records.
+        name;
+        /// Torque limit of the joint.
+        Torque = 1, "torque";
+        /// Current limit of the motor, where it is reached before the torque limit.
+        Current = 2, "current";
+        /// Speed limit of the joint.
+        Speed = 3, "speed";
+        /// The joint could otherwise not stop within its range.
+        Position = 4, "position";
+        /// A bridge is hot.
+        Temperature = 5, "temperature";
+        /// The bus voltage is low.
+        BusLow = 6, "bus_low";
+        /// The bus voltage is high.
+        BusHigh = 7, "bus_high";
+        /// The motor's winding is hot ([`super::Winding`]).
+        Winding = 8, "winding";
+        /// The motor's rotor angle is stored and has not been proven by a motion (`motor::Axis`).
+        FirstMotion = 9, "first_motion";
+        /// The current from the supply is near its limit ([`super::SupplyCurrent`]).
+        SupplyCurrent = 10, "supply_current";
+        /// The current into the supply is near its limit.
+        ChargeCurrent = 11, "charge_current";
+    }
 }
 
 /// A set of codes: bit n for code n.

@@ -9,32 +9,25 @@
 //! drop its wearer, a stiff one may hurt him. Damp needs a working servo, so it is used only where encoder,
 //! currents and timing remain trustworthy. All other faults lead to Off.
 
-/// Safe state that a fault leads to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reaction {
-    /// Outputs off in the same tick. Requires nothing.
-    Off,
-    /// Velocity damped under the torque cap for at most 300 ms, then Off. Requires encoder and currents.
-    Damp,
-    /// Active short circuit by the low sides, a passive brake. Requires a healthy gate driver.
-    ActiveShort,
-    /// Enabled with less torque than requested.
-    Limit,
-    /// Never enabled, with the reason reported.
-    Refuse,
-}
+use crate::listed::listed;
 
-impl Reaction {
-    /// Word used in tables and records.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Off => "Off",
-            Self::Damp => "Damp",
-            Self::ActiveShort => "Short",
-            Self::Limit => "Limit",
-            Self::Refuse => "Refuse",
-        }
+listed! {
+    /// Safe state that a fault leads to.
+    pub enum Reaction {
+        /// All reactions, in the order of the enum.
+        ALL,
+        /// Word used in tables and records.
+        name;
+        /// Outputs off in the same tick. Requires nothing.
+        Off, "Off";
+        /// Velocity damped under the torque cap for at most 300 ms, then Off. Requires encoder and currents.
+        Damp, "Damp";
+        /// Active short circuit by the low sides, a passive brake. Requires a healthy gate driver.
+        ActiveShort, "Short";
+        /// Enabled with less torque than requested.
+        Limit, "Limit";
+        /// Never enabled, with the reason reported.
+        Refuse, "Refuse";
     }
 }
 
@@ -173,41 +166,34 @@ impl FaultCode {
 /// Code of an emergency message that reports the end of an error.
 pub const NO_ERROR: u16 = 0;
 
-macro_rules! notices {
-    ($( $(#[doc = $doc:literal])* $code:ident = $number:literal; )*) => {
-        /// Emergency code of a node that is no fault of the leg. A number is never used again.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u16)]
-        pub enum NoticeCode {
-            $( $(#[doc = $doc])* $code = $number, )*
-        }
-
-        impl NoticeCode {
-            /// All notices, in the table's order.
-            pub const ALL: [Self; [$( $number, )*].len()] = [$( Self::$code, )*];
-
-            /// The number on the bus.
-            #[must_use]
-            pub const fn number(self) -> u16 {
-                self as u16
-            }
-        }
-    };
+listed! {
+    /// Emergency code of a node that is no fault of the leg. A number is never used again.
+    #[repr(u16)]
+    pub enum NoticeCode {
+        /// All notices, in the table's order.
+        ALL;
+        /// Received frames were lost (8110: CAN overrun).
+        Overrun = 0x8110;
+        /// A received PDO was shorter than its mapping (8210: PDO not processed).
+        ShortPdo = 0x8210;
+        /// A SYNC had no counter although 1019 expects one (8240: unexpected SYNC data length).
+        SyncLength = 0x8240;
+        /// Objects could not be stored or read back (5530: data storage).
+        StoreFailed = 0x5530;
+        /// A flash write begins: the node may be silent for seconds, heartbeats included.
+        Storing = 0xFF0D;
+        /// A step towards enabled was refused: joint (from 1; 0 the leg), reason (bit of 60FD), inhibit
+        /// reasons.
+        NotEnabled = 0xFF0E;
+    }
 }
 
-notices! {
-    /// Received frames were lost (8110: CAN overrun).
-    Overrun = 0x8110;
-    /// A received PDO was shorter than its mapping (8210: PDO not processed).
-    ShortPdo = 0x8210;
-    /// A SYNC had no counter although 1019 expects one (8240: unexpected SYNC data length).
-    SyncLength = 0x8240;
-    /// Objects could not be stored or read back (5530: data storage).
-    StoreFailed = 0x5530;
-    /// A flash write begins: the node may be silent for seconds, heartbeats included.
-    Storing = 0xFF0D;
-    /// A step towards enabled was refused: joint (from 1; 0 the leg), reason (bit of 60FD), inhibit reasons.
-    NotEnabled = 0xFF0E;
+impl NoticeCode {
+    /// The number on the bus.
+    #[must_use]
+    pub const fn number(self) -> u16 {
+        self as u16
+    }
 }
 
 /// A fault and the joint where it was detected; it stops the whole leg.

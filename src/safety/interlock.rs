@@ -34,6 +34,7 @@
 //! Cost: about 12 instructions per axis and tick, and the reads of an active line.
 
 use super::fault::FaultCode;
+use crate::listed::listed;
 
 /// Reads of a line that must agree. The board's image spends 45 instructions between the first and the last:
 /// 0.27, 0.36, 0.54 us at 1.0, 1.34, 2.0 cycles per instruction of 168 MHz.
@@ -52,74 +53,54 @@ const PATIENCE: u8 = 3;
 /// Missed ticks after which damping ends too: one millisecond.
 const DAMPING_ENDS_AFTER_TICKS: u8 = 24;
 
-/// Inhibit reason: keeps the drive off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum InhibitReason {
-    /// The emergency stop's contact is open.
-    EmergencyStop,
-    /// A gate driver reports a fault.
-    GateFault,
-    /// A gate driver does not hold its configuration.
-    GateConfiguration,
-    /// The first axis turned its outputs off.
-    Axis1,
-    /// The second axis turned its outputs off.
-    Axis2,
-    /// An axis detected a frozen counter: both axes brake.
-    EncoderFrozen,
-    /// A switching axis lost its rotor angle, so damping is impossible: both axes brake.
-    EncoderPosition,
-    /// 24 current ticks were missed without one in time between them.
-    CurrentTicks,
-    /// The servo did not answer three times in a row.
-    ServoTicks,
-    /// One shunt's conversion ended without the other's.
-    Conversion,
-    /// The firmware crashed before this start.
-    Crash,
-    /// The watchdog reset the board.
-    Watchdog,
-    /// The bridges' timers are not in phase.
-    Timers,
-    /// The board version does not determine the divider of the bus voltage.
-    BoardVersion,
-    /// The constants of an axis or of the leg are invalid.
-    Configuration,
-    /// The flash is being written, which may stall the processor.
-    Storing,
-    /// Too much current into the supply: both axes brake.
-    ChargeCurrent,
-    /// The processor's supply was too low for a flash write.
-    ProcessorSupply,
-    /// The operator's reset restarts the gate drivers.
-    Resetting,
+listed! {
+    /// Inhibit reason: keeps the drive off.
+    #[repr(u8)]
+    pub enum InhibitReason {
+        /// All reasons, in the order of their bits.
+        ALL;
+        /// The emergency stop's contact is open.
+        EmergencyStop;
+        /// A gate driver reports a fault.
+        GateFault;
+        /// A gate driver does not hold its configuration.
+        GateConfiguration;
+        /// The first axis turned its outputs off.
+        Axis1;
+        /// The second axis turned its outputs off.
+        Axis2;
+        /// An axis detected a frozen counter: both axes brake.
+        EncoderFrozen;
+        /// A switching axis lost its rotor angle, so damping is impossible: both axes brake.
+        EncoderPosition;
+        /// 24 current ticks were missed without one in time between them.
+        CurrentTicks;
+        /// The servo did not answer three times in a row.
+        ServoTicks;
+        /// One shunt's conversion ended without the other's.
+        Conversion;
+        /// The firmware crashed before this start.
+        Crash;
+        /// The watchdog reset the board.
+        Watchdog;
+        /// The bridges' timers are not in phase.
+        Timers;
+        /// The board version does not determine the divider of the bus voltage.
+        BoardVersion;
+        /// The constants of an axis or of the leg are invalid.
+        Configuration;
+        /// The flash is being written, which may stall the processor.
+        Storing;
+        /// Too much current into the supply: both axes brake.
+        ChargeCurrent;
+        /// The processor's supply was too low for a flash write.
+        ProcessorSupply;
+        /// The operator's reset restarts the gate drivers.
+        Resetting;
+    }
 }
 
 impl InhibitReason {
-    /// All reasons, in the order of their bits.
-    pub const ALL: [Self; 19] = [
-        Self::EmergencyStop,
-        Self::GateFault,
-        Self::GateConfiguration,
-        Self::Axis1,
-        Self::Axis2,
-        Self::EncoderFrozen,
-        Self::EncoderPosition,
-        Self::CurrentTicks,
-        Self::ServoTicks,
-        Self::Conversion,
-        Self::Crash,
-        Self::Watchdog,
-        Self::Timers,
-        Self::BoardVersion,
-        Self::Configuration,
-        Self::Storing,
-        Self::ChargeCurrent,
-        Self::ProcessorSupply,
-        Self::Resetting,
-    ];
-
     /// Fault that corresponds to the reason. `None` for an axis, which reports its own fault, and for
     /// storing and resetting, which were requested.
     #[must_use]
@@ -174,13 +155,7 @@ impl InhibitReason {
         }
     }
 
-    /// Returns whether no reset clears the reason: another board, other constants or a new start are needed.
-    #[must_use]
-    pub const fn is_for_ever(self) -> bool {
-        matches!(self, Self::Timers | Self::BoardVersion | Self::Configuration)
-    }
-
-    /// Bits of the reasons that no reset clears.
+    /// Bits of the reasons that no reset clears: another board, other constants or a new start are needed.
     #[must_use]
     pub const fn for_ever() -> u32 {
         Self::Timers.bit() | Self::BoardVersion.bit() | Self::Configuration.bit()
@@ -375,7 +350,5 @@ mod tests {
         let all = InhibitReason::ALL.iter().fold(0, |bits, cause| bits | cause.bit());
         assert_eq!(all.count_ones() as usize, InhibitReason::ALL.len());
         assert!(InhibitReason::ALL.iter().all(|cause| cause.name() != "-"));
-        let for_ever = InhibitReason::ALL.iter().filter(|cause| cause.is_for_ever());
-        assert_eq!(for_ever.fold(0, |bits, cause| bits | cause.bit()), InhibitReason::for_ever());
     }
 }

@@ -58,7 +58,7 @@ pub use holding_brake::{BrakeDelays, HoldingBrake};
 pub use interlock::{Bridges, InhibitReason, ServoWatch, TickState, TickWatch, stays_active};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, RANGE_TOLERANCE, Request};
-pub use periodic_checks::{BoardFault, CheckClock, of_gate_driver, of_temperature};
+pub use periodic_checks::{BoardFault, CheckClock, of_temperature};
 pub use refusal::{Refusal, RefusalReason};
 pub use state::{DriveState, Event, Permission, PowerRequest};
 pub use step_gate::{Reading, StepGate};

@@ -5,7 +5,7 @@
 //!
 //! | check | period | worst case | reaction |
 //! | --- | --- | --- | --- |
-//! | wrong gate register, read twice | 8 ms | 8 ms + a tick | [`InhibitReason::GateConfiguration`], Off |
+//! | wrong gate register, read twice | 8 ms | 8 ms + a tick | `InhibitReason::GateConfiguration`, Off |
 //! | absolute encoder silent | 8 ms | 40 ms + servo tick | [`FaultCode::AbsoluteEncoder`], Damp |
 //! | absolute encoder contradicts the counter, twice | 8 ms | 16 ms | rotor position lost, Short |
 //! | thermistor open or shorted | 50 ms | 50 ms + servo tick | [`FaultCode::Thermistor`], Damp |
@@ -17,37 +17,30 @@
 //! its range. Cost: about ten instructions.
 
 use super::fault::FaultCode;
-use super::interlock::InhibitReason;
+use crate::listed::listed;
 
-/// Faults that other levels of the board detect and the servo reacts to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum BoardFault {
-    /// Current ticks are missing.
-    CurrentTicks,
-    /// A bridge is too hot.
-    Temperature,
-    /// A thermistor is open or shorted.
-    Thermistor,
-    /// A winding is too hot.
-    Winding,
-    /// An absolute encoder sends no valid frame.
-    AbsoluteEncoder,
-    /// The thermistor of a motor cannot be read.
-    MotorThermistor,
+listed! {
+    /// Faults that other levels of the board detect and the servo reacts to.
+    #[repr(u8)]
+    pub enum BoardFault {
+        /// All faults, in the order of their bits.
+        ALL;
+        /// Current ticks are missing.
+        CurrentTicks;
+        /// A bridge is too hot.
+        Temperature;
+        /// A thermistor is open or shorted.
+        Thermistor;
+        /// A winding is too hot.
+        Winding;
+        /// An absolute encoder sends no valid frame.
+        AbsoluteEncoder;
+        /// The thermistor of a motor cannot be read.
+        MotorThermistor;
+    }
 }
 
 impl BoardFault {
-    /// All faults, in the order of their bits.
-    pub const ALL: [Self; 6] = [
-        Self::CurrentTicks,
-        Self::Temperature,
-        Self::Thermistor,
-        Self::Winding,
-        Self::AbsoluteEncoder,
-        Self::MotorThermistor,
-    ];
-
     /// Bit of the fault.
     #[must_use]
     pub const fn bit(self) -> u32 {
@@ -106,12 +99,6 @@ impl CheckClock {
     }
 }
 
-/// Inhibit reason of a gate driver, if it lost its configuration.
-#[must_use]
-pub const fn of_gate_driver(holds: bool) -> Option<InhibitReason> {
-    if holds { None } else { Some(InhibitReason::GateConfiguration) }
-}
-
 /// Fault for a bridge's temperature, if any. Temperature and limit `hottest` in degrees Celsius; `None` for a
 /// thermistor that is open or shorted.
 #[must_use]
@@ -149,9 +136,5 @@ mod tests {
         assert_eq!(of_temperature(Some(100.0), 100.0), Some(BoardFault::Temperature));
         assert_eq!(of_temperature(Some(f32::NAN), 100.0), Some(BoardFault::Temperature));
         assert_eq!(of_temperature(None, 100.0), Some(BoardFault::Thermistor));
-        assert_eq!(
-            (of_gate_driver(true), of_gate_driver(false)),
-            (None, Some(InhibitReason::GateConfiguration))
-        );
     }
 }

@@ -4,6 +4,8 @@
 //! bit of the digital inputs (60FD). Its bit number is also its number in emergency messages (FF0E), and its
 //! word appears in records (`not_enabled`).
 
+use crate::listed::listed;
+
 /// A request that was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Refusal {
@@ -24,28 +26,33 @@ impl Refusal {
     }
 }
 
-/// Reason why a request is refused; the numbers are the bits of 60FD.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum RefusalReason {
-    /// The operator does not hold the enabling switch. The bit of 60FD is set while it is held.
-    SwitchOpen = 16,
-    /// An inhibit reason is active (`InhibitReason`).
-    Blocked = 17,
-    /// The joints' zeros are unknown.
-    NoReference = 18,
-    /// An axis is not calibrated.
-    NotCalibrated = 19,
-    /// The joint is more than 0.5 degrees out of its range, and returning is not permitted.
-    OutOfRange = 20,
-    /// The joint is too fast to stop within its range, or faster than 0.1 rad/s outside it.
-    Moving = 21,
-    /// The encoder reading of this tick was rejected.
-    Encoder = 22,
-    /// CiA 402 has no such step from the joint's state, or bit 7 of the controlword is set.
-    NoTransition = 23,
-    /// Assistance: a model that its shares need is missing or no longer fits, or the joints move.
-    NoAssistance = 24,
+listed! {
+    /// Reason why a request is refused; the numbers are the bits of 60FD.
+    #[repr(u8)]
+    pub enum RefusalReason {
+        /// All reasons, in the order of their bits.
+        ALL,
+        /// Word used in records.
+        name;
+        /// The operator does not hold the enabling switch. The bit of 60FD is set while it is held.
+        SwitchOpen = 16, "switch_open";
+        /// An inhibit reason is active (`InhibitReason`).
+        Blocked = 17, "blocked";
+        /// The joints' zeros are unknown.
+        NoReference = 18, "no_reference";
+        /// An axis is not calibrated.
+        NotCalibrated = 19, "not_calibrated";
+        /// The joint is more than 0.5 degrees out of its range, and returning is not permitted.
+        OutOfRange = 20, "out_of_range";
+        /// The joint is too fast to stop within its range, or faster than 0.1 rad/s outside it.
+        Moving = 21, "moving";
+        /// The encoder reading of this tick was rejected.
+        Encoder = 22, "encoder";
+        /// CiA 402 has no such step from the joint's state, or bit 7 of the controlword is set.
+        NoTransition = 23, "no_transition";
+        /// Assistance: a model that its shares need is missing or no longer fits, or the joints move.
+        NoAssistance = 24, "no_assistance";
+    }
 }
 
 impl RefusalReason {

@@ -99,11 +99,11 @@ pub enum Event {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Permission {
     /// Outputs off.
-    Off,
+    Off = 0,
     /// Follow the request within the limits.
-    Follow,
+    Follow = 1,
     /// Damp regardless of the request.
-    Damp,
+    Damp = 2,
 }
 
 impl DriveState {

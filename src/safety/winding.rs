@@ -26,7 +26,7 @@
 //! should not have. Without a thermistor, ambient temperature, heat of iron and of the gear, and heat from
 //! one motor to another are not measured. Demagnetisation is not modelled.
 
-use crate::real::{is_finite, max};
+use crate::real::{clamp, is_finite, max};
 use crate::units::Ohm;
 
 /// Degrees below the limit at which the share begins to fall.
@@ -131,14 +131,7 @@ impl Winding {
     /// Remaining share of the torque cap, 0..=1; 0 for NaN.
     #[must_use]
     pub fn share(&self) -> f32 {
-        let left = (self.rating.limit_c - self.temperature_c) / RAMP_K;
-        if left >= 1.0 {
-            1.0
-        } else if left > 0.0 {
-            left
-        } else {
-            0.0
-        }
+        clamp((self.rating.limit_c - self.temperature_c) / RAMP_K, 0.0, 1.0)
     }
 }
 

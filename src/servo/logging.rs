@@ -47,11 +47,6 @@ impl<const N: usize> LogAverager<N> {
     /// Averager without ticks.
     pub const EMPTY: Self = Self { first: [0; N], counts: [0; N], current_a: [0.0; N], collected: 0 };
 
-    /// Takes one tick; every eighth returns the means and starts over.
-    pub fn push(&mut self, tick: u32, sample: &Sample<N>, scales: &[JointScale; N]) -> Option<LogSample<N>> {
-        self.collect(sample).then(|| self.means(tick, scales))
-    }
-
     /// Takes one tick; true at every eighth.
     pub fn collect(&mut self, sample: &Sample<N>) -> bool {
         if self.collected == 0 {
@@ -93,6 +88,11 @@ mod tests {
     use super::*;
     use crate::hal::JointSample;
 
+    /// Takes one tick; every eighth returns the means.
+    fn push(averager: &mut LogAverager<2>, tick: u32, sample: &Sample<2>) -> Option<LogSample<2>> {
+        averager.collect(sample).then(|| averager.means(tick, &[HIP, KNEE]))
+    }
+
     fn sample(counts: [i32; 2], current: f32) -> Sample<2> {
         Sample {
             joints: counts.map(|encoder_counts| JointSample {
@@ -112,7 +112,7 @@ mod tests {
         for tick in 0..8 {
             assert!(logged.is_none());
             let counts = origin + tick * tick;
-            logged = averager.push(tick as u32, &sample([counts, -counts], tick as f32), &[HIP, KNEE]);
+            logged = push(&mut averager, tick as u32, &sample([counts, -counts], tick as f32));
         }
         let logged = logged.expect("eight ticks make a sample");
         // Squares of 0..=7 sum up to 140; the mean current is 3.5 A.
@@ -126,7 +126,7 @@ mod tests {
     fn large_counts_have_means_although_their_sum_wraps() {
         let mut averager = LogAverager::EMPTY;
         let counts = [1_600_000_000, -1_600_000_000];
-        let logged = (0..8).find_map(|tick| averager.push(tick, &sample(counts, 0.0), &[HIP, KNEE]));
+        let logged = (0..8).find_map(|tick| push(&mut averager, tick, &sample(counts, 0.0)));
         let expected = [HIP.position(counts[0] as f32).0, KNEE.position(counts[1] as f32).0];
         assert_eq!(logged.map(|logged| logged.position_rad), Some(expected));
     }
@@ -137,7 +137,7 @@ mod tests {
         let mut logged = 0;
         for tick in 0..80 {
             let value = (tick / 8) as i32;
-            if let Some(mean) = averager.push(tick, &sample([value, 0], value as f32), &[HIP, KNEE]) {
+            if let Some(mean) = push(&mut averager, tick, &sample([value, 0], value as f32)) {
                 assert_eq!((tick % 8, mean.counts_sum[0]), (7, 8 * value));
                 assert_eq!(mean.torque_nm[0], 1.5 * value as f32);
                 logged += 1;
@@ -152,7 +152,7 @@ mod tests {
         let mut logged = None;
         for tick in 0..8 {
             let counts = (i32::MAX - 3).wrapping_add(tick);
-            logged = averager.push(tick as u32, &sample([counts, 0], 0.0), &[HIP, KNEE]);
+            logged = push(&mut averager, tick as u32, &sample([counts, 0], 0.0));
         }
         let exact = 8 * i64::from(i32::MAX - 3) + 28;
         assert_eq!(logged.expect("eight ticks").counts_sum[0], exact as i32);

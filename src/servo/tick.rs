@@ -24,8 +24,8 @@ use crate::hal::{DriveCommand, Sample};
 use crate::motion::MotionState;
 use crate::real::{clamp, is_finite, max, min};
 use crate::safety::{
-    Decision, Derating, DriveState, Fault, LimitCodes, Limits, Monitor, Observation, Permission,
-    PowerRequest, Reading, Request, StepGate,
+    Decision, DriveState, Fault, Limits, Monitor, Observation, Permission, PowerRequest, Reading, Request,
+    StepGate,
 };
 use crate::units::{Hertz, NewtonMetre, Radian, RadianPerSecond};
 
@@ -113,7 +113,7 @@ pub struct Servo<const N: usize> {
     gates: [StepGate; N],
     observers: [Observer; N],
     controllers: [Controller; N],
-    monitor: Monitor<N>,
+    pub(crate) monitor: Monitor<N>,
 }
 
 impl<const N: usize> Servo<N> {
@@ -189,33 +189,6 @@ impl<const N: usize> Servo<N> {
         })
     }
 
-    /// Reports a fault from elsewhere to the monitor, for the next tick.
-    pub fn report(&mut self, fault: Fault) {
-        self.monitor.report(fault);
-    }
-
-    /// Permits joints to be enabled outside their range, see [`Monitor::permit_return`].
-    pub const fn permit_return(&mut self, joints: [bool; N]) {
-        self.monitor.permit_return(joints);
-    }
-
-    /// Joints that return into their range.
-    #[must_use]
-    pub fn returns(&self) -> [bool; N] {
-        self.monitor.returns()
-    }
-
-    /// Sets the torque caps that temperature and bus voltage allow, from the next tick on.
-    pub fn derate(&mut self, derating: &Derating<N>) {
-        self.monitor.derate(derating);
-    }
-
-    /// Codes of the limits that a decision applied to each joint.
-    #[must_use]
-    pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
-        self.monitor.limit_codes(decision)
-    }
-
     /// Damping of a joint's controller, N m s/rad; zero beyond the last joint.
     #[must_use]
     pub fn damping(&self, joint: usize) -> f32 {
@@ -234,21 +207,10 @@ impl<const N: usize> Servo<N> {
         self.joints.map(|joint| joint.scale)
     }
 
-    /// Runs one tick; `gravity` in the base frame, m/s^2.
-    #[must_use]
-    pub fn tick<M: TorqueModel<N>>(
-        &mut self,
-        sample: &Sample<N>,
-        command: &ServoCommand<'_, N, M>,
-        gravity: [f32; 3],
-    ) -> ServoOutput<N> {
-        self.tick_with(sample, command, None, gravity)
-    }
-
-    /// Runs one tick with torques beside the motion.
+    /// Runs one tick, with torques beside the motion if there are any; `gravity` in the base frame, m/s^2.
     #[must_use]
     #[inline]
-    pub fn tick_with<M: TorqueModel<N>>(
+    pub fn tick<M: TorqueModel<N>>(
         &mut self,
         sample: &Sample<N>,
         command: &ServoCommand<'_, N, M>,

@@ -49,41 +49,35 @@ use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
 use crate::leg::{DriveState, Permission};
+use crate::listed::listed;
 use record::{HEAD, LONGEST};
 
 /// Length of the longest record in the flash, with its key, in whole words.
 const BUFFER: usize = (LONGEST + HEAD + 1).next_multiple_of(8);
 
-/// Keys of the stored values. Numbers never change and are never used again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Key {
-    /// Objects of the first node that a host changed.
-    Objects1 = 1,
-    /// Objects of the second node that a host changed.
-    Objects2 = 2,
-    /// Calibration of the first axis.
-    Calibration1 = 3,
-    /// Calibration of the second axis.
-    Calibration2 = 4,
-    /// Model of the leg, empty or unknown whether worn. Only this one is the feedforward after a start; a
-    /// worn leg's model serves the assistance alone.
-    Model = 5,
-    /// Model of the worn leg.
-    WornModel = 6,
+listed! {
+    /// Keys of the stored values. Numbers never change and are never used again.
+    #[repr(u8)]
+    pub enum Key {
+        /// All keys.
+        ALL;
+        /// Objects of the first node that a host changed.
+        Objects1 = 1;
+        /// Objects of the second node that a host changed.
+        Objects2 = 2;
+        /// Calibration of the first axis.
+        Calibration1 = 3;
+        /// Calibration of the second axis.
+        Calibration2 = 4;
+        /// Model of the leg, empty or unknown whether worn. Only this one is the feedforward after a start; a
+        /// worn leg's model serves the assistance alone.
+        Model = 5;
+        /// Model of the worn leg.
+        WornModel = 6;
+    }
 }
 
 impl Key {
-    /// All keys.
-    pub const ALL: [Self; 6] = [
-        Self::Objects1,
-        Self::Objects2,
-        Self::Calibration1,
-        Self::Calibration2,
-        Self::Model,
-        Self::WornModel,
-    ];
-
     /// Keys of the models, see [`ModelRecord::key`].
     pub const MODELS: [Self; 2] = [Self::Model, Self::WornModel];
 }

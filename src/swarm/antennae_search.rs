@@ -13,11 +13,11 @@
 //! Known limits: the step ends at e0 / (1 - e1) = 0.1 and covers about 120 units in 1,000 iterations, for any
 //! box; it does not reach the minimum in 30 dimensions.
 
-use crate::real::{Real, sign, sqrt};
+use crate::real::{Real, dot, sign, sqrt};
 
 use super::objective::{Objective, SwarmError, not_negative, positive};
 use super::random::Random;
-use super::rows::{add_scaled, dot, live, live_mut, scale};
+use super::rows::{add_scaled, live, live_mut, scale};
 use super::search::{Best, Search, SearchProgress};
 
 /// Constants of the antennae search; the default is the paper's.

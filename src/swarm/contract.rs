@@ -300,25 +300,6 @@ fn settings_that_make_no_sense_are_refused_by_name() {
 }
 
 #[test]
-fn a_restarted_swarm_equals_a_new_one_and_a_refused_restart_changes_nothing() {
-    let small = Shaped { dimension: 3, last: (0.0, 1.0) };
-    for settings in [BsoSettings::default(), BsoSettings::paper()] {
-        let mut swarm = TestBso::<f32>::new(&RIPPLES, BsoSettings::default(), 1).unwrap();
-        swarm.advance(&RIPPLES, 777);
-        let before = swarm.clone();
-        let inverted = Shaped { dimension: 3, last: (1.0, 0.0) };
-        assert_eq!(swarm.restart(&inverted, settings, 2), Err(SwarmError::Bounds { coordinate: 2 }));
-        assert!(swarm == before);
-        swarm.restart(&small, settings, 2).unwrap();
-        let mut fresh = TestBso::new(&small, settings, 2).unwrap();
-        assert!(swarm == fresh);
-        swarm.advance(&small, 500);
-        fresh.advance(&small, 500);
-        assert!(swarm == fresh);
-    }
-}
-
-#[test]
 fn one_dimension_and_two_beetles_are_enough() {
     let line = Shaped { dimension: 1, last: (0.5, 1.5) };
     let mut swarm = Bso::<f32, 2, 1>::new(&line, BsoSettings::default(), 9).unwrap();

@@ -88,16 +88,6 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         }
     }
 
-    /// Resets to the state of [`Self::new`], in place.
-    pub fn restart(&mut self, dimension: usize) {
-        self.dimension = dimension;
-        for rows in [&mut self.position, &mut self.velocity, &mut self.personal_best] {
-            rows.fill([T::zero(); D]);
-        }
-        self.value = [T::LARGEST; N];
-        self.personal_best_value = [T::LARGEST; N];
-    }
-
     /// Number of coordinates, 1..=D.
     pub fn dimension(&self) -> usize {
         self.dimension

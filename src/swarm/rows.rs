@@ -1,4 +1,4 @@
-//! Row arithmetic of the searches: the used part of a row, dot product, row plus a multiple of another.
+//! Row arithmetic of the searches: the used part of a row, row plus a multiple of another.
 //!
 //! Why not matrices of the linear algebra library: the dimension is known at run time only and is usually
 //! below the capacity. Loops over the used part have the cost of the problem, not of the capacity.
@@ -13,10 +13,6 @@ pub(super) fn live<T, const D: usize>(row: &[T; D], dimension: usize) -> &[T] {
 /// First `dimension` entries of a row, mutable.
 pub(super) fn live_mut<T, const D: usize>(row: &mut [T; D], dimension: usize) -> &mut [T] {
     &mut row[..dimension.min(D)]
-}
-
-pub(super) fn dot<T: Real>(one: &[T], other: &[T]) -> T {
-    one.iter().zip(other).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
 }
 
 /// `target += factor * row`.
@@ -41,6 +37,7 @@ pub(super) fn clip_to_box<T: Real>(value: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::real::dot;
 
     #[test]
     fn only_the_live_part_of_a_row_is_touched() {

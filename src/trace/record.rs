@@ -131,7 +131,7 @@ macro_rules! trace_records {
         tick: u32,
         /// Joint, from 1; 0 is the leg.
         joint: u8,
-        /// Reason, see [`super::words::refusal`].
+        /// Reason, see [`crate::leg::RefusalReason::name`].
         why: &'static str,
     }
     /// Fault of the leg.
@@ -140,7 +140,7 @@ macro_rules! trace_records {
         tick: u32,
         /// CiA 402 error code.
         code: u16,
-        /// Name, see [`super::words::fault`].
+        /// Name, see [`crate::leg::FaultCode::name`].
         name: &'static str,
         /// Joint, from 1.
         joint: u8,

@@ -1,10 +1,11 @@
 //! Words of the closed lists: one for each state, activity, fault and refusal. They never change.
 //!
-//! No match has a wildcard: a new state needs a word to compile.
+//! No match has a wildcard: a new state needs a word to compile. Faults, refusals to enable and the ends of
+//! assistance have their words where they are listed.
 
 use crate::leg::{
-    Activity, AssistEnd, AssistNote, AssistPhase, AssistRefusal, AxisFault, CalibrationRefusal, Cause,
-    DriveState, FaultCode, IdentifyPhase, Parameter, RefusalReason, Segment, Step,
+    Activity, AssistNote, AssistPhase, AxisFault, CalibrationRefusal, Cause, DriveState, IdentifyPhase,
+    Parameter, Segment, Step,
 };
 
 /// Word for the drive state.
@@ -53,26 +54,8 @@ pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
 #[must_use]
 pub const fn assist(note: AssistNote) -> (&'static str, &'static str) {
     match note {
-        AssistNote::Refused(why) => (
-            "refused",
-            match why {
-                AssistRefusal::Busy => "busy",
-                AssistRefusal::Shares => "shares",
-                AssistRefusal::NoEmptyModel => "no_empty_model",
-                AssistRefusal::NoWornModel => "no_worn_model",
-                AssistRefusal::Changed => "changed",
-            },
-        ),
-        AssistNote::Ending(why) => (
-            "ending",
-            match why {
-                AssistEnd::Requested => "requested",
-                AssistEnd::Energy => "energy",
-                AssistEnd::NotFinite => "not_finite",
-                AssistEnd::Late => "late",
-                AssistEnd::Changed => "changed",
-            },
-        ),
+        AssistNote::Refused(why) => ("refused", why.name()),
+        AssistNote::Ending(why) => ("ending", why.name()),
     }
 }
 
@@ -84,28 +67,6 @@ pub const fn segment(segment: Option<Segment>) -> (&'static str, u8) {
         Some(Segment::Training) => ("training", 0),
         Some(Segment::Validation(motion)) => ("validation", motion.saturating_add(1)),
         Some(Segment::Tracking) => ("tracking", 0),
-    }
-}
-
-/// Word for a fault of the leg.
-#[must_use]
-pub const fn fault(code: FaultCode) -> &'static str {
-    code.name()
-}
-
-/// Word for the refusal to enable the drive.
-#[must_use]
-pub const fn refusal(reason: RefusalReason) -> &'static str {
-    match reason {
-        RefusalReason::SwitchOpen => "switch_open",
-        RefusalReason::Blocked => "blocked",
-        RefusalReason::NoReference => "no_reference",
-        RefusalReason::NotCalibrated => "not_calibrated",
-        RefusalReason::OutOfRange => "out_of_range",
-        RefusalReason::Moving => "moving",
-        RefusalReason::Encoder => "encoder",
-        RefusalReason::NoTransition => "no_transition",
-        RefusalReason::NoAssistance => "no_assistance",
     }
 }
 
@@ -192,6 +153,7 @@ pub const fn calibration(refusal: CalibrationRefusal) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::leg::{FaultCode, RefusalReason};
 
     #[test]
     fn a_unit_is_the_report_s_with_its_spaces_closed() {
@@ -208,8 +170,8 @@ mod tests {
             activity(Activity::Idle).1,
             activity(Activity::Identify(IdentifyPhase::Validate { motion: 2, step: Step::Run })).1,
             segment(Some(Segment::Validation(0))).0,
-            fault(FaultCode::Overspeed),
-            refusal(RefusalReason::Moving),
+            FaultCode::Overspeed.name(),
+            RefusalReason::Moving.name(),
             axis_fault(AxisFault::NotANumber),
             cause(Cause::Payload { link: 1 }).0,
             calibration(CalibrationRefusal::CountsPerTurn { stated: 8192, found: 4000 }),

@@ -14,10 +14,11 @@ use scarab::safety::{FaultCode, NoticeCode};
 use tokens::{Token, tokens};
 
 /// Modules of the firmware; the open ones are allowed to all.
-const FIRMWARE: [(&str, &[&str]); 21] = [
+const FIRMWARE: [(&str, &[&str]); 22] = [
     ("units", &[]),
     ("real", &[]),
     ("in_place", &[]),
+    ("listed", &[]),
     ("checksum", &[]),
     ("testing", &[]),
     ("hal", &[]),
@@ -75,7 +76,7 @@ const HOST: [(&str, &[&[&str]]); 4] = [
 ];
 
 /// Firmware modules that every other firmware module may use.
-const OPEN: [&str; 5] = ["units", "real", "in_place", "checksum", "testing"];
+const OPEN: [&str; 6] = ["units", "real", "in_place", "listed", "checksum", "testing"];
 
 /// Source folders of all crates.
 const SOURCES: [&str; 13] = [

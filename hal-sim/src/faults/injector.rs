@@ -109,21 +109,22 @@ impl Injector {
     /// Whether an event (contact or timing) is injected at this tick.
     #[must_use]
     pub fn happens(&self, channel: Channel, joint: usize, tick: u64) -> bool {
+        self.acts(channel, joint, tick, |_| true)
+    }
+
+    /// Whether a fault in one of these forms acts on a signal at this tick.
+    fn acts(&self, channel: Channel, joint: usize, tick: u64, is_meant: impl Fn(Form) -> bool) -> bool {
         self.slots.iter().flatten().any(|(injection, _)| {
-            injection.channel == channel && injection.joint == joint && injection.timing.holds(tick)
+            let Injection { timing, form, .. } = injection;
+            injection.channel == channel && injection.joint == joint && timing.holds(tick) && is_meant(*form)
         })
     }
 
     /// Frame of an absolute encoder with this reading: bit 15 makes the parity even.
     pub fn frame(&mut self, channel: Channel, joint: usize, tick: u64, steps: u16) -> u16 {
         let value = wrapped(self.pass(channel, joint, tick, f64::from(steps), COUNTER));
-        let is_frame = self.slots.iter().flatten().any(|(injection, _)| {
-            let replaces = matches!(injection.form, Form::Off | Form::Rail(_) | Form::Garbage);
-            injection.channel == channel
-                && injection.joint == joint
-                && injection.timing.holds(tick)
-                && replaces
-        });
+        let replaces = |form| matches!(form, Form::Off | Form::Rail(_) | Form::Garbage);
+        let is_frame = self.acts(channel, joint, tick, replaces);
         let angle = value & 0x3FFF;
         if is_frame { value } else { angle | ((angle.count_ones() as u16 & 1) << 15) }
     }
@@ -174,12 +175,7 @@ impl Injector {
     /// Applies faults to the code of a motor's thermistor; `None` where its conversion does not end.
     pub fn motor_thermistor(&mut self, joint: usize, tick: u64, value: u16) -> Option<u16> {
         let passed = code(self.pass(Channel::MotorThermistor, joint, tick, f64::from(value), CODES));
-        let is_silent = self.slots.iter().flatten().any(|(injection, _)| {
-            injection.channel == Channel::MotorThermistor
-                && injection.joint == joint
-                && injection.form == Form::Off
-                && injection.timing.holds(tick)
-        });
+        let is_silent = self.acts(Channel::MotorThermistor, joint, tick, |form| form == Form::Off);
         (!is_silent).then_some(passed)
     }
 

@@ -23,7 +23,8 @@ use super::description::{WearerError, check_ranges};
 use super::plane::Pair;
 use crate::maths::sin_cos;
 use core::f64::consts::TAU;
-use rand_core::{Rng, SeedableRng};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Duration in which a motion fades in, s.
@@ -233,7 +234,7 @@ impl ReachingMovement {
     /// Plans the next movement from the end of the present one.
     fn plan(&mut self, reaching: &Reaching) {
         let [shortest, longest] = reaching.durations;
-        let shares = [0; 3].map(|_: i32| self.uniform());
+        let shares: [f64; 3] = core::array::from_fn(|_| StandardUniform.sample(&mut self.generator));
         self.from = self.to;
         self.start += self.duration;
         self.duration = shortest + shares[2] * (longest - shortest);
@@ -246,12 +247,6 @@ impl ReachingMovement {
             self.plan(reaching);
         }
         movement(self.from, self.to, time - self.start, self.duration)
-    }
-
-    /// Uniform random number in 0..1 with 53 bits.
-    fn uniform(&mut self) -> f64 {
-        const UNIT: f64 = 1.0 / (1_u64 << 53) as f64;
-        (self.generator.next_u64() >> 11) as f64 * UNIT
     }
 }
 

@@ -91,7 +91,7 @@ impl<const N: usize> World<N> {
         let Some(period) = self.electric.as_ref().map(|electric| electric.period) else {
             return [AxisSample::default(); N];
         };
-        let now = self.tick as f64 * TICK_S + f64::from(period) * PERIOD_S;
+        let now = self.time() + f64::from(period) * PERIOD_S;
         if period == 0 {
             self.decide_muscles();
         }

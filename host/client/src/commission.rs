@@ -713,7 +713,7 @@ impl<'a> Commission<'a> {
                 (set(RefusalReason::Encoder), RefusalReason::Encoder),
             ] {
                 if applies {
-                    reasons.push(format!("node {node}: {}", words::refusal(reason)));
+                    reasons.push(format!("node {node}: {}", reason.name()));
                 }
             }
         }

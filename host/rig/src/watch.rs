@@ -40,8 +40,8 @@ struct TruthChain<const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> TruthChain<N, B> {
     fn new() -> Self {
         Self {
-            torque: Box::default(),
-            sticking: Box::default(),
+            torque: Box::new(Smoother::new()),
+            sticking: Box::new(Smoother::new()),
             filter: Box::new(RowFilter::new(Ends::Whole)),
             rows: Vec::new(),
         }

@@ -4,6 +4,7 @@ use super::registers::{apply, byte, load};
 use super::settings::RESET_REASONS;
 use super::settings::analog::{BLANK, VERSION_ADDRESS, stated};
 use super::settings::flash::{OPTCR, brown_out_level};
+use crate::listed::listed;
 
 /// Version of a board without a factory entry, as stated when the image was built.
 const STATED: [u8; 3] = stated(option_env!("SCARAB_BOARD_VOLTS"));
@@ -22,35 +23,25 @@ pub struct Identity {
     pub brown_out: u8,
 }
 
-/// Reason of a processor reset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reset {
-    /// Power-on.
-    PowerOn,
-    /// Supply sagged.
-    BrownOut,
-    /// Reset pin, as used by a debug probe.
-    Pin,
-    /// Software reset after a crash.
-    Software,
-    /// Watchdog expired.
-    Watchdog,
-    /// Any other reason.
-    Other,
-}
-
-impl Reset {
-    /// Name used in records.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::PowerOn => "power_on",
-            Self::BrownOut => "brown_out",
-            Self::Pin => "pin",
-            Self::Software => "software",
-            Self::Watchdog => "watchdog",
-            Self::Other => "other",
-        }
+listed! {
+    /// Reason of a processor reset.
+    pub enum Reset {
+        /// All reasons, in the order of the enum.
+        ALL,
+        /// Name used in records.
+        name;
+        /// Power-on.
+        PowerOn, "power_on";
+        /// Supply sagged.
+        BrownOut, "brown_out";
+        /// Reset pin, as used by a debug probe.
+        Pin, "pin";
+        /// Software reset after a crash.
+        Software, "software";
+        /// Watchdog expired.
+        Watchdog, "watchdog";
+        /// Any other reason.
+        Other, "other";
     }
 }
 

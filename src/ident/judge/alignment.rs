@@ -199,8 +199,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         let used = rows.still.map(|still| !(still > T::from_double(LARGEST_STILL_SHARE)));
         let mut residual = rows.torque;
         for joint in 0..N {
-            let row = rows.regressor[joint].iter().zip(values);
-            residual[joint] -= row.fold(T::zero(), |sum, (&y, &p)| sum + y * p);
+            residual[joint] -= real::dot(&rows.regressor[joint], values);
             if used[joint] && real::abs(residual[joint]) > self.outlier_bound[joint] {
                 self.last_outlier[joint] = Some(self.rows);
             }
@@ -313,12 +312,6 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
                 row.iter().take(DIRECTIONS).fold(T::zero(), |sum, &element| sum + element * element);
             seen[direction].then(|| (row[DIRECTIONS], real::sqrt(variance)))
         })
-    }
-}
-
-impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Default for Alignment<T, N, B, PENDING> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -20,6 +20,7 @@
 
 use crate::ident::record::recorder::LARGEST_STILL_SHARE;
 use crate::ident::record::rows::{DECIMATION, FilteredRows};
+use crate::ident::record::stretch::ROW_S;
 use crate::real::{self, Real};
 
 /// Rows of a block: half a second.
@@ -153,8 +154,6 @@ impl<T: Real> JointResidual<T> {
     }
 }
 
-const ROW_S: f64 = 0.02;
-
 /// All joints' residuals on one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual<T, const N: usize> {
@@ -204,11 +203,5 @@ impl<T: Real, const N: usize> Residual<T, N> {
         self.common = if missed > 0 && expected == 0 { self.common.saturating_add(1) } else { 0 };
         self.longest_common_s =
             real::max(self.longest_common_s, T::from_double(f64::from(self.common)) * T::from_double(ROW_S));
-    }
-}
-
-impl<T: Real, const N: usize> Default for Residual<T, N> {
-    fn default() -> Self {
-        Self::new()
     }
 }

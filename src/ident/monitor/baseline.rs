@@ -65,9 +65,7 @@ impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
         else {
             return T::zero();
         };
-        let predicted =
-            row.iter().zip(&self.estimate.values).fold(T::zero(), |sum, (&left, &right)| sum + left * right);
-        let residual = torque - predicted;
+        let residual = torque - real::dot(row, &self.estimate.values);
         let unknown = self.estimate.sigma_of(row);
         residual * residual / (variance + unknown * unknown)
     }

@@ -166,14 +166,6 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         self.charts.map(|chart| chart.sum)
     }
 
-    /// Time to an alarm, s, once a joint that is never at rest has a residual with `energy` times that at
-    /// acceptance; `None` for an energy that raises no alarm.
-    #[must_use]
-    pub fn delay_s(&self, energy: T) -> Option<T> {
-        let step = real::min(self.step(energy), self.largest_step);
-        (step > T::zero()).then(|| self.limit / step * T::from_double(BLOCK_S))
-    }
-
     fn step(&self, energy: T) -> T {
         self.half_freedom * (energy * self.slope - self.intercept)
     }
@@ -250,9 +242,7 @@ fn exponent<T: Real>(ratio: T, margin: T) -> T {
 
 /// nu: degrees of freedom of a block of rows, white noise through these weights.
 fn block_freedom<T: Real>(weights: &[T]) -> T {
-    let product = |lag: usize| {
-        weights.iter().zip(weights.get(lag..).unwrap_or(&[])).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
-    };
+    let product = |lag: usize| real::dot(weights, weights.get(lag..).unwrap_or(&[]));
     let (energy, rows) = (product(0), T::from_double(f64::from(ROWS_PER_BLOCK)));
     let mut spread = T::one();
     for behind in 1..ROWS_PER_BLOCK as usize {

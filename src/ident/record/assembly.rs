@@ -13,7 +13,7 @@ use super::factor::Factor;
 use super::motion_record::Outliers;
 use super::motion_record::TorqueSize;
 use super::packed::{self, LARGEST_SIZE};
-use super::reweighting::{Weights, weigh, weighted};
+use super::reweighting::{INDEPENDENT_SHARE, Weights, weigh, weighted};
 use super::row_model::RowModel;
 use super::stribeck::{
     JointRows, SMALLEST_GAIN, SMALLEST_SURPLUS_SHARE, StribeckFit, bank_eliminated, eliminate, strongest,
@@ -25,8 +25,6 @@ use crate::real::{self, Real};
 const ROW_RATE_HZ: f64 = 50.0;
 /// A block counts as disturbed when it keeps less than this share of its weight.
 const DISTURBED_BELOW: f64 = 0.5;
-/// A column with a smaller independent share does not help to predict.
-const INDEPENDENT_SHARE: f64 = 1e-4;
 /// Noise floor as a share of the torque's root mean square: below it single precision decides, not the data.
 const SMALLEST_NOISE_SHARE: f64 = 1e-5;
 

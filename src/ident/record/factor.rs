@@ -264,9 +264,3 @@ impl<T: Real, const B: usize> Factor<T, B> {
         inverse
     }
 }
-
-impl<T: Real, const B: usize> Default for Factor<T, B> {
-    fn default() -> Self {
-        Self::new()
-    }
-}

@@ -44,7 +44,7 @@ const LIMITS_BESIDE: (f64, f64) = (0.5, 2.0);
 /// Largest harmless residual, as a share of the torque's root mean square: never a disturbance.
 const HARMLESS_SHARE: f64 = 2e-3;
 /// A column with a smaller independent share does not help to predict.
-const INDEPENDENT_SHARE: f64 = 1e-4;
+pub(super) const INDEPENDENT_SHARE: f64 = 1e-4;
 
 /// Weight of each block's squares, 0..1.
 pub type Weights<T> = [T; LARGEST_BLOCKS];

@@ -25,7 +25,7 @@ use crate::model::Parameter;
 use crate::real::{self, Real};
 
 /// Time between two rows, s.
-const ROW_S: f64 = 0.02;
+pub(in crate::ident) const ROW_S: f64 = 0.02;
 /// Error at which a stretch counts, in root mean square errors of the undisturbed rows: noise stays below.
 const START_ERRORS: f64 = 3.0;
 /// Its share of the torque: half of the systematic error that is harmless.

@@ -42,7 +42,7 @@ use curve::slope;
 use super::factor::Factor;
 use super::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE, Row};
 use super::window::Columns;
-use crate::real::{self, Real};
+use crate::real::{self, Real, dot};
 
 /// Stribeck columns of a joint.
 pub const BANK: usize = 3;
@@ -268,10 +268,6 @@ impl<T: Real> Reduced<T> {
         }
         best.1
     }
-}
-
-fn dot<T: Real>(one: &[T; BANK], other: &[T; BANK]) -> T {
-    one.iter().zip(other).fold(T::zero(), |sum, (&left, &right)| sum + left * right)
 }
 
 /// Stribeck curve that explains most of one joint's rows.

@@ -334,12 +334,6 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
     }
 }
 
-impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Default for Window<T, N, B, NUMBERS> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 fn is_of_the_link(parameter: Parameter) -> bool {
     !matches!(parameter, Parameter::IA | Parameter::FC | Parameter::FV | Parameter::OFF)
 }

@@ -142,12 +142,6 @@ impl<T: Real> NoiseLevel<T> {
     }
 }
 
-impl<T: Real> Default for NoiseLevel<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -83,12 +83,6 @@ impl<T: Real, const N: usize, const TAPS: usize> Smoother<T, N, TAPS> {
     }
 }
 
-impl<T: Real, const N: usize, const TAPS: usize> Default for Smoother<T, N, TAPS> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -14,32 +14,25 @@ use super::estimate::Estimate;
 use crate::ident::record::factor::Factor;
 use crate::ident::record::motion_record::Record;
 use crate::ident::record::row_model::RowModel;
+use crate::listed::listed;
 use crate::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing};
 use crate::real::{self, Real};
 
-/// Where a reported parameter's value comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
-    /// Measured alone.
-    Identified,
-    /// Measured only in a sum with others; the split comes from the prior.
-    Grouped,
-    /// Measured, but hard to separate from others.
-    Weak,
-    /// Without effect on torque, so the prior's value; or not estimated, then zero.
-    Prior,
-}
-
-impl Status {
-    /// Word used in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Identified => "identified",
-            Self::Grouped => "grouped",
-            Self::Weak => "weak",
-            Self::Prior => "prior",
-        }
+listed! {
+    /// Where a reported parameter's value comes from.
+    pub enum Status {
+        /// All states, in the order of the enum.
+        ALL,
+        /// Word used in reports.
+        name;
+        /// Measured alone.
+        Identified, "identified";
+        /// Measured only in a sum with others; the split comes from the prior.
+        Grouped, "grouped";
+        /// Measured, but hard to separate from others.
+        Weak, "weak";
+        /// Without effect on torque, so the prior's value; or not estimated, then zero.
+        Prior, "prior";
     }
 }
 

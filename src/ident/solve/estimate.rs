@@ -22,7 +22,7 @@
 use crate::ident::record::factor::Factor;
 use crate::ident::record::motion_record::Record;
 use crate::ident::record::row_model::RowModel;
-use crate::real::{self, Real};
+use crate::real::{self, Real, dot};
 
 /// Order in which the joints' rows give the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -162,8 +162,15 @@ fn spectral_norm<T: Real, const B: usize>(matrix: &[[T; B]; B]) -> T {
     norm
 }
 
-fn dot<T: Real, const B: usize>(one: &[T; B], other: &[T; B]) -> T {
-    one.iter().zip(other).fold(T::zero(), |sum, (&left, &right)| sum + left * right)
+/// Variance of a weighted sum of values with this covariance.
+pub(in crate::ident) fn variance<T: Real, const B: usize>(covariance: &[[T; B]; B], weights: &[T; B]) -> T {
+    let mut variance = T::zero();
+    for (row, &left) in covariance.iter().zip(weights) {
+        for (&element, &right) in row.iter().zip(weights) {
+            variance += left * element * right;
+        }
+    }
+    real::max(variance, T::zero())
 }
 
 /// Base parameters with their covariance.
@@ -195,13 +202,7 @@ impl<T: Real, const B: usize> Estimate<T, B> {
     /// Standard deviation of the weighted sum of base parameters.
     #[must_use]
     pub fn sigma_of(&self, weights: &[T; B]) -> T {
-        let mut variance = T::zero();
-        for (row, &left) in self.covariance.iter().zip(weights) {
-            for (&element, &right) in row.iter().zip(weights) {
-                variance += left * element * right;
-            }
-        }
-        real::sqrt(real::max(variance, T::zero()))
+        real::sqrt(variance(&self.covariance, weights))
     }
 
     /// Number of base parameters that the data determine.

@@ -135,8 +135,7 @@ impl<T: Real, const B: usize> Eliminated<T, B> {
 
     fn take(&mut self, factor: &Factor<T, B>, load: &[T; B]) {
         for (row, &torque) in factor.triangle().iter().zip(factor.right()) {
-            let felt = row.iter().zip(load).fold(T::zero(), |sum, (&element, &value)| sum + element * value);
-            self.rotate(*row, torque, felt);
+            self.rotate(*row, torque, real::dot(row, load));
         }
     }
 

@@ -17,9 +17,29 @@ pub const BEETLES: usize = 20;
 /// Most iterations of a stage.
 pub const LARGEST_ITERATIONS: u32 = 300;
 /// A stage ends when the best cost fell by less than [`SMALLEST_GAIN`] in this many iterations.
-pub(super) const PATIENCE: u32 = 15;
+const PATIENCE: u32 = 15;
 /// Smallest progress in chi-square units; a tenth of a standard deviation of one parameter is 0.01.
-pub(super) const SMALLEST_GAIN: f64 = 1e-3;
+const SMALLEST_GAIN: f64 = 1e-3;
+
+/// Rule that ends a search without progress.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Patience<T> {
+    value: T,
+    iteration: u32,
+}
+
+impl<T: Real> Patience<T> {
+    /// Patience before the first iteration.
+    pub const NEW: Self = Self { value: T::LARGEST, iteration: 0 };
+
+    /// Whether a search ends with this best cost after these iterations.
+    pub fn ends(&mut self, value: T, iterations: u32) -> bool {
+        if value < self.value - T::from_double(SMALLEST_GAIN) {
+            *self = Self { value, iteration: iterations };
+        }
+        iterations >= LARGEST_ITERATIONS || iterations >= self.iteration + PATIENCE
+    }
+}
 
 /// Cost of one stage in its box.
 struct StageCost<'a, T, const B: usize> {
@@ -67,8 +87,7 @@ pub struct SwarmSearch<T: Real, const B: usize> {
     iterations: u32,
     evaluations: u32,
     excess: T,
-    watched_value: T,
-    watched_iteration: u32,
+    patience: Patience<T>,
 }
 
 impl<T: Real, const B: usize> SwarmSearch<T, B> {
@@ -97,8 +116,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
             iterations: 0,
             evaluations: 0,
             excess: T::zero(),
-            watched_value: T::LARGEST,
-            watched_iteration: 0,
+            patience: Patience::NEW,
         }, { swarm: empty_slot })
     }
 
@@ -109,7 +127,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         self.swarm.clear();
         (self.stage_index, self.state) = (0, SearchState::Running);
         (self.iterations, self.evaluations, self.excess) = (0, 0, T::zero());
-        (self.watched_value, self.watched_iteration) = (T::LARGEST, 0);
+        self.patience = Patience::NEW;
     }
 
     /// Starts the first stage with open columns. The swarm is large, so it is
@@ -132,7 +150,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
             Ok(swarm) => self.swarm.fill(|slot| slot.write(swarm)),
             Err(error) => self.state = SearchState::Failed(error),
         }
-        (self.watched_value, self.watched_iteration) = (T::LARGEST, 0);
+        self.patience = Patience::NEW;
     }
 
     /// Spends up to `evaluations`; any slicing gives the same result.
@@ -157,20 +175,13 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
             let iterations = swarm.iterations();
             if iterations > before {
                 self.iterations = self.iterations.saturating_add(1);
-                if self.stage_ends(iterations) {
+                let value = swarm.best().map_or(T::LARGEST, |best| best.value);
+                if self.patience.ends(value, iterations) {
                     self.close_stage(problem);
                 }
             }
         }
         self.state
-    }
-
-    fn stage_ends(&mut self, iterations: u32) -> bool {
-        let value = self.stage_excess().unwrap_or(T::LARGEST);
-        if value < self.watched_value - T::from_double(SMALLEST_GAIN) {
-            (self.watched_value, self.watched_iteration) = (value, iterations);
-        }
-        iterations >= LARGEST_ITERATIONS || iterations >= self.watched_iteration + PATIENCE
     }
 
     fn close_stage<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {

@@ -8,6 +8,7 @@ use super::{Activity, Control};
 use crate::assist::{AssistDemand, AssistEnd, AssistSession, AssistShares, AssistTick, AssistTorque};
 use crate::leg::activity::AssistPhase;
 use crate::leg::model::IdentifiedModel;
+use crate::listed::listed;
 use crate::real::abs;
 use crate::servo::{Effort, ServoOutput};
 use crate::units::NewtonMetre;
@@ -24,19 +25,24 @@ pub enum Wearing {
     Worn,
 }
 
-/// Reason why a session is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AssistRefusal {
-    /// The drive is not enabled, moves, or does something else.
-    Busy,
-    /// A share is out of its range.
-    Shares,
-    /// No model of the empty leg.
-    NoEmptyModel,
-    /// No model of the worn leg, which the shares need.
-    NoWornModel,
-    /// The model monitor reports a change.
-    Changed,
+listed! {
+    /// Reason why a session is refused.
+    pub enum AssistRefusal {
+        /// All reasons, in the order of the enum.
+        ALL,
+        /// Word used in records.
+        name;
+        /// The drive is not enabled, moves, or does something else.
+        Busy, "busy";
+        /// A share is out of its range.
+        Shares, "shares";
+        /// No model of the empty leg.
+        NoEmptyModel, "no_empty_model";
+        /// No model of the worn leg, which the shares need.
+        NoWornModel, "no_worn_model";
+        /// The model monitor reports a change.
+        Changed, "changed";
+    }
 }
 
 /// Event of a session, for a record.
@@ -187,7 +193,7 @@ impl<const N: usize> Control<N> {
     /// Whether the leg rests and does nothing else: a push or a swing does not count as rest.
     pub(super) fn rests_for_assist(&self) -> bool {
         matches!(self.activity, Activity::Idle | Activity::Follow)
-            && !self.servo.returns().contains(&true)
+            && !self.servo.monitor.returns().contains(&true)
             && self.assistance.velocity.iter().all(|speed| abs(*speed) < FASTEST_REST)
     }
 

@@ -54,7 +54,7 @@ impl<const N: usize> Control<N> {
         self.models.want(commands.iter().all(|command| command.feedforward));
         let commanded = following.follow(commands);
         if let Some(fault) = commanded.fault {
-            self.servo.report(fault);
+            self.servo.monitor.report(fault);
         }
         // Start of a possible next activity.
         (self.motion, self.motion_tick) = (Motion::Hold(commanded.motion.position_rad), 0);

@@ -89,7 +89,7 @@ fn the_torque_current_follows_and_the_field_stays_zero_at_every_speed_and_sign()
         }
         assert_eq!(bench.axis.fault(), None);
         // One count per tick is 18 rad/s of the motor; tracked to a fiftieth.
-        let electrical = f64::from(bench.axis.electrical_speed().0);
+        let electrical = f64::from(bench.axis.speed.rad_per_s());
         assert!((electrical - 7.0 * speed).abs() < 4.0, "{electrical} rad/s");
     }
 }

@@ -190,7 +190,7 @@ fn an_open_switch_blocks_enabling_and_stops_an_enabled_leg() {
 fn the_bus_gets_a_report_every_second_tick_once_it_is_free() {
     let mut bench = Bench::new(&[]);
     let mut control = Control::new(&configuration()).expect("a leg");
-    let plain = control.tick(&SAMPLE, None, LEG.gravity);
+    let plain = control.tick(&SAMPLE, None, LEG.gravity, None);
     let mut refused = plain;
     refused.servo.decision.refused = Some(Refusal { joint: 0, reason: RefusalReason::Moving });
     // The bus has not read the previous report.
@@ -219,7 +219,7 @@ fn the_bus_gets_a_report_every_second_tick_once_it_is_free() {
 #[test]
 fn a_report_contains_the_switch_and_the_inhibit_reasons() {
     let mut control = Control::new(&configuration()).expect("a leg");
-    let output = control.tick(&SAMPLE, None, LEG.gravity);
+    let output = control.tick(&SAMPLE, None, LEG.gravity, None);
     for (switch, blocked) in [([true; 2], false), ([false, true], false), ([true; 2], true)] {
         let mut bench = Bench::new(&[]);
         bench.hold(switch);
@@ -266,7 +266,7 @@ fn a_host_without_the_drive_cancels_by_a_quick_stop() {
 #[test]
 fn a_bridge_reports_torque_smoothed_and_only_while_switching() {
     let mut control = Control::new(&configuration()).expect("a leg");
-    let mut output = control.tick(&SAMPLE, None, LEG.gravity);
+    let mut output = control.tick(&SAMPLE, None, LEG.gravity, None);
     let mut bench = Bench::new(&[]);
     bench.signals.statistics.see_bus(2400);
     let mut status = |state: DriveState, ticks: u32| {

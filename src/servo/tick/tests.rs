@@ -64,7 +64,7 @@ fn the_checksum_stays_in_motion_and_differs_for_other_gains_and_limits() {
     let servo = Servo::new(joints).expect("sensible");
     let sum = servo.checksum();
     let mut derated = servo;
-    derated.derate(&Derating::NONE);
+    derated.monitor.derate(&Derating::NONE);
     derated.restart();
     assert_eq!(derated.checksum(), sum);
     let mut changed = joints;
@@ -236,14 +236,14 @@ fn nothing_that_is_not_finite_passes_the_tick_and_nothing_of_it_stays() {
             }
             let feedforward = if field == 3 { None } else { Some(&model) };
             let command = ServoCommand { motion, feedforward, power: None };
-            let output = bench.servo.tick(&sample, &command, NOWHERE);
+            let output = bench.servo.tick(&sample, &command, None, NOWHERE);
             // An acceleration affects only observer and model; alone it must not get into the observer.
             if field == 3 {
                 assert!(output.drive().enabled);
                 assert_eq!(output.velocity[1], RadianPerSecond::ZERO);
                 let model = Exact;
                 let command = ServoCommand { motion, feedforward: Some(&model), power: None };
-                assert_eq!(*bench.servo.tick(&sample, &command, NOWHERE).drive(), DriveCommand::OFF);
+                assert_eq!(*bench.servo.tick(&sample, &command, None, NOWHERE).drive(), DriveCommand::OFF);
             } else {
                 assert_eq!(*output.drive(), DriveCommand::OFF, "{bad} in {field}");
             }
@@ -311,7 +311,7 @@ fn a_single_outlier_does_not_move_the_torque() {
     let mut sample = bench.sample();
     sample.joints[0].encoder_counts ^= 1 << 14;
     let command = ServoCommand { motion: hold, feedforward: None::<&NoModel>, power: None };
-    let output = bench.servo.tick(&sample, &command, NOWHERE);
+    let output = bench.servo.tick(&sample, &command, None, NOWHERE);
     // At rest within a count: stiffness 8,700 N m/rad times 1.5e-5 rad, and the velocity's noise.
     assert!(output.wanted_torque[0].abs().0 < 1.0, "{:?}", output.wanted_torque);
     assert_eq!(output.decision.fault, None);

@@ -26,11 +26,11 @@
 //! function, rotated in 10 dimensions and unrotated in 30. On a quadratic cost least squares is exact and
 //! instant. A noise of 1e-4 of the cost's value corrupts the last digits: the search is meant for fixed data.
 
-use crate::real::{Real, abs, clamp, max, min};
+use crate::real::{Real, abs, clamp, dot, max, min};
 
 use super::super::particles::{Particles, VelocityRule};
 use super::super::random::Random;
-use super::super::rows::{add_scaled, dot, live, live_mut};
+use super::super::rows::{add_scaled, live, live_mut};
 use super::frame::{Frame, Reach};
 use super::leap::{LEAP_SPREAD, Leap, leap_whisker};
 use super::metric::Metric;
@@ -85,15 +85,6 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
             progress: T::LARGEST,
             waited: 0,
         }
-    }
-
-    /// Resets to the state of [`Self::new`], in place.
-    pub fn restart(&mut self, settings: AdaptiveSettings<T>, dimension: usize) {
-        self.settings = settings;
-        self.frame.restart(dimension);
-        self.metric.restart(dimension);
-        self.leap = Leap::none();
-        self.forget();
     }
 
     /// Discards all learned values, when the swarm is scattered again or has leapt.

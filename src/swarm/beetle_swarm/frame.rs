@@ -16,10 +16,10 @@
 //! Cost: per direction two or three products with the metric (2 D^2 each) and 4 D j operations of
 //! Gram-Schmidt, repeated per draw, at most 8 draws; memory N (3 D + 6) scalars.
 
-use crate::real::{Real, abs, clamp, is_finite, min, sign, sqrt};
+use crate::real::{Real, abs, clamp, dot, is_finite, min, sign, sqrt};
 
 use super::super::random::Random;
-use super::super::rows::{add_scaled, dot, live, live_mut, scale};
+use super::super::rows::{add_scaled, live, live_mut, scale};
 use super::super::search::is_usable;
 use super::metric::Metric;
 
@@ -99,15 +99,6 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
             covector: [[T::zero(); D]; N],
             whisker: [Whisker::unaimed(); N],
         }
-    }
-
-    /// Resets to the state of [`Self::new`], in place.
-    pub fn restart(&mut self, dimension: usize) {
-        self.dimension = dimension;
-        self.direction.fill([T::zero(); D]);
-        self.displacement.fill([T::zero(); D]);
-        self.covector.fill([T::zero(); D]);
-        self.whisker.fill(Whisker::unaimed());
     }
 
     /// Number of directions in use: one per beetle, at most as many as an orthonormal frame can have.

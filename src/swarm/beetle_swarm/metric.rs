@@ -14,9 +14,9 @@
 //! Cost: 4 D^2 operations per stretch, 2 D^2 per product; memory 2 D^2 scalars.
 //! Known limits: a stretch that is not finite would corrupt the metric permanently; the caller passes none.
 
-use crate::real::Real;
+use crate::real::{Real, dot};
 
-use super::super::rows::{add_scaled, dot, live, live_mut};
+use super::super::rows::{add_scaled, live, live_mut};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Metric<T, const D: usize> {
@@ -32,12 +32,6 @@ impl<T: Real, const D: usize> Metric<T, D> {
         let mut metric = Self { dimension, shape: [[T::zero(); D]; D], inverse: [[T::zero(); D]; D] };
         metric.forget();
         metric
-    }
-
-    /// Resets to the state of [`Self::identity`], in place.
-    pub fn restart(&mut self, dimension: usize) {
-        self.dimension = dimension;
-        self.forget();
     }
 
     /// Resets to box coordinates.

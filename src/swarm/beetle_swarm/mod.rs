@@ -17,8 +17,7 @@
 //! Memory in scalars: 3 N D swarm, 2 D^2 metric, 3 N D frame, 4 D gradient, best and box, 11 N values and
 //! readings. The frame uses its first min(N, D) rows. `size_of` is 8,768 bytes for `Bso<f32, 20, 13>` and
 //! 21,136 for `Bso<f32, 20, 28>`. Stack, Cortex-M4F, D = 28: `advance` about 1.5 kB. [`Bso::new`] builds the
-//! value on the stack before the move (7 kB at opt-level 3, about 45 kB at "s"); [`Bso::restart`] works in
-//! place with 1 kB.
+//! value on the stack before the move (7 kB at opt-level 3, about 45 kB at "s").
 //! Cost: adaptive.rs, paper.rs. The longest computation between two evaluations is the end of an adaptive
 //! round, 4 D^2 min(N, D) operations (63,000 at D = 28).
 
@@ -45,7 +44,7 @@ pub use settings::{AdaptiveSettings, BsoSettings, PaperSettings, Part};
 /// Beetle swarm of `N` beetles (at least 2) with capacity for `D` coordinates.
 ///
 /// ```
-/// use scarab::swarm::{Bso, BsoSettings, TestFunction, TestProblem};
+/// use scarab::swarm::{Bso, BsoSettings, Search, TestFunction, TestProblem};
 ///
 /// let cost = TestProblem::new(TestFunction::Sphere, 13);
 /// let mut swarm = Bso::<f32, 20, 13>::new(&cost, BsoSettings::default(), 1)?;
@@ -74,12 +73,6 @@ impl<T: Real, const N: usize, const D: usize> Mode<T, N, D> {
             BsoSettings::Paper(settings) => Self::Paper(PaperRules::new(settings)),
         }
     }
-
-    /// Separate function, so that only a change of mode needs a second copy on the stack.
-    #[inline(never)]
-    fn replace(&mut self, settings: BsoSettings<T>, dimension: usize) {
-        *self = Self::new(settings, dimension);
-    }
 }
 
 impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
@@ -94,29 +87,10 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
         let mode = Mode::new(settings, progress.dimension());
         Ok(Self { swarm: Swarm::new(progress, seed), mode })
     }
+}
 
-    /// Restarts in place. The swarm then equals a [`new`](Self::new) one; on an error it is unchanged.
-    pub fn restart(
-        &mut self,
-        objective: &impl Objective<T>,
-        settings: BsoSettings<T>,
-        seed: u64,
-    ) -> Result<(), SwarmError> {
-        let progress = SearchProgress::open(objective)?;
-        settings.check()?;
-        match (&mut self.mode, settings) {
-            (Mode::Adaptive(rules), BsoSettings::Adaptive(settings)) => {
-                rules.restart(settings, progress.dimension());
-            }
-            (mode, settings) => mode.replace(settings, progress.dimension()),
-        }
-        self.swarm.restart(progress, seed);
-        Ok(())
-    }
-
-    /// Spends `evaluations` of the objective and returns how many were spent. That is all of them, or none if
-    /// the objective's dimension has changed. Slicing never changes the result.
-    pub fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
+impl<T: Real, const N: usize, const D: usize> Search<T> for Bso<T, N, D> {
+    fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
         if !self.swarm.progress.accepts(objective) {
             return 0;
         }
@@ -127,37 +101,16 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
         evaluations
     }
 
-    /// Best of all evaluations so far, across restarts; `None` until a finite cost was found.
-    #[must_use]
-    pub fn best(&self) -> Option<Best<'_, T>> {
+    fn best(&self) -> Option<Best<'_, T>> {
         self.swarm.progress.best()
     }
 
-    /// Completed iterations; the evaluation of the scattered swarm is iteration 0.
-    #[must_use]
-    pub fn iterations(&self) -> u32 {
+    fn iterations(&self) -> u32 {
         self.swarm.progress.iterations()
     }
 
-    /// Evaluations so far, including whiskers and restarts.
-    #[must_use]
-    pub fn evaluations(&self) -> u32 {
-        self.swarm.progress.evaluations()
-    }
-}
-
-impl<T: Real, const N: usize, const D: usize> Search<T> for Bso<T, N, D> {
-    fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
-        Self::advance(self, objective, evaluations)
-    }
-    fn best(&self) -> Option<Best<'_, T>> {
-        Self::best(self)
-    }
-    fn iterations(&self) -> u32 {
-        Self::iterations(self)
-    }
     fn evaluations(&self) -> u32 {
-        Self::evaluations(self)
+        self.swarm.progress.evaluations()
     }
 }
 
@@ -187,15 +140,6 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
         let mut beetles = Particles::new(progress.dimension());
         beetles.scatter(&mut random);
         Self { progress, random, beetles, found: [T::zero(); N], stage: Stage::Initial { beetle: 0 } }
-    }
-
-    fn restart(&mut self, progress: SearchProgress<T, D>, seed: u64) {
-        self.random = Random::new(seed);
-        self.beetles.restart(progress.dimension());
-        self.beetles.scatter(&mut self.random);
-        self.progress = progress;
-        self.found = [T::zero(); N];
-        self.stage = Stage::Initial { beetle: 0 };
     }
 
     fn advance(&mut self, rules: &mut impl Rules<T, N, D>, objective: &impl Objective<T>, evaluations: u32) {

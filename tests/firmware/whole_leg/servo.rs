@@ -69,11 +69,11 @@ fn control_restarted_during_a_motion_is_off() {
     tick(&mut pair, Some(ControlRequest::Identify));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Excite)));
     let (mut control, mut sample) = (pair.leg.control().clone(), pair.sample);
-    assert!(control.tick(&sample, None, context().gravity).servo.drive().enabled);
+    assert!(control.tick(&sample, None, context().gravity, None).servo.drive().enabled);
     control.restart();
     sample.joints.iter_mut().for_each(|joint| joint.encoder_counts = 0);
     for _ in 0..100 {
-        let output = control.tick(&sample, None, context().gravity);
+        let output = control.tick(&sample, None, context().gravity, None);
         assert!(!output.servo.drive().enabled && output.servo.decision.fault.is_none(), "{output:?}");
         assert_eq!(control.activity(), Activity::Idle);
     }

@@ -82,7 +82,6 @@ pub fn leg_error(leg: &LegFile, error: LegError) -> String {
                 violation.limit.to_degrees()
             )
         }
-        LegError::Motion(error) => format!("a motion is invalid: {error:?}"),
         LegError::Kernel(KernelError::TooLong { .. }) => {
             "bandwidth_hz must be at least 7.7 on the device".into()
         }

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use scarab::leg::LegConfiguration;
 use scarab::motion::{ExcitationTable, Fourier, HARMONICS, JointEnvelope, Motion, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
-use scarab::swarm::{Bso, BsoSettings, Objective};
+use scarab::swarm::{Bso, BsoSettings, Objective, Search};
 use scarab::units::{Radian, Second};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;

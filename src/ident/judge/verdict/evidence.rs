@@ -1,119 +1,64 @@
 //! Evidence of every test: value, location and limit, so that a report can explain both refusal and pass.
 
 use super::{Reason, Verdict};
+use crate::listed::listed;
 use crate::real::Real;
 
-/// A test of the verdict.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Test {
-    /// Usable rows of a joint.
-    Rows,
-    /// Number of samples and rows that were not finite.
-    NotFinite,
-    /// Root mean square of a joint's torque, N m.
-    Torque,
-    /// Cost of the search's end above least squares, chi-square units; the largest value if it did not end.
-    Search,
-    /// Drive enabled until the end: 1, or 0.
-    Drive,
-    /// Root mean square speed of a joint, rad/s.
-    Speed,
-    /// Number of base parameters that the data determine.
-    Determined,
-    /// Condition number of the scaled problem.
-    Condition,
-    /// Uncertainty of a held-out torque due to the parameters' covariance, over its root mean square.
-    PredictedUncertainty,
-    /// A parameter that is not finite.
-    Finite,
-    /// Negative excess of a parameter that cannot be negative, in standard deviations.
-    NegativeParameter,
-    /// Negative excess of the kinetic energy, in standard deviations.
-    NegativeEnergy,
-    /// Chi-square of the best allowed leg above least squares.
-    PriorBox,
-    /// Share of inertia and friction in a joint's torque.
-    DynamicShare,
-    /// Error on the motion identified from, N m.
-    TrainingError,
-    /// Error over torque on all rows of the motion identified from, excluded ones included.
-    WholeError,
-    /// Error on a held-out motion, N m.
-    ValidationError,
-    /// Slow part of the residual on a held-out motion, N m.
-    SlowResidual,
-    /// Apparent relative error of the length of the link before a joint.
-    LinkLength,
-    /// Apparent error of a joint's encoder zero, rad.
-    EncoderZero,
-    /// Time with large errors in all joints at once, s.
-    CommonDisturbance,
-    /// Share of a joint's samples replaced as outliers.
-    ReplacedShare,
-    /// Share of a joint's rows that lost more than half of their weight.
-    DisturbedShare,
-    /// Pulse of a joint's smoothed speed at one count of its encoder, rad/s.
-    EncoderPulse,
-}
-
-impl Test {
-    /// All tests, in the order of the enum.
-    pub const ALL: [Self; 24] = [
-        Self::Rows,
-        Self::NotFinite,
-        Self::Torque,
-        Self::Search,
-        Self::Drive,
-        Self::Speed,
-        Self::Determined,
-        Self::Condition,
-        Self::PredictedUncertainty,
-        Self::Finite,
-        Self::NegativeParameter,
-        Self::NegativeEnergy,
-        Self::PriorBox,
-        Self::DynamicShare,
-        Self::TrainingError,
-        Self::WholeError,
-        Self::ValidationError,
-        Self::SlowResidual,
-        Self::LinkLength,
-        Self::EncoderZero,
-        Self::CommonDisturbance,
-        Self::ReplacedShare,
-        Self::DisturbedShare,
-        Self::EncoderPulse,
-    ];
-
-    /// Word used in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Rows => "rows",
-            Self::NotFinite => "not_finite",
-            Self::Torque => "torque",
-            Self::Search => "search",
-            Self::Drive => "drive",
-            Self::Speed => "speed",
-            Self::Determined => "determined",
-            Self::Condition => "condition",
-            Self::PredictedUncertainty => "predicted_uncertainty",
-            Self::Finite => "finite",
-            Self::NegativeParameter => "negative_parameter",
-            Self::NegativeEnergy => "negative_energy",
-            Self::PriorBox => "prior_box",
-            Self::DynamicShare => "dynamic_share",
-            Self::TrainingError => "training_error",
-            Self::WholeError => "whole_error",
-            Self::ValidationError => "validation_error",
-            Self::SlowResidual => "slow_residual",
-            Self::LinkLength => "link_length",
-            Self::EncoderZero => "encoder_zero",
-            Self::CommonDisturbance => "common_disturbance",
-            Self::ReplacedShare => "replaced_share",
-            Self::DisturbedShare => "disturbed_share",
-            Self::EncoderPulse => "encoder_pulse",
-        }
+listed! {
+    /// A test of the verdict.
+    pub enum Test {
+        /// All tests, in the order of the enum.
+        ALL,
+        /// Word used in reports.
+        name;
+        /// Usable rows of a joint.
+        Rows, "rows";
+        /// Number of samples and rows that were not finite.
+        NotFinite, "not_finite";
+        /// Root mean square of a joint's torque, N m.
+        Torque, "torque";
+        /// Cost of the search's end above least squares, chi-square units; the largest value without an end.
+        Search, "search";
+        /// Drive enabled until the end: 1, or 0.
+        Drive, "drive";
+        /// Root mean square speed of a joint, rad/s.
+        Speed, "speed";
+        /// Number of base parameters that the data determine.
+        Determined, "determined";
+        /// Condition number of the scaled problem.
+        Condition, "condition";
+        /// Uncertainty of a held-out torque due to the parameters' covariance, over its root mean square.
+        PredictedUncertainty, "predicted_uncertainty";
+        /// A parameter that is not finite.
+        Finite, "finite";
+        /// Negative excess of a parameter that cannot be negative, in standard deviations.
+        NegativeParameter, "negative_parameter";
+        /// Negative excess of the kinetic energy, in standard deviations.
+        NegativeEnergy, "negative_energy";
+        /// Chi-square of the best allowed leg above least squares.
+        PriorBox, "prior_box";
+        /// Share of inertia and friction in a joint's torque.
+        DynamicShare, "dynamic_share";
+        /// Error on the motion identified from, N m.
+        TrainingError, "training_error";
+        /// Error over torque on all rows of the motion identified from, excluded ones included.
+        WholeError, "whole_error";
+        /// Error on a held-out motion, N m.
+        ValidationError, "validation_error";
+        /// Slow part of the residual on a held-out motion, N m.
+        SlowResidual, "slow_residual";
+        /// Apparent relative error of the length of the link before a joint.
+        LinkLength, "link_length";
+        /// Apparent error of a joint's encoder zero, rad.
+        EncoderZero, "encoder_zero";
+        /// Time with large errors in all joints at once, s.
+        CommonDisturbance, "common_disturbance";
+        /// Share of a joint's samples replaced as outliers.
+        ReplacedShare, "replaced_share";
+        /// Share of a joint's rows that lost more than half of their weight.
+        DisturbedShare, "disturbed_share";
+        /// Pulse of a joint's smoothed speed at one count of its encoder, rad/s.
+        EncoderPulse, "encoder_pulse";
     }
 }
 

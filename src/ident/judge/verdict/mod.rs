@@ -15,6 +15,8 @@
 //! [`Thresholds`] with the reason for its default. Where noise decides, the limit follows from degrees of
 //! freedom and one false-alarm rate.
 
+use crate::listed::listed;
+
 mod disturbance;
 mod evidence;
 mod fit;
@@ -27,54 +29,30 @@ pub use evidence::{Evidence, Test, VerdictBuilder};
 pub use fit::Unused;
 pub use thresholds::Thresholds;
 
-/// Reason of a refusal; a closed list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Reason {
-    /// No body can have these parameters.
-    Unphysical,
-    /// The motion excited too few parameters.
-    Unexcited,
-    /// The residual on the motion identified from is not noise.
-    Residual,
-    /// A held-out motion is predicted badly.
-    Validation,
-    /// The torque was computed, not measured.
-    NotAMeasurement,
-    /// Too many outliers.
-    Outliers,
-    /// The leg touched something.
-    Contact,
-    /// The data are not usable.
-    Input,
-}
-
-impl Reason {
-    /// All reasons, in the order of their bits.
-    pub const ALL: [Self; 8] = [
-        Self::Unphysical,
-        Self::Unexcited,
-        Self::Residual,
-        Self::Validation,
-        Self::NotAMeasurement,
-        Self::Outliers,
-        Self::Contact,
-        Self::Input,
-    ];
-
-    /// Word used in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Unphysical => "unphysical",
-            Self::Unexcited => "unexcited",
-            Self::Residual => "residual",
-            Self::Validation => "validation",
-            Self::NotAMeasurement => "not_a_measurement",
-            Self::Outliers => "outliers",
-            Self::Contact => "contact",
-            Self::Input => "input",
-        }
+listed! {
+    /// Reason of a refusal; a closed list.
+    #[repr(u8)]
+    pub enum Reason {
+        /// All reasons, in the order of their bits.
+        ALL,
+        /// Word used in reports.
+        name;
+        /// No body can have these parameters.
+        Unphysical, "unphysical";
+        /// The motion excited too few parameters.
+        Unexcited, "unexcited";
+        /// The residual on the motion identified from is not noise.
+        Residual, "residual";
+        /// A held-out motion is predicted badly.
+        Validation, "validation";
+        /// The torque was computed, not measured.
+        NotAMeasurement, "not_a_measurement";
+        /// Too many outliers.
+        Outliers, "outliers";
+        /// The leg touched something.
+        Contact, "contact";
+        /// The data are not usable.
+        Input, "input";
     }
 }
 

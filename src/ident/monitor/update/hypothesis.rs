@@ -24,9 +24,9 @@
 use crate::ident::judge::verdict::Thresholds;
 use crate::ident::record::factor::Factor;
 use crate::ident::record::row_model::RowModel;
-use crate::ident::solve::estimate::Estimate;
+use crate::ident::solve::estimate::{Estimate, variance};
 use crate::model::{PARAMETERS_PER_JOINT, Parameter};
-use crate::real::{self, Real};
+use crate::real::{self, Real, dot};
 
 /// Most free parameters: the ten of a rigid body.
 pub const DIRECTIONS: usize = 10;
@@ -96,13 +96,7 @@ impl<T: Real, const B: usize> Explanation<T, B> {
     /// Variance of a weighted sum of the values.
     #[must_use]
     pub fn variance_of(&self, weights: &[T; DIRECTIONS]) -> T {
-        let mut variance = T::zero();
-        for (row, &left) in self.covariance.iter().zip(weights) {
-            for (&element, &right) in row.iter().zip(weights) {
-                variance += left * element * right;
-            }
-        }
-        real::max(variance, T::zero())
+        variance(&self.covariance, weights)
     }
 }
 
@@ -262,10 +256,6 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
             }
         }
     }
-}
-
-fn dot<T: Real, const B: usize>(one: &[T; B], other: &[T; B]) -> T {
-    one.iter().zip(other).fold(T::zero(), |sum, (&left, &right)| sum + left * right)
 }
 
 fn times<T: Real, const B: usize>(matrix: &[[T; B]; B], vector: &[T; B]) -> [T; B] {

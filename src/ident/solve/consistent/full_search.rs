@@ -21,10 +21,10 @@
 
 use super::cost::LegCost;
 use super::limits::Limits;
-use crate::ident::solve::search::{BEETLES, LARGEST_ITERATIONS, PATIENCE, SMALLEST_GAIN};
+use crate::ident::solve::search::{BEETLES, Patience};
 use crate::model::{INERTIAL_PARAMETERS, LegParameters, LogCholesky, PARAMETERS_PER_JOINT, Parameter};
 use crate::real::{self, Real};
-use crate::swarm::{Bso, BsoSettings, Objective, SwarmError};
+use crate::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
 
 /// Extents over the prior's radius of gyration.
 const EXTENTS: (f64, f64) = (0.05, 1.58);
@@ -122,8 +122,7 @@ impl<T: Real, const N: usize> Objective<T> for FullObjective<'_, T, N> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FullSearch<T: Real, const D: usize> {
     swarm: Bso<T, BEETLES, D>,
-    watched_value: T,
-    watched_iteration: u32,
+    patience: Patience<T>,
     done: bool,
 }
 
@@ -138,7 +137,7 @@ impl<T: Real, const D: usize> FullSearch<T, D> {
         seed: u64,
     ) -> Result<Self, SwarmError> {
         let swarm = Bso::new(objective, settings, seed)?;
-        Ok(Self { swarm, watched_value: T::LARGEST, watched_iteration: 0, done: false })
+        Ok(Self { swarm, patience: Patience::NEW, done: false })
     }
 
     /// Spends up to `evaluations`; any slicing gives the same result. Returns true when the search has ended.
@@ -152,11 +151,7 @@ impl<T: Real, const D: usize> FullSearch<T, D> {
             let iterations = self.swarm.iterations();
             if iterations > before {
                 let value = self.swarm.best().map_or(T::LARGEST, |best| best.value);
-                if value < self.watched_value - T::from_double(SMALLEST_GAIN) {
-                    (self.watched_value, self.watched_iteration) = (value, iterations);
-                }
-                self.done |=
-                    iterations >= LARGEST_ITERATIONS || iterations >= self.watched_iteration + PATIENCE;
+                self.done |= self.patience.ends(value, iterations);
             }
         }
         self.done

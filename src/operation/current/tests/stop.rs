@@ -31,7 +31,7 @@ impl Scene {
         Self {
             loops: bench.loops,
             motors: bench.motors,
-            queues: Box::default(),
+            queues: Box::new(Queues::new()),
             signals: Rc::new(bench.signals),
             hardware: bench.hardware,
             now: bench.now,

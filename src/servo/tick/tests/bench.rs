@@ -99,7 +99,7 @@ impl Bench {
         power: Option<PowerRequest>,
     ) -> ServoOutput<2> {
         let command = ServoCommand { motion, feedforward, power };
-        let output = self.servo.tick(&self.sample(), &command, NOWHERE);
+        let output = self.servo.tick(&self.sample(), &command, None, NOWHERE);
         // The command computed from this sample acts from the next tick on.
         let acting = core::mem::replace(&mut self.command, *output.drive());
         for (joint, plant) in self.plants.iter_mut().enumerate() {

@@ -69,7 +69,7 @@ fn one(
             motion = implausible(&mut random, leg);
         }
         let command = ServoCommand { motion, feedforward: None::<&IdentifiedModel<JOINTS>>, power };
-        let output = servo.tick(&sample, &command, context.gravity);
+        let output = servo.tick(&sample, &command, None, context.gravity);
         if tick < 4 {
             motion = MotionState::at_rest(output.position.map(|angle| angle.0));
         }
