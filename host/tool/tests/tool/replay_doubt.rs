@@ -280,6 +280,7 @@ fn a_torque_of_the_wrong_sign_or_unit_is_named_and_is_not_called_computed() {
         wrong.iter_mut().flat_map(|row| &mut row[3..]).for_each(|torque| *torque *= factor);
         let (report, run) = replay(&wrong, "", 3);
         assert_eq!(report["likely_cause"]["name"], name);
+        assert!(factor > 0.0 || reasons(&report).contains(&"unphysical"), "{report}");
         assert!(!run.printed.contains("computed from the angle"), "{}", run.printed);
     }
 }

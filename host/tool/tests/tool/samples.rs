@@ -88,6 +88,9 @@ fn a_recording_given_twice_is_bad_input_under_any_name() {
     assert!(message.contains("which is identified from: it cannot be held out"), "{message}");
     let message = refused(&[&file, &copy]);
     assert!(message.contains("holds the same samples as"), "{message}");
+    let other = changed(&folder, |table| clip(table, "tau1_Nm", 0.93));
+    let message = refused(&[&other, Path::new("--validate"), &file, Path::new("--validate"), &copy]);
+    assert!(message.contains(&format!("--validate {}: holds the same samples", copy.display())), "{message}");
 }
 
 #[test]
