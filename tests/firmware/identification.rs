@@ -2,36 +2,23 @@
 //!
 //! There is no plant: these tests check the filter chain, the information factor and the statistics alone.
 
-use nalgebra::Vector3;
 use scarab::ident::{
     Estimate, Evidence, Plan, Problem, Reason, Recorder, RowModel, SAMPLE_RATE_HZ, Thresholds, Verdict,
     VerdictBuilder,
 };
 use scarab::model::planar::BASE;
-use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
+use scarab::model::{JointState, joint_torques};
 
+use crate::planar_leg::{GRAVITY, TRUTH, chain, row_model};
 use crate::testing::TestRandom;
+
+const LENGTH_M: f64 = 0.45;
 
 type LegRecorder = Recorder<f32, 2, BASE, 256, 26>;
 
-fn chain() -> Chain<f64, 2> {
-    let link = |a| DenavitHartenberg { alpha: 0.0, a, d: 0.0 };
-    Chain::new(&[link(0.0), link(0.45)]).expect("finite")
-}
-
-const GRAVITY: Vector3<f64> = Vector3::new(9.81, 0.0, 0.0);
-
 fn model<T: scarab::real::Real>() -> RowModel<T, 2, BASE> {
-    let (chain, gravity) = (chain().convert(), GRAVITY.map(T::from_double));
-    let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen base parameters");
-    RowModel::new(chain, gravity, base)
+    row_model(LENGTH_M)
 }
-
-/// Parameters XX XY XZ YY YZ ZZ HX HY HZ M IA FC FV OFF of a thigh and a shank.
-const TRUTH: LegParameters<f64, 2> = [
-    [0.03, -0.016, 0.0, 0.5, 0.0, 0.506, 1.7, 0.10, 0.0, 8.5, 0.12, 3.0, 1.2, 0.4],
-    [0.013, 0.011, 0.0, 0.25, 0.0, 0.2546, 0.864, -0.072, 0.0, 4.8, 0.08, 2.0, 0.8, -0.3],
-];
 
 /// Five harmonics of 0.1 Hz on each joint, D-H angles.
 fn motion(time: f64) -> JointState<f64, 2> {
@@ -52,7 +39,7 @@ fn motion(time: f64) -> JointState<f64, 2> {
 }
 
 fn torque(state: &JointState<f64, 2>) -> [f64; 2] {
-    joint_torques(&chain(), &TRUTH, state, &GRAVITY)
+    joint_torques(&chain(LENGTH_M), &TRUTH, state, &GRAVITY)
 }
 
 fn mean_absolute_torque() -> [f64; 2] {
