@@ -252,21 +252,6 @@ mod tests {
     }
 
     #[test]
-    fn the_smaller_priority_preempts_and_equal_ones_wait() {
-        let mut nvic = with(&[(18, 0x10), (77, 0x20), (10, 0x10)]);
-        nvic.pend(16 + 77, 0);
-        assert_eq!(nvic.preempting(THREAD), Some(16 + 77));
-        nvic.enter(16 + 77);
-        nvic.pend(16 + 18, 0);
-        assert_eq!(nvic.preempting(nvic.running()), Some(16 + 18));
-        nvic.enter(16 + 18);
-        nvic.pend(16 + 10, 0);
-        assert_eq!(nvic.preempting(nvic.running()), None);
-        nvic.leave(0);
-        assert_eq!(nvic.preempting(nvic.running()), Some(16 + 10));
-    }
-
-    #[test]
     fn a_line_that_stays_up_makes_its_interrupt_pending_again() {
         let mut nvic = with(&[(18, 0x10)]);
         nvic.set_line(18, true, 5);
@@ -278,22 +263,6 @@ mod tests {
         nvic.set_line(18, false, 10);
         nvic.leave(11);
         assert!(!nvic.is_pending(34));
-    }
-
-    #[test]
-    fn the_state_names_the_first_pending_exception_by_priority() {
-        let mut nvic = with(&[(18, 0x40), (77, 0x20)]);
-        assert_eq!(nvic.state(), 1 << 11);
-        nvic.write(0xD20, 4, 0x00F0_0000, 0);
-        nvic.pend(PENDING_SERVICE, 0);
-        assert_eq!(nvic.state(), 1 << 28 | 14 << 12 | 1 << 11);
-        nvic.pend(16 + 18, 0);
-        nvic.pend(16 + 77, 0);
-        assert_eq!(nvic.state(), 1 << 28 | 1 << 22 | (16 + 77) << 12 | 1 << 11);
-        nvic.enter(16 + 18);
-        nvic.enter(16 + 77);
-        nvic.unpend(PENDING_SERVICE);
-        assert_eq!(nvic.state(), 16 + 77);
     }
 
     #[test]

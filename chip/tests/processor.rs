@@ -6,14 +6,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use scarab_chip::chip::Chip;
 use scarab_chip::image::Image;
 use scarab_chip::machine::{End, Machine, Options};
-use scarab_chip::peripherals::rcc::ResetReason;
 use scarab_chip::plant::Plant;
-use scarab_chip::time::{TICK_HZ, Ticks, ticks};
+use scarab_chip::time::{Ticks, ticks};
 use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 
 const RAM: u32 = 0x2000_0000;
-/// Address of the software trigger of interrupts, of the interrupt enables, and of the priorities.
-const STIR: u32 = 0xE000_EF00;
+/// Addresses of the interrupt enables and of the priorities.
 const ISER: u32 = 0xE000_E100;
 const IPR: u32 = 0xE000_E400;
 
@@ -104,51 +102,6 @@ fn run(machine: &mut Machine, duration: f64) -> End {
 fn enable(program: &mut Program, interrupt: u32, priority: u32) {
     program.store(IPR + (interrupt & !3), priority << (8 * (interrupt % 4)));
     program.store(ISER + 4 * (interrupt / 32), 1 << (interrupt % 32));
-}
-
-#[test]
-fn an_interrupt_returns_with_all_registers_and_floats() {
-    let _alone = alone();
-    let mut program = Program::new();
-    enable(&mut program, 10, 0x20);
-    // vmov.f32 s0, #1.0; movs r4, #7
-    program.put(&[0xEEB7, 0x0A00, 0x2407]).store(STIR, 10);
-    // nop; nop; vadd.f32 s0, s0, s0; vmov r2, s0
-    program.put(&[0xBF00, 0xE7FF, 0xEE30, 0x0A00, 0xEE10, 0x2A10]);
-    // str r2, [r0]; str r4, [r0, #4]
-    program.constant(0, RAM).put(&[0x6002, 0x6044]).halt();
-    program.handler(26);
-    // vmov.f32 s0, #2.0; movs r2, #9; str r2, [r0, #8]; bx lr
-    program.put(&[0xEEB0, 0x0A00]).constant(0, RAM).put(&[0x2209, 0x6082, 0x4770]);
-    let mut machine = program.machine();
-    assert_eq!(run(&mut machine, 1e-4), End::Time);
-    assert_eq!(word(&machine, RAM), 2.0_f32.to_bits(), "float registers are restored");
-    assert_eq!((word(&machine, RAM + 4), word(&machine, RAM + 8)), (7, 9));
-    assert_eq!(machine.chip().load.usage(26).entries, 1);
-    assert_eq!(machine.chip().nvic.depth(), 0);
-}
-
-#[test]
-fn a_higher_level_preempts_and_a_masked_one_waits() {
-    let _alone = alone();
-    let mut program = Program::new();
-    enable(&mut program, 8, 0x40);
-    enable(&mut program, 12, 0x20);
-    // movs r2, #0x30; msr basepri, r2
-    program.put(&[0x2230, 0xF382, 0x8811]).store(STIR, 8).store(STIR, 12);
-    // A branch ends the block, because interrupts are taken between blocks.
-    program.put(&[0xE7FF]).store(RAM, 1);
-    // movs r2, #0; msr basepri, r2
-    program.put(&[0x2200, 0xF382, 0x8811]).halt();
-    program.handler(24).store(RAM + 4, 2).put(&[0x4770]);
-    // The handler of the higher level stores what the masked code has not yet written.
-    program.handler(28).constant(0, RAM).put(&[0x6802, 0x6082, 0x4770]);
-    let mut machine = program.machine();
-    machine.set_memory(RAM, &[0; 16]);
-    run(&mut machine, 1e-4);
-    assert_eq!(word(&machine, RAM + 4), 2);
-    assert_eq!(word(&machine, RAM + 8), 0, "level 0x20 ran before the store, in spite of the mask");
-    assert_eq!((machine.chip().load.usage(24).entries, machine.chip().load.usage(28).entries), (1, 1));
 }
 
 /// Begins a program with TIM5's interrupt every millisecond: clock 16 MHz, prescaler 16, top 999.
@@ -246,20 +199,6 @@ fn an_access_without_memory_is_a_hard_fault_with_its_address() {
     assert_eq!(word(&machine, RAM), 1 << 9 | 1 << 15);
     assert_eq!(word(&machine, RAM + 4), 0x6000_0000);
     assert_eq!(word(&machine, RAM + 8), Program::START + 8);
-}
-
-#[test]
-fn the_watchdog_resets_a_program_that_does_not_feed_it() {
-    let _alone = alone();
-    let mut program = Program::new();
-    program.store(0x4000_3000, 0x5555).store(0x4000_3008, 99);
-    program.store(0x4000_3000, 0xCCCC).store(0x4000_3000, 0xAAAA).halt();
-    let mut machine = program.machine();
-    assert_eq!(run(&mut machine, 1.0), End::Reset(ResetReason::Watchdog));
-    // 100 counts of 4 periods of 32 kHz.
-    let expected = TICK_HZ / 80;
-    assert!(machine.chip().now.abs_diff(expected) < TICK_HZ / 10_000, "{}", machine.chip().now);
-    assert_eq!(machine.chip_mut().read(0x4002_3874) >> 26, 0b1011);
 }
 
 #[test]

@@ -232,17 +232,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_those_of_the_lists() {
-        for (number, result) in StepResult::ALL.into_iter().enumerate() {
-            assert_eq!(result as usize, number);
-        }
-        assert_eq!(CommissioningStep::from_number(0), None);
-        for step in CommissioningStep::ALL {
-            assert_eq!(CommissioningStep::from_number(step as u32), Some(step));
-        }
-    }
-
-    #[test]
     fn a_command_is_passed_on_once_and_hides_the_result_of_the_one_before() {
         let mut board = BoardObjects::<2>::NEW;
         let done = BoardStatus { report: StepReport::new(StepResult::Done), ..BoardStatus::NONE };

@@ -186,11 +186,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn an_unknown_index_and_an_unknown_subindex_give_different_errors() {
-        assert_eq!(find(Object::at(0x5555, 0)), Err(Abort::NoObject));
-        assert_eq!(find(Object::at(0x1018, 9)), Err(Abort::NoSubindex));
-        assert_eq!(find(Object::at(0x1404, 1)), Err(Abort::NoObject));
-    }
 }

@@ -265,7 +265,9 @@ mod tests {
         for invalid in [0, 128, 255] {
             assert_eq!(send(&mut lss, SET_NODE_ID, invalid), (None, Some([0x11, 1, 0, 0, 0])));
         }
-        assert_eq!(send(&mut lss, SET_NODE_ID, 9), (Some(Setting::Write(NODE_ID, 9)), None));
+        for valid in [127, 1, 9] {
+            assert_eq!(send(&mut lss, SET_NODE_ID, valid), (Some(Setting::Write(NODE_ID, valid)), None));
+        }
         lss.written(true);
         assert_eq!(lss.take_answer().map(|answer| [answer[0], answer[1]]), Some([0x11, 0]));
         for (value, rate) in [(0x0000, 1000), (0x0200, 500), (0x0300, 250), (0x0400, 125)] {

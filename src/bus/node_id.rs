@@ -23,16 +23,3 @@ impl NodeId {
         base + self.0 as u16
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn node_numbers_are_one_to_127() {
-        for number in 0..=255 {
-            assert_eq!(NodeId::new(number).is_some(), (1..=127).contains(&number));
-        }
-        assert_eq!(NodeId::new(5).map(|node| node.on(0x600)), Some(0x605));
-    }
-}

@@ -380,15 +380,8 @@ fn residual(limits: &ModelLimits, now: &Shown<'_>) -> Rotating<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motor::testing::CONFIGURATION;
-    use crate::units::{Henry, Ohm, Volt, Weber};
-
-    const MOTOR: MotorConstants = MotorConstants {
-        resistance: Ohm(0.05),
-        direct_inductance: Henry(24e-6),
-        quadrature_inductance: Henry(27e-6),
-        flux: Weber(2.9e-3),
-    };
+    use crate::motor::testing::{CONFIGURATION, MOTOR};
+    use crate::units::Volt;
 
     fn limits() -> ModelLimits {
         let scale = CountScale::new(8192, 7).expect("usual");

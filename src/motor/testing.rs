@@ -3,11 +3,19 @@
 //! Tests against the simulated hardware, which resolves every edge and shares no code with this crate,
 //! are in `hal-sim/tests/`.
 
-use super::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale};
+use super::{AxisConfiguration, BridgeTiming, DeadTime, Direction, MotorConstants, SenseScale};
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ};
 use crate::real::{sin_cos, sqrt};
 use crate::testing::TestRandom;
-use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
+use crate::units::{Ampere, Henry, Hertz, Ohm, RadianPerSecond, Volt, Weber};
+
+/// Constants of the motor.
+pub(crate) const MOTOR: MotorConstants = MotorConstants {
+    resistance: Ohm(0.05),
+    direct_inductance: Henry(24e-6),
+    quadrature_inductance: Henry(27e-6),
+    flux: Weber(2.9e-3),
+};
 
 pub(crate) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
     sense: SenseScale::ODRIVE_3_6,

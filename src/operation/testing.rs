@@ -19,9 +19,15 @@ use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::identification::ResultsCopy;
 use crate::bus::{Identity, NodeId};
 use crate::hal::{AbsoluteEncoderSide, AxisCommand, Contacts, Controller, Frame, Hardware};
-use crate::leg::{DriveState, JointCommand, JointStatus, Plan};
+use crate::leg::{DeratingRamps, DriveState, JointCommand, JointStatus, Plan};
+use crate::motor::SenseScale;
 use crate::safety::InhibitReason;
-use crate::units::{Ampere, Hertz, NewtonMetre};
+use crate::units::{Ampere, Hertz, NewtonMetre, Volt};
+
+/// Usual reductions and scale of the bus voltage.
+pub(super) const RAMPS: DeratingRamps =
+    DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
+pub(super) const VOLT_PER_CODE: Volt = SenseScale::ODRIVE_3_6.volt_per_code;
 
 /// A watchdog whose new period becomes effective after a while. A write during another write is ignored.
 #[derive(Clone, Copy, Debug, Default)]

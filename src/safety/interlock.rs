@@ -321,12 +321,6 @@ mod tests {
     }
 
     #[test]
-    fn the_first_request_after_the_start_is_not_a_miss() {
-        let mut watch = ServoWatch::default();
-        assert_eq!([0, 0].map(|ticks| watch.check(ticks).0), [false, true]);
-    }
-
-    #[test]
     fn bridges_brake_only_without_another_reason() {
         let brakes =
             [InhibitReason::EncoderFrozen, InhibitReason::EncoderPosition, InhibitReason::ChargeCurrent]

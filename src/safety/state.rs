@@ -267,31 +267,6 @@ mod tests {
     }
 
     #[test]
-    fn only_shutdown_switch_on_enable_in_this_order_enables() {
-        // Every sequence of three requests from switch-on disabled.
-        let mut ways = 0;
-        for first in REQUESTS {
-            for second in REQUESTS {
-                for third in REQUESTS {
-                    let end = [first, second, third]
-                        .into_iter()
-                        .fold(DriveState::SwitchOnDisabled, |state, request| {
-                            state.after(Event::Requested(request), DAMP_TICKS)
-                        });
-                    if end.permission() != Permission::Off {
-                        ways += 1;
-                        assert_eq!(
-                            (first, second, third),
-                            (PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation)
-                        );
-                    }
-                }
-            }
-        }
-        assert_eq!(ways, 1);
-    }
-
-    #[test]
     fn a_fault_damps_an_enabled_drive_and_keeps_a_disabled_one_off() {
         for state in STATES {
             let failed = state.after(Event::Failed(OVERSPEED), DAMP_TICKS);

@@ -1,36 +1,17 @@
 //! Findings of held-out motions: synthetic torque of one leg, identified with the geometry of another.
 
-use nalgebra::Vector3;
 use scarab::ident::{
-    Direction, Ends, HeldOut, Misalignment, Plan, Problem, Recorder, Residual, RowModel, SAMPLE_RATE_HZ,
-    Stretches,
+    Direction, Ends, HeldOut, Misalignment, Plan, Problem, Recorder, Residual, SAMPLE_RATE_HZ, Stretches,
 };
 use scarab::model::planar::BASE;
-use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
+use scarab::model::{JointState, joint_torques};
 use scarab::real::sin_cos;
 
+use crate::planar_leg::{GRAVITY, TRUTH, chain, row_model};
 use crate::testing::TestRandom;
 
-const GRAVITY: Vector3<f64> = Vector3::new(9.81, 0.0, 0.0);
 const LENGTH_M: f64 = 0.42;
 const NOISE_NM: [f64; 2] = [0.4, 0.15];
-
-/// Parameters XX XY XZ YY YZ ZZ HX HY HZ M IA FC FV OFF of a thigh and a shank.
-const TRUTH: LegParameters<f64, 2> = [
-    [0.03, -0.016, 0.0, 0.5, 0.0, 0.506, 1.7, 0.10, 0.0, 8.5, 0.12, 3.0, 1.2, 0.4],
-    [0.013, 0.011, 0.0, 0.25, 0.0, 0.2546, 0.864, -0.072, 0.0, 4.8, 0.08, 2.0, 0.8, -0.3],
-];
-
-fn chain(length_m: f64) -> Chain<f64, 2> {
-    let link = |a| DenavitHartenberg { alpha: 0.0, a, d: 0.0 };
-    Chain::new(&[link(0.0), link(length_m)]).expect("finite")
-}
-
-fn believed(length_m: f64) -> RowModel<f32, 2, BASE> {
-    let (chain, gravity) = (chain(length_m).convert(), GRAVITY.map(|element| element as f32));
-    let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen base parameters");
-    RowModel::new(chain, gravity, base)
-}
 
 /// Three harmonics on each joint, faster by `speed`, from `start` on.
 fn motion(time: f64, speed: f64, start: f64) -> JointState<f64, 2> {
@@ -62,7 +43,7 @@ fn evaluate(
     seed: u64,
     disturbed: impl Fn(f64) -> f64,
 ) -> Found {
-    let model = believed(length_m);
+    let model = row_model(length_m);
     let mut random = TestRandom::new(seed);
     let mut sample = |state: &JointState<f64, 2>| -> ([f32; 2], [f32; 2]) {
         let torque = joint_torques(&chain(LENGTH_M), &TRUTH, state, &GRAVITY);
@@ -182,7 +163,7 @@ fn only_an_unmodelled_swing_counts_as_slow_residual() {
 /// Longest common disturbance of a training motion of this duration with a push of 0.6 s on both joints: by
 /// its blocks and by its rows.
 fn pushed(duration_s: u32) -> (f64, f64) {
-    let model = believed(LENGTH_M);
+    let model = row_model(LENGTH_M);
     let mut random = TestRandom::new(3);
     let begin_s = 0.4 * f64::from(duration_s);
     let samples: Vec<([f32; 2], [f32; 2])> = (0..500 * duration_s)

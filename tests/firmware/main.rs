@@ -7,6 +7,7 @@ mod complete_drive;
 mod held_out;
 mod identification;
 mod model_reference;
+mod planar_leg;
 mod store;
 mod swarm_document;
 mod swarm_tables;

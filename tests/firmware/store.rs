@@ -147,12 +147,6 @@ fn stored_data_is_present_after_a_start() {
 }
 
 #[test]
-fn an_empty_flash_contains_no_data() {
-    let (found, _) = content(Small::new(1)).unwrap();
-    assert_eq!(found, NOTHING);
-}
-
-#[test]
 fn writing_needs_a_drive_that_is_off() {
     let fault = Fault { code: FaultCode::Overspeed, joint: 0 };
     for state in [
@@ -356,16 +350,6 @@ fn a_model_of_schema_1_has_no_confidence_bounds() {
     assert_eq!((length, &bytes[2..192]), (2 + 210, &first_schema(&model(7))[2..]));
     assert_eq!((&bytes[..2], &bytes[192..196]), (&[2, 0][..], &1.75_f32.to_le_bytes()[..]));
     assert_eq!(block_on(store.load(Key::Model)), Ok(Some(model(7))));
-}
-
-#[test]
-fn a_stored_value_is_not_written_again() {
-    let mut store = store(Small::new(1));
-    keep(&mut store, 2).unwrap();
-    let before = store.into_flash();
-    let mut store = self::store(before.clone());
-    assert_eq!(keep(&mut store, 2), Ok(Saved::Unchanged));
-    assert_eq!(store.into_flash(), before);
 }
 
 #[test]

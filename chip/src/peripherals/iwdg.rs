@@ -148,28 +148,6 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_milliseconds_are_divider_4_and_reload_127() {
-        let (mut iwdg, mut findings) = (Iwdg::new(), Findings::default());
-        write(&mut iwdg, &mut findings, 0, 0, 0xCCCC);
-        for (offset, value) in [(0, 0x5555), (4, 0), (8, 127), (0, 0xAAAA)] {
-            write(&mut iwdg, &mut findings, 0, offset, value);
-        }
-        assert_eq!(iwdg.due(), TICK_HZ * 16 / 1000);
-        write(&mut iwdg, &mut findings, TICK_HZ / 100, 0, 0xAAAA);
-        assert_eq!(iwdg.due(), TICK_HZ * 26 / 1000);
-        assert!(findings.is_empty());
-    }
-
-    #[test]
-    fn a_start_without_a_feed_counts_from_the_reset_value() {
-        let (mut iwdg, mut findings) = (Iwdg::new(), Findings::default());
-        for (offset, value) in [(0, 0x5555), (4, 0), (8, 127), (0, 0xCCCC)] {
-            write(&mut iwdg, &mut findings, 0, offset, value);
-        }
-        assert_eq!(iwdg.due(), TICK_HZ * 512 / 1000);
-    }
-
-    #[test]
     fn values_are_locked_and_busy_ones_ignored() {
         let (mut iwdg, mut findings) = (Iwdg::new(), Findings::default());
         write(&mut iwdg, &mut findings, 0, 4, 3);

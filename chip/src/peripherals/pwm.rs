@@ -157,23 +157,4 @@ pub(crate) mod tests {
         outputs.connect([[true; 2]; 3]);
         (timer, outputs)
     }
-
-    #[test]
-    fn both_switches_of_a_half_bridge_are_off_for_the_dead_time() {
-        let (timer, mut outputs) = bridge(1000);
-        outputs.follow(&timer, 0);
-        let mut changes = Vec::new();
-        let mut now = 0;
-        while changes.len() < 5 {
-            let before = outputs.pins(&timer, now)[0];
-            now = outputs.next_change(&timer, now);
-            outputs.follow(&timer, now);
-            let after = outputs.pins(&timer, now)[0];
-            if before != after {
-                changes.push((now / 2, after));
-            }
-        }
-        let (high, low, off) = ([true, false], [false, true], [false; 2]);
-        assert_eq!(changes, [(20, low), (1000, off), (1020, high), (6000, off), (6020, low)]);
-    }
 }

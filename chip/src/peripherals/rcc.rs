@@ -386,20 +386,6 @@ mod tests {
     }
 
     #[test]
-    fn the_boards_clock_tree_is_168_mhz() {
-        let (mut rcc, mut findings) = (Rcc::new(), Findings::default());
-        assert_eq!((rcc.cycle(), rcc.timer_cycle(2)), (21, 21));
-        write(&mut rcc, &mut findings, 0, 0x00, 0x1_0081);
-        // 8 MHz / 4 * 168 / 2; USB / 7.
-        write(&mut rcc, &mut findings, CRYSTAL, 0x04, 4 | 168 << 6 | 1 << 22 | 7 << 24);
-        write(&mut rcc, &mut findings, CRYSTAL, 0x00, 0x101_0081);
-        write(&mut rcc, &mut findings, CRYSTAL + LOCK, 0x08, 2 | 5 << 10 | 4 << 13);
-        assert_eq!((rcc.cycle(), rcc.timer_cycle(1), rcc.timer_cycle(2)), (2, 4, 2));
-        assert_eq!((rcc.bus_hz(1), rcc.bus_hz(2)), (42_000_000, 84_000_000));
-        assert!(findings.is_empty(), "{findings:?}");
-    }
-
-    #[test]
     fn an_early_pll_and_an_early_switch_are_findings() {
         let (mut rcc, mut findings) = (Rcc::new(), Findings::default());
         write(&mut rcc, &mut findings, 0, 0x04, 4 | 168 << 6 | 1 << 22 | 7 << 24);

@@ -1,6 +1,6 @@
 extern crate std;
 
-use super::super::tests::{Board, axis};
+use super::super::tests::Board;
 use super::super::{Abort, Frame};
 use super::*;
 
@@ -154,24 +154,6 @@ fn a_counted_sync_without_valid_counter_is_ignored() {
     };
     assert_eq!([sent(&mut board, &[]), sent(&mut board, &[5]), sent(&mut board, &[0])], [0; 3]);
     assert_eq!([sent(&mut board, &[1]), sent(&mut board, &[4])], [1; 2]);
-}
-
-#[test]
-fn a_controller_state_becomes_an_emergency_message() {
-    let mut node = Node::new(NodeId::new(9).expect("a number"), super::super::tests::IDENTITY);
-    let mut axis = axis();
-    node.poll(0, &mut axis);
-    node.communication_mut().emergency.inhibit = 0;
-    for (state, code) in [
-        (Controller::Overrun, 0x8110_u16),
-        (Controller::Passive, 0x8120),
-        (Controller::Off, 0x8140),
-        (Controller::Active, 0),
-    ] {
-        node.on_controller(state, &mut axis);
-        let frame = node.poll(0, &mut axis).expect("a message");
-        assert_eq!((frame.id(), &frame.data()[..2]), (0x89, &code.to_le_bytes()[..]), "{state:?}");
-    }
 }
 
 /// Emergency codes of the first node among these frames.

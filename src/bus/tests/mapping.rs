@@ -1,4 +1,4 @@
-//! The two PDO mappings of docs/bus.md, and their bus load.
+//! The compact PDO mapping of docs/bus.md.
 
 use super::*;
 
@@ -53,25 +53,4 @@ fn the_compact_mapping_moves_two_joints_with_one_frame_and_answers_with_two() {
     assert_eq!(sent, [(0x181, 8), (0x182, 8)]);
     let target = dictionary::Object::at(0x607A, 0);
     assert_eq!(board.axes.map(|axis| axis.read(target)), [Ok(0x0003_0201), Ok(0x0006_0504)]);
-}
-
-/// Bits per cycle, fewest and most: one SYNC and the listed numbers of frames by length.
-fn cycle(frames: &[(u32, usize)]) -> [u32; 2] {
-    let mut sum = Frame::new(0x80, &[]).bits();
-    for (count, length) in frames {
-        let bits = Frame::new(1, &[0; 8][..*length]).bits();
-        sum = [sum[0] + count * bits[0], sum[1] + count * bits[1]];
-    }
-    sum
-}
-
-#[test]
-fn two_legs_fit_on_the_bus_at_500_hz_as_recorded_and_at_1_khz_compact() {
-    // Per node: statusword; position and velocity; torque; inputs; controlword; one target.
-    let recorded = cycle(&[(4, 2), (4, 8), (4, 2), (4, 4), (4, 2), (4, 4)]);
-    // One frame of 8 bytes per node and one of 8 bytes per leg.
-    let compact = cycle(&[(4, 8), (2, 8)]);
-    // At 1 Mbit/s: 2000 bits per cycle at 500 Hz, 1000 at 1 kHz.
-    assert_eq!((recorded, compact), ([1879, 2255], [713, 865]));
-    assert!(recorded[0] < 2000 && compact[1] < 1000);
 }

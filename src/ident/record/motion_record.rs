@@ -43,6 +43,22 @@ pub struct Record<T, const N: usize, const B: usize> {
 }
 
 impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
+    /// Record without noise, rejected samples and outliers, whose rows are independent.
+    #[cfg(test)]
+    pub fn plain(factors: [Factor<T, B>; N], torque: [TorqueSize<T>; N], rows: u32) -> Self {
+        Self {
+            factors,
+            torque,
+            rows: [rows; N],
+            rejected: 0,
+            row_information: T::one(),
+            noise: [T::zero(); N],
+            outliers: Outliers::none(),
+            stribeck: [const { None }; N],
+            selection: Selection::all(),
+        }
+    }
+
     /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Record<U, N, B> {

@@ -171,22 +171,6 @@ fn a_counter_that_began_elsewhere_moves_the_position_of_every_count() {
 }
 
 #[test]
-fn a_sound_motor_is_measured_and_its_offset_found() {
-    for (angle, direction) in [(0.3, 1.0), (2.0, -1.0), (-0.9, 1.0)] {
-        let mut motor = TestMotor { angle, encoder_sign: direction, ..TestMotor::default() };
-        let counter = if direction > 0.0 { Direction::Up } else { Direction::Down };
-        let configuration = AxisConfiguration { counter, ..CONFIGURATION };
-        let found = calibrate(&mut motor, &configuration).expect("sound");
-        assert!((f64::from(found.resistance().0) / 0.05 - 1.0).abs() < 0.02, "{found:?}");
-        assert!((f64::from(found.direct_inductance().0) / 24e-6 - 1.0).abs() < 0.02, "{found:?}");
-        assert!((f64::from(found.quadrature_inductance().0) / 27e-6 - 1.0).abs() < 0.02, "{found:?}");
-        let error = offset_error_deg(&mut motor, &configuration, &found);
-        assert!(error.abs() < 1.0, "{error} degrees");
-        assert!((f64::from(found.current_offsets()[0]) - 2060.3).abs() < 0.6, "{found:?}");
-    }
-}
-
-#[test]
 fn flux_and_friction_are_measured_while_the_motor_turns() {
     for (angle, direction) in [(0.3, 1.0), (2.0, -1.0)] {
         let mut motor = TestMotor { angle, encoder_sign: direction, coulomb: 0.05, ..TestMotor::default() };
@@ -405,30 +389,6 @@ fn second_day(counter: Direction) -> (TestMotor, AxisConfiguration, StoredCalibr
 }
 
 #[test]
-fn stored_values_are_confirmed_at_standstill_once_the_index_is_certain() {
-    for (counter, turns) in [(Direction::Up, 2.1), (Direction::Up, -2.1), (Direction::Down, 2.6)] {
-        let (mut motor, configuration, stored) = second_day(counter);
-        let search = turned_by_hand(&mut motor, turns);
-        let calibrator = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
-        let (begin, mut ticks) = (motor.angle, 0_u32);
-        let found = run_with(&mut motor, indexed(calibrator, &search), |_, _| ticks += 1).expect("sound");
-        assert!(!found.is_proven() && found.indexed() && found.offset() == stored.offset);
-        // A fifth of a second for the offsets, 0.3 s for each current, 0.1 s and a rise for each inductance.
-        assert!((20_000..36_000).contains(&ticks), "{ticks}");
-        let moved = (motor.angle - begin) * 7.0 / core::f64::consts::TAU;
-        assert!(moved.abs() < 0.005, "{moved} electrical turns");
-        let error = offset_error_deg(&mut motor, &configuration, &found);
-        assert!(error.abs() < 1.0, "{error} degrees");
-        let shares = [
-            found.resistance().0 / stored.resistance.0,
-            found.direct_inductance().0 / stored.direct_inductance.0,
-            found.quadrature_inductance().0 / stored.quadrature_inductance.0,
-        ];
-        assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.04 && *share != 1.0), "{shares:?}");
-    }
-}
-
-#[test]
 fn the_motor_turns_without_a_certain_index_without_stored_values_or_on_request() {
     let (motor, configuration, stored) = second_day(Direction::Up);
     let checked = Calibrator::from_stored(&configuration, SETTINGS, stored).expect("usual");
@@ -439,21 +399,6 @@ fn the_motor_turns_without_a_certain_index_without_stored_values_or_on_request()
         assert_eq!(indexed(calibrator, &search), calibrator);
         let found = run(&mut motor, indexed(calibrator, &search)).expect("sound");
         assert!(found.is_proven() && offset_error_deg(&mut motor, &configuration, &found).abs() < 1.0);
-    }
-}
-
-#[test]
-fn a_rotor_that_moves_at_standstill_is_refused_before_it_is_far() {
-    for degrees in [30.0, -60.0, 90.0, 150.0] {
-        let (mut motor, configuration, stored) = second_day(Direction::Up);
-        let search = turned_by_hand(&mut motor, 2.1);
-        let off = ElectricalAngle::from_turns(degrees / 360.0);
-        let wrong = StoredCalibration { offset: stored.offset.plus(off), ..stored };
-        let calibrator = Calibrator::from_stored(&configuration, SETTINGS, wrong).expect("usual");
-        let begin = motor.angle;
-        assert_eq!(run(&mut motor, indexed(calibrator, &search)), Err(Refusal::Moved), "{degrees}");
-        let moved = (motor.angle - begin) * 7.0 / core::f64::consts::TAU;
-        assert!(moved.abs() < 0.05, "{degrees}: {moved} electrical turns");
     }
 }
 

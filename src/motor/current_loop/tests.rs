@@ -1,13 +1,6 @@
 use super::*;
 use crate::hal::CURRENT_RATE_HZ;
-use crate::units::Weber;
-
-const MOTOR: MotorConstants = MotorConstants {
-    resistance: Ohm(0.05),
-    direct_inductance: Henry(24e-6),
-    quadrature_inductance: Henry(27e-6),
-    flux: Weber(2.9e-3),
-};
+use crate::motor::testing::MOTOR;
 
 const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
 

@@ -5,14 +5,13 @@ extern crate std;
 use std::boxed::Box;
 use std::vec::Vec;
 
-use super::super::testing::{TestHardware, commanded, ends, on_a_bus};
+use super::super::testing::{RAMPS, TestHardware, VOLT_PER_CODE, commanded, ends, on_a_bus};
 use super::super::{AssistEnds, AssistQueues, BusEnds, Ends};
 use super::*;
 use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::{Contacts, DriveCommand};
 use crate::leg::testing::{LEG, configuration};
 use crate::leg::{Finding, JointCommand, PowerRequest};
-use crate::motor::SenseScale;
 use crate::safety::BoardFault;
 use crate::units::Ampere;
 
@@ -22,9 +21,6 @@ mod faults;
 mod holding_brake;
 mod reports;
 
-const VOLT_PER_CODE: Volt = SenseScale::ODRIVE_3_6.volt_per_code;
-const RAMPS: DeratingRamps =
-    DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
 /// Counts at which both joints are within their ranges.
 const COUNTS: i32 = 30_000;
 

@@ -1,31 +1,15 @@
+extern crate std;
+
+use std::string::String;
+
 use super::super::Line;
 use super::*;
 
-/// Fixed buffer for one line of text, without a heap.
-struct Text {
-    bytes: [u8; 512],
-    length: usize,
-}
-
-impl Text {
-    fn new(record: &Record<2>, number: u32) -> Self {
-        let mut text = Self { bytes: [0; 512], length: 0 };
-        record.write(number, &mut text).expect("512 characters are enough");
-        text
-    }
-
-    fn as_str(&self) -> &str {
-        core::str::from_utf8(&self.bytes[..self.length]).expect("ASCII")
-    }
-}
-
-impl Write for Text {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        let end = self.length + text.len();
-        self.bytes.get_mut(self.length..end).ok_or(fmt::Error)?.copy_from_slice(text.as_bytes());
-        self.length = end;
-        Ok(())
-    }
+/// The line of a record.
+fn line_of(record: &Record<2>, number: u32) -> String {
+    let mut text = String::new();
+    record.write(number, &mut text).expect("writing to a string cannot fail");
+    text
 }
 
 #[test]
@@ -34,22 +18,22 @@ fn every_kind_has_one_format_and_any_values_in_it_are_a_line() {
         let (kind, _) = format.split_once(' ').expect("a kind");
         let same = |other: &&&str| other.split(' ').next() == Some(kind);
         assert_eq!(Record::<2>::FORMATS.iter().filter(same).count(), 1, "{kind}");
-        let mut text = Text { bytes: [0; 512], length: 0 };
+        let mut text = String::new();
         fill(format, &[&7_u32; 24].map(|value| value as &dyn Value), &mut text).expect("fits");
-        assert_eq!(Line::parse(text.as_str()).and_then(|line| line.number()), Ok(7), "{format}");
+        assert_eq!(Line::parse(&text).and_then(|line| line.number()), Ok(7), "{format}");
     }
 }
 
 #[test]
 fn what_is_written_is_read_back_bit_for_bit() {
     for value in [0.1_f32, -1.0 / 3.0, 1e-30, 3.4e38, f32::MIN_POSITIVE, 0.0, 12_345_679.0] {
-        let text = Text::new(&Record::Covariance { row: 3, column: 2, value }, 9);
-        let line = Line::parse(text.as_str()).expect("a line");
-        assert_eq!(line.value::<f32>("value").map(f32::to_bits), Ok(value.to_bits()), "{}", text.as_str());
+        let text = line_of(&Record::Covariance { row: 3, column: 2, value }, 9);
+        let line = Line::parse(&text).expect("a line");
+        assert_eq!(line.value::<f32>("value").map(f32::to_bits), Ok(value.to_bits()), "{text}");
         assert_eq!((line.kind(), line.number(), line.value::<u8>("column")), ("covariance", Ok(9), Ok(2)));
     }
-    let text = Text::new(&Record::Covariance { row: 0, column: 0, value: f32::NAN }, 0);
-    assert!(Line::parse(text.as_str()).and_then(|line| line.value::<f32>("value")).is_ok_and(f32::is_nan));
+    let text = line_of(&Record::Covariance { row: 0, column: 0, value: f32::NAN }, 0);
+    assert!(Line::parse(&text).and_then(|line| line.value::<f32>("value")).is_ok_and(f32::is_nan));
     let counts = [i32::MIN, 17];
     let log = Record::Log {
         tick: 80_007,
@@ -59,8 +43,8 @@ fn what_is_written_is_read_back_bit_for_bit() {
         torque_nm: [f32::NAN, 3.0],
         counts,
     };
-    let text = Text::new(&log, u32::MAX);
-    let line = Line::parse(text.as_str()).expect("a line");
+    let text = line_of(&log, u32::MAX);
+    let line = Line::parse(&text).expect("a line");
     assert_eq!(line.list::<f32, 2>("position_rad"), Ok([0.25, -1e-9]));
     assert_eq!((line.list::<i32, 2>("counts"), line.number()), (Ok(counts), Ok(u32::MAX)));
     assert!(line.list::<f32, 2>("torque_nm").is_ok_and(|torque| torque[0].is_nan() && torque[1] == 3.0));
@@ -68,7 +52,7 @@ fn what_is_written_is_read_back_bit_for_bit() {
 
 #[test]
 fn registers_are_written_in_base_sixteen() {
-    let text = Text::new(
+    let text = line_of(
         &Record::Crash {
             cause: "panic",
             pc: 0x0800_1234,
@@ -82,7 +66,7 @@ fn registers_are_written_in_base_sixteen() {
         },
         4,
     );
-    let line = Line::parse(text.as_str()).expect("a line");
+    let line = Line::parse(&text).expect("a line");
     assert_eq!((line.hex("pc"), line.text("status")), (Ok(0x0800_1234), Ok("0x9200")));
     assert_eq!(line.value::<u32>("line"), Ok(77));
 }

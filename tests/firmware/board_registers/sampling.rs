@@ -5,12 +5,10 @@ use core::f64::consts::TAU;
 use hal_sim::drive::description::SHIFT_QUARTERS;
 use hal_sim::drive::description::ShuntDescription;
 use scarab::board::odrive_v3_6::settings::drives::DEAD_TIME_BAND;
-use scarab::board::odrive_v3_6::settings::{
-    FAST_TIMER_HZ, SLOW_TIMER_HZ, Write, converters, prepare, timers,
-};
+use scarab::board::odrive_v3_6::settings::{FAST_TIMER_HZ, SLOW_TIMER_HZ, converters, prepare, timers};
 use scarab::hal::SHUNT_TRIGGER_CLOCKS;
 use scarab::motor::{BridgeTiming, DeadTime, Modulator, Stationary};
-use scarab::real::{sin_cos, sqrt};
+use scarab::real::sin_cos;
 use scarab::units::{Ampere, Volt};
 
 use super::timer::Bridges;
@@ -36,8 +34,8 @@ struct Instants {
     switchings: [Vec<i64>; 2],
 }
 
-/// Replays the start, then some other writes.
-fn instants(others: &[Write]) -> Instants {
+/// Replays the start.
+fn instants() -> Instants {
     let mut bridges = Bridges::new([TIM1, TIM8]);
     prepare(|writes| bridges.apply(writes));
     bridges.apply(&timers::LOCK_AND_START);
@@ -49,7 +47,6 @@ fn instants(others: &[Write]) -> Instants {
         }
         bridges.apply(&[timers::repetition(axis)]);
     }
-    bridges.apply(others);
     (0..2 * PERIOD).for_each(|_| bridges.clock());
     // Edge of the trigger: bits 20 and 21 of CR2 for TIM1's injected conversions, 28 and 29 for TIM8's
     // regular ones.
@@ -113,7 +110,7 @@ fn sampling() -> i64 {
 
 #[test]
 fn converters_start_119_ns_after_the_middle_of_the_lower_zero_vector() {
-    let instants = instants(&[]);
+    let instants = instants();
     let clock = f64::from(FAST_TIMER_HZ);
     for axis in 0..2 {
         let trigger = trigger_of(&instants, axis);
@@ -127,16 +124,6 @@ fn converters_start_119_ns_after_the_middle_of_the_lower_zero_vector() {
     }
 }
 
-#[test]
-fn a_trigger_before_the_middle_is_measured_as_negative() {
-    // Previous setting of the board: mode 1, compare value 40, which the falling counter reaches first.
-    let old = [TIM1, TIM8]
-        .map(|base| [Write::whole("CCMR2", base + 0x1C, 0x6878), Write::whole("CCR4", base + 0x40, 40)])
-        .concat();
-    let instants = instants(&old);
-    assert_eq!([0, 1].map(|axis| trigger_of(&instants, axis)), [-40; 2]);
-}
-
 /// Clocks from the middles of the first bridge to those of the second.
 fn shift(instants: &Instants) -> i64 {
     (instants.middles[1][0] - instants.middles[0][0]).rem_euclid(PERIOD)
@@ -144,7 +131,7 @@ fn shift(instants: &Instants) -> i64 {
 
 #[test]
 fn the_bridges_run_half_a_period_apart() {
-    let instants = instants(&[]);
+    let instants = instants();
     assert_eq!(shift(&instants), PERIOD / 2);
     assert_eq!(PERIOD * i64::from(SHIFT_QUARTERS) / 4, PERIOD / 2, "the simulated drives");
     for axis in 0..2 {
@@ -179,7 +166,7 @@ struct Count {
 impl Count {
     /// The board: dead time compensated, both instants at which a half bridge may switch.
     fn of_the_board() -> Self {
-        let instants = instants(&[]);
+        let instants = instants();
         Self {
             shift: shift(&instants),
             hold: trigger_of(&instants, 0) + sampling(),
@@ -268,83 +255,4 @@ fn the_other_bridge_s_edges_miss_the_sample_up_to_24_volts() {
     assert!((24.25..24.35).contains(&quiet), "{quiet}");
     assert!((24.65..24.75).contains(&timers_alone), "{timers_alone}");
     assert!((0.5..0.7).contains(&most) && (0.5..0.7).contains(&most_alone), "{most} {most_alone}");
-}
-
-#[test]
-fn a_quarter_period_shift_puts_edges_on_the_sample() {
-    let quarter = Count { shift: PERIOD / 4, ..Count::of_the_board() };
-    let shares = [0.0, 1.0, 2.0, 3.0, 5.0, 10.0].map(|volt| (volt, quarter.share(volt)));
-    println!("a quarter of a period: {shares:?}");
-    assert!(shares[..3].iter().all(|(_, share)| *share == 1.0), "{shares:?}");
-    assert!(shares.iter().all(|(_, share)| *share > 0.15), "{shares:?}");
-    // With the previous trigger, the timers' edges alone disturb all periods up to 3 V, a third at 5 V.
-    let old = Count { hold: sampling() - 40, dead_time: DeadTime::Uncompensated, switching: &[0], ..quarter };
-    assert_eq!([1.0, 2.0, 3.0].map(|volt| old.share(volt)), [1.0; 3]);
-    assert!((0.34..0.39).contains(&old.share(5.0)), "{}", old.share(5.0));
-}
-
-/// Effective ripple of the capacitor's current, over all pairs of electrical angles. The phase current
-/// is 1 A (peak) along the voltage in both bridges. Also the largest charge that flows in and out within
-/// a period, C.
-fn ripple(volt: f64, shift: i64) -> (f64, f64) {
-    const POINTS: i64 = 500;
-    const ANGLES: u32 = 18;
-    let count = Count { switching: &[], ..Count::of_the_board() };
-    let modulator = count.modulator();
-    let drawn: Vec<Vec<f64>> = (0..ANGLES)
-        .map(|number| {
-            let angle = TAU / f64::from(ANGLES) * (f64::from(number) + 0.25);
-            let compare = count.compare(&modulator, volt, angle, None);
-            let currents = [0.0, 1.0, 2.0].map(|phase| sin_cos(angle - TAU / 3.0 * phase).1);
-            let at = |instant: i64| {
-                let counter = if instant < PERIOD / 2 { instant } else { PERIOD - instant };
-                let on = currents.iter().zip(compare).filter(|(_, compare)| counter >= *compare);
-                on.map(|(current, _)| current).sum::<f64>()
-            };
-            (0..POINTS).map(|point| at(PERIOD / POINTS * point + PERIOD / POINTS / 2)).collect()
-        })
-        .collect();
-    let moved = (shift * POINTS / PERIOD) as usize;
-    let (mut squares, mut largest) = (0.0, 0.0_f64);
-    for one in &drawn {
-        for other in &drawn {
-            let sum: Vec<f64> = (0..one.len())
-                .map(|point| one[point] + other[(point + one.len() - moved) % one.len()])
-                .collect();
-            let mean = sum.iter().sum::<f64>() / sum.len() as f64;
-            let (mut charge, mut low, mut high) = (0.0, 0.0_f64, 0.0_f64);
-            for current in &sum {
-                squares += (current - mean) * (current - mean) / sum.len() as f64;
-                charge += (current - mean) / (24e3 * sum.len() as f64);
-                (low, high) = (low.min(charge), high.max(charge));
-            }
-            largest = largest.max(high - low);
-        }
-    }
-    (sqrt(squares / f64::from(ANGLES * ANGLES)), largest)
-}
-
-#[test]
-fn half_a_period_costs_the_capacitor_twice_the_ripple_of_a_quarter() {
-    println!(
-        "volt   none   quarter   half a period: effective A per A of phase current; mV from peak to peak per A in 1.5 mF"
-    );
-    let mut most = [0.0_f64; 3];
-    for volt in [1.0, 3.0, 5.0, 7.5, 10.0, 12.5, 15.0, 20.0, 25.0] {
-        let [none, quarter, half] = [0, PERIOD / 4, PERIOD / 2].map(|shift| ripple(volt, shift));
-        for (most, (effective, _)) in most.iter_mut().zip([none, quarter, half]) {
-            *most = most.max(effective);
-        }
-        let [none_mv, quarter_mv, half_mv] = [none, quarter, half].map(|(_, charge)| 1e3 * charge / 1.5e-3);
-        println!(
-            "{volt:>4}   {:.3}, {none_mv:.2}   {:.3}, {quarter_mv:.2}   {:.3}, {half_mv:.2}",
-            none.0, quarter.0, half.0
-        );
-        // Each bridge draws two pulses a period, half a period apart, so a shift of half a period
-        // has no effect.
-        assert!((half.0 / none.0 - 1.0).abs() < 0.02, "{none:?} {half:?}");
-    }
-    println!("most   {most:.3?}");
-    assert!((0.88..0.93).contains(&most[2]), "{most:?}");
-    assert!((1.9..2.2).contains(&(most[2] / most[1])), "{most:?}");
 }

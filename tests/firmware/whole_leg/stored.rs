@@ -1,6 +1,6 @@
 //! A stored model offered to a leg after a restart.
 
-use scarab::leg::{Assured, RestoreError, StoredModel};
+use scarab::leg::{Assured, RestoreError, StoredModel, Stribeck};
 use scarab::units::{NewtonMetrePerAmpere, Radian};
 
 use super::*;
@@ -67,49 +67,35 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
 }
 
 #[test]
-fn a_model_with_a_number_not_finite_is_refused_with_its_joint() {
-    for (joint, value) in [(0, f32::NAN), (1, f32::INFINITY)] {
-        let mut stored = kept();
-        stored.parameters[joint][7] = value;
-        assert_eq!(context().configuration.restore(&stored), Err(RestoreError::NotFinite { joint }));
-    }
-}
-
-#[test]
-fn an_invalid_stribeck_curve_is_refused_with_its_joint() {
-    // A speed of 0 makes the torque of a joint at rest NaN.
-    for (joint, excess, velocity) in
-        [(0, 0.0, 0.0), (1, -0.1, 0.1), (0, f32::NAN, 0.1), (1, 0.4, f32::INFINITY)]
-    {
-        let mut stored = kept();
-        (stored.stribeck[joint].excess, stored.stribeck[joint].velocity) = (excess, velocity);
-        assert_eq!(context().configuration.restore(&stored), Err(RestoreError::Stribeck { joint }));
-    }
-}
-
-#[test]
-fn invalid_confidence_bounds_are_refused() {
+fn invalid_numbers_of_a_stored_model_are_refused_with_their_joint() {
     let stored = kept();
     let assured = stored.assured;
     assert!(
         assured.inertia_share > 0.5 && assured.coulomb_nm.iter().all(|bound| *bound > 0.0),
         "{assured:?}"
     );
-    for value in [-0.01, f32::NAN, f32::INFINITY] {
-        for joint in 0..JOINTS {
-            let mut coulomb = stored;
-            coulomb.assured.coulomb_nm[joint] = value;
-            let mut viscous = stored;
-            viscous.assured.viscous[joint] = value;
-            for stored in [coulomb, viscous] {
-                let refused = context().configuration.restore(&stored);
-                assert_eq!(refused, Err(RestoreError::FrictionBound { joint }), "{value}");
-            }
+    let refused = |change: &dyn Fn(&mut StoredModel<JOINTS>), reason: RestoreError| {
+        let mut changed = stored;
+        change(&mut changed);
+        assert_eq!(context().configuration.restore(&changed), Err(reason));
+    };
+    for joint in 0..JOINTS {
+        for value in [f32::NAN, f32::INFINITY] {
+            refused(&|model| model.parameters[joint][7] = value, RestoreError::NotFinite { joint });
+        }
+        // A speed of 0 makes the torque of a joint at rest NaN.
+        for (excess, velocity) in [(0.0, 0.0), (-0.1, 0.1), (f32::NAN, 0.1), (0.4, f32::INFINITY)] {
+            let curve = Stribeck { excess, velocity };
+            refused(&|model| model.stribeck[joint] = curve, RestoreError::Stribeck { joint });
+        }
+        for value in [-0.01, f32::NAN, f32::INFINITY] {
+            let reason = RestoreError::FrictionBound { joint };
+            refused(&|model| model.assured.coulomb_nm[joint] = value, reason);
+            refused(&|model| model.assured.viscous[joint] = value, reason);
         }
     }
-    for inertia_share in [-0.01, 1.01, f32::NAN, f32::INFINITY] {
-        let stored = StoredModel { assured: Assured { inertia_share, ..assured }, ..stored };
-        assert_eq!(context().configuration.restore(&stored), Err(RestoreError::InertiaShare));
+    for share in [-0.01, 1.01, f32::NAN, f32::INFINITY] {
+        refused(&|model| model.assured.inertia_share = share, RestoreError::InertiaShare);
     }
     let whole = StoredModel { assured: Assured { inertia_share: 1.0, ..assured }, ..stored };
     let none = StoredModel { assured: Assured::NOTHING, ..stored };

@@ -13,9 +13,7 @@ use core::f64::consts::TAU;
 use hal_sim::drive::description::{EncoderWiring, Wiring};
 use hal_sim::drive::stand::{Load, Stand};
 use scarab::hal::AxisCommand;
-use scarab::motor::{
-    Axis, AxisRequest, Calibration, Direction, Mismatch, MotorConstant, Phase, Refusal, StoredCalibration,
-};
+use scarab::motor::{Axis, AxisRequest, Calibration, Direction, Phase, Refusal, StoredCalibration};
 use scarab::units::Ampere;
 use trial::Trial;
 
@@ -217,64 +215,6 @@ fn a_stored_calibration_is_accepted_by_the_same_motor_only() {
 #[ignore = "campaign: .ci/full"]
 fn stored_calibrations_are_accepted_by_the_same_of_36_motors_only() {
     accepted_by_the_same_motor_only(101..=100 + 2 * KINDS);
-}
-
-#[test]
-fn another_inductance_is_detected_at_the_next_power_up() {
-    another_inductance(&[(1, 1.3, true), (3, 1.12, false)], &[true]);
-    another_inductance(&[(2, 0.75, true)], &[false]);
-}
-
-#[test]
-#[ignore = "campaign: .ci/full"]
-fn other_inductances_along_and_across_are_detected_at_the_next_power_up() {
-    another_inductance(
-        &[(1, 1.3, true), (2, 0.75, true), (3, 1.12, false), (4, 0.88, false)],
-        &[false, true],
-    );
-}
-
-/// Seeds, shares of the inductance, and whether they are seen; along and across the flux.
-fn another_inductance(cases: &[(u64, f64, bool)], directions: &[bool]) {
-    for &(seed, share, seen) in cases {
-        for &across in directions {
-            let mut trial = Trial::sound(seed);
-            let stored = stored(&trial, seed);
-            let motor = &mut trial.axis.motor;
-            *if across { &mut motor.inductance_q } else { &mut motor.inductance_d } *= share;
-            let (_, result, _) = trial.run_stored(seed, stored);
-            match result {
-                Err(Refusal::OtherMotor(constant, Mismatch { stated, found })) => {
-                    let expected = [MotorConstant::DirectInductance, MotorConstant::QuadratureInductance];
-                    assert_eq!(
-                        (constant, seen),
-                        (expected[usize::from(across)], true),
-                        "seed {seed}: {share}"
-                    );
-                    assert!((f64::from(found / stated) / share - 1.0).abs() < 0.04, "seed {seed}: {share}");
-                }
-                other => assert!(other.is_ok() && !seen, "seed {seed}: {share}: {other:?}"),
-            }
-        }
-    }
-}
-
-#[test]
-fn an_encoder_turned_on_its_shaft_is_detected_at_power_up() {
-    for (seed, degrees, seen) in [(1, 8.0, true), (2, -8.0, true), (3, 60.0, true), (4, 2.0, false)] {
-        let mut trial = Trial::sound(seed);
-        let stored = stored(&trial, seed);
-        trial.axis.motor.electrical_zero += f64::to_radians(degrees);
-        let (_, result, _) = trial.run_stored(seed, stored);
-        match result {
-            Err(Refusal::StoredOffset(Mismatch { stated, found })) => {
-                let moved = f64::from(found - stated) * 360.0;
-                let apart = (moved - degrees + 180.0).rem_euclid(360.0) - 180.0;
-                assert!(seen && stated == stored.offset.turns() && apart.abs() < 1.5, "{degrees}: {moved}");
-            }
-            other => assert!(other.is_ok() && !seen, "{degrees} degrees: {other:?}"),
-        }
-    }
 }
 
 #[test]

@@ -301,6 +301,15 @@ pub struct LinkParameters {
     pub asymmetry: f64,
 }
 
+#[cfg(test)]
+impl LinkParameters {
+    /// Sums M, HX, HY, ZZ about the joint.
+    pub fn sums(&self) -> [f64; 4] {
+        let [x, y, _] = self.com;
+        [self.mass, self.mass * x, self.mass * y, self.inertia_com[5] + self.mass * (x * x + y * y)]
+    }
+}
+
 fn default_bandwidth() -> f64 {
     8.0
 }

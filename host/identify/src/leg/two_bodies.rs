@@ -195,10 +195,7 @@ mod tests {
         ];
         for (joint, expected) in bodies.exoskeleton.joints.iter().zip(expected) {
             for link in [joint.truth, joint.prior] {
-                let link = link.expect("both");
-                let [x, y, _] = link.com;
-                let about_joint = link.inertia_com[5] + link.mass * (x * x + y * y);
-                let sums = [link.mass, link.mass * x, link.mass * y, about_joint];
+                let sums = link.expect("both").sums();
                 for (sum, expected) in sums.iter().zip(expected) {
                     // Six decimals of the file, times 10 kg.
                     assert!((sum - expected).abs() < 2e-5, "{sums:?} {expected}");

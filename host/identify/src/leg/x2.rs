@@ -153,20 +153,13 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
 mod tests {
     use super::*;
 
-    /// Sums M, HX, HY, ZZ about the joint.
-    fn sums(link: &LinkParameters) -> [f64; 4] {
-        let [x, y, _] = link.com;
-        let about_joint = link.inertia_com[5] + link.mass * (x * x + y * y);
-        [link.mass, link.mass * x, link.mass * y, about_joint]
-    }
-
     #[test]
     fn derived_bodies_have_the_check_sums_of_their_sources() {
         let leg = leg_file(DEFAULT_WEARER_KG);
         let expected = [[10.34, 2.039, 0.0, 0.585], [6.94, 1.759, 0.201, 0.633]];
         for (joint, expected) in leg.joints.iter().zip(expected) {
             let truth = joint.truth.expect("derived");
-            for (sum, expected) in sums(&truth).iter().zip(expected) {
+            for (sum, expected) in truth.sums().iter().zip(expected) {
                 // The reference sums have three decimals, masses two.
                 assert!(
                     (sum - expected).abs() < if expected > 5.0 { 6e-3 } else { 6e-4 },

@@ -1,5 +1,6 @@
 //! Runs the tool as its users do and reads its outputs.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -105,11 +106,32 @@ impl Table {
         Self { header, rows }
     }
 
-    pub fn column(&self, name: &str) -> Vec<f64> {
+    /// The table as a CSV file.
+    pub fn text(&self) -> String {
+        let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
+        self.header.join(",") + "\n" + &self.rows.iter().map(line).collect::<String>()
+    }
+
+    pub fn index(&self, name: &str) -> usize {
         let index = self.header.iter().position(|present| present == name);
-        let index = index.unwrap_or_else(|| panic!("no column {name} in {:?}", self.header));
+        index.unwrap_or_else(|| panic!("no column {name} in {:?}", self.header))
+    }
+
+    pub fn column(&self, name: &str) -> Vec<f64> {
+        let index = self.index(name);
         self.rows.iter().map(|row| row[index]).collect()
     }
+}
+
+/// Folder with recordings of real machines, `SCARAB_RECORDINGS`; without it a notice that `what` is skipped.
+pub fn recordings(what: &str) -> Option<PathBuf> {
+    let folder = env::var_os("SCARAB_RECORDINGS").map(PathBuf::from);
+    if folder.is_none() {
+        // Bypasses the test harness, which suppresses the output of passing tests.
+        let notice = format!("SKIPPED {what}: SCARAB_RECORDINGS is not set");
+        writeln!(std::io::stderr(), "{notice}").expect("standard error");
+    }
+    folder
 }
 
 /// One number of a fit in a report.

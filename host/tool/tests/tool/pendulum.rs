@@ -1,7 +1,9 @@
 //! Pendulum with an analytic recording: torque in closed form, any stamps, a little noise.
 
+use crate::command::base;
 use scarab::real::sin_cos;
 use scarab_base::random::Random;
+use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
@@ -15,6 +17,21 @@ pub fn leg(more: &str) -> String {
         "name = \"pendulum\"\ngravity = [9.81, 0.0, 0.0]\n[[joint]]\nname = \"only\"\n\
          dh = {{ alpha = 0.0, a = 0.0, d = 0.0 }}\nrange_deg = [-200.0, 200.0]\n{more}"
     )
+}
+
+/// Fails unless every base parameter is right; returns the largest error in sigma.
+///
+/// Tolerance: noise of one recording, 3.5 sigma in the worst of six parameters. The effects of the
+/// filter's passband (flat to 1.6e-4) and of resampling are added.
+pub fn finds_the_truth(report: &Value) -> f64 {
+    let errors = TRUTH.map(|(name, truth)| {
+        let (error, sigma) = (base(report, name, "value") - truth, base(report, name, "sigma"));
+        assert!(error.abs() < 3.5 * sigma + 3e-4 * truth, "{name}: error {error}, sigma {sigma}");
+        // Noise of 0.2 N m on 15 N m; at 137 Hz the scatter over segments is up to twice as large.
+        assert!(sigma < 0.1 * truth, "{name}: sigma {sigma}");
+        error.abs() / sigma
+    });
+    errors.into_iter().fold(0.0, f64::max)
 }
 
 /// Motion and recording of the pendulum.

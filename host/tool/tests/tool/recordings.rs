@@ -3,7 +3,6 @@
 //! `SCARAB_RECORDINGS` names the folder with recordings of real machines; without it they are skipped.
 
 use std::env;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use scarab_identify::formats::recording::import::Import;
@@ -302,12 +301,7 @@ const REAL: [(&str, usize, usize, f64, Method); 12] = [
 
 #[test]
 fn recordings_of_real_machines_are_read_and_resampled() {
-    let Some(folder) = env::var_os("SCARAB_RECORDINGS").map(PathBuf::from) else {
-        // Bypasses the test harness, which suppresses the output of passing tests.
-        let notice = "SKIPPED recordings of real machines: SCARAB_RECORDINGS is not set";
-        writeln!(std::io::stderr(), "{notice}").expect("standard error");
-        return;
-    };
+    let Some(folder) = crate::command::recordings("recordings of real machines") else { return };
     for (name, joints, samples, duration, method) in REAL {
         let recording = Recording::read(&folder.join(name), &Import::plain(joints))
             .unwrap_or_else(|error| panic!("{error}"));

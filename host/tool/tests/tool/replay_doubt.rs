@@ -1,8 +1,7 @@
 //! Errors of a logging chain are estimated, refused and named by `scarab replay`.
 
-use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
+use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, recordings, scarab};
 use serde_json::Value;
-use std::env;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -280,6 +279,7 @@ fn a_torque_of_the_wrong_sign_or_unit_is_named_and_is_not_called_computed() {
         wrong.iter_mut().flat_map(|row| &mut row[3..]).for_each(|torque| *torque *= factor);
         let (report, run) = replay(&wrong, "", 3);
         assert_eq!(report["likely_cause"]["name"], name);
+        assert!(factor > 0.0 || reasons(&report).contains(&"unphysical"), "{report}");
         assert!(!run.printed.contains("computed from the angle"), "{}", run.printed);
     }
 }
@@ -414,17 +414,9 @@ fn impossible_torque_delays_are_refused() {
     assert!(refused("late").contains("invalid value 'late'"));
 }
 
-fn recordings() -> Option<PathBuf> {
-    let folder = env::var_os("SCARAB_RECORDINGS").map(PathBuf::from);
-    if folder.is_none() {
-        println!("SKIPPED: SCARAB_RECORDINGS is not set");
-    }
-    folder
-}
-
 #[test]
 fn a_real_arm_with_misfit_far_above_its_noise_is_accepted() {
-    let Some(recordings) = recordings() else { return };
+    let Some(recordings) = recordings("the real arm") else { return };
     let folder = Folder::new();
     let json = folder.path("report.json");
     let file = |number: &str| recordings.join("dp_A0").join(format!("{number}.csv"));

@@ -1,6 +1,5 @@
 //! Known masses in recordings, and the mass that two models differ by.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -59,14 +58,12 @@ fn a_stated_load_is_subtracted_an_unstated_one_is_in_the_parameters() {
 
 /// Recording with the torques multiplied.
 fn scaled(folder: &Folder, name: &str, file: &Path, factors: [f64; 2]) -> PathBuf {
-    let mut table = Table::parse(&fs::read_to_string(file).expect("the recording"));
+    let mut table = Table::read(file.to_str().expect("a path"));
     for (factor, column) in factors.iter().zip(["tau1_Nm", "tau2_Nm"]) {
-        let index = table.header.iter().position(|present| present == column).expect("a column");
+        let index = table.index(column);
         table.rows.iter_mut().for_each(|row| row[index] *= factor);
     }
-    let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-    let lines: Vec<String> = table.rows.iter().map(line).collect();
-    folder.write(name, &format!("{}\n{}\n", table.header.join(","), lines.join("\n")))
+    folder.write(name, &table.text())
 }
 
 #[test]

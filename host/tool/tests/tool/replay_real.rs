@@ -9,17 +9,10 @@ use scarab_base::stats::rms;
 
 use crate::command::{Folder, Table, fit, reasons, scarab};
 use scarab::real::{sin_cos, sqrt};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 fn recordings() -> Option<PathBuf> {
-    let folder = std::env::var_os("SCARAB_RECORDINGS").map(PathBuf::from);
-    if folder.is_none() {
-        // Bypasses the test harness, which suppresses the output of passing tests.
-        let notice = "SKIPPED replay of recordings of real machines: SCARAB_RECORDINGS is not set";
-        writeln!(std::io::stderr(), "{notice}").expect("standard error");
-    }
-    folder
+    crate::command::recordings("replay of recordings of real machines")
 }
 
 /// Runs `replay`; `@name` stands for a recording. Returns the report and the torque table.

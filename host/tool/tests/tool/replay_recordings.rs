@@ -9,18 +9,13 @@ use crate::command::{Folder, MUJOCO, Table, base, scarab};
 /// The three periods of the MuJoCo recording, a file each, with an offset added to the knee's torque, N m.
 fn periods(folder: &Folder, offset_nm: [f64; 3]) -> Vec<PathBuf> {
     let table = Table::read(MUJOCO);
-    let [time, torque] =
-        ["t_s", "tau2_Nm"].map(|name| table.header.iter().position(|own| own == name).expect("a column"));
+    let [time, torque] = ["t_s", "tau2_Nm"].map(|name| table.index(name));
     let part = |(number, offset): (usize, &f64)| {
         let from = 10.0 * number as f64;
-        let rows = table.rows.iter().filter(|row| row[time] >= from && row[time] < from + 10.0);
-        let line = |row: &Vec<f64>| {
-            let mut row = row.clone();
-            row[torque] += offset;
-            row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
-        };
-        let lines: Vec<String> = rows.map(line).collect();
-        folder.write(&format!("{number}.csv"), &format!("{}\n{}\n", table.header.join(","), lines.join("\n")))
+        let mut part = Table { header: table.header.clone(), rows: table.rows.clone() };
+        part.rows.retain(|row| row[time] >= from && row[time] < from + 10.0);
+        part.rows.iter_mut().for_each(|row| row[torque] += offset);
+        folder.write(&format!("{number}.csv"), &part.text())
     };
     offset_nm.iter().enumerate().map(part).collect()
 }
@@ -64,11 +59,10 @@ fn one_recording_reports_that_sigma_lacks_scatter_between_recordings() {
 #[test]
 fn a_warning_about_both_parts_of_a_file_is_printed_once() {
     let folder = Folder::new();
-    let table = Table::read(MUJOCO);
-    let sparse = table.rows.iter().step_by(table.rows.len() / 750);
-    let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-    let lines: Vec<String> = std::iter::once(table.header.join(",")).chain(sparse.map(line)).collect();
-    let file = folder.write("sparse.csv", &(lines.join("\n") + "\n"));
+    let mut table = Table::read(MUJOCO);
+    let step = table.rows.len() / 750;
+    table.rows = table.rows.into_iter().step_by(step).collect();
+    let file = folder.write("sparse.csv", &table.text());
     let errors = scarab("replay --leg mujoco-leg --split 0.67", &[&file]).errors;
     assert_eq!(errors.matches("is too large for a recording").count(), 1, "{errors}");
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::command::{Folder, MUJOCO, Run, scarab};
+use crate::command::{Folder, MUJOCO, Run, Table, scarab};
 use scraper::{Html, Selector};
 
 const LEG: &str = include_str!("../../../legs/x2-wearer-75kg.toml");
@@ -156,17 +156,12 @@ fn the_name_of_a_leg_is_escaped() {
 fn a_refused_run_is_marked_first_and_gives_every_reason() {
     let folder = Folder::new();
     // Recording with another joint's torque, which no model explains.
-    let recording = fs::read_to_string(MUJOCO).expect("a recording");
-    let mut lines = recording.lines();
-    let header = lines.next().expect("a header");
-    let torque = header.split(',').position(|name| name == "tau1_Nm").expect("a torque");
-    let mut wrong = format!("{header}\n");
-    for (number, line) in lines.enumerate() {
-        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
-        fields[torque] = format!("{}", (number % 480) as f64 / 6.0 - 40.0);
-        wrong += &(fields.join(",") + "\n");
+    let mut table = Table::read(MUJOCO);
+    let torque = table.index("tau1_Nm");
+    for (number, row) in table.rows.iter_mut().enumerate() {
+        row[torque] = (number % 480) as f64 / 6.0 - 40.0;
     }
-    let file = folder.write("wrong.csv", &wrong);
+    let file = folder.write("wrong.csv", &table.text());
     let (page, json) = (folder.path("report.html"), folder.path("run.json"));
     let arguments = format!("replay {} --leg mujoco-leg --json {} --report", file.display(), json.display());
     scarab(&arguments, &[&page]).ends_with(3);

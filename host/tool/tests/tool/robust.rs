@@ -4,11 +4,10 @@ use scarab_base::random::Random;
 use scarab_base::stats::rms;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::command::{Folder, MUJOCO, Table, base, reasons, scarab};
+use crate::command::{Folder, MUJOCO, Table, base, reasons, recordings, scarab};
 use scarab::real::{exp, sqrt};
 use serde_json::Value;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Errors of the base parameters of all runs over their Cramer-Rao bounds, root mean square;
 /// without static friction.
@@ -108,9 +107,7 @@ fn corrupted(recording: &Path, pushes_per_minute: f64) -> String {
             }
         }
     }
-    let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-    let rows: Vec<String> = table.rows.iter().map(line).collect();
-    format!("{}\n{}\n", table.header.join(","), rows.join("\n"))
+    table.text()
 }
 
 /// Root mean square distance of least squares on the corrupted recording from the robust result on
@@ -157,12 +154,7 @@ fn a_corrupted_recording_gives_the_parameters_of_the_clean_one() {
 
 #[test]
 fn outliers_are_replaced_at_the_rate_of_the_recording_before_resampling() {
-    let Some(recordings) = std::env::var_os("SCARAB_RECORDINGS").map(PathBuf::from) else {
-        // Bypasses the test harness, which suppresses the output of passing tests.
-        let notice = "SKIPPED the corrupted pendulum: SCARAB_RECORDINGS is not set";
-        writeln!(std::io::stderr(), "{notice}").expect("standard error");
-        return;
-    };
+    let Some(recordings) = recordings("the corrupted pendulum") else { return };
     // The stamps are jittered, so the recording is interpolated. No pushes: 6 s are too short to find them.
     let [robust, plain] =
         distances(&recordings.join("sp/ddp.csv"), "--leg sp --bandwidth 5", 0.0, |report| {

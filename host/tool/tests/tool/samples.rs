@@ -11,13 +11,7 @@ use std::path::{Path, PathBuf};
 fn changed(folder: &Folder, change: impl Fn(&mut Table)) -> PathBuf {
     let mut table = Table::read(MUJOCO);
     change(&mut table);
-    let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-    let rows: Vec<String> = table.rows.iter().map(line).collect();
-    folder.write("walk.csv", &format!("{}\n{}\n", table.header.join(","), rows.join("\n")))
-}
-
-fn index(table: &Table, name: &str) -> usize {
-    table.header.iter().position(|present| present == name).expect("a column")
+    folder.write("walk.csv", &table.text())
 }
 
 /// Report and output of a replay of the MuJoCo leg.
@@ -50,7 +44,7 @@ fn distance(report: &Value, other: &Value) -> f64 {
 }
 
 fn clip(table: &mut Table, name: &str, share: f64) {
-    let column = index(table, name);
+    let column = table.index(name);
     let limit = share * table.rows.iter().fold(0.0, |top: f64, row| top.max(row[column].abs()));
     table.rows.iter_mut().for_each(|row| row[column] = row[column].clamp(-limit, limit));
 }
@@ -88,6 +82,9 @@ fn a_recording_given_twice_is_bad_input_under_any_name() {
     assert!(message.contains("which is identified from: it cannot be held out"), "{message}");
     let message = refused(&[&file, &copy]);
     assert!(message.contains("holds the same samples as"), "{message}");
+    let other = changed(&folder, |table| clip(table, "tau1_Nm", 0.93));
+    let message = refused(&[&other, Path::new("--validate"), &file, Path::new("--validate"), &copy]);
+    assert!(message.contains(&format!("--validate {}: holds the same samples", copy.display())), "{message}");
 }
 
 #[test]
@@ -118,7 +115,7 @@ fn push_for(repetitions: &[usize]) {
             // Both joints move then; friction at rest would hide a part of the push.
             let first = 12.2;
             for name in ["tau1_Nm", "tau2_Nm"] {
-                let column = index(table, name);
+                let column = table.index(name);
                 let top = table.rows.iter().fold(0.0, |top: f64, row| top.max(row[column].abs()));
                 for row in &mut table.rows {
                     let phase = (row[0] - first) / 0.6;
@@ -140,7 +137,7 @@ fn push_for(repetitions: &[usize]) {
 fn wrong_time_stamps_are_refused_where_inertias_are_wrong() {
     let folder = Folder::new();
     let file = changed(&folder, |table| {
-        let column = index(table, "t_s");
+        let column = table.index("t_s");
         // Late by up to 1.9 ms, irregularly: rows are stamped when the recorder has time.
         let mut random = Random::new("stamps", 5);
         for row in &mut table.rows {

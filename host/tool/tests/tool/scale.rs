@@ -46,11 +46,8 @@ fn a_known_mass_makes_the_report_absolute_and_widens_sigma() {
 #[test]
 fn implausible_masses_are_refused_with_option_and_reason() {
     for (arguments, reason) in [
-        ("identify --payload 0@knee:0.2", "above 0 and at most 50"),
         ("identify --payload 5@ankle:0.2", "--payload: `ankle` is not a joint of `x2-wearer-75kg`"),
-        ("identify --payload 5@hip:0.5", "--payload: x 0.5 m, y 0 m lies outside the link of `hip`"),
         ("identify --load 5@hip:0.5", "--load: x 0.5 m, y 0 m lies outside the link of `hip`"),
-        ("identify --load 5@", "is not KG@JOINT:X_M"),
     ] {
         let refusal = scarab(arguments, &[]).refusal();
         assert!(refusal.contains(reason), "{arguments}: {refusal}");

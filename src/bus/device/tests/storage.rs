@@ -5,15 +5,20 @@ use super::*;
 #[test]
 fn stored_parameters_are_recalled_by_a_reset_and_a_start() {
     let mut bench = Bench::new();
+    bench.write(1, 0x1017, 0, 50, 2);
     bench.write(1, 0x6065, 0, 12_345, 4);
     bench.write(2, 0x2002, 0, 500, 2);
     bench.save(1);
     let (what, stored) = bench.store(true).expect("a store request");
     assert_eq!((what, bench.store(true)), (StoreCommand::All, None));
     assert_eq!(bench.device.bit_rate(), Some(500));
-    bench.write(1, 0x6065, 0, 1, 4);
-    bench.send(0, &[129, 0]);
-    assert_eq!(bench.read(1, 0x6065), 12_345);
+    // A communication reset leaves the drive objects unchanged.
+    for (command, expected) in [(130, (50, 777)), (129, (50, 12_345))] {
+        bench.write(1, 0x1017, 0, 90, 2);
+        bench.write(1, 0x6065, 0, 777, 4);
+        bench.send(0, &[command, 0]);
+        assert_eq!((bench.read(1, 0x1017), bench.read(1, 0x6065)), expected, "{command}");
+    }
     // Another start, with the stored bytes.
     let mut other = Bench::new();
     for (joint, stored) in stored.iter().enumerate() {
@@ -134,21 +139,6 @@ fn two_nodes_never_share_a_node_id() {
             other.device.recall(joint, [&hip, &knee][joint].bytes());
         }
         assert_eq!(other.device.nodes().each_ref().map(|node| node.id().number()), [2, 1]);
-    }
-}
-
-#[test]
-fn a_communication_reset_leaves_the_drive_objects_unchanged() {
-    let mut bench = Bench::new();
-    bench.write(1, 0x1017, 0, 50, 2);
-    bench.write(1, 0x6065, 0, 12_345, 4);
-    bench.save(1);
-    assert!(bench.store(true).is_some());
-    for (command, expected) in [(130, (50, 777)), (129, (50, 12_345))] {
-        bench.write(1, 0x1017, 0, 90, 2);
-        bench.write(1, 0x6065, 0, 777, 4);
-        bench.send(0, &[command, 1]);
-        assert_eq!((bench.read(1, 0x1017), bench.read(1, 0x6065)), expected, "{command}");
     }
 }
 

@@ -144,25 +144,14 @@ impl<T: Real> Thresholds<T> {
 mod tests {
     use super::*;
     use crate::ident::record::factor::Factor;
-    use crate::ident::record::motion_record::Outliers;
-    use crate::ident::record::motion_record::Selection;
     use crate::ident::record::motion_record::TorqueSize;
 
     #[test]
     fn a_prediction_is_uncertain_by_its_share_of_the_torque() {
         let mut factor = Factor::<f64, 2>::new();
         factor.insert(&[3.0, 0.0], 0.0);
-        let record = Record::<f64, 1, 2> {
-            factors: [factor],
-            torque: [TorqueSize { mean_absolute: 3.0, root_mean_square: 4.0, speed: 1.0 }],
-            rows: [1],
-            rejected: 0,
-            row_information: 1.0,
-            noise: [0.0],
-            outliers: Outliers::none(),
-            stribeck: [None],
-            selection: Selection::all(),
-        };
+        let torque = [TorqueSize { mean_absolute: 3.0, root_mean_square: 4.0, speed: 1.0 }];
+        let record = Record::<f64, 1, 2>::plain([factor], torque, 1);
         let mut estimate = Estimate::<f64, 2>::nothing();
         (estimate.covariance[0][0], estimate.determined) = (0.25, [true; 2]);
         let mut shares = [0.0; 1];
@@ -179,16 +168,10 @@ mod tests {
 
     #[test]
     fn the_error_allowed_is_that_of_noise_and_the_harmless_share_together() {
+        let torque = [TorqueSize { mean_absolute: 5.0, root_mean_square: 6.0, speed: 1.0 }];
         let record = |row_information| Record::<f64, 1, 2> {
-            factors: [Factor::new()],
-            torque: [TorqueSize { mean_absolute: 5.0, root_mean_square: 6.0, speed: 1.0 }],
-            rows: [400],
-            rejected: 0,
             row_information,
-            noise: [0.0],
-            outliers: Outliers::none(),
-            stribeck: [None],
-            selection: Selection::all(),
+            ..Record::plain([Factor::new()], torque, 400)
         };
         // 400 rows worth 0.25 independent ones each: 100 degrees of freedom;
         // chi-square's 0.999 quantile is 149.449.

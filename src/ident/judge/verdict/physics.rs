@@ -180,8 +180,6 @@ mod tests {
     use super::super::Evidence;
     use super::*;
     use crate::ident::record::factor::Factor;
-    use crate::ident::record::motion_record::Outliers;
-    use crate::ident::record::motion_record::Selection;
     use crate::ident::record::motion_record::TorqueSize;
     use crate::model::{BaseParameters, Chain, DenavitHartenberg};
 
@@ -196,17 +194,9 @@ mod tests {
         let base = BaseParameters::analyse(&chain, &gravity, &[[true; PARAMETERS_PER_JOINT]; 2]);
         let mut model = RowModel::<f32, 2, BASE>::new(chain, gravity, base.expect("13 of them"));
         model.drive_choice[0].meaning = meaning;
-        let record = Record::<f32, 2, BASE> {
-            factors: [Factor::new(), Factor::new()],
-            torque: [TorqueSize { mean_absolute: 10.0, root_mean_square: 10.0, speed: 1.0 }; 2],
-            rows: [100; 2],
-            rejected: 0,
-            row_information: 1.0,
-            noise: [0.1; 2],
-            outliers: Outliers::none(),
-            stribeck: [None; 2],
-            selection: Selection::all(),
-        };
+        let torque = [TorqueSize { mean_absolute: 10.0, root_mean_square: 10.0, speed: 1.0 }; 2];
+        let plain = Record::plain([Factor::new(), Factor::new()], torque, 100);
+        let record = Record::<f32, 2, BASE> { noise: [0.1; 2], ..plain };
         let mut estimate = Estimate::<f32, BASE>::nothing();
         estimate.determined = [true; BASE];
         (0..BASE).for_each(|base| estimate.covariance[base][base] = 0.01);

@@ -1,8 +1,6 @@
 //! The quick update on rows made from a known change: noise of known size, gait-like postures, no filter.
 
 use super::*;
-use crate::ident::record::motion_record::Outliers;
-use crate::ident::record::motion_record::Selection;
 use crate::ident::record::motion_record::TorqueSize;
 use crate::ident::solve::estimate::{Plan, Problem};
 use crate::model::planar::BASE;
@@ -58,17 +56,7 @@ fn record<T: Real>(
         root_mean_square: T::from_double(12.0),
         speed: T::from_double(speed),
     };
-    Record {
-        factors,
-        torque: [size; 2],
-        rows: [states; 2],
-        rejected: 0,
-        row_information: T::one(),
-        noise: [T::from_double(SIGMA); 2],
-        outliers: Outliers::none(),
-        stribeck: [None; 2],
-        selection: Selection::all(),
-    }
+    Record { noise: [T::from_double(SIGMA); 2], ..Record::plain(factors, [size; 2], states) }
 }
 
 const EXCITING: [f64; 3] = [3.0, 10.0, 0.0];

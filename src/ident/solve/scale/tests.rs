@@ -1,6 +1,4 @@
 use super::*;
-use crate::ident::record::motion_record::Outliers;
-use crate::ident::record::motion_record::Selection;
 use crate::ident::record::motion_record::TorqueSize;
 use crate::ident::record::row_model::RowModel;
 use crate::ident::signal::smoothing::Smoothed;
@@ -72,21 +70,7 @@ fn record<T: Real>(
         let size = T::from_double(real::sqrt(square));
         TorqueSize { mean_absolute: size, root_mean_square: size, speed: T::one() }
     });
-    record_of(factors, torque)
-}
-
-fn record_of<T: Real>(factors: [Factor<T, BASE>; 2], torque: [TorqueSize<T>; 2]) -> Record<T, 2, BASE> {
-    Record {
-        factors,
-        torque,
-        rows: [500; 2],
-        rejected: 0,
-        row_information: T::one(),
-        noise: [T::zero(); 2],
-        outliers: Outliers::none(),
-        stribeck: [None; 2],
-        selection: Selection::all(),
-    }
+    Record::plain(factors, torque, 500)
 }
 
 const RATIOS: [f64; 2] = [1.0 / 1.2, 1.1];

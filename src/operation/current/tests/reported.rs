@@ -2,13 +2,13 @@
 
 extern crate std;
 
-use super::super::super::testing::{NOTHING, device, ends, on_a_bus};
+use super::super::super::testing::{NOTHING, RAMPS, VOLT_PER_CODE, device, ends, on_a_bus};
 use super::super::super::{BusEnds, BusRound, Handover, ServoLevel, StoreJob};
 use super::*;
 use crate::bus::device::Device;
 use crate::hal::{Contacts, Frame, JointSample};
 use crate::leg::testing::{LEG, configuration};
-use crate::leg::{Control, DeratingRamps, Fault, FaultCode, Following};
+use crate::leg::{Control, Fault, FaultCode, Following};
 
 const AXIS_FAULTS: [AxisFault; 10] = [
     AxisFault::CurrentSense,
@@ -70,16 +70,14 @@ impl Bus {
         let (mut hardware, host, bus) = on_a_bus();
         let configuration = configuration();
         let control = Control::new(&configuration).expect("a leg");
-        let ramps = DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
-        let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
-        let level = ServoLevel::new(&control, ramps, volt_per_code, Some(Following::new(&configuration)));
+        let level = ServoLevel::new(&control, RAMPS, VOLT_PER_CODE, Some(Following::new(&configuration)));
         let mut ends = ends();
         ends.servo.host = Some(host);
         hardware.contacts = Contacts { enabling: true, start: false };
         let signals = Signals::new();
         signals.set_permits(true);
         signals.set_bridge_c(0, 30.0);
-        signals.statistics.see_bus((48.0 / volt_per_code.0) as u16);
+        signals.statistics.see_bus((48.0 / VOLT_PER_CODE.0) as u16);
         let (device, storage) = (device(), Handover::new(StoreJob::NOTHING));
         let mut bench =
             Self { control, level, device, round: BusRound::new(), hardware, signals, ends, bus, storage };

@@ -1,8 +1,6 @@
-//! Requests for the servo's tick, and the axis state as the levels above see it.
+//! Requests for the servo's tick, samples of running axes, and outcomes that wait.
 
 use super::*;
-use crate::hal::DriveCommand;
-use crate::units::Ampere;
 
 /// Ticks both axes until the servo was requested `requests` times; if `answers`, it ticks after each request.
 fn request(signals: &Signals<2>, requests: u32, answers: bool) -> u32 {
@@ -41,22 +39,6 @@ fn a_servo_that_never_answers_is_counted_and_inhibits() {
     request(&signals, 4, false);
     let given_up = InhibitReason::ServoTicks.bit();
     assert_eq!((signals.statistics.servo_missed.get(), signals.inhibit.causes()), (3, given_up));
-}
-
-#[test]
-fn the_state_of_each_axis_can_be_replaced() {
-    let mut bench = Bench::new(&CONFIGURATION);
-    assert!(bench.loops.axis_state_mut(2).is_none());
-    let is_running =
-        |bench: &Bench| [0, 1].map(|axis| bench.loops.axis_state(axis).is_some_and(AxisState::is_running));
-    *bench.loops.axis_state_mut(1).expect("two axes") = AxisState::OFF;
-    assert_eq!(is_running(&bench), [true, false]);
-    // A target is followed only where all axes run, so no tick enables a bridge.
-    bench.signals.set_targets(&DriveCommand { enabled: true, currents: [Ampere(1.0); 2] });
-    bench.run(12);
-    bench.signals.disable();
-    *bench.loops.axis_state_mut(0).expect("two axes") = AxisState::OFF;
-    assert_eq!(is_running(&bench), [false; 2]);
 }
 
 #[test]

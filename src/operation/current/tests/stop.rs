@@ -139,23 +139,14 @@ impl Scene {
 }
 
 #[test]
-fn a_stop_during_a_tick_of_running_axes_leaves_no_bridge_on() {
-    for axis in 0..2 {
-        Scene::following().stop_everywhere("following", axis);
-    }
-}
-
-#[test]
-fn a_stop_during_a_tick_of_a_calibration_leaves_no_bridge_on() {
-    for axis in 0..2 {
-        Scene::calibrating(axis).stop_everywhere("calibrating", axis);
-    }
-}
-
-#[test]
-fn a_stop_during_a_tick_of_braking_axes_leaves_no_bridge_on() {
-    for axis in 0..2 {
-        Scene::braking().stop_everywhere("braking", axis);
+fn a_stop_during_a_tick_leaves_no_bridge_on() {
+    let scenes: [(&str, fn(usize) -> Scene); 3] = [
+        ("following", |_| Scene::following()),
+        ("calibrating", Scene::calibrating),
+        ("braking", |_| Scene::braking()),
+    ];
+    for (name, scene) in scenes {
+        (0..2).for_each(|axis| scene(axis).stop_everywhere(name, axis));
     }
 }
 

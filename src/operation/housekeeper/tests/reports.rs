@@ -3,19 +3,14 @@
 use super::super::super::{ServoLevel, testing};
 use super::*;
 use crate::leg::testing::{LEG, configuration};
-use crate::leg::{Control, DeratingRamps, Fault, FaultCode};
-use crate::motor::SenseScale;
+use crate::leg::{Control, Fault, FaultCode};
 use crate::servo::SERVO_RATE_HZ;
-use crate::units::Volt;
-
-const RAMPS: DeratingRamps =
-    DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
 
 /// The fault of the servo's tick after a tenth of a second of housekeeping.
 fn fault_of(bench: &mut Bench) -> Option<Fault> {
     let mut control = Control::new(&configuration()).expect("a leg");
-    let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
-    let mut level = ServoLevel::new(&control, RAMPS, volt_per_code, None);
+    let volt_per_code = testing::VOLT_PER_CODE;
+    let mut level = ServoLevel::new(&control, testing::RAMPS, volt_per_code, None);
     let mut ends = testing::ends();
     bench.signals.statistics.see_bus((48.0 / volt_per_code.0) as u16);
     bench.signals.begin_servo();

@@ -2,20 +2,17 @@
 
 use core::num::NonZeroU32;
 
+use super::super::super::testing::{RAMPS, VOLT_PER_CODE};
 use super::super::super::{CurrentLoops, ServoLevel, Tick};
 use super::*;
 use crate::hal::CURRENT_RATE_HZ;
+use crate::leg::Control;
 use crate::leg::testing::{LEG, configuration};
-use crate::leg::{Control, DeratingRamps};
-use crate::motor::{AbsoluteAngle, SenseScale};
-use crate::units::Volt;
+use crate::motor::AbsoluteAngle;
 
 const PERIOD: NonZeroU32 = NonZeroU32::new(7000).expect("more than none");
 /// Motor angle of one joint turn.
 const RATIO_RAD: f64 = 50.0 * core::f64::consts::TAU;
-const VOLT_PER_CODE: Volt = SenseScale::ODRIVE_3_6.volt_per_code;
-const RAMPS: DeratingRamps =
-    DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
 
 /// Levels 0, 1 and 6 of a board with two motors, from the power-up on.
 pub(super) struct Machine {

@@ -5,19 +5,6 @@ use crate::safety::Bridges;
 use crate::units::Ohm;
 
 #[test]
-fn a_fault_from_another_level_reaches_the_leg_with_its_joint() {
-    for joint in 0..2 {
-        for seen in BoardFault::ALL {
-            let mut bench = Bench::enabled();
-            bench.signals.report(seen, joint);
-            bench.tick();
-            assert_eq!(bench.fault(), Some(Fault { code: seen.code(), joint: joint as u8 }));
-            assert_eq!(bench.signals.permission(), Permission::Damp);
-        }
-    }
-}
-
-#[test]
 fn changed_gains_or_limits_are_a_fault_within_64_ms() {
     let mut bench = Bench::enabled();
     bench.run(600);

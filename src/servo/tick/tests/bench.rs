@@ -7,29 +7,18 @@ use super::*;
 pub(super) const NOWHERE: [f32; 3] = [0.0; 3];
 pub(super) const BANDWIDTH: Hertz = Hertz(6.0);
 
+const JOINT: JointConfiguration = JointConfiguration {
+    scale: HIP,
+    low: Radian(-1.5),
+    high: Radian(1.5),
+    speed: RadianPerSecond(4.5),
+    torque: NewtonMetre(100.0),
+    current: Ampere(80.0),
+    inertia: KilogramMetreSquared(2.53),
+    bandwidth: BANDWIDTH,
+};
 /// Two independent joints, both with the knee's inertia; the second turns against its drive.
-pub(super) const JOINTS: [JointConfiguration; 2] = [
-    JointConfiguration {
-        scale: HIP,
-        low: Radian(-1.5),
-        high: Radian(1.5),
-        speed: RadianPerSecond(4.5),
-        torque: NewtonMetre(100.0),
-        current: Ampere(80.0),
-        inertia: KilogramMetreSquared(2.53),
-        bandwidth: BANDWIDTH,
-    },
-    JointConfiguration {
-        scale: KNEE,
-        low: Radian(-1.5),
-        high: Radian(1.5),
-        speed: RadianPerSecond(4.5),
-        torque: NewtonMetre(100.0),
-        current: Ampere(80.0),
-        inertia: KilogramMetreSquared(2.53),
-        bandwidth: BANDWIDTH,
-    },
-];
+pub(super) const JOINTS: [JointConfiguration; 2] = [JOINT, JointConfiguration { scale: KNEE, ..JOINT }];
 
 /// One joint of the physical world, in its own (anatomical) angle and torque.
 #[derive(Clone, Copy)]

@@ -135,20 +135,6 @@ mod tests {
     }
 
     #[test]
-    fn the_same_samples_under_another_name_are_refused() {
-        let (one, copy) = (recording("a.csv", &[1.0, 2.0]), recording("./a.csv", &[1.0, 2.0]));
-        let other = recording("b.csv", &[1.0, 3.0]);
-        assert!(refuse_copies(&[one.clone(), other.clone()], &[], "--validate").is_ok());
-        let refused = |training: &[&Recording], held_out: &[&Recording]| {
-            let all = |list: &[&Recording]| list.iter().map(|&one| one.clone()).collect::<Vec<_>>();
-            refuse_copies(&all(training), &all(held_out), "--validate").expect_err("copies").to_string()
-        };
-        assert!(refused(&[&one, &other, &copy], &[]).starts_with("./a.csv: holds the same samples as a.csv"));
-        assert!(refused(&[&one], &[&other, &copy]).contains("which is identified from"));
-        assert!(refused(&[&other], &[&one, &copy]).starts_with("--validate ./a.csv: holds the same samples"));
-    }
-
-    #[test]
     fn points_beside_an_excluded_stretch_are_excluded_as_their_interpolation_sees_it() {
         let recording = recording("a.csv", &[0.0; 100]);
         let screening =
