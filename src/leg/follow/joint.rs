@@ -153,7 +153,7 @@ pub struct Follower {
     halted: bool,
     /// What the previous tick added to the trajectory; nothing if it was not held.
     added: Added,
-    /// The same at the last change of mode or halt, and the ticks for which it still fades.
+    /// Copy of it at the last change of mode or halt, and the ticks for which that still fades.
     before: Added,
     easing: u8,
     /// Whether the trajectory was held in the previous tick.

@@ -140,13 +140,14 @@ impl Scene {
 
 #[test]
 fn a_stop_during_a_tick_leaves_no_bridge_on() {
-    let scenes: [(&str, fn(usize) -> Scene); 3] = [
-        ("following", |_| Scene::following()),
-        ("calibrating", Scene::calibrating),
-        ("braking", |_| Scene::braking()),
-    ];
-    for (name, scene) in scenes {
-        (0..2).for_each(|axis| scene(axis).stop_everywhere(name, axis));
+    for axis in 0..2 {
+        for (name, scene) in [
+            ("following", Scene::following()),
+            ("calibrating", Scene::calibrating(axis)),
+            ("braking", Scene::braking()),
+        ] {
+            scene.stop_everywhere(name, axis);
+        }
     }
 }
 
