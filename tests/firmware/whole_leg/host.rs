@@ -449,7 +449,8 @@ fn the_torque_of_a_mode_or_a_halt_does_not_step() {
 #[test]
 fn a_load_that_an_offset_carries_is_carried_on_by_a_torque_mode() {
     for settles_for in [0, 4, 100] {
-        let mut hosted = Hosted::enabled_at([0.5, 0.9]);
+        let mut hosted = Hosted::enabled_at([0.5, 1.5]);
+        hosted.commands[1].torque_slope_nm_per_s = 10.0;
         hosted.run(SECOND);
         let (position, weight) = (Radian(hosted.position(1)), hosted.status[1].torque_demand);
         let (velocity_offset, torque_offset) = (RadianPerSecond::ZERO, weight);
