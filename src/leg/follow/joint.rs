@@ -580,11 +580,8 @@ impl Follower {
         let velocity = self.course.velocity();
         let own = clamp(measured.velocity.0, min(velocity, 0.0), max(velocity, 0.0));
         self.course = Course::moving(self.course.position(), own);
-        let (rest, fading) = (velocity - own, self.added.unreached);
-        // What still fades does not add up with the next.
-        let larger = if abs(fading) > abs(rest) { fading } else { rest };
         if self.held {
-            self.added.unreached = if fading * rest > 0.0 { larger } else { fading + rest };
+            self.added.unreached += velocity - own;
         }
         self.ease(bounds);
     }

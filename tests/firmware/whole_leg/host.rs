@@ -413,6 +413,11 @@ fn the_torque_of_a_mode_or_a_halt_does_not_step() {
     starting.commands[1].acceleration = RadianPerSecondSquared(100.0);
     starting.commands[1].target = Target::ProfileVelocity(RadianPerSecond(-0.1));
     starting.run(10);
+    let mut restarted = starting.clone();
+    for (halt, ticks) in [(true, 5), (false, 6)] {
+        restarted.commands[1].halt = halt;
+        restarted.run(ticks);
+    }
     let mut loaded = Hosted::enabled_at([0.5, 0.9]);
     let (velocity_offset, torque_offset) = (RadianPerSecond::ZERO, NewtonMetre(-15.0));
     let position = Radian(loaded.position(1));
@@ -432,6 +437,7 @@ fn the_torque_of_a_mode_or_a_halt_does_not_step() {
             "stop of a joint that starts",
             largest_step(starting.clone(), |command| command.target = Target::Hold),
         ),
+        ("stop while a halt fades", largest_step(restarted, |command| command.target = Target::Hold)),
         ("halt of a joint that starts", largest_step(starting, |command| command.halt = true)),
         ("halt of a loaded joint", largest_step(loaded.clone(), |command| command.halt = true)),
         ("end of its mode", largest_step(loaded, |command| command.target = Target::Hold)),

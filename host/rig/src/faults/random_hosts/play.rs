@@ -14,6 +14,8 @@ const REASONS: i32 = 0x7E_0000;
 const TEST_SPEED: i32 = 100_000;
 /// Limit beyond those of every leg, micro-radian, also per second.
 const BEYOND_LIMITS: i32 = 20_000_000;
+/// Attempts to enable a leg that states no reason.
+const ATTEMPTS: u32 = 2;
 /// Time for which a new value explains a step of the torque, ticks: a cyclic target that has jumped is
 /// interpolated over its period, and the joint then follows.
 const AFTER_VALUE: u64 = 500 * MILLISECOND as u64;
@@ -335,6 +337,8 @@ impl<L: HostedLeg> Play<L> {
         }
         for (index, bytes, value) in [(0x60B1, 4, 0), (0x60B2, 2, 0), (0x607A, 4, position), (0x60FF, 4, 0)] {
             if is_held {
+                // Between demanded and present position are the encoder's steps.
+                self.expect(joint, index);
                 self.request(joint, (index, 0, bytes), value)?;
             } else {
                 self.write(joint, (index, 0, bytes), value)?;
@@ -438,7 +442,7 @@ impl<L: HostedLeg> Play<L> {
 
     /// A host moves a joint and is lost; the leg stays enabled and comes to rest.
     fn lose_host(&mut self, joint: usize, speed: i32, by_position: bool) -> Result<(), String> {
-        // The leg is silent while it writes its flash memory, and misses nobody.
+        // The leg is silent while it writes its flash memory, and misses no host.
         self.run(self.writes_flash_until.saturating_sub(self.ticks) as u32)?;
         self.nmt(1, 0)?;
         for node in 0..JOINTS {
@@ -574,32 +578,43 @@ impl<L: HostedLeg> Play<L> {
         Ok(())
     }
 
+    /// The operator opens the enabling switch and closes it again.
+    fn release_and_hold(&mut self) -> Result<(), String> {
+        self.hand(false, false);
+        self.run(SERVO_RATE_HZ / 20)?;
+        self.hand(true, false);
+        Ok(())
+    }
+
     /// A well-behaved host enables the leg, or hears why it cannot.
     pub(super) fn again(&mut self) -> Result<(), String> {
         self.unheard = None;
         self.plugged = true;
         self.leg.plug(true);
         // A contact that is closed from the start on enables nothing.
-        self.hand(false, false);
-        self.run(SERVO_RATE_HZ / 20)?;
-        self.hand(true, false);
+        self.release_and_hold()?;
         self.send(0x7E5, &[4, 0, 0, 0, 0, 0, 0, 0]);
         self.nmt(129, 0)?;
         self.run(SERVO_RATE_HZ * 3 / 5)?;
         self.check_session_settings()?;
         self.send(0, &[1, 0]);
         self.run(40)?;
-        for word in [0, 0x80, 0, 6, 7, 0xF] {
-            self.word(JOINTS, word)?;
-            // A reset takes 24 ms, and a brake its time.
-            self.run(SERVO_RATE_HZ / 20)?;
-        }
-        if self.is_enabled {
-            return self.follows();
-        }
-        let inputs = [self.read(0, 0x60FD, 0)?, self.read(1, 0x60FD, 0)?];
-        if inputs.iter().flatten().any(|inputs| inputs & REASONS != 0) {
-            return Ok(());
+        let mut inputs = [None; JOINTS];
+        for _ in 0..ATTEMPTS {
+            for word in [0, 0x80, 0, 6, 7, 0xF] {
+                self.word(JOINTS, word)?;
+                // A reset takes 24 ms, and a brake its time.
+                self.run(SERVO_RATE_HZ / 20)?;
+            }
+            if self.is_enabled {
+                return self.follows();
+            }
+            inputs = [self.read(0, 0x60FD, 0)?, self.read(1, 0x60FD, 0)?];
+            if inputs.iter().flatten().any(|inputs| inputs & REASONS != 0) {
+                return Ok(());
+            }
+            // After a reset the switch must have been open.
+            self.release_and_hold()?;
         }
         let words = [self.read(0, 0x6041, 0)?, self.read(1, 0x6041, 0)?];
         Err(format!("again: {:?}, 60FD {inputs:X?}, 6041 {words:X?}, heard {:X?}", self.fault, self.heard))

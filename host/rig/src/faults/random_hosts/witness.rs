@@ -164,8 +164,9 @@ pub(super) struct Play<L> {
     pub stops: [u64; JOINTS],
     /// Tick from which a joint must be at rest but for [`COMES_TO_REST`], and its position then.
     pose: [(u64, f64); JOINTS],
-    /// Tick before the leg was enabled.
+    /// Tick before the leg was enabled, and how far each joint was beyond its range then, rad.
     enabled_at: u64,
+    was_out: [f64; JOINTS],
     /// Tick from which a joint is held, and its least commanded speed since, rad/s: it only slows down.
     slows: [(u64, f32); JOINTS],
     /// Code that must be heard from each node, and the tick in which the leg had it.
@@ -203,6 +204,7 @@ impl<L: HostedLeg> Play<L> {
             stops: [0; JOINTS],
             pose: [(0, 0.0); JOINTS],
             enabled_at: 0,
+            was_out: [0.0; JOINTS],
             slows: [(0, f32::INFINITY); JOINTS],
             unheard: None,
             heard: [(0, 0); JOINTS],
@@ -294,13 +296,14 @@ impl<L: HostedLeg> Play<L> {
             if now.abs() > L::OVERSHOOT * cap {
                 return Err(format!("cap: joint {joint} {now} of {cap} N m"));
             }
+            let out = (low - position).max(position - high);
             if !seen.is_enabled || !was_enabled {
-                (self.pose[joint].0, self.enabled_at) = (ticks, ticks);
+                (self.pose[joint].0, self.enabled_at, self.was_out[joint]) = (ticks, ticks, out);
                 continue;
             }
             let is_fresh = ticks < self.enabled_at + TAKES_OVER;
-            let out = (low - position).max(position - high);
-            if out > BEYOND {
+            // A joint that is enabled beyond its range returns, and goes no farther out.
+            if out > BEYOND.max(self.was_out[joint] + HELD) {
                 return Err(format!("range: joint {joint} at {position} rad"));
             }
             let returns = seen.returns[joint];
