@@ -156,6 +156,8 @@ pub struct Follower {
     /// Copy of it at the last change of mode or halt, and the ticks for which that still fades.
     before: Added,
     easing: u8,
+    /// Velocity of the trajectory at that change, rad/s. What it has regained since is not added again.
+    eased_at: f32,
     /// Whether the trajectory was held in the previous tick.
     held: bool,
     /// Whether the joint is held before a mode without position control begins.
@@ -260,6 +262,7 @@ impl Follower {
         added: Added::NONE,
         before: Added::NONE,
         easing: 0,
+        eased_at: 0.0,
         held: true,
         settles: false,
         stated: None,
@@ -537,10 +540,11 @@ impl Follower {
             self.easing -= 1;
             let share = f32::from(self.easing) / f32::from(EASE_TICKS);
             let part = |before: f32, now: f32| share * before + (1.0 - share) * now;
+            let (fading, regained) = (share * before.unreached, self.course().velocity() - self.eased_at);
             self.added = Added {
                 velocity: part(before.velocity, self.added.velocity),
                 torque: part(before.torque, self.added.torque),
-                unreached: share * before.unreached,
+                unreached: clamp(fading - regained, min(fading, 0.0), max(fading, 0.0)),
             };
         }
         if self.settles {
@@ -558,7 +562,7 @@ impl Follower {
         let (Added { velocity, torque, unreached }, [_, damping]) = (self.added, bounds.impedance);
         let limited = |speed: f32| clamp(speed, -bounds.torque / damping, bounds.torque / damping);
         self.before = Added { velocity: limited(velocity), torque, unreached: limited(unreached) };
-        self.easing = EASE_TICKS;
+        (self.easing, self.eased_at) = (EASE_TICKS, self.course().velocity());
     }
 
     /// Starts a new mode from the present position, velocity and torque.

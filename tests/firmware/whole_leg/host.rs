@@ -453,6 +453,28 @@ fn the_torque_of_a_mode_or_a_halt_does_not_step() {
 }
 
 #[test]
+fn modes_that_alternate_drive_a_joint_no_faster_than_one_of_them() {
+    let torque_offset = NewtonMetre::ZERO;
+    for (joint, speed, ticks_of_a_mode) in [(0, -0.1, 4), (1, -0.15, 1), (1, -0.15, 4)] {
+        let velocity = RadianPerSecond(speed);
+        let modes = [Target::CyclicVelocity { velocity, torque_offset }, Target::ProfileVelocity(velocity)];
+        let fastest = |modes: [Target; 2]| {
+            let mut hosted = Hosted::enabled_at([0.5, 0.9]);
+            hosted.commands[joint].acceleration = RadianPerSecondSquared(100.0);
+            let mut fastest = 0.0_f32;
+            for tick in 0..SECOND / 5 {
+                hosted.commands[joint].target = modes[(tick / ticks_of_a_mode % 2) as usize];
+                hosted.run(1);
+                fastest = fastest.max(hosted.status[joint].velocity.0.abs());
+            }
+            fastest
+        };
+        let (one, alternating) = (fastest([modes[0]; 2]), fastest(modes));
+        assert!(alternating < 1.2 * one, "joint {joint}: {alternating} instead of {one} rad/s");
+    }
+}
+
+#[test]
 fn a_load_that_an_offset_carries_is_carried_on_by_a_torque_mode() {
     for settles_for in [0, 4, 100] {
         let mut hosted = Hosted::enabled_at([0.5, 1.5]);
