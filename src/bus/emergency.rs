@@ -215,10 +215,6 @@ impl Emergency {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
-    use std::vec::Vec;
-
     use super::*;
 
     const HOST_LOST: ErrorReport = ErrorReport::code(0x8130);

@@ -79,8 +79,6 @@ fn take(digest: &mut Digest<'_, u64, NoTable>, number: f32) {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
     use core::f64::consts::{FRAC_PI_3, PI};
 
     use super::super::chain::DenavitHartenberg;
@@ -116,7 +114,7 @@ mod tests {
             change(&mut geometry[joint]);
             fingerprint(geometry, DIRECTIONS, OFFSETS, CONSTANTS)
         };
-        let mut others = std::vec::Vec::new();
+        let mut others = Vec::new();
         for joint in 0..2 {
             others.push(changed(joint, &|numbers| numbers.alpha += 5e-5));
             others.push(changed(joint, &|numbers| numbers.alpha += PI));

@@ -3,13 +3,9 @@
 //! One value serves every level, so tests of single levels and of several together use the same board. An
 //! emergency stop can come before any access of a tick ([`Stop`]), like the interrupt of its contact.
 
-extern crate std;
-
 use core::cell::RefCell;
-use std::boxed::Box;
 use std::collections::VecDeque;
 use std::rc::Rc;
-use std::vec::Vec;
 
 use heapless::spsc::Producer;
 

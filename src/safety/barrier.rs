@@ -186,8 +186,6 @@ mod tests {
     use super::super::limits::tests::{HIP, KNEE};
     use super::*;
     use std::collections::VecDeque;
-    extern crate std;
-
     /// An inertia with gravity, pushed by a requested torque through the barrier, with delayed velocity and
     /// delayed drive torque. Semi-implicit Euler at 16 kHz, double precision. Returns the largest excursion
     /// beyond either end (negative inside), the largest speed, and the largest speed in the last of four

@@ -1,7 +1,3 @@
-extern crate std;
-
-use std::vec::Vec;
-
 use super::super::tests::IDENTITY;
 use super::*;
 use crate::bus::drive::Mode;

@@ -1,5 +1,3 @@
-extern crate std;
-
 use super::super::tests::{Board, axis};
 use super::super::{Lost, NmtState, Objects, dictionary::Object};
 use super::*;
@@ -153,7 +151,7 @@ fn both_nodes_report_a_fault_and_a_rising_edge_resets_it() {
     let fault = Fault { code: FaultCode::Overspeed, joint: 1 };
     board.drive = board.drive.after(DriveEvent::Failed(fault), 2);
     let frames = board.run(2);
-    let sent: std::vec::Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
+    let sent: Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
     let data = [0x00, 0x84, 0b10_0001, 2, 0, 0, 0, 0].to_vec();
     assert_eq!(sent, [(0x81, data.clone()), (0x82, data)]);
     assert_eq!(board.read(0x603F, 0), Ok(0x8400));

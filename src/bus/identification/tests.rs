@@ -1,5 +1,3 @@
-extern crate std;
-
 use super::super::dictionary::{Access, Type};
 use super::super::table::ROWS;
 use super::*;
@@ -159,7 +157,7 @@ fn the_log_delivers_each_sample_once_and_counts_lost_ones() {
         },
         segment: Some(Segment::Validation(2)),
     };
-    let (mut pushed, mut taken, mut next) = (0_u32, std::vec::Vec::new(), 5);
+    let (mut pushed, mut taken, mut next) = (0_u32, Vec::new(), 5);
     for _ in 0..50 {
         for _ in 0..next {
             log.push(&sample(pushed));
@@ -171,7 +169,7 @@ fn the_log_delivers_each_sample_once_and_counts_lost_ones() {
         pushed += 1;
         let size = log.bytes(0, &mut []);
         assert_eq!(size as usize, log.held() as usize * Log::<2, 8>::BYTES);
-        let mut block = std::vec![0; size as usize];
+        let mut block = vec![0; size as usize];
         for (index, piece) in block.chunks_mut(7).enumerate() {
             assert_eq!(log.bytes(7 * index as u32, piece), size);
         }

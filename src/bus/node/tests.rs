@@ -1,5 +1,3 @@
-extern crate std;
-
 use super::super::tests::Board;
 use super::super::{Abort, Frame};
 use super::*;
@@ -76,7 +74,7 @@ fn a_stopped_node_sends_its_heartbeat_and_nothing_else() {
     board.receive(0x080, &[]);
     board.receive(0x201, &[6, 0]);
     let frames = board.run(8);
-    let own: std::vec::Vec<_> = frames.iter().filter(|frame| frame.id() & 0x7F == 1).collect();
+    let own: Vec<_> = frames.iter().filter(|frame| frame.id() & 0x7F == 1).collect();
     assert_eq!(own, [&Frame::new(0x701, &[4]); 2]);
 }
 
@@ -157,7 +155,7 @@ fn a_counted_sync_without_valid_counter_is_ignored() {
 }
 
 /// Emergency codes of the first node among these frames.
-fn codes(frames: &[Frame]) -> std::vec::Vec<u16> {
+fn codes(frames: &[Frame]) -> Vec<u16> {
     let sent = frames.iter().filter(|frame| frame.id() == 0x81);
     sent.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect()
 }
@@ -207,7 +205,7 @@ fn another_pdo_does_not_end_the_error_of_a_late_one() {
     board.now_us += 101_000;
     assert_eq!(codes(&board.frames()), [0x8250]);
     board.receive(0x301, &[0; 4]);
-    assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), (std::vec::Vec::new(), Ok(0x11)));
+    assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), (Vec::new(), Ok(0x11)));
     board.receive(0x201, &[0, 0]);
     assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), ([0].into(), Ok(0)));
 }

@@ -1,9 +1,5 @@
 //! Tests of the server against an independent client by CiA 301, which may also lose segments.
 
-extern crate std;
-
-use std::vec::Vec;
-
 use super::super::Frame;
 use super::super::tests::{Board, LONG, LONG_TEXT};
 use super::*;

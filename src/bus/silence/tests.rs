@@ -1,7 +1,3 @@
-extern crate std;
-
-use std::vec::Vec;
-
 use super::super::tests::Board;
 use super::*;
 use crate::leg::DriveState;

@@ -1,13 +1,9 @@
 //! Test board: two nodes and a leg that follows every request. Tests of the whole bus are in the submodules.
 
-extern crate std;
-
 mod fuzz;
 mod mapping;
 mod session;
 mod values;
-
-use std::vec::Vec;
 
 use super::drive::{Axis, AxisConstants, Coupling, JointStatus, Mode};
 use super::*;

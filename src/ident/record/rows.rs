@@ -197,9 +197,6 @@ fn add_scaled<T: Real, const N: usize, const B: usize>(
 mod tests {
     use super::*;
 
-    extern crate std;
-    use std::vec::Vec;
-
     #[test]
     fn running_sums_equal_the_convolution_at_every_tenth_sample() {
         let low_pass = LowPass::<f64, 256>::new(8.0, 500.0).expect("fits");

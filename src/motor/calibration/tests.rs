@@ -1,8 +1,4 @@
-extern crate std;
-
 use std::collections::BTreeMap;
-use std::format;
-use std::string::String;
 use std::sync::{Mutex, PoisonError};
 
 use super::*;
@@ -260,7 +256,7 @@ const WRONG: [(Change, Refusal); 18] = [
 #[test]
 fn the_index_separates_counts_per_turn_from_pole_pairs() {
     let configuration = AxisConfiguration { counts_per_turn: 4096, ..CONFIGURATION };
-    let refusals: std::vec::Vec<Refusal> = (0..14)
+    let refusals: Vec<Refusal> = (0..14)
         .map(|turn| {
             // Up to the end of the forward pass the rotor has moved over some 1.15 turns. So it has passed
             // the index twice from one of 14 positions.

@@ -1,8 +1,3 @@
-extern crate std;
-
-use std::boxed::Box;
-use std::vec::Vec;
-
 use super::super::axis_state::Order;
 use super::super::testing::TestHardware;
 use super::super::{Ends, EventQueue, Queues};

@@ -1,7 +1,4 @@
-extern crate std;
-
 use std::collections::VecDeque;
-use std::vec::Vec;
 
 use super::super::BusEnds;
 use super::super::testing::{TestHardware, commanded, on_a_bus};

@@ -1,7 +1,3 @@
-extern crate std;
-
-use std::vec::Vec;
-
 use super::super::testing::{NOTHING, TestHardware, device};
 use super::*;
 

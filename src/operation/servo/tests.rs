@@ -1,10 +1,5 @@
 //! Tests of the servo's level with the control of the default leg, whose joints stand still.
 
-extern crate std;
-
-use std::boxed::Box;
-use std::vec::Vec;
-
 use super::super::testing::{RAMPS, TestHardware, VOLT_PER_CODE, commanded, ends, on_a_bus};
 use super::super::{AssistEnds, AssistQueues, BusEnds, Ends};
 use super::*;

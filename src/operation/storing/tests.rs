@@ -1,7 +1,3 @@
-extern crate std;
-
-use std::vec::Vec;
-
 use super::super::testing::{TestHardware, TestWatchdog};
 use super::*;
 
@@ -165,7 +161,7 @@ fn a_low_supply_of_the_processor_inhibits_and_prevents_the_write() {
         }
         bench.pass();
     }
-    assert_eq!((touched, bench.causes(), bench.storing), (0, low, std::vec![(0, true), (21, false)]));
+    assert_eq!((touched, bench.causes(), bench.storing), (0, low, vec![(0, true), (21, false)]));
     // A drive that is on is no reason to look at the supply, which would turn it off.
     let mut bench = Bench { permission: Permission::Follow, ..Bench::off() };
     bench.hardware.processor_supply_is_low = true;

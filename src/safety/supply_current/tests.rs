@@ -1,7 +1,4 @@
 use super::*;
-use std::vec::Vec;
-extern crate std;
-
 const LIMITS: SupplyLimits =
     SupplyLimits { draw: Some(Ampere(10.0)), charge: Some(Ampere(4.0)), brake: Ohm(2.0) };
 const BUS: Volt = Volt(48.0);

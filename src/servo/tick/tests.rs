@@ -2,8 +2,6 @@
 //!
 //! The joint is an inertia with viscous friction and gravity, a lagging drive and an encoder that counts.
 
-extern crate std;
-
 use super::*;
 use crate::hal::JointSample;
 use crate::motion::{Motion, Ramp};

@@ -5,7 +5,6 @@ use crate::bus::Abort;
 use crate::bus::program::{ProgramCommand, ProgramStatus};
 use crc::{CRC_16_XMODEM, Crc};
 use scarab_boot::Region;
-use std::vec;
 
 const CLEARED: ProgramStatus = ProgramStatus(ProgramStatus::STOPPED | ProgramStatus::CLEARED);
 

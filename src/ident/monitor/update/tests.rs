@@ -8,9 +8,6 @@ use crate::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegPara
 use crate::testing::TestRandom;
 use nalgebra::Vector3;
 
-extern crate std;
-use std::vec::Vec;
-
 const SIGMA: f64 = 0.5;
 const TRUTH: LegParameters<f64, 2> = [
     [0.03, -0.016, 0.0, 0.5, 0.0, 0.506, 1.7, 0.10, 0.0, 8.5, 0.12, 3.0, 1.2, 0.4],

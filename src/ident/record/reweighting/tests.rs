@@ -1,7 +1,5 @@
 //! Pushes lose their weight; noise and torque that the columns explain do not.
 
-extern crate std;
-
 use super::*;
 use crate::ident::record::rows::FilteredRows;
 use crate::ident::record::stribeck::BANK;
@@ -77,7 +75,7 @@ fn pushes_lose_their_weight_and_the_parameters_come_back() {
         let window = motion(900, seed, pushes);
         let weights = weigh(&window, 0, 1.0);
         let (plain, robust) = (error(&window, &[1.0; LARGEST_BLOCKS]), error(&window, &weights));
-        std::println!(
+        println!(
             "seed {seed}: {plain:.1} sigma plain, {robust:.1} robust, {:.2} lost",
             lost(&window, &weights)
         );
@@ -96,7 +94,7 @@ fn noise_alone_loses_next_to_nothing() {
         lost(&window, &weigh(&window, 0, 1.0))
     };
     let share = (0..SEEDS).map(of).sum::<f64>() / SEEDS as f64;
-    std::println!("{share:.5}");
+    println!("{share:.5}");
     // Half of the weight is lost beyond 3.3 standard deviations: one block of two thousand.
     assert!(share < 3e-3, "{share}");
 }

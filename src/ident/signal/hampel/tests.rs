@@ -1,9 +1,5 @@
 //! Regular samples pass, isolated outliers do not.
 
-extern crate std;
-
-use std::vec::Vec;
-
 use super::*;
 use crate::real::sin_cos;
 use crate::testing::TestRandom;

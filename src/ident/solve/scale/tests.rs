@@ -8,9 +8,6 @@ use crate::model::{BaseParameters, Chain, DenavitHartenberg, LegParameters, Payl
 use crate::testing::TestRandom;
 use nalgebra::Vector3;
 
-extern crate std;
-use std::vec::Vec;
-
 fn model<T: Real>() -> RowModel<T, 2, BASE> {
     let link = |a: f64| DenavitHartenberg { alpha: T::zero(), a: T::from_double(a), d: T::zero() };
     let chain = Chain::new(&[link(0.0), link(0.39)]).expect("finite");

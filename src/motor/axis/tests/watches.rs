@@ -1,9 +1,5 @@
 //! Faults that an axis detects by comparing voltages, currents, counts and codes.
 
-extern crate std;
-
-use std::format;
-
 use super::*;
 
 /// Servo periods in 20 ms and in 50 ms.

@@ -90,7 +90,7 @@ fn zeros_of_another_setting_or_before_a_load_are_not_used() {
         machine.hold(true, false, if forgets { 46.0 } else { 3.7 });
         (machine.results(), machine.signals.has_begun())
     };
-    let confirmed = std::vec![(1, "confirmed"), (2, "confirmed")];
+    let confirmed = vec![(1, "confirmed"), (2, "confirmed")];
     assert_eq!(begins(settings(), stored, false), (confirmed.clone(), true));
     let mut other = settings();
     other.encoders[1].absolute.joint = Some(Direction::Down);
@@ -98,7 +98,7 @@ fn zeros_of_another_setting_or_before_a_load_are_not_used() {
     let mut other = settings();
     other.encoders[0].ratio = 49.0;
     assert_eq!(begins(other, stored, false), (confirmed, false));
-    assert_eq!(begins(settings(), stored, true), (std::vec![(1, "done"), (2, "done")], false));
+    assert_eq!(begins(settings(), stored, true), (vec![(1, "done"), (2, "done")], false));
 }
 
 #[test]
