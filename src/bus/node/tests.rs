@@ -1,4 +1,4 @@
-use super::super::tests::Board;
+use super::super::tests::{self, Board};
 use super::super::{Abort, Frame};
 use super::*;
 
@@ -55,10 +55,8 @@ fn sync_and_emergency_refuse_cob_ids_of_other_messages() {
     }
     assert_eq!((board.write(0x1401, 1, 0x4000_0301, 4), board.write(0x1401, 1, 0x301, 4)), (Ok(()), Ok(())));
     // A disabled PDO or emergency message frees its COB-ID.
-    assert_eq!(
-        (board.write(0x1005, 0, 0x201, 4), board.write(0x1014, 0, 1 << 31 | 0x310, 4)),
-        (Ok(()), Ok(()))
-    );
+    assert_eq!(board.write(0x1005, 0, 0x201, 4), Ok(()));
+    assert_eq!(board.write(0x1014, 0, 1 << 31 | 0x310, 4), Ok(()));
     assert_eq!(board.write(0x1800, 1, 0x310, 4), Ok(()));
     assert_eq!((board.write(0x1005, 0, 0x80, 4), board.write(0x1014, 0, 0x81, 4)), (Ok(()), Ok(())));
 }
@@ -156,8 +154,7 @@ fn a_counted_sync_without_valid_counter_is_ignored() {
 
 /// Emergency codes of the first node among these frames.
 fn codes(frames: &[Frame]) -> Vec<u16> {
-    let sent = frames.iter().filter(|frame| frame.id() == 0x81);
-    sent.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect()
+    tests::codes(frames.iter().filter(|frame| frame.id() == 0x81)).iter().map(|(_, code)| *code).collect()
 }
 
 #[test]
@@ -216,9 +213,7 @@ fn a_sync_without_its_counter_is_an_error_until_a_valid_one() {
     assert_eq!(board.write(0x1019, 0, 10, 1), Ok(()));
     let mut emergency = |data: &[u8]| {
         board.receive(0x80, data);
-        let sent = board.run(80);
-        let own = sent.into_iter().find(|frame| frame.id() == 0x81);
-        own.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]))
+        codes(&board.run(80)).first().copied()
     };
     // A counter out of its range has the right length.
     let expected = [(&[1][..], None), (&[], Some(0x8240)), (&[], None), (&[11], None), (&[2], Some(0))];
