@@ -216,11 +216,8 @@ mod tests {
         while let Some(output) = filter.finish(&low_pass) {
             outputs.push(output);
         }
-        assert_eq!(
-            outputs.len(),
-            1500_usize.div_ceil(DECIMATION),
-            "one for every tenth sample, ends included"
-        );
+        // One for every tenth sample, ends included.
+        assert_eq!(outputs.len(), 1500_usize.div_ceil(DECIMATION));
         assert_eq!(filter, RowFilter::new(Ends::Cut));
         for (number, output) in outputs.iter().enumerate() {
             let window = low_pass.weights().iter().enumerate();
