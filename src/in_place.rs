@@ -169,8 +169,6 @@ impl<T: core::fmt::Debug> core::fmt::Debug for Slot<T> {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
     use core::mem::MaybeUninit;
 
     use super::{Slot, each, empty_slot, made};
@@ -204,6 +202,6 @@ mod tests {
     #[should_panic(expected = "lies elsewhere")]
     fn a_value_built_elsewhere_is_refused() {
         let mut slot: Slot<u32> = made(|slot| empty_slot(slot));
-        slot.fill(|_| std::boxed::Box::leak(std::boxed::Box::new(0)));
+        slot.fill(|_| Box::leak(Box::new(0)));
     }
 }

@@ -21,7 +21,7 @@
 //! | [`store`] | nonvolatile store: configuration, calibrations, the accepted model |
 //! | [`bus`] | a CANopen node per joint, and a board's device with its nodes, without I/O |
 //! | [`board`], `task` | one board's registers and interrupts; tasks and priorities (microcontroller only) |
-#![no_std]
+#![cfg_attr(not(test), no_std)]
 
 pub mod assist;
 pub mod board;

@@ -234,48 +234,42 @@ mod tests {
         }
     }
 
+    /// Appends the torques of so many ticks at rest, with a law of `law` N m. Returns the last one.
+    fn run(tick: &mut AssistTick<2>, ticks: u32, law: f32, torques: &mut Vec<f32>) -> f32 {
+        torques.extend((0..ticks).map(|number| {
+            if number % TICKS_PER_LOG == 0 {
+                tick.receive(&torque(law));
+            }
+            tick.advance(&[0.0; 2], &[0.0; 2]).torque_nm[0]
+        }));
+        torques[torques.len() - 1]
+    }
+
+    /// Largest change from one tick to the next.
+    fn largest_step(torques: &[f32]) -> f32 {
+        torques.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max)
+    }
+
     #[test]
     fn torque_moves_from_hold_to_law_and_back_without_a_step() {
-        let mut tick = begun(20.0);
-        let mut last = 20.0;
-        let mut largest = 0.0_f32;
-        let mut run = |tick: &mut AssistTick<2>, ticks: u32, law: f32| {
-            for number in 0..ticks {
-                if number % TICKS_PER_LOG == 0 {
-                    tick.receive(&torque(law));
-                }
-                let now = tick.advance(&[0.0; 2], &[0.0; 2]).torque_nm[0];
-                largest = largest.max((now - last).abs());
-                last = now;
-            }
-            last
-        };
-        assert!((run(&mut tick, 4001, -30.0) + 30.0).abs() < 1e-3);
+        let (mut tick, mut torques) = (begun(20.0), vec![20.0]);
+        assert!((run(&mut tick, 4001, -30.0, &mut torques) + 30.0).abs() < 1e-3);
         assert!(tick.is_complete());
         tick.leave(AssistEnd::Requested);
-        assert!((run(&mut tick, 4001, -30.0) - 5.0).abs() < 1e-3);
+        assert!((run(&mut tick, 4001, -30.0, &mut torques) - 5.0).abs() < 1e-3);
         assert!(tick.has_ended());
         // 50 N m in a second.
-        assert!(largest < 0.025, "{largest}");
+        assert!(largest_step(&torques) < 0.025, "{}", largest_step(&torques));
     }
 
     #[test]
     fn leaving_early_moves_the_hold_torque_without_a_step() {
-        let mut tick = begun(60.0);
-        let mut last = 60.0;
-        for number in 0..4000 {
-            if number % TICKS_PER_LOG == 0 {
-                tick.receive(&torque(5.0));
-            }
-            if number == 400 {
-                tick.leave(AssistEnd::Requested);
-            }
-            let now = tick.advance(&[0.0; 2], &[0.0; 2]).torque_nm[0];
-            // A tenth of the cap in eight ticks.
-            assert!((now - last).abs() < 1.1, "{number}: {last} to {now}");
-            last = now;
-        }
-        assert!((last - 5.0).abs() < 1e-3 && tick.has_ended());
+        let (mut tick, mut torques) = (begun(60.0), vec![60.0]);
+        run(&mut tick, 400, 5.0, &mut torques);
+        tick.leave(AssistEnd::Requested);
+        assert!((run(&mut tick, 3600, 5.0, &mut torques) - 5.0).abs() < 1e-3 && tick.has_ended());
+        // A tenth of the cap in eight ticks.
+        assert!(largest_step(&torques) < 1.1, "{}", largest_step(&torques));
     }
 
     #[test]
@@ -291,12 +285,7 @@ mod tests {
     #[test]
     fn a_jump_of_the_law_is_limited_to_a_tenth_of_the_cap_per_sample() {
         let mut tick = begun(0.0);
-        for number in 0..4800 {
-            if number % TICKS_PER_LOG == 0 {
-                tick.receive(&torque(0.0));
-            }
-            let _ = tick.advance(&[0.0; 2], &[0.0; 2]);
-        }
+        run(&mut tick, 4800, 0.0, &mut Vec::new());
         tick.receive(&torque(80.0));
         let ramp: [f32; 8] = core::array::from_fn(|_| tick.advance(&[0.0; 2], &[0.0; 2]).torque_nm[0]);
         assert!((ramp[7] - 8.5).abs() < 1e-3 && (ramp[3] - 4.25).abs() < 1e-3, "{ramp:?}");
@@ -305,12 +294,7 @@ mod tests {
     #[test]
     fn friction_fades_to_zero_at_rest() {
         let mut tick = begun(0.0);
-        for number in 0..4800 {
-            if number % TICKS_PER_LOG == 0 {
-                tick.receive(&torque(0.0));
-            }
-            let _ = tick.advance(&[0.0; 2], &[0.0; 2]);
-        }
+        run(&mut tick, 4800, 0.0, &mut Vec::new());
         let found = [0.0, 0.025, 1.0, -1.0].map(|speed| tick.advance(&[0.0; 2], &[speed, 0.0]).torque_nm[0]);
         for (found, expected) in found.into_iter().zip([0.0, 2.075, 7.0, -7.0]) {
             assert!((found - expected).abs() < 1e-3, "{found} against {expected}");
@@ -326,10 +310,8 @@ mod tests {
         assert_eq!(silent.end(), Some(AssistEnd::Late));
         let mut broken = begun(0.0);
         broken.receive(&torque(f32::NAN));
-        assert!(
-            broken.end() == Some(AssistEnd::NotFinite)
-                && broken.advance(&[0.0; 2], &[0.0; 2]).torque_nm == [0.0; 2]
-        );
+        assert_eq!(broken.end(), Some(AssistEnd::NotFinite));
+        assert_eq!(broken.advance(&[0.0; 2], &[0.0; 2]).torque_nm, [0.0; 2]);
         let mut exhausted = begun(0.0);
         exhausted.receive(&AssistTorque { is_exhausted: true, ..torque(1.0) });
         assert_eq!(exhausted.end(), Some(AssistEnd::Energy));

@@ -258,8 +258,6 @@ impl Communication {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
     use super::*;
 
     #[test]

@@ -163,11 +163,8 @@ mod tests {
             for index in row.index..row.index + u16::from(row.indices) {
                 let head = find(Object::at(index, 0)).expect("a number of entries");
                 assert_eq!(head.kind, Type::U8, "{index:x}");
-                let last = ROWS
-                    .iter()
-                    .filter(|other| other.holds(Object::at(index, other.sub)))
-                    .map(|other| u32::from(other.sub + other.subs - 1))
-                    .max();
+                let own = ROWS.iter().filter(|other| other.holds(Object::at(index, other.sub)));
+                let last = own.map(|other| u32::from(other.sub + other.subs - 1)).max();
                 if head.access == Access::Const {
                     assert_eq!(Some(head.default), last, "{index:x}");
                 }

@@ -52,4 +52,4 @@ pub use stored_parameters::{
 };
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

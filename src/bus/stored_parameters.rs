@@ -229,13 +229,11 @@ impl Node {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
     use super::super::tests::Board;
     use super::*;
     use crate::testing::TestRandom;
 
-    fn stored(board: &mut Board) -> std::vec::Vec<u8> {
+    fn stored(board: &mut Board) -> Vec<u8> {
         let mut bytes = [0; LONGEST];
         let length = board.nodes[0].store(&mut board.axes[0], &mut bytes).expect("it fits");
         bytes[..length].to_vec()
@@ -286,7 +284,7 @@ mod tests {
     fn foreign_bytes_cannot_set_the_controlword() {
         let mut random = TestRandom::new(1);
         for length in 0..200 {
-            let bytes: std::vec::Vec<u8> = (0..length).map(|_| random.byte()).collect();
+            let bytes: Vec<u8> = (0..length).map(|_| random.byte()).collect();
             let mut board = Board::started(1);
             let [node, _] = &mut board.nodes;
             node.recall(&bytes, Reset::Node, &mut board.axes[0]);

@@ -79,8 +79,6 @@ fn take(digest: &mut Digest<'_, u64, NoTable>, number: f32) {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
     use core::f64::consts::{FRAC_PI_3, PI};
 
     use super::super::chain::DenavitHartenberg;
@@ -116,7 +114,7 @@ mod tests {
             change(&mut geometry[joint]);
             fingerprint(geometry, DIRECTIONS, OFFSETS, CONSTANTS)
         };
-        let mut others = std::vec::Vec::new();
+        let mut others = Vec::new();
         for joint in 0..2 {
             others.push(changed(joint, &|numbers| numbers.alpha += 5e-5));
             others.push(changed(joint, &|numbers| numbers.alpha += PI));
@@ -149,11 +147,8 @@ mod tests {
         let anatomy =
             [AnatomicalJoint::new(1, -0.0_f32).unwrap(), AnatomicalJoint::new(-1, OFFSETS[1]).unwrap()];
         let chain = Chain::new(&single).unwrap();
-        assert_ne!(
-            chain,
-            Chain::new(&GEOMETRY).unwrap().convert(),
-            "the sines differ, or this tests nothing"
-        );
+        let double = Chain::new(&GEOMETRY).unwrap();
+        assert_ne!(chain, double.convert(), "the sines differ, or this tests nothing");
         assert_eq!(Fingerprint::new(&chain, &anatomy, &CONSTANTS), own());
     }
 

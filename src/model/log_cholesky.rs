@@ -154,24 +154,13 @@ mod tests {
         for _ in 0..50 {
             let body = random.body();
             let [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = body.0;
-            let factor = Matrix4::new(
-                exp(d1),
-                s12,
-                s13,
-                t1, //
-                0.0,
-                exp(d2),
-                s23,
-                t2, //
-                0.0,
-                0.0,
-                exp(d3),
-                t3, //
-                0.0,
-                0.0,
-                0.0,
-                1.0,
-            ) * exp(alpha);
+            // By columns.
+            let factor = Matrix4::from([
+                [exp(d1), 0.0, 0.0, 0.0],
+                [s12, exp(d2), 0.0, 0.0],
+                [s13, s23, exp(d3), 0.0],
+                [t1, t2, t3, 1.0],
+            ]) * exp(alpha);
             let difference = factor * factor.transpose() - pseudo_inertia(&body.to_parameters());
             // A few roundings of numbers up to 20.
             assert!(difference.abs().max() < 1e-14);

@@ -31,7 +31,7 @@ pub mod payload;
 pub mod planar;
 pub mod regressor;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
 pub use anatomy::AnatomicalJoint;
 pub use base::{BaseError, BaseParameters, ColumnMask, Standing, regroup};

@@ -130,22 +130,16 @@ mod tests {
     use super::super::inertia::{RigidBody, inertial};
     use super::super::testing::TestRandom;
     use super::*;
+    use nalgebra::Matrix3;
 
     /// Origin and orientation of each link from the angles alone, without the velocities of this module.
-    fn poses<const N: usize>(
-        chain: &Chain<f64, N>,
-        q: &[f64; N],
-    ) -> [(nalgebra::Matrix3<f64>, Vector3<f64>); N] {
+    fn poses<const N: usize>(chain: &Chain<f64, N>, q: &[f64; N]) -> [(Matrix3<f64>, Vector3<f64>); N] {
         let frames = chain.frames(q);
-        let (mut turn, mut position) = (nalgebra::Matrix3::identity(), Vector3::zeros());
+        let (mut turn, mut position) = (Matrix3::identity(), Vector3::zeros());
         core::array::from_fn(|link| {
             position += turn * frames[link].origin;
             let axis = |x: f64, y: f64, z: f64| frames[link].to_parent(&Vector3::new(x, y, z));
-            turn *= nalgebra::Matrix3::from_columns(&[
-                axis(1.0, 0.0, 0.0),
-                axis(0.0, 1.0, 0.0),
-                axis(0.0, 0.0, 1.0),
-            ]);
+            turn *= Matrix3::from_columns(&[axis(1.0, 0.0, 0.0), axis(0.0, 1.0, 0.0), axis(0.0, 0.0, 1.0)]);
             (turn, position)
         })
     }
@@ -161,19 +155,14 @@ mod tests {
     ) -> f64 {
         const STEP: f64 = 1e-4;
         let at = |time: f64| {
-            poses(
-                chain,
-                &core::array::from_fn(|joint| {
-                    state.q[joint] + state.qd[joint] * time + 0.5 * state.qdd[joint] * time * time
-                }),
-            )
+            let JointState { q, qd, qdd } = state;
+            poses(chain, &core::array::from_fn(|i| q[i] + qd[i] * time + 0.5 * qdd[i] * time * time))
         };
         let (before, now, after) = (at(time - STEP), at(time), at(time + STEP));
         let mut energy = 0.0;
         for link in 0..N {
             let body = RigidBody::from_parameters(&inertial(&leg[link])).unwrap();
-            let centre =
-                |pose: &(nalgebra::Matrix3<f64>, Vector3<f64>)| pose.1 + pose.0 * body.centre_of_mass;
+            let centre = |pose: &(Matrix3<f64>, Vector3<f64>)| pose.1 + pose.0 * body.centre_of_mass;
             let velocity = (centre(&after[link]) - centre(&before[link])) / (2.0 * STEP);
             let turning = (after[link].0 - before[link].0) / (2.0 * STEP) * now[link].0.transpose();
             let spin = now[link].0.transpose() * Vector3::new(turning.m32, turning.m13, turning.m21);

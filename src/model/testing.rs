@@ -18,12 +18,9 @@ pub fn down_along_x<T: Real>() -> Vector3<T> {
 
 impl TestRandom {
     pub(crate) fn chain<const N: usize>(&mut self) -> Chain<f64, N> {
-        Chain::new(&core::array::from_fn(|_| DenavitHartenberg {
-            alpha: self.within(PI),
-            a: self.within(0.5),
-            d: self.within(0.3),
-        }))
-        .unwrap()
+        let mut joint =
+            || DenavitHartenberg { alpha: self.within(PI), a: self.within(0.5), d: self.within(0.3) };
+        Chain::new(&core::array::from_fn(|_| joint())).unwrap()
     }
 
     pub(crate) fn state<const N: usize>(&mut self) -> JointState<f64, N> {

@@ -207,10 +207,8 @@ mod tests {
             let distance = target.abs();
             let peak = sqrt(distance * 16.0 / 3.0).min(1.0);
             let time = peak / 4.0 + peak / 8.0 + (distance - peak * peak * 3.0 / 16.0).max(0.0) / peak;
-            assert!(
-                (ticks as f32 * TICK_S - time).abs() < 4.0 * TICK_S + 0.01 * time,
-                "{target}: {ticks} {time}"
-            );
+            let error = (ticks as f32 * TICK_S - time).abs();
+            assert!(error < 4.0 * TICK_S + 0.01 * time, "{target}: {ticks} {time}");
             assert!(fastest <= 1.0 && fastest > 0.9 * peak - 8.0 * TICK_S, "{fastest} {peak}");
             // One tick of braking: 8 T^2.
             assert!(farthest <= 6e-7, "{farthest}");

@@ -171,10 +171,8 @@ mod tests {
             for step in 0..2000 {
                 let percent = f64::from(step) * 0.05;
                 let state = curve.state_at(&Phase::steady(percent as f32 / 100.0));
-                let deviation = f64::from(state.position_rad[index]).to_degrees()
-                    - closed_deg(joint, percent)
-                    - OFFSET_DEG[index];
-                worst = worst.max(deviation.abs());
+                let closed = closed_deg(joint, percent) + OFFSET_DEG[index];
+                worst = worst.max((f64::from(state.position_rad[index]).to_degrees() - closed).abs());
             }
             assert!(worst < stated && worst > 0.9 * stated, "{joint:?} {worst}");
         }
@@ -210,9 +208,8 @@ mod tests {
             -5089.0 * bell(76.25, 13.44) + 5677.0 * bell(75.76, 12.88) + 5.3288 * bell(19.74, 23.41)
         };
         let extremes = |angle: &dyn Fn(f64) -> f64| {
-            (0..=10_000)
-                .map(|step| angle(f64::from(step) * 0.01))
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+            let angles = (0..=10_000).map(|step| angle(f64::from(step) * 0.01));
+            angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
         };
         let (low, high) = extremes(&printed);
         assert!((low + 131.0).abs() < 1.0 && (high - 625.0).abs() < 1.0, "{low} {high}");

@@ -203,9 +203,8 @@ mod tests {
         // 10 s outweighs its curvature.
         let sine = Fourier::<1, 1>::new(Second(10.0), [0.0], [[0.5]], [[0.0]]).expect("finite");
         let motion = Periodic::new(sine, Second(0.2), 1, RATE_HZ).expect("positive times");
-        let peak = (0..motion.duration_ticks())
-            .map(|tick| motion.state_at(tick).acceleration_rad_per_s2[0].abs())
-            .fold(0.0, f32::max);
+        let states = (0..motion.duration_ticks()).map(|tick| motion.state_at(tick));
+        let peak = states.map(|state| state.acceleration_rad_per_s2[0].abs()).fold(0.0, f32::max);
         let bound = motion.envelope()[0].acceleration.0;
         // The bound adds the curvature w^2 A (0.2) to the blend's 1.5 w A / 0.2 s (2.36).
         assert!(peak <= bound && peak > 0.9 * bound, "{peak} {bound}");

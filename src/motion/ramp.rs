@@ -171,9 +171,8 @@ mod tests {
         }
         for joint in 0..2 {
             // Sampled every tick of some 5,000: the peaks are met within 1e-6.
-            assert!(
-                speed[joint] <= envelope[joint].speed.0 && speed[joint] > 0.999 * envelope[joint].speed.0
-            );
+            let bound = envelope[joint].speed.0;
+            assert!(speed[joint] <= bound && speed[joint] > 0.999 * bound);
             let bound = envelope[joint].acceleration.0;
             assert!(acceleration[joint] <= bound && acceleration[joint] > 0.999 * bound);
         }
@@ -215,10 +214,8 @@ mod tests {
     fn absurd_ramps_are_refused_and_the_joint_is_named() {
         let (one, fast) = (RadianPerSecond(1.0), RadianPerSecondSquared(1.0));
         let ramp = |to, speed, acceleration, rate| Ramp::between([0.0; 2], to, speed, acceleration, rate);
-        assert_eq!(
-            ramp([0.0, f32::NAN], [one; 2], [fast; 2], RATE_HZ),
-            Err(MotionError::NotFinite { joint: 1 })
-        );
+        let nowhere = ramp([0.0, f32::NAN], [one; 2], [fast; 2], RATE_HZ);
+        assert_eq!(nowhere, Err(MotionError::NotFinite { joint: 1 }));
         let stopped = [one, RadianPerSecond(0.0)];
         assert_eq!(ramp([1.0; 2], stopped, [fast; 2], RATE_HZ), Err(MotionError::Rate { joint: 1 }));
         let crawling = [RadianPerSecond(1e-9); 2];

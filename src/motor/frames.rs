@@ -132,9 +132,8 @@ mod tests {
             let vector = balanced(7.0, angle).to_stationary();
             let (sine, cosine) = sin_cos(angle);
             // Tolerance: six roundings of numbers of 7.
-            assert!(
-                (vector.alpha.0 - 7.0 * cosine).abs() < 3e-6 && (vector.beta.0 - 7.0 * sine).abs() < 3e-6
-            );
+            assert!((vector.alpha.0 - 7.0 * cosine).abs() < 3e-6, "{step}");
+            assert!((vector.beta.0 - 7.0 * sine).abs() < 3e-6, "{step}");
         }
     }
 

@@ -389,12 +389,16 @@ mod tests {
     }
 
     /// A period at rest with this integral of the current loop and this current.
-    fn shown<'a>(
-        current_loop: &'a CurrentLoop,
-        current: Rotating<Ampere>,
-        angle: ElectricalAngle,
-    ) -> Shown<'a> {
+    fn shown(current_loop: &CurrentLoop, current: Rotating<Ampere>, angle: ElectricalAngle) -> Shown<'_> {
         Shown { current_loop, current, speed_rad_per_s: 0.0, position: 0, angle }
+    }
+
+    /// Fault found in periods like this one. The counter moves, because a change of the current at a standing
+    /// one is a fault of its own.
+    fn found(limits: &ModelLimits, now: Shown<'_>) -> Option<AxisFault> {
+        let mut watch = ModelWatch::EMPTY;
+        let mut periods = 0..3 * i32::from(PATIENCE);
+        periods.find_map(|period| watch.check(limits, &Shown { position: 10 * period, ..now }))
     }
 
     #[test]
@@ -413,12 +417,8 @@ mod tests {
             // 30 % more resistance than was measured.
             let held = Rotating { d: Volt(1.3 * 0.05 * d), q: Volt(1.3 * 0.05 * q) };
             let current_loop = CurrentLoop::holding(held);
-            let mut watch = ModelWatch::EMPTY;
             let now = shown(&current_loop, current, ElectricalAngle::default());
-            // The counter moves: a change of the current at a standing one would be a fault of its own.
-            let seen = (0..3 * i32::from(PATIENCE))
-                .find_map(|period| watch.check(&limits, &Shown { position: 10 * period, ..now }));
-            assert_eq!(seen, None, "{d} {q}");
+            assert_eq!(found(&limits, now), None, "{d} {q}");
         }
     }
 
@@ -461,10 +461,7 @@ mod tests {
         let current_loop = CurrentLoop::holding(Rotating { d: Volt(2.2), q: Volt(0.05 * 50.0) });
         for (speed_rad_per_s, expected) in [(1500.0, None), (0.0, Some(AxisFault::OpenPhase))] {
             let now = Shown { speed_rad_per_s, ..shown(&current_loop, current, ElectricalAngle::default()) };
-            let mut watch = ModelWatch::EMPTY;
-            let seen = (0..3 * i32::from(PATIENCE))
-                .find_map(|period| watch.check(&limits, &Shown { position: 10 * period, ..now }));
-            assert_eq!(seen, expected, "{speed_rad_per_s}");
+            assert_eq!(found(&limits, now), expected, "{speed_rad_per_s}");
         }
     }
 

@@ -250,6 +250,7 @@ fn stop(now: &Situation) -> Option<OperatorRequest> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec::IntoIter;
 
     const REST: Situation = Situation {
         enabling: false,
@@ -264,20 +265,9 @@ mod tests {
         Situation { calibrated: true, referenced: true, drive: Some(DriveState::SwitchOnDisabled), ..REST };
 
     /// Requests within some ticks of one situation.
-    fn requested(
-        operator: &mut Operator,
-        now: Situation,
-        ticks: u32,
-    ) -> impl Iterator<Item = OperatorRequest> {
-        let mut all = [None; 8];
-        let mut count = 0;
-        for _ in 0..ticks {
-            if let Some(request) = operator.tick(&now) {
-                all[count] = Some(request);
-                count += 1;
-            }
-        }
-        all.into_iter().flatten()
+    fn requested(operator: &mut Operator, now: Situation, ticks: u32) -> IntoIter<OperatorRequest> {
+        let all: Vec<_> = (0..ticks).filter_map(|_| operator.tick(&now)).collect();
+        all.into_iter()
     }
 
     /// An operator that has seen both contacts open and then the switch held.
@@ -327,10 +317,8 @@ mod tests {
         assert_eq!(requested(&mut operator, refused, RATE_HZ).count(), 0);
         let open = Situation { enabling: false, drive: Some(DriveState::SwitchOnDisabled), ..READY };
         assert_eq!(requested(&mut operator, open, STEADY_TICKS).count(), 0);
-        assert_eq!(
-            requested(&mut operator, held, RATE_HZ).next(),
-            Some(OperatorRequest::Power(PowerRequest::Shutdown))
-        );
+        let request = requested(&mut operator, held, RATE_HZ).next();
+        assert_eq!(request, Some(OperatorRequest::Power(PowerRequest::Shutdown)));
     }
 
     #[test]
@@ -388,10 +376,8 @@ mod tests {
         assert_eq!(requested(&mut operator, Situation { start: true, ..stands }, RATE_HZ / 2).count(), 0);
         assert_eq!(requested(&mut operator, stands, RATE_HZ).next(), Some(OperatorRequest::Reference));
         // A long press is a reset, without a reference when it is released.
-        assert!(
-            requested(&mut operator, Situation { start: true, ..stands }, 2 * RESET_TICKS)
-                .eq([OperatorRequest::Reset])
-        );
+        let long = requested(&mut operator, Situation { start: true, ..stands }, 2 * RESET_TICKS);
+        assert!(long.eq([OperatorRequest::Reset]));
         assert_eq!(requested(&mut operator, stands, RATE_HZ).count(), 0);
         // A drive that damps keeps its gate drivers.
         let damps = DriveState::QuickStopActive { remaining_ticks: 1 };
@@ -412,10 +398,8 @@ mod tests {
             }
             // Releasing it requests nothing; after it was open it counts again.
             assert_eq!(requested(&mut operator, now, RATE_HZ).count(), 0, "{now:?}");
-            assert!(
-                requested(&mut operator, welded, 2 * RESET_TICKS).eq([OperatorRequest::Reset]),
-                "{now:?}"
-            );
+            let long = requested(&mut operator, welded, 2 * RESET_TICKS);
+            assert!(long.eq([OperatorRequest::Reset]), "{now:?}");
         }
     }
 
@@ -425,43 +409,28 @@ mod tests {
         let held = Situation { enabling: true, ..REST };
         let stands = Situation { calibrated: true, ..REST };
         let enabled = Situation { enabling: true, drive: Some(DriveState::OperationEnabled), ..READY };
+        let (open, closed) = (Some(StepResult::SwitchOpen), Some(StepResult::SwitchClosed));
         for (now, expected) in [
-            (held, [None, Some(StepResult::SwitchClosed), Some(StepResult::SwitchClosed)]),
-            (REST, [Some(StepResult::SwitchOpen), Some(StepResult::NotCalibrated), None]),
-            (stands, [Some(StepResult::SwitchOpen), None, None]),
-            (READY, [Some(StepResult::SwitchOpen), Some(StepResult::AlreadyDone), None]),
-            (
-                Situation { blocked: true, ..held },
-                [Some(StepResult::Inhibited), Some(StepResult::SwitchClosed), Some(StepResult::SwitchClosed)],
-            ),
-            (
-                Situation { calibrating: true, ..held },
-                [
-                    Some(StepResult::Calibrating),
-                    Some(StepResult::SwitchClosed),
-                    Some(StepResult::SwitchClosed),
-                ],
-            ),
-            (
-                enabled,
-                [Some(StepResult::DriveOn), Some(StepResult::SwitchClosed), Some(StepResult::SwitchClosed)],
-            ),
+            (held, [None, closed, closed]),
+            (REST, [open, Some(StepResult::NotCalibrated), None]),
+            (stands, [open, None, None]),
+            (READY, [open, Some(StepResult::AlreadyDone), None]),
+            (Situation { blocked: true, ..held }, [Some(StepResult::Inhibited), closed, closed]),
+            (Situation { calibrating: true, ..held }, [Some(StepResult::Calibrating), closed, closed]),
+            (enabled, [Some(StepResult::DriveOn), closed, closed]),
         ] {
             let mut operator = trusted();
             for _ in 0..RESET_TICKS {
                 let _ = operator.tick(&now);
             }
-            assert_eq!(
-                [Calibrate, Reference, Reset].map(|step| operator.refusal(step, &now)),
-                expected,
-                "{now:?}"
-            );
+            let refusals = [Calibrate, Reference, Reset].map(|step| operator.refusal(step, &now));
+            assert_eq!(refusals, expected, "{now:?}");
         }
         let stuck = Operator::default();
         assert_eq!(stuck.refusal(Reset, &REST), Some(StepResult::ContactsNotOpened));
         // The switch has just opened.
         let mut operator = trusted();
-        assert_eq!(operator.refusal(Reset, &REST), Some(StepResult::SwitchClosed));
+        assert_eq!(operator.refusal(Reset, &REST), closed);
         for _ in 0..RESET_TICKS {
             let _ = operator.tick(&REST);
         }

@@ -3,26 +3,23 @@
 //! One value serves every level, so tests of single levels and of several together use the same board. An
 //! emergency stop can come before any access of a tick ([`Stop`]), like the interrupt of its contact.
 
-extern crate std;
-
 use core::cell::RefCell;
-use std::boxed::Box;
 use std::collections::VecDeque;
 use std::rc::Rc;
-use std::vec::Vec;
 
 use heapless::spsc::Producer;
 
 use super::{BusEnds, BusQueues, Ends, HostEnds, Queues, Signals};
-use crate::bus::device::{Device, LegStatus};
-use crate::bus::drive::{AxisConstants, Mode};
+use crate::bus::device::{Device, LegOrder, LegRequest, LegStatus};
+use crate::bus::drive::AxisConstants;
 use crate::bus::identification::ResultsCopy;
+use crate::bus::tests::constants;
 use crate::bus::{Identity, NodeId};
 use crate::hal::{AbsoluteEncoderSide, AxisCommand, Contacts, Controller, Frame, Hardware};
 use crate::leg::{DeratingRamps, DriveState, JointCommand, JointStatus, Plan};
 use crate::motor::SenseScale;
 use crate::safety::InhibitReason;
-use crate::units::{Ampere, Hertz, NewtonMetre, Volt};
+use crate::units::{Hertz, Volt};
 
 /// Usual reductions and scale of the bus voltage.
 pub(super) const RAMPS: DeratingRamps =
@@ -390,18 +387,28 @@ pub(super) const NOTHING: ResultsCopy<2, 1> = ResultsCopy::nothing();
 
 /// Two nodes with the numbers 1 and 2.
 pub(super) fn device() -> Device<2, 4> {
-    let constants = AxisConstants {
-        rated_torque: NewtonMetre(40.0),
-        rated_current: Ampere(20.0),
-        modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
-        position_bandwidth: Hertz(6.0),
-        current_bandwidth: Hertz(1000.0),
-        ..AxisConstants::UNKNOWN
-    };
+    let (position_bandwidth, current_bandwidth) = (Hertz(6.0), Hertz(1000.0));
+    let constants = AxisConstants { position_bandwidth, current_bandwidth, ..constants() };
     let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
     let identity = Identity::scarab(1, "test");
     Device::new(own, identity, [constants; 2], Plan::OneTime, 1).with_emergency_inhibit(0)
 }
+
+/// An order of the bus without faults or refusals.
+pub(super) fn order(commands: Option<[JointCommand; 2]>, request: Option<LegRequest>) -> LegOrder<2> {
+    LegOrder { commands, request, faults: [None; 2], may_return: [true; 2], refused: None }
+}
+
+/// Values of the elements that match a pattern, in their order.
+macro_rules! picked {
+    ($elements:expr, $pattern:pat $(if $guard:expr)? => $value:expr) => {
+        $elements.iter().filter_map(|element| match element {
+            $pattern $(if $guard)? => Some($value),
+            _ => None,
+        })
+    };
+}
+pub(super) use picked;
 
 /// Commands of a host that has the drive.
 pub(super) fn commanded() -> [JointCommand; 2] {

@@ -186,7 +186,6 @@ mod tests {
     use super::super::limits::tests::{HIP, KNEE};
     use super::*;
     use std::collections::VecDeque;
-    extern crate std;
 
     /// An inertia with gravity, pushed by a requested torque through the barrier, with delayed velocity and
     /// delayed drive torque. Semi-implicit Euler at 16 kHz, double precision. Returns the largest excursion
@@ -211,12 +210,8 @@ mod tests {
         for tick in 0..16_000 {
             sensed.push_back(velocity);
             let late = sensed.pop_front().expect("fourteen values remain");
-            let (torque, _) = barrier.bound(
-                Radian(position as f32),
-                RadianPerSecond(late as f32),
-                NewtonMetre(wanted_nm),
-                false,
-            );
+            let (angle, speed) = (Radian(position as f32), RadianPerSecond(late as f32));
+            let (torque, _) = barrier.bound(angle, speed, NewtonMetre(wanted_nm), false);
             assert!(torque.abs() <= limits.torque_cap());
             for _ in 0..4 {
                 let dt = 1.0 / 16_000.0;
@@ -253,18 +248,12 @@ mod tests {
                                 if start < low || start > high {
                                     continue;
                                 }
-                                let (excursion, fastest, _) = push(
-                                    &limits,
-                                    inertia,
-                                    gravity,
-                                    wanted * sign as f32,
-                                    (start, sign * initial_speed),
-                                );
-                                assert!(
-                                    excursion.to_degrees() < 0.5,
-                                    "{} degrees beyond: {inertia} {wanted} {gravity} {initial_speed} {sign}",
-                                    excursion.to_degrees()
-                                );
+                                let start = (start, sign * initial_speed);
+                                let (excursion, fastest, _) =
+                                    push(&limits, inertia, gravity, wanted * sign as f32, start);
+                                let case = [inertia, f64::from(wanted), gravity, initial_speed, sign];
+                                let beyond = excursion.to_degrees();
+                                assert!(beyond < 0.5, "{beyond} degrees beyond: {case:?}");
                                 // The overspeed fault is at 1.1 times the limit, with gravity in either
                                 // direction.
                                 assert!(fastest < 1.1 * speed, "{fastest}");

@@ -150,6 +150,7 @@ pub(crate) mod tests {
     #[test]
     fn implausible_limits_are_refused_with_joint_and_quantity() {
         assert!(Limits::new([HIP, KNEE]).is_ok());
+        let unknown = NewtonMetrePerAmpere(0.0);
         let implausible = [
             (LimitQuantity::Range, JointLimits { low: Radian(1.0), ..HIP }),
             (LimitQuantity::Range, JointLimits { high: Radian(f32::NAN), ..HIP }),
@@ -160,10 +161,7 @@ pub(crate) mod tests {
             (LimitQuantity::Torque, JointLimits { torque: NewtonMetre(-5.0), ..HIP }),
             (LimitQuantity::Torque, JointLimits { torque: NewtonMetre(1e6), ..HIP }),
             (LimitQuantity::Current, JointLimits { current: Ampere(f32::NAN), ..HIP }),
-            (
-                LimitQuantity::TorquePerAmpere,
-                JointLimits { torque_per_ampere: NewtonMetrePerAmpere(0.0), ..HIP },
-            ),
+            (LimitQuantity::TorquePerAmpere, JointLimits { torque_per_ampere: unknown, ..HIP }),
             (LimitQuantity::Inertia, JointLimits { inertia: KilogramMetreSquared(0.0), ..HIP }),
         ];
         for (quantity, limits) in implausible {

@@ -257,11 +257,8 @@ mod tests {
                     "5" => DriveState::QuickStopActive { remaining_ticks: DAMP_TICKS },
                     index => STATES[index.parse::<usize>().expect("a digit")],
                 };
-                assert_eq!(
-                    state.after(Event::Requested(request), DAMP_TICKS),
-                    expected,
-                    "{state:?} {request:?}"
-                );
+                let after = state.after(Event::Requested(request), DAMP_TICKS);
+                assert_eq!(after, expected, "{state:?} {request:?}");
             }
         }
     }
@@ -270,13 +267,10 @@ mod tests {
     fn a_fault_damps_an_enabled_drive_and_keeps_a_disabled_one_off() {
         for state in STATES {
             let failed = state.after(Event::Failed(OVERSPEED), DAMP_TICKS);
-            let expected = match state {
-                DriveState::OperationEnabled => Permission::Damp,
-                DriveState::QuickStopActive { .. } | DriveState::FaultReactionActive { .. } => {
-                    Permission::Damp
-                }
-                _ => Permission::Off,
-            };
+            use DriveState::{FaultReactionActive, OperationEnabled, QuickStopActive};
+            let damps =
+                matches!(state, OperationEnabled | QuickStopActive { .. } | FaultReactionActive { .. });
+            let expected = if damps { Permission::Damp } else { Permission::Off };
             assert_eq!(failed.permission(), expected, "{state:?}");
             assert_eq!(failed.fault(), Some(OVERSPEED));
             let off = state.after(Event::Failed(NOT_FINITE), DAMP_TICKS);

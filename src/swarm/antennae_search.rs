@@ -166,9 +166,7 @@ impl<T: Real, const D: usize> Search<T> for Bas<T, D> {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use core::cell::RefCell;
-    use std::vec::Vec;
 
     use super::*;
     use crate::real::abs;

@@ -1,8 +1,6 @@
 //! Common contract of all searches, tested on each: slices, seeds, box, costs that are not finite, errors.
 
-extern crate std;
 use core::cell::{Cell, RefCell};
-use std::vec::Vec;
 
 use super::*;
 use crate::real::Real;

@@ -278,9 +278,6 @@ fn rastrigin<T: Real>(position: &[T]) -> T {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-    use std::vec::Vec;
-
     use super::*;
 
     /// Position of the minimum, for `n` coordinates.
@@ -291,16 +288,16 @@ mod tests {
             F::Branin => Vec::from([PI, 2.275]),
             F::BraninAsPrinted => Vec::from([2.25, PI]),
             F::CamelAsPrinted => Vec::from([-5.0, 0.916_952_924]),
-            F::Rosenbrock | F::Levy => std::vec![1.0; n],
-            F::ShiftedGriewank => std::vec![123.0; n],
-            F::ShiftedSchwefel => std::vec![13.0; n],
+            F::Rosenbrock | F::Levy => vec![1.0; n],
+            F::ShiftedGriewank => vec![123.0; n],
+            F::ShiftedSchwefel => vec![13.0; n],
             F::ShiftedEllipsoid | F::ShiftedSteepEllipsoid => {
                 (0..n).map(|i| 60.0 - (29 * i % 31) as f64).collect()
             }
             F::ShiftedRotatedAckley => {
                 (0..n).map(|i| 11.0 + 7.0 * ((37 * i % 11) as f64 / 11.0 - 0.5)).collect()
             }
-            _ => std::vec![0.0; n],
+            _ => vec![0.0; n],
         }
     }
 

@@ -50,13 +50,12 @@ fn complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
 #[ignore = "campaign: .ci/full"]
 fn twenty_complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
     let runs = |drive, perturbations: &[Perturbation]| {
-        let options: Vec<_> = (1..=20)
-            .map(|seed| SimulationOptions {
-                drive,
-                perturbations: perturbations.to_vec(),
-                ..SimulationOptions::with_seed(seed)
-            })
-            .collect();
+        let perturbed = |seed| SimulationOptions {
+            drive,
+            perturbations: perturbations.to_vec(),
+            ..SimulationOptions::with_seed(seed)
+        };
+        let options: Vec<_> = (1..=20).map(perturbed).collect();
         identify_many::<2, 13>(&leg(), &options).expect("they run")
     };
     let ideal = runs(DriveModel::Ideal, &[]);

@@ -20,10 +20,8 @@ struct Sample {
 
 fn table(name: &str) -> Vec<Vec<f64>> {
     let mut reader = csv::Reader::from_path(format!("{FOLDER}/{name}")).unwrap();
-    reader
-        .records()
-        .map(|record| record.unwrap().iter().map(|field| field.parse().unwrap()).collect())
-        .collect()
+    let row = |record: csv::StringRecord| record.iter().map(|field| field.parse().unwrap()).collect();
+    reader.records().map(|record| row(record.unwrap())).collect()
 }
 
 fn samples() -> Vec<Sample> {
@@ -33,11 +31,8 @@ fn samples() -> Vec<Sample> {
         .zip(rows.chunks(2))
         .map(|(line, rows)| {
             let pair = |first: usize| [line[first], line[first + 1]];
-            assert_eq!(
-                (rows[0][0], rows[0][1], rows[1][1]),
-                (line[0], 1.0, 2.0),
-                "the files have different rows"
-            );
+            let numbers = [rows[0][0], rows[0][1], rows[1][1]];
+            assert_eq!(numbers, [line[0], 1.0, 2.0], "the files have different rows");
             Sample {
                 state: JointState { q: pair(1), qd: pair(3), qdd: pair(5) },
                 rigid: pair(7),
@@ -56,12 +51,8 @@ fn leg() -> (Chain<f64, 2>, LegParameters<f64, 2>, Vector3<f64>) {
         serde_json::from_str(&std::fs::read_to_string(format!("{FOLDER}/truth.json")).unwrap()).unwrap();
     let number = |value: &Value| value.as_f64().unwrap();
     let geometry = [0, 1].map(|joint: usize| {
-        let numbers = &truth["dh"][joint];
-        DenavitHartenberg {
-            alpha: number(&numbers["alpha"]),
-            a: number(&numbers["a"]),
-            d: number(&numbers["d"]),
-        }
+        let [alpha, a, d] = ["alpha", "a", "d"].map(|name| number(&truth["dh"][joint][name]));
+        DenavitHartenberg { alpha, a, d }
     });
     let parameters = [0, 1].map(|joint: usize| {
         Parameter::ALL.map(|parameter| match parameter {

@@ -134,6 +134,15 @@ fn keep<const BYTES: usize>(store: &mut Store<Flash<BYTES, 2>>, number: u32) -> 
     }
 }
 
+/// Stores the operator's `number`th change in a flash.
+fn kept<const BYTES: usize>(
+    flash: Flash<BYTES, 2>,
+    number: u32,
+) -> (Result<Saved, SaveError>, Flash<BYTES, 2>) {
+    let mut store = store(flash);
+    (keep(&mut store, number), store.into_flash())
+}
+
 #[test]
 fn stored_data_is_present_after_a_start() {
     let mut first = store(Small::new(1));
@@ -148,21 +157,17 @@ fn stored_data_is_present_after_a_start() {
 
 #[test]
 fn writing_needs_a_drive_that_is_off() {
-    let fault = Fault { code: FaultCode::Overspeed, joint: 0 };
-    for state in [
-        DriveState::NotReadyToSwitchOn,
-        DriveState::SwitchOnDisabled,
-        DriveState::ReadyToSwitchOn,
-        DriveState::SwitchedOn,
-        DriveState::Fault { fault },
-    ] {
+    use DriveState::{
+        FaultReactionActive, NotReadyToSwitchOn, OperationEnabled, QuickStopActive, ReadyToSwitchOn,
+        SwitchOnDisabled, SwitchedOn,
+    };
+    let (fault, remaining_ticks) = (Fault { code: FaultCode::Overspeed, joint: 0 }, 1);
+    let off = DriveState::Fault { fault };
+    for state in [NotReadyToSwitchOn, SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, off] {
         assert!(Permit::from_state(state).is_some(), "{state:?}");
     }
-    for state in [
-        DriveState::OperationEnabled,
-        DriveState::QuickStopActive { remaining_ticks: 1 },
-        DriveState::FaultReactionActive { fault, remaining_ticks: 1 },
-    ] {
+    let damps = [QuickStopActive { remaining_ticks }, FaultReactionActive { fault, remaining_ticks }];
+    for state in [OperationEnabled].into_iter().chain(damps) {
         assert!(Permit::from_state(state).is_none(), "{state:?}");
     }
 }
@@ -175,18 +180,15 @@ fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
     let mut torn = [0_u32; 2];
     for number in 0..40 {
         let (before, clean) = content(flash.clone()).unwrap();
-        let mut whole = store(clean.clone());
-        keep(&mut whole, number).unwrap();
-        let done = whole.into_flash();
+        let (saved, done) = kept(clean.clone(), number);
         let (after, _) = content(done.clone()).unwrap();
+        assert_eq!(saved, Ok(Saved::Written));
         assert_ne!(before, after, "{number}: nothing was written");
         for cut in 1..=done.worked() - clean.worked() {
             let mut dying = clean.clone();
             dying.fail_after(Some(cut));
-            let mut store = store(dying);
-            let told = keep(&mut store, number);
-            let mut dead = store.into_flash();
-            assert!(dead.is_dead() && told == Err(SaveError::Flash), "{number}, byte {cut}: {told:?}");
+            let (saved, mut dead) = kept(dying, number);
+            assert!(dead.is_dead() && saved == Err(SaveError::Flash), "{number}, byte {cut}: {saved:?}");
             dead.fail_after(None);
             let (found, next) =
                 content(dead).unwrap_or_else(|error| panic!("{number}, byte {cut}: {error:?}"));
@@ -194,14 +196,11 @@ fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
             assert!(new || found == before, "{number}, byte {cut}: neither old nor new:\n{found:?}");
             torn[usize::from(new)] += 1;
             // Data stored afterwards is stored correctly.
-            let mut again = self::store(next);
-            keep(&mut again, number + 1).unwrap_or_else(|error| panic!("{number}, byte {cut}: {error:?}"));
-            let (last, _) = content(again.into_flash()).unwrap();
-            let (expected, _) = {
-                let mut straight = self::store(if new { done.clone() } else { clean.clone() });
-                keep(&mut straight, number + 1).unwrap();
-                content(straight.into_flash()).unwrap()
-            };
+            let [last, expected] = [next, if new { done.clone() } else { clean.clone() }].map(|flash| {
+                let (saved, flash) = kept(flash, number + 1);
+                saved.unwrap_or_else(|error| panic!("{number}, byte {cut}: {error:?}"));
+                content(flash).unwrap().0
+            });
             assert_eq!(last, expected, "{number}, byte {cut}: after the cut");
             cuts += 1;
         }
@@ -218,21 +217,16 @@ fn a_power_cut_during_a_repair_leaves_the_old_or_the_new() {
     let mut random = TestRandom::new(1);
     for number in 0..400 {
         let (before, clean) = content(flash).unwrap();
-        let mut whole = store(clean.clone());
-        keep(&mut whole, number).unwrap();
-        let done = whole.into_flash();
+        let (saved, done) = kept(clean.clone(), number);
+        saved.unwrap();
         let (after, _) = content(done.clone()).unwrap();
         let mut dying = clean.clone();
         dying.fail_after(Some(1 + random.below((done.worked() - clean.worked()).max(1))));
-        let mut first = store(dying);
-        let _ = keep(&mut first, number);
-        let mut dead = first.into_flash();
+        let (_, mut dead) = kept(dying, number);
         // Cuts the power twice more, within the work of a repair: a sector erased and records copied.
         for _ in 0..2 {
             dead.fail_after(Some(1 + random.below(3 * SECTOR as u64)));
-            let mut again = store(dead);
-            let _ = keep(&mut again, number);
-            dead = again.into_flash();
+            dead = kept(dead, number).1;
         }
         dead.fail_after(None);
         let (found, next) = content(dead).unwrap_or_else(|error| panic!("{number}: {error:?}"));
@@ -269,10 +263,7 @@ fn corrupt_flash_gives_stored_data_or_an_error() {
             Err(_) => refused += 1,
         }
     }
-    println!(
-        "one bit flipped, of {}: {whole_count} read whole, {partly} in part, {refused} refused",
-        8 * 1200
-    );
+    println!("one bit of 9600 flipped: {whole_count} read whole, {partly} in part, {refused} refused");
     let mut random = TestRandom::new(5);
     for _ in 0..300 {
         let mut foreign = Small::new(1);
@@ -390,9 +381,9 @@ fn few_erasures(models: u32, most: u32) {
     let flash = store.into_flash();
     let erased: u64 = flash.erasures().iter().map(|&erased| u64::from(erased)).sum();
     let worked = flash.worked() - erased * BOARD_SECTOR as u64;
+    let each = flash.erasures();
     println!(
-        "{models} models: {worked} bytes programmed, erasures {:?} of 10,000 permitted for a sector",
-        flash.erasures()
+        "{models} models: {worked} bytes programmed, erasures {each:?} of 10,000 permitted for a sector"
     );
     // A record with its log's header has 224 bytes: some 72 in a sector.
     assert!(flash.erasures().iter().all(|&erased| erased <= most), "{:?}", flash.erasures());
@@ -409,8 +400,8 @@ type Found = ([Option<StoredCalibration>; 2], [Option<u32>; 2], Vec<u8>, Small);
 fn found(flash: Small) -> Found {
     let mut storage = storage(flash);
     let calibrations = [0, 1].map(|axis| block_on(storage.calibration(axis)));
-    let generation = Key::MODELS
-        .map(|key| block_on(storage.model(key)).expect("readable").map(|kept| kept.provenance.generation));
+    let models = Key::MODELS.map(|key| block_on(storage.model(key)).expect("readable"));
+    let generation = models.map(|model| model.map(|model| model.provenance.generation));
     let mut bytes = [0; 64];
     let length = block_on(storage.objects(0, &mut bytes)).expect("readable");
     (calibrations, generation, bytes[..length].to_vec(), storage.into_flash())

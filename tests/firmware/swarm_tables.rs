@@ -70,18 +70,20 @@ fn bas(problem: TestProblem, runs: u64) -> Tally {
     Tally::new(problem, 0.1, runs, new)
 }
 
-/// Checks median and 95th percentile against limits, and that all runs succeed, in one precision.
-fn gate<T: Real>(function: TestFunction, dimension: usize, runs: u64, median: u32, most: u32) {
-    let tally = bso::<T>(TestProblem::new(function, dimension), 0.1, runs, BsoSettings::default());
-    let (middle, high, success) = (tally.quantile(0.5), tally.quantile(0.95), tally.success());
-    println!("{function:?} {dimension}: {middle} / {high} iterations, {:.1} %", 100.0 * success);
-    assert!(middle <= median && high <= most, "{function:?} {dimension}: {middle} / {high} iterations");
-    assert!(success >= 1.0, "{function:?} {dimension}: success {success}");
+/// The default swarm in double and in single precision.
+fn both(problem: TestProblem, runs: u64) -> [Tally; 2] {
+    let double = bso::<f64>(problem, 0.1, runs, BsoSettings::default());
+    [double, bso::<f32>(problem, 0.1, runs, BsoSettings::default())]
 }
 
+/// Checks median and 95th percentile against limits, and that all runs succeed, in both precisions.
 fn gate_both(function: TestFunction, dimension: usize, runs: u64, median: u32, most: u32) {
-    gate::<f64>(function, dimension, runs, median, most);
-    gate::<f32>(function, dimension, runs, median, most);
+    for tally in both(TestProblem::new(function, dimension), runs) {
+        let (middle, high, success) = (tally.quantile(0.5), tally.quantile(0.95), tally.success());
+        println!("{function:?} {dimension}: {middle} / {high} iterations, {:.1} %", 100.0 * success);
+        assert!(middle <= median && high <= most, "{function:?} {dimension}: {middle} / {high} iterations");
+        assert!(success >= 1.0, "{function:?} {dimension}: success {success}");
+    }
 }
 
 #[test]
@@ -104,10 +106,7 @@ fn adaptive_swarm_meets_its_table_in_thirty_dimensions() {
 fn rotation_and_shift_do_not_stop_the_adaptive_swarm() {
     // Known: 25 / 28 iterations, 100 % of 1,000 runs; 0 % without sharing.
     let problem = TestProblem::new(TestFunction::ShiftedRotatedAckley, 30);
-    for tally in [
-        bso::<f64>(problem, 0.1, 100, BsoSettings::default()),
-        bso::<f32>(problem, 0.1, 100, BsoSettings::default()),
-    ] {
+    for tally in both(problem, 100) {
         assert!(tally.success() >= 0.98, "success {}", tally.success());
         assert!(tally.quantile(0.5) <= 32 && tally.quantile(0.95) <= 45, "{}", tally.quantile(0.95));
     }
@@ -133,10 +132,7 @@ fn leaps_escape_ripples_that_restarts_do_not() {
     let scattered =
         BsoSettings::Adaptive(AdaptiveSettings { leaps: 0, patience: 25, ..AdaptiveSettings::default() });
     assert_eq!(bso::<f64>(problem, 0.1, 10, scattered).success(), 0.0);
-    for tally in [
-        bso::<f64>(problem, 0.1, 25, BsoSettings::default()),
-        bso::<f32>(problem, 0.1, 25, BsoSettings::default()),
-    ] {
+    for tally in both(problem, 25) {
         assert!(tally.success() >= 0.8, "success {}", tally.success());
         assert!(tally.quantile(0.5) <= 550, "{}", tally.quantile(0.5));
     }
@@ -172,10 +168,8 @@ fn adaptive_swarm_needs_fewer_evaluations_than_a_particle_swarm() {
 fn moving_only_the_best_saves_evaluations_in_the_plane() {
     // Known medians, best against all: 106 and 173, 362 and 772. The test requires three quarters. From 10
     // dimensions on all beetles move.
-    let all = BsoSettings::Adaptive(AdaptiveSettings {
-        without: Some(Part::BestMove),
-        ..AdaptiveSettings::default()
-    });
+    let without = Some(Part::BestMove);
+    let all = BsoSettings::Adaptive(AdaptiveSettings { without, ..AdaptiveSettings::default() });
     for function in [TestFunction::Ackley, TestFunction::Rastrigin] {
         let problem = TestProblem::new(function, 2);
         let best_move = bso::<f64>(problem, 0.1, 100, BsoSettings::default()).median_evaluations();

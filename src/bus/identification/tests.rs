@@ -1,5 +1,3 @@
-extern crate std;
-
 use super::super::dictionary::{Access, Type};
 use super::super::table::ROWS;
 use super::*;
@@ -56,10 +54,10 @@ fn leg() -> LegObjects<2, 8> {
     LegObjects::new(Plan::OneTime, 0x1234_5678_9ABC_DEF0, 3, 0)
 }
 
-fn with<T>(
+fn with<R: Results, T>(
     leg: &mut LegObjects<2, 8>,
-    results: &Numbers,
-    ask: impl FnOnce(&mut JointObjects<'_, Numbers, 2, 8>) -> T,
+    results: &R,
+    ask: impl FnOnce(&mut JointObjects<'_, R, 2, 8>) -> T,
 ) -> T {
     let mut axis = super::super::tests::axis();
     ask(&mut JointObjects { axis: &mut axis, joint: 1, leg, results })
@@ -113,15 +111,9 @@ fn a_copy_answers_every_object_like_the_original() {
     let mut compared = 0;
     for row in ROWS.iter().filter(|row| (0x2100..0x2140).contains(&row.index)) {
         for object in (row.sub..row.sub + row.subs).map(|sub| Object::at(row.index, sub)) {
-            let mut axis = super::super::tests::axis();
-            let mut leg = leg();
-            let copy =
-                JointObjects { axis: &mut axis, joint: 1, leg: &mut leg, results: &found }.read(object);
-            assert_eq!(
-                copy,
-                with(&mut self::leg(), &ACCEPTED, |objects| objects.read(object)),
-                "{object:x?}"
-            );
+            let copy = with(&mut leg(), &found, |objects| objects.read(object));
+            let original = with(&mut leg(), &ACCEPTED, |objects| objects.read(object));
+            assert_eq!(copy, original, "{object:x?}");
             compared += 1;
         }
     }
@@ -134,10 +126,7 @@ fn a_command_is_passed_once_and_settings_are_locked_meanwhile() {
     let write = |leg: &mut LegObjects<2, 8>, sub, value| {
         with(leg, &ACCEPTED, |objects| objects.write(Object::at(0x2100, sub), value))
     };
-    assert_eq!(
-        (write(&mut leg, 4, 1), write(&mut leg, 5, 7), write(&mut leg, 6, 0)),
-        (Ok(()), Ok(()), Ok(()))
-    );
+    assert_eq!([(4, 1), (5, 7), (6, 0)].map(|(sub, value)| write(&mut leg, sub, value)), [Ok(()); 3]);
     assert_eq!((leg.plan, leg.seed), (Plan::Sequential, 7));
     assert_eq!(write(&mut leg, 1, 1), Ok(()));
     assert_eq!((leg.take_request(), leg.take_request()), (Some(LegCommand::Identify), None));
@@ -159,7 +148,7 @@ fn the_log_delivers_each_sample_once_and_counts_lost_ones() {
         },
         segment: Some(Segment::Validation(2)),
     };
-    let (mut pushed, mut taken, mut next) = (0_u32, std::vec::Vec::new(), 5);
+    let (mut pushed, mut taken, mut next) = (0_u32, Vec::new(), 5);
     for _ in 0..50 {
         for _ in 0..next {
             log.push(&sample(pushed));
@@ -171,17 +160,15 @@ fn the_log_delivers_each_sample_once_and_counts_lost_ones() {
         pushed += 1;
         let size = log.bytes(0, &mut []);
         assert_eq!(size as usize, log.held() as usize * Log::<2, 8>::BYTES);
-        let mut block = std::vec![0; size as usize];
+        let mut block = vec![0; size as usize];
         for (index, piece) in block.chunks_mut(7).enumerate() {
             assert_eq!(log.bytes(7 * index as u32, piece), size);
         }
         for sample in block.chunks(24) {
             let word =
                 |index: usize| u32::from_le_bytes(sample[index..index + 4].try_into().expect("four bytes"));
-            assert_eq!(
-                (word(4), f32::from_bits(word(8)), f32::from_bits(word(16))),
-                (5, word(0) as f32, -1.0)
-            );
+            let [position, torque] = [8, 16].map(|index| f32::from_bits(word(index)));
+            assert_eq!((word(4), position, torque), (5, word(0) as f32, -1.0));
             taken.push(word(0));
         }
         log.hold(false);
@@ -197,11 +184,9 @@ fn nothing_is_stored_while_the_drive_may_switch() {
     let mut leg = leg();
     assert_eq!(with(&mut leg, &ACCEPTED, |objects| objects.store(false)), Ok(()));
     assert_eq!((leg.take_store(), leg.take_store()), (Some(false), None));
+    use crate::leg::{DriveState, JointStatus};
     let mut axis = super::super::tests::axis();
-    axis.update(&crate::leg::JointStatus {
-        drive: crate::leg::DriveState::OperationEnabled,
-        ..crate::leg::JointStatus::NONE
-    });
+    axis.update(&JointStatus { drive: DriveState::OperationEnabled, ..JointStatus::NONE });
     let mut objects = JointObjects { axis: &mut axis, joint: 0, leg: &mut leg, results: &ACCEPTED };
     assert_eq!(objects.store(true), Err(Abort::State));
 }

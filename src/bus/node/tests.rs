@@ -1,6 +1,4 @@
-extern crate std;
-
-use super::super::tests::Board;
+use super::super::tests::{self, Board};
 use super::super::{Abort, Frame};
 use super::*;
 
@@ -57,10 +55,8 @@ fn sync_and_emergency_refuse_cob_ids_of_other_messages() {
     }
     assert_eq!((board.write(0x1401, 1, 0x4000_0301, 4), board.write(0x1401, 1, 0x301, 4)), (Ok(()), Ok(())));
     // A disabled PDO or emergency message frees its COB-ID.
-    assert_eq!(
-        (board.write(0x1005, 0, 0x201, 4), board.write(0x1014, 0, 1 << 31 | 0x310, 4)),
-        (Ok(()), Ok(()))
-    );
+    assert_eq!(board.write(0x1005, 0, 0x201, 4), Ok(()));
+    assert_eq!(board.write(0x1014, 0, 1 << 31 | 0x310, 4), Ok(()));
     assert_eq!(board.write(0x1800, 1, 0x310, 4), Ok(()));
     assert_eq!((board.write(0x1005, 0, 0x80, 4), board.write(0x1014, 0, 0x81, 4)), (Ok(()), Ok(())));
 }
@@ -76,7 +72,7 @@ fn a_stopped_node_sends_its_heartbeat_and_nothing_else() {
     board.receive(0x080, &[]);
     board.receive(0x201, &[6, 0]);
     let frames = board.run(8);
-    let own: std::vec::Vec<_> = frames.iter().filter(|frame| frame.id() & 0x7F == 1).collect();
+    let own: Vec<_> = frames.iter().filter(|frame| frame.id() & 0x7F == 1).collect();
     assert_eq!(own, [&Frame::new(0x701, &[4]); 2]);
 }
 
@@ -157,9 +153,8 @@ fn a_counted_sync_without_valid_counter_is_ignored() {
 }
 
 /// Emergency codes of the first node among these frames.
-fn codes(frames: &[Frame]) -> std::vec::Vec<u16> {
-    let sent = frames.iter().filter(|frame| frame.id() == 0x81);
-    sent.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect()
+fn codes(frames: &[Frame]) -> Vec<u16> {
+    tests::codes(frames.iter().filter(|frame| frame.id() == 0x81)).iter().map(|(_, code)| *code).collect()
 }
 
 #[test]
@@ -207,7 +202,7 @@ fn another_pdo_does_not_end_the_error_of_a_late_one() {
     board.now_us += 101_000;
     assert_eq!(codes(&board.frames()), [0x8250]);
     board.receive(0x301, &[0; 4]);
-    assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), (std::vec::Vec::new(), Ok(0x11)));
+    assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), (Vec::new(), Ok(0x11)));
     board.receive(0x201, &[0, 0]);
     assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), ([0].into(), Ok(0)));
 }
@@ -218,9 +213,7 @@ fn a_sync_without_its_counter_is_an_error_until_a_valid_one() {
     assert_eq!(board.write(0x1019, 0, 10, 1), Ok(()));
     let mut emergency = |data: &[u8]| {
         board.receive(0x80, data);
-        let sent = board.run(80);
-        let own = sent.into_iter().find(|frame| frame.id() == 0x81);
-        own.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]))
+        codes(&board.run(80)).first().copied()
     };
     // A counter out of its range has the right length.
     let expected = [(&[1][..], None), (&[], Some(0x8240)), (&[], None), (&[11], None), (&[2], Some(0))];

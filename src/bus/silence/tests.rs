@@ -1,9 +1,8 @@
-extern crate std;
-
-use std::vec::Vec;
-
+use super::super::Frame;
 use super::super::tests::Board;
 use super::*;
+use crate::bus::Objects;
+use crate::bus::dictionary::Object;
 use crate::leg::DriveState;
 use crate::testing::TestRandom;
 
@@ -140,17 +139,16 @@ impl Board {
 fn a_silent_host_is_reported_and_stops_the_leg_by_its_option() {
     for (option, enabled) in [(0, true), (2, false), (3, false)] {
         let mut board = Board::moving();
-        for axis in 0..2 {
-            let object = crate::bus::dictionary::Object::at(0x6007, 0);
-            crate::bus::Objects::write(&mut board.axes[axis], object, option).expect("an option");
+        for axis in &mut board.axes {
+            axis.write(Object::at(0x6007, 0), option).expect("an option");
         }
         board.cycles(0x80, &[], 50);
         board.run(380);
         assert_eq!(board.drive, DriveState::OperationEnabled, "98 ms");
         let frames = board.run(40);
         assert_eq!(board.drive == DriveState::OperationEnabled, enabled, "{option}");
-        let reports: Vec<_> = frames.iter().filter(|frame| frame.data().starts_with(&[0x0F, 0xFF])).collect();
-        assert_eq!(reports.iter().map(|frame| frame.id()).collect::<Vec<_>>(), [0x81, 0x82]);
+        let reports = frames.iter().filter(|frame| frame.data().starts_with(&[0x0F, 0xFF]));
+        assert!(reports.map(Frame::id).eq([0x81, 0x82]), "{frames:?}");
         assert_eq!(board.read(0x603F, 0), Ok(0xFF0F));
         // The host sends again.
         board.receive(0, &[1, 0]);
@@ -160,8 +158,7 @@ fn a_silent_host_is_reported_and_stops_the_leg_by_its_option() {
         assert_eq!(board.drive == DriveState::OperationEnabled, enabled);
     }
     let mut board = Board::moving();
-    let object = crate::bus::dictionary::Object::at(0x6007, 0);
-    crate::bus::Objects::write(&mut board.axes[0], object, 1).expect("an option");
+    board.axes[0].write(Object::at(0x6007, 0), 1).expect("an option");
     board.cycles(0x201, &[15, 0], 50);
     board.run(440);
     assert_eq!(board.axes[0].take_fault(), Some(crate::leg::FaultCode::HostSilent));
@@ -200,9 +197,8 @@ fn a_host_that_stops_on_purpose_is_not_reported() {
     quiet(&mut board);
     // The detection is switched off (2013).
     let mut board = Board::moving();
-    for node in 0..2 {
-        let object = crate::bus::dictionary::Object::at(0x2013, 0);
-        crate::bus::Objects::write(&mut board.axes[node], object, 0).expect("off");
+    for axis in &mut board.axes {
+        axis.write(Object::at(0x2013, 0), 0).expect("off");
     }
     board.cycles(0x80, &[], 50);
     quiet(&mut board);
@@ -211,9 +207,7 @@ fn a_host_that_stops_on_purpose_is_not_reported() {
     let mut board = Board::moving();
     board.cycles(0x80, &[], 50);
     board.now_us += 3000 * MS;
-    for index in 0..2 {
-        board.nodes[index].stood_still(board.now_us);
-    }
+    board.nodes.iter_mut().for_each(|node| node.stood_still(board.now_us));
     board.run(380);
     assert_eq!(board.drive, DriveState::OperationEnabled);
 }

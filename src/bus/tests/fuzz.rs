@@ -103,7 +103,7 @@ fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
 fn random_frames_cause_no_panic_no_endless_answers_and_no_lone_joint() {
     let frames = std::env::var("SCARAB_FRAMES").ok().and_then(|text| text.parse().ok()).unwrap_or(50_000);
     let (most, seen) = play(1, frames);
-    std::println!(
+    println!(
         "{frames} frames: at most {most} frames in one tick, enabled/operational/aborts/answers {seen:?}"
     );
     // Two nodes may send a block of 127 segments each, and the other frames of one tick.

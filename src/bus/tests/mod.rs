@@ -1,13 +1,9 @@
 //! Test board: two nodes and a leg that follows every request. Tests of the whole bus are in the submodules.
 
-extern crate std;
-
 mod fuzz;
 mod mapping;
 mod session;
 mod values;
-
-use std::vec::Vec;
 
 use super::drive::{Axis, AxisConstants, Coupling, JointStatus, Mode};
 use super::*;
@@ -33,13 +29,31 @@ pub const LONG_TEXT: &str = match core::str::from_utf8(&BYTES) {
 pub const IDENTITY: Identity =
     Identity { product: 0x5CA2, revision: 1, texts: ["Scarab", "3.6", LONG_TEXT], ..Identity::scarab(7, "") };
 
-pub fn axis() -> Axis {
-    Axis::new(AxisConstants {
+/// Constants of a joint with every mode.
+pub fn constants() -> AxisConstants {
+    AxisConstants {
         rated_torque: NewtonMetre(40.0),
         rated_current: Ampere(20.0),
         modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
         ..AxisConstants::UNKNOWN
-    })
+    }
+}
+
+pub fn axis() -> Axis {
+    Axis::new(constants())
+}
+
+/// COB-ID and code of the emergency messages.
+pub fn codes<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Vec<(u16, u16)> {
+    let emergencies = frames.into_iter().filter(|frame| matches!(frame.id(), 0x81..=0xFF));
+    emergencies.map(|frame| (frame.id(), u16::from_le_bytes([frame.data()[0], frame.data()[1]]))).collect()
+}
+
+/// Value or abort code of an SDO answer.
+pub fn value(answer: [u8; 8]) -> Result<u32, u32> {
+    let [command, .., a, b, c, d] = answer;
+    let value = u32::from_le_bytes([a, b, c, d]);
+    if command == 0x80 { Err(value) } else { Ok(value) }
 }
 
 /// Two nodes, two joints, one drive.
@@ -118,11 +132,9 @@ impl Board {
     pub fn frames(&mut self) -> Vec<Frame> {
         let mut frames = Vec::new();
         for (node, axis) in self.nodes.iter_mut().zip(&mut self.axes) {
-            while let Some(frame) = node.poll(self.now_us, axis) {
-                frames.push(frame);
-                assert!(frames.len() < 1000, "a node sends without end");
-            }
+            frames.extend(core::iter::from_fn(|| node.poll(self.now_us, axis)).take(1000));
         }
+        assert!(frames.len() < 1000, "a node sends without end");
         frames
     }
 
@@ -147,17 +159,14 @@ impl Board {
     pub fn read(&mut self, index: u16, sub: u8) -> Result<u32, u32> {
         let [low, high] = index.to_le_bytes();
         let answer = self.ask([0x40, low, high, sub, 0, 0, 0, 0]).expect("an answer");
-        let value = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
         assert_eq!(answer[1..4], [low, high, sub]);
-        if answer[0] == 0x80 { Err(value) } else { Ok(value) }
+        value(answer)
     }
 
-    /// Writes a value with the given size.
-    pub fn write(&mut self, index: u16, sub: u8, value: u32, size: u8) -> Result<(), u32> {
-        let [low, high] = index.to_le_bytes();
-        let [a, b, c, d] = value.to_le_bytes();
+    /// Writes a number with the given size.
+    pub fn write(&mut self, index: u16, sub: u8, number: u32, size: u8) -> Result<(), u32> {
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), number.to_le_bytes());
         let answer = self.ask([0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]).expect("an answer");
-        let code = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
-        if answer[0] == 0x80 { Err(code) } else { Ok(()) }
+        value(answer).map(|_| ())
     }
 }

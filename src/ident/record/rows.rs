@@ -197,9 +197,6 @@ fn add_scaled<T: Real, const N: usize, const B: usize>(
 mod tests {
     use super::*;
 
-    extern crate std;
-    use std::vec::Vec;
-
     #[test]
     fn running_sums_equal_the_convolution_at_every_tenth_sample() {
         let low_pass = LowPass::<f64, 256>::new(8.0, 500.0).expect("fits");
@@ -219,11 +216,8 @@ mod tests {
         while let Some(output) = filter.finish(&low_pass) {
             outputs.push(output);
         }
-        assert_eq!(
-            outputs.len(),
-            1500_usize.div_ceil(DECIMATION),
-            "one for every tenth sample, ends included"
-        );
+        // One for every tenth sample, ends included.
+        assert_eq!(outputs.len(), 1500_usize.div_ceil(DECIMATION));
         assert_eq!(filter, RowFilter::new(Ends::Cut));
         for (number, output) in outputs.iter().enumerate() {
             let window = low_pass.weights().iter().enumerate();

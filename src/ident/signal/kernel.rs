@@ -225,8 +225,6 @@ fn sum<T: Real>(values: &[T]) -> T {
 mod tests {
     use super::*;
 
-    extern crate std;
-
     fn response<T: Real>(bandwidth: f64, frequency: f64) -> (f64, f64, f64) {
         let kernel = Kernel::<T, 512>::new(T::from_double(bandwidth), T::from_double(500.0)).expect("fits");
         let omega = 2.0 * core::f64::consts::PI * frequency;

@@ -103,9 +103,8 @@ mod tests {
             // through a curvature gain of 1e4.
             assert!((smoothed.position[0] - 0.7 - 0.4 * sine).abs() < 1.6e-4 * 0.4 + 1e-6);
             assert!((smoothed.velocity[0] - 0.4 * omega * cosine).abs() < 1.6e-4 * 0.4 * omega + 1e-5);
-            assert!(
-                (smoothed.acceleration[0] + 0.4 * omega * omega * sine).abs() < 1.6e-4 * 0.4 * 9.9 + 1e-3
-            );
+            let error = smoothed.acceleration[0] + 0.4 * omega * omega * sine;
+            assert!(error.abs() < 1.6e-4 * 0.4 * 9.9 + 1e-3);
             assert_eq!(smoothed.torque[0], (index - kernel.reach()) as f32);
             seen += 1;
         }

@@ -162,11 +162,8 @@ mod tests {
                 active += usize::from(at_low || at_high);
                 // Karush-Kuhn-Tucker: zero slope inside, outward downhill at a bound.
                 assert!(best[index] >= bounds.low[index] && best[index] <= bounds.high[index]);
-                assert!(
-                    slope[index].abs() < 1e-9
-                        || (at_low && slope[index] > 0.0)
-                        || (at_high && slope[index] < 0.0)
-                );
+                let slope = slope[index];
+                assert!(slope.abs() < 1e-9 || at_low && slope > 0.0 || at_high && slope < 0.0);
             }
         }
         assert!(active > 100, "the bounds must matter in this test: {active}");

@@ -1,7 +1,5 @@
 //! Records of random states for tests: a leg with or without the parameters that may be dropped.
 
-use nalgebra::Vector3;
-
 use super::estimate::Plan;
 use super::search::SearchState;
 use super::solver::Solver;
@@ -9,6 +7,7 @@ use crate::ident::record::choice::{Choice, DriveChoice};
 use crate::ident::record::motion_record::Record;
 use crate::ident::record::recorder::Recorder;
 use crate::ident::record::row_model::RowModel;
+use crate::model::testing::down_along_x;
 use crate::model::{
     BaseParameters, Chain, ColumnMask, DenavitHartenberg, JointState, LegParameters, Parameter, regressor,
 };
@@ -22,27 +21,33 @@ const STATES: u32 = 400;
 
 pub type Model<T> = RowModel<T, 2, B>;
 
+/// Mask of all columns.
+pub const ALL: ColumnMask<2> = [[true; 14]; 2];
+
+/// Rows of one or two parallel axes a thigh of `length` metres apart, with the columns of `mask`.
+pub fn planar<T: Real, const N: usize>(length: f64, mask: &ColumnMask<N>) -> RowModel<T, N, B> {
+    let length = |joint: usize| if joint == 0 { 0.0 } else { length };
+    let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
+    let chain = Chain::<f64, N>::new(&geometry).unwrap().convert();
+    let gravity = down_along_x();
+    RowModel::new(chain, gravity, BaseParameters::analyse(&chain, &gravity, mask).unwrap())
+}
+
 /// Model without the columns of `off`, with those of `choice` to be decided.
 pub fn model<T: Real>(choice: Choice, off: &[(usize, Parameter)]) -> Model<T> {
-    let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
-    let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
-    let chain = Chain::<f64, 2>::new(&geometry).unwrap().convert();
-    let gravity = Vector3::new(T::from_double(9.81), T::zero(), T::zero());
-    let mut mask: ColumnMask<2> = [[true; 14]; 2];
+    let mut mask = ALL;
     off.iter().for_each(|(joint, parameter)| mask[*joint][parameter.index()] = false);
-    let mut model = RowModel::new(chain, gravity, BaseParameters::analyse(&chain, &gravity, &mask).unwrap());
+    let mut model = planar(0.45, &mask);
     model.drive_choice = [DriveChoice { rotor: choice, constant: choice, ..DriveChoice::ALL }; 2];
     model
 }
 
 /// Leg with the knee's rotor inertia and both offsets, the candidates for dropping.
 pub fn leg(rotor: f64, offsets: [f64; 2]) -> LegParameters<f64, 2> {
-    let mut leg = [
+    [
         [0.03, 0.0, 0.0, 0.5, 0.0, 0.51, 1.7, 0.1, 0.0, 8.5, 0.12, 3.0, 1.2, offsets[0]],
         [0.01, 0.0, 0.0, 0.25, 0.0, 0.26, 0.86, -0.07, 0.0, 4.8, rotor, 2.0, 0.8, offsets[1]],
-    ];
-    leg[0][Parameter::OFF.index()] = offsets[0];
-    leg
+    ]
 }
 
 /// Noisy torque of a leg on random states; `angle` maps a random number in -1..1 to the hip's angle.

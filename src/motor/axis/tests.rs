@@ -34,6 +34,18 @@ impl Bench {
         bench
     }
 
+    /// The board's calls of a servo period after a tick: checks, and the joint's sample after the sixth.
+    fn follow_up(&mut self, tick: usize) {
+        match tick % 6 {
+            0 => self.axis.check_constants(),
+            2 => self.axis.check(),
+            5 => {
+                let _ = self.axis.joint_sample();
+            }
+            _ => {}
+        }
+    }
+
     fn tick(&mut self, request: AxisRequest) -> AxisCommand {
         let command = self.axis.tick(&self.sample, request);
         self.sample = self.motor.period(command);
@@ -45,15 +57,7 @@ impl Bench {
         for tick in 0..ticks {
             inject(&mut self.sample);
             self.tick(request);
-            if tick % 6 == 0 {
-                self.axis.check_constants();
-            }
-            if tick % 6 == 2 {
-                self.axis.check();
-            }
-            if tick % 6 == 5 {
-                let _ = self.axis.joint_sample();
-            }
+            self.follow_up(tick);
         }
     }
 

@@ -74,10 +74,8 @@ mod tests {
             let step = travelled - position;
             // 8 turns per second are 3.3e-4 of a turn per tick, reached in a quarter of a second: 5.6e-8 more
             // in each. Nine turns are rounded to half a millionth.
-            assert!(
-                (0.0..3.4e-4).contains(&step) && (step - speed).abs() < 2e-6,
-                "{tick}: {step} after {speed}"
-            );
+            assert!((0.0..3.4e-4).contains(&step), "{tick}: {step}");
+            assert!((step - speed).abs() < 2e-6, "{tick}: {step} after {speed}");
             assert_eq!(way.steady(travelled).is_some(), travelled > 1.0 && travelled <= 8.0);
             (position, speed) = (travelled, step);
         }

@@ -214,14 +214,10 @@ mod tests {
 
     #[test]
     fn values_contradict_beyond_the_share_of_the_stated_one_and_where_one_is_invalid() {
-        for (stated, found, contradicts) in [
-            (2.0, 2.49, false),
-            (2.0, 1.51, false),
-            (2.0, 2.51, true),
-            (2.0, 1.49, true),
-            (2.0, f32::NAN, true),
-        ] {
-            assert_eq!(Mismatch::beyond(0.25, stated, found).is_some(), contradicts, "{found}");
+        for (found, contradicts) in
+            [(2.49, false), (1.51, false), (2.51, true), (1.49, true), (f32::NAN, true)]
+        {
+            assert_eq!(Mismatch::beyond(0.25, 2.0, found).is_some(), contradicts, "{found}");
         }
         assert_eq!(Mismatch::beyond(0.25, 2.0, 4.0), Some(Mismatch { stated: 2.0, found: 4.0 }));
     }

@@ -88,10 +88,7 @@ impl IndexSearch {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
     use super::*;
-    use std::vec::Vec;
 
     const TURN: i32 = 8192;
     const GREATEST_STEP: i32 = 26;

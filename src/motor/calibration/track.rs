@@ -195,11 +195,8 @@ mod tests {
             // A single turn.
             (i32::MAX, i32::MIN, true),
         ] {
-            assert_eq!(
-                Travel { least, most, ..Travel::default() }.is_even(EVEN_SHARE),
-                even,
-                "{least} {most}"
-            );
+            let travel = Travel { least, most, ..Travel::default() };
+            assert_eq!(travel.is_even(EVEN_SHARE), even, "{least} {most}");
         }
     }
 }

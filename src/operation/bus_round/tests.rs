@@ -1,11 +1,8 @@
-extern crate std;
-
-use std::vec::Vec;
-
 use super::super::testing::{NOTHING, TestHardware, device, on_a_bus};
 use super::super::{HostEnds, Signals};
 use super::*;
 use crate::bus::device::{LegOrder, LegRequest, LegStatus};
+use crate::bus::tests::codes;
 use crate::hal::Frame;
 use crate::leg::{DriveEvent, DriveState, JointStatus, PowerRequest};
 
@@ -100,10 +97,8 @@ impl Bench {
 
     /// Codes of both nodes' emergency messages since the last call, the first node's first.
     fn emergencies(&mut self) -> Vec<(u16, u16)> {
-        let sent = core::mem::take(&mut self.hardware.can.sent).into_iter().map(|(frame, _, _)| frame);
-        let emergencies = sent.filter(|frame| matches!(frame.id(), 0x81..=0xFF));
-        let code = |frame: Frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]);
-        let mut emergencies: Vec<(u16, u16)> = emergencies.map(|frame| (frame.id(), code(frame))).collect();
+        let sent = core::mem::take(&mut self.hardware.can.sent);
+        let mut emergencies = codes(sent.iter().map(|(frame, _, _)| frame));
         emergencies.sort_by_key(|(id, _)| *id);
         emergencies
     }
@@ -233,9 +228,9 @@ fn one_store_runs_at_a_time_and_its_result_is_reported() {
     assert_eq!((bench.device.generation(), given(&bench).generation), (5, 5));
     end(&bench, false);
     bench.run(8);
-    let codes: Vec<u16> =
-        bench.emergencies().iter().filter(|(id, _)| *id == 0x81).map(|(_, code)| *code).collect();
-    assert_eq!((codes.first(), codes.last()), (Some(&0xFF0D), Some(&0x5530)), "{codes:x?}");
+    let mut codes = bench.emergencies();
+    codes.retain(|(id, _)| *id == 0x81);
+    assert_eq!((codes.first(), codes.last()), (Some(&(0x81, 0xFF0D)), Some(&(0x81, 0x5530))), "{codes:x?}");
     assert!(bench.storage.given().is_none() && bench.storage.idle().is_some());
     // The flash refused the second: a reset restores the first.
     bench.send(0, &[129, 0]);

@@ -1,8 +1,3 @@
-extern crate std;
-
-use std::boxed::Box;
-use std::vec::Vec;
-
 use super::super::axis_state::Order;
 use super::super::testing::TestHardware;
 use super::super::{Ends, EventQueue, Queues};
@@ -83,9 +78,8 @@ impl Bench {
             self.signals.statistics.servo_ticks.add();
         }
         servo.samples.iter_mut().for_each(|samples| while samples.dequeue().is_some() {});
-        while let Some(outcome) = housekeeping.outcomes[axis].dequeue() {
-            self.outcomes.push((axis, outcome));
-        }
+        let sent = core::iter::from_fn(|| housekeeping.outcomes[axis].dequeue());
+        self.outcomes.extend(sent.map(|outcome| (axis, outcome)));
         for (joint, damped) in self.damped.iter_mut().enumerate() {
             *damped |= self.signals.take_reported(joint).any(|fault| fault == BoardFault::CurrentTicks);
         }
@@ -129,9 +123,7 @@ impl Bench {
     /// Turns both rotors through a whole turn past their index. Returns whether no axis finds it at a wrong
     /// position.
     fn is_at_its_position(&mut self) -> bool {
-        for motor in &mut self.motors {
-            motor.speed = 60.0;
-        }
+        self.motors.iter_mut().for_each(|motor| motor.speed = 60.0);
         self.run(2600);
         let faults = self.loops.axes.each_ref().map(|axis| axis.stage.fault());
         faults == [None; 2] && self.causes() == 0
@@ -191,9 +183,7 @@ fn an_ordered_bandwidth_reaches_the_running_axis() {
 #[test]
 fn the_brake_resistor_has_no_duty_while_the_flash_is_written() {
     let mut bench = Bench::new(&CONFIGURATION);
-    for motor in &mut bench.motors {
-        motor.bus = 53.0;
-    }
+    bench.motors.iter_mut().for_each(|motor| motor.bus = 53.0);
     bench.run(3);
     assert!(bench.hardware.brake > 0.7, "{}", bench.hardware.brake);
     bench.signals.inhibit.raise(InhibitReason::Storing);

@@ -1,10 +1,7 @@
-extern crate std;
-
 use std::collections::VecDeque;
-use std::vec::Vec;
 
 use super::super::BusEnds;
-use super::super::testing::{TestHardware, commanded, on_a_bus};
+use super::super::testing::{self, TestHardware, commanded, on_a_bus};
 use super::*;
 use crate::bus::device::LegOrder;
 use crate::hal::{Contacts, JointSample};
@@ -107,7 +104,7 @@ const SAMPLE: Sample<2> = Sample {
 };
 
 fn order(request: Option<LegRequest>) -> LegOrder<2> {
-    LegOrder { commands: Some(commanded()), request, faults: [None; 2], may_return: [true; 2], refused: None }
+    testing::order(Some(commanded()), request)
 }
 
 const UP: PowerRequest = PowerRequest::EnableOperation;
@@ -207,13 +204,10 @@ fn the_bus_gets_a_report_every_second_tick_once_it_is_free() {
     let (cause, verdict) = (Cause::Friction, Verdict::ACCEPTED);
     assert!(!control.receive(Finding::Updated { cause, verdict, model: Some(model()) }));
     (0..4).for_each(|_| bench.report(&control, &plain));
-    let status: Vec<(bool, bool, bool, [bool; 2])> = bench
-        .status
-        .iter()
-        .map(|status| (status.refused.is_some(), status.blocked, status.held, status.change))
-        .collect();
-    let expected = [(true, false, true, [true; 2]), (false, false, true, [true; 2])];
-    assert_eq!((bench.hardware.bus_pended, &status[..]), (5, &expected[..]));
+    let status = bench.status.iter();
+    let status = status.map(|status| (status.refused.is_some(), status.blocked, status.held, status.change));
+    assert!(status.eq([(true, false, true, [true; 2]), (false, false, true, [true; 2])]));
+    assert_eq!(bench.hardware.bus_pended, 5);
 }
 
 #[test]

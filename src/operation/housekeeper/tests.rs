@@ -1,9 +1,6 @@
-extern crate std;
+use core::iter::from_fn;
 
-use std::boxed::Box;
-use std::vec::Vec;
-
-use super::super::testing::TestHardware;
+use super::super::testing::{TestHardware, picked};
 use super::super::{Ends, EventQueue, Queues};
 use super::*;
 use crate::hal::AxisCommand;
@@ -66,16 +63,10 @@ impl Bench {
             self.queues.split(&mut self.events);
         self.keeper.round(&mut housekeeping, &self.signals, &mut self.hardware);
         for (axis, orders) in current.orders.iter_mut().enumerate() {
-            while let Some(order) = orders.dequeue() {
-                self.orders.push((axis, order));
-            }
+            self.orders.extend(from_fn(|| orders.dequeue()).map(|order| (axis, order)));
         }
-        while let Some(one) = calibrated.dequeue() {
-            self.calibrated.push(one);
-        }
-        while let Some(record) = identification.notes.dequeue() {
-            self.records.push(record);
-        }
+        self.calibrated.extend(from_fn(|| calibrated.dequeue()));
+        self.records.extend(from_fn(|| identification.notes.dequeue()));
         while servo.requests.dequeue().is_some() {}
     }
 
@@ -196,13 +187,11 @@ fn the_records_show_both_values_of_a_contradiction_and_what_a_turning_motor_show
         let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
         bench.press();
         bench.ends(0, Outcome::Calibrated(calibration));
-        let found = bench.records.iter().find_map(|record| match *record {
-            Record::CalibrationFindings { joint: 1, flux_wb, friction_sigma_a, .. } => {
-                Some([flux_wb, friction_sigma_a])
-            }
-            _ => None,
-        });
-        assert_eq!(found, shown.then_some([findings.flux.0, findings.friction_sigma.0]));
+        let mut found = picked!(
+            bench.records,
+            Record::CalibrationFindings { joint: 1, flux_wb: a, friction_sigma_a: b, .. } => [*a, *b]
+        );
+        assert_eq!(found.next(), shown.then_some([findings.flux.0, findings.friction_sigma.0]));
     }
 }
 
@@ -275,24 +264,13 @@ fn after_an_erasure_a_reference_has_to_be_taken_again() {
     bench.signals.begin_servo();
     bench.ends(0, Outcome::StoodStill);
     bench.ends(1, Outcome::StoodStill);
-    let forgotten = |joint| Record::AxisFault { tick: 0, joint, name: "zero_forgotten" };
-    let recorded: Vec<Record<2>> = bench
-        .records
-        .iter()
-        .filter_map(|record| match record {
-            Record::AxisFault { joint, name, .. } => Some(Record::AxisFault { tick: 0, joint: *joint, name }),
-            _ => None,
-        })
-        .collect();
-    assert_eq!(recorded, [forgotten(1), forgotten(2)]);
+    let recorded = picked!(bench.records, Record::AxisFault { joint, name, .. } => (*joint, *name));
+    assert!(recorded.eq([(1, "zero_forgotten"), (2, "zero_forgotten")]), "{:?}", bench.records);
     // No new calibration is needed: the axes run on.
     assert!(!bench.signals.has_begun() && bench.keeper.is_calibrated());
     bench.hold(false, false);
     bench.hold(false, true);
-    let mut orders = bench.hold(false, false);
-    for _ in 0..6 {
-        orders.extend(bench.hold(false, false));
-    }
+    let orders: Vec<_> = (0..7).flat_map(|_| bench.hold(false, false)).collect();
     assert_eq!(orders, [(0, Order::SetCounts(0)), (1, Order::SetCounts(0))]);
     assert!(bench.signals.has_begun());
 }

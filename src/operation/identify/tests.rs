@@ -1,8 +1,3 @@
-extern crate std;
-
-use std::boxed::Box;
-use std::vec::Vec;
-
 use super::super::testing;
 use super::super::{Ends, LegEvent};
 use super::*;

@@ -1,11 +1,6 @@
 //! Tests of the servo's level with the control of the default leg, whose joints stand still.
 
-extern crate std;
-
-use std::boxed::Box;
-use std::vec::Vec;
-
-use super::super::testing::{RAMPS, TestHardware, VOLT_PER_CODE, commanded, ends, on_a_bus};
+use super::super::testing::{RAMPS, TestHardware, VOLT_PER_CODE, commanded, ends, on_a_bus, order, picked};
 use super::super::{AssistEnds, AssistQueues, BusEnds, Ends};
 use super::*;
 use crate::bus::device::{LegOrder, LegRequest, LegStatus};
@@ -116,8 +111,7 @@ impl Bench {
 
     /// The bus orders.
     fn order(&mut self, commands: Option<[JointCommand; 2]>, request: Option<LegRequest>) {
-        let order = LegOrder { commands, request, faults: [None; 2], may_return: [true; 2], refused: None };
-        assert!(self.bus.orders.enqueue(order).is_ok(), "full");
+        assert!(self.bus.orders.enqueue(order(commands, request)).is_ok(), "full");
     }
 
     fn tick(&mut self) -> Option<ControlOutput<2>> {
@@ -127,14 +121,10 @@ impl Bench {
         }
         let Self { level, control, ends, signals, hardware, .. } = self;
         let output = level.tick(control, LEG.gravity, &mut ends.servo, signals, hardware);
-        while self.is_received
-            && let Some(event) = self.ends.identification.events.dequeue()
-        {
-            self.events.push(event);
+        if self.is_received {
+            self.events.extend(core::iter::from_fn(|| self.ends.identification.events.dequeue()));
         }
-        while let Some(state) = self.ends.housekeeping.drive.dequeue() {
-            self.states.push(state);
-        }
+        self.states.extend(core::iter::from_fn(|| self.ends.housekeeping.drive.dequeue()));
         self.status = self.bus.status.dequeue().or(self.status);
         output
     }
@@ -230,11 +220,9 @@ fn a_restarted_leg_discards_the_zeros_of_homing() {
     bench.signals.begin_servo();
     bench.order(Some(hold), None);
     bench.run(10);
-    let after = position(&bench);
-    assert!(
-        after.iter().zip(before).all(|(after, before)| (after - before).abs() < 1e-6),
-        "{after:?} {before:?}"
-    );
+    for (after, before) in position(&bench).into_iter().zip(before) {
+        assert!((after - before).abs() < 1e-6, "{after} {before}");
+    }
 }
 
 #[test]
@@ -263,15 +251,10 @@ fn the_start_button_begins_nothing_while_a_host_has_the_drive() {
         bench.clear();
         bench.ask(ControlRequest::Identify);
         bench.tick();
-        let accepted: Vec<bool> = bench.events.iter().filter_map(accepted).collect();
-        assert_eq!((accepted, bench.control.activity().is_identifying()), ([!hosted].to_vec(), !hosted));
+        let accepted = picked!(bench.events, LegEvent::Record(Record::Request { accepted, .. }) => *accepted);
+        assert!(accepted.eq([!hosted]), "{hosted}");
+        assert_eq!(bench.control.activity().is_identifying(), !hosted);
     }
-}
-
-/// Whether a request was accepted, by its record.
-fn accepted(event: &LegEvent<2>) -> Option<bool> {
-    let LegEvent::Record(Record::Request { accepted, .. }) = event else { return None };
-    Some(*accepted)
 }
 
 #[test]

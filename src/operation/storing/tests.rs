@@ -1,7 +1,3 @@
-extern crate std;
-
-use std::vec::Vec;
-
 use super::super::testing::{TestHardware, TestWatchdog};
 use super::*;
 
@@ -66,12 +62,19 @@ impl Bench {
 
 /// Returns whether the write succeeded, and the number of flash accesses.
 fn change(storing: &mut Storing, bench: &mut Bench) -> (bool, u32) {
-    change_with(storing, bench, true)
+    change_with(storing, bench, true, |_| ())
 }
 
-fn change_with(storing: &mut Storing, bench: &mut Bench, says: bool) -> (bool, u32) {
+/// As [`change`], with a flash that succeeds or fails; `before` may change the board before each step.
+fn change_with(
+    storing: &mut Storing,
+    bench: &mut Bench,
+    says: bool,
+    before: impl Fn(&mut Bench),
+) -> (bool, u32) {
     let mut touched = 0;
     for _ in 0..1000 {
+        before(bench);
         let change = || {
             touched += 1;
             Some(says)
@@ -111,10 +114,8 @@ fn a_watchdog_with_the_starts_period_keeps_the_drive_off() {
 fn the_watchdog_is_stretched_during_a_flash_write() {
     let (mut storing, mut bench) = (settled(), Bench::off());
     assert_eq!(change(&mut storing, &mut bench), (true, 1));
-    assert_eq!(
-        (bench.hardware.watchdog.stretched, bench.hardware.watchdog.under_way, bench.causes()),
-        (false, None, 0)
-    );
+    let watchdog = bench.hardware.watchdog;
+    assert_eq!((watchdog.stretched, watchdog.under_way, bench.causes()), (false, None, 0));
     // 20 ms for the announcement, twice 48 ms for the watchdog, three steps, of which one is for the current
     // loops.
     assert_eq!(bench.storing, [(0, true), (119, false)]);
@@ -123,7 +124,7 @@ fn the_watchdog_is_stretched_during_a_flash_write() {
 #[test]
 fn a_failed_write_is_reported() {
     let (mut storing, mut bench) = (settled(), Bench::off());
-    assert_eq!(change_with(&mut storing, &mut bench, false), (false, 1));
+    assert_eq!(change_with(&mut storing, &mut bench, false, |_| ()), (false, 1));
     assert_eq!((bench.causes(), bench.hardware.watchdog.stretched), (0, false));
 }
 
@@ -152,20 +153,10 @@ fn a_low_supply_of_the_processor_inhibits_and_prevents_the_write() {
     assert_eq!(change(&mut settled(), &mut bench), (false, 0));
     assert_eq!((bench.causes(), bench.storing), (low, Vec::new()));
     // The supply falls during the announcement.
-    let (mut storing, mut bench, mut touched) = (settled(), Bench::off(), 0);
-    for _ in 0..1000 {
-        bench.hardware.processor_supply_is_low = bench.now_ms >= 10;
-        let change = || {
-            touched += 1;
-            Some(true)
-        };
-        if let Some(done) = bench.step(&mut storing, change) {
-            assert!(!done);
-            break;
-        }
-        bench.pass();
-    }
-    assert_eq!((touched, bench.causes(), bench.storing), (0, low, std::vec![(0, true), (21, false)]));
+    let mut bench = Bench::off();
+    let fall = |bench: &mut Bench| bench.hardware.processor_supply_is_low = bench.now_ms >= 10;
+    assert_eq!(change_with(&mut settled(), &mut bench, true, fall), (false, 0));
+    assert_eq!((bench.causes(), bench.storing), (low, vec![(0, true), (21, false)]));
     // A drive that is on is no reason to look at the supply, which would turn it off.
     let mut bench = Bench { permission: Permission::Follow, ..Bench::off() };
     bench.hardware.processor_supply_is_low = true;

@@ -1,8 +1,3 @@
-extern crate std;
-
-use std::vec;
-use std::vec::Vec;
-
 use super::*;
 use heapless::spsc::Queue;
 use scarab_boot::{HEADER_AT, Header, seal};

@@ -24,12 +24,20 @@ fn ask(power: PowerRequest) -> Request<2> {
     Request { power: Some(power), ..request(0.0) }
 }
 
+fn off() -> Monitor<2> {
+    Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ)
+}
+
+/// Requests each step up to enabling; returns the decision on the last one, which has its own observation.
+fn enable(monitor: &mut Monitor<2>, before: &Observation<2>, last: &Observation<2>) -> Decision<2> {
+    let _ = monitor.decide(before, &ask(PowerRequest::Shutdown));
+    let _ = monitor.decide(before, &ask(PowerRequest::SwitchOn));
+    monitor.decide(last, &ask(PowerRequest::EnableOperation))
+}
+
 fn enabled() -> Monitor<2> {
-    let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
-    for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
-        let _ = monitor.decide(&STANDING, &ask(power));
-    }
-    assert_eq!(monitor.state(), DriveState::OperationEnabled);
+    let mut monitor = off();
+    assert_eq!(enable(&mut monitor, &STANDING, &STANDING).state, DriveState::OperationEnabled);
     monitor
 }
 
@@ -135,9 +143,7 @@ fn a_fault_is_latched_until_reset_and_enabling_starts_over() {
     let _ = monitor.decide(&STANDING, &ask(PowerRequest::ResetFault));
     assert_eq!(monitor.state(), DriveState::SwitchOnDisabled);
     assert!(!monitor.decide(&STANDING, &ask(PowerRequest::EnableOperation)).command.enabled);
-    let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
-    let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
-    assert!(monitor.decide(&STANDING, &ask(PowerRequest::EnableOperation)).command.enabled);
+    assert!(enable(&mut monitor, &STANDING, &STANDING).command.enabled);
 }
 
 #[test]
@@ -157,31 +163,25 @@ fn three_rejected_readings_in_ten_milliseconds_are_a_fault() {
     }
 }
 
+/// The hip stands in the middle of its range; the knee is here and moves, rad/s.
+fn knee(position: Radian, speed: f32) -> Observation<2> {
+    let velocity = [RadianPerSecond::ZERO, RadianPerSecond(speed)];
+    Observation { position: [MIDDLE[0], position], velocity, ..STANDING }
+}
+
 #[test]
 fn a_refused_enabling_names_joint_and_reason() {
     let cases = [
-        (Observation { position: [MIDDLE[0], Radian(0.1)], ..STANDING }, RefusalReason::OutOfRange),
-        (
-            Observation { velocity: [RadianPerSecond::ZERO, RadianPerSecond(3.2)], ..STANDING },
-            RefusalReason::Moving,
-        ),
+        (knee(Radian(0.1), 0.0), RefusalReason::OutOfRange),
+        (knee(MIDDLE[1], 3.2), RefusalReason::Moving),
         // One that falls towards the end of its range: 0.5 rad/s 10 mrad before it.
-        (
-            Observation {
-                position: [MIDDLE[0], KNEE.low + Radian(0.01)],
-                velocity: [RadianPerSecond::ZERO, RadianPerSecond(-0.5)],
-                ..STANDING
-            },
-            RefusalReason::Moving,
-        ),
+        (knee(KNEE.low + Radian(0.01), -0.5), RefusalReason::Moving),
         (Observation { rejected: [false, true], ..STANDING }, RefusalReason::Encoder),
     ];
     for (observation, reason) in cases {
-        let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
+        let mut monitor = off();
         monitor.permit_return([true, false]);
-        let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
-        let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
-        let decision = monitor.decide(&observation, &ask(PowerRequest::EnableOperation));
+        let decision = enable(&mut monitor, &STANDING, &observation);
         assert_eq!(decision.refused, Some(Refusal { joint: 1, reason }));
         assert_eq!((decision.state, decision.command.enabled), (DriveState::SwitchedOn, false));
     }
@@ -192,17 +192,10 @@ fn a_joint_whose_angle_is_not_proven_is_enabled_at_rest_only() {
     for (first_motion, speed, is_enabled) in
         [(1.0, -1.0, true), (0.25, -1.0, false), (0.9, -0.11, false), (0.25, -0.09, true)]
     {
-        let moving = Observation {
-            position: [MIDDLE[0], KNEE.low + Radian(0.1)],
-            velocity: [RadianPerSecond::ZERO, RadianPerSecond(speed)],
-            ..STANDING
-        };
-        let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
+        let mut monitor = off();
         let joints = [JointShares { first_motion, ..JointShares::ALL }; 2];
         monitor.derate(&RAMPS.at(25.0, Volt(48.0), joints));
-        let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
-        let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
-        let decision = monitor.decide(&moving, &ask(PowerRequest::EnableOperation));
+        let decision = enable(&mut monitor, &STANDING, &knee(KNEE.low + Radian(0.1), speed));
         let refused = (!is_enabled).then_some(Refusal { joint: 1, reason: RefusalReason::Moving });
         assert_eq!(decision.refused, refused, "{first_motion} of the current, {speed} rad/s");
     }
@@ -210,12 +203,10 @@ fn a_joint_whose_angle_is_not_proven_is_enabled_at_rest_only() {
 
 /// Places the hip beyond its upper end and the knee beyond its lower end, rad, and requests enabling there.
 fn outside(hip: f32, knee: f32) -> (Monitor<2>, Observation<2>) {
-    let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), SERVO_RATE_HZ);
+    let mut monitor = off();
     let position = [HIP.high + Radian(hip), KNEE.low - Radian(knee)];
     let observation = Observation { position, ..STANDING };
-    for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
-        let _ = monitor.decide(&observation, &ask(power));
-    }
+    let _ = enable(&mut monitor, &observation, &observation);
     (monitor, observation)
 }
 
@@ -252,17 +243,12 @@ fn a_returning_joint_that_moves_outwards_stops_the_leg() {
     {
         // The joint comes nearer before it moves out again.
         let (mut monitor, observation) = outside(0.1, 0.0);
-        let at = |beyond: f32| Observation {
-            position: [HIP.high + Radian(beyond), observation.position[1]],
-            ..STANDING
-        };
+        let [_, knee] = observation.position;
+        let at = |beyond: f32| Observation { position: [HIP.high + Radian(beyond), knee], ..STANDING };
         assert_eq!(monitor.decide(&at(first), &request(0.0)).fault, None);
         let fault = monitor.decide(&at(then), &request(0.0)).fault;
-        assert_eq!(
-            fault.map(|fault| fault.code),
-            faulty.then_some(FaultCode::PositionLimit),
-            "{first} {then}"
-        );
+        let expected = faulty.then_some(FaultCode::PositionLimit);
+        assert_eq!(fault.map(|fault| fault.code), expected, "{first} {then}");
         // A requested stop is no fault, although the leg falls during it.
         let (mut monitor, _) = outside(0.1, 0.0);
         let _ = monitor.decide(&at(first), &ask(PowerRequest::QuickStop));
@@ -271,10 +257,7 @@ fn a_returning_joint_that_moves_outwards_stops_the_leg() {
     let (mut monitor, observation) = outside(0.1, 0.2);
     monitor.restart();
     monitor.permit_return([false; 2]);
-    for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
-        let _ = monitor.decide(&observation, &ask(power));
-    }
-    assert_ne!(monitor.state(), DriveState::OperationEnabled);
+    assert_ne!(enable(&mut monitor, &observation, &observation).state, DriveState::OperationEnabled);
 }
 
 #[test]
@@ -285,10 +268,8 @@ fn a_joint_beyond_its_end_stops_is_not_enabled() {
         let (mut monitor, observation) = outside(hip, knee);
         let asked = monitor.decide(&observation, &ask(PowerRequest::EnableOperation));
         let expected = refused.map(|joint| Refusal { joint, reason: RefusalReason::OutOfRange });
-        assert_eq!(
-            (asked.refused, monitor.state() == DriveState::OperationEnabled),
-            (expected, refused.is_none())
-        );
+        assert_eq!(asked.refused, expected);
+        assert_eq!(monitor.state() == DriveState::OperationEnabled, refused.is_none());
     }
 }
 

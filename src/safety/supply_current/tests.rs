@@ -1,6 +1,4 @@
 use super::*;
-use std::vec::Vec;
-extern crate std;
 
 const LIMITS: SupplyLimits =
     SupplyLimits { draw: Some(Ampere(10.0)), charge: Some(Ampere(4.0)), brake: Ohm(2.0) };
@@ -24,18 +22,17 @@ struct Leg {
 fn closed(leg: Leg, limits: SupplyLimits, resistor: bool) -> Vec<(f32, f32, Option<FaultCode>)> {
     let mut supply = SupplyCurrent::new(limits);
     let (mut torque, mut late, mut given) = (0.0_f32, [0.0_f32; 2], 0.0);
-    (0..2 * SECOND)
-        .map(|_| {
-            torque += 0.75 * (late[0] - torque);
-            let bridges = leg.full_a * if leg.power == 1 { torque } else { torque * torque };
-            let found = supply.advance(bridges * BUS.0, given, BUS);
-            let current = bridges + given * BUS.0 / 2.0;
-            given = if resistor { supply.brake_duty() } else { 0.0 };
-            let share = supply.shares()[usize::from(leg.full_a < 0.0)];
-            late = [late[1], leg.wanted.min(share)];
-            (current, share, found)
-        })
-        .collect()
+    let tick = |_| {
+        torque += 0.75 * (late[0] - torque);
+        let bridges = leg.full_a * if leg.power == 1 { torque } else { torque * torque };
+        let found = supply.advance(bridges * BUS.0, given, BUS);
+        let current = bridges + given * BUS.0 / 2.0;
+        given = if resistor { supply.brake_duty() } else { 0.0 };
+        let share = supply.shares()[usize::from(leg.full_a < 0.0)];
+        late = [late[1], leg.wanted.min(share)];
+        (current, share, found)
+    };
+    (0..2 * SECOND).map(tick).collect()
 }
 
 #[test]

@@ -2,8 +2,6 @@
 //!
 //! The joint is an inertia with viscous friction and gravity, a lagging drive and an encoder that counts.
 
-extern crate std;
-
 use super::*;
 use crate::hal::JointSample;
 use crate::motion::{Motion, Ramp};
@@ -248,12 +246,8 @@ fn nothing_that_is_not_finite_passes_the_tick_and_nothing_of_it_stays() {
                 assert_eq!(*output.drive(), DriveCommand::OFF, "{bad} in {field}");
             }
             let here = bench.pose();
-            for power in [
-                PowerRequest::ResetFault,
-                PowerRequest::Shutdown,
-                PowerRequest::SwitchOn,
-                PowerRequest::EnableOperation,
-            ] {
+            use PowerRequest::{EnableOperation, ResetFault, Shutdown, SwitchOn};
+            for power in [ResetFault, Shutdown, SwitchOn, EnableOperation] {
                 let output = bench.tick(MotionState::at_rest(here), None::<&NoModel>, Some(power));
                 assert!(output.position[1].is_finite() && output.velocity[1].is_finite());
             }

@@ -321,10 +321,8 @@ mod tests {
             rules.smell(beetle, &beetles, right, left);
         }
         for beetle in 0..N {
-            let within_reach = beetles.position[beetle]
-                .iter()
-                .enumerate()
-                .all(|(index, &entry)| abs(entry - (0.3 + 0.1 * index as f64)) < 0.3);
+            let position = &beetles.position[beetle];
+            let within_reach = (0..D).all(|index| abs(position[index] - (0.3 + 0.1 * index as f64)) < 0.3);
             rules.displace(beetle, &mut beetles, &mut random);
             if within_reach {
                 // Parabolas over whiskers of 0.1 leave 1e-16 / 0.01 of rounding.

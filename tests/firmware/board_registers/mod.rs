@@ -94,11 +94,8 @@ fn bridges_start_off_at_24_khz_with_119_ns_dead_time() {
         assert_eq!(registers.bits(base + 0x44, 15, 1), 0, "main output off");
         assert_eq!(registers.bits(base + 0x44, 14, 1), 0, "never switched on by hardware");
         assert_eq!(registers.bits(base + 0x44, 10, 2), 0b11, "idle levels are driven");
-        assert_eq!(
-            registers.bits(base + 0x44, 12, 1),
-            0,
-            "no break circuit: its pins are taken, so a failed crystal turns outputs off by the interrupt"
-        );
+        // No break circuit: its pins are taken, so a failed crystal turns outputs off by the interrupt.
+        assert_eq!(registers.bits(base + 0x44, 12, 1), 0);
         for channel in 0..3 {
             let shift = 8 * (channel % 2);
             let mode = registers.bits(base + 0x18 + 4 * (channel / 2), shift, 8);
@@ -146,10 +143,8 @@ fn the_converters_sample_the_shunts_of_the_board() {
     assert_eq!(registers.bits(ADC[0] + 0x04, 8, 1), 1, "scan");
     // Thermistors of the motors on IN0 (PA0) and IN1 (PA1): one regular conversion by software, 480 cycles.
     assert_eq!(converters::MOTORS, [0, 1]);
-    assert_eq!(
-        MOTOR_THERMISTORS.map(|pin| (pin.port, pin.number, pin.mode)),
-        [(b'A', 0, Mode::Analog), (b'A', 1, Mode::Analog)]
-    );
+    let pins = MOTOR_THERMISTORS.map(|pin| (pin.port, pin.number, pin.mode));
+    assert_eq!(pins, [(b'A', 0, Mode::Analog), (b'A', 1, Mode::Analog)]);
     assert_eq!((registers.at(ADC[0] + 0x2C), registers.at(ADC[0] + 0x10) & 0o77), (0, 0o77));
     let triggered = registers.at(ADC[0] + converters::CR2);
     assert_eq!(converters::START, triggered | 1 << 30, "the injected trigger stays");
@@ -424,10 +419,8 @@ fn images_are_linked_to_their_sectors_and_the_header_follows_the_vectors() {
         let before: u32 = (0..region.sector).map(kilobytes).sum();
         assert_eq!(region.address, 0x0800_0000 + (before << 10));
         for number in region.sector..region.sector + region.sectors {
-            assert_eq!(
-                (region.sector_bytes, flash::erase(number) >> 3 & 0xF),
-                (kilobytes(number) << 10, number)
-            );
+            assert_eq!(region.sector_bytes, kilobytes(number) << 10);
+            assert_eq!(flash::erase(number) >> 3 & 0xF, number);
         }
     }
 }

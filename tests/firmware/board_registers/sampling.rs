@@ -25,6 +25,7 @@ const WINDOW: i64 = 202;
 const DEAD: i64 = 20;
 
 /// Instants of each bridge in two PWM periods, in clocks.
+#[derive(Default)]
 struct Instants {
     /// Counter at zero: the middle of the lower zero vector.
     middles: [Vec<i64>; 2],
@@ -52,11 +53,7 @@ fn instants() -> Instants {
     // regular ones.
     let registers = started();
     let edges = [registers.bits(ADC[2] + 0x08, 20, 2), registers.bits(ADC[2] + 0x08, 28, 2)];
-    let mut found = Instants {
-        middles: Default::default(),
-        triggers: Default::default(),
-        switchings: Default::default(),
-    };
+    let mut found = Instants::default();
     let mut before = levels(&bridges);
     for _ in 0..2 * PERIOD {
         bridges.clock();
@@ -232,10 +229,8 @@ impl Count {
         let shares: Vec<f64> = (0..=steps).map(|step| self.share(0.1 * f64::from(step))).collect();
         let quiet = shares.iter().take_while(|share| **share == 0.0).count();
         assert!(quiet > 0, "disturbed even at zero voltage");
-        (
-            0.1 * (quiet - 1) as f64,
-            shares[quiet..].iter().fold(self.share(self.limit()), |most, share| most.max(*share)),
-        )
+        let most = shares[quiet..].iter().fold(self.share(self.limit()), |most, share| most.max(*share));
+        (0.1 * (quiet - 1) as f64, most)
     }
 }
 
@@ -243,10 +238,9 @@ impl Count {
 fn the_other_bridge_s_edges_miss_the_sample_up_to_24_volts() {
     let board = Count::of_the_board();
     let (quiet, most) = board.quiet_up_to();
+    let (limit, percent) = (board.limit(), 1e2 * most);
     println!(
-        "board: no edge up to {quiet:.1} V of {:.2} V; above in up to {:.1} % of the periods",
-        board.limit(),
-        1e2 * most
+        "board: no edge up to {quiet:.1} V of {limit:.2} V; above in up to {percent:.1} % of the periods"
     );
     // Edges of the timers alone, with the duties of a bridge without dead-time compensation.
     let plain = Count { dead_time: DeadTime::Uncompensated, switching: &[0], ..board };

@@ -11,19 +11,12 @@ const DAMPING: u64 = 1200;
 #[test]
 fn after_a_stop_the_model_returns_without_a_torque_step() {
     let mut pair = identified();
-    let gait = context().configuration.prove(context().motions.validation[1]).expect("proved at the start");
-    assert!(pair.leg.set_tracked(gait));
-    tick(&mut pair, Some(ControlRequest::Track { with_model: true }));
-    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
-    for _ in 0..SECOND {
-        tick(&mut pair, None);
-    }
+    track_gait(&mut pair, context());
+    run(&mut pair, SECOND);
     let in_motion = tick(&mut pair, None).servo.wanted_torque.map(|torque| torque.0.abs());
     tick(&mut pair, Some(ControlRequest::Power(PowerRequest::QuickStop)));
     // Wait until the leg hangs still: the damping by its speed does not come from the model.
-    for _ in 0..DAMPING + 5 * SECOND {
-        tick(&mut pair, None);
-    }
+    run(&mut pair, DAMPING + 5 * SECOND);
     assert!(pair.enable(context().gravity));
     let mut before = [0.0; JOINTS];
     for ticks in 0..SECOND {
@@ -51,9 +44,7 @@ fn an_identification_begun_before_the_verdict_keeps_both_halves_consistent() {
     assert!(!output.refused);
     assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Approach));
     // The verdict was expected within eight ticks.
-    for _ in 0..100 {
-        tick(&mut pair, None);
-    }
+    run(&mut pair, 100);
     assert_eq!(pair.leg.control().verdict(), None);
     assert_eq!(pair.leg.control().model().copied(), model);
     assert_eq!(*pair.leg.identification().model_monitor(), watched, "it monitors a model that is not in use");
@@ -87,12 +78,7 @@ fn a_refused_result_does_not_change_the_monitored_friction() {
     assert!(!verdict.is_accepted());
     assert_ne!(pair.leg.identification().model().stribeck, accepted, "the refused result has another curve");
 
-    let gait = context.configuration.prove(context.motions.validation[1]).expect("proved at the start");
-    assert!(pair.leg.set_tracked(gait));
-    tick(&mut pair, Some(ControlRequest::Track { with_model: true }));
-    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
-    for _ in 0..SECOND {
-        tick(&mut pair, None);
-    }
+    track_gait(&mut pair, &context);
+    run(&mut pair, SECOND);
     assert_eq!(pair.leg.identification().model().stribeck, accepted);
 }

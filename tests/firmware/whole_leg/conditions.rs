@@ -3,8 +3,6 @@
 use scarab::ident::Reason;
 use scarab_base::number::Number;
 use scarab_identify::formats::leg_file::PushesFile;
-use scarab_identify::report::RunReport;
-use scarab_rig::simulate::simulate;
 
 use super::*;
 
@@ -38,17 +36,14 @@ fn a_joint_with_a_third_of_its_torque_missing_is_refused() {
     }
 }
 
-fn pushed(per_minute: f64, torque_nm: f64) -> Result<RunReport, String> {
-    let leg =
-        LegFile { pushes: Some(PushesFile { per_minute, torque_nm, duration_s: 0.5 }), ..default_leg() };
-    simulate::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(1))
-        .map(|run| run.report)
-        .map_err(|error| error.to_string())
+fn pushed(per_minute: f64, torque_nm: f64) -> RunReport {
+    let pushes = Some(PushesFile { per_minute, torque_nm, duration_s: 0.5 });
+    simulated(&LegFile { pushes, ..default_leg() }, &SimulationOptions::with_seed(1))
 }
 
 #[test]
 fn hard_pushes_are_refused_with_every_number_known() {
-    let report = pushed(60.0, 60.0).expect("the drive holds against 60 N m");
+    let report = pushed(60.0, 60.0);
     // With a push every second, too much of the training motion is excluded, but not of the held-out motions.
     assert_eq!(report.reasons, ["outliers"]);
     let known = |number: &Number| number.known().is_some();
@@ -67,7 +62,7 @@ fn hard_pushes_are_refused_with_every_number_known() {
 
 #[test]
 fn pushes_above_the_drive_s_torque_cause_a_reported_fault() {
-    let report = pushed(200.0, 400.0).expect("it ends");
+    let report = pushed(200.0, 400.0);
     assert_eq!(report.reasons, ["input"]);
     let words = &report.findings.first().expect("the stop is reported").words;
     assert!(words.contains("the drive stopped during identification with fault 0x8400: joint "), "{words}");
@@ -78,10 +73,8 @@ fn a_leg_outside_the_prior_is_refused_not_clamped() {
     let mut leg = default_leg();
     // The box reaches 5 times the prior's Coulomb friction of 4 N m.
     leg.joints[1].truth.as_mut().expect("simulated").offset = 25.0;
-    let report = simulate::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report;
-    assert_eq!(report.reasons, ["unphysical"]);
+    let options = SimulationOptions::with_seed(1);
+    assert_eq!(simulated(&leg, &options).reasons, ["unphysical"]);
     leg.joints[1].truth.as_mut().expect("simulated").offset = 9.0;
-    assert!(
-        simulate::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report.accepted()
-    );
+    assert!(simulated(&leg, &options).accepted());
 }

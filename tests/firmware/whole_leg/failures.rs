@@ -24,9 +24,7 @@ fn identifying_again() -> Pair {
         let mut pair = identified();
         tick(&mut pair, Some(ControlRequest::Identify));
         assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Excite)));
-        for _ in 0..5 * SECOND {
-            tick(&mut pair, None);
-        }
+        run(&mut pair, 5 * SECOND);
         pair
     })
     .clone()
@@ -103,29 +101,17 @@ fn implausible_counts_end_the_identification_and_keep_the_old_model() {
 fn a_single_implausible_count_is_bridged_and_never_harmful() {
     // 30,000 counts are 26 degrees: a mean of eight with such a reading would move parameters by 20 sigma.
     for (joint, glitch) in [(1, i32::MAX), (0, 30_000), (1, -30_000), (0, 10_000), (1, 3_000)] {
-        glitch_is_bridged(joint, glitch);
-    }
-}
-
-fn glitch_is_bridged(joint: usize, glitch: i32) {
-    let mut pair = during_excitation();
-    let counts = &mut pair.sample.joints[joint].encoder_counts;
-    *counts = counts.wrapping_add(glitch);
-    tick(&mut pair, None);
-    assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Excite));
-    assert!(run_until(&mut pair, |pair| !matches!(activity(pair), Activity::Identify(_))));
-    assert!(is_enabled(&pair));
-    let verdict = pair.leg.control().verdict().expect("the motion did not continue");
-    if verdict.is_accepted() {
-        let estimate = pair.leg.identification().solver().expect("solved").estimate();
-        let background = &context().background;
-        let truth = background.model.base.project(background.truth.as_ref().expect("simulated"));
-        for (base, truth) in truth.iter().enumerate() {
-            let sigma = f64::from(estimate.sigma(base).expect("determined"));
-            assert!(
-                (f64::from(estimate.values[base]) - truth).abs() < 4.0 * sigma,
-                "joint {joint}, {glitch} counts: base {base}"
-            );
+        let mut pair = during_excitation();
+        let counts = &mut pair.sample.joints[joint].encoder_counts;
+        *counts = counts.wrapping_add(glitch);
+        tick(&mut pair, None);
+        assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Excite));
+        assert!(run_until(&mut pair, |pair| !matches!(activity(pair), Activity::Identify(_))));
+        assert!(is_enabled(&pair));
+        let verdict = pair.leg.control().verdict().expect("the motion did not continue");
+        if verdict.is_accepted() {
+            let worst = worst_pull(&pair.leg.identification().solver().expect("solved").estimate());
+            assert!(worst < 4.0, "joint {joint}, {glitch} counts: {worst} sigma");
         }
     }
 }
@@ -153,9 +139,7 @@ fn a_request_during_motion_is_refused_without_a_command_step() {
     let mut pair = during_validation();
     let phase = IdentifyPhase::Validate { motion: 2, step: Step::Run };
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(phase)));
-    for _ in 0..4 * SECOND {
-        tick(&mut pair, None);
-    }
+    run(&mut pair, 4 * SECOND);
     let before = pair.tick(None, context().gravity);
     let asked = pair.tick(Some(ControlRequest::Identify), context().gravity);
     assert!(asked.refused && !before.refused);

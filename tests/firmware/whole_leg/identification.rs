@@ -2,19 +2,15 @@
 
 use std::path::Path;
 
-use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::recording::Recording;
 use scarab_identify::formats::recording::import::Import;
-use scarab_identify::report::RunReport;
 use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
 use scarab_rig::identify::identify_one;
-use scarab_rig::options::SimulationOptions;
-use scarab_rig::simulate::simulate;
 
 use super::*;
 
-fn run(seed: u64) -> RunReport {
-    simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::with_seed(seed)).expect("it runs").report
+fn identified_with(seed: u64) -> RunReport {
+    simulated(&default_leg(), &SimulationOptions::with_seed(seed))
 }
 
 /// Errors of the base parameters in reported standard deviations.
@@ -39,19 +35,23 @@ fn more_legs_are_identified_validated_and_accepted_within_four_sigma() {
 
 fn within_four_sigma(seeds: &[u64]) {
     for &seed in seeds {
-        let report = run(seed);
-        assert!(report.accepted(), "seed {seed}: {:?}", report.reasons);
+        let report = identified_with(seed);
         assert_eq!((report.rank, report.base_parameters.len(), report.validation.len()), (13, 13, 6));
-        for (name, error) in errors_in_sigma(&report) {
-            // One of 39 normal errors exceeds four sigma for 0.25 % of all choices of seeds.
-            assert!(error.abs() < 4.0, "seed {seed}, {name}: {error:.1} sigma");
-        }
+        accepted_within_four_sigma(&report, &format!("seed {seed}"));
+    }
+}
+
+fn accepted_within_four_sigma(report: &RunReport, case: &str) {
+    assert!(report.accepted(), "{case}: {:?}", report.reasons);
+    for (name, error) in errors_in_sigma(report) {
+        // One of 39 normal errors exceeds four sigma for 0.25 % of all choices of seeds.
+        assert!(error.abs() < 4.0, "{case}, {name}: {error:.1} sigma");
     }
 }
 
 #[test]
 fn the_model_in_the_feedforward_tracks_gait_three_times_better() {
-    let report = run(1);
+    let report = identified_with(1);
     assert_eq!(report.tracking.len(), JOINTS);
     for joint in report.tracking {
         let without = joint.rms_deg_without_model.known().expect("tracked");
@@ -69,12 +69,12 @@ fn text(mut report: RunReport) -> String {
 
 #[test]
 fn equal_seeds_give_equal_reports_and_different_seeds_do_not() {
-    let same_swarm = run(7);
+    let same_swarm = identified_with(7);
     let first = text(same_swarm.clone());
-    assert_eq!(first, text(run(7)));
-    assert_ne!(first, text(run(8)));
+    assert_eq!(first, text(identified_with(7)));
+    assert_ne!(first, text(identified_with(8)));
     let other_swarm = SimulationOptions { swarm_seed: 8, ..SimulationOptions::with_seed(7) };
-    let other_swarm = simulate::<JOINTS, BASE>(&default_leg(), &other_swarm).expect("it runs").report;
+    let other_swarm = simulated(&default_leg(), &other_swarm);
     // The data are identical; the path of the search differs.
     assert_eq!(same_swarm.least_squares, other_swarm.least_squares);
     assert_ne!(same_swarm.bso.evaluations, other_swarm.bso.evaluations);
@@ -103,8 +103,8 @@ fn a_cloned_leg_and_world_continue_identically() {
 #[test]
 fn the_noise_free_bias_is_below_a_seventh_of_sigma() {
     let quiet = SimulationOptions { torque_noise_percent: Some(0.0), ..SimulationOptions::with_seed(1) };
-    let quiet = simulate::<JOINTS, BASE>(&default_leg(), &quiet).expect("it runs").report;
-    let noisy = run(1);
+    let quiet = simulated(&default_leg(), &quiet);
+    let noisy = identified_with(1);
     assert!(quiet.accepted(), "{:?}", quiet.reasons);
     for (quiet, noisy) in quiet.base_parameters.iter().zip(&noisy.base_parameters) {
         let error = quiet.value.known().expect("known") - quiet.truth.known().expect("simulated");
@@ -144,18 +144,12 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
 fn the_paper_s_chain_of_three_joints_is_identified() {
     let leg = LegFile::load("paper-chain").expect("shipped");
     let report = simulate::<3, 28>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report;
-    assert!(report.accepted(), "{:?}", report.reasons);
-    for (name, error) in errors_in_sigma(&report) {
-        assert!(error.abs() < 4.0, "{name}: {error:.1} sigma");
-    }
+    accepted_within_four_sigma(&report, "paper-chain");
 }
 
 #[test]
 fn the_mujoco_leg_is_identified() {
     let leg = LegFile::load("mujoco-leg").expect("shipped");
-    let report = simulate::<2, 13>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report;
-    assert!(report.accepted(), "{:?}", report.reasons);
-    for (name, error) in errors_in_sigma(&report) {
-        assert!(error.abs() < 4.0, "{name}: {error:.1} sigma");
-    }
+    let report = simulated(&leg, &SimulationOptions::with_seed(1));
+    accepted_within_four_sigma(&report, "mujoco-leg");
 }

@@ -19,13 +19,15 @@ mod trace;
 use std::sync::OnceLock;
 
 use scarab::hal::SERVO_RATE_HZ;
-use scarab::ident::Verdict;
+use scarab::ident::{Estimate, Verdict};
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase, Step};
 use scarab::model::planar::{BASE, JOINTS};
 use scarab::safety::DriveState;
 use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_identify::report::RunReport;
 use scarab_rig::options::SimulationOptions;
 use scarab_rig::pair;
+use scarab_rig::simulate::simulate;
 
 type Pair = pair::Pair<JOINTS, BASE>;
 type Context = pair::Context<JOINTS, BASE>;
@@ -54,12 +56,24 @@ fn enabled(leg: &LegFile, seed: u64) -> Pair {
     pair
 }
 
+/// Report of the firmware's identification of a leg.
+fn simulated(leg: &LegFile, options: &SimulationOptions) -> RunReport {
+    simulate::<JOINTS, BASE>(leg, options).expect("it runs").report
+}
+
 fn tick(pair: &mut Pair, request: Option<ControlRequest>) -> scarab::leg::ControlOutput<JOINTS> {
     pair.tick(request, context().gravity)
 }
 
 fn activity(pair: &Pair) -> Activity {
     pair.leg.control().activity()
+}
+
+/// Ticks so many times without a request.
+fn run(pair: &mut Pair, ticks: u64) {
+    (0..ticks).for_each(|_| {
+        tick(pair, None);
+    });
 }
 
 /// Ticks until `reached`, at most for the duration of an identification; returns whether it was reached.
@@ -71,6 +85,14 @@ fn run_until(pair: &mut Pair, reached: impl Fn(&Pair) -> bool) -> bool {
         tick(pair, None);
     }
     false
+}
+
+/// Tracks the 3 s gait, from its first step on.
+fn track_gait(pair: &mut Pair, context: &Context) {
+    let gait = context.configuration.prove(context.motions.validation[1]).expect("proved at the start");
+    assert!(pair.leg.set_tracked(gait));
+    tick(pair, Some(ControlRequest::Track { with_model: true }));
+    assert!(run_until(pair, |pair| activity(pair) == Activity::Track(Step::Run)));
 }
 
 /// Identifies; `None` if the leg stopped without a verdict.
@@ -87,9 +109,7 @@ fn during_excitation() -> Pair {
         let mut pair = enabled(&default_leg(), 1);
         tick(&mut pair, Some(ControlRequest::Identify));
         assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Excite)));
-        for _ in 0..10 * SECOND {
-            tick(&mut pair, None);
-        }
+        run(&mut pair, 10 * SECOND);
         pair
     })
     .clone()
@@ -115,9 +135,7 @@ fn during_validation() -> Pair {
         pair.evaluations = pair::EVALUATIONS_PER_TICK;
         let phase = IdentifyPhase::Validate { motion: 1, step: Step::Run };
         assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(phase)));
-        for _ in 0..2 * SECOND {
-            tick(&mut pair, None);
-        }
+        run(&mut pair, 2 * SECOND);
         pair
     })
     .clone()
@@ -134,6 +152,21 @@ fn identified() -> Pair {
         pair
     })
     .clone()
+}
+
+/// True values of the base parameters.
+fn true_base() -> [f64; BASE] {
+    let background = &context().background;
+    background.model.base.project(background.truth.as_ref().expect("simulated"))
+}
+
+/// Largest error of the base parameters in units of their sigma.
+fn worst_pull(estimate: &Estimate<f32, BASE>) -> f64 {
+    let pull = |(base, truth): (usize, &f64)| {
+        let sigma = estimate.sigma(base).expect("determined");
+        (f64::from(estimate.values[base]) - truth).abs() / f64::from(sigma)
+    };
+    true_base().iter().enumerate().map(pull).fold(0.0, f64::max)
 }
 
 fn is_enabled(pair: &Pair) -> bool {

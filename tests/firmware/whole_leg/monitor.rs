@@ -28,9 +28,7 @@ fn walking() -> Pair {
         let mut pair = identified();
         walk(&mut pair, true);
         assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
-        for _ in 0..10 * SECOND {
-            tick(&mut pair, None);
-        }
+        run(&mut pair, 10 * SECOND);
         assert_eq!(pair.leg.control().change(), None);
         pair
     })

@@ -4,16 +4,16 @@ use core::ops::RangeInclusive;
 
 use scarab_base::number::Number;
 use scarab_identify::formats::leg_file::PushesFile;
-use scarab_identify::report::RunReport;
-use scarab_rig::perturb::Perturbation;
-use scarab_rig::simulate::simulate;
 
 use super::*;
 
 fn perturbed(perturbation: &str, seed: u64) -> RunReport {
-    let perturbations = vec![perturbation.parse::<Perturbation>().expect("known")];
-    let options = SimulationOptions { perturbations, ..SimulationOptions::with_seed(seed) };
-    simulate::<JOINTS, BASE>(&default_leg(), &options).expect("a verdict").report
+    with_perturbations(&default_leg(), &[perturbation], seed)
+}
+
+fn with_perturbations(leg: &LegFile, perturbations: &[&str], seed: u64) -> RunReport {
+    let perturbations = perturbations.iter().map(|word| word.parse().expect("known")).collect();
+    simulated(leg, &SimulationOptions { perturbations, ..SimulationOptions::with_seed(seed) })
 }
 
 /// Errors that are refused for exactly one reason.
@@ -85,8 +85,7 @@ fn pushed(seeds: RangeInclusive<u64>) {
     let pushes = PushesFile { per_minute: 30.0, torque_nm: 10.0, duration_s: 0.3 };
     let leg = LegFile { pushes: Some(pushes), ..default_leg() };
     for seed in seeds {
-        let report =
-            simulate::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(seed)).expect("it ends").report;
+        let report = simulated(&leg, &SimulationOptions::with_seed(seed));
         println!("seed {seed}: {:?}", report.reasons);
         for base in report.base_parameters.iter().filter(|_| report.accepted()) {
             let known = |number: Number| number.known().expect("known");
@@ -109,12 +108,7 @@ fn pushes_during_validation_hide_no_error_with_another_seed() {
 
 fn pushed_during_validation(seeds: RangeInclusive<u64>) {
     let leg = LegFile::load("x2-rough").expect("shipped");
-    let run = |perturbations: &[&str], seed: u64| {
-        let perturbations =
-            perturbations.iter().map(|word| word.parse::<Perturbation>().expect("known")).collect();
-        let options = SimulationOptions { perturbations, ..SimulationOptions::with_seed(seed) };
-        simulate::<JOINTS, BASE>(&leg, &options).expect("a verdict").report
-    };
+    let run = |perturbations: &[&str], seed: u64| with_perturbations(&leg, perturbations, seed);
     for seed in seeds {
         let report = run(&[], seed);
         assert!(report.accepted(), "seed {seed}: {:?}", report.reasons);
@@ -188,16 +182,12 @@ fn more_valid_runs_are_accepted_far_within_the_limits() {
 
 fn valid(seeds: RangeInclusive<u64>) {
     for seed in seeds {
-        let report = simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::with_seed(seed))
-            .expect("it runs")
-            .report;
+        let report = simulated(&default_leg(), &SimulationOptions::with_seed(seed));
         assert!(report.accepted(), "seed {seed}: {:?}", report.reasons);
         let near = |test: &str| {
-            let of = report.findings.iter().filter(|finding| finding.test == test);
-            let shares = of.map(|finding| {
-                finding.value.known().expect("seen").abs() / finding.limit.known().expect("set")
-            });
-            shares.fold(0.0, f64::max)
+            let own = report.findings.iter().filter(|finding| finding.test == test);
+            let known = |number: Number| number.known().expect("seen");
+            own.map(|finding| known(finding.value).abs() / known(finding.limit)).fold(0.0, f64::max)
         };
         for test in ["training_error", "validation_error", "slow_residual", "link_length", "encoder_zero"] {
             let share = near(test);

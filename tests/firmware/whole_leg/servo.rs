@@ -27,9 +27,7 @@ fn amplitude_ratio(joint: usize, frequency_hz: f32) -> f64 {
     assert!(pair.leg.set_tracked(proved));
     tick(&mut pair, Some(ControlRequest::Track { with_model: false }));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
-    for _ in 0..motion.blend_ticks() + (CYCLES - 8) * motion.period_ticks() {
-        tick(&mut pair, None);
-    }
+    run(&mut pair, u64::from(motion.blend_ticks() + (CYCLES - 8) * motion.period_ticks()));
     let scale = context().configuration.joints[joint].scale;
     let (mut commanded, mut followed) = ([0.0; 2], [0.0; 2]);
     let ticks = 8 * motion.period_ticks();
@@ -39,9 +37,8 @@ fn amplitude_ratio(joint: usize, frequency_hz: f32) -> f64 {
         let phase = f64::from(index) / f64::from(motion.period_ticks()) * core::f64::consts::TAU;
         let (sine, cosine) = scarab::real::sin_cos(phase);
         let angle = f64::from(scale.anatomy.direction()) * truth + f64::from(scale.anatomy.zero_offset());
-        for (sums, value) in
-            [(&mut commanded, f64::from(output.motion.position_rad[joint])), (&mut followed, angle)]
-        {
+        let command = f64::from(output.motion.position_rad[joint]);
+        for (sums, value) in [(&mut commanded, command), (&mut followed, angle)] {
             sums[0] += value * sine;
             sums[1] += value * cosine;
         }

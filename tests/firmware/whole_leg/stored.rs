@@ -51,10 +51,7 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
 
     let mut configuration = context().configuration.clone();
     configuration.joints.iter_mut().for_each(|joint| joint.scale.mirrored = true);
-    assert!(
-        matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })),
-        "a model of the other side"
-    );
+    assert!(matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })), "other side");
 
     // Changes that leave the parameters' meaning unchanged do not refuse the model.
     let mut configuration = context().configuration.clone();
@@ -70,10 +67,8 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
 fn invalid_numbers_of_a_stored_model_are_refused_with_their_joint() {
     let stored = kept();
     let assured = stored.assured;
-    assert!(
-        assured.inertia_share > 0.5 && assured.coulomb_nm.iter().all(|bound| *bound > 0.0),
-        "{assured:?}"
-    );
+    assert!(assured.inertia_share > 0.5, "{assured:?}");
+    assert!(assured.coulomb_nm.iter().all(|bound| *bound > 0.0), "{assured:?}");
     let refused = |change: &dyn Fn(&mut StoredModel<JOINTS>), reason: RestoreError| {
         let mut changed = stored;
         change(&mut changed);
@@ -112,10 +107,7 @@ fn a_model_is_not_exchanged_in_motion_or_while_in_use() {
     assert!(!pair.leg.adopt(restored));
 
     let mut pair = identified();
-    let motion = context().configuration.prove(context().motions.validation[1]).expect("proved before");
-    assert!(pair.leg.set_tracked(motion));
-    tick(&mut pair, Some(ControlRequest::Track { with_model: true }));
-    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
+    track_gait(&mut pair, context());
     assert!(!pair.leg.adopt(restored), "tracking");
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Idle));
     assert!(!pair.leg.adopt(restored), "at rest, the model still holds the leg");

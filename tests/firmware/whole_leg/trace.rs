@@ -10,8 +10,7 @@ fn told(pair: &Pair) -> Vec<String> {
     let mut lines = Vec::new();
     while let Some(record) = report.advance(pair.leg.identification()) {
         let mut line = String::new();
-        Record::<JOINTS>::write(&record, lines.len() as u32, &mut line)
-            .expect("writing to a string cannot fail");
+        Record::<JOINTS>::write(&record, lines.len() as u32, &mut line).expect("a string takes every line");
         lines.push(line);
     }
     lines

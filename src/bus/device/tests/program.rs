@@ -5,7 +5,6 @@ use crate::bus::Abort;
 use crate::bus::program::{ProgramCommand, ProgramStatus};
 use crc::{CRC_16_XMODEM, Crc};
 use scarab_boot::Region;
-use std::vec;
 
 const CLEARED: ProgramStatus = ProgramStatus(ProgramStatus::STOPPED | ProgramStatus::CLEARED);
 
@@ -25,7 +24,7 @@ impl Receiver {
 
     /// Sends one frame; returns the answer of the first node at once, if it has one.
     fn send(&mut self, data: &[u8]) -> Option<[u8; 8]> {
-        self.bench.device.receive(&Frame::new(0x601, data), self.bench.now_us, None, &NOTHING);
+        self.bench.receive(0x601, data);
         self.round()
     }
 
@@ -116,24 +115,23 @@ fn segments_arrive_complete_however_slow_their_consumer_is() {
 
 #[test]
 fn an_image_that_does_not_fit_or_comes_at_the_wrong_time_is_refused() {
-    let abort = |answer: [u8; 8]| u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
     let begin = |length: u32| {
         let [a, b, c, d] = length.to_le_bytes();
         [0xC6, 0x50, 0x1F, 1, a, b, c, d]
     };
     let mut receiver = Receiver::new(1);
-    assert_eq!(abort(receiver.ask(&begin(Region::IMAGE.bytes() + 1))), Abort::TooLong.code());
-    assert_eq!(abort(receiver.ask(&[0x40, 0x50, 0x1F, 1, 0, 0, 0, 0])), Abort::WriteOnly.code());
+    assert_eq!(value(receiver.ask(&begin(Region::IMAGE.bytes() + 1))), Err(Abort::TooLong.code()));
+    assert_eq!(value(receiver.ask(&[0x40, 0x50, 0x1F, 1, 0, 0, 0, 0])), Err(Abort::WriteOnly.code()));
     for status in [0, ProgramStatus::STOPPED, CLEARED.0 | ProgramStatus::UNDER_WAY] {
         receiver.bench.device.update_program(ProgramStatus(status));
-        assert_eq!(abort(receiver.ask(&begin(1000))), Abort::State.code(), "{status:#x}");
+        assert_eq!(value(receiver.ask(&begin(1000))), Err(Abort::State.code()), "{status:#x}");
     }
     // A client that does not wait for the acknowledgement of a block loses its transfer, not the board.
     receiver.bench.device.update_program(CLEARED);
     receiver.per_round = 0;
     assert_eq!(receiver.ask(&begin(1000))[0], 0xA4);
     let answers: Vec<[u8; 8]> = (0..70).filter_map(|number| receiver.send(&[number % 32 + 1; 8])).collect();
-    assert_eq!(answers.first().map(|answer| abort(*answer)), Some(Abort::Sequence.code()));
+    assert_eq!(answers.first().map(|answer| value(*answer)), Some(Err(Abort::Sequence.code())));
 }
 
 #[test]
@@ -165,9 +163,7 @@ fn both_nodes_show_the_same_program_and_a_command_is_passed_on_once() {
     let mut bench = Bench::new();
     bench.device.update_program(CLEARED);
     for node in [1, 2] {
-        let frames = bench.send(0x600 + node, &[0x40, 0x57, 0x1F, 1, 0, 0, 0, 0]);
-        let answer = frames.iter().find(|frame| frame.id() == 0x580 + node).expect("an answer");
-        assert_eq!(answer.data()[4..], CLEARED.0.to_le_bytes());
+        assert_eq!(value(bench.ask(node, [0x40, 0x57, 0x1F, 1, 0, 0, 0, 0])), Ok(CLEARED.0));
     }
     bench.write(2, 0x1F51, 1, 3, 1);
     assert_eq!(bench.device.take_program_command(), Some(ProgramCommand::Clear));

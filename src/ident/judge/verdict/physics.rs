@@ -181,18 +181,11 @@ mod tests {
     use super::*;
     use crate::ident::record::factor::Factor;
     use crate::ident::record::motion_record::TorqueSize;
-    use crate::model::{BaseParameters, Chain, DenavitHartenberg};
+    use crate::ident::solve::testing::{ALL, B as BASE, planar};
 
     /// Number of sigma by which joint 0's friction is negative, with these values and a sigma of 0.1 each.
     fn negative(level: f32, half: f32, meaning: Constant) -> f32 {
-        use crate::model::planar::BASE;
-        let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
-        let geometry =
-            core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
-        let chain = Chain::<f64, 2>::new(&geometry).expect("two joints").convert();
-        let gravity = Vector3::new(9.81, 0.0, 0.0);
-        let base = BaseParameters::analyse(&chain, &gravity, &[[true; PARAMETERS_PER_JOINT]; 2]);
-        let mut model = RowModel::<f32, 2, BASE>::new(chain, gravity, base.expect("13 of them"));
+        let mut model = planar::<f32, 2>(0.45, &ALL);
         model.drive_choice[0].meaning = meaning;
         let torque = [TorqueSize { mean_absolute: 10.0, root_mean_square: 10.0, speed: 1.0 }; 2];
         let plain = Record::plain([Factor::new(), Factor::new()], torque, 100);

@@ -2,9 +2,6 @@
 
 use super::*;
 
-extern crate std;
-use std::vec::Vec;
-
 use crate::testing::TestRandom;
 
 const BANDWIDTH: f64 = 16.0;
@@ -25,7 +22,7 @@ impl Rows {
         let low_pass = low_pass();
         let size = real::sqrt(low_pass.energy());
         let weights: Vec<_> = low_pass.weights().iter().map(|weight| weight / size).collect();
-        let mut rows = Self { random: TestRandom::new(seed), window: std::vec![0.0; weights.len()], weights };
+        let mut rows = Self { random: TestRandom::new(seed), window: vec![0.0; weights.len()], weights };
         for _ in 0..20 {
             rows.next();
         }
@@ -77,7 +74,7 @@ fn false_alarms_are_as_rare_as_requested_and_not_much_rarer() {
         let scale = real::sqrt(margin);
         let settings = settings(asked, margin, 0.0);
         let found = mean((0..60).map(|seed| run_length(&settings, seed, scale, 0.0)));
-        std::println!("margin {margin}: {found} s, asked for {asked} s");
+        println!("margin {margin}: {found} s, asked for {asked} s");
         // The mean of 60 times with an exponential distribution is known to 13 %. Lorden's bound neglects the
         // overshoot and the reflections at zero, together worth a factor of 3 to 10. A bound wrong by the row
         // correlation would be off by a factor of e.

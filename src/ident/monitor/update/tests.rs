@@ -3,13 +3,9 @@
 use super::*;
 use crate::ident::record::motion_record::TorqueSize;
 use crate::ident::solve::estimate::{Plan, Problem};
-use crate::model::planar::BASE;
-use crate::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, Payload, regressor};
+use crate::ident::solve::testing::{ALL, B as BASE, planar};
+use crate::model::{JointState, LegParameters, Payload, regressor};
 use crate::testing::TestRandom;
-use nalgebra::Vector3;
-
-extern crate std;
-use std::vec::Vec;
 
 const SIGMA: f64 = 0.5;
 const TRUTH: LegParameters<f64, 2> = [
@@ -18,11 +14,7 @@ const TRUTH: LegParameters<f64, 2> = [
 ];
 
 fn model<T: Real>() -> RowModel<T, 2, BASE> {
-    let link = |a| DenavitHartenberg { alpha: 0.0, a, d: 0.0 };
-    let chain = Chain::<f64, 2>::new(&[link(0.0), link(0.45)]).expect("finite").convert();
-    let gravity = Vector3::new(9.81, 0.0, 0.0).map(T::from_double);
-    let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen base parameters");
-    RowModel::new(chain, gravity, base)
+    planar(0.45, &ALL)
 }
 
 /// Independent rows of random states: `speed` and `acceleration` bound them, `bias`

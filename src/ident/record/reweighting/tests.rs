@@ -1,7 +1,5 @@
 //! Pushes lose their weight; noise and torque that the columns explain do not.
 
-extern crate std;
-
 use super::*;
 use crate::ident::record::rows::FilteredRows;
 use crate::ident::record::stribeck::BANK;
@@ -66,9 +64,8 @@ fn error(window: &Blocks, weights: &Weights<f32>) -> f64 {
     let inverse = information.inverse(COLUMNS);
     let sigma =
         |column: usize| real::sqrt(inverse[column].iter().map(|element| element * element).sum::<f64>());
-    (0..COLUMNS)
-        .map(|column| (f64::from(found[column]) - TRUTH[column]).abs() / sigma(column))
-        .fold(0.0, f64::max)
+    let errors = (0..COLUMNS).map(|column| (f64::from(found[column]) - TRUTH[column]).abs() / sigma(column));
+    errors.fold(0.0, f64::max)
 }
 
 #[test]
@@ -77,14 +74,12 @@ fn pushes_lose_their_weight_and_the_parameters_come_back() {
         let window = motion(900, seed, pushes);
         let weights = weigh(&window, 0, 1.0);
         let (plain, robust) = (error(&window, &[1.0; LARGEST_BLOCKS]), error(&window, &weights));
-        std::println!(
-            "seed {seed}: {plain:.1} sigma plain, {robust:.1} robust, {:.2} lost",
-            lost(&window, &weights)
-        );
+        let lost = lost(&window, &weights);
+        println!("seed {seed}: {plain:.1} sigma plain, {robust:.1} robust, {lost:.2} lost");
         // Six parameters from a sixth fewer rows: 4.5 sigma in one of ten thousand sets.
         assert!(robust < 4.5 && plain > 2.0 * robust, "{robust} {plain}");
         // 2.4 of 18 s, in blocks of 0.16 and 0.32 s.
-        assert!((0.1..0.35).contains(&lost(&window, &weights)));
+        assert!((0.1..0.35).contains(&lost));
     }
 }
 
@@ -96,7 +91,7 @@ fn noise_alone_loses_next_to_nothing() {
         lost(&window, &weigh(&window, 0, 1.0))
     };
     let share = (0..SEEDS).map(of).sum::<f64>() / SEEDS as f64;
-    std::println!("{share:.5}");
+    println!("{share:.5}");
     // Half of the weight is lost beyond 3.3 standard deviations: one block of two thousand.
     assert!(share < 3e-3, "{share}");
 }

@@ -1,7 +1,5 @@
 //! The bank represents any speed in its range; surplus and speed are recovered from rows.
 
-extern crate std;
-
 use super::*;
 use crate::ident::record::reweighting::weighted;
 use crate::ident::record::rows::FilteredRows;
@@ -100,7 +98,7 @@ fn surplus_and_speed_come_back_from_rows_with_the_sigma_they_claim() {
                 biases[index] += error / SEEDS as f64;
             }
         }
-        std::println!("{surplus} N m, {speed} rad/s: mean square {squares:.2?}, mean {biases:.2?} sigma");
+        println!("{surplus} N m, {speed} rad/s: mean square {squares:.2?}, mean {biases:.2?} sigma");
         for index in 0..3 {
             // 60 squares of standard normal numbers scatter by 0.18 about one; speed and surplus are not
             // linear in the rows.

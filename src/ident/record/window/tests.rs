@@ -46,12 +46,11 @@ fn ten_hours_of_rows_in_single_precision_keep_the_parameters() {
     let all = weighted(&window, 0, &[1.0; LARGEST_BLOCKS]);
     let (truth, inverse) = (double.solve(COLUMNS), double.inverse(COLUMNS));
     let sigmas = |values: &[f32]| {
-        (0..COLUMNS)
-            .map(|column| {
-                let sigma = inverse[column].iter().map(|element| element * element).sum::<f64>();
-                (f64::from(values[column]) - truth[column]).abs() / real::sqrt(sigma)
-            })
-            .fold(0.0, f64::max)
+        let errors = (0..COLUMNS).map(|column| {
+            let sigma = inverse[column].iter().map(|element| element * element).sum::<f64>();
+            (f64::from(values[column]) - truth[column]).abs() / real::sqrt(sigma)
+        });
+        errors.fold(0.0, f64::max)
     };
     let (kept, lost) = (sigmas(&packed::solve(&all, COLUMNS, 1e-4)), sigmas(&naive.solve(COLUMNS)));
     assert!(kept < 0.1, "window {kept} sigma off");

@@ -1,9 +1,5 @@
 //! Regular samples pass, isolated outliers do not.
 
-extern crate std;
-
-use std::vec::Vec;
-
 use super::*;
 use crate::real::sin_cos;
 use crate::testing::TestRandom;
@@ -52,11 +48,9 @@ fn three_percent_of_outliers_are_found_and_leave_errors_of_the_noise() {
     let mut random = TestRandom::new(2);
     let clean: Vec<f64> = (0..100_000).map(|index| torque(index) + gaussian(&mut random)).collect();
     let hit: Vec<bool> = clean.iter().map(|_| random.uniform() < 0.03).collect();
-    let samples: Vec<f64> = clean
-        .iter()
-        .zip(&hit)
-        .map(|(value, hit)| if *hit { value + 30.0 * (2.0 * random.uniform() - 1.0) } else { *value })
-        .collect();
+    let samples = clean.iter().zip(&hit);
+    let samples: Vec<f64> =
+        samples.map(|(value, hit)| if *hit { value + random.within(30.0) } else { *value }).collect();
     let cleaned = run(Quantity::Torque, &samples);
     let (mut missed, mut false_alarms, mut squared) = (0, 0, 0.0);
     for (((cleaned, clean), sample), hit) in cleaned.iter().zip(&clean).zip(&samples).zip(&hit) {
@@ -80,12 +74,9 @@ fn three_outliers_in_a_row_are_found_and_a_step_is_not() {
         samples[number] += 25.0;
     }
     samples.iter_mut().skip(3200).for_each(|value| *value += 25.0);
-    let outlier: Vec<usize> = run(Quantity::Torque, &samples)
-        .iter()
-        .enumerate()
-        .filter_map(|(number, cleaned)| cleaned.outlier.then_some(number))
-        .collect();
-    assert_eq!(outlier, [1000, 1001, 1002, 2500, 2501]);
+    let cleaned = run(Quantity::Torque, &samples);
+    let outlier = (0..cleaned.len()).filter(|number| cleaned[*number].outlier);
+    assert!(outlier.eq([1000, 1001, 1002, 2500, 2501]));
 }
 
 #[test]

@@ -9,11 +9,8 @@ use crate::ident::record::recorder::Recorder;
 use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::bounds::{LinkPrior, prior_parameters};
 use crate::ident::solve::estimate::{Estimate, Plan, Problem};
-use crate::model::planar::BASE as B;
-use crate::model::{
-    BaseParameters, Chain, ColumnMask, DenavitHartenberg, JointState, LegParameters, Parameter, RigidBody,
-    regressor,
-};
+use crate::ident::solve::testing::{ALL, B, planar};
+use crate::model::{ColumnMask, JointState, LegParameters, Parameter, RigidBody, regressor};
 use crate::real::Real;
 use crate::swarm::{BsoSettings, Objective};
 use crate::testing::TestRandom;
@@ -55,14 +52,8 @@ fn wrong(random: &mut TestRandom, share: f64) -> [LinkPrior<f64>; 2] {
 }
 
 fn model<T: Real, const N: usize>(mask: &ColumnMask<N>) -> RowModel<T, N, B> {
-    let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
-    let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
-    let chain = Chain::<f64, N>::new(&geometry).unwrap().convert();
-    let gravity = Vector3::new(T::from_double(9.81), T::zero(), T::zero());
-    RowModel::new(chain, gravity, BaseParameters::analyse(&chain, &gravity, mask).unwrap())
+    planar(0.45, mask)
 }
-
-const ALL: ColumnMask<2> = [[true; 14]; 2];
 
 /// Torque of these base values on random states, with noise of 0.3 N m.
 fn record<const N: usize>(
@@ -107,11 +98,10 @@ fn complete<T: Real, const N: usize>(
     let estimate = problem.least_squares(Plan::OneTime);
     let mut completion = Completion::new(&model, &record, prior.as_ref(), effort);
     completion.start(&model, &problem.whole(), &estimate.values, &estimate.values);
-    loop {
+    let mut is_complete = false;
+    while !is_complete {
         assert!(completion.limits().allow(&completion.parameters()), "{:?}", completion.parameters());
-        if completion.step() {
-            break;
-        }
+        is_complete = completion.step();
     }
     assert!(completion.limits().allow(&completion.parameters()));
     (completion, estimate)
@@ -204,9 +194,8 @@ fn a_closed_form_that_is_a_leg_is_taken_as_it_is() {
     let record = record(&mut random, &model, &model.base.project(&prior_parameters(&truth())));
     let (completion, estimate) = complete::<f64, 2>(&ALL, &record, Some(&truth()), Effort::reference());
     assert_eq!(completion.steps(), 0);
-    let closed =
-        crate::ident::solve::completion::complete(&model, &estimate.values, &prior_parameters(&truth()))
-            .unwrap();
+    let prior = prior_parameters(&truth());
+    let closed = crate::ident::solve::completion::complete(&model, &estimate.values, &prior).unwrap();
     for (found, closed) in completion.parameters().as_flattened().iter().zip(closed.as_flattened()) {
         // Rounding of scaling there and back.
         assert!((found - closed).abs() < 1e-12);

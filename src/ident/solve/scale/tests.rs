@@ -3,20 +3,13 @@ use crate::ident::record::motion_record::TorqueSize;
 use crate::ident::record::row_model::RowModel;
 use crate::ident::signal::smoothing::Smoothed;
 use crate::ident::solve::estimate::{Plan, Problem};
-use crate::model::planar::BASE;
-use crate::model::{BaseParameters, Chain, DenavitHartenberg, LegParameters, Payload};
+use crate::ident::solve::testing::{ALL, B as BASE, planar};
+use crate::model::{LegParameters, Payload};
 use crate::testing::TestRandom;
 use nalgebra::Vector3;
 
-extern crate std;
-use std::vec::Vec;
-
 fn model<T: Real>() -> RowModel<T, 2, BASE> {
-    let link = |a: f64| DenavitHartenberg { alpha: T::zero(), a: T::from_double(a), d: T::zero() };
-    let chain = Chain::new(&[link(0.0), link(0.39)]).expect("finite");
-    let gravity = Vector3::new(T::from_double(9.81), T::zero(), T::zero());
-    let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen");
-    RowModel::new(chain, gravity, base)
+    planar(0.39, &ALL)
 }
 
 /// XX XY XZ YY YZ ZZ HX HY HZ M IA FC FV OFF of hip and knee.
@@ -126,18 +119,16 @@ fn the_reported_sigma_of_the_ratio_is_its_spread_and_honest_runs_are_consistent(
 
 #[test]
 fn a_wrong_mass_scales_the_constant_unnoticed_and_a_wrong_position_is_noticed() {
-    let (without, with) =
-        (record::<f64>(None, RATIOS, 0.3, 1), record::<f64>(Some(&ON_THE_KNEE), RATIOS, 0.3, 2));
+    let without = record::<f64>(None, RATIOS, 0.3, 1);
+    let with = record(Some(&ON_THE_KNEE), RATIOS, 0.3, 2);
     let stated = |mass: f64, x: f64| {
         let load = base_of(&Payload { mass, position: Vector3::new(x, 0.0, 0.0), ..ON_THE_KNEE });
         torque_constant_ratio(&without, &with, 1, &load).expect("felt")
     };
     let right = stated(5.0, 0.2);
     let heavy = stated(5.5, 0.2);
-    assert!(
-        (heavy.ratio * 1.1 - right.ratio).abs() < 1e-9,
-        "the product of mass and ratio is what is measured"
-    );
+    // The product of mass and ratio is what is measured.
+    assert!((heavy.ratio * 1.1 - right.ratio).abs() < 1e-9);
     assert!(right.is_consistent() && heavy.is_consistent());
     assert!(!stated(5.0, 0.4).is_consistent());
 }

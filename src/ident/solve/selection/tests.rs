@@ -23,12 +23,7 @@ fn what_is_there_is_kept_and_every_number_is_that_of_columns_that_are_on() {
     let (auto, on) = (model::<f32>(Choice::Auto, &[]), model::<f32>(Choice::On, &[]));
     for seed in 1..=20 {
         let chosen = solved(&auto, record(&auto, &truth, seed), 20);
-        assert_eq!(
-            dropped(&auto, chosen.record()),
-            [false; 3],
-            "seed {seed}: {:?}",
-            chosen.record().selection
-        );
+        assert_eq!(dropped(&auto, chosen.record()), [false; 3], "seed {seed}");
         let plain = solved(&on, record(&on, &truth, seed), 20);
         assert_eq!(chosen.least_squares(), plain.least_squares());
         assert_eq!(chosen.parameters(), plain.parameters());
@@ -89,10 +84,8 @@ fn a_column_that_the_motion_does_not_separate_from_others_is_dropped() {
     assert!(Problem::new(&two(&on), &on).whole().columns().len() < B);
     let chosen = select(&auto, two(&auto));
     let stage = Problem::new(&chosen, &auto).whole();
-    assert_eq!(
-        (dropped(&auto, &chosen), stage.columns().len(), stage.requested()),
-        ([false, true, false], 12, 12)
-    );
+    assert_eq!(dropped(&auto, &chosen), [false, true, false]);
+    assert_eq!((stage.columns().len(), stage.requested()), (12, 12));
 }
 
 #[test]

@@ -92,9 +92,8 @@ fn only_travel_in_a_row_with_a_back_emf_beyond_the_tolerance_counts() {
 #[test]
 fn more_than_the_first_speed_loses_the_position_and_brakes() {
     // 3.5 (0.44 V + 0.35 * 0.05 ohm * 10 A) / 2.9 mV s / 7.
-    let limit =
-        f64::from(SPEED_SHARE * Bench::unproven(0.0, |_| {}).axis.constants.model.frozen_speed(Ampere(10.0)))
-            / 7.0;
+    let frozen = Bench::unproven(0.0, |_| {}).axis.constants.model.frozen_speed(Ampere(10.0));
+    let limit = f64::from(SPEED_SHARE * frozen) / 7.0;
     assert!((limit - 106.0).abs() < 2.0, "{limit}");
     for (share, lost) in [(0.97, false), (1.03, true), (-1.03, true)] {
         let mut bench = Bench::unproven(0.0, |_| {});
@@ -155,11 +154,8 @@ fn a_warm_motor_s_first_motion_is_proven() {
                 motor.inductance = motor.inductance.map(|henry| henry * inductance);
             });
             bench.turn(speed, current, 1.0);
-            assert_eq!(
-                (bench.axis.is_proven(), bench.axis.fault()),
-                (true, None),
-                "{flux} {speed} {current}"
-            );
+            let found = (bench.axis.is_proven(), bench.axis.fault());
+            assert_eq!(found, (true, None), "{flux} {speed} {current}");
         }
     }
 }

@@ -1,9 +1,5 @@
 //! Faults that an axis detects by comparing voltages, currents, counts and codes.
 
-extern crate std;
-
-use std::format;
-
 use super::*;
 
 /// Servo periods in 20 ms and in 50 ms.
@@ -32,16 +28,11 @@ impl Bench {
             for tick in 0..6 {
                 inject(&mut self.sample);
                 self.tick(request(period));
-                match tick {
-                    0 => self.axis.check_constants(),
-                    2 => self.axis.check(),
-                    _ => {}
-                }
+                self.follow_up(tick);
                 if let Some(fault) = self.axis.fault() {
                     return Some((period, fault));
                 }
             }
-            let _ = self.axis.joint_sample();
         }
         None
     }
@@ -61,9 +52,7 @@ impl Bench {
             self.tick(ask(0.0));
         }
         self.motor.speed = 0.0;
-        for _ in 0..600 {
-            self.tick(ask(0.0));
-        }
+        self.run(ask(0.0), 600);
     }
 
     fn settled(speed: f64, current: f32) -> Self {
@@ -100,11 +89,7 @@ fn a_counter_that_stops_in_motion_is_seen_at_any_current_and_a_rotor_that_is_sto
             let mut bench = Bench::settled(speed, current);
             let found = bench.frozen(ask(current), TWENTY_MS);
             let frozen = matches!(found, Some((periods, AxisFault::EncoderFrozen)) if periods <= 48);
-            assert_eq!(
-                (found.is_some(), frozen),
-                (is_seen, is_seen),
-                "{speed} rad/s, {current} A: {found:?}"
-            );
+            assert_eq!([found.is_some(), frozen], [is_seen; 2], "{speed} rad/s, {current} A: {found:?}");
             // Stopped with 10,000 rad/s^2, five times what full current does to this motor with its gear.
             let mut bench = Bench::settled(speed, current);
             while bench.motor.speed != 0.0 {
@@ -194,16 +179,14 @@ fn a_frozen_counter_is_seen_while_torque_of_any_frequency_acts() {
                 move |sample: &mut AxisSample| (sample.encoder_count, sample.index_count) = (count, None)
             };
             let count = if begins_at_rest {
+                // Frozen at rest nothing shows, until the rotor turns.
+                assert_eq!(bench.until_fault_of(request, 80, freeze_at(at_rest)), None, "{case}");
+                bench.motor.speed = 1.5 * speed;
                 at_rest
             } else {
                 assert_eq!(bench.until_fault_of(request, 80, |_| {}), None, "{case}");
                 bench.sample.encoder_count
             };
-            // Frozen at rest nothing shows, until the rotor turns.
-            if begins_at_rest {
-                assert_eq!(bench.until_fault_of(request, 80, freeze_at(count)), None, "{case}");
-                bench.motor.speed = 1.5 * speed;
-            }
             let found = bench.until_fault_of(|period| request(period + 80), FIFTY_MS, freeze_at(count));
             let in_time = matches!(found, Some((periods, AxisFault::EncoderFrozen)) if periods <= TWENTY_MS);
             assert!(in_time, "{case}, sign {sign}, at rest {begins_at_rest}: {found:?}");
@@ -218,12 +201,7 @@ fn a_sound_axis_brakes_for_as_long_as_the_other_one_needs_it() {
         for tick in 0..4800 {
             assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::BRAKE, "{speed} rad/s, tick {tick}");
             bench.sample = bench.motor.period(AxisCommand::BRAKE);
-            if tick % 6 == 2 {
-                bench.axis.check();
-            }
-            if tick % 6 == 5 {
-                let _ = bench.axis.joint_sample();
-            }
+            bench.follow_up(tick);
         }
         let current = bench.motor.current[0].hypot(bench.motor.current[1]);
         assert_eq!(bench.axis.fault(), None, "{speed} rad/s: {current} A");
@@ -289,10 +267,8 @@ fn a_zero_that_drifts_by_six_amperes_is_seen_within_50_ms_of_motion() {
             let mut bench = Bench::settled(speed, current);
             bench.motor.current_offsets[shunt] += codes;
             let found = bench.until_fault(ask(current), FIFTY_MS, |_| {});
-            assert!(
-                matches!(found, Some((_, AxisFault::CurrentOffset))),
-                "{speed} rad/s, {current} A: {found:?}"
-            );
+            let found = found.map(|(_, fault)| fault);
+            assert_eq!(found, Some(AxisFault::CurrentOffset), "{speed} rad/s, {current} A");
             // A drift of 1 A is tolerated.
             let mut bench = Bench::settled(speed, current);
             bench.motor.current_offsets[shunt] += codes / 6.0;
@@ -326,12 +302,7 @@ fn a_warm_motor_that_is_reversed_again_and_again_raises_nothing() {
             bench.motor.speed = 220.0 * crate::real::sin_cos(time * 18.8).0;
             let current = 38.0 * crate::real::sin_cos(time * 44.0).0 as f32;
             bench.tick(ask(if step % 3000 < 1500 { current } else { -0.5 * current }));
-            if step % 6 == 2 {
-                bench.axis.check();
-            }
-            if step % 6 == 5 {
-                let _ = bench.axis.joint_sample();
-            }
+            bench.follow_up(step as usize);
             assert_eq!(bench.axis.fault(), None, "{resistance} {flux} {inductance} at {time} s");
         }
     }
@@ -416,10 +387,7 @@ fn a_code_that_is_wrong_every_other_tick_is_not_survived_for_long() {
                 bench.tick(ask(5.0));
             }
             assert_eq!(bench.axis.fault(), detected_after.map(|_| fault), "one of {of}");
-            assert!(
-                detected_after.is_none_or(|detected_after| detected_after == wrong),
-                "one of {of}: {wrong}"
-            );
+            assert!(detected_after.is_none_or(|after| after == wrong), "one of {of}: {wrong}");
         }
     }
 }

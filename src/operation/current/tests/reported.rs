@@ -1,7 +1,5 @@
 //! Every fault of the one list on the bus: current loops, servo and bus level of a leg with a host.
 
-extern crate std;
-
 use super::super::super::testing::{NOTHING, RAMPS, VOLT_PER_CODE, device, ends, on_a_bus};
 use super::super::super::{BusEnds, BusRound, Handover, ServoLevel, StoreJob};
 use super::*;
@@ -216,8 +214,8 @@ fn reports(mut bench: Bus, code: FaultCode, origin: Origin, case: &str) {
 fn every_fault_of_the_list_reaches_both_nodes_and_ends_by_a_reset() {
     for code in FaultCode::ALL {
         for origin in origins(code) {
-            reports(Bus::enabled(), code, origin, &std::format!("{code:?} by {origin:?}, enabled"));
-            reports(Bus::resting(), code, origin, &std::format!("{code:?} by {origin:?}, resting"));
+            reports(Bus::enabled(), code, origin, &format!("{code:?} by {origin:?}, enabled"));
+            reports(Bus::resting(), code, origin, &format!("{code:?} by {origin:?}, resting"));
         }
     }
 }

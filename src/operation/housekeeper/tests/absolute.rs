@@ -19,13 +19,11 @@ fn settings() -> HousekeepingSettings<2> {
 fn first_day() -> ([Option<StoredCalibration>; 2], [f64; 2]) {
     let mut machine = Machine::with(settings(), second_day().0, [None; 2]);
     machine.hold(false, false, 0.1);
-    machine.press();
-    machine.hold(true, false, 45.0);
+    machine.calibrate(45.0);
     assert_eq!(machine.results(), [(1, "done"), (2, "done")]);
     machine.hold(false, false, 0.1);
     let angles = machine.motors.each_ref().map(|motor| motor.angle);
-    machine.hold(false, true, 0.2);
-    machine.hold(false, false, 0.7);
+    machine.reference();
     assert!(machine.signals.has_begun());
     (machine.offered, angles)
 }
@@ -44,11 +42,7 @@ fn restarted(turned: [f64; 2], stored: [Option<StoredCalibration>; 2], zeros: [f
 
 /// Axis faults recorded by the housekeeping.
 fn faults(machine: &Machine) -> Vec<(u8, &'static str)> {
-    let fault = |record: &Record<2>| match record {
-        Record::AxisFault { joint, name, .. } => Some((*joint, *name)),
-        _ => None,
-    };
-    machine.records.iter().filter_map(fault).collect()
+    picked!(machine.records, Record::AxisFault { joint, name, .. } => (*joint, *name)).collect()
 }
 
 #[test]
@@ -58,8 +52,7 @@ fn a_second_day_needs_neither_hand_nor_reference() {
     // Far from the zero, by whole motor turns and parts of one; 300 rad are 344 degrees of the joint.
     for turned in [[40.0, -61.7], [-3.3, 120.0]] {
         let mut machine = restarted(turned, stored, zeros);
-        machine.press();
-        machine.hold(true, false, 2.9);
+        machine.calibrate(2.9);
         assert_eq!(machine.results(), [(1, "confirmed"), (2, "confirmed")]);
         machine.hold(true, false, 0.8);
         assert!(machine.signals.has_begun(), "no reference by the operator");
@@ -86,11 +79,10 @@ fn zeros_of_another_setting_or_before_a_load_are_not_used() {
             machine.signals.forget_stored();
         }
         machine.hold(false, false, 0.1);
-        machine.press();
-        machine.hold(true, false, if forgets { 46.0 } else { 3.7 });
+        machine.calibrate(if forgets { 46.0 } else { 3.7 });
         (machine.results(), machine.signals.has_begun())
     };
-    let confirmed = std::vec![(1, "confirmed"), (2, "confirmed")];
+    let confirmed = vec![(1, "confirmed"), (2, "confirmed")];
     assert_eq!(begins(settings(), stored, false), (confirmed.clone(), true));
     let mut other = settings();
     other.encoders[1].absolute.joint = Some(Direction::Down);
@@ -98,15 +90,14 @@ fn zeros_of_another_setting_or_before_a_load_are_not_used() {
     let mut other = settings();
     other.encoders[0].ratio = 49.0;
     assert_eq!(begins(other, stored, false), (confirmed, false));
-    assert_eq!(begins(settings(), stored, true), (std::vec![(1, "done"), (2, "done")], false));
+    assert_eq!(begins(settings(), stored, true), (vec![(1, "done"), (2, "done")], false));
 }
 
 #[test]
 fn an_offset_at_an_index_is_not_used_with_an_absolute_encoder() {
     let at_index = measured().stored().expect("an index");
     let mut machine = restarted([0.0; 2], [Some(at_index); 2], [0.3; 2]);
-    machine.press();
-    machine.hold(true, false, 3.0);
+    machine.calibrate(3.0);
     // The motor turns.
     assert_eq!(machine.results(), []);
     assert!(machine.most_ampere > 10.0);
@@ -117,12 +108,9 @@ fn a_joint_encoder_that_does_not_answer_delays_the_zero_and_refuses_a_stated_one
     let (stored, zeros) = first_day();
     let mut machine = restarted([40.0; 2], stored, zeros);
     machine.joint_steps[1] = None;
-    machine.press();
-    machine.hold(true, false, 3.7);
+    machine.calibrate(3.7);
     assert!(!machine.signals.has_begun());
-    machine.hold(false, false, 0.1);
-    machine.hold(false, true, 0.2);
-    machine.hold(false, false, 0.7);
+    machine.reference();
     assert!(!machine.signals.has_begun(), "its zero would be lost");
     machine.joint_steps[1] = Some(0);
     machine.hold(false, false, 0.7);
@@ -135,24 +123,18 @@ fn a_gear_that_slipped_while_the_power_was_off_needs_a_reference() {
     // A third of a motor turn, 2.4 degrees of the joint.
     let mut machine = restarted([40.0; 2], stored, zeros);
     machine.joint_steps[1] = Some(16_384 / 150);
-    machine.press();
-    machine.hold(true, false, 3.7);
+    machine.calibrate(3.7);
     assert_eq!(machine.results(), [(1, "confirmed"), (2, "confirmed")]);
     assert!(!machine.signals.has_begun());
     let refused =
         |record: &&Record<2>| matches!(record, Record::Request { name: "reference", accepted: false, .. });
     assert_eq!(machine.records.iter().filter(refused).count(), 1);
     // The operator states the pose.
-    machine.hold(false, false, 0.1);
-    machine.hold(false, true, 0.2);
-    machine.hold(false, false, 0.7);
+    machine.reference();
     assert!(machine.signals.has_begun());
     let joint_zero = |stored: Option<StoredCalibration>| stored.and_then(|stored| stored.joint_zero);
-    assert_ne!(
-        joint_zero(machine.offered[1]),
-        joint_zero(stored[1]),
-        "the new zero is offered to the storage"
-    );
+    // The new zero is offered to the storage.
+    assert_ne!(joint_zero(machine.offered[1]), joint_zero(stored[1]));
 }
 
 #[test]
@@ -162,8 +144,7 @@ fn encoders_that_contradict_each_other_brake_once_and_end_the_zero() {
         [(24, 0, "absolute_encoder"), (0, 16_384 / 120, "joint_encoder"), (0, -16_384 / 120, "joint_encoder")]
     {
         let mut machine = restarted([40.0; 2], stored, zeros);
-        machine.press();
-        machine.hold(true, false, 3.7);
+        machine.calibrate(3.7);
         assert!(machine.signals.has_begun());
         machine.counted[0] = machine.counted[0].wrapping_add(lost);
         machine.joint_steps[0] = Some(steps);
@@ -186,8 +167,7 @@ fn a_contradiction_of_an_axis_that_is_off_makes_its_motor_turn_next() {
         // Reset.
         machine.hold(false, true, 2.3);
         machine.hold(false, false, 0.3);
-        machine.press();
-        machine.hold(true, false, 3.0);
+        machine.calibrate(3.0);
         let is_confirmed = machine.results().contains(&(1, "confirmed"));
         assert_eq!(is_confirmed, lost == 0, "{:?}", machine.results());
     }
@@ -226,12 +206,10 @@ fn exchanged_lines_of_the_encoder_end_the_calibration_until_a_reset() {
     }
     machine.is_spi_forward = true;
     machine.hold(false, false, 0.1);
-    machine.press();
-    machine.hold(true, false, 12.0);
+    machine.calibrate(12.0);
     assert_eq!(faults(&machine), [(1, "absolute_encoder")]);
     assert_eq!(machine.results(), [(1, "interrupted")]);
     machine.hold(false, false, 0.1);
-    machine.press();
-    machine.hold(true, false, 0.1);
+    machine.calibrate(0.1);
     assert_eq!(machine.results(), [(1, "interrupted"), (1, "absolute_encoder")]);
 }

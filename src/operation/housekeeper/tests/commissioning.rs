@@ -18,32 +18,24 @@ fn state(bench: &Bench) -> u8 {
 
 #[test]
 fn a_host_commissions_the_board_without_a_button() {
+    use CommissioningStep::{Calibrate, Reference};
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
-    assert_eq!(ask(&mut bench, CommissioningStep::Calibrate, false), StepReport::new(StepResult::SwitchOpen));
-    assert_eq!(
-        ask(&mut bench, CommissioningStep::Reference, false),
-        StepReport::new(StepResult::NotCalibrated)
-    );
-    assert_eq!(ask(&mut bench, CommissioningStep::Calibrate, true), StepReport::new(StepResult::UnderWay));
+    assert_eq!(ask(&mut bench, Calibrate, false), StepReport::new(StepResult::SwitchOpen));
+    assert_eq!(ask(&mut bench, Reference, false), StepReport::new(StepResult::NotCalibrated));
+    assert_eq!(ask(&mut bench, Calibrate, true), StepReport::new(StepResult::UnderWay));
     assert_eq!(state(&bench), BoardState::CALIBRATING | BoardState::SWITCH_CLOSED);
     for axis in 0..2 {
         assert_eq!(bench.signals.board_status().report, StepReport::new(StepResult::UnderWay));
         bench.ends(axis, Outcome::Calibrated(measured()));
     }
     assert_eq!(bench.signals.board_status().report, StepReport::new(StepResult::Done));
-    assert_eq!(
-        ask(&mut bench, CommissioningStep::Reference, true),
-        StepReport::new(StepResult::SwitchClosed)
-    );
-    assert_eq!(ask(&mut bench, CommissioningStep::Reference, false), StepReport::new(StepResult::UnderWay));
+    assert_eq!(ask(&mut bench, Reference, true), StepReport::new(StepResult::SwitchClosed));
+    assert_eq!(ask(&mut bench, Reference, false), StepReport::new(StepResult::UnderWay));
     // A joint that stands for a second.
     (0..10).for_each(|_| drop(bench.hold(false, false)));
     assert_eq!(bench.signals.board_status().report, StepReport::new(StepResult::Done));
     assert_eq!(state(&bench), BoardState::CALIBRATED | BoardState::REFERENCED);
-    assert_eq!(
-        ask(&mut bench, CommissioningStep::Reference, false),
-        StepReport::new(StepResult::AlreadyDone)
-    );
+    assert_eq!(ask(&mut bench, Reference, false), StepReport::new(StepResult::AlreadyDone));
 }
 
 #[test]

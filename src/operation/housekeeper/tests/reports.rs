@@ -86,11 +86,9 @@ fn windings_are_assumed_warm_until_their_temperature_is_known() {
 #[test]
 fn each_gate_driver_is_recorded_with_its_own_status() {
     let statuses = |bench: &Bench, cause: InhibitReason| -> Vec<(u8, u32)> {
-        let status = |record: &Record<2>| match record {
-            Record::GateDriver { why, joint, status } if *why == cause.name() => Some((*joint, *status)),
-            _ => None,
-        };
-        bench.records.iter().filter_map(status).collect()
+        let own = |why: &str| why == cause.name();
+        picked!(bench.records, Record::GateDriver { why, joint, status } if own(why) => (*joint, *status))
+            .collect()
     };
     let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
     bench.hardware.gate_status = [0x0481_0300, 0x0402_0301];
@@ -120,19 +118,13 @@ fn a_reference_is_refused_while_a_joint_moves() {
             }
             bench.round();
         }
-        let answers: Vec<bool> = bench
-            .records
-            .iter()
-            .filter_map(|record| match record {
-                Record::Request { name: "reference", accepted, .. } => Some(*accepted),
-                _ => None,
-            })
-            .collect();
-        let stands = moving.is_none();
-        let expected: &[bool] = if stands { &[true] } else { &[true, false] };
-        assert_eq!((&answers[..], bench.signals.has_begun()), (expected, stands), "{moving:?}");
-        let set =
-            if stands { Vec::from([(0, Order::SetCounts(0)), (1, Order::SetCounts(0))]) } else { Vec::new() };
-        assert_eq!(bench.orders, set, "{moving:?}");
+        let answers =
+            picked!(bench.records, Record::Request { name: "reference", accepted, .. } => *accepted);
+        let (expected, set): (&[bool], &[_]) = match moving {
+            None => (&[true], &[(0, Order::SetCounts(0)), (1, Order::SetCounts(0))]),
+            Some(_) => (&[true, false], &[]),
+        };
+        assert!(answers.eq(expected.iter().copied()), "{moving:?}");
+        assert_eq!((&bench.orders[..], bench.signals.has_begun()), (set, moving.is_none()), "{moving:?}");
     }
 }

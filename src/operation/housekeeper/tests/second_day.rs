@@ -110,9 +110,7 @@ impl Machine {
         while let Some((axis, stored)) = calibrated.dequeue() {
             self.offered[axis] = stored;
         }
-        while let Some(record) = identification.notes.dequeue() {
-            self.records.push(record);
-        }
+        self.records.extend(from_fn(|| identification.notes.dequeue()));
         while identification.events.dequeue().is_some() {}
     }
 
@@ -137,24 +135,34 @@ impl Machine {
         self.hold(true, true, 0.1);
     }
 
+    /// The operator begins a calibration and holds the switch for some seconds.
+    pub(super) fn calibrate(&mut self, seconds: f64) {
+        self.press();
+        self.hold(true, false, seconds);
+    }
+
+    /// The operator takes the pose as reference.
+    pub(super) fn reference(&mut self) {
+        self.hold(false, false, 0.1);
+        self.hold(false, true, 0.2);
+        self.hold(false, false, 0.7);
+    }
+
     /// A hand turns both motors by an angle in rad, at 60 rad/s.
     pub(super) fn turn(&mut self, angle: f64) {
-        for motor in &mut self.motors {
-            (motor.driven, motor.speed) = (true, 60.0 * angle.signum());
-        }
+        self.drive(true, 60.0 * angle.signum());
         let contacts = self.hardware.contacts;
         self.hold(contacts.enabling, contacts.start, angle.abs() / 60.0);
-        for motor in &mut self.motors {
-            (motor.driven, motor.speed) = (false, 0.0);
-        }
+        self.drive(false, 0.0);
+    }
+
+    /// A hand holds both motors at a speed, rad/s, or lets go.
+    fn drive(&mut self, driven: bool, speed: f64) {
+        self.motors.iter_mut().for_each(|motor| (motor.driven, motor.speed) = (driven, speed));
     }
 
     pub(super) fn results(&self) -> Vec<(u8, &'static str)> {
-        let result = |record: &Record<2>| match record {
-            Record::Calibration { joint, result, .. } => Some((*joint, *result)),
-            _ => None,
-        };
-        self.records.iter().filter_map(result).collect()
+        picked!(self.records, Record::Calibration { joint, result, .. } => (*joint, *result)).collect()
     }
 
     pub(super) fn state(&self) -> DriveState {
@@ -192,17 +200,14 @@ fn a_second_day_is_enabled_without_motion_by_the_motors() {
     let mut machine = Machine::turned();
     assert_eq!(machine.most_ampere, 0.0);
     let begin = machine.motors.each_ref().map(|motor| motor.angle);
-    machine.press();
-    machine.hold(true, false, 2.9);
+    machine.calibrate(2.9);
     assert_eq!(machine.results(), [(1, "confirmed"), (2, "confirmed")]);
     for (motor, begin) in machine.motors.iter().zip(begin) {
         let moved = (motor.angle - begin) * 7.0 / core::f64::consts::TAU;
         assert!(moved.abs() < 0.005, "{moved} electrical turns");
     }
     // Reference, then by hand into the range: 0.4 rad of the joint.
-    machine.hold(false, false, 0.1);
-    machine.hold(false, true, 0.2);
-    machine.hold(false, false, 0.7);
+    machine.reference();
     assert!(machine.signals.has_begun());
     machine.turn(20.0);
     machine.hold(false, false, 0.3);
@@ -218,12 +223,8 @@ fn a_second_day_is_enabled_without_motion_by_the_motors() {
 
 #[test]
 fn the_operator_is_told_when_an_index_is_certain_and_when_no_more() {
-    let certain = |machine: &Machine| {
-        let index = |record: &Record<2>| match record {
-            Record::Index { joint, certain } => Some((*joint, *certain)),
-            _ => None,
-        };
-        machine.records.iter().filter_map(index).collect::<Vec<_>>()
+    let certain = |machine: &Machine| -> Vec<(u8, bool)> {
+        picked!(machine.records, Record::Index { joint, certain } => (*joint, *certain)).collect()
     };
     let (motors, stored) = second_day();
     let mut machine = Machine::new(motors, stored);
@@ -244,12 +245,10 @@ fn the_operator_is_told_when_an_index_is_certain_and_when_no_more() {
 fn an_interrupted_check_can_be_repeated_without_turning_the_joints_again() {
     let mut machine = Machine::turned();
     for _ in 0..2 {
-        machine.press();
-        machine.hold(true, false, 0.5);
+        machine.calibrate(0.5);
         machine.hold(false, false, 0.1);
     }
-    machine.press();
-    machine.hold(true, false, 2.9);
+    machine.calibrate(2.9);
     let interrupted = (1, "interrupted");
     assert_eq!(machine.results(), [interrupted, interrupted, (1, "confirmed"), (2, "confirmed")]);
 }
@@ -258,15 +257,10 @@ fn an_interrupted_check_can_be_repeated_without_turning_the_joints_again() {
 fn a_joint_that_still_moves_when_start_is_pressed_can_be_checked_afterwards() {
     let mut machine = Machine::turned();
     machine.hold(true, false, 0.1);
-    for motor in &mut machine.motors {
-        (motor.driven, motor.speed) = (true, 20.0);
-    }
+    machine.drive(true, 20.0);
     machine.hold(true, true, 0.1);
-    for motor in &mut machine.motors {
-        (motor.driven, motor.speed) = (false, 0.0);
-    }
-    machine.press();
-    machine.hold(true, false, 2.9);
+    machine.drive(false, 0.0);
+    machine.calibrate(2.9);
     assert_eq!(machine.results(), [(1, "turning"), (1, "confirmed"), (2, "confirmed")]);
 }
 

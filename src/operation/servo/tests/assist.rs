@@ -64,9 +64,7 @@ fn refusals_and_ends_are_recorded_with_their_reason() {
 fn without_an_answer_of_the_law_the_session_ends() {
     let mut bench = ready();
     bench.ask(ControlRequest::Assist(SHARES));
-    for _ in 0..60 {
-        bench.tick();
-    }
+    bench.run(60);
     // The law never had a share of the torque.
     assert!(!bench.control.activity().assists());
 }

@@ -87,8 +87,7 @@ fn too_much_current_into_the_supply_shorts_the_motors() {
 fn a_lost_host_is_the_fault_of_its_joint() {
     let mut bench = Bench::enabled();
     let faults = [None, Some(FaultCode::Heartbeat)];
-    let order = LegOrder { commands: None, request: None, faults, may_return: [true; 2], refused: None };
-    assert!(bench.bus.orders.enqueue(order).is_ok());
+    assert!(bench.bus.orders.enqueue(LegOrder { faults, ..order(None, None) }).is_ok());
     bench.tick();
     assert_eq!(bench.fault(), Some(Fault { code: FaultCode::Heartbeat, joint: 1 }));
 }

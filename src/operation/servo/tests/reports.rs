@@ -7,16 +7,13 @@ use crate::leg::Plan;
 use crate::safety::Winding;
 use crate::safety::winding::tests::RATING;
 
-/// Tick and joint of every reported limit.
-fn limits(bench: &Bench) -> Vec<(u32, u8)> {
-    let limit = |event: &LegEvent<2>| match event {
-        LegEvent::Record(Record::Limit { tick, code, joint, .. }) => {
-            assert_eq!(*code, LimitCode::Temperature as u8);
-            Some((*tick, *joint))
-        }
-        _ => None,
-    };
-    bench.events.iter().filter_map(limit).collect()
+/// Tick, code and joint of every reported limit.
+fn limits(bench: &Bench) -> Vec<(u32, u8, u8)> {
+    let limits = picked!(
+        bench.events,
+        LegEvent::Record(Record::Limit { tick, code, joint, .. }) => (*tick, *code, *joint)
+    );
+    limits.collect()
 }
 
 #[test]
@@ -28,13 +25,12 @@ fn limits_are_reported_once_a_second_and_one_per_tick() {
         bench.counts = bench.counts.map(|counts| counts + 1);
         bench.tick();
     }
-    while bench.level.ticks() < 8100 {
-        bench.tick();
-    }
+    bench.run(8100 - bench.level.ticks());
     let limits = limits(&bench);
-    let [(first, _), (second, _), later @ ..] = &limits[..] else { panic!("{limits:?}") };
-    assert!(first < second && *second < 100, "{limits:?}");
-    assert_eq!(later, [(4000, 1), (4001, 2), (8000, 1), (8001, 2)]);
+    assert!(limits.iter().all(|(_, code, _)| *code == LimitCode::Temperature as u8), "{limits:?}");
+    assert!(limits[0].0 < limits[1].0 && limits[1].0 < 100, "{limits:?}");
+    let later = limits[2..].iter().map(|(tick, _, joint)| (*tick, *joint));
+    assert!(later.eq([(4000, 1), (4001, 2), (8000, 1), (8001, 2)]), "{limits:?}");
     // A cool leg reports no limit.
     let mut bench = Bench::enabled();
     bench.counts = bench.counts.map(|counts| counts + 10);
@@ -50,11 +46,7 @@ fn after_a_move(change: impl Fn(&Signals<2>)) -> (Vec<(u8, u8)>, [f32; 2]) {
         bench.counts = bench.counts.map(|counts| counts + 1);
         bench.tick();
     }
-    let limited = |event: &LegEvent<2>| match event {
-        LegEvent::Record(Record::Limit { code, joint, .. }) => Some((*code, *joint)),
-        _ => None,
-    };
-    let limits = bench.events.iter().filter_map(limited).collect();
+    let limits = limits(&bench).iter().map(|(_, code, joint)| (*code, *joint)).collect();
     (limits, [0, 1].map(|joint| bench.signals.target(joint).current.0))
 }
 
@@ -73,11 +65,8 @@ fn an_unproven_rotor_angle_leaves_a_quarter_of_its_joints_torque() {
     assert_eq!(limits, [(LimitCode::FirstMotion as u8, 1)]);
     let (none, whole) = after_a_move(|signals| signals.set_current_share(0, 1.0));
     assert_eq!(none, []);
-    assert!(
-        (limited[0].abs() - quarter).abs() < 0.1 && whole[0].abs() > quarter + 1.0,
-        "{limited:?} {whole:?}"
-    );
-    assert!((limited[1] - whole[1]).abs() < 0.1, "{limited:?} {whole:?}");
+    assert!((limited[0].abs() - quarter).abs() < 0.1, "{limited:?}");
+    assert!(whole[0].abs() > quarter + 1.0 && (limited[1] - whole[1]).abs() < 0.1, "{limited:?} {whole:?}");
 }
 
 #[test]
@@ -103,9 +92,7 @@ fn a_refusal_by_the_bus_is_recorded_once_with_and_without_zeros_of_the_joints() 
         bench.tick();
         bench.clear();
         let refused = Some(Refusal { joint: Refusal::LEG, reason: RefusalReason::NoReference });
-        let order =
-            LegOrder { commands: None, request: None, faults: [None; 2], may_return: [true; 2], refused };
-        assert!(bench.bus.orders.enqueue(order).is_ok(), "full");
+        assert!(bench.bus.orders.enqueue(LegOrder { refused, ..order(None, None) }).is_ok(), "full");
         bench.run(3);
         assert_eq!(bench.names(), ["not enabled"]);
         let record =
@@ -164,10 +151,6 @@ fn a_refused_request_is_recorded_and_begins_nothing() {
 fn every_sample_of_the_log_leaves_with_its_tick() {
     let mut bench = Bench::enabled();
     bench.run(80);
-    let tick = |event: &LegEvent<2>| match event {
-        LegEvent::Sample(logged) => Some(logged.sample.tick),
-        _ => None,
-    };
-    let ticks: Vec<u32> = bench.events.iter().filter_map(tick).collect();
-    assert_eq!(ticks, (1..=10).map(|sample| 8 * sample).collect::<Vec<u32>>());
+    let ticks = picked!(bench.events, LegEvent::Sample(logged) => logged.sample.tick);
+    assert!(ticks.eq((1..=10).map(|sample| 8 * sample)));
 }
