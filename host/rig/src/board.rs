@@ -21,10 +21,10 @@ use hal_sim::world::World;
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use scarab::board::odrive_v3_6::settings::analog::HOTTEST_C;
 use scarab::board::odrive_v3_6::settings::drives;
-use scarab::hal::{AxisCommand, CURRENT_RATE_HZ, LegDrives};
+use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, LegDrives};
 use scarab::motor::calibration::STRONG_SHARE;
 use scarab::motor::{
-    Axis, AxisConfiguration, Calibration, CalibrationSettings, CalibrationStep, Calibrator, Chopper,
+    Axis, AxisConfiguration, Calibration, CalibrationSettings, CalibrationStep, Calibrator, Chopper, Refusal,
     SenseScale,
 };
 use scarab::operation::{EncoderSettings, HousekeepingSettings};
@@ -53,7 +53,7 @@ const ROTOR_INERTIA: f64 = 1e-4;
 /// Rest before a calibration: half a second.
 const REST_PERIODS: u32 = 12_000;
 /// Limit of a calibration, periods; it takes some seconds.
-const LONGEST_CALIBRATION: u32 = 60 * CURRENT_RATE_HZ;
+pub const LONGEST_CALIBRATION: u64 = 60 * CURRENT_RATE_HZ as u64;
 
 /// Configuration of a joint's axis, derived from the leg file by the board's settings.
 pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfiguration {
@@ -91,6 +91,23 @@ pub fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, se
     stand
 }
 
+/// Runs a calibration with `sample`, the readings of a period under the command of the period before. Returns
+/// the period of its end and the result; `None` if it does not end in time.
+pub fn run_calibration(
+    calibrator: &mut Calibrator,
+    mut sample: impl FnMut(u64, &AxisCommand) -> AxisSample,
+) -> Option<(u64, Result<Calibration, Refusal>)> {
+    let mut command = AxisCommand::OFF;
+    for period in 0..LONGEST_CALIBRATION {
+        match calibrator.tick(&sample(period, &command)) {
+            CalibrationStep::Running(next) => command = next,
+            CalibrationStep::Done(calibration) => return Some((period, Ok(calibration))),
+            CalibrationStep::Refused(reason) => return Some((period, Err(reason))),
+        }
+    }
+    None
+}
+
 /// Calibrates a motor on its stand with the rotor at `angle` (rad); `name` is used in error messages.
 pub fn commission(
     name: &str,
@@ -105,17 +122,10 @@ pub fn commission(
     let mut stand = rested(axis, supply, angle, seed);
     let mut calibrator =
         Calibrator::new(configuration, settings).map_err(|error| refused(words::axis_error(error)))?;
-    let mut command = AxisCommand::OFF;
-    for _ in 0..LONGEST_CALIBRATION {
-        match calibrator.tick(&stand.period(&command, 0.0)) {
-            CalibrationStep::Running(next) => command = next,
-            CalibrationStep::Done(calibration) => return Ok(calibration),
-            CalibrationStep::Refused(reason) => {
-                return Err(refused(words::refusal(reason)));
-            }
-        }
+    match run_calibration(&mut calibrator, |_, command| stand.period(command, 0.0)) {
+        Some((_, result)) => result.map_err(|reason| refused(words::refusal(reason))),
+        None => Err(refused("the calibration did not end in time".into())),
     }
-    Err(refused("the calibration did not end in time".into()))
 }
 
 /// Everything that a calibration depends on, in the order of [`commission`].

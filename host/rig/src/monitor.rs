@@ -208,7 +208,8 @@ pub fn watch<const N: usize, const B: usize>(
             .collect(),
         limit: f64::from(model_monitor.monitor().limit()).into(),
         hours: options.hours,
-        ..MonitorRun::new(options.seed)
+        seed: options.seed,
+        ..MonitorRun::default()
     };
     if options.hours > 0.0 {
         run.false_alarms_at_s = false_alarms(leg, &context, pair.clone(), options)?;

@@ -58,6 +58,11 @@ pub struct Context<const N: usize, const B: usize> {
 }
 
 impl<const N: usize, const B: usize> Context<N, B> {
+    /// Prepares a run with complete drives.
+    pub fn with_complete_drives(leg: &LegFile, seed: u64) -> Result<Self, ToolError> {
+        Self::new(leg, &SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(seed) })
+    }
+
     /// Prepares a run of this leg as the firmware assumes it.
     pub fn new(leg: &LegFile, options: &SimulationOptions) -> Result<Self, ToolError> {
         perturb::check_drives(options)?;
@@ -98,9 +103,7 @@ impl<const N: usize, const B: usize> Context<N, B> {
             perturbations,
         })
     }
-}
 
-impl<const N: usize, const B: usize> Context<N, B> {
     /// Noise of each joint's current, A.
     #[must_use]
     pub fn current_noise(&self, leg: &LegFile) -> [f64; N] {

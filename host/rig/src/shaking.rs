@@ -13,6 +13,7 @@ use hal_sim::world::{TICK_S, World};
 use scarab::ident::Reason;
 use scarab::motion::MotionState;
 use scarab::real::sqrt;
+use scarab_base::number::Number;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::RunReport;
 use scarab_identify::report::findings::FindingReport;
@@ -134,16 +135,8 @@ impl<const N: usize> Shaking<N> {
             finding.words =
                 finding.words.replacen("something held the leg", "the leg did not follow its command", 1);
         }
-        let finding = FindingReport {
-            reason: Reason::Input.name(),
-            test,
-            joint: Some(joint + 1),
-            motion: None,
-            value: value.into(),
-            limit: limit.into(),
-            passed: false,
-            words,
-        };
+        let values = [value, limit].map(Number::from);
+        let finding = FindingReport::judged(Reason::Input.name(), test, Some(joint + 1), values, Some(words));
         run.findings.insert(0, finding);
         let before = core::mem::take(&mut run.reasons);
         let is_named = |name: &&'static str| *name == Reason::Input.name() || before.contains(name);

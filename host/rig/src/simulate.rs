@@ -13,10 +13,9 @@ use scarab_identify::report::{RunReport, TrackingReport};
 
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
-use crate::perturb;
-use crate::scale;
 use crate::shaking::Shaking;
 use crate::watch::Watch;
+use crate::{perturb, scale};
 
 /// Limit of a run, s.
 const LONGEST_RUN_S: f64 = 300.0;

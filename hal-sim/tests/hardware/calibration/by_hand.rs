@@ -99,6 +99,13 @@ impl PowerUp {
         Calibrator::from_stored(&self.trial.configuration, self.trial.settings, stored).expect("sensible")
     }
 
+    /// Confirms stored values while a hand supports the leg; see [`Self::calibrate`].
+    fn confirm(&mut self, stored: StoredCalibration) -> (Result<Calibration, Refusal>, f64, u32) {
+        self.let_go(f64::INFINITY);
+        let calibrator = self.calibrator(stored);
+        self.calibrate(calibrator, |_, _| {})
+    }
+
     /// Orders a calibration; returns its end, and the greatest travel on the way in electrical turns. `hand`
     /// may change the stand in every period.
     fn calibrate(
@@ -213,9 +220,7 @@ fn confirms(seeds: core::ops::RangeInclusive<u64>) -> f64 {
         let mut leg = ready(geared(seed, None), seed);
         let stored = ideal(&leg.trial);
         assert!(leg.most_ampere < 1e-9, "seed {seed}: {} A before the order", leg.most_ampere);
-        leg.let_go(f64::INFINITY);
-        let calibrator = leg.calibrator(stored);
-        let (result, travel, periods) = leg.calibrate(calibrator, |_, _| {});
+        let (result, travel, periods) = leg.confirm(stored);
         let found = result.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{:?}", leg.trial));
         assert!(!found.is_proven() && found.indexed() && found.offset() == stored.offset, "seed {seed}");
         let offset = offset_error(&mut leg.stand, &leg.trial, &found, seed);
@@ -271,9 +276,7 @@ fn what_a_calibration_in_motion_stored_is_confirmed_on_the_next_day() {
         trial.axis.counter.start = trial.axis.counter.start.wrapping_add(12_345);
         trial.angle += 3.0;
         let mut leg = ready(trial, seed + 100);
-        leg.let_go(f64::INFINITY);
-        let calibrator = leg.calibrator(stored);
-        let (result, travel, _) = leg.calibrate(calibrator, |_, _| {});
+        let (result, travel, _) = leg.confirm(stored);
         let found = result.expect("the same motor");
         assert!(!found.is_proven() && travel < 1e-3, "seed {seed}: {travel}");
         let error = offset_error(&mut leg.stand, &leg.trial, &found, seed);
@@ -288,9 +291,7 @@ fn wrong_offsets_are_refused(all_degrees: &[f32], legs: u64) {
             for sign in [1.0, -1.0] {
                 let mut leg = ready(geared(seed, None), seed);
                 let wrong = turned_off(ideal(&leg.trial), sign * degrees);
-                leg.let_go(f64::INFINITY);
-                let calibrator = leg.calibrator(wrong);
-                let (result, travel, _) = leg.calibrate(calibrator, |_, _| {});
+                let (result, travel, _) = leg.confirm(wrong);
                 worst = worst.max(travel);
                 if let Err(reason) = result {
                     assert_eq!(reason, Refusal::Moved, "seed {seed}: {degrees} degrees");
@@ -330,9 +331,7 @@ fn half_a_turn_off(legs: u64) {
     for seed in 1..=legs {
         let mut leg = ready(geared(seed, None), seed);
         let wrong = turned_off(ideal(&leg.trial), 180.0);
-        leg.let_go(f64::INFINITY);
-        let calibrator = leg.calibrator(wrong);
-        let (result, travel, _) = leg.calibrate(calibrator, |_, _| {});
+        let (result, travel, _) = leg.confirm(wrong);
         let found = result.expect("at rest at the unstable equilibrium");
         leg.let_go(0.0);
         let (proven, fault, speed) = leg.first_motion(&found, [8.0, -8.0], None);
@@ -420,9 +419,7 @@ fn exchanged_since_the_store(legs: u64) {
             let stored = ideal(&trial);
             change(&mut trial);
             let mut leg = ready(trial, seed);
-            leg.let_go(f64::INFINITY);
-            let calibrator = leg.calibrator(stored);
-            let result = leg.calibrate(calibrator, |_, _| {}).0;
+            let result = leg.confirm(stored).0;
             let (found, hand) = match result {
                 Err(Refusal::Moved) => {
                     moved += 1;
@@ -549,9 +546,7 @@ fn another_motor_is_refused_at_standstill() {
             let stored = ideal(&trial);
             change(&mut trial);
             let mut leg = ready(trial, seed);
-            leg.let_go(f64::INFINITY);
-            let calibrator = leg.calibrator(stored);
-            let (result, travel, _) = leg.calibrate(calibrator, |_, _| {});
+            let (result, travel, _) = leg.confirm(stored);
             assert!(matches!(result, Err(Refusal::OtherMotor(..))), "seed {seed}: {result:?}");
             assert!(travel < 1e-3, "seed {seed}: {travel}");
         }
@@ -567,9 +562,7 @@ fn an_open_phase_is_refused_at_standstill() {
             let stored = ideal(&trial);
             let mut leg = ready(trial, seed);
             leg.stand.break_wire(output);
-            leg.let_go(f64::INFINITY);
-            let calibrator = leg.calibrator(stored);
-            let reason = leg.calibrate(calibrator, |_, _| {}).0.expect_err("open");
+            let reason = leg.confirm(stored).0.expect_err("open");
             let phase = [Phase::A, Phase::B, Phase::C][output];
             // Near the open phase's axis the bent current turns the rotor. Across that axis the phase would
             // carry no current anyway, and shows only in the inductance.

@@ -99,13 +99,13 @@ pub struct LegFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
     /// Side of the body.
-    #[serde(default, skip_serializing_if = "BodySide::is_default")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub side: BodySide,
     /// Segments of thigh and shank.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub segments: Option<SegmentsFile>,
     /// Supply of complete drives.
-    #[serde(default, skip_serializing_if = "SupplyFile::is_default")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub supply: SupplyFile,
     /// Greatest current from the supply, A; `None` for no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -145,7 +145,7 @@ pub struct JointFile {
     /// Position of its frame in the previous one.
     pub dh: DhFile,
     /// 1 or -1: joint angle = direction * anatomical angle + zero offset.
-    #[serde(default = "one")]
+    #[serde(default = "default_direction")]
     pub direction: i64,
     /// Joint angle at the anatomical zero, degrees.
     #[serde(default)]
@@ -187,16 +187,16 @@ pub struct JointFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outliers: Option<OutliersFile>,
     /// Whether a torque offset is estimated.
-    #[serde(default = "Switch::on")]
+    #[serde(default = "always")]
     pub offset: Switch,
     /// Whether a rotor inertia is estimated.
-    #[serde(default = "Switch::on")]
+    #[serde(default = "always")]
     pub rotor: Switch,
     /// Whether Stribeck friction is estimated.
-    #[serde(default = "Switch::auto")]
+    #[serde(default = "automatic")]
     pub stribeck_model: Switch,
     /// Whether Coulomb friction has a level for each direction.
-    #[serde(default = "Switch::off", skip_serializing_if = "Switch::is_off")]
+    #[serde(default = "never", skip_serializing_if = "Switch::is_off")]
     pub asymmetric_coulomb: Switch,
     /// Static friction above Coulomb friction, simulated only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -297,7 +297,7 @@ pub struct LinkParameters {
     #[serde(default)]
     pub offset: f64,
     /// Half the difference of Coulomb friction between growing and falling D-H angle, N m.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub asymmetry: f64,
 }
 
@@ -310,24 +310,8 @@ impl LinkParameters {
     }
 }
 
-fn default_bandwidth() -> f64 {
-    8.0
-}
-
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
-fn one() -> i64 {
-    1
-}
-
 /// Range of a joint without `range_deg`, anatomical, degrees.
 pub const DEFAULT_RANGE_DEG: [f64; 2] = [-90.0, 90.0];
-
-fn default_range() -> [f64; 2] {
-    DEFAULT_RANGE_DEG
-}
 
 /// Speed limit of a joint without `speed_limit_deg_s`, degrees per second.
 pub const DEFAULT_SPEED_LIMIT: f64 = 180.0;
@@ -338,28 +322,30 @@ const DEFAULT_TORQUE_PER_AMPERE: f64 = 1.5;
 /// Bandwidth of the position loop, which no leg file changes.
 pub const POSITION_BANDWIDTH: Hertz = Hertz(6.0);
 
-fn default_speed_limit() -> f64 {
-    DEFAULT_SPEED_LIMIT
+/// Writes the functions that serde asks for defaults.
+macro_rules! defaults {
+    ($($name:ident: $kind:ty = $value:expr;)*) => { $(fn $name() -> $kind { $value })* };
+}
+pub(crate) use defaults;
+
+defaults! {
+    default_bandwidth: f64 = 8.0;
+    default_direction: i64 = 1;
+    default_range: [f64; 2] = DEFAULT_RANGE_DEG;
+    default_speed_limit: f64 = DEFAULT_SPEED_LIMIT;
+    default_acceleration_limit: f64 = 2000.0;
+    default_torque_limit: f64 = DEFAULT_TORQUE_LIMIT;
+    default_torque_per_ampere: f64 = DEFAULT_TORQUE_PER_AMPERE;
+    default_lag: f64 = 5e-4;
+    default_encoder: EncoderFile = EncoderFile { side: Side::Motor, counts: 8192, ratio: 50.0 };
+    always: Switch = Switch::On;
+    automatic: Switch = Switch::Auto;
+    never: Switch = Switch::Off;
 }
 
-fn default_acceleration_limit() -> f64 {
-    2000.0
-}
-
-fn default_torque_limit() -> f64 {
-    DEFAULT_TORQUE_LIMIT
-}
-
-fn default_torque_per_ampere() -> f64 {
-    DEFAULT_TORQUE_PER_AMPERE
-}
-
-fn default_lag() -> f64 {
-    5e-4
-}
-
-fn default_encoder() -> EncoderFile {
-    EncoderFile { side: Side::Motor, counts: 8192, ratio: 50.0 }
+/// Whether a key has its type's default, so that it is not written.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 impl JointFile {
@@ -369,7 +355,7 @@ impl JointFile {
         Self {
             name: name.to_owned(),
             dh,
-            direction: one(),
+            direction: default_direction(),
             zero_offset_deg: 0.0,
             range_deg: default_range(),
             speed_limit_deg_s: default_speed_limit(),
@@ -461,6 +447,16 @@ impl LegFile {
         let table = text.parse::<toml::Table>().unwrap_or_default();
         let joints = table.get("joint").and_then(toml::Value::as_array);
         joints.into_iter().flatten().map(|joint| joint.get(key).is_some()).collect()
+    }
+
+    /// One value for each joint. Fails if the leg does not have `N` joints.
+    pub(crate) fn each_joint<T, const N: usize>(
+        &self,
+        of: impl FnMut(&JointFile) -> Result<T, FileError>,
+    ) -> Result<[T; N], FileError> {
+        let count = self.joints.len();
+        let all: Vec<T> = self.joints.iter().map(of).collect::<Result<_, _>>()?;
+        all.try_into().map_err(|_| self.error(format!("has {count} joints, not {N}")))
     }
 
     /// Error about this leg.

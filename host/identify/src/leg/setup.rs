@@ -25,6 +25,7 @@ use scarab_base::error::FileError;
 use crate::formats::leg_file::geometry::{anatomy, chain};
 use crate::formats::leg_file::{BodySide, JointFile, LegFile, LinkParameters, POSITION_BANDWIDTH};
 use crate::leg::background::{Background, StribeckTruth};
+use crate::leg::link_body::body;
 use crate::leg::model_choice::{TermSwitches, drive_choice, stribeck_choice};
 use crate::leg::motions::{Motions, motions};
 
@@ -151,13 +152,8 @@ pub fn device_model<const N: usize, const B: usize>(
 }
 
 fn link_prior(link: &LinkParameters) -> LinkPrior<f64> {
-    let [xx, xy, xz, yy, yz, zz] = link.inertia_com;
     LinkPrior {
-        body: RigidBody {
-            mass: link.mass,
-            centre_of_mass: Vector3::from(link.com),
-            inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
-        },
+        body: body(link.mass, link.com, link.inertia_com),
         rotor_inertia: link.rotor_inertia,
         coulomb_friction: link.coulomb,
         viscous_friction: link.viscous,

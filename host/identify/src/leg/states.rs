@@ -18,9 +18,8 @@ use scarab_base::error::FileError;
 
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
-use crate::formats::recording::Fault;
 use crate::formats::recording::columns::{Column, LineNumbers, for_each_row, refuse};
-use crate::formats::recording::source;
+use crate::formats::recording::{Fault, source};
 
 /// Convention of the angles in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

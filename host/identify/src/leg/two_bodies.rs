@@ -52,22 +52,13 @@ pub enum MuscleTone {
     Insisting,
 }
 
-/// Muscles of a test rig. The deviation from the intended motion is the interaction torque over this
-/// impedance: 40 N m are at most 0.004 rad. They have no reflexes: such gains are unstable with a delay.
-const INSISTING: [MuscleDescription; 2] = [
-    MuscleDescription {
-        torque_limit: 1000.0,
-        intrinsic: Impedance { stiffness: 10_000.0, damping: 800.0 },
-        reflex: Impedance { stiffness: 0.0, damping: 0.0 },
-        resisting: Impedance { stiffness: 10_000.0, damping: 800.0 },
-    },
-    MuscleDescription {
-        torque_limit: 1000.0,
-        intrinsic: Impedance { stiffness: 10_000.0, damping: 400.0 },
-        reflex: Impedance { stiffness: 0.0, damping: 0.0 },
-        resisting: Impedance { stiffness: 10_000.0, damping: 400.0 },
-    },
-];
+/// Muscles of one joint of a test rig. The deviation from the intended motion is the interaction torque over
+/// this impedance: 40 N m are at most 0.004 rad. They have no reflexes: such gains are unstable with a delay.
+fn insisting(damping: f64) -> MuscleDescription {
+    let impedance = Impedance { stiffness: 10_000.0, damping };
+    let reflex = Impedance::default();
+    MuscleDescription { torque_limit: 1000.0, intrinsic: impedance, reflex, resisting: impedance }
+}
 
 impl MuscleTone {
     /// Muscles of hip and knee.
@@ -76,7 +67,7 @@ impl MuscleTone {
         match self {
             Self::Relaxed => [MuscleDescription::HIP, MuscleDescription::KNEE],
             Self::Firm => [MuscleDescription::FIRM_HIP, MuscleDescription::FIRM_KNEE],
-            Self::Insisting => INSISTING,
+            Self::Insisting => [800.0, 400.0].map(insisting),
         }
     }
 }

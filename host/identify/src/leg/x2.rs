@@ -19,8 +19,7 @@
 
 use crate::formats::anthropometry::{Along, Segment, Wearer, joined};
 use crate::formats::leg_file::{
-    BodySide, DhFile, EncoderFile, JointFile, LegFile, LinkParameters, MotorFile, SegmentsFile, Side,
-    SupplyFile,
+    DhFile, EncoderFile, JointFile, LegFile, LinkParameters, MotorFile, SegmentsFile, Side,
 };
 
 const THIGH_M: f64 = 0.39;
@@ -32,34 +31,22 @@ pub const DEFAULT_WEARER_KG: f64 = 75.0;
 /// Body mass of a standard wearer, which a designer would have assumed, kg.
 const STANDARD_WEARER_KG: f64 = 70.0;
 
+/// Part along its segment's axis.
+fn tube(mass: f64, x: f64, sagittal: f64, radius: f64) -> Segment {
+    Segment { mass, x, y: 0.0, sagittal, radius, along: Along::X }
+}
+
 /// Upper and lower thigh of the exoskeleton for a length, m. It is a telescope: the upper part
 /// keeps its position below the hip, the lower one above the knee.
 fn exoskeleton_thigh(length: f64) -> [Segment; 2] {
-    [
-        Segment { mass: 0.70, x: 0.0811, y: 0.0, sagittal: 0.002_197, radius: 0.05, along: Along::X },
-        Segment {
-            mass: 2.14,
-            x: length - 0.055_64,
-            y: 0.0,
-            sagittal: 0.005_901,
-            radius: 0.05,
-            along: Along::X,
-        },
-    ]
+    [tube(0.70, 0.0811, 0.002_197, 0.05), tube(2.14, length - 0.055_64, 0.005_901, 0.05)]
 }
 
 /// Upper and lower shank and foot of the exoskeleton, also a telescope.
 fn exoskeleton_shank(length: f64) -> [Segment; 3] {
     [
-        Segment { mass: 0.64, x: 0.0908, y: 0.0, sagittal: 0.002_346, radius: 0.05, along: Along::X },
-        Segment {
-            mass: 0.47,
-            x: length - 0.0562,
-            y: 0.0,
-            sagittal: 0.000_794_1,
-            radius: 0.04,
-            along: Along::X,
-        },
+        tube(0.64, 0.0908, 0.002_346, 0.05),
+        tube(0.47, length - 0.0562, 0.000_794_1, 0.04),
         Segment { mass: 1.25, x: length, y: 0.088_34, sagittal: 0.004_441, radius: 0.05, along: Along::Y },
     ]
 }
@@ -126,26 +113,17 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
     knee.range_deg = [6.85, 95.53];
     knee.truth = Some(shank(wearer, [1.9, 4.67, 3.26]));
     knee.prior = Some(shank(&standard, [1.7, 4.0, 4.0]));
+    let name = format!("x2-wearer-{}kg", wearer.mass);
     LegFile {
-        name: format!("x2-wearer-{}kg", wearer.mass),
-        gravity: [9.81, 0.0, 0.0],
         torque_noise_percent: 7.0,
         bandwidth_hz: 16.0,
-        temperature_c: None,
-        pushes: None,
-        side: BodySide::Right,
         segments: Some(SegmentsFile {
             shank_m: wearer.shank,
             foot_m: wearer.foot,
             wearer_kg: wearer.mass,
             prior_wearer_kg: prior_mass,
         }),
-        supply: SupplyFile::default(),
-        supply_current_a: None,
-        charge_current_a: None,
-        brake: None,
-        assist: None,
-        joints: vec![hip, knee],
+        ..LegFile::plain(&name, [9.81, 0.0, 0.0], vec![hip, knee])
     }
 }
 

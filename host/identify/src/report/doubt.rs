@@ -94,7 +94,7 @@ impl RecordingsReport {
 }
 
 /// Most likely reason of a refusal.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CauseReport {
     /// A word of the closed list.
     pub name: &'static str,
@@ -158,7 +158,7 @@ pub struct DirectionReport {
 }
 
 /// A fault in a recording's columns.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SampleFinding {
     /// `saturation`, `held_samples`, `quantised` or `time_stamps`.
     pub name: &'static str,
@@ -225,9 +225,7 @@ impl DirectionReport {
     /// Test of the verdict.
     #[must_use]
     pub fn finding(&self) -> FindingReport {
-        let words = if self.passed {
-            String::new()
-        } else {
+        let failure = (!self.passed).then(|| {
             format!(
                 "{}, limit {:.3} {}; it explains {:.0} % of the misfit and moves a parameter by {:.1} sigma",
                 self.words(),
@@ -236,17 +234,8 @@ impl DirectionReport {
                 100.0 * self.explained.known().unwrap_or(f64::NAN),
                 self.largest_shift.known().unwrap_or(f64::NAN),
             )
-        };
-        FindingReport {
-            reason: "residual",
-            test: self.name,
-            joint: self.joint,
-            motion: None,
-            value: self.value,
-            limit: self.limit,
-            passed: self.passed,
-            words,
-        }
+        });
+        FindingReport::judged("residual", self.name, self.joint, [self.value, self.limit], failure)
     }
 }
 

@@ -50,19 +50,25 @@ impl FindingReport {
         }
     }
 
+    /// Report of a test with a value and a limit; `failure` is the sentence of a failed one. Joints count
+    /// from 1.
+    #[must_use]
+    pub fn judged(
+        reason: Word,
+        test: Word,
+        joint: Option<usize>,
+        [value, limit]: [Number; 2],
+        failure: Option<String>,
+    ) -> Self {
+        let passed = failure.is_none();
+        Self { reason, test, joint, motion: None, value, limit, passed, words: failure.unwrap_or_default() }
+    }
+
     /// Report of a drive that stopped before the end of the identification; `words` give the reason.
     #[must_use]
     pub fn stopped(words: String) -> Self {
-        Self {
-            reason: Reason::Input.name(),
-            test: Test::Drive.name(),
-            joint: None,
-            motion: None,
-            value: 0.0.into(),
-            limit: 1.0.into(),
-            passed: false,
-            words,
-        }
+        let values = [0.0, 1.0].map(Number::from);
+        Self::judged(Reason::Input.name(), Test::Drive.name(), None, values, Some(words))
     }
 }
 

@@ -218,7 +218,7 @@ pub struct ModelDetail {
 }
 
 /// Search for a physically consistent leg.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ConsistentSearchReport {
     /// Iterations of the swarm.
     pub iterations: u32,

@@ -90,16 +90,7 @@ fn full<const N: usize, const B: usize>(
     cost.fill(&background.device, &problem.whole(), &values, Effort::device(background.prior.is_some()).pull);
 
     let objective = FullObjective::new(limits, &cost);
-    let mut report = ConsistentSearchReport {
-        iterations: 0,
-        evaluations: 0,
-        steps: 0,
-        settled: None,
-        excess_chi2: Number::UNKNOWN,
-        iterations_to_half_chi2: None,
-        consistent: Some(true),
-        parameters: BTreeMap::new(),
-    };
+    let mut report = ConsistentSearchReport { consistent: Some(true), ..ConsistentSearchReport::default() };
     let seed = solver.search().seed();
     let Ok(mut search) = FullSearch::<f32, DIMENSIONS>::new(&objective, BsoSettings::default(), seed) else {
         return report;

@@ -265,6 +265,9 @@ fn rows<const B: usize>(leg: &LegFile, options: &AssistOptions, seeds: &[SeedRes
                     if *mode == Mode::Weight && is_slow { mean.into() } else { Number::UNKNOWN }
                 };
                 rows.push(AssistRow {
+                    mode: mode.name(),
+                    motion: exercise.name(),
+                    joint: file.name.clone(),
                     drives_off_rms_nm: pooled(all().map(|found| found.off.as_ref()), interaction),
                     gravity_only_rms_nm: pooled(all().map(|found| found.gravity_only.as_ref()), interaction),
                     true_model_rms_nm: pooled(all().map(|found| found.truth.as_ref()), interaction),
@@ -274,7 +277,6 @@ fn rows<const B: usize>(leg: &LegFile, options: &AssistOptions, seeds: &[SeedRes
                     wearer_without_rms_nm: pooled(all().map(|found| Some(&found.without)), muscle),
                     wearer_gravity_share: share(&|found| found.identified.gravity_share[joint]),
                     wearer_gravity_share_without: share(&|found| found.without.gravity_share[joint]),
-                    ..AssistRow::new(mode.name(), &exercise.name(), &file.name)
                 });
             }
             case += 1;

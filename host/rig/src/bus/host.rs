@@ -13,6 +13,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use scarab::bus::Frame;
+use scarab::hal::SERVO_RATE_HZ;
 use scarab::leg::Permission;
 use scarab_base::error::ToolError;
 use scarab_client::bus::{Bus, Object, Patience, RequestError};
@@ -31,6 +32,11 @@ pub const NODES: [u16; JOINTS] = [1, 2];
 const NUMBER: u16 = 0x70;
 const START: u16 = 0;
 const SYNC: u16 = 0x80;
+/// Servo ticks per second.
+pub const SECOND: u64 = SERVO_RATE_HZ as u64;
+/// Object of the following window, micro-radian, and the value with which a host requests storing.
+pub const WINDOW: u16 = 0x6065;
+pub const SAVE: u32 = u32::from_le_bytes(*b"save");
 /// COB-ID of both joints' targets; hip and knee take their half each.
 pub const TARGETS: u16 = 0x301;
 const WORDS: u16 = 0x200;
@@ -48,7 +54,7 @@ const WAY_RAD: f64 = 0.25;
 const RATE_HZ: f64 = 0.7;
 
 /// Frames that the host sends by itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Speaks {
     /// SYNC and targets.
     pub targets: bool,
@@ -114,7 +120,7 @@ impl Host {
     pub fn new(board: Board<JOINTS, BASE>) -> Self {
         Self {
             network: Network::new(vec![board], 1_000_000),
-            speaks: Speaks { targets: false, words: false, heartbeat: 0 },
+            speaks: Speaks::default(),
             ticks: 0,
             positions: [0; JOINTS],
             from: None,
@@ -253,6 +259,14 @@ impl Host {
         Client::over(self).try_write(node, object, value, size).map_err(|error| error.refused(node, object))
     }
 
+    /// Writes an object of `size` bytes without subindex to both nodes.
+    ///
+    /// # Errors
+    /// A node does not answer, or refuses.
+    pub fn write_both(&mut self, index: u16, value: u32, size: u8) -> Result<(), ToolError> {
+        NODES.into_iter().try_for_each(|node| self.write(node, index, 0, value, size))
+    }
+
     /// Starts the nodes and configures the compact mapping: statusword, position and speed; both targets in
     /// one frame.
     ///
@@ -333,22 +347,18 @@ impl Bus for Host {
 mod tests {
     use super::*;
     use crate::bus::board::Label;
-    use crate::options::{DriveModel, SimulationOptions};
     use crate::pair::Context;
     use crate::parameter_file::memory::Memory;
-    use scarab::hal::SERVO_RATE_HZ;
     use scarab::leg::Wearing;
     use scarab_identify::formats::leg_file::DEFAULT_LEG;
 
     fn host(leg: &LegFile) -> Host {
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
-        let context = Context::<JOINTS, BASE>::new(leg, &options).expect("a leg");
+        let context = Context::<JOINTS, BASE>::with_complete_drives(leg, 1).expect("a leg");
         Host::new(Board::new(leg, context, 1, Label::SINGLE, Memory::new(None)).expect("a board"))
     }
 
     #[test]
     fn a_failed_store_is_reported_and_not_recalled_by_a_reset() {
-        const WINDOW: u16 = 0x6065;
         let mut host = host(&LegFile::load(DEFAULT_LEG).expect("shipped"));
         host.begin().expect("nodes that answer");
         let mut ask = |window: u32, (object, word): (u16, &[u8; 4]), fails: bool| {
@@ -438,9 +448,6 @@ mod tests {
         assert!(host.is_enabled());
         assert!(there.iter().zip(stands).all(|(there, stands)| (there - stands).abs() < 0.02));
     }
-
-    /// Ticks per second.
-    const SECOND: u64 = SERVO_RATE_HZ as u64;
 
     /// Steps of a usual host towards enabled. Returns whether the leg is enabled.
     fn enable(host: &mut Host) -> bool {

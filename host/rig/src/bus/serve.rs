@@ -19,7 +19,6 @@ use crate::bus::board::{Board, Label};
 use crate::bus::network::Network;
 use crate::bus::pace::{BOOT_TICKS, Pace, judge, reachable};
 use crate::bus::server::{Event, Server, What};
-use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
 use crate::parameter_file::memory::{BYTES, Memory};
 use crate::worn::Worn;
@@ -101,9 +100,7 @@ pub fn network<const N: usize, const B: usize>(
     wearers: &[Worn<N>],
 ) -> Result<Network<N, B>, ToolError> {
     let leg = wearers.first().map_or(leg, |worn| &worn.exoskeleton);
-    let simulation =
-        SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(options.seed) };
-    let context = Context::<N, B>::new(leg, &simulation)?;
+    let context = Context::<N, B>::with_complete_drives(leg, options.seed)?;
     let mut boards = Vec::new();
     for index in 0..options.legs {
         let memory = Memory::new(flash.and_then(|bytes| bytes.get(index * BYTES..(index + 1) * BYTES)));

@@ -48,6 +48,13 @@ pub const FEWEST_EVALUATIONS: u32 = 600;
 pub const MOST_EVALUATIONS: u32 = 10_000_000;
 
 impl ExciteOptions {
+    /// Options for the leg as its file states it, with its best description.
+    #[must_use]
+    pub fn plain(design: DesignOptions, margin_percent: f64) -> Self {
+        let (given, torque_noise_percent, carried) = (None, None, Vec::new());
+        Self { design, given, torque_noise_percent, carried, margin_percent, assumption: Assumption::Best }
+    }
+
     /// Checks duration, margin and effort.
     ///
     /// # Errors

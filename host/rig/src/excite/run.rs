@@ -18,7 +18,7 @@ use scarab_identify::report::excite::{
     ComparedBase, ExciteReport, ExpectedBase, ExpectedParameter, JointReport, RandomMotion, SCHEMA,
 };
 
-use crate::excite::assumption::{Assumption, with_rotors};
+use crate::excite::assumption::with_rotors;
 use crate::excite::bench::{Bench, ExciteOptions};
 use crate::excite::design::{Candidate, DesignOptions, Goal, SHRINK, candidates, smaller};
 use crate::excite::expectation::{Expectation, Rehearsal};
@@ -57,14 +57,8 @@ pub fn check<const N: usize, const B: usize>(
 ) -> Result<(), ToolError> {
     // First, because another leg's motion is the most likely mistake.
     motion.table::<N>(leg).map_err(|reason| FileError::new(file.display(), reason))?;
-    let options = ExciteOptions {
-        design: DesignOptions { duration_s: 0.0, seed: 0, evaluations: 0 },
-        given: None,
-        carried: carried.to_vec(),
-        torque_noise_percent: None,
-        margin_percent: 0.0,
-        assumption: Assumption::Best,
-    };
+    let none = DesignOptions { duration_s: 0.0, seed: 0, evaluations: 0 };
+    let options = ExciteOptions { carried: carried.to_vec(), ..ExciteOptions::plain(none, 0.0) };
     Bench::<N, B>::new(leg, &options)?
         .given(motion)
         .map_err(|reason| FileError::new(file.display(), reason))?;
@@ -170,14 +164,9 @@ pub fn designable<const N: usize, const B: usize>(leg: &LegFile) -> Result<Vec<S
 }
 
 fn designed_shortly<const N: usize, const B: usize>(leg: &LegFile, goal: Goal) -> Result<(), ToolError> {
-    let options = ExciteOptions {
-        design: DesignOptions { duration_s: USUAL_DURATION_S, seed: DEFAULT_SEED, evaluations: SHORT_SEARCH },
-        given: None,
-        carried: Vec::new(),
-        torque_noise_percent: None,
-        margin_percent: USUAL_MARGIN_PERCENT,
-        assumption: Assumption::Best,
-    };
+    let design =
+        DesignOptions { duration_s: USUAL_DURATION_S, seed: DEFAULT_SEED, evaluations: SHORT_SEARCH };
+    let options = ExciteOptions::plain(design, USUAL_MARGIN_PERCENT);
     let bench = Bench::<N, B>::new(leg, &options)?;
     let found = searched(&bench, &options.design, goal, &ProgressBar::hidden())?;
     let rehearsed: Vec<_> =

@@ -7,7 +7,7 @@
 //!
 //! A shard takes neighbouring seeds, so it runs few bases ([`Shard`]).
 
-use hal_sim::faults::{Channel, Form, Injection, Timing};
+use hal_sim::faults::{Channel, Form, Timing};
 use hal_sim::world::TICK_S;
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use rayon::prelude::*;
@@ -20,21 +20,20 @@ use scarab_identify::leg::exercise::Exercise;
 
 use crate::faults::bench::offsets::OFFSETS;
 use crate::faults::bounds::bounds;
+use crate::faults::catalogue;
 use crate::faults::detectors::views;
+use crate::faults::draw::{at, one};
 use crate::faults::entry::Entry;
-use crate::faults::forks::stop::ROWS as STOP;
+use crate::faults::forks::stop::emergency_stop;
 use crate::faults::results::{Base, Campaign};
 use crate::faults::run::{Manner, Outcome, run};
-use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
+use crate::faults::scenario::{Bounds, Expected, Row, Scenario};
 use crate::faults::trial::Trial;
 use crate::faulty_board::{PERIODS_PER_S, Rig};
 use crate::operator::begin;
-use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::{Context, Pair};
 use crate::worn::{CADENCE_HZ, Worn};
-use scarab::model::planar::JOINTS;
-
-use scarab::model::planar::BASE;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Runs of a row per base.
 const RUNS_PER_BASE: u64 = 256;
@@ -204,8 +203,7 @@ fn based(
 
 /// Context of a base; `widened` torque caps are never reached.
 fn context(leg: &LegFile, base: u64, widened: bool) -> Result<Context<JOINTS, BASE>, ToolError> {
-    let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(base) };
-    let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
+    let mut context = Context::with_complete_drives(leg, base)?;
     if widened {
         for joint in &mut context.configuration.joints {
             (joint.torque, joint.current) = (joint.torque * WIDENED, joint.current * WIDENED);
@@ -268,25 +266,10 @@ impl Setting<'_> {
 
     /// Emergency stop at this period.
     fn stop(&self, period: u64) -> Job {
-        let row = &STOP[0];
-        let open = Injection {
-            channel: Channel::EmergencyStop,
-            joint: 0,
-            form: Form::Off,
-            timing: Timing::lasting(0, 1),
-        };
-        let scenario = Scenario {
-            injections: [Some(open), None],
-            event: Event::None,
-            onset: Onset::Injection,
-            expected: Expected::Released,
-            magnitude: None,
-            by_design: false,
-            patience: 4,
-            within_ms: None,
-            turns: 1.1,
-        };
-        Job::Row { row, scenario, seed: period, manner: Manner { brief: true, ..self.manner } }
+        static STOP: Row = Row { fault: &catalogue::X1, draw: emergency_stop };
+        let open = at(Channel::EmergencyStop, 0, Form::Off, Timing::lasting(0, 1));
+        let scenario = Scenario { patience: 4, ..one(open, Expected::Released) };
+        Job::Row { row: &STOP, scenario, seed: period, manner: Manner { brief: true, ..self.manner } }
     }
 
     fn flush(&self, batch: &mut Vec<(Rig<JOINTS, BASE>, Job)>, campaign: &mut Campaign) {

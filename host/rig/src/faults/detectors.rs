@@ -14,7 +14,7 @@ use crate::faults::run::{Blind, Outcome};
 use crate::faults::scenario::Row;
 
 /// One fault code of the firmware. Field names are part of the JSON interface.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct DetectorReport {
     /// Word used in records.
     pub code: &'static str,
@@ -66,14 +66,7 @@ pub fn detectors(rows: &[Entry], campaign: &Campaign) -> Vec<DetectorReport> {
 }
 
 fn detector(code: FaultCode, rows: &[Entry], campaign: &Campaign) -> DetectorReport {
-    let mut report = DetectorReport {
-        code: code.name(),
-        faults: Vec::new(),
-        seen: 0,
-        missed_without: 0,
-        seen_by_others: 0,
-        unjudged_without: 0,
-    };
+    let mut report = DetectorReport { code: code.name(), ..DetectorReport::default() };
     for row in forked(rows).filter(|row| row.fault.codes.contains(&code)) {
         let of = |blind: Blind| {
             let singly = campaign.singly.iter().filter(move |(how, _)| *how == blind);

@@ -2,7 +2,7 @@
 
 use crate::faults::bench::{BENCHES, Bench};
 use crate::faults::catalogue::{Fault, index_of};
-use crate::faults::forks::rows;
+use crate::faults::forks::ROWS;
 use crate::faults::scenario::Row;
 
 /// One way to run a row.
@@ -39,7 +39,8 @@ impl Entry {
 /// All rows, in the catalogue's order.
 #[must_use]
 pub fn entries() -> Vec<Entry> {
-    let mut all: Vec<Entry> = rows().map(Entry::Forked).chain(BENCHES.iter().map(Entry::Bench)).collect();
+    let mut all: Vec<Entry> =
+        ROWS.iter().map(Entry::Forked).chain(BENCHES.iter().map(Entry::Bench)).collect();
     all.sort_by_key(|entry| index_of(entry.fault().id));
     all
 }
@@ -52,7 +53,7 @@ mod tests {
     #[test]
     fn each_fault_runs_in_the_campaign_or_on_the_chip() {
         let entries = entries();
-        for fault in ALL {
+        for &fault in ALL {
             let forked = entries.iter().filter(|entry| core::ptr::eq(entry.fault(), fault)).count();
             let on_the_chip = ON_THE_CHIP.iter().filter(|other| core::ptr::eq(**other, fault)).count();
             assert_eq!(forked + on_the_chip, 1, "{}", fault.id);

@@ -22,11 +22,9 @@ use crate::bus::board::{Board, Label, TICK_NS};
 use crate::bus::host::{Host, NODES};
 use crate::faulty_board::{PERIODS_PER_S, Rig};
 use crate::operator::begin;
-use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
 use crate::parameter_file::memory::Memory;
-use scarab::model::planar::BASE;
-use scarab::model::planar::JOINTS;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Duration of one stretch, s.
 const STRETCH_S: u64 = 180;
@@ -116,10 +114,6 @@ pub fn hours(leg: &LegFile, hours: f64, shard: Shard) -> Result<Vec<Stretch>, To
         .collect()
 }
 
-fn context(leg: &LegFile, seed: u64) -> Result<Context<JOINTS, BASE>, ToolError> {
-    Context::new(leg, &SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(seed) })
-}
-
 /// Text of the fault that ends a stretch, if there is one.
 fn alarm(rig: &Rig<JOINTS, BASE>, seed: u64, from: u64) -> Option<String> {
     let at = (rig.period - from) as f64 / PERIODS_PER_S as f64;
@@ -152,13 +146,12 @@ impl Wave {
 
 /// Runs a stretch with a host that shakes the leg.
 fn shaken(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
-    let mut host = Host::new(Board::new(leg, context(leg, seed)?, seed, Label::SINGLE, Memory::new(None))?);
+    let context = Context::with_complete_drives(leg, seed)?;
+    let mut host = Host::new(Board::new(leg, context, seed, Label::SINGLE, Memory::new(None))?);
     host.begin()?;
     host.move_leg(leg)?;
     host.speaks.targets = false;
-    for node in NODES {
-        host.write(node, 0x6060, 0, 10, 1)?;
-    }
+    host.write_both(0x6060, 10, 1)?;
     let mut random = Random::new("shaken", seed);
     let mut waves = [0; JOINTS].map(|_| Wave::new(&mut random));
     let (from, mut cycle) = (host.rig().period, 0);
@@ -188,7 +181,7 @@ fn shaken(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
 
 /// Runs a stretch with a wearer who pushes.
 fn pushed(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
-    let context = context(leg, seed)?;
+    let context = Context::<JOINTS, BASE>::with_complete_drives(leg, seed)?;
     let mut rig = Rig::new(leg, &context, seed)?;
     begin(leg, &mut rig)?;
     rig.world.set_pushes(Some(PUSHES));

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::faults::recording::FaultCurves;
 
 /// Outcome of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Id of the row.
     #[serde(deserialize_with = "word")]

@@ -279,15 +279,17 @@ fn row_report(row: &Fault, outcomes: &[Outcome]) -> RowReport {
     let longest = of.iter().filter_map(|outcome| outcome.intermittent_ms).fold(f64::NEG_INFINITY, f64::max);
     let codes = FaultCode::ALL.iter().map(|code| code.name());
     let raised = |name: &&str| of.iter().any(|outcome| outcome.alarm == Some(*name));
+    let detected = count(&|outcome| outcome.detected);
+    let missed = count(&|outcome| !outcome.detected && !outcome.undetectable);
     RowReport {
         fault: row.id,
         runs: of.len(),
-        detected: count(&|outcome| outcome.detected),
+        detected,
         seen_by_own: count(&|outcome| {
             let own = |alarm: &str| row.codes.iter().any(|code| code.name() == alarm);
             outcome.detected && outcome.alarm.is_none_or(own)
         }),
-        missed: count(&|outcome| !outcome.detected && !outcome.undetectable),
+        missed,
         false_alarms: count(&|outcome| outcome.false_alarm),
         judges_false_alarms: JUDGED.contains(&row.id),
         worst_ms: worst(false).into(),
@@ -307,10 +309,7 @@ fn row_report(row: &Fault, outcomes: &[Outcome]) -> RowReport {
         largest_unseen: magnitudes(false).fold(f64::NEG_INFINITY, f64::max).into(),
         unit: row.unit,
         lacking: row.lacking,
-        detected_of_detectable: detected_of(
-            count(&|outcome| outcome.detected),
-            count(&|outcome| !outcome.detected && !outcome.undetectable),
-        ),
+        detected_of_detectable: detected_of(detected, missed),
     }
 }
 

@@ -45,17 +45,9 @@ pub fn run<const B: usize>(
             fault: row.fault.id,
             seed,
             period: base.period,
-            detected: false,
-            undetectable: false,
-            false_alarm: false,
-            after_ms: None,
-            intermittent_ms: None,
-            state: None,
-            alarm: None,
             magnitude: scenario.magnitude,
             broken: vec!["a panic".into()],
-            hash: String::new(),
-            recording: None,
+            ..Outcome::default()
         })
 }
 
@@ -84,7 +76,8 @@ struct Watched<'a, const B: usize> {
     before: [f64; 2],
     /// Largest change of them within a period since then, A.
     steepest: [f64; 2],
-    hold: Hold,
+    /// Time until which the operator's contacts stay as they are.
+    held_until: u64,
     recording: Option<FaultCurves>,
     brief: bool,
 }
@@ -94,12 +87,6 @@ fn requested<const B: usize>(rig: &Rig<JOINTS, B>, joint: usize) -> [f64; 2] {
     let current = rig.requested(joint);
     let angle = rig.world.complete_drives().map_or(0.0, |drives| drives.axes()[joint].electrical_angle());
     [1.0, 2.0].map(|phase| -current * (angle - phase * core::f64::consts::TAU / 3.0).sin())
-}
-
-/// Time until which the operator's contacts stay as they are.
-#[derive(Default)]
-struct Hold {
-    until: u64,
 }
 
 impl<'a, const B: usize> Watched<'a, B> {
@@ -148,7 +135,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             requested: requested(&rig, joint),
             before: [f64::NAN; 2],
             steepest: [0.0; 2],
-            hold: Hold::default(),
+            held_until: 0,
             recording: manner.recorded.then(FaultCurves::default),
             brief: manner.brief,
             rig,
@@ -243,7 +230,7 @@ impl<'a, const B: usize> Watched<'a, B> {
     /// Operates the contacts at random, with a complete reset now and then.
     fn hands(&mut self) {
         let now = self.rig.period;
-        if now < self.hold.until {
+        if now < self.held_until {
             return;
         }
         let choice = self.random.below(6);
@@ -255,7 +242,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         };
         // Sometimes long enough for a reset.
         let longest = if choice == 3 { 3 * PERIODS_PER_S } else { PERIODS_PER_S / 2 };
-        self.hold.until = now + 1 + self.random.below(longest);
+        self.held_until = now + 1 + self.random.below(longest);
         self.rig.hand = hand;
     }
 
@@ -281,7 +268,6 @@ impl<'a, const B: usize> Watched<'a, B> {
         let early = onset.is_none() && !own;
         let elsewhere = !early && seen.is_some_and(|state| !self.leads_to(state));
         false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !Self::is_caused_by_a_push(code));
-        let alarm = alarm.map(FaultCode::name);
         let begun = onset.map_or(safe, |onset| onset.min(safe));
         let after_ms = seen.map(|_| (safe - begun) as f64 * PERIOD_MS);
         let in_time = after_ms.is_some_and(|after| after <= self.deadline_ms() + 1e-9);
@@ -289,21 +275,31 @@ impl<'a, const B: usize> Watched<'a, B> {
         let stood = self.row.fault.deadline_ms.is_infinite() && !self.has_turned();
         let in_time = in_time && !early && !elsewhere;
         let undetectable = !in_time && !elsewhere && (self.scenario.by_design || nothing_came || stood);
+        let intermittent_ms = self.intermittent_ms();
+        let found = self.ended(alarm);
         Outcome {
-            fault: self.row.fault.id,
-            seed: self.seed,
-            period: self.begun,
             detected: in_time,
             undetectable,
             false_alarm,
             after_ms,
-            intermittent_ms: self.intermittent_ms(),
+            intermittent_ms,
             state: seen,
-            alarm,
+            ..found
+        }
+    }
+
+    /// Outcome of this run before it is judged.
+    fn ended(self, alarm: Option<FaultCode>) -> Outcome {
+        Outcome {
+            fault: self.row.fault.id,
+            seed: self.seed,
+            period: self.begun,
+            alarm: alarm.map(FaultCode::name),
             magnitude: self.scenario.magnitude,
             broken: self.invariants.into_broken(),
             hash: format!("{:016x}", self.rig.hash),
             recording: self.recording,
+            ..Outcome::default()
         }
     }
 
@@ -315,7 +311,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         while seen.is_none() && (self.rig.period < limit) {
             self.step();
             if self.scenario.expected == Expected::Rejected && self.rig.period == self.begun + 1 {
-                let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
+                let joint = self.joint();
                 let kept = self.rig.commands()[joint] == before[joint];
                 let rejected = kept && self.rig.alarm().is_none();
                 seen = rejected.then_some("Limit");
@@ -344,7 +340,7 @@ impl<'a, const B: usize> Watched<'a, B> {
     fn has_turned(&self) -> bool {
         let position = self.rig.world.anatomical_position();
         let drives = self.rig.world.complete_drives();
-        let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
+        let joint = self.joint();
         let ratio = drives.map_or(1.0, |drives| drives.axes()[joint].description().ratio);
         (position[joint] - self.angles[joint]).abs() * ratio > self.scenario.turns * core::f64::consts::TAU
     }

@@ -17,7 +17,7 @@ use scarab_identify::formats::leg_file::LegFile;
 
 use crate::faults::aftermath::{RESET, RESET_EVERY, hand};
 use crate::faults::event::apply;
-use crate::faults::forks::rows;
+use crate::faults::forks::ROWS;
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::recording::FaultCurves;
 use crate::faults::run::Outcome;
@@ -126,7 +126,7 @@ impl Trial {
     }
 
     fn add(&mut self, random: &mut Random, bounds: &Bounds, later: u64) {
-        let pool = || rows().filter(|row| !ALONE.contains(&row.fault.id));
+        let pool = || ROWS.iter().filter(|row| !ALONE.contains(&row.fault.id));
         let all = pool().count() as u64;
         let mut injections = Vec::new();
         if random.below(12) == 0 {
@@ -231,15 +231,10 @@ impl Trial {
             period: base.period,
             detected: alarm.is_some(),
             undetectable: alarm.is_none(),
-            false_alarm: false,
-            after_ms: None,
-            intermittent_ms: None,
-            state: None,
             alarm: alarm.map(FaultCode::name),
-            magnitude: None,
             broken: broken.into_iter().map(with).collect(),
             hash,
-            recording: None,
+            ..Outcome::default()
         }
     }
 }
@@ -248,7 +243,6 @@ impl Trial {
 mod tests {
     use super::*;
     use crate::operator::begin;
-    use crate::options::{DriveModel, SimulationOptions};
     use crate::pair::Context;
     use scarab::model::planar::BASE;
     use scarab_identify::formats::leg_file::DEFAULT_LEG;
@@ -273,8 +267,7 @@ mod tests {
     #[test]
     fn a_lasting_stop_or_gate_fault_is_detected_in_every_run() {
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
-        let context = Context::<JOINTS, BASE>::new(&leg, &options).expect("the default leg");
+        let context = Context::<JOINTS, BASE>::with_complete_drives(&leg, 1).expect("the default leg");
         let mut base = Rig::new(&leg, &context, 1).expect("complete drives");
         begin(&leg, &mut base).expect("it is enabled");
         for channel in [Channel::EmergencyStop, Channel::GateFault] {

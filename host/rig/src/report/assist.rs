@@ -214,27 +214,6 @@ pub struct InteractionCurve {
     pub identified_nm: Vec<f64>,
 }
 
-impl AssistRow {
-    /// Row without results.
-    #[must_use]
-    pub fn new(mode: &'static str, motion: &str, joint: &str) -> Self {
-        Self {
-            mode,
-            motion: motion.to_owned(),
-            joint: joint.to_owned(),
-            drives_off_rms_nm: Number::UNKNOWN,
-            gravity_only_rms_nm: Number::UNKNOWN,
-            true_model_rms_nm: Number::UNKNOWN,
-            identified_rms_nm: Number::UNKNOWN,
-            prior_rms_nm: Number::UNKNOWN,
-            wearer_rms_nm: Number::UNKNOWN,
-            wearer_without_rms_nm: Number::UNKNOWN,
-            wearer_gravity_share: Number::UNKNOWN,
-            wearer_gravity_share_without: Number::UNKNOWN,
-        }
-    }
-}
-
 impl AssistReport {
     /// What failed: refused models, energy, rest, faults, stability; empty if nothing did.
     #[must_use]

@@ -18,7 +18,7 @@ pub struct MonitorRuns {
 }
 
 /// One run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct MonitorRun {
     /// Seed of noise and pushes.
     pub seed: u64,
@@ -115,29 +115,9 @@ pub struct ValueReport {
 }
 
 impl MonitorRun {
-    /// Report before any event.
-    pub fn new(seed: u64) -> Self {
-        Self {
-            seed,
-            refused: Vec::new(),
-            row_sigma_nm: Vec::new(),
-            limit: Number::UNKNOWN,
-            hours: 0.0,
-            false_alarms_at_s: Vec::new(),
-            changed: false,
-            alarm: None,
-            update: None,
-            still_changing: false,
-            alarm_after_update: false,
-            error_deg_before: Number::UNKNOWN,
-            error_deg_changed: Number::UNKNOWN,
-            error_deg_updated: Number::UNKNOWN,
-        }
-    }
-
     /// Report of a rejected identification.
     pub fn refused(seed: u64, reasons: Vec<&'static str>) -> Self {
-        Self { refused: reasons, ..Self::new(seed) }
+        Self { seed, refused: reasons, ..Self::default() }
     }
 
     /// Whether the run met its requirements: a model, no false alarm, and a change that was detected and

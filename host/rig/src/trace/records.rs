@@ -21,16 +21,19 @@ pub trait Field {
 }
 
 macro_rules! fields {
-    ($($type:ty),*) => {$(
+    ($($type:ty $(, $from_digits:ident)?;)*) => {$(
         impl Field for $type {
             type Value = Self;
             fn read(text: &str) -> Option<Self> {
                 text.parse().ok()
             }
+            $(fn read_hex(digits: &str) -> Option<Self> {
+                Self::$from_digits(digits, 16).ok()
+            })?
         }
     )*};
 }
-fields!(u64, i32, f32, bool);
+fields!(u64; i32; f32; bool; u16, from_str_radix; u32, from_str_radix;);
 
 /// One byte is a count or an index.
 impl Field for u8 {
@@ -39,21 +42,6 @@ impl Field for u8 {
         text.parse::<Self>().ok().map(usize::from)
     }
 }
-
-macro_rules! registers {
-    ($($type:ty),*) => {$(
-        impl Field for $type {
-            type Value = Self;
-            fn read(text: &str) -> Option<Self> {
-                text.parse().ok()
-            }
-            fn read_hex(digits: &str) -> Option<Self> {
-                Self::from_str_radix(digits, 16).ok()
-            }
-        }
-    )*};
-}
-registers!(u16, u32);
 
 impl Field for &str {
     type Value = String;

@@ -8,8 +8,7 @@
 use scarab::ident::{Estimate, Estimator, Evidence, Plan, Reason, Selection, Status, Test};
 use scarab::model::Parameter;
 use scarab_base::error::ToolError;
-use scarab_base::names::VALIDATION_NAMES;
-use scarab_base::names::{estimator_name, plan_name};
+use scarab_base::names::{VALIDATION_NAMES, estimator_name, plan_name};
 use scarab_base::number::Number;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::leg::background::Background;
@@ -292,11 +291,7 @@ fn consistent(solver: &Solver) -> ConsistentReport {
             iterations: solver.iterations,
             evaluations: solver.evaluations,
             steps: solver.steps,
-            settled: None,
-            excess_chi2: Number::UNKNOWN,
-            iterations_to_half_chi2: None,
-            consistent: None,
-            parameters: std::collections::BTreeMap::new(),
+            ..ConsistentSearchReport::default()
         },
     }
 }

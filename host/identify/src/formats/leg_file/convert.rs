@@ -23,25 +23,20 @@ impl LegFile {
     /// refers to a motion, for which the caller adds it with `World::set_current_noise`. Fails if the leg
     /// does not have `N` joints or a joint has no `truth`.
     pub fn description<const N: usize>(&self) -> Result<LegDescription<N>, FileError> {
-        let mut joints = Vec::with_capacity(N);
-        for joint in &self.joints {
+        let described = |joint: &JointFile| {
             let truth = joint.truth.as_ref().ok_or_else(|| {
                 self.error(format!("joint `{}` has no `truth`: the leg cannot be simulated; `replay` identifies from a recording", joint.name))
             })?;
-            joints.push(joint.description(truth));
-        }
-        let count = joints.len();
-        let joints = joints.try_into().map_err(|_| self.error(format!("has {count} joints, not {N}")))?;
+            Ok(joint.description(truth))
+        };
         Ok(LegDescription {
             gravity: self.gravity,
-            joints,
+            joints: self.each_joint(described)?,
             mirrored: self.side == BodySide::Left,
             pushes: self.pushes.as_ref().map(pushes),
         })
     }
-}
 
-impl LegFile {
     /// Replaces the noise by this standard deviation of each joint's logged torque, N m.
     #[must_use]
     pub fn with_torque_noise(mut self, noise_nm: &[f64]) -> Self {

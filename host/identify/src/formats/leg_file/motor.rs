@@ -20,7 +20,7 @@ use scarab_base::toml_file::Fault;
 use serde::{Deserialize, Serialize};
 
 use crate::formats::leg_file::check::KeyLocation;
-use crate::formats::leg_file::{JointFile, LegFile, Side};
+use crate::formats::leg_file::{JointFile, LegFile, Side, defaults, is_default};
 
 /// Least time constant of a winding, s; below it the board cannot measure an inductance within its
 /// PWM periods.
@@ -90,7 +90,7 @@ pub struct MotorFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_turns: Option<f64>,
     /// Whether the encoder is an AS5047P that is also read by SPI; it has no index then.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub absolute_encoder: bool,
     /// AS5047P at the joint, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -119,28 +119,12 @@ pub enum JointEncoder {
     AgainstCounter,
 }
 
-fn is_false(value: &bool) -> bool {
-    !*value
-}
-
-fn default_cogging_periods() -> u32 {
-    84
-}
-
-fn default_thermal_resistance() -> f64 {
-    1.0
-}
-
-fn default_thermal_time() -> f64 {
-    300.0
-}
-
-fn default_ambient() -> f64 {
-    40.0
-}
-
-fn default_winding_limit() -> f64 {
-    100.0
+defaults! {
+    default_cogging_periods: u32 = 84;
+    default_thermal_resistance: f64 = 1.0;
+    default_thermal_time: f64 = 300.0;
+    default_ambient: f64 = 40.0;
+    default_winding_limit: f64 = 100.0;
 }
 
 /// Supply of the board.
@@ -180,12 +164,6 @@ impl Default for SupplyFile {
 }
 
 impl SupplyFile {
-    /// Whether the supply equals the default.
-    #[must_use]
-    pub fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// Description of the simulated supply.
     #[must_use]
     pub fn description(&self) -> SupplyDescription {
@@ -476,18 +454,15 @@ impl LegFile {
     /// Complete drives of the simulated leg. Fails if the leg does not have `N` joints or a joint
     /// has no motor.
     pub fn complete_description<const N: usize>(&self) -> Result<CompleteDescription<N>, FileError> {
-        let mut axes = Vec::with_capacity(N);
-        for joint in &self.joints {
+        let axes = self.each_joint(|joint| {
             let motor = joint.motor.as_ref().ok_or_else(|| {
                 self.error(format!(
                     "joint `{}` has no `[joint.motor]`: its complete drive cannot be simulated",
                     joint.name
                 ))
             })?;
-            axes.push(motor.axis(joint));
-        }
-        let count = axes.len();
-        let axes = axes.try_into().map_err(|_| self.error(format!("has {count} joints, not {N}")))?;
+            Ok(motor.axis(joint))
+        })?;
         let mut supply = self.supply.description();
         supply.takes_charge = self.charge_current_a.is_some();
         Ok(CompleteDescription::new(axes, supply))

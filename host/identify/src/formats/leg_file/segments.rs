@@ -39,12 +39,6 @@ pub enum BodySide {
 }
 
 impl BodySide {
-    /// Whether this is the default side.
-    #[must_use]
-    pub fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// Sign of motors and encoders relative to the anatomical direction.
     #[must_use]
     pub fn mounting(self) -> f64 {

@@ -25,18 +25,6 @@ impl Switch {
         }
     }
 
-    pub(super) const fn on() -> Self {
-        Self::On
-    }
-
-    pub(super) const fn auto() -> Self {
-        Self::Auto
-    }
-
-    pub(super) const fn off() -> Self {
-        Self::Off
-    }
-
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
     pub(super) const fn is_off(&self) -> bool {
         matches!(self, Self::Off)

@@ -8,7 +8,7 @@ use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
 use crate::formats::recording::suggest::{
-    Reading, advice, by_number, command, nearest, readings, unit_in_name,
+    Reading, advice, by_number, choices_of_joint, command, nearest, readings, required, unit_in_name,
 };
 use crate::formats::recording::{LARGEST_POSITION_RAD, LARGEST_TIME_S, LARGEST_TORQUE_NM};
 use crate::report::reading::ColumnReport;
@@ -94,11 +94,10 @@ impl Chosen {
 pub(crate) fn choose(names: &Names, import: &Import) -> Result<(Vec<Chosen>, usize), Fault> {
     let joints = import.drives.len();
     let finder = Finder { names, import };
-    let choices = std::iter::once(vec![Signal::Time]).chain((1..=joints).flat_map(choices_of_joint));
     let mut found = BTreeMap::new();
     let mut missing = None;
     let mut order = Vec::new();
-    for choices in choices {
+    for choices in required(joints) {
         match finder.find(&choices)? {
             Some((signal, column)) => {
                 found.insert(signal, column);
@@ -119,18 +118,10 @@ pub(crate) fn choose(names: &Names, import: &Import) -> Result<(Vec<Chosen>, usi
         return Err(finder.missing(signal, &found));
     }
     let columns = order.iter().map(|signal| finder.chosen(*signal, &found)).collect::<Result<Vec<_>, _>>()?;
-    let has_joint = |joint: &usize| choices_of_joint(*joint).all(|choices| finder.has_documented(&choices));
+    let has_joint =
+        |joint: &usize| choices_of_joint(*joint).iter().all(|choices| finder.has_documented(choices));
     let documented = (1..=names.names.len()).take_while(has_joint).count();
     Ok((columns, documented.max(joints)))
-}
-
-/// Signals that give the angle, and those that give the torque, of one joint.
-fn choices_of_joint(joint: usize) -> impl Iterator<Item = Vec<Signal>> {
-    [
-        vec![Signal::Angle(joint), Signal::MotorAngle(joint)],
-        vec![Signal::Torque(joint), Signal::Current(joint)],
-    ]
-    .into_iter()
 }
 
 struct Finder<'a> {

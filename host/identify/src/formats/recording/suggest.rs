@@ -285,15 +285,17 @@ fn named_column(candidates: &[(usize, Name, Signal)], import: &Import, signal: S
     }
 }
 
+/// Signals that give the angle, and those that give the torque, of one joint.
+pub(crate) fn choices_of_joint(joint: usize) -> [Vec<Signal>; 2] {
+    [
+        vec![Signal::Angle(joint), Signal::MotorAngle(joint)],
+        vec![Signal::Torque(joint), Signal::Current(joint)],
+    ]
+}
+
 /// Signals that a recording of so many joints must have, each with those that replace it.
-fn required(joints: usize) -> impl Iterator<Item = Vec<Signal>> {
-    let of_joints = (1..=joints).flat_map(|joint| {
-        [
-            vec![Signal::Angle(joint), Signal::MotorAngle(joint)],
-            vec![Signal::Torque(joint), Signal::Current(joint)],
-        ]
-    });
-    std::iter::once(vec![Signal::Time]).chain(of_joints)
+pub(crate) fn required(joints: usize) -> impl Iterator<Item = Vec<Signal>> {
+    std::iter::once(vec![Signal::Time]).chain((1..=joints).flat_map(choices_of_joint))
 }
 
 /// Signal that is read from a column in a unit.

@@ -11,8 +11,6 @@
 //! halve the misfit's power, or be a direction that refuses. Another leg is named only where a link's length
 //! or a zero is significant.
 
-use scarab_base::number::Number;
-
 use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
 use crate::report::findings::FindingReport;
 use crate::run::logging_errors::directions::{CHANCE, Directions, Found, label};
@@ -118,9 +116,8 @@ pub fn likely<const N: usize, const B: usize>(
             name: "other_leg",
             joint: finding.joint,
             value: finding.value,
-            sigma: Number::UNKNOWN,
             words: finding.words.clone(),
-            reads: Vec::new(),
+            ..CauseReport::default()
         },
         (None, None) => weaker(question, errors, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
     }
@@ -134,9 +131,8 @@ fn motionless(findings: &[FindingReport]) -> Option<CauseReport> {
         name: "motion",
         joint: finding.joint,
         value: finding.value,
-        sigma: Number::UNKNOWN,
         words: format!("{}; record a motion that moves every joint", finding.words),
-        reads: Vec::new(),
+        ..CauseReport::default()
     })
 }
 
@@ -171,9 +167,8 @@ fn encoder_steps<const N: usize, const B: usize>(
         name: "encoder_steps",
         joint: Some(joint + 1),
         value: share.into(),
-        sigma: Number::UNKNOWN,
         words,
-        reads: Vec::new(),
+        ..CauseReport::default()
     })
 }
 
@@ -240,13 +235,10 @@ fn excluded(samples: &[SampleFinding]) -> Option<CauseReport> {
 fn unknown() -> CauseReport {
     CauseReport {
         name: "unknown",
-        joint: None,
-        value: Number::UNKNOWN,
-        sigma: Number::UNKNOWN,
         words: "no correction of units and no single one of signs, columns, delay, scale or gravity makes the recording \
                 acceptable"
             .into(),
-        reads: Vec::new(),
+        ..CauseReport::default()
     }
 }
 
@@ -305,7 +297,7 @@ fn changed_midway(midway: &Midway, here: Quality) -> Tried {
         value: midway.change.into(),
         sigma: midway.sigma.into(),
         words: midway_words(midway),
-        reads: Vec::new(),
+        ..CauseReport::default()
     };
     let remaining = here.remaining * (1.0 - midway.explained).max(0.0).sqrt();
     Tried { cause, quality: Quality { remaining, sound: true }, is_shared: false }
@@ -352,10 +344,9 @@ fn refit<const N: usize, const B: usize>(
     let cause = CauseReport {
         name: correction.name,
         joint: correction.joint.map(|joint| joint + 1),
-        value: Number::UNKNOWN,
-        sigma: Number::UNKNOWN,
         words,
         reads: correction.reads.clone(),
+        ..CauseReport::default()
     };
     Some(Tried { cause, quality, is_shared: false })
 }
@@ -482,31 +473,26 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
     all.extend(angle_units(question));
     for one in 0..N {
         for other in one + 1..N {
-            let names = format!("{} and {}", one + 1, other + 1);
-            all.push(Correction {
-                name: "joints_swapped",
-                joint: None,
-                words: format!("torques of joints {names} exchanged"),
-                reads: Vec::new(),
-                apply: Box::new(move |_, torques| torques.swap(one, other)),
-            });
-            all.push(Correction {
-                name: "joints_swapped",
-                joint: None,
-                words: format!("angles of joints {names} exchanged"),
-                reads: Vec::new(),
-                apply: Box::new(move |angles, _| angles.swap(one, other)),
-            });
-            all.push(Correction {
-                name: "joints_swapped",
-                joint: None,
-                words: format!("joints {names} exchanged"),
-                reads: Vec::new(),
-                apply: Box::new(move |angles, torques| {
-                    angles.swap(one, other);
-                    torques.swap(one, other);
-                }),
-            });
+            for (what, of_angles, of_torques) in [
+                ("torques of joints", false, true),
+                ("angles of joints", true, false),
+                ("joints", true, true),
+            ] {
+                all.push(Correction {
+                    name: "joints_swapped",
+                    joint: None,
+                    words: format!("{what} {} and {} exchanged", one + 1, other + 1),
+                    reads: Vec::new(),
+                    apply: Box::new(move |angles, torques| {
+                        if of_angles {
+                            angles.swap(one, other);
+                        }
+                        if of_torques {
+                            torques.swap(one, other);
+                        }
+                    }),
+                });
+            }
         }
     }
     for joint in (0..N).filter(|_| N > 1) {

@@ -173,7 +173,7 @@ fn cause(kind: Kind, joint: Option<usize>, time_s: f64, sigma_s: f64, remaining:
         value: time_ms.into(),
         sigma: sigma_ms.into(),
         words: format!("{words}; fitted, it explains {explained:.0} % of the misfit"),
-        reads: Vec::new(),
+        ..CauseReport::default()
     }
 }
 

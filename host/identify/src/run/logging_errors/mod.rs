@@ -38,7 +38,7 @@ use scarab::ident::{KernelError, RowModel};
 use scarab::model::AnatomicalJoint;
 use scarab_base::number::Number;
 
-use crate::report::doubt::{CauseReport, DirectionReport, DoubtReport, RecordingsReport, SampleFinding};
+use crate::report::doubt::{CauseReport, DirectionReport, DoubtReport, SampleFinding};
 use crate::report::findings::FindingReport;
 use directions::{Directions, Found};
 use encoder::{Bias, Encoders, LARGEST_NOISE, LARGEST_SHARE};
@@ -218,9 +218,8 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
         let mut sigma: [Sigma; B] = core::array::from_fn(|base| Sigma {
             noise: question.sigma[base],
             segments: scatter[base],
-            recordings: 0.0,
-            logging: 0.0,
             encoder: encoder.map_or(0.0, |bias| bias.sigma[base]),
+            ..Sigma::default()
         });
         let misfit_over_noise = core::array::from_fn(|joint| {
             let misfit = equations.row_sigma[joint] * equations.information().sqrt();
@@ -250,29 +249,15 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
             } else {
                 (bias.largest_share(), LARGEST_SHARE)
             };
-            FindingReport {
-                reason: "input",
-                test: "encoder_steps",
-                joint: Some(joint + 1),
-                motion: None,
-                value: value.into(),
-                limit: limit.into(),
-                passed: !bias.refuses(),
-                words: if bias.refuses() { self.encoder_words(bias) } else { String::new() },
-            }
+            let failure = bias.refuses().then(|| self.encoder_words(bias));
+            let values = [value, limit].map(Number::from);
+            FindingReport::judged("input", "encoder_steps", Some(joint + 1), values, failure)
         }));
         findings.extend(self.midway.as_ref().map(|midway| {
-            let refused = midway.refuses();
-            FindingReport {
-                reason: "residual",
-                test: "changed_midway",
-                joint: midway.joint.map(|joint| joint + 1),
-                motion: None,
-                value: midway.change.into(),
-                limit: midway.limit().into(),
-                passed: !refused,
-                words: if refused { midway_words(midway) } else { String::new() },
-            }
+            let failure = midway.refuses().then(|| midway_words(midway));
+            let values = [midway.change, midway.limit()].map(Number::from);
+            let joint = midway.joint.map(|joint| joint + 1);
+            FindingReport::judged("residual", "changed_midway", joint, values, failure)
         }));
         findings
     }
@@ -304,12 +289,9 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
     #[must_use]
     pub fn report(&self) -> DoubtReport {
         DoubtReport {
-            likely_cause: None,
             directions: self.directions.clone(),
             misfit_over_noise: self.misfit_over_noise.map(Number::from).to_vec(),
-            at_prior_limit: Vec::new(),
-            recordings: RecordingsReport::default(),
-            bandwidth: None,
+            ..DoubtReport::default()
         }
     }
 }
@@ -317,16 +299,9 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
 /// Finding about samples, for the verdict.
 #[must_use]
 pub fn sample_finding(finding: &SampleFinding) -> FindingReport {
-    FindingReport {
-        reason: "input",
-        test: finding.name,
-        joint: finding.joint,
-        motion: None,
-        value: finding.value.into(),
-        limit: Number::UNKNOWN,
-        passed: !finding.refuses,
-        words: if finding.refuses { format!("{}: {}", finding.file, finding.text) } else { String::new() },
-    }
+    let failure = finding.refuses.then(|| format!("{}: {}", finding.file, finding.text));
+    let values = [finding.value.into(), Number::UNKNOWN];
+    FindingReport::judged("input", finding.name, finding.joint, values, failure)
 }
 
 /// Finding about samples, as the likely cause.
@@ -338,7 +313,7 @@ pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
         value: finding.value.into(),
         sigma: finding.sigma.into(),
         words: format!("{}: {}", finding.file, finding.text),
-        reads: Vec::new(),
+        ..CauseReport::default()
     }
 }
 

@@ -222,17 +222,7 @@ impl<'a> Examination<'a> {
     fn finding(&self, name: &'static str, joint: Option<usize>, text: String) -> SampleFinding {
         let file = self.recording.file.display().to_string();
         let joint = joint.map(|joint| joint + 1);
-        SampleFinding {
-            name,
-            file,
-            joint,
-            value: 0.0,
-            unit: "s",
-            sigma: None,
-            share: 0.0,
-            refuses: false,
-            text,
-        }
+        SampleFinding { name, file, joint, unit: "s", text, ..SampleFinding::default() }
     }
 
     /// Columns that repeat their values, and those with coarse steps.
@@ -406,14 +396,11 @@ fn coarse(values: &[f64], column: &str, unit: &'static str) -> Option<SampleFind
     let is_coarse = if unit == "rad" { u >= COARSE_RAD } else { u > COARSE_SHARE * (high - low) };
     (is_coarse && 4 * single > changes.len()).then(|| SampleFinding {
         name: QUANTISED,
-        file: String::new(),
-        joint: None,
         value: u,
         unit: if unit == "rad" { "rad" } else { "N m" },
-        sigma: None,
         share: 1.0,
-        refuses: false,
         text: format!("{column} has steps of {u:.3e}: a coarse sensor"),
+        ..SampleFinding::default()
     })
 }
 

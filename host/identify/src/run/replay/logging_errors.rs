@@ -171,16 +171,9 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             run.findings.extend(errors.findings());
             run.findings.extend(cause::in_degrees(&question, errors).map(|found| {
                 let remedy = units::remedy(self.options.import.as_ref(), &found);
-                FindingReport {
-                    reason: Reason::Input.name(),
-                    test: found.name,
-                    joint: found.joint,
-                    motion: None,
-                    value: found.value,
-                    limit: found.value,
-                    passed: false,
-                    words: found.words + &remedy.unwrap_or_default(),
-                }
+                let words = found.words + &remedy.unwrap_or_default();
+                let values = [found.value; 2];
+                FindingReport::judged(Reason::Input.name(), found.name, found.joint, values, Some(words))
             }));
         }
         run.findings.extend(samples.iter().filter(|found| found.refuses).map(sample_finding));

@@ -8,7 +8,6 @@ use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 
 use crate::faults::aftermath;
 use crate::faulty_board::{PERIODS_PER_S, Rig};
-use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
 use scarab::model::planar::BASE;
 
@@ -24,8 +23,7 @@ fn ready() -> TestRig {
     let mut leg = LegFile { gravity: [0.0; 3], ..LegFile::load(DEFAULT_LEG).expect("shipped") };
     // The zero pose is within the range, so the leg can be enabled without moving it first.
     leg.joints.iter_mut().for_each(|joint| joint.range_deg[0] = -20.0);
-    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
-    let context = Context::new(&leg, &options).expect("the default leg");
+    let context = Context::with_complete_drives(&leg, 1).expect("the default leg");
     let mut rig = Rig::new(&leg, &context, 1).expect("complete drives");
     hold(&mut rig, OPEN, 0.1);
     rig

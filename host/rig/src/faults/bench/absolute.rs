@@ -20,14 +20,12 @@ use scarab::safety::FaultCode;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::bus::board::{Board, Label};
 use crate::bus::host::Host;
-use crate::faults::bench::Bench;
-use crate::faults::bench::hosted::{Fork, context, forked_within};
-use crate::faults::catalogue::{self, ENCODER_CHECK, ENCODER_CHECK_MS, Fault, TICK_MS};
+use crate::faults::bench::Outcomes;
+use crate::faults::bench::hosted::{Fork, context, forked_within, moving};
+use crate::faults::catalogue::{ENCODER_CHECK, ENCODER_CHECK_MS, Fault, TICK_MS};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
-use crate::parameter_file::memory::Memory;
 
 /// Ticks of a run: three strokes of the motion.
 const PATIENCE: u64 = 12_000;
@@ -41,28 +39,21 @@ const HIDDEN: [f64; 2] = [10.0 * COUNT, 38.0];
 /// Random frames: at worst ten checks, and twice that where a random angle is right by chance.
 const GARBAGE_MS: f64 = 20.0 * ENCODER_CHECK_MS;
 
-pub(super) const SILENT: Bench = Bench { fault: &catalogue::E6, run: silent };
-
-pub(super) const CONTRADICTION: Bench = Bench { fault: &catalogue::E7, run: contradict };
-
 fn base(leg: &LegFile, blind: bool) -> Result<Host, ToolError> {
     let motors = leg.with_absolute_encoders();
     let mut believed = motors.clone();
     for motor in believed.joints.iter_mut().filter_map(|joint| joint.motor.as_mut()).filter(|_| blind) {
         (motor.absolute_encoder, motor.joint_encoder) = (false, None);
     }
-    let mut base = Host::new(Board::new(&motors, context(&believed)?, 1, Label::SINGLE, Memory::new(None))?);
-    base.begin()?;
-    base.move_leg(leg)?;
-    Ok(base)
+    moving(&motors, context(&believed)?)
 }
 
-fn silent(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn silent(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let scope = Scope { torque: true, range: true, rotor_position: true };
     forked_within(fault, leg, base(leg, blind)?, seeds, scope, falls_silent)
 }
 
-fn contradict(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn contradict(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let scope = Scope { torque: false, range: true, rotor_position: false };
     forked_within(fault, leg, base(leg, blind)?, seeds, scope, contradicts)
 }

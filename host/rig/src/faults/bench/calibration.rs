@@ -8,30 +8,47 @@
 use core::f64::consts::TAU;
 
 use hal_sim::drive::description::{AxisDescription, EncoderWiring, SupplyDescription};
+use hal_sim::drive::stand::Stand;
 use hal_sim::faults::{Channel, Form, Injection, Injector, Timing};
 use rayon::prelude::*;
-use scarab::hal::{AxisCommand, CURRENT_RATE_HZ};
-use scarab::motor::{Calibration, CalibrationStep, Calibrator};
+use scarab::motor::{AxisConfiguration, Calibration, Calibrator};
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::{JointFile, LegFile, MotorFile};
 use scarab_identify::leg::board_words::axis_error;
 
-use crate::board::{axis_configuration, calibration_settings, commission, rested};
-use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::board::{
+    LONGEST_CALIBRATION, axis_configuration, calibration_settings, commission, rested, run_calibration,
+};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::draw::AMPERE_PER_CODE;
 use crate::faults::run::Outcome;
+use scarab::model::planar::JOINTS;
 
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::E5, run: calibrate };
+/// Message about a leg that these rows cannot run.
+pub(super) const UNFIT: &str = "every joint needs a motor that can be calibrated";
 
-/// Longest calibration, periods; usually some seconds.
-const LONGEST: u64 = 60 * CURRENT_RATE_HZ as u64;
+/// Motor of a joint at rest on a test stand, its calibration and its axis.
+pub(super) fn on_stand(
+    leg: &LegFile,
+    index: usize,
+    seed: u64,
+) -> Result<(Stand, Calibrator, AxisConfiguration), ToolError> {
+    let unfit = || leg.error(UNFIT);
+    let drives = leg.complete_description::<JOINTS>()?;
+    let joint = &leg.joints[index];
+    let motor = joint.motor.as_ref().ok_or_else(unfit)?;
+    let configuration = axis_configuration(joint, motor);
+    let settings = calibration_settings(&configuration, motor);
+    let stand = rested(&drives.axes[index], &drives.supply, TAU * 0.3, seed);
+    Ok((stand, Calibrator::new(&configuration, settings).map_err(|_| unfit())?, configuration))
+}
 
 /// Number of ways to connect an axis wrongly.
 const WAYS: u64 = 11;
 
-fn calibrate(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn calibrate(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     seeds.par_iter().map(|seed| one(fault, leg, *seed, blind)).collect()
 }
 
@@ -104,22 +121,17 @@ fn loose(
         }
         let mut calibrator =
             Calibrator::new(&configuration, settings).map_err(|error| ToolError::input(axis_error(error)))?;
-        let mut command = AxisCommand::OFF;
-        for tick in 0..LONGEST {
+        let ended = run_calibration(&mut calibrator, |tick, command| {
             if let Some((at, Loose::Wire(output))) = loose
                 && at == tick
             {
                 stand.break_wire(*output);
             }
-            let mut sample = stand.period(&command, 0.0);
+            let mut sample = stand.period(command, 0.0);
             injector.sample(0, tick, &mut sample);
-            match calibrator.tick(&sample) {
-                CalibrationStep::Running(next) => command = next,
-                CalibrationStep::Done(found) => return Ok((tick, Some(found))),
-                CalibrationStep::Refused(_) => return Ok((tick, None)),
-            }
-        }
-        Ok((LONGEST, None))
+            sample
+        });
+        Ok(ended.map_or((LONGEST_CALIBRATION, None), |(tick, result)| (tick, result.ok())))
     };
     let (length, sound) = measure(None)?;
     let at = random.below(length);

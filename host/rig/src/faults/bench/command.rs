@@ -15,21 +15,18 @@ use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::invariants::MARGIN_RAD;
 use crate::faults::run::Outcome;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, start_position};
-use scarab::model::planar::BASE;
-use scarab::model::planar::JOINTS;
-
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::J1_COMMANDED, run: command };
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Distance by which the ends of a range are moved when the clamp is disabled.
 const WIDENED: Radian = Radian(2.0);
 
-fn command(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn command(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let mut context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::with_seed(1))?;
     if blind {
         for joint in &mut context.configuration.joints {

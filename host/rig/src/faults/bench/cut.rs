@@ -9,9 +9,10 @@ use scarab::hal::{AxisCommand, Contacts, SERVO_RATE_HZ};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::faults::bench::Bench;
+use crate::bus::host::{SAVE, WINDOW};
+use crate::faults::bench::Outcomes;
 use crate::faults::bench::hosted::{Fork, forked, started};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::catalogue::Fault;
 use crate::faults::run::Outcome;
 use crate::parameter_file::memory::Memory;
 use scarab::model::planar::JOINTS;
@@ -22,18 +23,12 @@ const HANDS: u64 = 1000;
 const OPEN: u64 = 200;
 /// Bus voltage with the supply present, V.
 const BUS_V: f64 = 48.0;
-const SAVE: u32 = u32::from_le_bytes(*b"save");
 /// Stored following window, micro-radian.
-const WINDOW: u16 = 0x6065;
 const KEPT: u32 = 43_210;
 
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::X3, run: cut };
-
-fn cut(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn cut(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let mut host = started(leg)?;
-    for node in [1, 2] {
-        host.write(node, WINDOW, 0, KEPT, 4)?;
-    }
+    host.write_both(WINDOW, KEPT, 4)?;
     host.write(1, 0x1010, 1, SAVE, 4)?;
     host.run(400);
     host.move_leg(leg)?;

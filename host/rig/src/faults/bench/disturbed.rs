@@ -15,15 +15,14 @@ use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::{LegFile, PushesFile};
 
-use crate::faults::bench::{Bench, outcome};
+use crate::faults::bench::{Bench, Outcomes, outcome};
 use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
 use crate::options::SimulationOptions;
 use crate::pair::Context;
 use crate::perturb::{self, Perturbation};
 use crate::simulate::drive;
-use scarab::model::planar::BASE;
-use scarab::model::planar::JOINTS;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Twice the limit for an undisturbed identification.
 const HARMFUL_PERCENT: f64 = 3.0;
@@ -50,7 +49,7 @@ fn all(
     seeds: &[u64],
     blind: bool,
     draw: fn(&mut Random, &LegFile) -> Drawn,
-) -> Result<Vec<Outcome>, ToolError> {
+) -> Outcomes {
     let one = |seed: &u64| {
         let (leg, perturbations, magnitude) = draw(&mut Random::new(fault.id, *seed), leg);
         judge(fault, &leg, perturbations, magnitude, *seed, blind)

@@ -12,17 +12,15 @@ use scarab_identify::formats::leg_file::LegFile;
 
 use crate::bus::board::{Board, Label};
 use crate::bus::host::Host;
-use crate::faults::bench::outcome;
+use crate::faults::bench::{Outcomes, outcome};
 use crate::faults::catalogue::{Fault, TICK_MS};
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
 use crate::faulty_board::Rig;
 use crate::operator::begin;
-use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
 use crate::parameter_file::memory::Memory;
-use scarab::model::planar::BASE;
-use scarab::model::planar::JOINTS;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Servo ticks of the motion in which forks begin: two strokes back and forth.
 const MOTION: u64 = 11_400;
@@ -38,8 +36,7 @@ pub(super) fn board(leg: &LegFile) -> Result<Board<JOINTS, BASE>, ToolError> {
 
 /// Context of such a board.
 pub(super) fn context(leg: &LegFile) -> Result<Context<JOINTS, BASE>, ToolError> {
-    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
-    Context::new(leg, &options)
+    Context::with_complete_drives(leg, 1)
 }
 
 /// A host, its nodes started and mapped, the leg off.
@@ -51,7 +48,13 @@ pub(super) fn started(leg: &LegFile) -> Result<Host, ToolError> {
 
 /// A host that moves its leg.
 pub(super) fn hosted(leg: &LegFile) -> Result<Host, ToolError> {
-    let mut host = started(leg)?;
+    moving(leg, context(leg)?)
+}
+
+/// A host that moves a leg whose firmware has another context.
+pub(super) fn moving(leg: &LegFile, context: Context<JOINTS, BASE>) -> Result<Host, ToolError> {
+    let mut host = Host::new(Board::new(leg, context, 1, Label::SINGLE, Memory::new(None))?);
+    host.begin()?;
     host.move_leg(leg)?;
     Ok(host)
 }
@@ -148,7 +151,7 @@ pub(super) fn forked<'a>(
     base: Host,
     seeds: &[u64],
     run: impl Fn(Fork<'a>) -> Result<Outcome, ToolError> + Sync,
-) -> Result<Vec<Outcome>, ToolError> {
+) -> Outcomes {
     forked_within(fault, leg, base, seeds, Scope { torque: true, range: true, rotor_position: true }, run)
 }
 
@@ -160,7 +163,7 @@ pub(super) fn forked_within<'a>(
     seeds: &[u64],
     scope: Scope,
     run: impl Fn(Fork<'a>) -> Result<Outcome, ToolError> + Sync,
-) -> Result<Vec<Outcome>, ToolError> {
+) -> Outcomes {
     let drawn = |seed: &u64| {
         let mut random = Random::new(fault.id, *seed);
         (random.below(MOTION), *seed, random)

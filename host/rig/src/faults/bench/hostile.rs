@@ -21,10 +21,10 @@ use scarab_identify::formats::leg_file::LegFile;
 
 use crate::bus::board::TICK_NS;
 use crate::bus::host::Host;
-use crate::faults::bench::Bench;
+use crate::faults::bench::Outcomes;
 use crate::faults::bench::hosted::{Fork, forked, hosted, identifying, started};
 use crate::faults::bench::lost::{until_safe, watched};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::catalogue::{BUS_MS, Fault};
 use crate::faults::run::Outcome;
 
 /// Servo ticks of hostile frames, and frames in each: more than the bus carries.
@@ -38,10 +38,6 @@ const SERVO_DRIVE: u32 = 0x0002_0192;
 const FULL: f64 = 0.98;
 /// Allowed deviation of a motion because frames wait for others, rad.
 const OFF_RAD: f64 = 2e-3;
-
-pub(super) const FRAMES_BENCH: Bench = Bench { fault: &catalogue::B3, run: flood };
-
-pub(super) const BABBLE: Bench = Bench { fault: &catalogue::B4, run: babble };
 
 /// Draws any frame.
 pub fn frame(random: &mut Random) -> Frame {
@@ -109,7 +105,7 @@ pub fn malformed(random: &mut Random) -> Frame {
     }
 }
 
-fn flood(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn flood(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let of = |way: u64| seeds.iter().copied().filter(|seed| seed % 3 == way).collect::<Vec<_>>();
     let mut base = started(leg)?;
     // Blind: the enabling switch is held.
@@ -185,7 +181,7 @@ fn flooded(mut fork: Fork<'_>, off: bool) -> Result<Outcome, ToolError> {
     Ok(fork.ended(safe.then_some("-"), None))
 }
 
-fn babble(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn babble(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let of = |way: u64| seeds.iter().copied().filter(|seed| seed % 3 == way).collect::<Vec<_>>();
     let moved = hosted(leg)?;
     let mut outcomes = forked(fault, leg, identifying(leg)?, &of(0), beside_an_operator)?;
@@ -226,8 +222,8 @@ fn beside_a_host(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
 fn instead_of_a_host(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let patience = watched(&mut fork, [true; 2], blind)?;
     fork.host.network.babble(Some(Frame::new(1 + fork.random.below(0x7F) as u16, &[0x55; 8])));
-    let (state, after_ms) = until_safe(&mut fork, &patience);
-    let in_time = after_ms.is_some_and(|after| (0.0..=catalogue::BUS_MS + 1e-9).contains(&after));
+    let (state, after_ms) = until_safe(&mut fork, |host| patience.due_ns(host));
+    let in_time = after_ms.is_some_and(|after| (0.0..=BUS_MS + 1e-9).contains(&after));
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let found = fork.ended(state, alarm);
     Ok(Outcome { detected: in_time && state == Some("Damp"), after_ms, ..found })

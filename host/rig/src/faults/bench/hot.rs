@@ -25,7 +25,6 @@
 //! has no thermistors.
 
 use hal_sim::faults::{Channel, Form, Timing};
-use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
 use scarab::safety::FaultCode;
 use scarab::safety::thermistor::{OPEN, SHORTED};
@@ -33,20 +32,16 @@ use scarab::safety::winding::RAMP_K;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::bus::board::{Board, Label};
-use crate::bus::host::{Host, NODES};
-use crate::faults::bench::Bench;
-use crate::faults::bench::hosted::{Fork, context, forked_within};
-use crate::faults::catalogue::{self, Fault, THERMISTOR_MS};
+use crate::bus::host::{Host, SECOND, WINDOW};
+use crate::faults::bench::Outcomes;
+use crate::faults::bench::hosted::{Fork, context, forked_within, moving};
+use crate::faults::catalogue::{Fault, THERMISTOR_MS};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
 use crate::faulty_board::PERIOD_MS;
-use crate::parameter_file::memory::Memory;
 
 /// Codes of a partial short, hotter than 120 degrees.
 const PARTIAL: [u16; 2] = [SHORTED + 1, 640];
-/// Servo ticks per second.
-const SECOND: u64 = SERVO_RATE_HZ as u64;
 /// Thermal resistance to ambient, K/W, and time constant, s.
 const KELVIN_PER_WATT: f64 = 8.0;
 const TIME_S: f64 = 30.0;
@@ -58,14 +53,6 @@ const LIMIT_C: f64 = 100.0;
 const TOLERANCE_K: f64 = 15.0;
 /// Largest excess in T3, whose thermistors lag behind their windings.
 const LAGGING_K: f64 = 20.0;
-/// Object of the following window, which no push may leave.
-const WINDOW: u16 = 0x6065;
-
-pub(super) const CURRENT: Bench = Bench { fault: &catalogue::T2, run: current };
-
-pub(super) const COOLING: Bench = Bench { fault: &catalogue::T3, run: cooling };
-
-pub(super) const THERMISTOR: Bench = Bench { fault: &catalogue::T4, run: thermistor };
 
 /// The leg with other thermal constants of its motors.
 fn warmed(leg: &LegFile, kelvin_per_watt: f64, time_s: f64) -> LegFile {
@@ -78,13 +65,10 @@ fn warmed(leg: &LegFile, kelvin_per_watt: f64, time_s: f64) -> LegFile {
 }
 
 /// A host that moves a leg for some seconds; `believed` is the firmware's leg file, `motors` the plant's.
-fn moving(leg: &LegFile, motors: &LegFile, believed: &LegFile, seconds: f64) -> Result<Host, ToolError> {
-    let mut base = Host::new(Board::new(motors, context(believed)?, 1, Label::SINGLE, Memory::new(None))?);
-    base.begin()?;
-    base.move_leg(leg)?;
-    for node in NODES {
-        base.write(node, WINDOW, 0, u32::MAX, 4)?;
-    }
+fn warm_up(motors: &LegFile, believed: &LegFile, seconds: f64) -> Result<Host, ToolError> {
+    let mut base = moving(motors, context(believed)?)?;
+    // No push may leave the following window.
+    base.write_both(WINDOW, u32::MAX, 4)?;
     base.run(seconds as u64 * SECOND);
     Ok(base)
 }
@@ -92,23 +76,23 @@ fn moving(leg: &LegFile, motors: &LegFile, believed: &LegFile, seconds: f64) -> 
 /// A strong push moves a joint beyond its range.
 const PUSHED: Scope = Scope { torque: true, range: false, rotor_position: true };
 
-fn current(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn current(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let believed = warmed(leg, if blind { 1e-3 * KELVIN_PER_WATT } else { KELVIN_PER_WATT }, TIME_S);
-    let base = moving(leg, &warmed(leg, KELVIN_PER_WATT, TIME_S), &believed, 3.0 * TIME_S)?;
+    let base = warm_up(&warmed(leg, KELVIN_PER_WATT, TIME_S), &believed, 3.0 * TIME_S)?;
     forked_within(fault, leg, base, seeds, PUSHED, |fork| heats(fork, TOLERANCE_K))
 }
 
-fn cooling(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn cooling(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let motors = warmed(leg, 2.0 * KELVIN_PER_WATT, 2.0 * TIME_S).with_thermistors();
     let believed = warmed(leg, KELVIN_PER_WATT, TIME_S);
     let believed = if blind { believed } else { believed.with_thermistors() };
-    let base = moving(leg, &motors, &believed, 4.0 * TIME_S)?;
+    let base = warm_up(&motors, &believed, 4.0 * TIME_S)?;
     forked_within(fault, leg, base, seeds, PUSHED, |fork| heats(fork, LAGGING_K))
 }
 
-fn thermistor(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn thermistor(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let motors = leg.with_thermistors();
-    let base = moving(leg, &motors, if blind { leg } else { &motors }, 1.0)?;
+    let base = warm_up(&motors, if blind { leg } else { &motors }, 1.0)?;
     let scope = Scope { torque: true, range: true, rotor_position: true };
     forked_within(fault, leg, base, seeds, scope, fails)
 }

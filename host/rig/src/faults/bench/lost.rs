@@ -19,10 +19,10 @@ use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::bus::board::TICK_NS;
-use crate::bus::host::{NODES, Speaks};
-use crate::faults::bench::Bench;
+use crate::bus::host::{Host, NODES, Speaks};
+use crate::faults::bench::Outcomes;
 use crate::faults::bench::hosted::{Fork, forked, hosted};
-use crate::faults::catalogue::{self, BUS_MS, Fault};
+use crate::faults::catalogue::{BUS_MS, Fault};
 use crate::faults::run::Outcome;
 use crate::faulty_board::PERIOD_MS;
 
@@ -33,16 +33,12 @@ const BACK: u64 = 400;
 /// Servo ticks between two attempts of a returned host.
 const TRIES: u64 = 40;
 /// Servo ticks within which an emergency message has to be on the wire.
-const REPORT_TICKS: u64 = 40;
+pub(super) const REPORT_TICKS: u64 = 40;
 const HOST: u32 = 0x70;
 /// Value of 6007: fault.
 const FAULT: u32 = 1;
 /// Longest wait after a host's timeout, ns.
-pub(super) const LATE_NS: u64 = 20 * MS;
-
-pub(super) const HOST_LOST: Bench = Bench { fault: &catalogue::B1, run: silence };
-
-pub(super) const BUS_LOST: Bench = Bench { fault: &catalogue::B2, run: leave };
+const LATE_NS: u64 = 20 * MS;
 
 /// Timeouts of a host.
 #[derive(Clone, Copy, Debug)]
@@ -57,9 +53,9 @@ pub(super) struct Patience {
 
 impl Patience {
     /// Time of the host's timeout, ns.
-    pub(super) fn due_ns(&self, sent_ns: [u64; 2]) -> u64 {
+    pub(super) fn due_ns(&self, host: &Host) -> u64 {
         let due = (0..2).filter(|way| self.silent[*way]);
-        due.map(|way| sent_ns[way] + u64::from(self.times_ms[way]) * MS).min().unwrap_or(u64::MAX)
+        due.map(|way| host.sent_ns()[way] + u64::from(self.times_ms[way]) * MS).min().unwrap_or(u64::MAX)
     }
 
     /// Shortest timeout, ms.
@@ -84,18 +80,19 @@ pub(super) fn watched(fork: &mut Fork<'_>, silent: [bool; 2], blind: bool) -> Re
         }
     }
     // The detector for hosts without heartbeat (B5) is not tested here.
-    for node in NODES {
-        fork.host.write(node, 0x2013, 0, 0, 1)?;
-    }
+    fork.host.write_both(0x2013, 0, 1)?;
     fork.run(3 * fork.host.speaks.heartbeat);
     Ok(Patience { times_ms, silent, faults: option == FAULT })
 }
 
-/// Runs until the leg is safe; returns the state, and the time since the timeout, ms.
-pub(super) fn until_safe(fork: &mut Fork<'_>, patience: &Patience) -> (Option<&'static str>, Option<f64>) {
+/// Runs until the leg is safe; returns the state, and the time since the timeout at `due_ns`, ms.
+pub(super) fn until_safe(
+    fork: &mut Fork<'_>,
+    due_ns: impl Fn(&Host) -> u64,
+) -> (Option<&'static str>, Option<f64>) {
     loop {
         let command_ns = fork.tick() + (PERIOD_MS * 1e6) as u64;
-        let due_ns = patience.due_ns(fork.host.sent_ns());
+        let due_ns = due_ns(&fork.host);
         if let Some(state) = fork.safe_state() {
             return (Some(state), Some((command_ns as f64 - due_ns as f64) * 1e-6));
         }
@@ -118,7 +115,7 @@ fn check_report(fork: &mut Fork<'_>, state: Option<&str>, codes: [FaultCode; 2])
 
 /// Damps to the end without a host; then the host returns and continues as before.
 pub(super) fn comes_back(fork: &mut Fork<'_>, speaks: Speaks, faults: bool) {
-    fork.host.speaks = Speaks { targets: false, words: false, heartbeat: 0 };
+    fork.host.speaks = Speaks::default();
     fork.run(DAMPED);
     if fork.host.rig().is_switching() {
         fork.broken("damped, but not off afterwards");
@@ -139,7 +136,7 @@ pub(super) fn comes_back(fork: &mut Fork<'_>, speaks: Speaks, faults: bool) {
     }
 }
 
-fn silence(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn silence(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     forked(fault, leg, hosted(leg)?, seeds, |fork| silent(fork, blind))
 }
 
@@ -154,7 +151,7 @@ fn silent(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     if silent[1] {
         (fork.host.speaks.targets, fork.host.speaks.words) = (false, !silent[0]);
     }
-    let (state, after_ms) = until_safe(&mut fork, &patience);
+    let (state, after_ms) = until_safe(&mut fork, |host| patience.due_ns(host));
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     check_report(&mut fork, state, [FaultCode::Heartbeat, FaultCode::LatePdo]);
     comes_back(&mut fork, speaks, patience.faults);
@@ -170,16 +167,14 @@ fn silent(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     })
 }
 
-fn leave(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn leave(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     forked(fault, leg, hosted(leg)?, seeds, |fork| left(fork, blind))
 }
 
 fn left(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let how = if fork.random.coin() { Controller::Off } else { Controller::Passive };
     let option = if fork.random.coin() { FAULT } else { 3 };
-    for node in NODES {
-        fork.host.write(node, 0x6007, 0, option, 2)?;
-    }
+    fork.host.write_both(0x6007, option, 2)?;
     let lasts = 1 + fork.random.below(400);
     let speaks = fork.host.speaks;
     let left_ns = fork.host.network.now_ns();

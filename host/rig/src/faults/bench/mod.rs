@@ -24,15 +24,17 @@ mod stopped;
 pub mod stored_data;
 mod supply;
 
-use scarab::safety::FaultCode;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::faults::catalogue::Fault;
+use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
 
+/// Outcomes of some seeds.
+pub type Outcomes = Result<Vec<Outcome>, ToolError>;
+
 /// Runs a bench for some seeds. If blind, the fault's detector is disabled as stated by each bench.
-pub type Runs = fn(&Fault, &LegFile, &[u64], bool) -> Result<Vec<Outcome>, ToolError>;
+pub type Runs = fn(&Fault, &LegFile, &[u64], bool) -> Outcomes;
 
 /// A row with its own bench.
 #[derive(Clone, Copy, Debug)]
@@ -45,52 +47,37 @@ pub struct Bench {
 
 /// All benches.
 pub static BENCHES: [Bench; 28] = [
-    absolute::SILENT,
-    absolute::CONTRADICTION,
-    offsets::BENCH,
-    calibration::BENCH,
-    start::ZEROS,
-    hot::CURRENT,
-    hot::COOLING,
-    hot::THERMISTOR,
-    supply::DRAW,
-    supply::CHARGE,
-    stopped::BENCH,
-    parts::BENCH,
-    command::BENCH,
+    Bench { fault: &catalogue::E6, run: absolute::silent },
+    Bench { fault: &catalogue::E7, run: absolute::contradict },
+    Bench { fault: &catalogue::E3, run: offsets::shift },
+    Bench { fault: &catalogue::E5, run: calibration::calibrate },
+    Bench { fault: &catalogue::C1_AT_ENABLING, run: start::arm },
+    Bench { fault: &catalogue::T2, run: hot::current },
+    Bench { fault: &catalogue::T3, run: hot::cooling },
+    Bench { fault: &catalogue::T4, run: hot::thermistor },
+    Bench { fault: &catalogue::V4, run: supply::run },
+    Bench { fault: &catalogue::V5, run: supply::run },
+    Bench { fault: &catalogue::X1_EARLY, run: stopped::stop },
+    Bench { fault: &catalogue::V3, run: parts::chop },
+    Bench { fault: &catalogue::J1_COMMANDED, run: command::command },
     disturbed::WEARER,
     disturbed::CONTACT,
     disturbed::OTHER_LEG,
-    search::BENCH,
-    lost::HOST_LOST,
-    lost::BUS_LOST,
-    silent::BENCH,
-    outside::BENCH,
-    hostile::FRAMES_BENCH,
-    hostile::BABBLE,
+    Bench { fault: &catalogue::I1, run: search::interrupt },
+    Bench { fault: &catalogue::B1, run: lost::silence },
+    Bench { fault: &catalogue::B2, run: lost::leave },
+    Bench { fault: &catalogue::B5, run: silent::run },
+    Bench { fault: &catalogue::J3, run: outside::run },
+    Bench { fault: &catalogue::B3, run: hostile::flood },
+    Bench { fault: &catalogue::B4, run: hostile::babble },
     random_sessions::BENCH,
-    cut::BENCH,
-    stored_data::CUT,
-    stored_data::CORRUPTION,
-    stored_data::ARMED,
+    Bench { fault: &catalogue::X3, run: cut::cut },
+    Bench { fault: &catalogue::F1, run: stored_data::cuts },
+    Bench { fault: &catalogue::F2, run: stored_data::corruptions },
+    Bench { fault: &catalogue::F3, run: stored_data::armed },
 ];
 
 /// Outcome of a run: `state` if it was made safe, `None` otherwise.
 pub(super) fn outcome(fault: &Fault, seed: u64, state: Option<&'static str>) -> Outcome {
-    Outcome {
-        fault: fault.id,
-        seed,
-        period: 0,
-        detected: state.is_some(),
-        undetectable: false,
-        false_alarm: false,
-        after_ms: None,
-        intermittent_ms: None,
-        state,
-        alarm: None::<FaultCode>.map(FaultCode::name),
-        magnitude: None,
-        broken: Vec::new(),
-        hash: String::new(),
-        recording: None,
-    }
+    Outcome { fault: fault.id, seed, detected: state.is_some(), state, ..Outcome::default() }
 }

@@ -6,25 +6,23 @@
 //! samples are equal bit for bit. Successive seeds start the counter one count farther from its wrap, odd
 //! seeds below and even ones above. So 65,536 seeds cover all offsets, and among the first hundreds every
 //! other counter wraps during the motion.
-//! one wraps during the motion.
 
 use core::f64::consts::TAU;
 
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use rayon::prelude::*;
 use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, JointSample};
-use scarab::motor::{Axis, AxisConfiguration, AxisRequest, Calibration, CalibrationStep, Calibrator};
+use scarab::motor::{Axis, AxisConfiguration, AxisRequest, Calibration};
 use scarab::units::Ampere;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::board::{axis_configuration, calibration_settings, rested};
-use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::board::run_calibration;
+use crate::faults::bench::calibration::{UNFIT, on_stand};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::run::Outcome;
 use scarab::model::planar::JOINTS;
-
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::E3, run: shift };
 
 /// Number of start values of a counter.
 pub const OFFSETS: u64 = 65_536;
@@ -33,7 +31,6 @@ const PERIODS: usize = 600;
 /// Amplitude (A) and frequency (Hz) of the requested current.
 const ASKED_A: f64 = 4.0;
 const ASKED_HZ: f64 = 40.0;
-const LONGEST: u64 = 60 * CURRENT_RATE_HZ as u64;
 
 /// Inputs and outputs of one axis.
 struct Driven {
@@ -72,27 +69,10 @@ fn run(
 
 impl Driven {
     fn new(leg: &LegFile, index: usize) -> Result<Self, ToolError> {
-        let unfit = || leg.error("every joint needs a motor that can be calibrated");
-        let drives = leg.complete_description::<JOINTS>()?;
-        let joint = &leg.joints[index];
-        let motor = joint.motor.as_ref().ok_or_else(unfit)?;
-        let configuration = axis_configuration(joint, motor);
-        let settings = calibration_settings(&configuration, motor);
-        let mut stand = rested(&drives.axes[index], &drives.supply, TAU * 0.3, 1);
-        let mut calibrator = Calibrator::new(&configuration, settings).map_err(|_| unfit())?;
-        let mut command = AxisCommand::OFF;
-        let mut calibration = None;
-        for _ in 0..LONGEST {
-            match calibrator.tick(&stand.period(&command, 0.0)) {
-                CalibrationStep::Running(next) => command = next,
-                CalibrationStep::Done(found) => {
-                    calibration = Some(found);
-                    break;
-                }
-                CalibrationStep::Refused(_) => break,
-            }
-        }
-        let calibration = calibration.ok_or_else(unfit)?;
+        let unfit = || leg.error(UNFIT);
+        let (mut stand, mut calibrator, configuration) = on_stand(leg, index, 1)?;
+        let ended = run_calibration(&mut calibrator, |_, command| stand.period(command, 0.0));
+        let calibration = ended.and_then(|(_, result)| result.ok()).ok_or_else(unfit)?;
         let first = stand.period(&AxisCommand::OFF, 0.0);
         let mut axis = Axis::new(&configuration, &calibration, &first).map_err(|_| unfit())?;
         let mut samples = Vec::with_capacity(PERIODS);
@@ -108,7 +88,7 @@ impl Driven {
     }
 }
 
-fn shift(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn shift(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let driven = (0..JOINTS).map(|joint| Driven::new(leg, joint)).collect::<Result<Vec<_>, _>>()?;
     Ok(seeds.par_iter().map(|seed| one(fault, &driven, *seed, blind)).collect())
 }

@@ -18,20 +18,15 @@ use scarab::units::Radian;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::bus::board::{Board, Label};
-use crate::bus::host::{Host, NODES, Speaks};
-use crate::faults::bench::Bench;
-use crate::faults::bench::hosted::{Fork, context, forked_within};
-use crate::faults::catalogue::{self, Fault};
+use crate::bus::host::{NODES, SECOND, Speaks};
+use crate::faults::bench::Outcomes;
+use crate::faults::bench::hosted::{Fork, context, forked_within, moving};
+use crate::faults::catalogue::Fault;
 use crate::faults::invariants::{MARGIN_RAD, Scope};
 use crate::faults::run::Outcome;
-use crate::parameter_file::memory::Memory;
-use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
 
 const WIDENED: Radian = Radian(2.0);
-/// Servo ticks per second.
-const SECOND: u64 = SERVO_RATE_HZ as u64;
 /// Largest share of the torque cap.
 const SHARE: f64 = 0.25;
 /// Largest speed outside the range, rad/s: the commanded 0.1 rad/s plus the transient while the drive takes
@@ -39,20 +34,15 @@ const SHARE: f64 = 0.25;
 const FASTEST: f64 = 0.3;
 /// Code of a refused step towards enabled.
 const REFUSED: u16 = NoticeCode::NotEnabled.number();
-const NOTHING: Speaks = Speaks { targets: false, words: false, heartbeat: 0 };
 
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::J3, run };
-
-fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let mut context = context(leg)?;
     if blind {
         for joint in &mut context.configuration.joints {
             (joint.low, joint.high) = (joint.low - WIDENED, joint.high + WIDENED);
         }
     }
-    let mut base = Host::new(Board::new(leg, context, 1, Label::SINGLE, Memory::new(None))?);
-    base.begin()?;
-    base.move_leg(leg)?;
+    let base = moving(leg, context)?;
     // A returning joint is driven outside its range.
     let scope = Scope { torque: true, range: false, rotor_position: true };
     forked_within(fault, leg, base, seeds, scope, |fork| one(fork, leg))
@@ -78,7 +68,7 @@ fn enable(fork: &mut Fork<'_>) -> bool {
 }
 
 fn one(mut fork: Fork<'_>, leg: &LegFile) -> Result<Outcome, ToolError> {
-    fork.host.speaks = NOTHING;
+    fork.host.speaks = Speaks::default();
     let stop = if fork.random.coin() { 0 } else { 2 };
     NODES.into_iter().for_each(|node| fork.host.command(node, stop));
     fork.run(3 * SECOND / 2);
@@ -106,9 +96,7 @@ fn one(mut fork: Fork<'_>, leg: &LegFile) -> Result<Outcome, ToolError> {
 
 /// Returns whether enabling is refused and both nodes report it.
 fn is_refused(fork: &mut Fork<'_>) -> Result<bool, ToolError> {
-    for node in NODES {
-        fork.host.write(node, 0x2012, 0, 0, 1)?;
-    }
+    fork.host.write_both(0x2012, 0, 1)?;
     let is_enabled = enable(fork);
     let has_reported = |node: &u16| fork.host.emergencies().contains(&(*node, REFUSED));
     let all_reported = NODES.iter().all(has_reported);
@@ -117,7 +105,7 @@ fn is_refused(fork: &mut Fork<'_>) -> Result<bool, ToolError> {
 
 fn begins(fork: &mut Fork<'_>) -> bool {
     fork.host.follow_positions();
-    fork.host.speaks = Speaks { targets: true, ..NOTHING };
+    fork.host.speaks = Speaks { targets: true, ..Speaks::default() };
     fork.run(40);
     // A swinging leg is refused, so the request is repeated.
     (0..8).any(|_| {

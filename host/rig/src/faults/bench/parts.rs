@@ -6,18 +6,15 @@
 use scarab::hal::GREATEST_BRAKE_DUTY;
 use scarab::motor::Chopper;
 use scarab::units::Volt;
-use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::board::BRAKE;
-use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::run::Outcome;
 
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::V3, run: chop };
-
-fn chop(fault: &Fault, _: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn chop(fault: &Fault, _: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     Ok(seeds.iter().map(|seed| one(fault, *seed, blind)).collect())
 }
 

@@ -11,21 +11,18 @@ use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::run::Outcome;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
 use scarab::hal::SERVO_RATE_HZ;
-use scarab::model::planar::BASE;
-use scarab::model::planar::JOINTS;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Longest identification, servo ticks.
 const LONGEST: u64 = 300 * SERVO_RATE_HZ as u64;
 /// Servo ticks for which a leg is observed after its search: half a second.
 const AFTERWARDS: u64 = 2000;
-
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::I1, run: interrupt };
 
 /// A leg with an accepted model at the first tick of another search, and the duration of that search in
 /// ticks.
@@ -85,7 +82,7 @@ fn go(pair: &mut Pair<JOINTS, BASE>, gravity: [f32; 3], there: fn(&Pair<JOINTS, 
     }
 }
 
-fn interrupt(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn interrupt(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let searching = Searching::new(leg)?;
     Ok(seeds.par_iter().map(|seed| one(fault, &searching, *seed, blind)).collect())
 }

@@ -13,25 +13,19 @@ use scarab::safety::FaultCode;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::bus::host::{NODES, Speaks};
-use crate::faults::bench::Bench;
+use crate::bus::host::{Host, NODES, Speaks};
+use crate::faults::bench::Outcomes;
 use crate::faults::bench::hosted::{Fork, forked, hosted};
-use crate::faults::bench::lost::{LATE_NS, comes_back};
-use crate::faults::catalogue::{self, BUS_MS, Fault};
+use crate::faults::bench::lost::{REPORT_TICKS, comes_back, until_safe};
+use crate::faults::catalogue::{BUS_MS, Fault};
 use crate::faults::run::Outcome;
-use crate::faulty_board::PERIOD_MS;
 
 /// Timeout for cycles of less than 10 ms, ns.
 const TIME_NS: u64 = 100_000_000;
 /// Longest pause, servo ticks: 95 ms.
 const PAUSE: u64 = 380;
-/// Servo ticks within which an emergency message has to be on the wire.
-const REPORT_TICKS: u64 = 40;
-const NOTHING: Speaks = Speaks { targets: false, words: false, heartbeat: 0 };
 
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::B5, run };
-
-fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     forked(fault, leg, hosted(leg)?, seeds, |fork| one(fork, blind))
 }
 
@@ -47,7 +41,7 @@ fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     for _ in 0..3 {
         let (spoken, pause) = (400 + fork.random.below(400), fork.random.below(PAUSE - fork.host.cycle * 4));
         fork.run(spoken);
-        fork.host.speaks = NOTHING;
+        fork.host.speaks = Speaks::default();
         fork.run(pause);
         fork.host.rewind(pause);
         fork.host.speaks = speaks;
@@ -62,19 +56,9 @@ fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
         let found = fork.ended(None, None);
         return Ok(Outcome { detected: false, undetectable: true, false_alarm, ..found });
     }
-    fork.host.speaks = NOTHING;
-    let (mut state, mut after_ms) = (None, None);
-    loop {
-        let command_ns = fork.tick() + (PERIOD_MS * 1e6) as u64;
-        let due_ns = fork.host.cyclic_ns().into_iter().min().unwrap_or(0) + TIME_NS;
-        if let Some(safe) = fork.safe_state() {
-            (state, after_ms) = (Some(safe), Some((command_ns as f64 - due_ns as f64) * 1e-6));
-            break;
-        }
-        if command_ns > due_ns + LATE_NS {
-            break;
-        }
-    }
+    fork.host.speaks = Speaks::default();
+    let due_ns = |host: &Host| host.cyclic_ns().into_iter().min().unwrap_or(0) + TIME_NS;
+    let (state, after_ms) = until_safe(&mut fork, due_ns);
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     fork.run(REPORT_TICKS);
     let silent = FaultCode::HostSilent.number();

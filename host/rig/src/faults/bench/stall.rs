@@ -20,7 +20,8 @@ use scarab::safety::{FaultCode, NO_ERROR, NoticeCode};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::bus::host::{Host, NODES};
+use crate::bus::host::{Host, NODES, SAVE, WINDOW};
+use crate::faults::bench::Outcomes;
 use crate::faults::bench::hosted::{Fork, forked, started};
 use crate::faults::bench::lost::watched;
 use crate::faults::catalogue::Fault;
@@ -38,9 +39,6 @@ const REPORT_TICKS: u64 = 80;
 const NS_PER_S: f64 = 1e9;
 /// Servo ticks for each step of enabling.
 const ENABLING: u64 = 400;
-const SAVE: u32 = u32::from_le_bytes(*b"save");
-/// Object of the stored following window, micro-radian.
-const WINDOW: u16 = 0x6065;
 const ERROR_REGISTER: u16 = 0x1001;
 /// Emergency codes: a flash write begins; frames were lost; no error.
 const STORING: u16 = NoticeCode::Storing.number();
@@ -64,12 +62,7 @@ fn full(leg: &LegFile) -> Result<Host, ToolError> {
     Ok(host)
 }
 
-pub(super) fn stall(
-    fault: &Fault,
-    leg: &LegFile,
-    seeds: &[u64],
-    blind: bool,
-) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn stall(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let (erased, words): (Vec<u64>, Vec<u64>) = seeds.iter().partition(|seed| seed.is_multiple_of(4));
     let mut outcomes = forked(fault, leg, full(leg)?, &erased, |fork| stalled(fork, true, blind))?;
     outcomes.extend(forked(fault, leg, started(leg)?, &words, |fork| stalled(fork, false, blind))?);
@@ -81,9 +74,7 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     if fork.random.coin() {
         watched(&mut fork, [true, false], false)?;
     }
-    for node in NODES {
-        fork.host.write(node, WINDOW, 0, window, 4)?;
-    }
+    fork.host.write_both(WINDOW, window, 4)?;
     if erases {
         // The wearer moves the leg during the stall.
         let (joint, push) =

@@ -10,16 +10,14 @@ use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::draw::{AMPERE_PER_CODE, at};
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
 use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S, Rig};
-use crate::options::{DriveModel, SimulationOptions};
 use crate::pair::Context;
-use scarab::model::planar::BASE;
-use scarab::model::planar::JOINTS;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Periods until the switch is closed; the low-pass of 2.7 ms has settled by then.
 const RELEASED: u64 = PERIODS_PER_S / 10;
@@ -28,16 +26,12 @@ const ENABLED: u64 = PERIODS_PER_S / 2;
 /// Detectable offset of one shunt, A: 2 A of the vector, plus 10 % for calibration and low-pass.
 const SEEN_A: f64 = 1.1 * 2.0 * 0.866;
 
-pub(super) const ZEROS: Bench = Bench { fault: &catalogue::C1_AT_ENABLING, run: arm };
-
 /// A ready machine at rest, drive off.
 pub(super) fn ready(leg: &LegFile) -> Result<Rig<JOINTS, BASE>, ToolError> {
-    let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
-    let context = Context::<JOINTS, BASE>::new(leg, &options)?;
-    Rig::new(leg, &context, 1)
+    Rig::new(leg, &Context::with_complete_drives(leg, 1)?, 1)
 }
 
-fn arm(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn arm(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let ready = ready(leg)?;
     Ok(seeds.par_iter().map(|seed| one(fault, leg, &ready, *seed, blind)).collect())
 }

@@ -6,39 +6,33 @@
 //! | boot, to the start of an identification | whole board, as operated | off in the tick, not enabled |
 //! | calibration | motor on a test stand, tick checks | off in the tick, calibration ended without result |
 
-use core::f64::consts::TAU;
-
 use hal_sim::faults::{Channel, Form, Injector, Timing};
 use rayon::prelude::*;
 use scarab::hal::AxisCommand;
 use scarab::leg::DriveState;
-use scarab::motor::{CalibrationStep, Calibrator};
+use scarab::motor::CalibrationStep;
 use scarab::safety::{Bridges, FaultCode, TickState, TickWatch};
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::board::{axis_configuration, calibration_settings, rested};
+use crate::board::LONGEST_CALIBRATION;
+use crate::faults::bench::calibration::{UNFIT, on_stand};
 use crate::faults::bench::start::ready;
-use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::draw::at;
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
 use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S, Rig};
-use scarab::model::planar::BASE;
-use scarab::model::planar::JOINTS;
-
-pub(super) const BENCH: Bench = Bench { fault: &catalogue::X1_EARLY, run: stop };
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Periods until the operator closes the switch, then presses the button, and until the end.
 const CLOSED: u64 = PERIODS_PER_S / 5;
 const PRESSED: u64 = 2 * CLOSED;
 const BOOTED: u64 = 3 * CLOSED;
-/// Longest calibration, periods; usually some seconds.
-const LONGEST: u64 = 60 * PERIODS_PER_S;
 
-fn stop(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn stop(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let ready = ready(leg)?;
     // Duration of an undisturbed calibration.
     let length = calibrated(leg, 0, 1, None, false)?.0;
@@ -130,17 +124,10 @@ fn calibrated(
     pressed: Option<u64>,
     blind: bool,
 ) -> Result<(u64, bool), ToolError> {
-    let unfit = || leg.error("every joint needs a motor that can be calibrated");
-    let drives = leg.complete_description::<JOINTS>()?;
-    let joint = &leg.joints[index];
-    let motor = joint.motor.as_ref().ok_or_else(unfit)?;
-    let configuration = axis_configuration(joint, motor);
-    let settings = calibration_settings(&configuration, motor);
-    let mut stand = rested(&drives.axes[index], &drives.supply, TAU * 0.3, seed);
-    let mut calibrator = Calibrator::new(&configuration, settings).map_err(|_| unfit())?;
+    let (mut stand, mut calibrator, _) = on_stand(leg, index, seed)?;
     let mut watch = TickWatch::default();
     let mut command = AxisCommand::OFF;
-    for tick in 0..LONGEST {
+    for tick in 0..LONGEST_CALIBRATION {
         let sample = stand.period(&command, 0.0);
         let emergency_stop = pressed.is_some_and(|pressed| tick >= pressed) && !blind;
         let state = TickState { emergency_stop, gate_fault: false, complete: true, missed: 0 };
@@ -153,5 +140,5 @@ fn calibrated(
             CalibrationStep::Done(_) | CalibrationStep::Refused(_) => return Ok((tick + 1, false)),
         }
     }
-    Err(unfit().into())
+    Err(leg.error(UNFIT).into())
 }

@@ -31,18 +31,17 @@ use scarab_client::master::Client;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::bus::board::Board;
-use crate::bus::host::Host;
+use crate::bus::host::{Host, SAVE, WINDOW};
 use crate::faults::bench::hosted::{Fork, board, forked, hosted};
 use crate::faults::bench::stall::stall;
-use crate::faults::bench::{Bench, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::run::Outcome;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
 use crate::parameter_file::memory::{Memory, SECTOR};
 use scarab::hal::SERVO_RATE_HZ;
-use scarab::model::planar::BASE;
-use scarab::model::planar::JOINTS;
+use scarab::model::planar::{BASE, JOINTS};
 
 /// Longest identification, servo ticks.
 const LONGEST_TICKS: u64 = 300 * SERVO_RATE_HZ as u64;
@@ -50,19 +49,10 @@ const LONGEST_TICKS: u64 = 300 * SERVO_RATE_HZ as u64;
 const OFF: DriveState = DriveState::SwitchOnDisabled;
 /// Number of fill levels of the flash.
 const LEVELS: u64 = 24;
-/// "save", and the stored object: the following window, micro-radian.
-const SAVE: u32 = u32::from_le_bytes(*b"save");
-const WINDOW: u16 = 0x6065;
 const WINDOWS: [u32; 2] = [20_000, 30_000];
 const UNTOUCHED: u32 = 87_266;
 /// Emergency code: stored data cannot be read.
 const LOST: u16 = NoticeCode::StoreFailed.number();
-
-pub(super) const CUT: Bench = Bench { fault: &catalogue::F1, run: cuts };
-
-pub(super) const CORRUPTION: Bench = Bench { fault: &catalogue::F2, run: corruptions };
-
-pub(super) const ARMED: Bench = Bench { fault: &catalogue::F3, run: armed };
 
 /// Identifies a leg and returns its model as stored.
 ///
@@ -192,7 +182,7 @@ fn filled(model: &ModelRecord<JOINTS>) -> Vec<Filled> {
     all
 }
 
-fn cuts(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn cuts(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let filled = filled(&identified(leg, 1)?);
     Ok(seeds.par_iter().map(|seed| cut(fault, &filled, *seed, blind)).collect())
 }
@@ -259,9 +249,7 @@ impl FilledBoard {
         host.begin()?;
         let mut objects = [Vec::new(), Vec::new()];
         for (window, kept) in WINDOWS.into_iter().zip(&kept) {
-            for node in [1, 2] {
-                host.write(node, WINDOW, 0, window, 4)?;
-            }
+            host.write_both(WINDOW, window, 4)?;
             host.write(1, 0x1010, 1, SAVE, 4)?;
             host.run(400);
             for (joint, objects) in objects.iter_mut().enumerate() {
@@ -286,7 +274,7 @@ impl FilledBoard {
     }
 }
 
-fn corruptions(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn corruptions(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let stored = FilledBoard::new(leg)?;
     seeds.par_iter().map(|seed| corruption(fault, &stored, *seed, blind)).collect()
 }
@@ -378,7 +366,7 @@ pub fn corrupt(memory: &mut Memory, other: &ModelRecord<JOINTS>, way: u64, rando
     }
 }
 
-fn armed(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn armed(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let (off, on): (Vec<u64>, Vec<u64>) = seeds.iter().partition(|seed| seed.is_multiple_of(2));
     let mut outcomes = stall(fault, leg, &off, blind)?;
     outcomes.extend(forked(fault, leg, hosted(leg)?, &on, |fork| requested(fork, blind))?);

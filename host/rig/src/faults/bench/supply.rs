@@ -15,7 +15,6 @@
 //!
 //! Blind: the firmware has no limit.
 
-use scarab::hal::SERVO_RATE_HZ;
 use scarab::model::planar::JOINTS;
 use scarab::safety::{FaultCode, SupplyLimits};
 use scarab::units::{Ampere, Ohm};
@@ -23,17 +22,14 @@ use scarab_base::error::ToolError;
 use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::bus::board::{Board, Label};
-use crate::bus::host::{Host, NODES};
-use crate::faults::bench::Bench;
-use crate::faults::bench::hosted::{Fork, context, forked_within};
-use crate::faults::catalogue::{self, Fault};
+use crate::bus::host::{SECOND, WINDOW};
+use crate::faults::bench::Outcomes;
+use crate::faults::bench::hosted::{Fork, forked_within, hosted};
+use crate::faults::catalogue::{Fault, V5};
 use crate::faults::invariants::Scope;
 use crate::faults::run::Outcome;
-use crate::parameter_file::memory::Memory;
 
-/// Servo ticks per second, and per millisecond.
-const SECOND: u64 = SERVO_RATE_HZ as u64;
+/// Servo ticks per millisecond.
 const MILLISECOND: u64 = SECOND / 1000;
 /// Random legs of a campaign.
 const LEGS: u64 = 8;
@@ -49,12 +45,6 @@ const FAULT_FACTOR: f64 = 1.25;
 const SHORTED: u64 = 10 * MILLISECOND;
 /// Charge limit of the plant's leg file, A: a battery, without a limit that counts.
 const BATTERY_A: f64 = 500.0;
-/// Object of the following window, which no push may leave.
-const WINDOW: u16 = 0x6065;
-
-pub(super) const DRAW: Bench = Bench { fault: &catalogue::V4, run };
-
-pub(super) const CHARGE: Bench = Bench { fault: &catalogue::V5, run };
 
 /// The leg on a battery, with random motors, cables and voltage.
 fn random_leg(leg: &LegFile, number: u64) -> LegFile {
@@ -73,7 +63,7 @@ fn random_leg(leg: &LegFile, number: u64) -> LegFile {
     leg
 }
 
-fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+pub(super) fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
     let mut outcomes = Vec::with_capacity(seeds.len());
     for number in 0..LEGS {
         let own: Vec<u64> = seeds.iter().copied().filter(|seed| seed % LEGS == number).collect();
@@ -81,12 +71,9 @@ fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<O
             continue;
         }
         let leg = random_leg(leg, number);
-        let mut base = Host::new(Board::new(&leg, context(&leg)?, 1, Label::SINGLE, Memory::new(None))?);
-        base.begin()?;
-        base.move_leg(&leg)?;
-        for node in NODES {
-            base.write(node, WINDOW, 0, u32::MAX, 4)?;
-        }
+        let mut base = hosted(&leg)?;
+        // No push may leave the following window.
+        base.write_both(WINDOW, u32::MAX, 4)?;
         // A strong push moves a joint beyond its range.
         let scope = Scope { torque: true, range: false, rotor_position: true };
         let brake = Ohm(leg.supply.brake_ohm as f32);
@@ -141,7 +128,7 @@ fn push_joints(fork: &mut Fork<'_>, charges: bool) -> f64 {
 }
 
 fn one(mut fork: Fork<'_>, brake: Ohm, blind: bool) -> Result<Outcome, ToolError> {
-    let charges = fork.fault.id == CHARGE.fault.id;
+    let charges = fork.fault.id == V5.id;
     let limit = set_limit(&mut fork, charges, brake, blind);
     let longest_push = push_joints(&mut fork, charges);
     let sign = if charges { -1.0 } else { 1.0 };

@@ -4,24 +4,19 @@ use hal_sim::faults::{Channel, Form, Timing};
 use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
-use crate::faults::scenario::{Bounds, Expected, Row, Scenario};
+use crate::faults::scenario::{Bounds, Expected, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 2] =
-    [Row { fault: &catalogue::P2, draw: registers }, Row { fault: &catalogue::T1, draw: temperature }];
-
 /// P2: changed registers.
-fn registers(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn registers(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     one(at(Channel::GateRegisters, joint, Form::Off, Timing::from(0)), Expected::Off)
 }
 
 /// T1: an open or shorted wire, or a bridge temperature.
-fn temperature(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn temperature(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let code = match random.below(3) {
         0 => [0.0, 4095.0][random.below(2) as usize],

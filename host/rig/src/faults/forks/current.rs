@@ -3,21 +3,13 @@
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{AMPERE_PER_CODE, at, now_and_then, one};
-use crate::faults::scenario::{Bounds, Expected, Onset, Row, Scenario};
+use crate::faults::scenario::{Bounds, Expected, Onset, Scenario};
 use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S};
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 3] = [
-    Row { fault: &catalogue::C2, draw: rail },
-    Row { fault: &catalogue::C3, draw: conversion },
-    Row { fault: &catalogue::C4, draw: overcurrent },
-];
-
 /// C2: a code at a rail of amplifier or converter.
-fn rail(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn rail(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let channel = if random.coin() { Channel::ShuntB } else { Channel::ShuntC };
     // Rails of the amplifier or of the converter, low or high.
@@ -26,7 +18,7 @@ fn rail(random: &mut Random, _: &Bounds) -> Scenario {
 }
 
 /// C3: conversions that do not end, or always return the same code.
-fn conversion(random: &mut Random, bounds: &Bounds) -> Scenario {
+pub(super) fn conversion(random: &mut Random, bounds: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let way = random.below(5);
     if way == 0 {
@@ -51,7 +43,7 @@ fn conversion(random: &mut Random, bounds: &Bounds) -> Scenario {
 }
 
 /// C4: current above the bound, or the gate driver's pin.
-fn overcurrent(random: &mut Random, bounds: &Bounds) -> Scenario {
+pub(super) fn overcurrent(random: &mut Random, bounds: &Bounds) -> Scenario {
     if random.below(2) == 0 {
         return one(at(Channel::GateFault, 0, Form::Off, Timing::from(0)), Expected::Off);
     }

@@ -3,18 +3,13 @@
 use hal_sim::faults::{Channel, Form, Injection, Timing};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
-use crate::faults::scenario::{Bounds, Expected, Onset, Row, Scenario};
+use crate::faults::scenario::{Bounds, Expected, Onset, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 2] =
-    [Row { fault: &catalogue::E2, draw: glitch }, Row { fault: &catalogue::E4, draw: lost_counts }];
-
 /// E2: one wrong counter reading, or three in 10 ms.
-fn glitch(random: &mut Random, bounds: &Bounds) -> Scenario {
+pub(super) fn glitch(random: &mut Random, bounds: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let size = random.logarithmic(2.0, 32_767.0).round();
     let sign = random.sign();
@@ -42,7 +37,7 @@ fn glitch(random: &mut Random, bounds: &Bounds) -> Scenario {
 pub const LOST_TURNS: f64 = 2.15;
 
 /// E4: a counter that lost or gained counts; an index that no longer comes; a glitch on the index line.
-fn lost_counts(random: &mut Random, bounds: &Bounds) -> Scenario {
+pub(super) fn lost_counts(random: &mut Random, bounds: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     match random.below(4) {
         0 => {
@@ -82,18 +77,17 @@ mod tests {
     use scarab::safety::DriveState;
 
     use super::*;
+    use crate::faults::forks::ROWS;
     use crate::faults::run::{Manner, Outcome, run};
     use crate::faulty_board::Rig;
     use crate::operator::begin;
-    use crate::options::{DriveModel, SimulationOptions};
     use crate::pair::Context;
     use scarab::model::planar::BASE;
     use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 
     /// The default leg with its drive off, holding its pose, and during an identification's motion.
     fn machines(leg: &LegFile) -> [Rig<JOINTS, BASE>; 3] {
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(1) };
-        let context = Context::<JOINTS, BASE>::new(leg, &options).expect("the default leg");
+        let context = Context::with_complete_drives(leg, 1).expect("the default leg");
         let mut rig = Rig::new(leg, &context, 1).expect("complete drives");
         let advance = |rig: &mut Rig<JOINTS, BASE>| (0..PERIODS_PER_S / 2).for_each(|_| rig.advance());
         advance(&mut rig);
@@ -111,10 +105,10 @@ mod tests {
     #[test]
     fn wrong_index_pulses_are_ignored_and_lost_counts_brake() {
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let row = &ROWS[1];
         let machines = machines(&leg);
-        let of =
-            |base, scenario: &Scenario| -> Outcome { run(&leg, row, scenario, 1, Manner::default(), base) };
+        let of = |base, scenario: &Scenario| -> Outcome {
+            run(&leg, &ROWS[1], scenario, 1, Manner::default(), base)
+        };
         for joint in 0..JOINTS {
             for (base, machine) in machines.iter().zip(["off", "holding", "moving"]) {
                 for periods in [1, 24] {

@@ -3,18 +3,13 @@
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{at, beside, one};
-use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
+use crate::faults::scenario::{Bounds, Event, Expected, Onset, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 2] =
-    [Row { fault: &catalogue::J1, draw: pushed }, Row { fault: &catalogue::J2, draw: overspeed }];
-
 /// J1: a push towards either end of the range, limited to the drive's torque left beside the leg's weight.
-fn pushed(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn pushed(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let peak = random.logarithmic(10.0, 70.0);
     let seconds = random.uniform(0.2, 1.0);
@@ -24,7 +19,7 @@ fn pushed(random: &mut Random, _: &Bounds) -> Scenario {
 }
 
 /// J2: a kick.
-fn overspeed(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn overspeed(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let peak = random.logarithmic(200.0, 900.0);
     let kick = Event::Kick(joint, random.sign() * peak, random.uniform(0.06, 0.2));

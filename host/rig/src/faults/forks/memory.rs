@@ -4,17 +4,13 @@ use scarab::motor::Axis;
 use scarab::servo::Servo;
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::beside;
-use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
+use crate::faults::scenario::{Bounds, Event, Expected, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 1] = [Row { fault: &catalogue::M2, draw: upset }];
-
 /// M2: any bit of any of the accessible values.
-fn upset(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn upset(random: &mut Random, _: &Bounds) -> Scenario {
     let of_axis = random.coin();
     let joint = random.below(JOINTS as u64) as usize;
     let numbers = if of_axis { Axis::NUMBERS } else { Servo::<JOINTS>::NUMBERS };

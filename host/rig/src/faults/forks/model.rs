@@ -6,24 +6,16 @@
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{AMPERE_PER_CODE, at, one};
-use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
+use crate::faults::scenario::{Bounds, Event, Expected, Onset, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
-
-/// Rows of this group.
-pub static ROWS: [Row; 3] = [
-    Row { fault: &catalogue::E1, draw: frozen },
-    Row { fault: &catalogue::C1, draw: drift },
-    Row { fault: &catalogue::P1, draw: open_phase },
-];
 
 /// Time within which a joint must turn, and for which it must keep turning.
 const PATIENCE: u64 = PERIODS_PER_S / 2;
 
 /// E1: counter and index of a failed sensor.
-fn frozen(random: &mut Random, bounds: &Bounds) -> Scenario {
+pub(super) fn frozen(random: &mut Random, bounds: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let counter = at(Channel::Counter, joint, Form::Stuck, Timing::from(0));
     // Ten percent margin: the speed estimate has lag and ripple. Counts come in whole numbers: 4 or 5 a
@@ -40,7 +32,7 @@ fn frozen(random: &mut Random, bounds: &Bounds) -> Scenario {
 }
 
 /// C1: an offset step of up to 30 A.
-fn drift(random: &mut Random, bounds: &Bounds) -> Scenario {
+pub(super) fn drift(random: &mut Random, bounds: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let size = random.logarithmic(0.5, 30.0);
     let channel = if random.coin() { Channel::ShuntB } else { Channel::ShuntC };
@@ -62,7 +54,7 @@ fn drift(random: &mut Random, bounds: &Bounds) -> Scenario {
 }
 
 /// P1: a broken wire.
-fn open_phase(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn open_phase(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let output = random.below(3) as usize;
     // Inactive injection that selects the joint.

@@ -3,16 +3,12 @@
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
-use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
+use crate::faults::scenario::{Bounds, Event, Expected, Onset, Scenario};
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 1] = [Row { fault: &catalogue::N1, draw: not_finite }];
-
 /// N1: NaN or infinity between axis and servo in either direction, or in the values of an axis' modulation.
-fn not_finite(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn not_finite(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let value = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][random.below(3) as usize];
     if random.below(4) == 0 {

@@ -3,18 +3,13 @@
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
-use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
+use crate::faults::scenario::{Bounds, Event, Expected, Onset, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 2] =
-    [Row { fault: &catalogue::X1, draw: emergency_stop }, Row { fault: &catalogue::X2, draw: bouncing_stop }];
-
 /// X1: pressed for at most 10 ms; in half of the runs during damping or braking for another fault.
-fn emergency_stop(random: &mut Random, _: &Bounds) -> Scenario {
+pub fn emergency_stop(random: &mut Random, _: &Bounds) -> Scenario {
     let lasting = 1 + random.below(PERIODS_PER_S / 100);
     let stop = |from| at(Channel::EmergencyStop, 0, Form::Off, Timing::lasting(from, lasting));
     let reacted = random.below(4);
@@ -36,7 +31,7 @@ fn emergency_stop(random: &mut Random, _: &Bounds) -> Scenario {
 }
 
 /// X2: a contact that bounces for up to a second, with hands at the other contacts.
-fn bouncing_stop(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn bouncing_stop(random: &mut Random, _: &Bounds) -> Scenario {
     let lasting = 1 + random.below(PERIODS_PER_S);
     let (on, off) = (1 + random.below(200), 1 + random.below(200));
     let timing = Timing { begin: 0, duration: lasting, on, off };

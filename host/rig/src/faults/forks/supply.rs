@@ -3,17 +3,12 @@
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{VOLT_PER_CODE, at, now_and_then, one};
-use crate::faults::scenario::{Bounds, Event, Expected, Onset, Row, Scenario};
+use crate::faults::scenario::{Bounds, Event, Expected, Onset, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 
-/// Rows of this group.
-pub static ROWS: [Row; 2] =
-    [Row { fault: &catalogue::V1, draw: overvoltage }, Row { fault: &catalogue::V2, draw: undervoltage }];
-
 /// V1: a wrong reading, or a pushing supply without a brake resistor.
-fn overvoltage(random: &mut Random, bounds: &Bounds) -> Scenario {
+pub(super) fn overvoltage(random: &mut Random, bounds: &Bounds) -> Scenario {
     let [_, high] = bounds.bus_v;
     if random.below(2) == 0 {
         let volts = random.uniform(high + 0.2, 62.0);
@@ -33,7 +28,7 @@ fn overvoltage(random: &mut Random, bounds: &Bounds) -> Scenario {
 }
 
 /// V2: a wrong reading, or a supply that is cut or too weak.
-fn undervoltage(random: &mut Random, bounds: &Bounds) -> Scenario {
+pub(super) fn undervoltage(random: &mut Random, bounds: &Bounds) -> Scenario {
     let [low, _] = bounds.bus_v;
     let volts = random.uniform(0.0, low - 0.5);
     if random.below(2) == 0 {

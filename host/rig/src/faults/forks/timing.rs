@@ -3,20 +3,12 @@
 use hal_sim::faults::{Channel, Form, Timing};
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::{at, one};
-use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
+use crate::faults::scenario::{Bounds, Event, Expected, Scenario};
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 2] = [LATE, HUNG];
-
-const LATE: Row = Row { fault: &catalogue::K1, draw: late_ticks };
-
-const HUNG: Row = Row { fault: &catalogue::K3, draw: hang };
-
 /// K3: hang of any level that checks in, or of both current loops, at any tick; the others continue.
-fn hang(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn hang(random: &mut Random, _: &Bounds) -> Scenario {
     let hung = |channel, joint| at(channel, joint, Form::Off, Timing::from(0));
     let (first, second) = match random.below(5) {
         joint @ 0..=1 => (hung(Channel::Tick, joint as usize), None),
@@ -30,7 +22,7 @@ fn hang(random: &mut Random, _: &Bounds) -> Scenario {
 }
 
 /// K1: current ticks missed intermittently or in a row, or a servo without ticks.
-fn late_ticks(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn late_ticks(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     match random.below(3) {
         // Every other tick; the third missed one is a fault.

@@ -2,17 +2,13 @@
 
 use scarab_base::random::Random;
 
-use crate::faults::catalogue;
 use crate::faults::draw::beside;
-use crate::faults::scenario::{Bounds, Event, Expected, Row, Scenario};
+use crate::faults::scenario::{Bounds, Event, Expected, Scenario};
 use crate::faulty_board::PERIODS_PER_S;
 use scarab::model::planar::JOINTS;
 
-/// Rows of this group.
-pub static ROWS: [Row; 1] = [Row { fault: &catalogue::H1, draw: held }];
-
 /// H1: a hand holds or pushes a joint for up to a second.
-fn held(random: &mut Random, _: &Bounds) -> Scenario {
+pub(super) fn held(random: &mut Random, _: &Bounds) -> Scenario {
     let joint = random.below(JOINTS as u64) as usize;
     let strength = random.logarithmic(5.0, 300.0);
     let seconds = random.uniform(0.1, 1.0);

@@ -4,14 +4,14 @@ use scarab_base::random::Random;
 use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 
 use crate::faults::bounds::bounds;
-use crate::faults::forks::rows;
+use crate::faults::forks::ROWS;
 use crate::faults::report::{JUDGED, names};
 use crate::faults::scenario::{Event, Expected};
 
 #[test]
 fn only_rows_with_harmless_runs_judge_false_alarms() {
     let bounds = bounds(&LegFile::load(DEFAULT_LEG).expect("shipped")).expect("complete drives");
-    for row in rows() {
+    for row in &ROWS {
         let harmless = (1..=64).any(|seed| {
             let scenario = (row.draw)(&mut Random::new(row.fault.id, seed), &bounds);
             matches!(scenario.expected, Expected::Kept | Expected::Rejected | Expected::Ignored)

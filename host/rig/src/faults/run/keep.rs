@@ -1,7 +1,6 @@
 //! Runs without a broken part: pushes, in which the limits must hold, and noise, which must have no effect.
 
 use hal_sim::faults::Injector;
-use scarab::safety::FaultCode;
 
 use crate::faults::run::{Outcome, Watched};
 use crate::faulty_board::PERIOD_MS;
@@ -32,23 +31,17 @@ impl<const B: usize> Watched<'_, B> {
         let after_ms = timed.then_some(longest as f64 * PERIOD_MS);
         let in_time = after_ms.is_none_or(|after| after <= self.deadline_ms());
         let intermittent_ms = self.intermittent_ms();
-        let broken = self.invariants.into_broken();
+        let found = self.ended(alarm);
+        let is_whole = found.broken.is_empty();
         Outcome {
-            fault: self.row.fault.id,
-            seed: self.seed,
-            period: self.begun,
-            detected: state.is_some() && broken.is_empty() && known && in_time,
+            detected: state.is_some() && is_whole && known && in_time,
             // The limits were not reached.
-            undetectable: state.is_none() && broken.is_empty(),
+            undetectable: state.is_none() && is_whole,
             false_alarm: !known,
             after_ms,
             intermittent_ms,
             state,
-            alarm: alarm.map(FaultCode::name),
-            magnitude: self.scenario.magnitude,
-            broken,
-            hash: format!("{:016x}", self.rig.hash),
-            recording: self.recording,
+            ..found
         }
     }
 
@@ -64,22 +57,7 @@ impl<const B: usize> Watched<'_, B> {
         }
         let alarm = self.rig.alarm();
         let ignored = alarm.is_none() && self.rig.hash == twin.hash && self.rig.counts() == twin.counts();
-        Outcome {
-            fault: self.row.fault.id,
-            seed: self.seed,
-            period: self.begun,
-            detected: false,
-            undetectable: ignored,
-            false_alarm: !ignored,
-            after_ms: None,
-            intermittent_ms: None,
-            state: None,
-            alarm: alarm.map(FaultCode::name),
-            magnitude: self.scenario.magnitude,
-            broken: self.invariants.into_broken(),
-            hash: format!("{:016x}", self.rig.hash),
-            recording: self.recording,
-        }
+        Outcome { undetectable: ignored, false_alarm: !ignored, ..self.ended(alarm) }
     }
 
     /// Returns whether a motor's torque is above its joint's cap.

@@ -112,11 +112,10 @@ pub(super) fn current<const N: usize, const B: usize>(
     }
     Some(CauseReport {
         name: "torque_current",
-        joint: None,
         value: scales.first().map_or(Number::UNKNOWN, |scale| scale.ratio.into()),
-        sigma: Number::UNKNOWN,
         words: format!("{words}; read it so by {}", options(&changed)),
         reads: angles.into_iter().collect(),
+        ..CauseReport::default()
     })
 }
 
