@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use scarab_base::error::{EXIT_ACCEPTED, ToolError};
 use scarab_base::output;
 use scarab_base::shard::Shard;
@@ -11,7 +11,7 @@ use scarab_identify::formats::shard::{Argument, CampaignHeader, Program, ShardFi
 use scarab_paper::contenders::Algorithm;
 use scarab_paper::runs::PaperRuns;
 use scarab_paper::{PaperOptions, Part};
-use scarab_tool::cli::arguments::{Input, Output, OutputFolder, Updated};
+use scarab_tool::cli::arguments::{Choice, Input, Output, OutputFolder, Updated, one_of};
 use scarab_tool::cli::common::write_json;
 use scarab_tool::cli::merge::parsed;
 use scarab_tool::cli::perform;
@@ -20,37 +20,33 @@ use scarab_tool::view::{document, figures};
 /// Limit of the runs.
 const MOST_SEEDS: u64 = 100_000;
 
-/// A table of the paper.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum TableArgument {
-    /// The test functions and their least values.
-    #[value(name = "III")]
-    Three,
-    /// The searches on the test functions.
-    #[value(name = "IV")]
-    Four,
-    /// The chain's parameters one by one; always printed with VI.
-    #[value(name = "V")]
-    Five,
-    /// The combinations of the chain's parameters that torque determines; always printed with V.
-    #[value(name = "VI")]
-    Six,
-    /// The chain identified before and after its load changes; no table of the paper, but its argument.
-    LoadChange,
-    /// Iterations of the default swarm on identification problems; no table of the paper.
-    Convergence,
-}
+/// Tables of the paper, and two that it does not have.
+const TABLES: &[Choice<Part>] = &[
+    ("III", Part::TableThree, "The test functions and their least values"),
+    ("IV", Part::TableFour, "The searches on the test functions"),
+    ("V", Part::TablesFiveSix, "The chain's parameters one by one; always printed with VI"),
+    (
+        "VI",
+        Part::TablesFiveSix,
+        "The combinations of the chain's parameters that torque determines; always printed with V",
+    ),
+    (
+        "load-change",
+        Part::LoadChange,
+        "The chain identified before and after its load changes; no table of the paper, but its argument",
+    ),
+    (
+        "convergence",
+        Part::Convergence,
+        "Iterations of the default swarm on identification problems; no table of the paper",
+    ),
+];
 
-/// A figure of the paper.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FigureArgument {
-    /// Paths of the swarms on f1 to f4.
-    #[value(name = "5")]
-    Five,
-    /// Torque of the chain, predicted and real.
-    #[value(name = "7")]
-    Seven,
-}
+/// Figures of the paper.
+const FIGURES: &[Choice<Part>] = &[
+    ("5", Part::FigureFive, "Paths of the swarms on f1 to f4"),
+    ("7", Part::FigureSeven, "Torque of the chain, predicted and real"),
+];
 
 /// Reproduce the paper's tables and figures, and compare them with its printed results.
 #[derive(Parser, Debug)]
@@ -59,11 +55,11 @@ struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
     /// Table to compute; may be repeated. Default: all tables and figures.
-    #[arg(long, value_enum, ignore_case = true)]
-    table: Vec<TableArgument>,
+    #[arg(long, value_parser = one_of(TABLES), ignore_case = true)]
+    table: Vec<Part>,
     /// Figure to draw; may be repeated.
-    #[arg(long, value_enum)]
-    figure: Vec<FigureArgument>,
+    #[arg(long, value_parser = one_of(FIGURES))]
+    figure: Vec<Part>,
     /// Runs of each row, each with its own seed.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     seeds: Option<u64>,
@@ -73,6 +69,13 @@ struct Arguments {
     /// Only the runs of shard I of N, from 1, into --json; `merge` joins all of them.
     #[arg(long, value_name = "I/N", requires = "json", conflicts_with_all = ["out", "docs"])]
     shard: Option<Shard>,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+/// Outputs of a campaign.
+#[derive(Args, Debug)]
+struct Outputs {
     /// Draw into this directory, as SVG files.
     #[arg(long)]
     out: Option<OutputFolder>,
@@ -97,15 +100,8 @@ struct MergeArguments {
     /// JSON of all shards, in any order.
     #[arg(required = true, value_name = "FILES")]
     files: Vec<Input>,
-    /// Draw into this directory, as SVG files.
-    #[arg(long)]
-    out: Option<OutputFolder>,
-    /// Write the rows as JSON here.
-    #[arg(long)]
-    json: Option<Output>,
-    /// Write the tables into this document, each between its markers.
-    #[arg(long)]
-    docs: Option<Updated>,
+    #[command(flatten)]
+    outputs: Outputs,
 }
 
 /// Searches by their names in the report.
@@ -128,21 +124,10 @@ impl Arguments {
         if self.table.is_empty() && self.figure.is_empty() {
             return Part::ALL.to_vec();
         }
-        let tables = self.table.iter().map(|table| match table {
-            TableArgument::Three => Part::TableThree,
-            TableArgument::Four => Part::TableFour,
-            TableArgument::Five | TableArgument::Six => Part::TablesFiveSix,
-            TableArgument::LoadChange => Part::LoadChange,
-            TableArgument::Convergence => Part::Convergence,
-        });
-        let figures = self.figure.iter().map(|figure| match figure {
-            FigureArgument::Five => Part::FigureFive,
-            FigureArgument::Seven => Part::FigureSeven,
-        });
         let mut parts: Vec<Part> = Vec::new();
-        for part in tables.chain(figures) {
-            if !parts.contains(&part) {
-                parts.push(part);
+        for part in self.table.iter().chain(&self.figure) {
+            if !parts.contains(part) {
+                parts.push(*part);
             }
         }
         parts
@@ -168,9 +153,9 @@ fn merge(merged: &MergeArguments) -> Result<u8, ToolError> {
     let files: Vec<_> = merged.files.iter().map(|file| &**file).collect();
     let shards = ShardFiles::read(&files, &program(), &[CAMPAIGN])?;
     let outputs = [
-        ("--out", merged.out.as_deref()),
-        ("--json", merged.json.as_deref()),
-        ("--docs", merged.docs.as_deref()),
+        ("--out", merged.outputs.out.as_deref()),
+        ("--json", merged.outputs.json.as_deref()),
+        ("--docs", merged.outputs.docs.as_deref()),
     ];
     let arguments: Arguments = parsed(shards.campaign(), shards.campaign().command_line(), &outputs)?;
     check(&arguments)?;
@@ -182,7 +167,7 @@ fn run(arguments: &Arguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
     check(arguments)?;
     let options = arguments.options();
     let results = ShardResults::new(options.shard, scarab_paper::runs(&arguments.parts(), &options)?);
-    if let (Some(_), Some(path)) = (arguments.shard, &arguments.json) {
+    if let (Some(_), Some(path)) = (arguments.shard, &arguments.outputs.json) {
         let campaign =
             CampaignHeader { command: CAMPAIGN.into(), arguments: stated, leg: None, program: program() };
         return results.write(path, &campaign, &format!("{} runs", results.results.count()));
@@ -201,7 +186,7 @@ fn check(arguments: &Arguments) -> Result<(), ToolError> {
     if !arguments.algorithm.is_empty() && !parts.contains(&Part::TableFour) {
         return Err(ToolError::input("--algorithm: applies to --table IV only"));
     }
-    if let Some(path) = &arguments.docs {
+    if let Some(path) = &arguments.outputs.docs {
         parts.iter().try_for_each(|part| document::check(path, "paper", part.section_name()))?;
     }
     Ok(())
@@ -214,15 +199,15 @@ fn conclude(arguments: &Arguments, shards: Vec<ShardResults<PaperRuns>>) -> Resu
     for section in &sections {
         output::print(&format!("{}\n", section.markdown))?;
     }
-    if let Some(path) = &arguments.json {
+    if let Some(path) = &arguments.outputs.json {
         write_json(path, &scarab_paper::report(&sections))?;
     }
-    if let Some(directory) = &arguments.out {
+    if let Some(directory) = &arguments.outputs.out {
         let drawn: Vec<_> = sections.iter().flat_map(|section| section.figures.iter().cloned()).collect();
         figures::write(directory, &drawn)?;
         output::print(&format!("figures: {}\n", directory.display()))?;
     }
-    if let Some(path) = &arguments.docs {
+    if let Some(path) = &arguments.outputs.docs {
         for section in &sections {
             document::replace(path, "paper", section.name, &section.markdown)?;
         }

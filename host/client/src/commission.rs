@@ -54,35 +54,6 @@ pub enum Step {
     Store,
 }
 
-impl Step {
-    /// All steps.
-    pub const ALL: [Self; 8] = [
-        Self::Find,
-        Self::Wiring,
-        Self::Calibrate,
-        Self::Reference,
-        Self::Direction,
-        Self::Enable,
-        Self::Identify,
-        Self::Store,
-    ];
-
-    /// Name in the report.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Find => "find",
-            Self::Wiring => "wiring",
-            Self::Calibrate => "calibrate",
-            Self::Reference => "reference",
-            Self::Direction => "direction",
-            Self::Enable => "enable",
-            Self::Identify => "identify",
-            Self::Store => "store",
-        }
-    }
-}
-
 /// What the procedure should do.
 #[derive(Clone, Copy, Debug)]
 pub struct CommissionOptions {
@@ -151,6 +122,9 @@ struct Replaced {
     mode: u32,
 }
 
+/// A step's work; returns its result in words.
+type Perform<C> = fn(&mut C) -> Result<String, ToolError>;
+
 /// The procedure.
 pub struct Commission<'a> {
     client: Client,
@@ -181,6 +155,10 @@ fn inhibits(causes: u32) -> String {
         })
         .collect();
     words.join(", ")
+}
+
+fn are_enabled(states: &[Option<JointState>]) -> bool {
+    states.iter().all(|state| state.is_some_and(JointState::is_enabled))
 }
 
 /// Whether both joints are bent, and count in their direction.
@@ -223,18 +201,29 @@ impl<'a> Commission<'a> {
 
     /// Runs all steps up to the last one. The report holds what was reached, also after an error.
     pub fn run(mut self) -> (CommissionReport, Result<(), ToolError>) {
+        // With their names in the report.
+        let steps: [(Step, &'static str, Perform<Self>); 8] = [
+            (Step::Find, "find", Self::find),
+            (Step::Wiring, "wiring", Self::check_wiring),
+            (Step::Calibrate, "calibrate", Self::calibrate),
+            (Step::Reference, "reference", Self::reference),
+            (Step::Direction, "direction", Self::check_direction),
+            (Step::Enable, "enable", Self::enable),
+            (Step::Identify, "identify", Self::identify),
+            (Step::Store, "store", Self::store),
+        ];
         let mut result = Ok(());
         let until = self.options.until;
-        for step in Step::ALL.into_iter().filter(|step| *step <= until) {
+        for (_, name, perform) in steps.into_iter().filter(|(step, ..)| *step <= until) {
             let begun = self.client.now();
-            let found = self.perform(step);
+            let found = perform(&mut self);
             let words = match &found {
                 Ok(words) => words.clone(),
                 Err(error) => format!("failed: {error}"),
             };
-            self.line(&format!("{:<10} {words}", step.name()));
+            self.line(&format!("{name:<10} {words}"));
             let seconds = self.seconds_since(begun);
-            self.report.steps.push(StepTaken { step: step.name(), result: words, seconds });
+            self.report.steps.push(StepTaken { step: name, result: words, seconds });
             if let Err(error) = found {
                 result = Err(error);
                 break;
@@ -243,19 +232,6 @@ impl<'a> Commission<'a> {
         // Whatever happened, the leg is not left enabled.
         let restored = self.restore_settings();
         (self.report, result.and(restored))
-    }
-
-    fn perform(&mut self, step: Step) -> Result<String, ToolError> {
-        match step {
-            Step::Find => self.find(),
-            Step::Wiring => self.check_wiring(),
-            Step::Calibrate => self.calibrate(),
-            Step::Reference => self.reference(),
-            Step::Direction => self.check_direction(),
-            Step::Enable => self.enable(),
-            Step::Identify => self.identify(),
-            Step::Store => self.store(),
-        }
     }
 
     fn line(&mut self, words: &str) {
@@ -612,7 +588,7 @@ impl<'a> Commission<'a> {
             "support the leg within its range of motion, open the enabling switch, then hold it; support the leg until it holds its pose: only a quarter of the current is there until the motors have moved",
             |this| {
                 let states = this.states()?;
-                if states.iter().all(|state| state.is_some_and(JointState::is_enabled)) {
+                if are_enabled(&states) {
                     // The contacts may have enabled it: from here on this host controls the leg.
                     this.command(15)?;
                     return Ok(true);
@@ -626,8 +602,7 @@ impl<'a> Commission<'a> {
                 for word in [6, 7, 15] {
                     this.command(word)?;
                 }
-                let is_enabled =
-                    this.states()?.iter().all(|state| state.is_some_and(JointState::is_enabled));
+                let is_enabled = are_enabled(&this.states()?);
                 if !is_enabled {
                     // Its requests would otherwise be repeated as soon as the reason ends.
                     this.command(0)?;
@@ -702,20 +677,13 @@ impl<'a> Commission<'a> {
         let mut reasons = Vec::new();
         for node in self.options.nodes {
             let inputs = self.client.read(node, INPUTS)?;
-            let set = |reason: RefusalReason| inputs & reason.bit() != 0;
-            for (applies, reason) in [
-                (!set(RefusalReason::SwitchOpen), RefusalReason::SwitchOpen),
-                (set(RefusalReason::Blocked), RefusalReason::Blocked),
-                (set(RefusalReason::NoReference), RefusalReason::NoReference),
-                (set(RefusalReason::NotCalibrated), RefusalReason::NotCalibrated),
-                (set(RefusalReason::OutOfRange), RefusalReason::OutOfRange),
-                (set(RefusalReason::Moving), RefusalReason::Moving),
-                (set(RefusalReason::Encoder), RefusalReason::Encoder),
-            ] {
-                if applies {
-                    reasons.push(format!("node {node}: {}", reason.name()));
-                }
-            }
+            // The bit of the enabling switch is set while it is held.
+            let inputs = inputs ^ RefusalReason::SwitchOpen.bit();
+            let set = RefusalReason::ALL.into_iter().filter(|reason| {
+                !matches!(reason, RefusalReason::NoTransition | RefusalReason::NoAssistance)
+                    && inputs & reason.bit() != 0
+            });
+            reasons.extend(set.map(|reason| format!("node {node}: {}", reason.name())));
         }
         Ok(reasons.join(", "))
     }
@@ -741,7 +709,7 @@ impl<'a> Commission<'a> {
                 self.line(&format!("           {words}"));
                 last = activity;
             }
-            if !self.states()?.iter().all(|state| state.is_some_and(JointState::is_enabled)) {
+            if !are_enabled(&self.states()?) {
                 let (code, causes) = (self.read(Object(0x603F, 0))?, self.read(REASONS)?);
                 return Err(refused(format!(
                     "the drive is off: error code {code:04X}; inhibit reasons: {}; start the command again",

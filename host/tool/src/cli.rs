@@ -1,5 +1,6 @@
 //! The command line: one file for each command.
 
+mod adapter;
 pub mod arguments;
 pub mod assist;
 mod commission;

@@ -7,7 +7,7 @@ use scarab_base::shard::Shard;
 use scarab_paper::printed::{TABLE_FIVE, TABLE_SIX};
 use scarab_paper::{convergence, figure_seven, load_change, tables_five_six};
 
-use crate::command::{Folder, scarab};
+use crate::command::Folder;
 
 #[test]
 fn torque_determines_nine_of_twenty_parameters_and_fifteen_sums() {
@@ -126,12 +126,10 @@ fn the_swarm_converges_on_all_sets_of_unknowns_of_the_leg() {
 #[test]
 fn the_same_seeds_give_the_same_tables_and_json() {
     let folder = Folder::new();
-    let run = |name: &str| {
-        let path = folder.path(name);
-        let printed = scarab("--table V --table VI --seeds 1 --json", &[&path]).ends_with(0).printed;
-        (printed, folder.json(name))
-    };
-    let (first, second) = (run("first.json"), run("second.json"));
+    let [first, second] = [(); 2].map(|()| {
+        let (run, report) = folder.reported("--table V --table VI --seeds 1", 0);
+        (run.printed, report)
+    });
     assert_eq!(first, second);
     let tables = &first.1["tables_v_vi"];
     for key in

@@ -1,23 +1,19 @@
 //! `paper`: the report of Tables III and IV as an interface, and properties of any few runs.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::sync::OnceLock;
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, Run, list, scarab};
 use serde_json::Value;
 
 /// Table IV of two runs, shared by all tests here.
 fn rows() -> &'static [Value] {
     static REPORT: OnceLock<Value> = OnceLock::new();
-    let report = REPORT.get_or_init(|| table_four("a.json").1);
-    report["rows"].as_array().expect("a list")
+    list(REPORT.get_or_init(|| table_four().1), "rows")
 }
 
-fn table_four(name: &str) -> (String, Value) {
-    let folder = Folder::new();
-    let run = scarab("--table IV --seeds 2 --json", &[&folder.path(name)]).ends_with(0);
-    (run.printed, folder.json(name))
+fn table_four() -> (Run, Value) {
+    Folder::new().reported("--table IV --seeds 2", 0)
 }
 
 fn texts(key: &str) -> BTreeSet<&'static str> {
@@ -122,18 +118,17 @@ fn searches_of_other_crates_are_really_run() {
 
 #[test]
 fn the_same_command_gives_the_same_rows() {
-    let (printed, report) = table_four("b.json");
+    let (run, report) = table_four();
     assert_eq!(report["schema"], 1);
-    assert_eq!(report["rows"].as_array().expect("a list"), rows());
-    assert!(printed.contains("paper's BSO"), "{printed}");
+    assert_eq!(list(&report, "rows"), rows());
+    run.prints("paper's BSO");
 }
 
 #[test]
 fn least_values_are_those_of_the_standard_functions_and_not_the_listed_ones() {
     let folder = Folder::new();
-    scarab("--table III --json", &[&folder.path("three.json")]).ends_with(0);
-    let report = folder.json("three.json");
-    let minima = report["minima"].as_array().expect("a list");
+    let (_, report) = folder.reported("--table III", 0);
+    let minima = list(&report, "minima");
     // Grid, compass search and stated value agree to 1e-9.
     for (function, reading, least) in [
         ("f1", "intended", 0.0),
@@ -154,15 +149,14 @@ fn least_values_are_those_of_the_standard_functions_and_not_the_listed_ones() {
 fn a_document_changes_only_between_its_markers() {
     let folder = Folder::new();
     let text = "before\n<!-- paper: table-iii -->\nold\n<!-- end of table-iii -->\nafter\n";
-    let document = folder.write("a.md", text);
-    scarab("--table III --docs", &[&document]).ends_with(0);
-    let written = fs::read_to_string(&document).expect("the document");
+    folder.write("a.md", text);
+    folder.scarab("--table III --docs @a.md").ends_with(0);
+    let written = folder.read("a.md");
     assert!(written.starts_with("before\n<!-- paper: table-iii -->\n"), "{written}");
     assert!(written.ends_with("<!-- end of table-iii -->\nafter\n") && !written.contains("old"), "{written}");
     assert!(written.contains("-1.031628"), "{written}");
-    let empty = folder.write("b.md", "nothing\n");
-    let run = scarab("--table III --docs", &[&empty]).ends_with(2);
-    assert!(run.errors.contains("paper: table-iii"), "{}", run.errors);
+    folder.write("b.md", "nothing\n");
+    folder.scarab("--table III --docs @b.md").ends_with(2).warns("paper: table-iii");
 }
 
 #[test]
@@ -174,18 +168,16 @@ fn impossible_requests_are_refused() {
         ("--figure 6", "--figure"),
         ("--table III --docs nowhere.md", "nowhere.md"),
     ] {
-        let refusal = scarab(arguments, &[]).refusal();
-        assert!(refusal.contains(named), "{arguments}: {refusal}");
+        scarab(arguments).refuses(named);
     }
 }
 
 #[test]
 fn figure_five_is_drawn_for_each_function_small_and_well_formed() {
     let folder = Folder::new();
-    scarab("--figure 5 --seeds 5 --out", &[&folder.path("drawn")]).ends_with(0);
+    folder.scarab("--figure 5 --seeds 5 --out @drawn").ends_with(0);
     for function in ["f1", "f2", "f3", "f4"] {
-        let path = folder.path("drawn").join(format!("figure-5-{function}.svg"));
-        let svg = fs::read_to_string(&path).expect("it was drawn");
+        let svg = folder.read(&format!("drawn/figure-5-{function}.svg"));
         roxmltree::Document::parse(&svg).unwrap_or_else(|error| panic!("{function}: {error}"));
         assert!(!svg.contains("NaN") && !svg.contains("inf,"), "{function}");
         // Suitable size for a repository.

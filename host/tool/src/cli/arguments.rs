@@ -6,6 +6,7 @@
 //! | part | contents |
 //! | --- | --- |
 //! | [`role`] | types of arguments that define the use of a file |
+//! | [`choice`] | parser of arguments that are one of a few words |
 //! | [`mod@check`] | detects files that a command would overwrite or cannot write |
 //! | [`mod@stated`] | arguments that shards of one campaign have in common |
 //!
@@ -13,9 +14,11 @@
 //! case. Redirections of the shell are not checked.
 
 pub mod check;
+pub mod choice;
 pub mod role;
 pub mod stated;
 
 pub use check::check;
+pub use choice::{Choice, one_of};
 pub use role::{Input, LegName, Output, OutputFolder, Updated};
 pub use stated::stated;

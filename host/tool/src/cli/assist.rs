@@ -1,6 +1,6 @@
 //! `assist`: a wearer moves in a leg that is transparent, carries weight or assists, and both are measured.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use scarab_base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use scarab_base::shard::Shard;
 use scarab_base::{files, output};
@@ -15,35 +15,21 @@ use scarab_rig::faults::entry::{Entry, entries};
 use scarab_rig::faults::report::CampaignReport;
 use scarab_rig::faults::run::{Blind, Manner};
 
-use crate::cli::arguments::OutputFolder;
+use crate::cli::arguments::{Choice, OutputFolder, one_of};
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
 use crate::view::html::{self, Circumstances};
 use crate::view::{assist as text, figures};
 
-/// Motion of the wearer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum MotionArgument {
-    /// Walking in the air at 0.5, 0.8 and 1.2 strides per second.
-    Gait,
-    /// Kicks with the knee.
-    Kicking,
-    /// Slow extensions of the knee, seated.
-    Extension,
-    /// Irregular reaching.
-    Reaching,
-}
-
-impl MotionArgument {
-    fn exercises(self) -> Vec<Exercise> {
-        match self {
-            Self::Gait => [0.5, 0.8, 1.2].map(Exercise::Gait).into(),
-            Self::Kicking => vec![Exercise::Kicking],
-            Self::Extension => vec![Exercise::Extension],
-            Self::Reaching => vec![Exercise::Reaching],
-        }
-    }
-}
+/// Walking at several strides per second.
+const GAITS: &[Exercise] = &[Exercise::Gait(0.5), Exercise::Gait(0.8), Exercise::Gait(1.2)];
+/// Motions of the wearer.
+const MOTIONS: &[Choice<&[Exercise]>] = &[
+    ("gait", GAITS, "Walking in the air at 0.5, 0.8 and 1.2 strides per second"),
+    ("kicking", &[Exercise::Kicking], "Kicks with the knee"),
+    ("extension", &[Exercise::Extension], "Slow extensions of the knee, seated"),
+    ("reaching", &[Exercise::Reaching], "Irregular reaching"),
+];
 
 /// Limit of the runs.
 const MOST_RUNS: u64 = 100_000;
@@ -57,8 +43,8 @@ pub struct AssistArguments {
     #[arg(long, value_enum)]
     mode: Vec<Mode>,
     /// Motion of the wearer; may be repeated. Gait, kicking and reaching unless given.
-    #[arg(long, value_enum)]
-    motion: Vec<MotionArgument>,
+    #[arg(long, value_parser = one_of(MOTIONS))]
+    motion: Vec<&'static [Exercise]>,
     /// Share of the empty leg's friction that is compensated (0 to 1).
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, allow_negative_numbers = true)]
     friction: f64,
@@ -128,12 +114,12 @@ impl AssistArguments {
             modes = vec![Mode::Transparent, Mode::Weight, Mode::Periodic];
         }
         modes.dedup();
-        let usual = [MotionArgument::Gait, MotionArgument::Kicking, MotionArgument::Reaching];
+        let usual = [GAITS, &[Exercise::Kicking], &[Exercise::Reaching]];
         let chosen = if self.motion.is_empty() { &usual[..] } else { &self.motion };
         let seed = self.seed.unwrap_or(DEFAULT_SEED);
         Ok(AssistOptions {
             modes,
-            exercises: chosen.iter().flat_map(|motion| motion.exercises()).collect(),
+            exercises: chosen.concat(),
             shares: AssistFile {
                 friction: share("friction", self.friction, [0.0, 1.0])?,
                 inertia: share("inertia", self.inertia, [0.0, 0.8])?,

@@ -3,24 +3,18 @@
 use clap::Args;
 use scarab_base::error::{EXIT_ACCEPTED, EXIT_INPUT, ToolError};
 use scarab_base::{files, output};
-use scarab_client::adapter::open;
 use scarab_client::commission::{Commission, CommissionOptions, Step};
-use scarab_client::master::Client;
 
+use crate::cli::adapter::AdapterOptions;
 use crate::cli::arguments::OutputFolder;
 use crate::cli::common::write_json;
-use crate::cli::serve::bit_rates;
 use crate::view::html;
 
 /// Bus, nodes and steps.
 #[derive(Args, Debug)]
 pub struct CommissionArguments {
-    /// Adapter of the bus (slcan): HOST:PORT or a serial device.
-    #[arg(long, value_name = "ADAPTER")]
-    slcan: String,
-    /// Bit rate of the bus, kbit/s.
-    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
-    bit_rate: u64,
+    #[command(flatten)]
+    adapter: AdapterOptions,
     /// Node-IDs of hip and knee.
     #[arg(long, value_name = "ID,ID", default_value = "1,2", value_delimiter = ',', num_args = 1, value_parser = clap::value_parser!(u8).range(1..=127))]
     nodes: Vec<u8>,
@@ -52,7 +46,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<u8, ToolError> {
             arguments.patience
         )));
     }
-    let client = Client::new(open(&arguments.slcan, arguments.bit_rate)?)?;
+    let client = arguments.adapter.client()?;
     let options = CommissionOptions {
         nodes,
         until: arguments.until,

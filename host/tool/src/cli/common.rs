@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::view::spread::Spread;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use scarab::ident::{Estimator, Plan};
 use scarab_base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use scarab_base::{files, output};
@@ -14,7 +14,7 @@ use scarab_identify::leg::setup::PriorChoice;
 use scarab_identify::report::series::Series;
 use scarab_identify::report::{RunReport, Source};
 
-use crate::cli::arguments::{Output, OutputFolder};
+use crate::cli::arguments::{Choice, Output, OutputFolder, one_of};
 use crate::cli::leg_options::LegOptions;
 use crate::view::{figures, html, tables};
 
@@ -24,41 +24,21 @@ pub fn program() -> Program {
     Program::from_sources(env!("SCARAB_SOURCES"))
 }
 
-/// Plan of the estimate.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum PlanArgument {
-    /// All joints at once, weighted by their noise.
-    OneTime,
-    /// Distal joint first, then substitution.
-    Sequential,
-}
-
-impl From<PlanArgument> for Plan {
-    fn from(plan: PlanArgument) -> Self {
-        match plan {
-            PlanArgument::OneTime => Self::OneTime,
-            PlanArgument::Sequential => Self::Sequential,
-        }
-    }
-}
+/// Plan of the estimate: word, value and help.
+const PLANS: &[Choice<Plan>] = &[
+    ("one-time", Plan::OneTime, "All joints at once, weighted by their noise"),
+    ("sequential", Plan::Sequential, "Distal joint first, then substitution"),
+];
 
 /// Treatment of disturbances.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum EstimatorArgument {
-    /// Replace outliers, reduce the weight of disturbed stretches, and search Stribeck friction.
-    Robust,
-    /// Weight every sample alike.
-    Plain,
-}
-
-impl From<EstimatorArgument> for Estimator {
-    fn from(estimator: EstimatorArgument) -> Self {
-        match estimator {
-            EstimatorArgument::Robust => Self::Robust,
-            EstimatorArgument::Plain => Self::Plain,
-        }
-    }
-}
+const ESTIMATORS: &[Choice<Estimator>] = &[
+    (
+        "robust",
+        Estimator::Robust,
+        "Replace outliers, reduce the weight of disturbed stretches, and search Stribeck friction",
+    ),
+    ("plain", Estimator::Plain, "Weight every sample alike"),
+];
 
 /// Arguments shared by identification and replay.
 #[derive(Args, Debug)]
@@ -69,11 +49,11 @@ pub struct Common {
     #[arg(long, help_heading = "Identification")]
     pub swarm_seed: Option<u64>,
     /// Order of the estimate.
-    #[arg(long, value_enum, default_value = "one-time", help_heading = "Identification")]
-    pub plan: PlanArgument,
+    #[arg(long, value_parser = one_of(PLANS), default_value = "one-time", help_heading = "Identification")]
+    pub plan: Plan,
     /// Treatment of outliers and disturbances.
-    #[arg(long, value_enum, default_value = "robust", help_heading = "Identification")]
-    pub estimator: EstimatorArgument,
+    #[arg(long, value_parser = one_of(ESTIMATORS), default_value = "robust", help_heading = "Identification")]
+    pub estimator: Estimator,
     /// Prior of the search: none, file, or wrong:PERCENT. Default: that of the leg file.
     #[arg(long, help_heading = "Identification")]
     pub prior: Option<PriorChoice>,

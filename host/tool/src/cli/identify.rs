@@ -1,6 +1,6 @@
 //! `identify`: a simulated leg from excitation to verdict.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use scarab::model::Payload;
 use scarab_base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use scarab_base::shard::Shard;
@@ -17,7 +17,7 @@ use scarab_rig::options::{DriveModel, SimulationOptions};
 use scarab_rig::perturb::Perturbation;
 use serde::{Deserialize, Serialize};
 
-use crate::cli::arguments::{Input, Output};
+use crate::cli::arguments::{Choice, Input, Output, one_of};
 use crate::cli::common::{Common, draw, draw_runs, finish, program, write_json};
 use crate::cli::model::ModelArguments;
 use crate::cli::noise::NoiseOptions;
@@ -42,8 +42,8 @@ pub struct IdentifyArguments {
     #[command(flatten)]
     noise: NoiseOptions,
     /// Ideal currents, or motors, bridges and sensors under the board's current loops.
-    #[arg(long, value_enum, default_value = "ideal", help_heading = "Simulation")]
-    drive: DriveArgument,
+    #[arg(long, value_parser = one_of(DRIVES), default_value = "ideal", help_heading = "Simulation")]
+    drive: DriveModel,
     /// Identify again with a known mass, KG@JOINT:X_M[:Y_M] (JOINT: name or number; X along the
     /// link): determines the torque constants.
     #[arg(long, help_heading = "Simulation")]
@@ -63,23 +63,15 @@ pub struct IdentifyArguments {
     log: Option<Output>,
 }
 
-/// Kind of simulated drives.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum DriveArgument {
-    /// A current that follows its target with a lag.
-    Ideal,
-    /// Motor, inverter, current and angle sensors, supply; needs `[joint.motor]` in the leg file.
-    Full,
-}
-
-impl From<DriveArgument> for DriveModel {
-    fn from(drive: DriveArgument) -> Self {
-        match drive {
-            DriveArgument::Ideal => Self::Ideal,
-            DriveArgument::Full => Self::Full,
-        }
-    }
-}
+/// Kinds of simulated drives.
+pub(super) const DRIVES: &[Choice<DriveModel>] = &[
+    ("ideal", DriveModel::Ideal, "A current that follows its target with a lag"),
+    (
+        "full",
+        DriveModel::Full,
+        "Motor, inverter, current and angle sensors, supply; needs `[joint.motor]` in the leg file",
+    ),
+];
 
 pub(super) fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
     let ends = text
@@ -126,12 +118,12 @@ pub fn run(arguments: &IdentifyArguments, stated: Vec<Argument>) -> Result<u8, T
         seed,
         swarm_seed: arguments.common.swarm_seed.unwrap_or(seed),
         torque_noise_percent,
-        drive: arguments.drive.into(),
-        plan: arguments.common.plan.into(),
+        drive: arguments.drive,
+        plan: arguments.common.plan,
         prior: arguments.common.prior.unwrap_or_default(),
         payload,
         load,
-        estimator: arguments.common.estimator.into(),
+        estimator: arguments.common.estimator,
         with_series: arguments.common.is_drawn() && arguments.seeds.is_none(),
         perturbations: arguments.perturb.clone(),
         excitation: excitation.clone(),

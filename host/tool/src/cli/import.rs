@@ -1,7 +1,8 @@
 //! Options that state how recordings are read.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use crate::cli::arguments::{Choice, one_of};
 use scarab_base::error::ToolError;
 use scarab_base::names::BY_CARGO;
 use scarab_base::shell::{program_of, quoted};
@@ -24,25 +25,17 @@ pub struct ImportArguments {
     #[arg(long, help_heading = "Recordings")]
     skip_bad: bool,
     /// Separator of fields, where the first lines allow two.
-    #[arg(long, value_enum, help_heading = "Recordings")]
-    delimiter: Option<DelimiterArgument>,
+    #[arg(long, value_parser = one_of(DELIMITERS), help_heading = "Recordings")]
+    delimiter: Option<Delimiter>,
     /// Decimal sign, where the first lines allow two.
-    #[arg(long, value_enum, help_heading = "Recordings")]
-    decimal: Option<DecimalArgument>,
+    #[arg(long, value_parser = one_of(DECIMALS), help_heading = "Recordings")]
+    decimal: Option<Decimal>,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum DelimiterArgument {
-    Comma,
-    Semicolon,
-    Tab,
-}
+const DELIMITERS: &[Choice<Delimiter>] =
+    &[("comma", Delimiter::Comma, ""), ("semicolon", Delimiter::Semicolon, ""), ("tab", Delimiter::Tab, "")];
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum DecimalArgument {
-    Point,
-    Comma,
-}
+const DECIMALS: &[Choice<Decimal>] = &[("point", Decimal::Point, ""), ("comma", Decimal::Comma, "")];
 
 impl ImportArguments {
     /// How to read the recordings of this leg. `name` is the leg's name or file.
@@ -50,15 +43,8 @@ impl ImportArguments {
         let (text, _) = LegFile::text(name)?;
         let import = Import {
             skip_bad: self.skip_bad,
-            delimiter: self.delimiter.map(|delimiter| match delimiter {
-                DelimiterArgument::Comma => Delimiter::Comma,
-                DelimiterArgument::Semicolon => Delimiter::Semicolon,
-                DelimiterArgument::Tab => Delimiter::Tab,
-            }),
-            decimal: self.decimal.map(|decimal| match decimal {
-                DecimalArgument::Point => Decimal::Point,
-                DecimalArgument::Comma => Decimal::Comma,
-            }),
+            delimiter: self.delimiter,
+            decimal: self.decimal,
             command: command(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
             ..Import::from_leg(leg, &text)
         };

@@ -1,22 +1,19 @@
 //! Leg with its wearer, side and trunk.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use scarab_base::error::ToolError;
 use scarab_base::shell::program;
 use scarab_identify::formats::leg_file::{BodySide, DEFAULT_LEG, LegFile, SHIPPED_LEGS};
 use scarab_identify::leg::posture::{on_side, pitched};
 use scarab_identify::leg::size::{Person, Size};
 
-use crate::cli::arguments::LegName;
+use crate::cli::arguments::{Choice, LegName, one_of};
 
-/// Side of the body.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum SideArgument {
-    /// Drives mounted mirrored.
-    Left,
-    /// Drives mounted as described.
-    Right,
-}
+/// Sides of the body.
+const SIDES: &[Choice<BodySide>] = &[
+    ("left", BodySide::Left, "Drives mounted mirrored"),
+    ("right", BodySide::Right, "Drives mounted as described"),
+];
 
 /// Leg and its settings.
 #[derive(Args, Clone, Debug)]
@@ -35,8 +32,8 @@ pub struct LegOptions {
     #[arg(long, value_name = "KG,M", help_heading = "Simulated wearer")]
     wearer: Option<Person>,
     /// Side of the body. Default: that of the leg file.
-    #[arg(long, value_enum, help_heading = "Simulated wearer")]
-    side: Option<SideArgument>,
+    #[arg(long, value_parser = one_of(SIDES), help_heading = "Simulated wearer")]
+    side: Option<BodySide>,
     /// Angle by which the trunk leans forward, degrees; the firmware gets it too.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, help_heading = "Simulated wearer")]
     trunk_pitch: Option<f64>,
@@ -78,15 +75,9 @@ impl LegOptions {
         changes.extend(self.thigh.map(|length| format!(" --thigh {length}")));
         changes.extend(self.shank.map(|length| format!(" --shank {length}")));
         changes.extend(self.wearer.map(|person| format!(" --wearer {},{}", person.mass, person.height)));
-        if let Some(side) = self.side {
-            let (side, word) = match side {
-                SideArgument::Left => (BodySide::Left, "left"),
-                SideArgument::Right => (BodySide::Right, "right"),
-            };
-            if side != leg.side {
-                leg = on_side(&leg, side)?;
-                changes.push(format!(" --side {word}"));
-            }
+        if let Some(side) = self.side.filter(|side| *side != leg.side) {
+            leg = on_side(&leg, side)?;
+            changes.push(format!(" --side {}", if side == BodySide::Left { "left" } else { "right" }));
         }
         if let Some(degrees) = self.trunk_pitch {
             leg = pitched(&leg, degrees)?;

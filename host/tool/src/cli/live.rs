@@ -20,15 +20,15 @@ use scarab_identify::leg::matching::refuse_another_leg;
 use scarab_identify::leg::setup::DEFAULT_SEED;
 use scarab_identify::run::replay::{Recordings, ReplayOptions};
 use scarab_identify::with_leg_size;
-use scarab_rig::options::SimulationOptions;
+use scarab_rig::options::{DriveModel, SimulationOptions};
 use scarab_rig::perturb::Perturbation;
 use scarab_rig::traced::run::{StreamReader, decoder};
 
-use crate::cli::arguments::Input;
-use crate::cli::identify::DriveArgument;
+use crate::cli::adapter::bit_rates;
+use crate::cli::arguments::{Input, one_of};
+use crate::cli::identify::DRIVES;
 use crate::cli::import::ImportArguments;
 use crate::cli::leg_options::LegOptions;
-use crate::cli::serve::bit_rates;
 use crate::live::bus::{BusInput, Lines, watch};
 use crate::live::playback::play;
 use crate::live::report::LiveUpdate;
@@ -60,8 +60,8 @@ pub struct LiveArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Simulation")]
     runs: u32,
     /// Ideal currents, or motors, bridges and sensors under the board's current loops.
-    #[arg(long, value_enum, default_value = "ideal", help_heading = "Simulation")]
-    drive: DriveArgument,
+    #[arg(long, value_parser = one_of(DRIVES), default_value = "ideal", help_heading = "Simulation")]
+    drive: DriveModel,
     /// Inject a deliberate error: NAME or NAME=VALUE, repeatable.
     #[arg(long, value_name = "NAME[=VALUE]", help_heading = "Simulation")]
     perturb: Vec<Perturbation>,
@@ -128,7 +128,7 @@ impl LiveArguments {
         }
         let Some(file) = &self.recording else {
             let options = SimulationOptions {
-                drive: self.drive.into(),
+                drive: self.drive,
                 perturbations: self.perturb.clone(),
                 ..SimulationOptions::with_seed(self.seed)
             };

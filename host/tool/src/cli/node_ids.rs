@@ -3,21 +3,15 @@
 use clap::Args;
 use scarab_base::error::{EXIT_ACCEPTED, ToolError};
 use scarab_base::output;
-use scarab_client::adapter::open;
-use scarab_client::master::Client;
 use scarab_client::node_ids::{Board, NodeIds, check};
 
-use crate::cli::serve::bit_rates;
+use crate::cli::adapter::AdapterOptions;
 
 /// Bus and node-IDs.
 #[derive(Args, Debug)]
 pub struct NodeIdsArguments {
-    /// Adapter of the bus (slcan): HOST:PORT or a serial device.
-    #[arg(long, value_name = "ADAPTER")]
-    slcan: String,
-    /// Bit rate of the bus, kbit/s.
-    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
-    bit_rate: u64,
+    #[command(flatten)]
+    adapter: AdapterOptions,
     /// Node-IDs of hip and knee for the board with this serial number; stored. Can be repeated.
     #[arg(long, value_name = "SERIAL=ID,ID", value_parser = wanted)]
     set: Vec<(u32, [u8; 2])>,
@@ -35,7 +29,7 @@ fn wanted(text: &str) -> Result<(u32, [u8; 2]), String> {
 
 /// Lists and sets; exit code 3 where a board refuses, 2 where the bus fails.
 pub fn run(arguments: &NodeIdsArguments) -> Result<u8, ToolError> {
-    let mut ids = NodeIds::new(Client::new(open(&arguments.slcan, arguments.bit_rate)?)?);
+    let mut ids = NodeIds::new(arguments.adapter.client()?);
     let mut boards = ids.find()?;
     if boards.is_empty() {
         return Err(ToolError::input(

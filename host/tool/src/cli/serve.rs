@@ -3,8 +3,7 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::Path;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use scarab_base::error::{EXIT_ACCEPTED, ToolError};
 use scarab_identify::leg::exercise::Exercise;
 use scarab_identify::leg::setup::DEFAULT_SEED;
@@ -12,32 +11,17 @@ use scarab_identify::with_leg_size;
 use scarab_rig::bus::serve::{Beginning, ServeOptions, serve};
 use scarab_rig::worn::CADENCE_HZ;
 
-use crate::cli::arguments::Updated;
+use crate::cli::adapter::bit_rates;
+use crate::cli::arguments::{Choice, Updated, one_of};
 use crate::cli::leg_options::LegOptions;
 
-/// Motion of a wearer.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum WearerMotion {
-    /// Walks in the air.
-    Gait,
-    /// Kicks with the knee.
-    Kicking,
-    /// Extends the knee slowly, seated.
-    Extension,
-    /// Reaches random postures.
-    Reaching,
-}
-
-impl WearerMotion {
-    fn exercise(self) -> Exercise {
-        match self {
-            Self::Gait => Exercise::Gait(CADENCE_HZ),
-            Self::Kicking => Exercise::Kicking,
-            Self::Extension => Exercise::Extension,
-            Self::Reaching => Exercise::Reaching,
-        }
-    }
-}
+/// Motions of a wearer.
+const MOTIONS: &[Choice<Exercise>] = &[
+    ("gait", Exercise::Gait(CADENCE_HZ), "Walks in the air"),
+    ("kicking", Exercise::Kicking, "Kicks with the knee"),
+    ("extension", Exercise::Extension, "Extends the knee slowly, seated"),
+    ("reaching", Exercise::Reaching, "Reaches random postures"),
+];
 
 /// Legs, address and speed.
 #[derive(Args, Debug)]
@@ -55,8 +39,8 @@ pub struct ServeArguments {
     new: bool,
     /// Each leg is on a wearer who moves so while it assists, and is limp otherwise. The boards know the
     /// models of the empty and the worn leg.
-    #[arg(long, value_enum, help_heading = "Simulated wearer")]
-    motion: Option<WearerMotion>,
+    #[arg(long, value_parser = one_of(MOTIONS), help_heading = "Simulated wearer")]
+    motion: Option<Exercise>,
     /// The boards are neither calibrated nor have zeros, and the operator's contacts are open. A calibration
     /// is refused, because the legs hang on their motors.
     #[arg(long, conflicts_with = "enabled_by_contacts")]
@@ -85,11 +69,6 @@ fn address(text: &str) -> Result<SocketAddr, String> {
     found.first().copied().ok_or_else(|| "no address".into())
 }
 
-/// Bit rates of the board's controller, kbit/s (object 2002).
-pub fn bit_rates() -> impl TypedValueParser<Value = u64> {
-    PossibleValuesParser::new(["125", "250", "500", "1000"]).try_map(|rate| rate.parse::<u64>())
-}
-
 /// Serves until SIGTERM; returns the exit code.
 pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
@@ -112,7 +91,7 @@ pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
             (_, true) => Beginning::EnabledByContacts,
             _ => Beginning::Ready,
         },
-        wearer: arguments.motion.map(WearerMotion::exercise),
+        wearer: arguments.motion,
     };
     let (leg, options) = (&leg, &options);
     with_leg_size!(leg, serve(leg, options))?;

@@ -5,22 +5,16 @@ use std::path::Path;
 use clap::Args;
 use scarab_base::error::{EXIT_ACCEPTED, FileError, ToolError};
 use scarab_base::output;
-use scarab_client::adapter::open;
-use scarab_client::master::Client;
 use scarab_client::update::{Update, check};
 
+use crate::cli::adapter::AdapterOptions;
 use crate::cli::arguments::Input;
-use crate::cli::serve::bit_rates;
 
 /// Bus, board and image.
 #[derive(Args, Debug)]
 pub struct UpdateArguments {
-    /// Adapter of the bus (slcan): HOST:PORT or a serial device.
-    #[arg(long, value_name = "ADAPTER")]
-    slcan: String,
-    /// Bit rate of the bus, kbit/s.
-    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
-    bit_rate: u64,
+    #[command(flatten)]
+    adapter: AdapterOptions,
     /// Either node-ID of the board.
     #[arg(long, value_name = "ID", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=127))]
     node: u8,
@@ -34,7 +28,7 @@ pub fn run(arguments: &UpdateArguments) -> Result<u8, ToolError> {
     let path: &Path = &arguments.image;
     let program = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
     let header = check(&program).map_err(|why| ToolError::input(format!("{}: {why}", path.display())))?;
-    let client = Client::new(open(&arguments.slcan, arguments.bit_rate)?)?;
+    let client = arguments.adapter.client()?;
     let mut say = |words: &str| {
         let _ = output::print(&format!("{words}\n"));
     };

@@ -178,6 +178,7 @@ fn sender(frame: &Frame) -> Option<u8> {
 }
 
 /// Bits on the wire over the last second.
+#[derive(Default)]
 struct Load {
     bits_per_s: u64,
     since_s: f64,
@@ -243,7 +244,7 @@ pub fn watch<const N: usize, const B: usize>(
     let mut legs = legs::<N, B>(leg, &source, out)?;
     let BusInput { input, lines, name, bits_per_s, speed, .. } = source;
     let note = |time_s: f64, weight, words: String| out(LiveUpdate::Note(LiveNote { time_s, weight, words }));
-    let mut load = Load { bits_per_s, since_s: 0.0, bits: 0, frames: 0, words: String::new() };
+    let mut load = Load { bits_per_s, ..Load::default() };
     let mut clock = speed.map(Clock::new);
     let (send, received) = sync_channel(MOST_WAITING);
     let reader = thread::spawn(move || read(input, lines, &send));
@@ -348,7 +349,7 @@ mod tests {
 
     #[test]
     fn the_load_is_counted_again_after_time_goes_back() {
-        let mut load = Load { bits_per_s: 1_000_000, since_s: 0.0, bits: 0, frames: 0, words: String::new() };
+        let mut load = Load { bits_per_s: 1_000_000, ..Load::default() };
         load.at(100.0);
         load.at(5.0);
         (0..100).for_each(|_| load.add(&Frame::new(0x80, &[])));

@@ -86,7 +86,7 @@ pub fn page(
     sources: &[Source],
     figures: &[Figure],
 ) -> Result<String, ToolError> {
-    let rest = generic::unknown_keys(run)?;
+    let rest = generic::sections(run)?;
     let group = |group: Group| -> Markup {
         html! { @for figure in figures.iter().filter(|figure| figure.group == group) { (drawing(figure)) } }
     };
@@ -118,7 +118,7 @@ pub fn page(
                     (choices::comparison(run))
                     @if !run.tracking.is_empty() { (results::tracking(run, &circumstances.leg)) }
                     (results::scale(run))
-                    @for (name, value) in &rest { (generic::section(name, value)) }
+                    (rest)
                     (verdict::doubts(run))
                     (verdict::tests(&run.findings, &circumstances.leg))
                     (limits::section(run))

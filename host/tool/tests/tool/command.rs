@@ -1,8 +1,8 @@
 //! Runs the tool as its users do and reads its outputs.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::{env, fs};
 
@@ -13,19 +13,32 @@ pub const MUJOCO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/
 
 /// Output and exit code of a run.
 pub struct Run {
+    /// Arguments of the run, shown where a check fails.
+    line: String,
     pub code: Option<i32>,
     pub printed: String,
     pub errors: String,
 }
 
-/// Runs the program under test with arguments separated by spaces, and paths.
-pub fn scarab(arguments: &str, paths: &[&Path]) -> Run {
-    let output: Output = Command::new(crate::PROGRAM)
-        .args(arguments.split_whitespace())
-        .args(paths)
-        .output()
+/// Runs the program under test with arguments separated by spaces.
+pub fn scarab(arguments: &str) -> Run {
+    run(arguments.split_whitespace().map(str::to_owned).collect(), "")
+}
+
+/// Runs the program under test with these arguments and this text as its standard input.
+pub fn run(arguments: Vec<String>, input: &str) -> Run {
+    let mut child = Command::new(crate::PROGRAM)
+        .args(&arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
         .expect("the tool runs");
+    // A refused command line ends the run before it reads.
+    let _ = child.stdin.take().expect("a pipe").write_all(input.as_bytes());
+    let output = child.wait_with_output().expect("the tool ends");
     Run {
+        line: arguments.join(" "),
         code: output.status.code(),
         printed: String::from_utf8(output.stdout).expect("text"),
         errors: String::from_utf8(output.stderr).expect("text"),
@@ -34,17 +47,45 @@ pub fn scarab(arguments: &str, paths: &[&Path]) -> Run {
 
 impl Run {
     /// Fails unless the run ended with this code, and shows its output.
+    #[track_caller]
     pub fn ends_with(self, code: i32) -> Self {
-        assert_eq!(self.code, Some(code), "{}{}", self.printed, self.errors);
+        assert_eq!(self.code, Some(code), "{}\n{}{}", self.line, self.printed, self.errors);
         self
     }
 
     /// Message of a run rejected as bad input.
+    #[track_caller]
     pub fn refusal(self) -> String {
         let run = self.ends_with(2);
         assert_eq!(run.printed, "", "bad input prints only its message");
         run.errors
     }
+
+    /// Fails unless the run was rejected as bad input by a message with these words.
+    #[track_caller]
+    pub fn refuses(self, words: &str) {
+        let line = self.line.clone();
+        let message = self.refusal();
+        assert!(message.contains(words), "{line}\nexpected: {words}\n{message}");
+    }
+
+    /// Fails unless standard output contains these words.
+    #[track_caller]
+    pub fn prints(&self, words: &str) {
+        assert!(self.printed.contains(words), "{}\nexpected: {words}\n{}", self.line, self.printed);
+    }
+
+    /// Fails unless standard error contains these words.
+    #[track_caller]
+    pub fn warns(&self, words: &str) {
+        assert!(self.errors.contains(words), "{}\nexpected: {words}\n{}", self.line, self.errors);
+    }
+}
+
+/// Fails unless the text contains these words.
+#[track_caller]
+pub fn assert_contains(text: &str, words: &str) {
+    assert!(text.contains(words), "expected: {words}\n{text}");
 }
 
 /// Temporary folder.
@@ -63,19 +104,38 @@ impl Folder {
         self.0.join(name)
     }
 
-    pub fn write(&self, name: &str, text: &str) -> PathBuf {
+    /// Runs the program under test; an argument `@name` is a path in this folder.
+    pub fn scarab(&self, arguments: &str) -> Run {
+        let argument = |word: &str| match word.strip_prefix('@') {
+            Some(name) => self.path(name).display().to_string(),
+            None => word.to_owned(),
+        };
+        run(arguments.split_whitespace().map(argument).collect(), "")
+    }
+
+    /// Runs a command that ends with this code, and reads its report.
+    #[track_caller]
+    pub fn reported(&self, arguments: &str, code: i32) -> (Run, Value) {
+        let run = self.scarab(&format!("{arguments} --json @report.json")).ends_with(code);
+        (run, self.json("report.json"))
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path(name);
-        fs::write(&path, text).expect("a temporary file");
+        fs::write(&path, content).expect("a temporary file");
         path
     }
 
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
     pub fn json(&self, name: &str) -> Value {
-        let text = fs::read_to_string(self.path(name)).expect("the report was written");
-        serde_json::from_str(&text).expect("JSON")
+        serde_json::from_str(&self.read(name)).expect("JSON")
     }
 
     pub fn table(&self, name: &str) -> Table {
-        Table::parse(&fs::read_to_string(self.path(name)).expect("the table was written"))
+        Table::parse(&self.read(name))
     }
 }
 
@@ -134,21 +194,28 @@ pub fn recordings(what: &str) -> Option<PathBuf> {
     folder
 }
 
+/// List under this key.
+pub fn list<'a>(report: &'a Value, key: &str) -> &'a [Value] {
+    report[key].as_array().unwrap_or_else(|| panic!("{key} is not a list: {report}"))
+}
+
+/// Number under this key.
+pub fn number(entry: &Value, key: &str) -> f64 {
+    entry[key].as_f64().unwrap_or_else(|| panic!("{key} is not a number: {entry}"))
+}
+
 /// One number of a fit in a report.
 pub fn fit(report: &Value, part: &str, joint: usize, field: &str) -> f64 {
-    let entry = report[part].as_array().expect("a list").iter().find(|entry| entry["joint"] == joint);
-    entry
-        .and_then(|entry| entry[field].as_f64())
-        .unwrap_or_else(|| panic!("{part} {joint} {field}: {report}"))
+    let entry = list(report, part).iter().find(|entry| entry["joint"] == joint);
+    number(entry.unwrap_or_else(|| panic!("no {part} of joint {joint}: {report}")), field)
 }
 
 /// One number of a base parameter in a report.
 pub fn base(report: &Value, name: &str, field: &str) -> f64 {
-    let entry =
-        report["base_parameters"].as_array().expect("a list").iter().find(|entry| entry["name"] == name);
-    entry.and_then(|entry| entry[field].as_f64()).unwrap_or_else(|| panic!("{name} {field}: {report}"))
+    let entry = list(report, "base_parameters").iter().find(|entry| entry["name"] == name);
+    number(entry.unwrap_or_else(|| panic!("no {name}: {report}")), field)
 }
 
 pub fn reasons(report: &Value) -> Vec<&str> {
-    report["reasons"].as_array().expect("a list").iter().filter_map(Value::as_str).collect()
+    list(report, "reasons").iter().filter_map(Value::as_str).collect()
 }

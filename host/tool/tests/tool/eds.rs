@@ -6,7 +6,7 @@ use scarab::bus::drive::{Axis, AxisConstants};
 use scarab::bus::{Frame, Identity, Node, NodeId};
 use scarab::units::{Ampere, NewtonMetre};
 
-use crate::command::{Folder, scarab};
+use crate::command::Folder;
 
 const NODE: u8 = 2;
 
@@ -68,14 +68,10 @@ fn number(text: &str) -> u32 {
 fn the_sheet_lists_exactly_the_node_s_objects_with_size_and_default() {
     let folder = Folder::new();
     let out = folder.path("sheets");
-    let run = scarab("eds --out", &[&out]).ends_with(0);
+    let run = folder.scarab("eds --out @sheets").ends_with(0);
     for joint in ["hip", "knee"] {
         let path = out.join(format!("scarab-{joint}.eds"));
-        assert!(
-            run.printed.contains(&format!("electronic data sheet: {}\n", path.display())),
-            "{}",
-            run.printed
-        );
+        run.prints(&format!("electronic data sheet: {}\n", path.display()));
         let sheet = sections(&std::fs::read_to_string(&path).expect("just written"));
         let mut live = Live::new();
         let mut listed = Vec::new();

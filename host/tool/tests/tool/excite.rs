@@ -5,10 +5,10 @@ use scarab_identify::formats::excitation::Excitation;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_tool::excitation_constant as constant;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::OnceLock;
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, assert_contains, list, number, scarab};
 use scarab::real::sqrt;
 use scarab::servo::SERVO_RATE_HZ;
 use serde_json::Value;
@@ -28,22 +28,10 @@ fn designed() -> &'static (Folder, Value) {
     static DESIGN: OnceLock<(Folder, Value)> = OnceLock::new();
     DESIGN.get_or_init(|| {
         let folder = Folder::new();
-        let (file, source, json) =
-            (folder.path("motion.toml"), folder.path("motion.rs"), folder.path("report.json"));
-        let arguments = format!("excite --assume-truth {EFFORT}");
-        let paths = [Path::new("--out"), &file, Path::new("--const"), &source, Path::new("--json"), &json];
-        scarab(&arguments, &paths).ends_with(0);
-        let report = folder.json("report.json");
+        let arguments = format!("excite --assume-truth {EFFORT} --out @motion.toml --const @motion.rs");
+        let (_, report) = folder.reported(&arguments, 0);
         (folder, report)
     })
-}
-
-fn list<'a>(report: &'a Value, key: &str) -> &'a [Value] {
-    report[key].as_array().unwrap_or_else(|| panic!("{key} is a list: {report}"))
-}
-
-fn value(entry: &Value, key: &str) -> f64 {
-    entry[key].as_f64().unwrap_or_else(|| panic!("{key} is a number: {entry}"))
 }
 
 #[test]
@@ -55,15 +43,15 @@ fn a_design_keeps_every_limit_in_proof_and_simulation() {
             assert!(seen[0].as_f64().expect("a number") >= low, "{joint}");
             assert!(seen[1].as_f64().expect("a number") <= high, "{joint}");
         }
-        let (speed, torque) = (value(joint, "speed_limit_deg_s"), value(joint, "torque_limit_nm"));
-        assert!(value(joint, "speed_deg_s") <= speed && value(&joint["simulated"], "speed_deg_s") <= speed);
-        assert!(value(joint, "acceleration_deg_s2") <= value(joint, "acceleration_limit_deg_s2"));
-        let bound = value(joint, "torque_with_margin_nm");
+        let (speed, torque) = (number(joint, "speed_limit_deg_s"), number(joint, "torque_limit_nm"));
+        assert!(number(joint, "speed_deg_s") <= speed && number(&joint["simulated"], "speed_deg_s") <= speed);
+        assert!(number(joint, "acceleration_deg_s2") <= number(joint, "acceleration_limit_deg_s2"));
+        let bound = number(joint, "torque_with_margin_nm");
         assert!(bound <= torque, "{joint}");
         // Near the ends the monitor reduces the torque of a joint that could not stop; here it must not.
         assert_eq!(joint["simulated"]["limited_ticks"], 0, "{joint}");
         // The plant's own torque, with friction and position loop, stays below the bound with the margin.
-        assert!(value(&joint["simulated"], "torque_nm") <= bound, "{joint}");
+        assert!(number(&joint["simulated"], "torque_nm") <= bound, "{joint}");
         // The limits are used: a design that hardly moves would also respect them.
         assert!(bound > 0.5 * torque, "{joint}");
     }
@@ -72,8 +60,8 @@ fn a_design_keeps_every_limit_in_proof_and_simulation() {
 #[test]
 fn a_design_is_far_more_informative_than_300_random_motions() {
     let (_, report) = designed();
-    let own = value(report, "log_determinant");
-    let random = value(&report["random"], "log_determinant");
+    let own = number(report, "log_determinant");
+    let random = number(&report["random"], "log_determinant");
     println!("ln det {own:.2} against {random:.2}");
     // Measured 18.3 with the default effort; 13 corresponds to every sigma at 0.6 of the random motion's.
     assert!(own > random + 13.0, "{own} {random}");
@@ -84,16 +72,15 @@ fn a_design_is_far_more_informative_than_300_random_motions() {
 fn the_expected_sigma_equals_reported_sigma_and_observed_spread() {
     let (folder, report) = designed();
     const SEEDS: u32 = 40;
-    let (file, json) = (folder.path("motion.toml"), folder.path("runs.json"));
-    let paths = [Path::new("--excitation"), &file, Path::new("--json"), &json];
-    scarab(&format!("identify --seeds 1..{SEEDS}"), &paths).ends_with(0);
+    let line = format!("identify --seeds 1..{SEEDS} --excitation @motion.toml --json @runs.json");
+    folder.scarab(&line).ends_with(0);
     let runs = folder.json("runs.json");
     let runs = list(&runs, "runs");
     let (mut pooled, mut count) = (0.0, 0.0);
     for (index, base) in list(report, "base_parameters").iter().enumerate() {
-        let sigma = value(base, "sigma");
+        let sigma = number(base, "sigma");
         let of = |key: &str| -> Vec<f64> {
-            runs.iter().map(|run| value(&run["base_parameters"][index], key)).collect()
+            runs.iter().map(|run| number(&run["base_parameters"][index], key)).collect()
         };
         let (values, reported) = (of("value"), of("sigma"));
         let mean = |values: &[f64]| values.iter().sum::<f64>() / f64::from(SEEDS);
@@ -121,15 +108,13 @@ fn the_expected_sigma_equals_reported_sigma_and_observed_spread() {
 #[test]
 fn the_noise_is_that_of_the_sensors_for_any_assumed_leg() {
     let folder = Folder::new();
-    let json = folder.path("report.json");
     let report = |arguments: &str| {
         // The motion was designed for the truth, so no margin is added for the prior.
-        let arguments = format!("excite --torque-margin 0 {arguments} --excitation");
-        scarab(&arguments, &[Path::new(SHIPPED), Path::new("--json"), &json]).ends_with(0);
-        folder.json("report.json")
+        let arguments = format!("excite --torque-margin 0 {arguments} --excitation {SHIPPED}");
+        folder.reported(&arguments, 0).1
     };
     let noise = |report: &Value| -> Vec<f64> {
-        list(report, "joints").iter().map(|joint| value(joint, "torque_noise_nm")).collect()
+        list(report, "joints").iter().map(|joint| number(joint, "torque_noise_nm")).collect()
     };
     let (prior, truth) = (report(""), report("--assume-truth"));
     assert_eq!(noise(&prior), noise(&truth));
@@ -137,7 +122,7 @@ fn the_noise_is_that_of_the_sensors_for_any_assumed_leg() {
     // Standstill depends slightly on the assumed friction; noise as a share of the assumed torque changed it
     // by 8 %.
     for (prior, truth) in list(&prior, "base_parameters").iter().zip(list(&truth, "base_parameters")) {
-        let ratio = value(prior, "sigma") / value(truth, "sigma");
+        let ratio = number(prior, "sigma") / number(truth, "sigma");
         println!("{}: sigma expected of the prior over that of the truth {ratio:.3}", prior["name"]);
         assert!((ratio - 1.0).abs() < 0.05, "{}: {ratio}", prior["name"]);
     }
@@ -148,14 +133,12 @@ fn the_noise_is_that_of_the_sensors_for_any_assumed_leg() {
     let doubled = report("--torque-noise-nm 4,3");
     for (one, two) in list(&stated, "base_parameters").iter().zip(list(&doubled, "base_parameters")) {
         // The noise-free residual is added to it.
-        assert!((value(two, "sigma") / value(one, "sigma") - 2.0).abs() < 0.05, "{one} {two}");
+        assert!((number(two, "sigma") / number(one, "sigma") - 2.0).abs() < 0.05, "{one} {two}");
     }
     // The run has the stated noise: its sigma is the expected one.
-    let paths = [Path::new(SHIPPED), Path::new("--json"), &json];
-    scarab("identify --torque-noise-nm 2,1.5 --excitation", &paths).ends_with(0);
-    let run = folder.json("report.json");
+    let (_, run) = folder.reported(&format!("identify --torque-noise-nm 2,1.5 --excitation {SHIPPED}"), 0);
     for (expected, found) in list(&stated, "base_parameters").iter().zip(list(&run, "base_parameters")) {
-        let ratio = value(found, "sigma") / value(expected, "sigma");
+        let ratio = number(found, "sigma") / number(expected, "sigma");
         // One run determines a noise within 3 %; the tolerance is three times that, plus the prior
         // friction's effect on stillness.
         assert!((ratio - 1.0).abs() < 0.12, "{}: {ratio}", expected["name"]);
@@ -164,26 +147,23 @@ fn the_noise_is_that_of_the_sensors_for_any_assumed_leg() {
 
 #[test]
 fn a_motion_is_checked_with_the_carried_mass() {
-    let message = scarab("identify --payload 30@knee:0.35 --excitation", &[Path::new(SHIPPED)]).refusal();
-    assert!(message.contains("the motion needs") && message.contains("limit 85.0 N m"), "{message}");
-    let message = scarab("identify --load 30@knee:0.35 --excitation", &[Path::new(SHIPPED)]).refusal();
-    assert!(message.contains("the motion needs"), "{message}");
+    let message = scarab(&format!("identify --payload 30@knee:0.35 --excitation {SHIPPED}")).refusal();
+    assert_contains(&message, "the motion needs");
+    assert_contains(&message, "limit 85.0 N m");
+    scarab(&format!("identify --load 30@knee:0.35 --excitation {SHIPPED}")).refuses("the motion needs");
 }
 
 #[test]
 fn a_written_motion_is_read_back_unchanged() {
     let (folder, report) = designed();
-    let file = folder.path("motion.toml");
-    let motion = Excitation::load(&file).expect("just written");
-    assert_eq!(fs::read_to_string(&file).expect("a file"), motion.to_toml());
-    assert_eq!(fs::read_to_string(folder.path("motion.rs")).expect("a file"), constant::source(&motion));
+    let motion = Excitation::load(&folder.path("motion.toml")).expect("just written");
+    assert_eq!(folder.read("motion.toml"), motion.to_toml());
+    assert_eq!(folder.read("motion.rs"), constant::source(&motion));
     let expected = motion.expected.expect("a design states its expectation");
     assert_eq!(expected.assumed, "truth");
     assert_eq!(expected.base_parameter.len(), list(report, "base_parameters").len());
     // Checking the same motion gives an identical report.
-    let json = folder.path("again.json");
-    let paths = [Path::new("--excitation"), &file, Path::new("--json"), &json];
-    scarab("excite --assume-truth", &paths).ends_with(0);
+    folder.scarab("excite --assume-truth --excitation @motion.toml --json @again.json").ends_with(0);
     assert_eq!(folder.json("again.json")["base_parameters"], report["base_parameters"]);
 }
 
@@ -222,15 +202,12 @@ fn every_parameter_has_a_status_before_anything_moves() {
 #[test]
 fn a_leg_without_truth_is_designed_from_its_prior() {
     let folder = Folder::new();
-    let (file, json) = (folder.path("motion.toml"), folder.path("report.json"));
-    let arguments = format!("excite --leg sp --torque-noise 5 --duration 12 {EFFORT}");
-    scarab(&arguments, &[Path::new("--out"), &file, Path::new("--json"), &json]).ends_with(0);
-    let report = folder.json("report.json");
+    let arguments = format!("excite --leg sp --torque-noise 5 --duration 12 {EFFORT} --out @motion.toml");
+    let (_, report) = folder.reported(&arguments, 0);
     assert_eq!(report["assumed"], "prior");
-    assert!(value(&list(&report, "joints")[0], "torque_with_margin_nm") <= 12.0);
-    assert!(value(&report, "duration_s") <= 12.01);
-    let refused = scarab("excite --leg sp --assume-truth", &[]).refusal();
-    assert!(refused.contains("needs a `truth`"), "{refused}");
+    assert!(number(&list(&report, "joints")[0], "torque_with_margin_nm") <= 12.0);
+    assert!(number(&report, "duration_s") <= 12.01);
+    scarab("excite --leg sp --assume-truth").refuses("needs a `truth`");
 }
 
 #[test]
@@ -242,86 +219,78 @@ fn a_motion_of_another_leg_or_beyond_limits_is_refused() {
         text.replacen(from, to, 1)
     };
     let cases = [
-        ("x2-wearer-75kg", with("cycles = 6", "cycles = 0"), "at least one cycle"),
-        ("x2-wearer-75kg", with("cycles = 6", "cycles = 4000000000"), "at most 120 s"),
-        ("x2-wearer-75kg", with("schema = 1", "schema = 2"), "`schema` is 2"),
-        ("x2-wearer-75kg", with("period_s = ", "period_s = nan # "), "`period_s` is NaN"),
-        ("x2-wearer-75kg", with("period_s = ", "period_s = 1.5 # "), "speed reaches"),
-        ("x2-wearer-75kg", with("blend_s = 1.0", "blend_s = 0.1"), "acceleration reaches"),
-        ("x2-wearer-75kg", with("blend_s = 1.0", "blend_s = -1.0"), "`blend_s` is -1"),
-        ("x2-wearer-75kg", with("sine_rad = [", "sine_rad = [inf, "), "7 sines and 6 cosines"),
-        ("x2-wearer-75kg", with("centre_rad = ", "centre_rad = nan # "), "a coefficient is NaN"),
-        (
-            "x2-wearer-75kg",
-            with("centre_rad = ", "centre_rad = 1.2 # "),
-            "joint hip: a motion's angle reaches",
-        ),
-        ("x2-wearer-75kg", with("name = \"hip\"", "name = \"knee\""), "not the same leg"),
-        ("x2-wearer-75kg", with("geometry = \"", "geometry = \"0"), "lengths, axes or zero differ"),
-        ("x2-wearer-75kg", with("cycles = 6", "cycles = 6\ncolour = 3"), "unknown field `colour`"),
-        ("x2-wearer-75kg", text[..text.len() / 3].to_owned(), "motion.toml"),
-        ("x2-wearer-75kg", String::new(), "missing field"),
+        (with("cycles = 6", "cycles = 0"), "at least one cycle"),
+        (with("cycles = 6", "cycles = 4000000000"), "at most 120 s"),
+        (with("schema = 1", "schema = 2"), "`schema` is 2"),
+        (with("period_s = ", "period_s = nan # "), "`period_s` is NaN"),
+        (with("period_s = ", "period_s = 1.5 # "), "speed reaches"),
+        (with("blend_s = 1.0", "blend_s = 0.1"), "acceleration reaches"),
+        (with("blend_s = 1.0", "blend_s = -1.0"), "`blend_s` is -1"),
+        (with("sine_rad = [", "sine_rad = [inf, "), "7 sines and 6 cosines"),
+        (with("centre_rad = ", "centre_rad = nan # "), "a coefficient is NaN"),
+        (with("centre_rad = ", "centre_rad = 1.2 # "), "joint hip: a motion's angle reaches"),
+        (with("name = \"hip\"", "name = \"knee\""), "not the same leg"),
+        (with("geometry = \"", "geometry = \"0"), "lengths, axes or zero differ"),
+        (with("cycles = 6", "cycles = 6\ncolour = 3"), "unknown field `colour`"),
+        (text[..text.len() / 3].to_owned(), "motion.toml"),
+        (String::new(), "missing field"),
+    ];
+    let default = cases.map(|(text, reason)| ("x2-wearer-75kg", text, reason));
+    let others = [
         ("mujoco-leg", text.clone(), "lengths, axes or zero differ"),
         ("sp", text.clone(), "the motion has 2 joints, the leg `sp` has 1"),
     ];
-    for (leg, text, reason) in cases {
-        let file = folder.write("motion.toml", &text);
+    for (leg, text, reason) in default.into_iter().chain(others) {
+        folder.write("motion.toml", &text);
         for command in ["identify", "excite"] {
-            let message = scarab(&format!("{command} --leg {leg} --excitation"), &[&file]).refusal();
-            assert!(message.contains(reason) && message.contains("motion.toml"), "{reason}: {message}");
+            let message =
+                folder.scarab(&format!("{command} --leg {leg} --excitation @motion.toml")).refusal();
+            assert_contains(&message, reason);
+            assert_contains(&message, "motion.toml");
         }
     }
-    let message = scarab("identify --excitation", &[&folder.path("none.toml")]).refusal();
-    assert!(message.contains("cannot be read"), "{message}");
+    folder.scarab("identify --excitation @none.toml").refuses("cannot be read");
 }
 
 #[test]
 fn a_motion_above_the_torque_limit_is_refused_and_none_is_designed() {
     let folder = Folder::new();
-    let frail = folder.write("frail.toml", &frail().to_toml());
-    let arguments = ["identify --excitation", SHIPPED, "--leg"].join(" ");
-    let message = scarab(&arguments, &[&frail]).refusal();
-    assert!(message.contains("the motion needs") && message.contains("limit 55.0 N m"), "{message}");
-    let message = scarab(&format!("excite {EFFORT} --leg"), &[&feeble(&folder)]).refusal();
+    limited(&folder, 55.0, 55.0);
+    let message = folder.scarab(&format!("identify --excitation {SHIPPED} --leg @limited.toml")).refusal();
+    assert_contains(&message, "the motion needs");
+    assert_contains(&message, "limit 55.0 N m");
+    limited(&folder, 5.0, 85.0);
+    let message = folder.scarab(&format!("excite {EFFORT} --leg @limited.toml")).refusal();
     for word in [
         "no exciting motion fits the limits: joint `hip`: ",
         "limit 5.000 N m (`torque_limit_nm`)",
         ": raise it, ",
     ] {
-        assert!(message.contains(word), "{word}: {message}");
+        assert_contains(&message, word);
     }
 }
 
-/// Default leg with little torque.
-fn frail() -> LegFile {
+/// Writes `limited.toml`: the default leg with these torque limits of hip and knee, N m.
+fn limited(folder: &Folder, hip: f64, knee: f64) {
     let mut leg = LegFile::load("x2-wearer-75kg").expect("shipped");
-    for joint in &mut leg.joints {
-        joint.torque_limit_nm = 55.0;
-    }
-    leg
-}
-
-/// File of the default leg with a hip that cannot move it.
-fn feeble(folder: &Folder) -> PathBuf {
-    let mut leg = LegFile::load("x2-wearer-75kg").expect("shipped");
-    leg.joints[0].torque_limit_nm = 5.0;
-    folder.write("feeble.toml", &leg.to_toml())
+    (leg.joints[0].torque_limit_nm, leg.joints[1].torque_limit_nm) = (hip, knee);
+    folder.write("limited.toml", leg.to_toml());
 }
 
 #[test]
 #[ignore = "campaign: .ci/full"]
 fn a_design_for_a_leg_with_little_torque_respects_its_limit() {
     let folder = Folder::new();
-    let frail = folder.write("frail.toml", &frail().to_toml());
+    limited(&folder, 55.0, 55.0);
     // Half the torque limit: the hip of the assumed leg alone needs 53 N m at the end of its range.
-    let json = folder.path("report.json");
-    let arguments = format!("excite {EFFORT} --torque-margin 5 --leg");
-    scarab(&arguments, &[&frail, Path::new("--json"), &json]).ends_with(0);
-    for joint in list(&folder.json("report.json"), "joints") {
-        assert!(value(joint, "torque_with_margin_nm") <= 55.0, "{joint}");
+    let arguments = format!("excite {EFFORT} --torque-margin 5 --leg @limited.toml");
+    for joint in list(&folder.reported(&arguments, 0).1, "joints") {
+        assert!(number(joint, "torque_with_margin_nm") <= 55.0, "{joint}");
     }
-    let checked = scarab("leg --check", &[&feeble(&folder)]).ends_with(0).printed;
-    assert!(checked.contains("\nexcite: not possible: ") && checked.contains("joint `hip`"), "{checked}");
+    limited(&folder, 5.0, 85.0);
+    let checked = folder.scarab("leg --check @limited.toml").ends_with(0).printed;
+    assert_contains(&checked, "\nexcite: not possible: ");
+    assert_contains(&checked, "joint `hip`");
 }
 
 /// The check searches less than the design: only the search for the least torque, equal in both, decides.
@@ -340,21 +309,17 @@ fn check_and_design_agree_on_a_leg_with_too_little_torque() {
             )
         };
         let (hip, knee) = (joint("hip", 0.0, 2.0, "[-60, 60]"), joint("knee", 0.3, 1.5, "[0, 100]"));
-        let leg =
-            folder.write("leg.toml", &format!("name = \"leg\"\ngravity = [9.81, 0.0, 0.0]\n{hip}{knee}"));
-        let checked = scarab("leg --check", &[&leg]).ends_with(0).printed;
+        folder.write("leg.toml", format!("name = \"leg\"\ngravity = [9.81, 0.0, 0.0]\n{hip}{knee}"));
+        let checked = folder.scarab("leg --check @leg.toml").ends_with(0).printed;
         for noise in ["0.1", "0.1,0.5"] {
-            let run = scarab(&format!("excite {EFFORT} --torque-noise-nm {noise} --leg"), &[&leg]);
+            let run = folder.scarab(&format!("excite {EFFORT} --torque-noise-nm {noise} --leg @leg.toml"));
             if checked.contains("\nexcite: ready\n") {
                 ready += 1;
                 assert_eq!(run.code, Some(0), "{limit}: {}", run.errors);
             } else {
                 refused += 1;
                 let reason = run.refusal().trim_start_matches("error: ").trim_end().to_owned();
-                assert!(
-                    checked.contains(&format!("\nexcite: not possible: {reason}\n")),
-                    "{reason}\n{checked}"
-                );
+                assert_contains(&checked, &format!("\nexcite: not possible: {reason}\n"));
             }
         }
     }
@@ -412,16 +377,13 @@ fn converted_robots_without_friction_and_with_wide_limits_get_a_motion() {
         ("exoskeleton", [(3.5, 0.18, 0.06), (1.1, 0.07, 0.008)], 0.42, &exoskeleton, ""),
     ] {
         let folder = Folder::new();
-        let urdf = folder.write("robot.urdf", &description(links, length, [&limits[0], &limits[1]]));
-        let out = folder.path("leg.toml");
-        let converted = scarab("leg --urdf", &[&urdf, Path::new("--out"), &out]).ends_with(0).printed;
-        assert!(converted.contains(remark), "{name}: {converted}");
-        let checked = scarab("leg --check", &[&out]).ends_with(0).printed;
-        assert!(checked.contains("\nexcite: ready\n  the option --torque-noise-nm NM"), "{name}: {checked}");
-        let json = folder.path("report.json");
-        let arguments = "excite --torque-noise-nm 0.1 --evaluations 1800 --leg";
-        scarab(arguments, &[&out, Path::new("--json"), &json]).ends_with(0);
-        for joint in list(&folder.json("report.json"), "joints") {
+        folder.write("robot.urdf", description(links, length, [&limits[0], &limits[1]]));
+        let converted = folder.scarab("leg --urdf @robot.urdf --out @leg.toml").ends_with(0).printed;
+        assert_contains(&converted, remark);
+        let checked = folder.scarab("leg --check @leg.toml").ends_with(0).printed;
+        assert_contains(&checked, "\nexcite: ready\n  the option --torque-noise-nm NM");
+        let arguments = "excite --torque-noise-nm 0.1 --evaluations 1800 --leg @leg.toml";
+        for joint in list(&folder.reported(arguments, 0).1, "joints") {
             assert_eq!(joint["simulated"]["limited_ticks"], 0, "{name}: {joint}");
         }
     }
@@ -443,40 +405,36 @@ fn implausible_options_are_refused_with_a_reason() {
         ("excite --evaluations 1", "evaluations"),
         ("excite --leg none-such", "none-such"),
     ] {
-        let message = scarab(arguments, &[]).refusal();
-        assert!(message.contains(reason), "{arguments}: {message}");
+        scarab(arguments).refuses(reason);
     }
 }
 
 #[test]
 #[ignore = "campaign: .ci/full"]
 fn the_paper_s_chain_has_no_motion_within_its_limits() {
-    let message = scarab("excite --leg paper-chain --evaluations 600", &[]).refusal();
-    assert!(message.contains("no exciting motion fits the limits: joint `hip rotation`: "), "{message}");
+    scarab("excite --leg paper-chain --evaluations 600")
+        .refuses("no exciting motion fits the limits: joint `hip rotation`: ");
 }
 
 #[test]
 fn no_sigma_is_expected_without_stated_noise() {
-    for arguments in ["", "--torque-noise-nm 0", "--torque-noise 0", "--excitation"] {
+    for arguments in [
+        "--leg sp",
+        "--leg sp --torque-noise-nm 0",
+        "--leg sp --torque-noise 0",
+        &format!("--leg @silent.toml --excitation {SHIPPED}"),
+    ] {
         let folder = Folder::new();
-        let json = folder.path("report.json");
-        let mut line = vec![Path::new("--json"), &json];
         // Leg with its own motion but without stated noise.
         let mut silent = LegFile::load("x2-wearer-75kg").expect("shipped");
         silent.torque_noise_percent = 0.0;
-        let silent = folder.write("silent.toml", &silent.to_toml());
-        let leg = if arguments == "--excitation" { silent.as_path() } else { Path::new("sp") };
-        line.extend([Path::new("--leg"), leg]);
-        line.extend(arguments.split_whitespace().map(Path::new));
-        if arguments == "--excitation" {
-            line.push(Path::new(SHIPPED));
-        }
-        let message = scarab("excite", &line).refusal();
+        folder.write("silent.toml", silent.to_toml());
+        let message = folder.scarab(&format!("excite {arguments} --json @report.json")).refusal();
         for word in
             ["is not stated", "`current_noise_a`", "`torque_noise_percent`", "--torque-noise-nm", "joint `"]
         {
-            assert!(message.contains(word), "{arguments}: `{word}` missing in {message}");
+            assert_contains(&message, word);
         }
-        assert!(!json.exists());
+        assert!(!folder.path("report.json").exists());
     }
 }

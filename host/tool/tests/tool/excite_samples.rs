@@ -2,10 +2,9 @@
 
 use scarab_identify::formats::excitation::{Excitation, geometry};
 use scarab_identify::formats::leg_file::LegFile;
-use std::fs;
 use std::path::Path;
 
-use crate::command::{Folder, Table, scarab};
+use crate::command::{Folder, Table, assert_contains, scarab};
 use scarab::servo::SERVO_RATE_HZ;
 use serde_json::Value;
 
@@ -25,28 +24,17 @@ fn offset_leg(folder: &Folder) -> (LegFile, Excitation) {
     knee.torque_limit_nm = 400.0;
     leg.joints[0].torque_limit_nm = 400.0;
     motion.geometry = geometry(&leg);
-    folder.write("leg.toml", &leg.to_toml());
-    folder.write("motion.toml", &motion.to_toml());
+    folder.write("leg.toml", leg.to_toml());
+    folder.write("motion.toml", motion.to_toml());
     (leg, motion)
 }
 
 /// Both files at a rate.
 fn sampled(folder: &Folder, rate: u32) -> (Table, Vec<Value>) {
-    let (csv, yaml) = (folder.path("motion.csv"), folder.path("motion.yaml"));
-    let arguments = format!("excite --torque-margin 0 --rate {rate} --leg");
-    let (leg, motion) = (folder.path("leg.toml"), folder.path("motion.toml"));
-    let paths = [
-        &leg,
-        Path::new("--excitation"),
-        &motion,
-        Path::new("--csv"),
-        &csv,
-        Path::new("--trajectory"),
-        &yaml,
-    ];
-    scarab(&arguments, &paths).ends_with(0);
-    let text = fs::read_to_string(&yaml).expect("written");
-    let points = text.lines().filter_map(|line| line.strip_prefix("- ")).map(flow).collect();
+    let files = "--leg @leg.toml --excitation @motion.toml --csv @motion.csv --trajectory @motion.yaml";
+    folder.scarab(&format!("excite --torque-margin 0 --rate {rate} {files}")).ends_with(0);
+    let points = folder.read("motion.yaml");
+    let points = points.lines().filter_map(|line| line.strip_prefix("- ")).map(flow).collect();
     (folder.table("motion.csv"), points)
 }
 
@@ -103,11 +91,8 @@ fn samples_are_the_states_that_the_servo_follows() {
             assert!([2, 3, 5, 6].iter().all(|column| row[*column] == 0.0), "{row:?}");
         }
     }
-    let text = fs::read_to_string(folder.path("motion.yaml")).expect("written");
-    assert!(
-        text.contains("\njoint_names: [\"hip\", \"the \\\"knee\\\": #1\"]\npoints:\n- {positions: ["),
-        "{text:.600}"
-    );
+    let text = folder.read("motion.yaml");
+    assert_contains(&text, "\njoint_names: [\"hip\", \"the \\\"knee\\\": #1\"]\npoints:\n- {positions: [");
 }
 
 #[test]
@@ -115,8 +100,7 @@ fn the_samples_are_states_for_predict_and_regressor() {
     let folder = Folder::new();
     offset_leg(&folder);
     let (table, _) = sampled(&folder, 50);
-    let paths = [&folder.path("leg.toml"), Path::new("--states"), &folder.path("motion.csv")];
-    let printed = scarab("regressor --leg", &paths).ends_with(0).printed;
+    let printed = folder.scarab("regressor --leg @leg.toml --states @motion.csv").ends_with(0).printed;
     assert_eq!(printed.lines().count(), table.rows.len() + 1);
 }
 
@@ -130,10 +114,9 @@ fn a_rate_between_the_ticks_is_refused_with_the_nearest() {
         ("nan", "is not a whole number"),
         ("99999999999", "is not a whole number"),
     ] {
-        let refused = scarab(&format!("excite --csv no.csv --rate={rate}"), &[]).refusal();
-        assert!(refused.contains(reason), "{rate}: {refused}");
+        scarab(&format!("excite --csv no.csv --rate={rate}")).refuses(reason);
     }
-    let same = scarab("excite --csv same.yaml --trajectory same.yaml", &[]).refusal();
-    assert!(same.contains("is the same file as"), "{same}");
+    let same = scarab("excite --csv same.yaml --trajectory same.yaml").refusal();
+    assert_contains(&same, "is the same file as");
     assert!(!Path::new("same.yaml").exists() && !Path::new("no.csv").exists());
 }

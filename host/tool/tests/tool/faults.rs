@@ -8,9 +8,7 @@ use crate::command::{Folder, scarab};
 fn report(arguments: &str, code: i32) -> Value {
     let folder = Folder::new();
     let seconds = if arguments.contains("--seconds") { "" } else { "--seconds 1" };
-    let line = format!("faults {seconds} {arguments} --json");
-    scarab(&line, &[&folder.path("faults.json")]).ends_with(code);
-    folder.json("faults.json")
+    folder.reported(&format!("faults {seconds} {arguments}"), code).1
 }
 
 #[test]
@@ -64,14 +62,10 @@ fn equal_seeds_give_equal_traces_and_single_runs_repeat() {
     let rows = "--fault X1 --fault C2 --fault E4";
     let [one, other] = [(); 2].map(|()| report(&format!("{rows} --seeds 2"), 0));
     assert_eq!(one, other);
-    let alone = scarab("faults --seconds 1 --fault C2 --replay 2", &[]).ends_with(0);
-    let all = scarab("faults --seconds 1 --fault C2 --seeds 2", &[]).ends_with(0);
-    assert!(
-        alone.printed.contains("C2 seed 2: seen, after 0.083 ms, state Off, code current_sense"),
-        "{}",
-        alone.printed
-    );
-    assert!(all.printed.contains("trace hash"), "{}", all.printed);
+    let alone = scarab("faults --seconds 1 --fault C2 --replay 2").ends_with(0);
+    let all = scarab("faults --seconds 1 --fault C2 --seeds 2").ends_with(0);
+    alone.prints("C2 seed 2: seen, after 0.083 ms, state Off, code current_sense");
+    all.prints("trace hash");
 }
 
 /// The hash of all runs is computed from those of single repeated runs: all of them agree bit for bit.
@@ -84,8 +78,8 @@ fn runs_of_sweep_and_pairs_can_be_repeated_alone() {
         let folder = Folder::new();
         let alone: String = (1..=2)
             .map(|seed| {
-                let line = format!("faults --seconds 1 --fault {kind} --replay {seed} --report");
-                let printed = scarab(&line, &[&folder.path("run.html")]).ends_with(0).printed;
+                let line = format!("faults --seconds 1 --fault {kind} --replay {seed} --report @run.html");
+                let printed = folder.scarab(&line).ends_with(0).printed;
                 let reported =
                     printed.split_once(&format!("{kind} seed {seed}: ")).expect("it is reported").1;
                 reported.split_once("hash ").expect("its hash").1[..16].to_owned()
@@ -95,7 +89,7 @@ fn runs_of_sweep_and_pairs_can_be_repeated_alone() {
             hash.rotate_left(5).wrapping_mul(0x0000_0100_0000_01b3) ^ u64::from(byte)
         });
         assert_eq!(all["trace_hash"], format!("{folded:016x}"));
-        let page = std::fs::read_to_string(folder.path("run.html")).expect("written");
+        let page = folder.read("run.html");
         assert!(page.contains("<svg") && page.contains(&format!("{kind}, seed 2")));
         // Eleven columns are wider than a screen: words may wrap, and the table scrolls.
         assert!(page.contains("<div class=\"wide\"><table class=\"any\">"));
@@ -181,7 +175,6 @@ fn bad_input_names_the_option() {
         ("--docs no-such-file.md", "no-such-file.md: cannot be read"),
         ("--docs Cargo.toml", "Cargo.toml: has no `<!-- faults: table -->`"),
     ] {
-        let message = scarab(&format!("faults {arguments}"), &[]).refusal();
-        assert!(message.contains(words), "{arguments}: {message}");
+        scarab(&format!("faults {arguments}")).refuses(words);
     }
 }

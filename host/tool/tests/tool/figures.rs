@@ -8,9 +8,8 @@ use scarab_rig::identify::identify_one;
 use scarab_rig::options::SimulationOptions;
 use scarab_rig::perturb::Perturbation;
 use scarab_tool::view::figures;
-use std::path::Path;
 
-use crate::command::{Folder, MUJOCO, scarab};
+use crate::command::{Folder, MUJOCO};
 use scarab::model::Payload;
 
 fn identified() -> (RunReport, Series) {
@@ -131,10 +130,9 @@ fn torques_corrected_by_a_known_mass_are_drawn_corrected() {
 #[test]
 fn a_recording_is_drawn_into_the_same_set_of_files() {
     let folder = Folder::new();
-    let figures = folder.path("figures");
-    let arguments = format!("replay {MUJOCO} --leg mujoco-leg --split 0.7 --figures");
-    scarab(&arguments, &[&figures]).ends_with(0);
-    let read = |name: &str| std::fs::read_to_string(Path::new(&figures).join(name)).expect(name);
+    let arguments = format!("replay {MUJOCO} --leg mujoco-leg --split 0.7 --figures @figures");
+    folder.scarab(&arguments).ends_with(0);
+    let read = |name: &str| folder.read(&format!("figures/{name}"));
     assert!(read("torque-1.svg").contains("fourier.csv (unused, predicted)"));
     assert!(!read("torque-1.svg").contains("noise-free"), "a recording has no noise-free torque");
     assert!(!read("motions.svg").contains("commanded"), "a recording has no commands");

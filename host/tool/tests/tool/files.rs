@@ -2,11 +2,11 @@
 //! are reported before any computation.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use scarab_rig::parameter_file::memory::BYTES;
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, assert_contains, scarab};
 
 /// Content of a file that a command must not modify.
 const CONTENT: &str = "not to be touched";
@@ -52,62 +52,52 @@ fn no_command_overwrites_what_it_reads() {
         for (input, output) in
             inputs.iter().flat_map(|input| outputs.iter().map(move |output| (input, output)))
         {
-            let mut line: Vec<&Path> = vec![Path::new(output), &file];
             // `replay` and `export` need further files, which need not exist.
-            let further: &[&str] = match (command, *input) {
-                ("replay", "") => &["--leg", "sp"],
-                ("replay", "--leg") => &["none.csv"],
-                ("replay", _) => &["--leg", "sp", "none.csv"],
-                ("trace", "--image" | "--leg" | "--compare-model") => &["none.trace"],
-                ("export", "--leg") => &["--model", "none.toml"],
-                ("predict --states none.csv", "--leg") => &["--model", "none.toml"],
-                _ => &[],
+            let further = match (command, *input) {
+                ("replay", "") => "--leg sp",
+                ("replay", "--leg") => "none.csv",
+                ("replay", _) => "--leg sp none.csv",
+                ("trace", "--image" | "--leg" | "--compare-model") => "none.trace",
+                ("export", "--leg") => "--model none.toml",
+                ("predict --states none.csv", "--leg") => "--model none.toml",
+                _ => "",
             };
-            if !input.is_empty() {
-                line.push(Path::new(input));
-            }
-            line.push(&file);
-            line.extend(further.iter().map(Path::new));
-            let message = scarab(command, &line).refusal();
+            let line = format!("{command} {output} @data.csv {input} @data.csv {further}");
+            let message = folder.scarab(&line).refusal();
             let expected = format!("error: {output} {}: ", file.display());
             assert!(message.starts_with(&expected), "{command} {input}: {message}");
-            assert!(message.contains("which the command reads"), "{command} {input} {output}: {message}");
-            assert_eq!(fs::read_to_string(&file).expect("there"), CONTENT, "{command} {input} {output}");
+            assert_contains(&message, "which the command reads");
+            assert_eq!(folder.read("data.csv"), CONTENT, "{command} {input} {output}");
             tried += 1;
         }
     }
     println!("{tried} pairs of an input and an output");
     // Both files are positional.
-    let message = scarab("kept import", &[&file, &file]).refusal();
-    assert!(message.contains("which the command reads"), "{message}");
-    assert_eq!(fs::read_to_string(&file).expect("there"), CONTENT);
+    folder.scarab("kept import @data.csv @data.csv").refuses("which the command reads");
+    assert_eq!(folder.read("data.csv"), CONTENT);
 }
 
 #[test]
 fn no_command_writes_one_file_twice() {
     let folder = Folder::new();
-    let file = folder.path("result");
     for (command, _, outputs) in COMMANDS {
         let pairs = outputs
             .iter()
             .enumerate()
             .flat_map(|(index, one)| outputs[index + 1..].iter().map(move |other| (*one, *other)));
         for (one, other) in pairs {
-            let further: &[&str] = match command {
-                "replay" => &["--leg", "sp", "none.csv"],
-                "trace" => &["none.trace"],
-                "merge" => &["none.json"],
-                _ => &[],
+            let further = match command {
+                "replay" => "--leg sp none.csv",
+                "trace" => "none.trace",
+                "merge" => "none.json",
+                _ => "",
             };
-            let mut line: Vec<&Path> = vec![Path::new(one), &file, Path::new(other), &file];
-            line.extend(further.iter().map(Path::new));
-            let message = scarab(command, &line).refusal();
-            assert!(
-                message.contains("which the command writes as well"),
-                "{command} {one} {other}: {message}"
-            );
-            assert!(message.contains(one) && message.contains(other), "{command} {one} {other}: {message}");
-            assert!(!file.exists(), "{command} {one} {other}");
+            let line = format!("{command} {one} @result {other} @result {further}");
+            let message = folder.scarab(&line).refusal();
+            assert_contains(&message, "which the command writes as well");
+            assert_contains(&message, one);
+            assert_contains(&message, other);
+            assert!(!folder.path("result").exists(), "{command} {one} {other}");
         }
     }
 }
@@ -125,19 +115,8 @@ fn other_spellings_and_links_count_as_the_same_file() {
     // Neither of them exists yet.
     symlink(folder.path("new.json"), folder.path("dangling.json")).expect("a link");
     let refused = |json: &str, csv: &str, what: &str| {
-        let (json, csv) = (folder.path(json), folder.path(csv));
-        let line = [
-            &file,
-            Path::new("--leg"),
-            Path::new("sp"),
-            Path::new("--json"),
-            &json,
-            Path::new("--csv"),
-            &csv,
-        ];
-        let message = scarab("replay", &line).refusal();
-        assert!(message.contains(what), "{}: {message}", json.display());
-        assert_eq!(fs::read_to_string(&file).expect("there"), CONTENT);
+        folder.scarab(&format!("replay @data.csv --leg sp --json @{json} --csv @{csv}")).refuses(what);
+        assert_eq!(folder.read("data.csv"), CONTENT);
     };
     for name in
         ["data.csv", "./data.csv", "inner/../data.csv", "inner/around/data.csv", "link.csv", "hard.csv"]
@@ -152,10 +131,9 @@ fn other_spellings_and_links_count_as_the_same_file() {
 #[test]
 fn a_folder_of_drawings_must_not_contain_other_outputs() {
     let folder = Folder::new();
-    let (drawn, page) = (folder.path("drawn"), folder.path("drawn/identify.svg"));
-    let line = [Path::new("--figures"), &drawn, Path::new("--report"), &page];
-    let message = scarab("identify", &line).refusal();
-    assert!(message.contains("could overwrite --report"), "{message}");
+    folder
+        .scarab("identify --figures @drawn --report @drawn/identify.svg")
+        .refuses("could overwrite --report");
 }
 
 #[test]
@@ -181,21 +159,19 @@ fn an_output_that_cannot_be_written_is_found_before_the_input_is_read() {
     }
     for (option, path, reason) in cases {
         // The recording does not exist: the output is checked first.
-        let message = scarab("replay none.csv --leg sp", &[Path::new(option), &path]).refusal();
+        let message = scarab(&format!("replay none.csv --leg sp {option} {}", path.display())).refusal();
         let expected = format!("error: {option} {}: cannot be written: ", path.display());
         assert!(message.starts_with(&expected) && message.contains(reason), "{message}");
     }
-    for kept in [&file, &locked] {
-        assert_eq!(fs::read_to_string(kept).expect("there"), CONTENT);
+    for kept in ["file", "locked.json"] {
+        assert_eq!(folder.read(kept), CONTENT);
     }
     assert_eq!(fs::read_dir(folder.path("")).expect("a folder").count(), 2, "a temporary file remains");
 }
 
 /// Flash of a board without stored data.
-fn erased_flash(folder: &Folder) -> PathBuf {
-    let flash = folder.path("flash.bin");
-    fs::write(&flash, vec![0xFF; BYTES]).expect("a temporary file");
-    flash
+fn erased_flash(folder: &Folder) {
+    fs::write(folder.path("flash.bin"), vec![0xFF; BYTES]).expect("a temporary file");
 }
 
 #[cfg(unix)]
@@ -203,16 +179,16 @@ fn erased_flash(folder: &Folder) -> PathBuf {
 fn a_file_is_replaced_as_a_whole_and_links_remain() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = Folder::new();
-    let flash = erased_flash(&folder);
+    erased_flash(&folder);
     let file = folder.write("kept.toml", CONTENT);
     fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("own file");
     // The other hard link still has the old content: the file was replaced, not overwritten.
     fs::hard_link(&file, folder.path("old.toml")).expect("a link");
     symlink(&file, folder.path("link.toml")).expect("a link");
-    scarab("kept export --out", &[&folder.path("link.toml"), &flash]).ends_with(0);
-    let text = fs::read_to_string(&file).expect("written");
+    folder.scarab("kept export --out @link.toml @flash.bin").ends_with(0);
+    let text = folder.read("kept.toml");
     assert!(text != CONTENT && !text.is_empty(), "{text}");
-    assert_eq!(fs::read_to_string(folder.path("old.toml")).expect("there"), CONTENT);
+    assert_eq!(folder.read("old.toml"), CONTENT);
     assert!(folder.path("link.toml").is_symlink());
     assert_eq!(fs::metadata(&file).expect("there").permissions().mode() & 0o777, 0o640);
     let names: Vec<_> = fs::read_dir(folder.path("")).expect("a folder").flatten().collect();
@@ -222,19 +198,19 @@ fn a_file_is_replaced_as_a_whole_and_links_remain() {
 #[test]
 fn a_failed_run_does_not_change_its_output_file() {
     let folder = Folder::new();
-    let (file, flash) = (folder.write("kept.toml", CONTENT), folder.write("flash.bin", "too short"));
-    let message = scarab("kept export --out", &[&file, &flash]).refusal();
-    assert!(message.contains("flash.bin"), "{message}");
-    assert_eq!(fs::read_to_string(&file).expect("there"), CONTENT);
+    folder.write("kept.toml", CONTENT);
+    folder.write("flash.bin", "too short");
+    folder.scarab("kept export --out @kept.toml @flash.bin").refuses("flash.bin");
+    assert_eq!(folder.read("kept.toml"), CONTENT);
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn a_stream_is_written_to_and_not_replaced() {
     let folder = Folder::new();
-    let flash = erased_flash(&folder);
-    let printed = scarab("kept export", &[&flash]).ends_with(0).printed;
-    let streamed = scarab("kept export --out /dev/stdout", &[&flash]).ends_with(0).printed;
+    erased_flash(&folder);
+    let printed = folder.scarab("kept export @flash.bin").ends_with(0).printed;
+    let streamed = folder.scarab("kept export --out /dev/stdout @flash.bin").ends_with(0).printed;
     assert!(!printed.is_empty());
     assert_eq!(streamed, printed);
 }
@@ -242,13 +218,11 @@ fn a_stream_is_written_to_and_not_replaced() {
 #[test]
 fn a_created_folder_may_contain_other_outputs() {
     let folder = Folder::new();
-    let sheets = folder.path("new/sheets");
-    scarab("eds --out", &[&sheets]).ends_with(0);
-    assert_eq!(fs::read_dir(&sheets).expect("made").count(), 2);
+    folder.scarab("eds --out @new/sheets").ends_with(0);
+    assert_eq!(fs::read_dir(folder.path("new/sheets")).expect("made").count(), 2);
     // The drawings' folder does not exist yet, and the report lies in it: only the recording is missing.
-    let (drawn, page) = (folder.path("drawn"), folder.path("drawn/report.html"));
-    let line = [Path::new("--figures"), &drawn, Path::new("--report"), &page];
-    let message = scarab("replay none.csv --leg sp", &line).refusal();
-    assert!(message.contains("none.csv: cannot be read"), "{message}");
-    assert!(!drawn.exists());
+    folder
+        .scarab("replay none.csv --leg sp --figures @drawn --report @drawn/report.html")
+        .refuses("none.csv: cannot be read");
+    assert!(!folder.path("drawn").exists());
 }

@@ -1,5 +1,6 @@
 //! Leg constant of an image, and the size of an image.
 
+use crate::command::assert_contains;
 use scarab::board::odrive_v3_6::settings::drives;
 use scarab::motor::{AxisConfiguration, CalibrationSettings, Calibrator};
 use scarab::safety::{BrakeDelays, SupplyLimits, Thermistor};
@@ -114,8 +115,7 @@ fn the_shipped_constant_equals_the_default_leg() {
 
 #[test]
 fn an_unsupported_leg_is_refused_by_name() {
-    let refused = describe(&leg("sp"), 1).expect_err("one joint").to_string();
-    assert!(refused.contains("two joints"), "{refused}");
+    assert_contains(&describe(&leg("sp"), 1).expect_err("one joint").to_string(), "two joints");
 }
 
 #[test]
@@ -123,10 +123,10 @@ fn an_image_without_a_described_motor_is_refused() {
     let refused = |leg: &LegFile| describe(leg, 1).expect_err("no motor").to_string();
     let mut bare = leg(DEFAULT_LEG);
     bare.joints[1].motor = None;
-    assert!(refused(&bare).contains("joint `knee`: has no `[joint.motor]`"), "{}", refused(&bare));
+    assert_contains(&refused(&bare), "joint `knee`: has no `[joint.motor]`");
     let mut coarse = leg(DEFAULT_LEG);
     coarse.joints[0].encoder = EncoderFile { side: Side::Joint, counts: 8192, ratio: 1.0 };
-    assert!(refused(&coarse).contains("joint `hip`: its encoder is at the joint"), "{}", refused(&coarse));
+    assert_contains(&refused(&coarse), "joint `hip`: its encoder is at the joint");
 }
 
 /// Text of the default leg without the lines (of the first joint) that begin with a key.
@@ -179,7 +179,7 @@ fn an_image_has_no_defaults_for_safety_relevant_keys() {
         |text: String| format!("{}[[joint]]{after}", text.split_once("[joint.motor]").expect("a motor").0);
     for key in ["torque_per_ampere", "encoder"] {
         let (_, reason) = refused(&unmotored(without(key)));
-        assert!(reason.contains(&format!("`{key}`, `motor` are missing")), "{reason}");
+        assert_contains(&reason, &format!("`{key}`, `motor` are missing"));
     }
     let (line, reason) = refused(&without("side"));
     assert!(reason.starts_with("`side` is missing"), "{reason}");
@@ -198,7 +198,7 @@ fn an_image_has_no_defaults_for_safety_relevant_keys() {
     }
     let reason = LegFile::load_for_image("mujoco-leg", true).expect_err("no motor").reason;
     assert!(reason.starts_with("joint `hip`: `encoder.side` is \"joint\": the board commutates"), "{reason}");
-    assert!(reason.contains("`motor` are missing"), "{reason}");
+    assert_contains(&reason, "`motor` are missing");
 }
 
 #[test]
@@ -245,7 +245,8 @@ fn a_leg_file_states_the_thermistors_of_its_motors() {
     assert_eq!(description.joints.map(|joint| joint.motor.thermistor), [None, Some(expected)]);
     let source = source(&description);
     assert!(source.contains("use crate::safety::{SupplyLimits, Thermistor, WindingRating};"));
-    assert!(source.contains("thermistor: None,") && source.contains("beta_k: 3435.0,"), "{source}");
+    assert_contains(&source, "thermistor: None,");
+    assert_contains(&source, "beta_k: 3435.0,");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use scarab::real::sin_cos;
 use scarab_identify::formats::recording::import::{Drive, Import};
 use scarab_identify::formats::recording::{JointSeries, Read, Recording};
 
-use crate::command::{Folder, Run, scarab};
+use crate::command::{Folder, Run, assert_contains, scarab};
 use crate::pendulum::{Motion, finds_the_truth, leg};
 
 const FILE: &str = "walk.csv";
@@ -143,7 +143,7 @@ fn times_in_another_unit_are_refused_with_the_complete_command() {
             let message = refusal(&text, import);
             let command =
                 format!("cargo sim replay --columns t=t_s,q1=q1_rad,tau1=tau1_Nm --units {unit},rad,Nm");
-            assert!(message.contains(&format!(": is the time in {unit}? Then it would be 6")), "{message}");
+            assert_contains(&message, &format!(": is the time in {unit}? Then it would be 6"));
             assert!(message.ends_with(&command), "{unit}: {message}");
         }
         let read = read(&text, &import("t=t_s,q1=q1_rad,tau1=tau1_Nm", &format!("{unit},rad,Nm")));
@@ -212,9 +212,7 @@ fn options_that_contradict_each_other_are_refused() {
 
 #[test]
 fn a_folder_is_answered_with_what_to_name() {
-    let run = scarab("replay --leg sp", &[Path::new("tests")]);
-    let refusal = run.refusal();
-    assert!(refusal.contains("is a folder: name the recording in it"), "{refusal}");
+    scarab("replay --leg sp tests").refuses("is a folder: name the recording in it");
 }
 
 #[test]
@@ -237,16 +235,14 @@ fn well_known_names_give_the_complete_command_and_are_not_read() {
         let text = text(&format!("{header}\n"), |[time, ..]| vec![time.to_string(); fields].join(","));
         let message = refusal(&text, &import("", ""));
         let command = format!("repeat the command with them:\n  cargo sim replay --columns {options}");
-        assert!(message.contains(&command), "{message}\n{command}");
+        assert_contains(&message, &command);
     }
     // The unit in a name is proposed even where another one is stated.
     let message = refusal(&text("t_s,q1_deg,tau1_Nm\n", plain), &import("", "ms,deg"));
-    assert!(
-        message.contains("no column `t_ms`") && message.contains("tau1=tau1_Nm --units s,deg,Nm"),
-        "{message}"
-    );
+    assert_contains(&message, "no column `t_ms`");
+    assert_contains(&message, "tau1=tau1_Nm --units s,deg,Nm");
     let message = refusal(&text("a,b,c\n", plain), &import("", ""));
-    assert!(message.contains("No name resembles t, q1, tau1. Name the columns by --columns"), "{message}");
+    assert_contains(&message, "No name resembles t, q1, tau1. Name the columns by --columns");
 }
 
 #[test]
@@ -262,7 +258,7 @@ fn several_joints_are_proposed_by_number_or_name() {
         ("t,q_knee,q_hip,tau_knee,tau_hip,x", "t=t,q1=q_hip,q2=q_knee,tau1=tau_hip,tau2=tau_knee"),
     ] {
         let message = refusal(&format!("{header}\n0,0,0,0,0,0\n"), &import);
-        assert!(message.contains(&format!("--columns {columns} --units s,rad,Nm")), "{message}");
+        assert_contains(&message, &format!("--columns {columns} --units s,rad,Nm"));
     }
 }
 
@@ -318,11 +314,10 @@ fn ambiguous_delimiters_and_decimals_are_refused_with_the_option() {
     let message = refusal(&two, &import("", ""));
     assert!(message.ends_with("--delimiter comma or --delimiter semicolon"), "{message}");
     let mixed = text("t_s;q1_rad;tau1_Nm\n", |[time, angle, _]| format!("{time:.3};{angle:.3};1,5"));
-    let message = refusal(&mixed, &import("", ""));
-    assert!(message.contains("`1,5` has a comma and `0.000` a point"), "{message}");
+    assert_contains(&refusal(&mixed, &import("", "")), "`1,5` has a comma and `0.000` a point");
     let thousands = text("t_s;q1_rad;tau1_Nm\n", |_| "1;2;3,250".to_owned());
     let message = refusal(&thousands, &import("", ""));
-    assert!(message.contains("`3,250` may have a decimal comma or a separator of thousands"), "{message}");
+    assert_contains(&message, "`3,250` may have a decimal comma or a separator of thousands");
     let stated = Import {
         decimal: Some(scarab_identify::formats::recording::dialect::Decimal::Comma),
         ..import("", "")
@@ -395,12 +390,9 @@ fn currents_and_motor_angles_become_torques_and_joint_angles() {
     assert_eq!(by, [(1.0, None), (-0.02, Some("encoder.ratio")), (-1.5, Some("torque_per_ampere"))]);
     let unknown = Import::plain(1);
     let message = refusal(&text("t_s,q1_rad,i1_A\n", plain), &unknown);
-    assert!(
-        message.contains("`i1_A` is of the motor, but the leg file states no `torque_per_ampere`"),
-        "{message}"
-    );
+    assert_contains(&message, "`i1_A` is of the motor, but the leg file states no `torque_per_ampere`");
     let message = refusal(&text("t_s,motor1_rad,tau1_Nm\n", plain), &unknown);
-    assert!(message.contains("the leg file states no `encoder` at the motor for joint `1`"), "{message}");
+    assert_contains(&message, "the leg file states no `encoder` at the motor for joint `1`");
 }
 
 fn packed(text: &[u8]) -> Vec<u8> {
@@ -421,11 +413,9 @@ fn gzip_is_unpacked_while_reading_and_bombs_are_refused() {
     let whole = read(&good).expect("gzip");
     assert_restored(&whole.recording);
     assert_eq!(whole.report.format, "CSV with commas, gzip");
-    let message = read(&good[..good.len() / 2]).expect_err("cut");
-    assert!(message.contains("walk.csv.gz: damaged gzip data"), "{message}");
+    assert_contains(&read(&good[..good.len() / 2]).expect_err("cut"), "walk.csv.gz: damaged gzip data");
     let bomb = packed(&[b"t_s,q1_rad,tau1_Nm\n".as_slice(), &b"#\n".repeat(60_000_000)].concat());
-    let message = read(&bomb).expect_err("a bomb");
-    assert!(message.contains("unpack to more than 200 times their size"), "{message}");
+    assert_contains(&read(&bomb).expect_err("a bomb"), "unpack to more than 200 times their size");
 }
 
 /// Replays the pendulum from a CSV that is written as stated.
@@ -437,12 +427,9 @@ fn replayed(
     options: &str,
 ) -> Run {
     let rows: Vec<String> = Motion::default().samples().into_iter().map(row).collect();
-    let (csv, leg) = (
-        folder.write("run.csv", &format!("{header}\n{}\n", rows.join("\n"))),
-        folder.write("leg.toml", &leg(more)),
-    );
-    let json = folder.path("report.json");
-    scarab(&format!("replay {options}"), &[&csv, Path::new("--leg"), &leg, Path::new("--json"), &json])
+    folder.write("run.csv", format!("{header}\n{}\n", rows.join("\n")));
+    folder.write("leg.toml", leg(more));
+    folder.scarab(&format!("replay {options} @run.csv --leg @leg.toml --json @report.json"))
 }
 
 #[test]
@@ -465,7 +452,7 @@ fn a_replay_of_currents_in_milliampere_prints_and_writes_every_conversion() {
     for line in
         ["i1 ", "torque_per_ampere", "encoder.ratio", "CSV with semicolons, decimal commas; 5000 rows"]
     {
-        assert!(run.printed.contains(line), "{}", run.printed);
+        run.prints(line);
     }
 }
 
@@ -475,11 +462,9 @@ fn close_names_end_a_replay_with_exit_code_two_and_a_command_that_works() {
     let row = |[time, angle, torque]: [f64; 3]| format!("{time:.7},{:.7},{torque:.6}", angle.to_degrees());
     let message = replayed(&folder, "Time,position_0_deg,effort_0", row, "", "").refusal();
     let command = message.lines().nth(1).expect("a command").trim();
-    let words: Vec<&str> = command.split(' ').collect();
-    assert_eq!(words[..2], [crate::PROGRAM, "replay"], "{message}");
-    let paths: Vec<&Path> = words[2..].iter().map(Path::new).collect();
-    let run = scarab("replay", &paths).ends_with(0);
-    assert!(run.printed.contains("position_0_deg"), "{}", run.printed);
+    let arguments = command.strip_prefix(crate::PROGRAM).expect("this program").trim_start();
+    assert!(arguments.starts_with("replay "), "{message}");
+    scarab(arguments).ends_with(0).prints("position_0_deg");
 }
 
 #[test]
@@ -526,13 +511,11 @@ fn files_of_other_kinds_are_refused_with_the_way_to_one_that_is_read() {
         let path = folder.path("run");
         std::fs::write(&path, begin).expect("a temporary file");
         let message = Recording::read(&path, &import("", "")).expect_err("not a recording").to_string();
-        assert!(message.contains(words), "{message}");
+        assert_contains(&message, words);
     }
     let message = Recording::read(&foreign("level5.mat"), &import("", "")).expect_err("SciPy's").to_string();
-    assert!(
-        message.contains("level5.mat: a MAT file") && message.contains("writetable(table(t, q1, tau1)"),
-        "{message}"
-    );
+    assert_contains(&message, "level5.mat: a MAT file");
+    assert_contains(&message, "writetable(table(t, q1, tau1)");
 }
 
 #[cfg(not(feature = "readers"))]
@@ -541,7 +524,7 @@ fn parquet_and_mcap_name_the_command_that_reads_them() {
     for name in ["snappy.parquet", "plain.mcap"] {
         let message =
             Recording::read(&foreign(name), &import("", "")).expect_err("built without").to_string();
-        assert!(message.contains("give the same command with `cargo sim-readers` instead of `"), "{message}");
+        assert_contains(&message, "give the same command with `cargo sim-readers` instead of `");
     }
 }
 
@@ -553,10 +536,10 @@ fn a_parquet_file_in_nanoseconds_is_read_once_its_columns_and_units_are_stated()
         Recording::read(&foreign("snappy.parquet"), &import).map_err(|error| error.to_string())
     };
     let message = read("t=stamp", "", false).expect_err("in seconds by default");
-    assert!(message.contains("column `stamp` is in ns by its name or type, but t is read in s"), "{message}");
-    assert!(message.contains("--columns t=stamp,q1=q1_rad,tau1=tau1_Nm --units ns,rad,Nm"), "{message}");
+    assert_contains(&message, "column `stamp` is in ns by its name or type, but t is read in s");
+    assert_contains(&message, "--columns t=stamp,q1=q1_rad,tau1=tau1_Nm --units ns,rad,Nm");
     let message = read("t=stamp", "ns", false).expect_err("a missing value");
-    assert!(message.contains("snappy.parquet:8: `NaN` in column `tau1_Nm` is not finite"), "{message}");
+    assert_contains(&message, "snappy.parquet:8: `NaN` in column `tau1_Nm` is not finite");
     let Read { recording, report } = read("t=stamp", "ns", true).expect("119 samples");
     assert_eq!((recording.time_s.len(), report.skipped, report.format.as_str()), (119, 1, "Parquet"));
     // 100 is after the skipped sample 7.
@@ -573,7 +556,7 @@ fn joints_of_a_bag_are_chosen_by_name_and_proposed_by_the_names_of_the_leg() {
     let message =
         Recording::read(&foreign("zstd.mcap"), &unnamed).expect_err("no documented names").to_string();
     let columns = "t=time,q1=position[knee_joint],q2=position[hip_joint],tau1=effort[knee_joint],tau2=effort[hip_joint]";
-    assert!(message.contains(&format!("--columns '{columns}' --units s,rad,Nm")), "{message}");
+    assert_contains(&message, &format!("--columns '{columns}' --units s,rad,Nm"));
     let choices: Vec<_> = columns.split(',').map(|choice| choice.parse().expect("a column")).collect();
     let Read { recording, report } =
         Recording::read(&foreign("zstd.mcap"), &unnamed.with(&choices, &[]).expect("valid")).expect("a bag");

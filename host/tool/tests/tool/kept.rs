@@ -1,13 +1,12 @@
 //! Identification of the default leg, shared by the tests of stored models.
 
-use std::fs;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use scarab_identify::formats::model_file::ModelFile;
 use serde_json::Value;
 
-use crate::command::{Folder, Run, scarab};
+use crate::command::{Folder, Run};
 
 /// Identification of the default leg: its report and its model.
 pub struct Kept {
@@ -20,11 +19,9 @@ pub fn kept() -> &'static Kept {
     static KEPT: OnceLock<Kept> = OnceLock::new();
     KEPT.get_or_init(|| {
         let folder = Folder::new();
-        let (report, model) = (folder.path("run.json"), folder.path("model.toml"));
-        let arguments = format!("identify --json {} --save-model", report.display());
-        let run = scarab(&arguments, &[&model]).ends_with(0);
+        let model = folder.path("model.toml");
+        let (run, report) = folder.reported("identify --save-model @model.toml", 0);
         assert!(run.printed.ends_with(&format!("model: {}\n", model.display())), "{}", run.printed);
-        let report = folder.json("run.json");
         Kept { folder, report, model }
     })
 }
@@ -34,7 +31,7 @@ pub fn model() -> ModelFile {
 }
 
 pub fn text() -> String {
-    fs::read_to_string(&kept().model).expect("just written")
+    kept().folder.read("model.toml")
 }
 
 pub const STATES: &str =
@@ -42,6 +39,7 @@ pub const STATES: &str =
 
 /// Predicts the torque of [`STATES`], in D-H angles, from a model.
 pub fn predict(folder: &Folder, model: &str, more: &str) -> Run {
-    let (model, states) = (folder.write("model.toml", model), folder.write("states.csv", STATES));
-    scarab(&format!("predict --dh {more} --model"), &[&model, "--states".as_ref(), &states])
+    folder.write("model.toml", model);
+    folder.write("states.csv", STATES);
+    folder.scarab(&format!("predict --dh {more} --model @model.toml --states @states.csv"))
 }

@@ -1,69 +1,59 @@
 //! `scarab leg --new` and `--check`: answers become a file, missing keys become lines to paste.
 
 use scarab_identify::formats::leg_file::LegFile;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
-use crate::command::{Folder, Run, scarab};
+use crate::command::{Folder, Run, assert_contains, run, scarab};
 use crate::robots::SIMPLE;
 
 /// Gravity, two joints and their numbers; empty lines take the value in brackets.
 const ANSWERS: &str = "my-arm\n2\n\nhip\n\n\n\n\n\nknee\n\n0.45\n\n-1\n10\n";
 
-/// Runs the tool with answers on its standard input.
-fn answered(answers: &str, out: &Path) -> Run {
-    let mut child = Command::new(crate::PROGRAM)
-        .args(["leg", "--new", "--out"])
-        .arg(out)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the tool runs");
-    // A refused file ends the command before it reads.
-    let _ = child.stdin.take().expect("a pipe").write_all(answers.as_bytes());
-    let output = child.wait_with_output().expect("the tool ends");
-    Run {
-        code: output.status.code(),
-        printed: String::from_utf8(output.stdout).expect("text"),
-        errors: String::from_utf8(output.stderr).expect("text"),
-    }
+/// Creates `arm.toml` from these answers on the tool's standard input.
+fn answered(folder: &Folder, answers: &str) -> Run {
+    let out = folder.path("arm.toml").display().to_string();
+    run(["leg", "--new", "--out", &out].map(str::to_owned).into(), answers)
+}
+
+/// Report of the check of this leg file.
+fn checked(folder: &Folder, name: &str) -> String {
+    folder.scarab(&format!("leg --check @{name}")).ends_with(0).printed
+}
+
+/// Writes `pasted.toml`: the file with the lines that its check asks for in a section. Returns its report.
+fn paste(folder: &Folder, name: &str, section: &str) -> String {
+    let text = pasted(&folder.read(name), &checked(folder, name), section);
+    folder.write("pasted.toml", &text);
+    checked(folder, "pasted.toml")
 }
 
 #[test]
 fn piped_answers_become_a_leg_file_that_the_check_accepts() {
     let folder = Folder::new();
     let out = folder.path("arm.toml");
-    let run = answered(ANSWERS, &out).ends_with(0);
-    assert!(run.printed.contains("or its three numbers (x): "), "{}", run.printed);
+    let run = answered(&folder, ANSWERS).ends_with(0);
+    run.prints("or its three numbers (x): ");
     let next = format!("\nnext: {} leg --check {}\n", crate::PROGRAM, out.display());
     assert!(run.printed.ends_with(&next), "{}", run.printed);
     let leg = LegFile::load(&out.display().to_string()).expect("a leg file");
     assert_eq!((leg.name.as_str(), leg.gravity), ("my-arm", [9.81, 0.0, 0.0]));
     let knee = &leg.joints[1];
     assert_eq!((knee.dh.a, knee.direction, knee.zero_offset_deg), (0.45, -1, 10.0));
-    let checked = scarab("leg --check", &[&out]).ends_with(0).printed;
-    assert!(checked.contains("\nreplay: ready\n"), "{checked}");
-    assert!(checked.contains("\nsimulation: keys are missing\n"), "{checked}");
-    assert!(checked.contains("\nimage: keys are missing\n"), "{checked}");
+    let checked = checked(&folder, "arm.toml");
+    for line in ["replay: ready", "simulation: keys are missing", "image: keys are missing"] {
+        assert_contains(&checked, &format!("\n{line}\n"));
+    }
 }
 
 #[test]
 fn an_ended_input_or_an_existing_file_writes_nothing() {
     let folder = Folder::new();
-    let out = folder.path("arm.toml");
-    let run = answered("my-arm\n2\nx\n", &out).ends_with(2);
-    assert!(
-        run.errors.contains("the input ended before answer 4 (name of joint 1); nothing was written"),
-        "{}",
-        run.errors
-    );
-    assert!(!out.exists());
-    let kept = folder.write("arm.toml", "mine\n");
-    let run = answered(ANSWERS, &kept).ends_with(2);
-    assert!(run.printed.is_empty() && run.errors.contains("exists and is not overwritten"), "{}", run.errors);
-    assert_eq!(std::fs::read_to_string(&kept).expect("kept"), "mine\n");
+    answered(&folder, "my-arm\n2\nx\n")
+        .ends_with(2)
+        .warns("the input ended before answer 4 (name of joint 1); nothing was written");
+    assert!(!folder.path("arm.toml").exists());
+    folder.write("arm.toml", "mine\n");
+    answered(&folder, ANSWERS).refuses("exists and is not overwritten");
+    assert_eq!(folder.read("arm.toml"), "mine\n");
 }
 
 /// Values for the words in capitals of a line to paste.
@@ -120,21 +110,12 @@ fn pasted(text: &str, report: &str, section: &str) -> String {
 #[ignore = "campaign: .ci/full"]
 fn pasted_lines_make_a_new_leg_ready_for_simulation_and_image() {
     let folder = Folder::new();
-    let out = folder.path("arm.toml");
-    answered(ANSWERS, &out).ends_with(0);
-    let mut text = std::fs::read_to_string(&out).expect("written");
-    for section in ["simulation", "image"] {
-        let file = folder.write("pasted.toml", &text);
-        let report = scarab("leg --check", &[&file]).ends_with(0).printed;
-        text = pasted(&text, &report, section);
-        let file = folder.write("pasted.toml", &text);
-        let report = scarab("leg --check", &[&file]).ends_with(0).printed;
-        assert!(report.contains(&format!("\n{section}: ready\n")), "{report}\n{text}");
-    }
+    answered(&folder, ANSWERS).ends_with(0);
+    assert_contains(&paste(&folder, "arm.toml", "simulation"), "\nsimulation: ready\n");
+    assert_contains(&paste(&folder, "pasted.toml", "image"), "\nimage: ready\n");
     // The other commands agree with the check.
-    let file = folder.write("pasted.toml", &text);
-    scarab("fw --leg", &[&file, "--source".as_ref(), &folder.path("leg.rs")]).ends_with(0);
-    let run = scarab("identify --leg", &[&file]);
+    folder.scarab("fw --leg @pasted.toml --source @leg.rs").ends_with(0);
+    let run = folder.scarab("identify --leg @pasted.toml");
     assert!([Some(0), Some(3)].contains(&run.code), "{}", run.errors);
 }
 
@@ -147,21 +128,18 @@ fn the_check_says_what_excite_needs() {
 #[ignore = "campaign: .ci/full"]
 fn a_leg_that_is_ready_for_excite_gets_a_motion() {
     let folder = Folder::new();
-    let file = ready_for_excite(&folder);
-    scarab("excite --torque-noise-nm 0.5 --evaluations 1800 --leg", &[&file]).ends_with(0);
+    ready_for_excite(&folder);
+    folder.scarab("excite --torque-noise-nm 0.5 --evaluations 1800 --leg @pasted.toml").ends_with(0);
 }
 
-/// File with the lines that the check asks for.
-fn ready_for_excite(folder: &Folder) -> PathBuf {
-    let out = folder.path("arm.toml");
-    answered(ANSWERS, &out).ends_with(0);
-    let report = scarab("leg --check", &[&out]).ends_with(0).printed;
-    assert!(report.contains("\nexcite: keys are missing\n  before the first [[joint]]\n    # no key: the option --torque-noise-nm NM"), "{report}");
-    let text = pasted(&std::fs::read_to_string(&out).expect("written"), &report, "excite");
-    let file = folder.write("pasted.toml", &text);
-    let report = scarab("leg --check", &[&file]).ends_with(0).printed;
-    assert!(report.contains("\nexcite: ready\n"), "{report}");
-    file
+/// Writes `pasted.toml` with the lines that the check asks for.
+fn ready_for_excite(folder: &Folder) {
+    answered(folder, ANSWERS).ends_with(0);
+    assert_contains(
+        &checked(folder, "arm.toml"),
+        "\nexcite: keys are missing\n  before the first [[joint]]\n    # no key: the option --torque-noise-nm NM",
+    );
+    assert_contains(&paste(folder, "arm.toml", "excite"), "\nexcite: ready\n");
 }
 
 #[test]
@@ -177,52 +155,41 @@ fn a_simulated_leg_without_rotor_and_friction_that_shakes_is_named() {
              dh = {{ alpha = 0.0, a = 0.35, d = 0.0 }}\ntruth = {{ {tip}{drive} }}\n"
         )
     };
-    let bare = folder.write("bare.toml", &leg(""));
-    let run = scarab("identify --leg", &[&bare]).ends_with(3);
-    for word in [
-        "input: the simulated leg shakes: for a second the speed of joint",
-        "`rotor_inertia`, `coulomb` and `viscous` are 0",
-    ] {
-        assert!(run.printed.contains(word), "{word}: {}", run.printed);
-    }
+    folder.write("bare.toml", leg(""));
+    let run = folder.scarab("identify --leg @bare.toml").ends_with(3);
+    run.prints("input: the simulated leg shakes: for a second the speed of joint");
+    run.prints("`rotor_inertia`, `coulomb` and `viscous` are 0");
     assert!(!run.printed.contains("something held the leg"), "{}", run.printed);
-    let driven = folder.write("driven.toml", &leg(", rotor_inertia = 0.1, coulomb = 0.5, viscous = 0.5"));
-    scarab("identify --leg", &[&driven]).ends_with(0);
+    folder.write("driven.toml", leg(", rotor_inertia = 0.1, coulomb = 0.5, viscous = 0.5"));
+    folder.scarab("identify --leg @driven.toml").ends_with(0);
 }
 
 #[test]
 fn a_forgotten_word_in_capitals_is_refused_with_its_line() {
     let folder = Folder::new();
-    let out = folder.path("arm.toml");
-    answered(ANSWERS, &out).ends_with(0);
-    let text = std::fs::read_to_string(&out).expect("written");
+    answered(&folder, ANSWERS).ends_with(0);
+    let text = folder.read("arm.toml");
     for line in text.lines().filter_map(|line| line.strip_prefix("# ")).filter(|line| line.contains(" = ")) {
-        let forgotten = text.replacen(&format!("# {line}"), line, 1);
-        let refused = scarab("leg --check", &[&folder.write("forgotten.toml", &forgotten)]).refusal();
-        assert!(refused.contains("forgotten.toml:"), "{line}: {refused}");
+        folder.write("forgotten.toml", text.replacen(&format!("# {line}"), line, 1));
+        folder.scarab("leg --check @forgotten.toml").refuses("forgotten.toml:");
     }
 }
 
 #[test]
 fn the_check_of_a_robot_offers_its_prior_as_truth() {
     let folder = Folder::new();
-    let (urdf, out) = (folder.write("robot.urdf", SIMPLE), folder.path("leg.toml"));
-    scarab("leg --urdf", &[&urdf, "--out".as_ref(), &out]).ends_with(0);
-    let report = scarab("leg --check", &[&out]).ends_with(0).printed;
-    assert!(report.contains("\nreplay: ready\n\nsimulation: keys are missing\n"), "{report}");
-    assert!(report.contains("    truth = { mass = 5.0, com = [0.2, 0.0, 0.0]"), "{report}");
-    assert!(report.contains("    # within `prior = { .. }`: rotor_inertia = KG_M2\n"), "{report}");
-    let text = pasted(&std::fs::read_to_string(&out).expect("written"), &report, "simulation");
-    let file = folder.write("simulated.toml", &text);
-    let report = scarab("leg --check", &[&file]).ends_with(0).printed;
-    assert!(
-        report.contains("\nsimulation: ready\n  its torque has no noise: add --torque-noise 1"),
-        "{report}\n{text}"
-    );
+    folder.write("robot.urdf", SIMPLE);
+    folder.scarab("leg --urdf @robot.urdf --out @leg.toml").ends_with(0);
+    let report = checked(&folder, "leg.toml");
+    assert_contains(&report, "\nreplay: ready\n\nsimulation: keys are missing\n");
+    assert_contains(&report, "    truth = { mass = 5.0, com = [0.2, 0.0, 0.0]");
+    assert_contains(&report, "    # within `prior = { .. }`: rotor_inertia = KG_M2\n");
+    let report = paste(&folder, "leg.toml", "simulation");
+    assert_contains(&report, "\nsimulation: ready\n  its torque has no noise: add --torque-noise 1");
     for (leg, words) in
         [("none.toml", "cannot be read"), ("sp", "image: not possible: an image supports two joints")]
     {
-        let run = scarab(&format!("leg --check {leg}"), &[]);
+        let run = scarab(&format!("leg --check {leg}"));
         assert!(run.printed.contains(words) || run.errors.contains(words), "{}{}", run.printed, run.errors);
     }
 }

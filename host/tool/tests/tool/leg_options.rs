@@ -1,28 +1,23 @@
 //! Leg with a wearer, on either side, below a leaning trunk: invariants and rejections.
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, base, list, number, scarab};
 use serde_json::Value;
 
 /// Report of a run with these options.
 fn identified(options: &str) -> Value {
     let folder = Folder::new();
-    scarab(&format!("identify {options} --json"), &[&folder.path("run.json")]).ends_with(0);
-    folder.json("run.json")
+    folder.reported(&format!("identify {options}"), 0).1
 }
 
-fn bases(run: &Value) -> Vec<Value> {
-    run["base_parameters"].as_array().expect("a list").clone()
-}
-
-fn number(of: &Value, key: &str) -> f64 {
-    of[key].as_f64().expect("known")
+fn bases(run: &Value) -> &[Value] {
+    list(run, "base_parameters")
 }
 
 /// Checks that all base parameters are within four sigma of the simulated leg's.
 fn assert_true(run: &Value) {
     for base in bases(run) {
-        let off = (number(&base, "value") - number(&base, "truth")).abs();
-        assert!(off < 4.0 * number(&base, "sigma"), "{} of {}", base["name"], run["leg"]);
+        let off = (number(base, "value") - number(base, "truth")).abs();
+        assert!(off < 4.0 * number(base, "sigma"), "{} of {}", base["name"], run["leg"]);
     }
 }
 
@@ -30,12 +25,9 @@ fn assert_true(run: &Value) {
 fn left_and_right_leg_have_the_same_anatomical_parameters() {
     let folder = Folder::new();
     let run = |side: &str| {
-        let files = [format!("{side}.json"), format!("{side}.csv")];
-        let [json, log] = files.each_ref().map(|name| folder.path(name).display().to_string());
         // Without noise: equal draws would have opposite signs relative to the motion on one side.
-        scarab(&format!("identify --torque-noise 0 --side {side} --json {json} --log {log}"), &[])
-            .ends_with(0);
-        (folder.json(&files[0]), std::fs::read_to_string(folder.path(&files[1])).expect("written"))
+        let line = format!("identify --torque-noise 0 --side {side} --log @log.csv");
+        (folder.reported(&line, 0).1, folder.read("log.csv"))
     };
     let ((right, right_log), (left, left_log)) = (run("right"), run("left"));
     assert_eq!(left["leg"], "x2-wearer-75kg --side left");
@@ -50,7 +42,7 @@ fn a_known_trunk_pitch_turns_gravity_and_keeps_the_base_set() {
     let upright = identified("");
     for pitch in ["5", "-10"] {
         let leaning = identified(&format!("--trunk-pitch {pitch}"));
-        for (one, other) in bases(&upright).iter().zip(&bases(&leaning)) {
+        for (one, other) in bases(&upright).iter().zip(bases(&leaning)) {
             assert_eq!(one["name"], other["name"]);
             // Rounding of the analysis differs; factors and values are near 1.
             assert!((number(one, "truth") - number(other, "truth")).abs() < 1e-9);
@@ -77,9 +69,7 @@ fn legs_of_any_size_are_identified_and_named_by_size() {
         assert_true(&run);
     }
     // The heavier and taller leg is heavier and longer.
-    let of = |run: &Value, name: &str| {
-        number(bases(run).iter().find(|base| base["name"] == name).expect("there"), "value")
-    };
+    let of = |run: &Value, name: &str| base(run, name, "value");
     let (default, tall) = (identified(""), identified("--wearer 95,1.95"));
     assert!(of(&tall, "HX2") > 1.3 * of(&default, "HX2") && of(&tall, "ZZ2") > 1.5 * of(&default, "ZZ2"));
 }
@@ -101,7 +91,6 @@ fn impossible_leg_options_are_refused_with_option_and_reason() {
         ("--trunk-pitch nan", "--trunk-pitch NaN: degrees forward"),
         ("--side middle", "invalid value 'middle'"),
     ] {
-        let refusal = scarab(&format!("identify {options}"), &[]).refusal();
-        assert!(refusal.contains(reason), "{options}: {refusal}");
+        scarab(&format!("identify {options}")).refuses(reason);
     }
 }

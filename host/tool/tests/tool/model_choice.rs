@@ -7,7 +7,7 @@ use scarab_identify::report::model_choice::ModelChoiceReport;
 use scarab_rig::identify::identify_many;
 use scarab_rig::options::SimulationOptions;
 
-use crate::command::{Folder, base, scarab};
+use crate::command::{Folder, assert_contains, base, list, scarab};
 use serde_json::Value;
 
 fn runs(leg: &LegFile, seeds: std::ops::RangeInclusive<u64>) -> Vec<RunReport> {
@@ -76,46 +76,32 @@ fn identified_in_both(seeds: u64) {
 #[test]
 fn friction_of_two_directions_is_stored_exported_and_predicted() {
     let folder = Folder::new();
-    let (file, model) =
-        (folder.write("leg.toml", &uneven(Switch::On, 0.8).to_toml()), folder.path("model.toml"));
-    let arguments = format!(
-        "identify --leg {} --json {} --save-model",
-        file.display(),
-        folder.path("run.json").display()
-    );
-    let printed = scarab(&arguments, &[&model]).ends_with(0).printed;
-    assert!(printed.contains("Coulomb friction of joint 2: "), "{printed}");
-    let half = base(&folder.json("run.json"), "FCA2", "value");
-    let kept = ModelFile::load(&model).expect("just written");
+    folder.write("leg.toml", uneven(Switch::On, 0.8).to_toml());
+    let (run, report) = folder.reported("identify --leg @leg.toml --save-model @model.toml", 0);
+    run.prints("Coulomb friction of joint 2: ");
+    let half = base(&report, "FCA2", "value");
+    let kept = ModelFile::load(&folder.path("model.toml")).expect("just written");
     assert!(kept.base_set.parameters.iter().any(|base| base.carrier == "FCA2"));
 
     let states = "q1,q2,qd1,qd2,qdd1,qdd2\n0.3,-0.9,0,1.0,0,0\n0.3,-0.9,0,-1.0,0,0\n0.3,-0.9,0,0,0,0\n";
-    let states = folder.write("states.csv", states);
-    let out = folder.path("torque.csv");
-    let arguments = format!("predict --dh --states {} --out {} --model", states.display(), out.display());
-    scarab(&arguments, &[&model]).ends_with(0);
+    folder.write("states.csv", states);
+    folder.scarab("predict --dh --states @states.csv --out @torque.csv --model @model.toml").ends_with(0);
     let table = folder.table("torque.csv");
     let friction = table.column("tau2_friction_Nm");
     // One rounding per number below 10.
     assert!((friction[0] + friction[1] - 2.0 * half).abs() < 1e-6, "{friction:?} {half}");
     assert_eq!((friction[2], table.column("tau2_offset_Nm")), (0.0, vec![0.0; 3]), "not zero at rest");
 
-    let urdf = folder.path("leg.urdf");
-    let arguments = format!("export --model {} --urdf", model.display());
-    scarab(&arguments, &[&urdf]).ends_with(0);
-    let text = std::fs::read_to_string(&urdf).expect("written");
-    assert!(text.contains("Coulomb friction that differs between the directions: 5."), "{text}");
+    folder.scarab("export --model @model.toml --urdf @leg.urdf").ends_with(0);
+    assert_contains(&folder.read("leg.urdf"), "Coulomb friction that differs between the directions: 5.");
 }
 
 #[test]
 fn a_dropped_column_is_not_in_the_stored_model() {
     let folder = Folder::new();
-    let file = folder.write("leg.toml", &leg().to_toml());
-    let model = folder.path("model.toml");
-    let json = folder.path("run.json");
-    let arguments = format!("identify --leg {} --json {} --save-model", file.display(), json.display());
-    scarab(&arguments, &[&model]).ends_with(0);
-    let kept = ModelFile::load(&model).expect("a model without the dropped columns");
+    folder.write("leg.toml", leg().to_toml());
+    let (_, report) = folder.reported("identify --leg @leg.toml --save-model @model.toml", 0);
+    let kept = ModelFile::load(&folder.path("model.toml")).expect("a model without the dropped columns");
     for name in ["IA2", "OFF1", "OFF2"] {
         assert!(kept.conditions.not_estimated.iter().any(|other| other == name), "{name}");
         assert!(kept.base_set.parameters.iter().all(|base| base.carrier != name), "{name}");
@@ -123,17 +109,16 @@ fn a_dropped_column_is_not_in_the_stored_model() {
         assert_eq!((full.value, full.sigma, full.status.as_str()), (Some(0.0), None, "prior"), "{name}");
     }
     assert_eq!(kept.base_set.covariance.len(), 10);
-    let report = folder.json("run.json");
     assert_eq!(
         (report["rank"].as_u64(), report["consistent"]["degrees_of_freedom"].as_u64()),
         (Some(10), Some(10))
     );
     // The hip's rotor is only determined in a sum, whatever its value.
-    let choices = report["model_choice"].as_array().expect("choices");
+    let choices = list(&report, "model_choice");
     let hip =
         choices.iter().find(|choice| choice["joint"] == 1 && choice["option"] == "rotor").expect("the hip's");
     assert!(hip["used"] == "on" && hip["why"].as_str().is_some_and(|why| why.contains("ZZ1R")), "{hip}");
-    scarab(&format!("export --model {} --urdf", model.display()), &[&folder.path("leg.urdf")]).ends_with(0);
+    folder.scarab("export --model @model.toml --urdf @leg.urdf").ends_with(0);
 }
 
 #[test]
@@ -141,11 +126,11 @@ fn one_column_cannot_be_requested_twice() {
     let folder = Folder::new();
     let mut both = LegFile::load(DEFAULT_LEG).expect("shipped");
     both.joints[1].asymmetric_coulomb = Switch::On;
-    let file = folder.write("leg.toml", &both.to_toml());
-    let refusal = scarab("identify --leg", &[&file]).refusal();
-    assert!(refusal.contains("leg.toml:"), "{refusal}");
-    assert!(refusal.contains("joint `knee`: `asymmetric_coulomb` is on and so is `offset`"), "{refusal}");
-    assert!(refusal.contains("are the same column"), "{refusal}");
+    folder.write("leg.toml", both.to_toml());
+    let refusal = folder.scarab("identify --leg @leg.toml").refusal();
+    assert_contains(&refusal, "leg.toml:");
+    assert_contains(&refusal, "joint `knee`: `asymmetric_coulomb` is on and so is `offset`");
+    assert_contains(&refusal, "are the same column");
 
     let words = |offset: Switch, asked: Switch, option: &str| {
         let mut leg = both.clone();
@@ -166,35 +151,32 @@ fn one_column_cannot_be_requested_twice() {
         );
         // The written file already has the key; if so, only its value is replaced.
         let text = if key == "rotor" { text.replacen("rotor = \"on\"\n", "", 1) } else { text };
-        let refusal = scarab("identify --leg", &[&folder.write("leg.toml", &text)]).refusal();
-        assert!(
-            refusal.contains(&format!("unknown variant `{word}`, expected one of `auto`, `on`, `off`")),
-            "{refusal}"
-        );
+        folder.write("leg.toml", &text);
+        folder
+            .scarab("identify --leg @leg.toml")
+            .refuses(&format!("unknown variant `{word}`, expected one of `auto`, `on`, `off`"));
     }
 }
 
 #[test]
 fn the_temperature_is_stored_and_another_one_gives_a_warning() {
     let folder = Folder::new();
-    let (model, json) = (folder.path("model.toml"), folder.path("run.json"));
-    scarab(&format!("identify --temperature 21.5 --json {} --save-model", json.display()), &[&model])
-        .ends_with(0);
-    assert_eq!(folder.json("run.json")["temperature_c"], 21.5);
-    assert_eq!(ModelFile::load(&model).expect("just written").conditions.temperature_c, Some(21.5));
+    let (_, report) = folder.reported("identify --temperature 21.5 --save-model @model.toml", 0);
+    assert_eq!(report["temperature_c"], 21.5);
+    let model = ModelFile::load(&folder.path("model.toml")).expect("just written");
+    assert_eq!(model.conditions.temperature_c, Some(21.5));
     let compared = |arguments: &str| {
-        let arguments = format!("identify {arguments} --json {} --compare-model", json.display());
-        let printed = scarab(&arguments, &[&model]).ends_with(0).printed;
-        let warned = folder.json("run.json")["compared"]["warning"].as_str().map(str::to_owned);
-        assert_eq!(printed.contains("\nwarning: "), warned.is_some(), "{printed}");
+        let (run, report) = folder.reported(&format!("identify {arguments} --compare-model @model.toml"), 0);
+        let warned = report["compared"]["warning"].as_str().map(str::to_owned);
+        assert_eq!(run.printed.contains("\nwarning: "), warned.is_some(), "{}", run.printed);
         warned
     };
     assert_eq!((compared("--temperature 30"), compared("")), (None, None));
-    assert_eq!(folder.json("run.json")["temperature_c"], Value::Null);
+    assert_eq!(folder.json("report.json")["temperature_c"], Value::Null);
     let warning = compared("--temperature -10").expect("31.5 K");
-    assert!(warning.contains("-31.5 K") && warning.contains("+3.5 %"), "{warning}");
+    assert_contains(&warning, "-31.5 K");
+    assert_contains(&warning, "+3.5 %");
     for bad in ["126", "nan", "warm"] {
-        let refusal = scarab(&format!("identify --temperature {bad}"), &[]).refusal();
-        assert!(refusal.contains("temperature from -40 to 125"), "{refusal}");
+        scarab(&format!("identify --temperature {bad}")).refuses("temperature from -40 to 125");
     }
 }

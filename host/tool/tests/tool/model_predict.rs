@@ -5,8 +5,8 @@ use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_identify::leg::setup::{links, row_model};
 use scarab_identify::run::predict::Predictor;
 
-use crate::command::{Folder, Table, scarab};
-use crate::kept::{kept, model, predict, text};
+use crate::command::{Folder, Table};
+use crate::kept::{model, predict, text};
 use hal_sim::leg::Leg;
 use scarab::ident::prior_parameters;
 use scarab::model::JointState;
@@ -72,8 +72,7 @@ fn the_band_is_the_covariance_propagated_to_the_torque() {
 #[test]
 fn the_table_has_total_band_and_parts_in_both_angle_conventions() {
     let folder = Folder::new();
-    let out = folder.path("torque.csv");
-    let run = predict(&folder, &text(), &format!("--out {}", out.display())).ends_with(0);
+    let run = predict(&folder, &text(), "--out @torque.csv").ends_with(0);
     assert_eq!(run.printed, "");
     let table = folder.table("torque.csv");
     assert_eq!(
@@ -93,8 +92,8 @@ fn the_table_has_total_band_and_parts_in_both_angle_conventions() {
     }
     // The knee's anatomical angle is minus its D-H angle; units in column names and the time are optional.
     let flexed = "q1_rad,q2_rad,qd1_radps,qd2_radps,qdd1_radps2,qdd2_radps2\n0.3,0.9,0.7,1.1,4.0,6.0\n0.8,0.2,-1.3,-0.4,-2.0,-9.0\n";
-    let flexed = folder.write("flexed.csv", flexed);
-    let printed = scarab("predict --model", &[&kept().model, "--states".as_ref(), &flexed]);
+    folder.write("flexed.csv", flexed);
+    let printed = folder.scarab("predict --model @model.toml --states @flexed.csv");
     let anatomical = Table::parse(&printed.ends_with(0).printed);
     assert_eq!(anatomical.column("k"), [0.0, 1.0]);
     for part in ["", "_sigma", "_rigid", "_friction", "_offset"] {

@@ -9,7 +9,7 @@ use scarab_identify::leg::from_robot;
 use scarab_identify::leg::setup::{links, row_model};
 use scarab_identify::run::predict::Predictor;
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, assert_contains};
 use crate::robots::{self, State};
 use hal_sim::description::{BodyDescription, DenavitHartenberg, LegDescription};
 use hal_sim::mechanism::Mechanism;
@@ -35,12 +35,17 @@ fn skewed(name: &str) -> LegFile {
     leg
 }
 
+/// Model of an identification of this leg.
+fn identified(folder: &Folder, leg: &LegFile) -> ModelFile {
+    folder.write("leg.toml", leg.to_toml());
+    folder.scarab("identify --leg @leg.toml --save-model @model.toml").ends_with(0);
+    ModelFile::load(&folder.path("model.toml")).expect("just written")
+}
+
 /// Model of that leg with its true bodies, independent of any identification.
 fn true_model<const N: usize, const B: usize>(folder: &Folder, name: &str) -> ModelFile {
     let leg = skewed(name);
-    let (file, path) = (folder.write("leg.toml", &leg.to_toml()), folder.path("model.toml"));
-    scarab(&format!("identify --leg {} --save-model", file.display()), &[&path]).ends_with(0);
-    let mut model = ModelFile::load(&path).expect("just written");
+    let mut model = identified(folder, &leg);
     let truth = prior_parameters(&links::<N>(&leg, |joint| joint.truth.as_ref()).expect("simulated"));
     for (parameter, value) in model.full_set.parameters.iter_mut().zip(truth.as_flattened()) {
         parameter.value = Some(*value);
@@ -55,14 +60,10 @@ fn true_model<const N: usize, const B: usize>(folder: &Folder, name: &str) -> Mo
 /// Leg identified with its truth as prior, so that every body is physically consistent; model and
 /// robot description.
 fn exported(folder: &Folder, name: &str) -> (ModelFile, String) {
-    let file = folder.write("leg.toml", &skewed(name).to_toml());
-    let model = folder.path("model.toml");
-    scarab(&format!("identify --leg {} --save-model", file.display()), &[&model]).ends_with(0);
-    let urdf = folder.path("leg.urdf");
-    let run = scarab("export --model", &[&model, "--urdf".as_ref(), &urdf]).ends_with(0);
-    assert_eq!(run.printed, format!("robot description: {}\n", urdf.display()));
-    let text = std::fs::read_to_string(&urdf).expect("just written");
-    (ModelFile::load(&model).expect("just written"), text)
+    let model = identified(folder, &skewed(name));
+    let run = folder.scarab("export --model @model.toml --urdf @leg.urdf").ends_with(0);
+    assert_eq!(run.printed, format!("robot description: {}\n", folder.path("leg.urdf").display()));
+    (model, folder.read("leg.urdf"))
 }
 
 fn turn(rpy: &[f64; 3]) -> Matrix3<f64> {
@@ -198,13 +199,10 @@ fn exported_bodies_of_crossed_axes_give_the_identified_torque() {
 #[test]
 fn the_exported_default_leg_gives_the_identified_torque() {
     let folder = Folder::new();
-    let path = folder.path("model.toml");
-    scarab("identify --save-model", &[&path]).ends_with(0);
-    let urdf = folder.path("leg.urdf");
-    scarab("export --model", &[&path, "--urdf".as_ref(), &urdf]).ends_with(0);
-    let robot = urdf_rs::read_file(&urdf).expect("another library reads it");
-    let model = ModelFile::load(&path).expect("just written");
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
+    let model = identified(&folder, &leg);
+    folder.scarab("export --model @model.toml --urdf @leg.urdf").ends_with(0);
+    let robot = urdf_rs::read_from_string(&folder.read("leg.urdf")).expect("another library reads it");
     let mechanism = Mechanism::new(&described::<2>(&robot, &leg));
     let predictor = Predictor::<2>::new(&model).expect("two joints");
     let state = JointState { q: [0.3, -0.9], qd: [0.7, -1.1], qdd: [4.0, -6.0] };
@@ -274,17 +272,16 @@ fn impossible_or_unknown_bodies_are_not_exported() {
     let no_body = refusal(&|model| model.full_set.parameters[index(1, Parameter::XX)].value = Some(-0.1));
     assert!(no_body.starts_with("model.toml: not exported: no body can have the ten inertial"), "{no_body}");
     let unknown = refusal(&|model| model.full_set.parameters[index(0, Parameter::M)].value = None);
-    assert!(unknown.contains("a parameter of joint `hip` is unknown"), "{unknown}");
+    assert_contains(&unknown, "a parameter of joint `hip` is unknown");
     let contradiction = refusal(&|model| {
         let value = &mut model.full_set.parameters[index(1, Parameter::HX)].value;
         *value = value.map(|value| value + 0.01);
     });
-    assert!(contradiction.contains("the bodies' HX2 is +"), "{contradiction}");
+    assert_contains(&contradiction, "the bodies' HX2 is +");
 
     // From the command line: without a prior no mass is known.
-    let path = folder.path("bare.toml");
-    scarab("identify --prior none --save-model", &[&path]).ends_with(0);
-    let run = scarab("export --urdf none.urdf --model", &[&path]).ends_with(3);
-    assert!(run.errors.contains("without a prior torque determines only sums"), "{}", run.errors);
-    assert!(!std::path::Path::new("none.urdf").exists());
+    folder.scarab("identify --prior none --save-model @bare.toml").ends_with(0);
+    let run = folder.scarab("export --urdf @none.urdf --model @bare.toml").ends_with(3);
+    run.warns("without a prior torque determines only sums");
+    assert!(!folder.path("none.urdf").exists());
 }

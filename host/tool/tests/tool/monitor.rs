@@ -5,9 +5,8 @@ use crate::command::{Folder, scarab};
 #[test]
 fn a_payload_is_detected_and_estimated_while_pushes_raise_no_alarm() {
     let folder = Folder::new();
-    let arguments = "monitor --payload 3@knee:0.2 --seed 2 --at 5 --hours 0.02 --pushes 6:20 --json";
-    scarab(arguments, &[&folder.path("monitor.json")]).ends_with(0);
-    let report = folder.json("monitor.json");
+    let arguments = "monitor --payload 3@knee:0.2 --seed 2 --at 5 --hours 0.02 --pushes 6:20";
+    let (_, report) = folder.reported(arguments, 0);
     let run = &report["runs"][0];
     assert_eq!(run["false_alarms_at_s"].as_array().map(Vec::len), Some(0));
     assert!(run["alarm"]["after_s"].as_f64().is_some_and(|after| (3.0..10.0).contains(&after)), "{run}");
@@ -32,7 +31,6 @@ fn bad_input_names_the_option() {
         ("--pushes 0:5", "--pushes PER_MINUTE"),
         ("--leg sp", "has no `truth`"),
     ] {
-        let message = scarab(&format!("monitor {arguments}"), &[]).refusal();
-        assert!(message.contains(words), "{arguments}: {message}");
+        scarab(&format!("monitor {arguments}")).refuses(words);
     }
 }

@@ -2,26 +2,21 @@
 
 use std::sync::OnceLock;
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, assert_contains, list, number, scarab};
 use serde_json::Value;
 
 /// Report of the default leg's first motor.
 fn report() -> &'static Value {
     static REPORT: OnceLock<Value> = OnceLock::new();
     REPORT.get_or_init(|| {
-        let folder = Folder::new();
-        let run = scarab("motor --json", &[&folder.path("motor.json")]).ends_with(0);
-        assert!(run.printed.contains("hip: current loop of 1000 Hz"), "{}", run.printed);
-        folder.json("motor.json")
+        let (run, report) = Folder::new().reported("motor", 0);
+        run.prints("hip: current loop of 1000 Hz");
+        report
     })
 }
 
-fn number(entry: &Value, key: &str) -> f64 {
-    entry[key].as_f64().unwrap_or_else(|| panic!("{key}: {entry}"))
-}
-
 fn entries(key: &str) -> &'static [Value] {
-    report()[key].as_array().expect("a list")
+    list(report(), key)
 }
 
 #[test]
@@ -104,28 +99,26 @@ fn the_chopper_limits_the_bus_and_without_it_the_bridge_turns_off() {
 #[test]
 fn figures_are_drawn_and_wrong_joints_refused() {
     let folder = Folder::new();
-    scarab("motor --joint knee --figures", &[&folder.path("figures")]).ends_with(0);
+    folder.scarab("motor --joint knee --figures @figures").ends_with(0);
     for file in ["current-steps", "torque-ripple", "voltage-limit", "regeneration"] {
-        let svg = std::fs::read_to_string(folder.path(&format!("figures/{file}.svg"))).expect("drawn");
+        let svg = folder.read(&format!("figures/{file}.svg"));
         let document = roxmltree::Document::parse(&svg).expect("well-formed");
         assert!(document.descendants().count() > 50, "{file}");
     }
-    let refusal = scarab("motor --joint ankle", &[]).refusal();
-    assert!(refusal.contains("`ankle` is not a joint of x2-wearer-75kg: hip, knee or 1 to 2"), "{refusal}");
-    let refusal = scarab("motor --leg sp", &[]).refusal();
-    assert!(refusal.contains("sp: the joint has no `[joint.motor]`"), "{refusal}");
+    scarab("motor --joint ankle").refuses("`ankle` is not a joint of x2-wearer-75kg: hip, knee or 1 to 2");
+    scarab("motor --leg sp").refuses("sp: the joint has no `[joint.motor]`");
 }
 
 #[test]
 fn curves_of_one_frame_differ_in_colour_or_dashes_and_the_legend_has_each() {
     let folder = Folder::new();
-    scarab("motor --figures", &[&folder.path("figures")]).ends_with(0);
+    folder.scarab("motor --figures @figures").ends_with(0);
     for (file, frames, names) in [
         ("current-steps", 4, &["q with feedforward", "q without", "d with feedforward", "d without"][..]),
         ("voltage-limit", 2, &["48 V: quadrature", "12 V: quadrature", "48 V: direct", "12 V: direct"]),
         ("regeneration", 2, &["with chopper", "without, until the outputs are off"]),
     ] {
-        let svg = std::fs::read_to_string(folder.path(&format!("figures/{file}.svg"))).expect("drawn");
+        let svg = folder.read(&format!("figures/{file}.svg"));
         let document = roxmltree::Document::parse(&svg).expect("well-formed");
         let words: Vec<_> = document.descendants().filter_map(|node| node.text().map(str::trim)).collect();
         for name in names {
@@ -143,14 +136,14 @@ fn curves_of_one_frame_differ_in_colour_or_dashes_and_the_legend_has_each() {
     }
 }
 
-/// Default leg with replaced words, in its own folder.
-fn changed(folder: &Folder, changes: &[(&str, &str)]) -> std::path::PathBuf {
+/// Writes `leg.toml`: the default leg with replaced words.
+fn changed(folder: &Folder, changes: &[(&str, &str)]) {
     let mut text = include_str!("../../../legs/x2-wearer-75kg.toml").to_owned();
     for (from, to) in changes {
         assert!(text.contains(from), "{from}");
         text = text.replace(from, to);
     }
-    folder.write("leg.toml", &text)
+    folder.write("leg.toml", &text);
 }
 
 #[test]
@@ -173,12 +166,11 @@ fn weak_and_slow_motors_are_measured_within_their_limits() {
         ],
     ] {
         let folder = Folder::new();
-        let (leg, json) = (changed(&folder, changes), folder.path("motor.json"));
-        let run = scarab("motor --leg", &[&leg, "--json".as_ref(), &json]).ends_with(0);
+        changed(&folder, changes);
+        let (run, report) = folder.reported("motor --leg @leg.toml", 0);
         assert!(!run.printed.contains("NaN"), "{}", run.printed);
-        let report = folder.json("motor.json");
         let limit = changes[0].1.ends_with("5.0").then_some(5.0 / 1.5);
-        for step in report["steps"].as_array().expect("steps") {
+        for step in list(&report, "steps") {
             // 1 mH takes 0.7 ms at the voltage limit; without feedforward the integral has not
             // settled after 2 ms.
             assert!(number(step, "error_a").abs() < 0.3, "{changes:?}: {} A", step["error_a"]);
@@ -192,12 +184,12 @@ fn weak_and_slow_motors_are_measured_within_their_limits() {
 fn an_axis_turned_off_and_a_failing_supply_are_named() {
     let folder = Folder::new();
     let weak = "supply = { voltage_v = 24.0, resistance_ohm = 1.0, capacitance_uf = 50.0, brake_ohm = 2.0 }\nsegments =";
-    let leg = changed(&folder, &[("segments =", weak)]);
-    let run = scarab("motor --leg", &[&leg]).ends_with(3);
-    assert!(run.errors.contains("axis `hip` turned its bridge off (steps"), "{}", run.errors);
-    assert!(run.errors.contains("the bus voltage left 20 V..58 V (`supply`)"), "{}", run.errors);
+    changed(&folder, &[("segments =", weak)]);
+    let run = folder.scarab("motor --leg @leg.toml").ends_with(3);
+    run.warns("axis `hip` turned its bridge off (steps");
+    run.warns("the bus voltage left 20 V..58 V (`supply`)");
     // With a leg the servo detects the falling supply before an axis does.
-    let run = scarab("identify --drive full --leg", &[&leg]).ends_with(3);
+    let run = folder.scarab("identify --drive full --leg @leg.toml").ends_with(3);
     let words = "fault 0x3220: joint hip, its supply went away";
     assert!(format!("{}{}", run.printed, run.errors).contains(words), "{}{}", run.printed, run.errors);
 }
@@ -206,7 +198,8 @@ fn an_axis_turned_off_and_a_failing_supply_are_named() {
 fn configuration_errors_name_the_key_that_corrects_them() {
     let refusal = |changes: &[(&str, &str)]| {
         let folder = Folder::new();
-        scarab("motor --leg", &[&changed(&folder, changes)]).refusal()
+        changed(&folder, changes);
+        folder.scarab("motor --leg @leg.toml").refusal()
     };
     let supply = |volts: &str| {
         let line = format!(
@@ -215,24 +208,19 @@ fn configuration_errors_name_the_key_that_corrects_them() {
         refusal(&[("segments =", &line)])
     };
     for volts in ["12.0", "55.0"] {
-        assert!(supply(volts).contains("outside 22..50: the board's bridges"), "{}", supply(volts));
+        assert_contains(&supply(volts), "outside 22..50: the board's bridges");
     }
     let strong = refusal(&[
         ("torque_per_ampere = 1.5", "torque_per_ampere = 15.0"),
         ("torque_limit_nm = 85.0", "torque_limit_nm = 400.0"),
     ]);
-    assert!(
-        strong.contains("the back-EMF of a motor with its bridge off")
-            && strong.contains("`speed_limit_deg_s`"),
-        "{strong}"
-    );
+    assert_contains(&strong, "the back-EMF of a motor with its bridge off");
+    assert_contains(&strong, "`speed_limit_deg_s`");
     let cogging = refusal(&[("cogging_nm = 0.017", "cogging_nm = 0.5")]);
-    assert!(
-        cogging.contains("did not follow the field evenly") && cogging.contains("cogging_nm"),
-        "{cogging}"
-    );
+    assert_contains(&cogging, "did not follow the field evenly");
+    assert_contains(&cogging, "cogging_nm");
     let limit = refusal(&[("torque_limit_nm = 85.0", "torque_limit_nm = 100.0")]);
-    assert!(limit.contains("its current limit (`current_limit_a`"), "{limit}");
+    assert_contains(&limit, "its current limit (`current_limit_a`");
 }
 
 #[test]
@@ -240,8 +228,7 @@ fn configuration_errors_name_the_key_that_corrects_them() {
 fn encoder_counts_that_do_not_divide_the_counter_range_work() {
     for counts in ["10000", "30000"] {
         let folder = Folder::new();
-        let leg = changed(&folder, &[("counts = 8192", &format!("counts = {counts}"))]);
-        let run = scarab("identify --drive full --leg", &[&leg]).ends_with(0);
-        assert!(run.printed.contains("verdict: accepted"), "{}", run.printed);
+        changed(&folder, &[("counts = 8192", &format!("counts = {counts}"))]);
+        folder.scarab("identify --drive full --leg @leg.toml").ends_with(0).prints("verdict: accepted");
     }
 }

@@ -12,7 +12,7 @@ use scarab_client::adapter::open;
 use scarab_client::bus::{Object, RequestError};
 use scarab_client::master;
 
-use crate::command::{Folder, Run, scarab};
+use crate::command::{Folder, Run, assert_contains, scarab};
 use crate::serve::{Client, Serve};
 
 const MS: Duration = Duration::from_millis(1);
@@ -76,7 +76,7 @@ impl Wire {
     }
 
     fn run(&self, command: &str) -> Run {
-        scarab(&format!("{command} --slcan {}", self.address), &[])
+        scarab(&format!("{command} --slcan {}", self.address))
     }
 }
 
@@ -120,11 +120,12 @@ fn every_procedure_refuses_beside_another_host_and_names_it() {
             ends.store(true, Ordering::Relaxed);
             runs
         });
-        for (procedure, run) in procedures.into_iter().zip(runs) {
+        for run in runs {
             let run = run.ends_with(3);
             let all = run.printed + &run.errors;
-            assert!(all.contains("another host uses the bus: ") && all.contains(words), "{procedure}: {all}");
-            assert!(all.contains("run the command again"), "{procedure}: {all}");
+            assert_contains(&all, "another host uses the bus: ");
+            assert_contains(&all, words);
+            assert_contains(&all, "run the command again");
         }
     }
     // A silent host whose controlword stands.
@@ -133,16 +134,13 @@ fn every_procedure_refuses_beside_another_host_and_names_it() {
     for procedure in ["commission", update.as_str(), "node-ids --set 00000001=3,4"] {
         let run = wire.run(procedure).ends_with(3);
         let all = run.printed + &run.errors;
-        assert!(
-            all.contains("node 1: another host controls the drive (ready to switch on"),
-            "{procedure}: {all}"
-        );
+        assert_contains(&all, "node 1: another host controls the drive (ready to switch on");
     }
     // A new connection: the other one has heard the answers to the procedures.
     Client::at(&wire.address).write(1, 0x6040, 0, 0, 2);
     // Alone, each of them does its work; this board never takes an image.
     let errors = wire.run(&update).ends_with(3).errors;
-    assert!(errors.contains("a simulated board (`serve`), which never takes an image"), "{errors}");
+    assert_contains(&errors, "a simulated board (`serve`), which never takes an image");
     wire.run("node-ids").ends_with(0);
     wire.run("commission --until wiring").ends_with(0);
 }
@@ -153,10 +151,7 @@ fn a_drive_that_the_contacts_turned_on_is_neither_updated_nor_renumbered() {
     let wire = Wire::new(&serve);
     for procedure in [format!("update {}", image(&folder).display()), "node-ids --set 00000001=3,4".into()] {
         let errors = wire.run(&procedure).ends_with(3).errors;
-        assert!(
-            errors.contains("the drive is on (operation enabled), by the operator's contacts"),
-            "{errors}"
-        );
+        assert_contains(&errors, "the drive is on (operation enabled), by the operator's contacts");
     }
     // The operator is the partner of this one.
     wire.run("commission --until wiring").ends_with(0);
@@ -175,7 +170,7 @@ fn a_watch_of_another_host_stays_and_a_free_one_is_given_back() {
     };
     [1, 2].into_iter().for_each(|node| host().write(node, 0x1016, 1, theirs, 4));
     let run = wire.run("commission --until enable").ends_with(0);
-    assert!(run.printed.contains("enabled; the leg holds its pose"), "{}", run.printed);
+    run.prints("enabled; the leg holds its pose");
     assert_eq!(watches(), [[theirs, 0]; 2]);
     // This host's watch: node 112, 500 ms.
     let sent = wire.sent.lock().expect("no thread panics").clone();
@@ -185,21 +180,17 @@ fn a_watch_of_another_host_stays_and_a_free_one_is_given_back() {
     // Without a free entry nothing is replaced.
     [1, 2].into_iter().for_each(|node| host().write(node, 0x1016, 2, 0x51 << 16 | 5000, 4));
     let run = wire.run("commission --until enable").ends_with(3);
-    assert!(run.printed.contains("node 1 watches the heartbeats of nodes 80 and 81"), "{}", run.printed);
+    run.prints("node 1 watches the heartbeats of nodes 80 and 81");
     assert_eq!(watches(), [[theirs, 0x51 << 16 | 5000]; 2]);
 }
 
 #[test]
 fn waiting_says_what_the_board_says() {
     let serve = Serve::at("127.0.0.1:0", "--uncalibrated");
-    let run = scarab(&format!("commission --patience 2 --until calibrate --slcan {}", serve.address), &[])
-        .ends_with(3);
-    assert!(run.printed.contains("the board says: the enabling switch is open\n"), "{}", run.printed);
-    assert!(
-        run.printed.contains("waited 2 s, the board says: the enabling switch is open"),
-        "{}",
-        run.printed
-    );
+    let run =
+        scarab(&format!("commission --patience 2 --until calibrate --slcan {}", serve.address)).ends_with(3);
+    run.prints("the board says: the enabling switch is open\n");
+    run.prints("waited 2 s, the board says: the enabling switch is open");
 }
 
 /// Adapter that answers each line of a client by these bytes.
@@ -242,9 +233,9 @@ fn texts_of_a_node_are_escaped_and_bounded() {
 #[test]
 fn a_line_without_end_ends_the_procedure_by_one_sentence() {
     let address = adapter(|_| [&b"t\x1b[2J"[..], &[b'A'; 4 << 20], b"\r"].concat());
-    let errors = scarab(&format!("node-ids --slcan {address}"), &[]).ends_with(2).errors;
+    let errors = scarab(&format!("node-ids --slcan {address}")).ends_with(2).errors;
     assert!(errors.contains("a line of 256 bytes or more") && errors.len() < 400, "{errors}");
     let address = adapter(|_| b"x\x1b]0;owned\x07\r".to_vec());
-    let errors = scarab(&format!("node-ids --slcan {address}"), &[]).ends_with(2).errors;
+    let errors = scarab(&format!("node-ids --slcan {address}")).ends_with(2).errors;
     assert!(errors.contains(r"the adapter says `x\u{1b}]0;owned`") && !errors.contains('\x1b'), "{errors}");
 }

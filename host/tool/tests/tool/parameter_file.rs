@@ -2,7 +2,6 @@
 //! board that starts with it.
 
 use std::fs;
-use std::path::Path;
 
 use scarab::leg::{Assured, Wearing};
 use scarab_identify::formats::leg_file::geometry::fingerprint;
@@ -10,7 +9,7 @@ use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_rig::bus::serve::{ServeOptions, network};
 use scarab_rig::parameter_file::memory::{BYTES, Memory};
 
-use crate::command::{Folder, Run, scarab};
+use crate::command::{Folder, Run, assert_contains};
 
 const NODES: &str = r#"
 [[node]]
@@ -87,85 +86,85 @@ fn content(exported: &str) -> &str {
     &exported[exported.find("schema").expect("a schema")..]
 }
 
-fn export(flash: &Path) -> Run {
-    scarab("kept export", &[flash])
+fn export(folder: &Folder) -> Run {
+    folder.scarab("kept export @flash.bin")
 }
 
-fn import(folder: &Folder, text: &str, flash: &Path) -> Run {
-    let file = folder.write("kept.toml", text);
-    scarab("kept import", &[&file, flash])
+fn import(folder: &Folder, text: &str) -> Run {
+    folder.write("kept.toml", text);
+    folder.scarab("kept import @kept.toml @flash.bin")
 }
 
 #[test]
 fn a_repeated_export_after_import_has_the_same_text() {
     let folder = Folder::new();
-    let (first, second, out) = (folder.path("first.bin"), folder.path("second.bin"), folder.path("out.toml"));
-    import(&folder, &text(), &first).ends_with(0);
-    let exported = export(&first).ends_with(0);
+    let (first, second) = (folder.path("flash.bin"), folder.path("second.bin"));
+    import(&folder, &text()).ends_with(0);
+    let exported = export(&folder).ends_with(0);
     assert_eq!(exported.errors, "");
     assert_eq!(content(&exported.printed), text());
-    import(&folder, &exported.printed, &second).ends_with(0);
-    scarab("kept export --out", &[&out, &second]).ends_with(0);
-    assert_eq!(fs::read_to_string(&out).expect("written"), exported.printed);
+    folder.write("kept.toml", &exported.printed);
+    folder.scarab("kept import @kept.toml @second.bin").ends_with(0);
+    folder.scarab("kept export --out @out.toml @second.bin").ends_with(0);
+    assert_eq!(folder.read("out.toml"), exported.printed);
     assert_eq!(fs::read(&first).expect("written"), fs::read(&second).expect("written"));
 
     // Second board of a file; the first is unchanged, and a repeated import writes nothing.
     let before = fs::read(&second).expect("written");
-    let file = folder.write("kept.toml", &exported.printed);
-    scarab("kept import --board 2", &[&file, &second]).ends_with(0);
-    scarab("kept import --board 2", &[&file, &second]).ends_with(0);
+    for _ in 0..2 {
+        folder.scarab("kept import --board 2 @kept.toml @second.bin").ends_with(0);
+    }
     let after = fs::read(&second).expect("written");
     assert_eq!((after.len(), &after[..BYTES], &after[BYTES..]), (2 * BYTES, &before[..], &before[..]));
-    let beyond = scarab("kept export --board 3", &[&second]).refusal();
-    assert!(beyond.contains("--board 3:") && beyond.contains("holds the flash of 2"), "{beyond}");
+    let beyond = folder.scarab("kept export --board 3 @second.bin").refusal();
+    assert_contains(&beyond, "--board 3:");
+    assert_contains(&beyond, "holds the flash of 2");
 }
 
 #[test]
 fn a_file_without_bounds_gives_models_without_bounds() {
     let folder = Folder::new();
-    let flash = folder.path("flash.bin");
     let bounds = |line: &&str| !line.contains("lower_bound");
     let older: Vec<String> = text().lines().filter(bounds).map(|line| format!("{line}\n")).collect();
-    import(&folder, &older.concat(), &flash).ends_with(0);
+    import(&folder, &older.concat()).ends_with(0);
     let none = text()
         .replace("inertia_lower_bound = 0.95", "inertia_lower_bound = 0.0")
         .replace("coulomb_nm = 3.1, viscous_nm_s_rad = 0.9", "coulomb_nm = 0.0, viscous_nm_s_rad = 0.0");
-    assert_eq!(content(&export(&flash).ends_with(0).printed), none);
+    assert_eq!(content(&export(&folder).ends_with(0).printed), none);
 }
 
 #[test]
 fn unnamed_parts_stay_and_calibrations_of_different_age_are_not_mixed() {
     let folder = Folder::new();
     let flash = folder.path("flash.bin");
-    let exported = import(&folder, "schema = 1\n", &flash).ends_with(0);
+    let exported = import(&folder, "schema = 1\n").ends_with(0);
     assert!(exported.printed.starts_with("flash: "), "{}", exported.printed);
-    let empty = export(&flash).ends_with(0);
+    let empty = export(&folder).ends_with(0);
     assert_eq!((content(&empty.printed), empty.errors.matches("absent: ").count()), ("schema = 1\n", 6));
 
-    import(&folder, &text(), &flash).ends_with(0);
+    import(&folder, &text()).ends_with(0);
     let knee =
         "schema = 1\n[[node]]\njoint = \"knee\"\nobjects = [{ index = 0x6065, subindex = 0, value = 7 }]\n";
-    import(&folder, knee, &flash).ends_with(0);
+    import(&folder, knee).ends_with(0);
     let line =
         "objects = [\n  { index = 0x6065, subindex = 0, name = \"Following error window\", value = 7 },\n]\n";
-    assert_eq!(content(&export(&flash).ends_with(0).printed), text().replace("objects = []\n", line));
+    assert_eq!(content(&export(&folder).ends_with(0).printed), text().replace("objects = []\n", line));
 
     let before = fs::read(&flash).expect("written");
     let alone = CALIBRATIONS.find("\n[[calibration]]\njoint = \"knee\"").expect("the second");
-    let refused = import(&folder, &format!("schema = 1\n{}", &CALIBRATIONS[..alone]), &flash).ends_with(3);
-    assert!(refused.errors.contains("the knee has an older one"), "{}", refused.errors);
+    let refused = import(&folder, &format!("schema = 1\n{}", &CALIBRATIONS[..alone])).ends_with(3);
+    refused.warns("the knee has an older one");
     assert_eq!(fs::read(&flash).expect("still there"), before);
 }
 
 #[test]
 fn a_board_uses_an_imported_flash_but_refuses_another_leg_s_model() {
-    let folder = Folder::new();
     let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-    let start = |text: &str, name: &str| {
-        let flash = folder.path(name);
-        import(&folder, text, &flash).ends_with(0);
+    let start = |text: &str| {
+        let folder = Folder::new();
+        import(&folder, text).ends_with(0);
         let options = ServeOptions::local(1);
-        let bytes = fs::read(&flash).expect("written");
+        let bytes = fs::read(folder.path("flash.bin")).expect("written");
         let mut network = network::<2, 13>(&leg, &options, Some(&bytes), &[]).expect("the default leg");
         let board = &mut network.boards()[0];
         let control = board.rig.leg.control();
@@ -173,7 +172,7 @@ fn a_board_uses_an_imported_flash_but_refuses_another_leg_s_model() {
         assert_eq!(control.model(), empty.as_ref(), "the feedforward");
         (board.nodes().each_ref().map(|node| node.id().number()), [empty, worn])
     };
-    let (numbers, models) = start(&text(), "own.bin");
+    let (numbers, models) = start(&text());
     let [empty, worn] = models.map(|model| model.expect("a model of this leg"));
     let [hip, knee] = empty.equivalent_parameters();
     assert_eq!(numbers, [9, 2]);
@@ -183,7 +182,7 @@ fn a_board_uses_an_imported_flash_but_refuses_another_leg_s_model() {
     assert_eq!([empty.assured(), worn.assured()], [&bounds; 2]);
 
     let [model, worn_model] = ["model", "worn_model"].map(|table| model(table, "0123456789abcdef"));
-    let (numbers, models) = start(&format!("schema = 1\n{NODES}{model}{worn_model}"), "other.bin");
+    let (numbers, models) = start(&format!("schema = 1\n{NODES}{model}{worn_model}"));
     assert_eq!((numbers, models), ([9, 2], [None; 2]));
 }
 
@@ -202,11 +201,11 @@ fn damaged_parts_are_reported_and_the_rest_is_exported() {
         (&[0x02, 0x20, 0, 2, 1, 0], "0x2002:0 (Bit rate after the next start): a node refuses this value"),
     ] {
         fs::remove_file(&flash).ok();
-        import(&folder, &format!("schema = 1\n{CALIBRATIONS}"), &flash).ends_with(0);
+        import(&folder, &format!("schema = 1\n{CALIBRATIONS}")).ends_with(0);
         let mut memory = Memory::new(Some(&fs::read(&flash).expect("written")));
         assert!(memory.keep_objects(off, 0, bytes) && memory.keep_objects(off, 1, &[]));
         fs::write(&flash, memory.bytes()).expect("a temporary file");
-        let run = export(&flash).ends_with(3);
+        let run = export(&folder).ends_with(3);
         let expected = format!("schema = 1\n\n[[node]]\njoint = \"knee\"\nobjects = []\n{CALIBRATIONS}");
         assert_eq!(content(&run.printed), expected);
         let said: Vec<&str> = run.errors.lines().collect();
@@ -219,22 +218,20 @@ fn damaged_parts_are_reported_and_the_rest_is_exported() {
     let noise: Vec<u8> =
         (0..BYTES as u32).map(|index| (index.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     fs::write(&flash, &noise).expect("a temporary file");
-    let run = export(&flash).ends_with(3);
+    let run = export(&folder).ends_with(3);
     assert_eq!((content(&run.printed), run.errors.matches("damaged: ").count()), ("schema = 1\n", 1));
-    let run = import(&folder, &text(), &flash).ends_with(3);
-    assert!(run.errors.contains("no record in it can be read: nothing was written"), "{}", run.errors);
+    import(&folder, &text()).ends_with(3).warns("no record in it can be read: nothing was written");
     assert_eq!(fs::read(&flash).expect("still there"), noise);
 
     // A damaged record (followed by zeros that fill the word) without a copy: the log cannot repair it, and
     // the file is not erased.
     fs::remove_file(&flash).ok();
-    import(&folder, "schema = 1\n[[node]]\njoint = \"hip\"\nobjects = []\n", &flash).ends_with(0);
+    import(&folder, "schema = 1\n[[node]]\njoint = \"hip\"\nobjects = []\n").ends_with(0);
     let mut bytes = fs::read(&flash).expect("written");
     let last = bytes.iter().take(BYTES / 4).rposition(|byte| !matches!(byte, 0 | 0xFF)).expect("a record");
     bytes[last] ^= 1;
     fs::write(&flash, &bytes).expect("a temporary file");
-    let run = export(&flash).ends_with(3);
-    assert!(run.errors.contains("damaged: "), "{}", run.errors);
+    export(&folder).ends_with(3).warns("damaged: ");
 }
 
 /// Replacements in a complete file, each with the words of the refusal.
@@ -294,7 +291,7 @@ const REPLACEMENTS: &[(&str, &str, &str)] = &[
 fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
     let folder = Folder::new();
     let flash = folder.path("flash.bin");
-    import(&folder, &text(), &flash).ends_with(0);
+    import(&folder, &text()).ends_with(0);
     let before = fs::read(&flash).expect("written");
     let whole = text();
     let own = own_fingerprint();
@@ -302,7 +299,7 @@ fn an_invalid_file_is_refused_with_its_reason_and_the_flash_unchanged() {
     for (old, new, why) in REPLACEMENTS.iter().copied().chain([short]) {
         let bad = whole.replacen(old, new, 1);
         assert_ne!(bad, whole, "{old}");
-        let said = import(&folder, &bad, &flash).refusal();
+        let said = import(&folder, &bad).refusal();
         assert!(
             said.starts_with("error: ") && said.contains("kept.toml:") && said.contains(why),
             "{new}: {said}"
@@ -325,13 +322,10 @@ fn too_many_objects_and_a_file_of_another_size_are_refused() {
         }))
         .collect();
     let many = format!("schema = 1\n[[node]]\njoint = \"hip\"\nobjects = [{}]\n", many.join(", "));
-    let said = import(&folder, &many, &flash).refusal();
-    assert!(said.contains("more than the 400 bytes that a board stores for a node"), "{said}");
+    import(&folder, &many).refuses("more than the 400 bytes that a board stores for a node");
     // A file of another size is not a flash and stays unchanged.
     fs::write(&flash, [0xFF; 100]).expect("a temporary file");
-    let said = import(&folder, &text(), &flash).refusal();
-    assert!(said.contains("100 bytes; the flash of 1 to 4 boards has 32768 each"), "{said}");
+    import(&folder, &text()).refuses("100 bytes; the flash of 1 to 4 boards has 32768 each");
     assert_eq!(fs::read(&flash).expect("still there"), [0xFF; 100]);
-    let said = export(&folder.path("none.bin")).refusal();
-    assert!(said.contains("does not exist"), "{said}");
+    folder.scarab("kept export @none.bin").refuses("does not exist");
 }

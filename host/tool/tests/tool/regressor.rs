@@ -1,6 +1,6 @@
 //! `scarab regressor` compared with an independent rigid-body library.
 
-use crate::command::{Folder, Table, scarab};
+use crate::command::{Folder, Table};
 use scarab::real::sin_cos;
 use serde_json::Value;
 use std::io::Read;
@@ -80,9 +80,8 @@ fn errors(table: &Table) -> (f64, f64) {
 #[test]
 fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_offset() {
     let folder = Folder::new();
-    let file = folder.write("leg.toml", &leg("truth"));
-    let arguments = format!("regressor --dh --states {} --leg", states());
-    let run = scarab(&arguments, &[&file]).ends_with(0);
+    folder.write("leg.toml", leg("truth"));
+    let run = folder.scarab(&format!("regressor --dh --states {} --leg @leg.toml", states())).ends_with(0);
     assert_eq!(run.errors, "");
     let table = Table::parse(&run.printed);
     assert_eq!(table.header.join(","), header());
@@ -97,7 +96,8 @@ fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_of
 
     // The device's arithmetic rounds about ten times, at 6e-8; a visible difference proves that it
     // was used.
-    let run = scarab(&format!("regressor --dh --f32 --states {} --leg", states()), &[&file]).ends_with(0);
+    let arguments = format!("regressor --dh --f32 --states {} --leg @leg.toml", states());
+    let run = folder.scarab(&arguments).ends_with(0);
     let (torque, elements) = errors(&Table::parse(&run.printed));
     assert!((1e-9..1e-6).contains(&torque), "torque {torque:e}");
     assert!((1e-9..1e-6).contains(&elements), "regressor {elements:e}");
@@ -107,7 +107,7 @@ fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_of
 fn angles_are_anatomical_unless_the_option_dh_is_given() {
     let folder = Folder::new();
     // Direction -1, zero at 20 degrees.
-    let file = folder.write("leg.toml", &leg("truth"));
+    folder.write("leg.toml", leg("truth"));
     let zero = 20.0_f64.to_radians();
     let anatomical = [[0.4, 1.1], [-0.7, 0.9], [3.0, -5.0]];
     let [angles, speeds, accelerations] = anatomical;
@@ -115,8 +115,8 @@ fn angles_are_anatomical_unless_the_option_dh_is_given() {
     let printed = |option: &str, header: &str, numbers: [[f64; 2]; 3]| {
         let numbers: Vec<String> =
             numbers.as_flattened().iter().map(|number| format!("{number:e}")).collect();
-        let states = folder.write("states.csv", &format!("{header}\n{}\n", numbers.join(",")));
-        let run = scarab(&format!("regressor {option} --leg"), &[&file, "--states".as_ref(), &states]);
+        folder.write("states.csv", format!("{header}\n{}\n", numbers.join(",")));
+        let run = folder.scarab(&format!("regressor {option} --leg @leg.toml --states @states.csv"));
         Table::parse(&run.ends_with(0).printed)
     };
     let short = "q1,q2,qd1,qd2,qdd1,qdd2";
@@ -141,9 +141,9 @@ fn angles_are_anatomical_unless_the_option_dh_is_given() {
 fn single_precision_rounds_the_states_too() {
     let folder = Folder::new();
     // 0.1 is not exact in either precision; the element is a copy of the acceleration.
-    let states = folder.write("states.csv", "q1,qd1,qdd1\n0,0,0.1\n");
+    folder.write("states.csv", "q1,qd1,qdd1\n0,0,0.1\n");
     let element = |arguments: &str| {
-        let run = scarab(&format!("regressor --leg sp {arguments} --states"), &[&states]).ends_with(0);
+        let run = folder.scarab(&format!("regressor --leg sp {arguments} --states @states.csv")).ends_with(0);
         Table::parse(&run.printed).column("y1_ZZ1")[0]
     };
     assert_eq!(element(""), 0.1);
@@ -154,20 +154,20 @@ fn single_precision_rounds_the_states_too() {
 fn torque_uses_the_truth_else_the_prior_else_is_empty() {
     let folder = Folder::new();
     let states = states();
-    let printed = |name: &str, text: &str| {
-        let file = folder.write(name, text);
-        scarab(&format!("regressor --dh --states {states} --leg"), &[&file]).ends_with(0).printed
+    let printed = |text: &str| {
+        folder.write("leg.toml", text);
+        folder.scarab(&format!("regressor --dh --states {states} --leg @leg.toml")).ends_with(0).printed
     };
-    let truth = printed("truth.toml", &leg("truth"));
-    assert_eq!(printed("prior.toml", &leg("prior")), truth);
+    let truth = printed(&leg("truth"));
+    assert_eq!(printed(&leg("prior")), truth);
     let with_both = leg("truth").replace(
         "[[joint]]",
         "[[joint]]\nprior = { mass = 1.0, com = [0.1, 0.0, 0.0], inertia_com = [0.1, 0.0, 0.0, 0.1, 0.0, 0.1] }",
     );
-    assert_eq!(printed("both.toml", &with_both), truth);
+    assert_eq!(printed(&with_both), truth);
     let bare: Vec<String> =
         leg("truth").lines().filter(|line| !line.starts_with("truth")).map(str::to_owned).collect();
-    let bare = printed("bare.toml", &bare.join("\n"));
+    let bare = printed(&bare.join("\n"));
     for (bare, full) in bare.lines().zip(truth.lines()).skip(1) {
         let mut fields: Vec<&str> = full.split(',').collect();
         (fields[1], fields[2]) = ("", "");
@@ -178,15 +178,16 @@ fn torque_uses_the_truth_else_the_prior_else_is_empty() {
 #[test]
 fn columns_are_found_by_name_for_any_number_of_joints() {
     let folder = Folder::new();
-    let plain = folder.write("plain.csv", "q1,qd1,qdd1\n0.3,-1.5,20\n0.4,2,-3e1\n");
-    let mixed =
-        folder.write("mixed.csv", "note,qdd1,q2,q1,k,qd1\r\na,20,9,0.3,7,-1.5\r\n\r\nb,-30,9,0.4,8,2\r\n");
-    let printed = |states| scarab("regressor --leg sp --states", &[states]).ends_with(0).printed;
-    assert_eq!(printed(&plain), printed(&mixed));
-    assert_eq!(printed(&plain).lines().count(), 3);
-    let states = folder.write("three.csv", "q1,q2,q3,qd1,qd2,qd3,qdd1,qdd2,qdd3\n0.1,0.2,0.3,1,2,3,4,5,6\n");
-    let table =
-        Table::parse(&scarab("regressor --leg paper-chain --states", &[&states]).ends_with(0).printed);
+    let printed = |leg: &str, states: &str| {
+        folder.write("states.csv", states);
+        folder.scarab(&format!("regressor --leg {leg} --states @states.csv")).ends_with(0).printed
+    };
+    let plain = printed("sp", "q1,qd1,qdd1\n0.3,-1.5,20\n0.4,2,-3e1\n");
+    let mixed = printed("sp", "note,qdd1,q2,q1,k,qd1\r\na,20,9,0.3,7,-1.5\r\n\r\nb,-30,9,0.4,8,2\r\n");
+    assert_eq!(plain, mixed);
+    assert_eq!(plain.lines().count(), 3);
+    let states = "q1,q2,q3,qd1,qd2,qd3,qdd1,qdd2,qdd3\n0.1,0.2,0.3,1,2,3,4,5,6\n";
+    let table = Table::parse(&printed("paper-chain", states));
     assert_eq!(table.header.len(), 1 + 3 + 3 * 30);
     assert!(table.rows[0].iter().all(|number| number.is_finite()));
 }
@@ -196,7 +197,7 @@ fn bad_states_are_refused_with_file_line_and_reason() {
     let folder = Folder::new();
     let refusal = |text: &str| {
         let states = folder.write("states.csv", text);
-        let message = scarab("regressor --leg sp --states", &[&states]).refusal();
+        let message = folder.scarab("regressor --leg sp --states @states.csv").refusal();
         message.replace(&states.display().to_string(), "states.csv")
     };
     assert_eq!(
@@ -204,8 +205,8 @@ fn bad_states_are_refused_with_file_line_and_reason() {
         "error: states.csv:1: the header has no column `qdd1`; its columns are: q1, qd1; needed are: q1, qd1, qdd1\n"
     );
     // Nothing is written before all states are valid; blank lines count.
-    let states = folder.write("states.csv", "q1,qd1,qdd1\n0,0,1e30\n\n0,0,1e39\n");
-    let message = scarab("regressor --leg sp --f32 --states", &[&states]).refusal();
+    folder.write("states.csv", "q1,qd1,qdd1\n0,0,1e30\n\n0,0,1e39\n");
+    let message = folder.scarab("regressor --leg sp --f32 --states @states.csv").refusal();
     let reason = ":4: the torque of this state exceeds the range of double precision\n";
     assert!(message.ends_with(reason), "{message}");
 }

@@ -1,30 +1,24 @@
 //! `scarab replay` as an interface: valid recordings, contents of the report and the torque table.
 
-use crate::command::{Folder, MUJOCO, base, fit, reasons, scarab};
+use crate::command::{Folder, MUJOCO, base, fit, reasons};
 use crate::pendulum::{Motion, TRUTH, finds_the_truth, leg};
 use scarab::ident::record::recorder::SMOOTHING_BANDWIDTHS;
 use scarab::ident::{Kernel, LowPass};
 use scarab::real::sqrt;
 use serde_json::Value;
-use std::path::Path;
 
 /// Replays the named recordings of the folder with its `leg.toml`; writes `report.json` and `torque.csv`.
 fn replay(folder: &Folder, files: &[&str], arguments: &str) -> (Value, crate::command::Run) {
-    let files: Vec<_> = files.iter().map(|name| folder.path(name)).collect();
-    let (leg, json, csv) = (folder.path("leg.toml"), folder.path("report.json"), folder.path("torque.csv"));
-    let mut paths: Vec<&Path> = files.iter().map(|path| &**path).collect();
-    paths.extend([Path::new("--leg"), &leg, Path::new("--json"), &json, Path::new("--csv"), &csv]);
-    let arguments = arguments.replace('@', &format!("{}/", folder.path("").display()));
-    paths.extend(arguments.split_whitespace().map(Path::new));
-    let run = scarab("replay", &paths).ends_with(0);
-    (folder.json("report.json"), run)
+    let (run, report) = folder
+        .reported(&format!("replay {} --leg @leg.toml --csv @torque.csv {arguments}", files.join(" ")), 0);
+    (report, run)
 }
 
 fn folder_with(more: &str, recordings: &[(&str, Motion)]) -> Folder {
     let folder = Folder::new();
-    folder.write("leg.toml", &leg(more));
+    folder.write("leg.toml", leg(more));
     for (name, motion) in recordings {
-        folder.write(name, &motion.csv());
+        folder.write(name, motion.csv());
     }
     folder
 }
@@ -35,7 +29,7 @@ fn jittered_stamps_and_other_rates_give_the_same_parameters() {
         [(500.0, 0.0), (500.0, 0.8e-3), (1000.0, 0.4e-3), (137.0, 1e-3), (3333.0, 1e-4)]
     {
         let folder = folder_with("", &[("a.csv", Motion { rate_hz, jitter_s, ..Motion::default() })]);
-        let (report, run) = replay(&folder, &["a.csv"], "");
+        let (report, run) = replay(&folder, &["@a.csv"], "");
         assert_eq!(run.errors, "");
         println!("{rate_hz} Hz, {jitter_s} s of jitter: {:.2} sigma", finds_the_truth(&report));
     }
@@ -44,10 +38,10 @@ fn jittered_stamps_and_other_rates_give_the_same_parameters() {
 #[test]
 fn direction_inverts_angle_and_torque_the_zero_offset_shifts_the_angle() {
     let plain = folder_with("", &[("a.csv", Motion::default())]);
-    let (expected, _) = replay(&plain, &["a.csv"], "--split 0.5");
+    let (expected, _) = replay(&plain, &["@a.csv"], "--split 0.5");
     let turned = Motion { direction: -1.0, zero_offset: 30_f64.to_radians(), ..Motion::default() };
     let folder = folder_with("direction = -1\nzero_offset_deg = 30.0\n", &[("a.csv", turned)]);
-    let (report, _) = replay(&folder, &["a.csv"], "--split 0.5");
+    let (report, _) = replay(&folder, &["@a.csv"], "--split 0.5");
     for (name, _) in TRUTH {
         let difference = base(&report, name, "value") - base(&expected, name, "value");
         // Nine digits in the file and single precision: far below the noise.
@@ -67,9 +61,9 @@ fn several_files_form_one_training_set_without_windows_across_files() {
     // The pendulum jumps by two radians between the files.
     let (one, other) = (Motion::default(), Motion { centre: -1.6, seed: 2, ..Motion::default() });
     let folder = folder_with("", &[("a.csv", one), ("b.csv", other)]);
-    let (alone, _) = replay(&folder, &["a.csv"], "");
-    let (both, run) = replay(&folder, &["a.csv", "b.csv"], "");
-    let (reversed, _) = replay(&folder, &["b.csv", "a.csv"], "");
+    let (alone, _) = replay(&folder, &["@a.csv"], "");
+    let (both, run) = replay(&folder, &["@a.csv", "@b.csv"], "");
+    let (reversed, _) = replay(&folder, &["@b.csv", "@a.csv"], "");
     finds_the_truth(&both);
     assert!((both["simulated_s"].as_f64().expect("a number") - 20.0).abs() < 1e-6);
     // Twice the data: 0.71. The scatter of two recordings is |z| of it: 3 % exceed 2.1, which is a ratio of
@@ -100,11 +94,11 @@ fn several_files_form_one_training_set_without_windows_across_files() {
 fn a_split_trains_on_the_first_part_of_each_file_and_holds_out_the_rest() {
     let samples = Motion::default().samples();
     let folder = folder_with("", &[("whole.csv", Motion::default())]);
-    folder.write("first.csv", &crate::pendulum::csv(&samples[..3000]));
-    folder.write("rest.csv", &crate::pendulum::csv(&samples[3000..]));
-    let (split, run) = replay(&folder, &["whole.csv"], "--split 0.6");
-    let torques = std::fs::read_to_string(folder.path("torque.csv")).expect("written");
-    let (apart, _) = replay(&folder, &["first.csv"], "--validate @rest.csv");
+    folder.write("first.csv", crate::pendulum::csv(&samples[..3000]));
+    folder.write("rest.csv", crate::pendulum::csv(&samples[3000..]));
+    let (split, run) = replay(&folder, &["@whole.csv"], "--split 0.6");
+    let torques = folder.read("torque.csv");
+    let (apart, _) = replay(&folder, &["@first.csv"], "--validate @rest.csv");
     for part in ["training", "validation", "bso"] {
         assert_eq!(split[part], apart[part], "{part}");
     }
@@ -115,8 +109,9 @@ fn a_split_trains_on_the_first_part_of_each_file_and_holds_out_the_rest() {
         let [one, other] = [one, other].map(|parameter| parameter["sigma"].as_f64().expect("a number"));
         assert!((0.6..1.6).contains(&(one / other)), "{one} {other}");
     }
-    assert_eq!(std::fs::read_to_string(folder.path("torque.csv")).expect("written"), torques);
-    assert!(run.printed.contains("validation") && run.printed.contains("6.00"), "{}", run.printed);
+    assert_eq!(folder.read("torque.csv"), torques);
+    run.prints("validation");
+    run.prints("6.00");
 }
 
 #[test]
@@ -124,7 +119,7 @@ fn filtering_both_columns_of_the_table_gives_the_printed_error() {
     let motions =
         [(0.4, 1), (-0.3, 2), (0.8, 3)].map(|(centre, seed)| Motion { centre, seed, ..Motion::default() });
     let folder = folder_with("", &[("a.csv", motions[0]), ("b.csv", motions[1]), ("c.csv", motions[2])]);
-    let (report, _) = replay(&folder, &["a.csv"], "--bandwidth 6 --validate @b.csv @c.csv");
+    let (report, _) = replay(&folder, &["@a.csv"], "--bandwidth 6 --validate @b.csv @c.csv");
     let table = folder.table("torque.csv");
     assert_eq!(table.header, ["t_s", "tau1_measured_Nm", "tau1_predicted_Nm", "file"]);
 
@@ -168,7 +163,7 @@ fn a_file_with_more_joints_than_the_leg_gives_a_warning() {
         Motion::default().samples().iter().map(|[t, q, tau]| format!("{t:.4},{q},{tau},0.1,0.2")).collect();
     let text = "t_s,q1_rad,tau1_Nm,q2_rad,tau2_Nm\n".to_owned() + &rows.join("\n");
     folder.write("a.csv", &text);
-    let (_, run) = replay(&folder, &["a.csv"], "");
+    let (_, run) = replay(&folder, &["@a.csv"], "");
     assert!(
         run.errors.starts_with("warning: ")
             && run.errors.contains("a.csv: holds 2 joints, the leg `pendulum` has 1"),
@@ -183,27 +178,27 @@ fn a_last_line_without_line_end_gives_a_warning() {
     let whole = Motion::default().csv();
     // Cut within the last number.
     folder.write("a.csv", &whole[..whole.len() - 3]);
-    let (_, run) = replay(&folder, &["a.csv"], "");
+    let (_, run) = replay(&folder, &["@a.csv"], "");
     let words = "a.csv: the last line has no line end: if the file was cut, its last value is wrong";
-    assert!(run.errors.contains(words), "{}", run.errors);
+    run.warns(words);
 }
 
 #[test]
 fn angles_outside_the_range_of_the_leg_give_a_warning() {
     let folder = folder_with("", &[("a.csv", Motion { centre: 9.0, ..Motion::default() })]);
-    let (_, run) = replay(&folder, &["a.csv"], "");
-    assert!(run.errors.contains("q1_rad goes from"), "{}", run.errors);
-    assert!(run.errors.contains("the range of `only` is -200 to 200 deg"), "{}", run.errors);
+    let (_, run) = replay(&folder, &["@a.csv"], "");
+    run.warns("q1_rad goes from");
+    run.warns("the range of `only` is -200 to 200 deg");
 }
 
 #[test]
 fn a_result_without_validation_is_reported_as_such() {
     let folder = folder_with("", &[("a.csv", Motion::default())]);
     let note = "not validated: no motion was held out";
-    let (report, run) = replay(&folder, &["a.csv"], "");
+    let (report, run) = replay(&folder, &["@a.csv"], "");
     assert!(run.printed.contains(note) && run.printed.contains("verdict: accepted, not validated"));
     assert_eq!((&report["validation"], &report["validated"]), (&Value::Array(Vec::new()), &false.into()));
-    let (report, run) = replay(&folder, &["a.csv"], "--split 0.5");
+    let (report, run) = replay(&folder, &["@a.csv"], "--split 0.5");
     assert!(!run.printed.contains("not validated"), "{}", run.printed);
     assert_eq!(report["validated"], true);
 }
@@ -262,10 +257,7 @@ fn is_complete(report: &Value, joints: usize) {
 #[test]
 fn reports_are_complete_and_free_of_nan_whatever_the_verdict() {
     let folder = Folder::new();
-    let json = folder.path("report.json");
-    let arguments = format!("replay {MUJOCO} --leg mujoco-leg --split 0.6");
-    scarab(&arguments, &[Path::new("--json"), &json]).ends_with(0);
-    let report = folder.json("report.json");
+    let (_, report) = folder.reported(&format!("replay {MUJOCO} --leg mujoco-leg --split 0.6"), 0);
     is_complete(&report, 2);
     assert_eq!((&report["verdict"], reasons(&report).len()), (&"accepted".into(), 0));
     assert!(report["parameters"].as_array().expect("a list").iter().all(|entry| entry["value"].is_number()));
@@ -273,15 +265,12 @@ fn reports_are_complete_and_free_of_nan_whatever_the_verdict() {
     assert_eq!(base(&report, "HX2", "value"), report["parameters"][14 + 6]["value"]);
 
     // Without motion, prior or truth all values are unknown.
-    folder.write("leg.toml", &leg(""));
+    folder.write("leg.toml", leg(""));
     let still: Vec<[f64; 3]> = (0..2500).map(|k| [f64::from(k) * 0.002, 0.3, 1.5]).collect();
-    let (leg, still) = (folder.path("leg.toml"), folder.write("still.csv", &crate::pendulum::csv(&still)));
-    let torque = folder.path("torque.csv");
-    let options = [Path::new("--json"), &json, Path::new("--csv"), &torque, Path::new("--leg"), &leg, &still];
-    let run = scarab("replay --split 0.5", &options).ends_with(3);
-    assert!(run.printed.contains("verdict: refused, unexcited"), "{}", run.printed);
+    folder.write("still.csv", crate::pendulum::csv(&still));
+    let (run, report) = folder.reported("replay --split 0.5 --csv @torque.csv --leg @leg.toml @still.csv", 3);
+    run.prints("verdict: refused, unexcited");
     assert!(!run.printed.contains("NaN"), "{}", run.printed);
-    let report = folder.json("report.json");
     is_complete(&report, 1);
     assert_eq!(report["verdict"], "refused");
     assert!(reasons(&report).contains(&"unexcited"), "{:?}", reasons(&report));
@@ -294,7 +283,7 @@ fn reports_are_complete_and_free_of_nan_whatever_the_verdict() {
 fn the_same_seed_gives_the_same_report_and_another_the_same_optimum() {
     let folder = folder_with("", &[("a.csv", Motion::default())]);
     let report = |arguments: &str| {
-        let (mut report, _) = replay(&folder, &["a.csv"], arguments);
+        let (mut report, _) = replay(&folder, &["@a.csv"], arguments);
         report["wall_s"] = Value::Null;
         report
     };

@@ -1,9 +1,8 @@
 //! Errors of a logging chain are estimated, refused and named by `scarab replay`.
 
-use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, recordings, scarab};
+use crate::command::{Folder, MUJOCO, Run, Table, assert_contains, base, list, reasons, recordings, scarab};
 use serde_json::Value;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
 
 /// Recording of the MuJoCo leg: time, angles and torques of both joints.
 fn samples() -> Vec<[f64; 5]> {
@@ -32,10 +31,10 @@ fn late(joint: usize, by: usize) -> Vec<[f64; 5]> {
 /// Identifies from two thirds of the samples.
 fn replay(samples: &[[f64; 5]], arguments: &str, code: i32) -> (Value, Run) {
     let folder = Folder::new();
-    let (file, json) = (folder.write("walk.csv", &csv(samples)), folder.path("report.json"));
-    let arguments = format!("replay --leg mujoco-leg --split 0.666666 {arguments}");
-    let run = scarab(&arguments, &[&file, Path::new("--json"), &json]).ends_with(code);
-    (folder.json("report.json"), run)
+    folder.write("walk.csv", csv(samples));
+    let arguments = format!("replay --leg mujoco-leg --split 0.666666 {arguments} @walk.csv");
+    let (run, report) = folder.reported(&arguments, code);
+    (report, run)
 }
 
 fn direction<'a>(report: &'a Value, name: &str, joint: usize) -> &'a Value {
@@ -67,13 +66,7 @@ fn quantised(bits: i32) -> Vec<[f64; 5]> {
 fn coarse_encoders_widen_sigma_or_are_refused_with_a_lower_bandwidth() {
     let (clean, _) = replay(&samples(), "--bandwidth 8", 0);
     let (coarse, _) = replay(&quantised(12), "--bandwidth 8", 0);
-    assert!(
-        coarse["base_parameters"]
-            .as_array()
-            .expect("a list")
-            .iter()
-            .any(|row| row["sigma_from"] == "encoder")
-    );
+    assert!(list(&coarse, "base_parameters").iter().any(|row| row["sigma_from"] == "encoder"));
     let difference = |one: &Value, name: &str| {
         let [right, wrong] = [&clean, one].map(|report| base(report, name, "value"));
         (wrong - right).abs() / base(one, name, "sigma")
@@ -83,7 +76,7 @@ fn coarse_encoders_widen_sigma_or_are_refused_with_a_lower_bandwidth() {
     }
     let (refused, run) = replay(&quantised(10), "--bandwidth 16", 3);
     assert_eq!(refused["likely_cause"]["name"], "encoder_steps");
-    assert!(run.printed.contains("encoder too coarse at this bandwidth"), "{}", run.printed);
+    run.prints("encoder too coarse at this bandwidth");
     let (chosen, _) = replay(&quantised(10), "--bandwidth auto", 0);
     assert_eq!(chosen["bandwidth_chosen"], true);
     assert!(number(&chosen["bandwidth_hz"]) < 8.0);
@@ -135,7 +128,7 @@ fn a_larger_bandwidth_is_proposed_where_the_encoders_allow_it() {
     let (at_5_hz, run) = replay(&samples(), "--bandwidth 5", 0);
     let proposed = number(&at_5_hz["bandwidth_proposed_hz"]);
     assert!(proposed > 5.0);
-    assert!(run.printed.contains(&format!("`--bandwidth {proposed}`")), "{}", run.printed);
+    run.prints(&format!("`--bandwidth {proposed}`"));
     let (there, _) = replay(&samples(), &format!("--bandwidth {proposed}"), 0);
     assert!(there["bandwidth_proposed_hz"].is_null());
     let (chosen, _) = replay(&samples(), "--bandwidth auto", 0);
@@ -149,8 +142,8 @@ fn encoders_too_coarse_for_the_stribeck_search_are_reported_with_its_bandwidth()
     let (coarse, run) = replay(&quantised(14), "--bandwidth 8", 0);
     let proposed = number(&coarse["bandwidth_for_stribeck_hz"]);
     assert!(proposed < 8.0 && coarse["bandwidth_proposed_hz"].is_null(), "{proposed}");
-    assert!(run.printed.contains(&format!("`--bandwidth {proposed}` searches for it")), "{}", run.printed);
-    assert!(run.printed.contains("not searched: the encoder is too coarse"), "{}", run.printed);
+    run.prints(&format!("`--bandwidth {proposed}` searches for it"));
+    run.prints("not searched: the encoder is too coarse");
     let (there, _) = replay(&quantised(14), &format!("--bandwidth {proposed}"), 0);
     assert!(there["bandwidth_for_stribeck_hz"].is_null());
 }
@@ -168,7 +161,8 @@ fn lengths_that_a_recording_hardly_tests_are_reported() {
 #[test]
 fn sigma_states_its_parts_by_noise_and_by_misfit() {
     let (report, run) = replay(&samples(), "", 0);
-    assert!(run.printed.contains("of noise") && run.printed.contains("of misfit"), "{}", run.printed);
+    run.prints("of noise");
+    run.prints("of misfit");
     for name in NAMES {
         let [sigma, noise, misfit] =
             ["sigma", "sigma_noise", "sigma_misfit"].map(|part| base(&report, name, part));
@@ -201,9 +195,9 @@ fn damage_of_the_recording_is_not_called_contact() {
     {
         for bandwidth in ["8", "16"] {
             let folder = Folder::new();
-            let (file, json) = (folder.write("walk.csv", &csv(&rows)), folder.path("report.json"));
-            let arguments = format!("replay --leg mujoco-leg --split 0.666666 --bandwidth {bandwidth}");
-            scarab(&arguments, &[&file, Path::new("--json"), &json]);
+            folder.write("walk.csv", csv(&rows));
+            let options = format!("--split 0.666666 --bandwidth {bandwidth} --json @report.json");
+            folder.scarab(&format!("replay --leg mujoco-leg @walk.csv {options}"));
             let report = folder.json("report.json");
             assert!(!reasons(&report).contains(&"contact"), "{name} at {bandwidth} Hz: {report}");
         }
@@ -229,8 +223,9 @@ fn a_right_recording_is_accepted_and_reports_every_direction() {
         // The model is right, so the misfit is the noise, within the scatter of its estimate.
         assert!((number(ratio) - 1.0).abs() < 0.2, "{ratio}");
     }
-    assert!(run.printed.contains("torque of joint 1: ") && run.printed.contains(" ms "), "{}", run.printed);
-    assert!(run.printed.contains("misfit over noise: joint 1: "), "{}", run.printed);
+    run.prints("torque of joint 1: ");
+    run.prints(" ms ");
+    run.prints("misfit over noise: joint 1: ");
 }
 
 #[test]
@@ -242,7 +237,7 @@ fn a_torque_20_ms_late_is_refused_with_its_joint_and_size() {
         assert_eq!((cause["name"].as_str(), cause["joint"].as_u64()), (Some("delay"), Some(joint as u64)));
         let (value, sigma) = (number(&cause["value"]), number(&cause["sigma"]));
         assert!((value - 20.0).abs() < 4.0 * sigma && sigma < 3.0, "{value} +- {sigma}");
-        assert!(run.printed.contains("likely cause: delay: torque of joint"), "{}", run.printed);
+        run.prints("likely cause: delay: torque of joint");
     }
 }
 
@@ -340,21 +335,20 @@ fn two_wrong_units_are_named_together_with_the_options_that_read_them() {
             row[1..3].iter_mut().for_each(|value| *value *= angle);
             row[3..].iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
         }
-        let (file, json) = (folder.write("walk.csv", &csv(&wrong)), folder.path("report.json"));
-        let leg = folder.write("leg.toml", leg);
-        let run = |options: &str| {
-            let arguments = format!("replay --split 0.666666 {options} --leg");
-            scarab(&arguments, &[&leg, &file, Path::new("--json"), &json])
+        folder.write("walk.csv", csv(&wrong));
+        folder.write("leg.toml", leg);
+        let report = |options: &str, code: i32| {
+            let arguments = format!("replay --split 0.666666 {options} --leg @leg.toml @walk.csv");
+            folder.reported(&arguments, code).1
         };
-        run("").ends_with(3);
-        let report = folder.json("report.json");
-        let cause = &report["likely_cause"];
+        let torque_report = report("", 3);
+        let cause = &torque_report["likely_cause"];
         assert_eq!(cause["name"], name, "{units}: {cause}");
         let options = format!("--columns {},{} --units {units}", angles(columns.0), torques(columns.1));
         let words = cause["words"].as_str().expect("words");
         assert!(words.ends_with(&format!("; read it so by {options}")), "{units}: {words}");
         if !words.contains("Then state each joint") {
-            run(&options).ends_with(0);
+            report(&options, 0);
         }
     }
 }
@@ -370,11 +364,10 @@ fn currents_that_were_read_as_torques_are_suspected_by_the_scale_of_the_prior() 
     assert!(stated != leg && unknown != leg);
     let mut currents = samples();
     currents.iter_mut().flat_map(|row| &mut row[3..]).for_each(|torque| *torque /= CONSTANT);
-    let file = folder.write("walk.csv", &csv(&currents));
-    let run = |leg: &str, arguments: &str| {
-        let leg = folder.write("leg.toml", leg);
-        let arguments = format!("replay --split 0.666666 {arguments} --leg");
-        scarab(&arguments, &[&leg, &file])
+    let run = |leg: &str, samples: &[[f64; 5]], arguments: &str| {
+        folder.write("walk.csv", csv(samples));
+        folder.write("leg.toml", leg);
+        folder.scarab(&format!("replay --split 0.666666 {arguments} --leg @leg.toml @walk.csv"))
     };
     let options = reading("i1=tau1_Nm,i2=tau2_Nm", "s,rad,A");
     for (leg, words) in [
@@ -384,31 +377,25 @@ fn currents_that_were_read_as_torques_are_suspected_by_the_scale_of_the_prior() 
             "in its shape: is it a current? Then state each joint's `torque_per_ampere` (by the prior about 3",
         ),
     ] {
-        let suspected = run(leg, "");
+        let suspected = run(leg, &currents, "");
         let all = format!("{}{}", suspected.printed, suspected.errors);
         for word in [words, &options] {
             assert_eq!(all.matches(word).count(), 1, "{word}: {all}");
         }
     }
-    let read = run(&stated, &options).ends_with(0);
+    let read = run(&stated, &currents, &options).ends_with(0);
     assert!(!read.errors.contains("is it a current?"), "{}", read.errors);
     // Torques are not suspected, whatever constant the leg file states.
-    let torques = folder.write("torque.csv", &csv(&samples()));
-    let stated = folder.write("leg.toml", &stated);
-    let run = scarab("replay --split 0.666666 --leg", &[&stated, &torques]).ends_with(0);
+    let run = run(&stated, &samples(), "").ends_with(0);
     assert!(!run.errors.contains("is it a current?"), "{}", run.errors);
 }
 
 #[test]
 fn impossible_torque_delays_are_refused() {
-    let refused = |value: &str| {
-        scarab(&format!("replay {MUJOCO} --leg mujoco-leg --torque-delay {value}"), &[]).refusal()
-    };
+    let refused =
+        |value: &str| scarab(&format!("replay {MUJOCO} --leg mujoco-leg --torque-delay {value}")).refusal();
     let message = refused("1,2,3");
-    assert!(
-        message.contains("--torque-delay: 3 values; give one for all joints, or one for each of 2"),
-        "{message}"
-    );
+    assert_contains(&message, "--torque-delay: 3 values; give one for all joints, or one for each of 2");
     assert!(refused("nan").contains("the limit is a tenth of the recording"));
     assert!(refused("9000").contains("the limit is a tenth of the recording"));
     assert!(refused("late").contains("invalid value 'late'"));
@@ -418,15 +405,11 @@ fn impossible_torque_delays_are_refused() {
 fn a_real_arm_with_misfit_far_above_its_noise_is_accepted() {
     let Some(recordings) = recordings("the real arm") else { return };
     let folder = Folder::new();
-    let json = folder.path("report.json");
-    let file = |number: &str| recordings.join("dp_A0").join(format!("{number}.csv"));
-    let files: Vec<PathBuf> = ["00", "01", "03", "05", "13"].map(file).to_vec();
-    let held_out: Vec<PathBuf> = ["02", "04", "12"].map(file).to_vec();
-    let mut paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    paths.extend([Path::new("--json"), &json, Path::new("--validate")]);
-    paths.extend(held_out.iter().map(PathBuf::as_path));
-    scarab("replay --leg dp-a0 --bandwidth 5", &paths).ends_with(0);
-    let report = folder.json("report.json");
+    let file = |number: &str| recordings.join(format!("dp_A0/{number}.csv")).display().to_string();
+    let files = ["00", "01", "03", "05", "13"].map(file).join(" ");
+    let held_out = ["02", "04", "12"].map(file).join(" ");
+    let arguments = format!("replay --leg dp-a0 --bandwidth 5 {files} --validate {held_out}");
+    let (_, report) = folder.reported(&arguments, 0);
     let ratios = report["misfit_over_noise"].as_array().expect("a list");
     assert!(ratios.iter().all(|ratio| number(ratio) > 3.0), "{ratios:?}");
     // The shoulder's torque is really late, and its scale differs from the elbow's.

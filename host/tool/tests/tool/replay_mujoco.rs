@@ -5,11 +5,11 @@
 //! the true one. The hip's mean absolute torque is 10.3 N m in the remaining rows and 7.7 N m over
 //! the whole motion; each error states its reference.
 
-use crate::command::{Folder, MUJOCO, Table, base, fit, scarab};
+use crate::command::{Folder, MUJOCO, Table, base, fit};
 use scarab::ident::LowPass;
 use scarab::ident::record::recorder::{LARGEST_STILL_SHARE, STILL_SPEED};
 use scarab::real::sqrt;
-use std::path::Path;
+use serde_json::Value;
 
 const CLEAN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/mujoco_leg/clean_torque.csv");
 /// Mean absolute torque of hip and knee over the whole motion, N m, from the simulation.
@@ -17,19 +17,19 @@ const MEAN_ABSOLUTE: [f64; 2] = [7.6965, 4.8675];
 const BANDWIDTH_HZ: f64 = 8.0;
 const CLEAN_RATE_HZ: f64 = 100.0;
 
-fn replay(folder: &Folder, arguments: &str) {
-    let arguments = format!("replay {MUJOCO} --leg mujoco-leg --split 0.666666 --bandwidth 8 {arguments}");
-    let (json, csv) = (folder.path("report.json"), folder.path("torque.csv"));
-    let run = scarab(&arguments, &[Path::new("--json"), &json, Path::new("--csv"), &csv]).ends_with(0);
+/// Report of a replay that writes `torque.csv`.
+fn replay(folder: &Folder, arguments: &str) -> Value {
+    let options = "--leg mujoco-leg --split 0.666666 --bandwidth 8 --csv @torque.csv";
+    let (run, report) = folder.reported(&format!("replay {MUJOCO} {options} {arguments}"), 0);
     assert_eq!(run.errors, "");
+    report
 }
 
 #[test]
 fn torque_held_out_is_predicted_to_the_noise_of_the_recording() {
     let folder = Folder::new();
     for plan in ["one-time", "sequential"] {
-        replay(&folder, &format!("--plan {plan}"));
-        let report = folder.json("report.json");
+        let report = replay(&folder, &format!("--plan {plan}"));
         // Relative to the mean over the whole motion, noise alone is 0.95 and 0.76 %; measured:
         // 1.040 and 0.841 %.
         for (joint, limit, limit_of_whole) in [(1, 1.05, 1.05), (2, 0.9, 0.9)] {
@@ -47,8 +47,7 @@ fn torque_held_out_is_predicted_to_the_noise_of_the_recording() {
 #[test]
 fn parameters_of_the_simulated_leg_are_found_within_their_sigma() {
     let folder = Folder::new();
-    replay(&folder, "");
-    let report = folder.json("report.json");
+    let report = replay(&folder, "");
     assert_eq!(report["rank"], 13);
     // One draw of the noise: 13 errors of up to three sigma; large parameters also within 4 %.
     for entry in report["base_parameters"].as_array().expect("a list") {

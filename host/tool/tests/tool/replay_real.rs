@@ -7,7 +7,7 @@
 
 use scarab_base::stats::rms;
 
-use crate::command::{Folder, Table, fit, reasons, scarab};
+use crate::command::{Folder, Table, fit, reasons};
 use scarab::real::{sin_cos, sqrt};
 use std::path::{Path, PathBuf};
 
@@ -19,9 +19,8 @@ fn recordings() -> Option<PathBuf> {
 fn replay(recordings: &Path, arguments: &str, code: i32) -> (serde_json::Value, Table) {
     let folder = Folder::new();
     let arguments = format!("replay {}", arguments.replace('@', &format!("{}/", recordings.display())));
-    let (json, csv) = (folder.path("report.json"), folder.path("torque.csv"));
-    scarab(&arguments, &[Path::new("--json"), &json, Path::new("--csv"), &csv]).ends_with(code);
-    (folder.json("report.json"), folder.table("torque.csv"))
+    let (_, report) = folder.reported(&format!("{arguments} --csv @torque.csv"), code);
+    (report, folder.table("torque.csv"))
 }
 
 /// Reference filter: second-order Butterworth at 5 Hz of 500, forward and backward, at rest at its

@@ -1,9 +1,8 @@
 //! Report page: complete, well-formed, explicit about unknown values, and safe against the contents of files.
 
-use std::fs;
-
-use crate::command::{Folder, MUJOCO, Run, Table, scarab};
+use crate::command::{Folder, MUJOCO, Run, Table, assert_contains, list, number};
 use scraper::{Html, Selector};
+use serde_json::Value;
 
 const LEG: &str = include_str!("../../../legs/x2-wearer-75kg.toml");
 
@@ -15,7 +14,7 @@ struct Page {
 
 impl Page {
     fn read(folder: &Folder) -> Self {
-        let text = fs::read_to_string(folder.path("report.html")).expect("the page was written");
+        let text = folder.read("report.html");
         let document = Html::parse_document(&text);
         assert_eq!(document.errors, Vec::<String>::new(), "invalid HTML");
         Self { text, document }
@@ -33,25 +32,19 @@ impl Page {
     }
 }
 
-fn reported(arguments: &str, code: i32) -> (Folder, Run, Page) {
-    let folder = Folder::new();
-    let (page, json) = (folder.path("report.html"), folder.path("run.json"));
-    let paths = format!("{arguments} --json {} --report", json.display());
-    let run = scarab(&paths, &[&page]).ends_with(code);
-    let page = Page::read(&folder);
-    (folder, run, page)
+fn reported(folder: &Folder, arguments: &str, code: i32) -> (Run, Value, Page) {
+    let (run, report) = folder.reported(&format!("{arguments} --report @report.html"), code);
+    (run, report, Page::read(folder))
 }
 
 #[test]
 fn a_page_shows_the_whole_run_and_fetches_nothing() {
-    let (folder, run, page) = reported("identify --seed 2", 0);
-    let report = folder.json("run.json");
+    let (run, report, page) = reported(&Folder::new(), "identify --seed 2", 0);
     assert!(run.printed.trim_end().ends_with("report.html"), "the last line names the page: {}", run.printed);
     assert_eq!(page.one(".verdict .word"), "Accepted");
     assert!(page.all("tr.failed").is_empty() && page.all("table.tests tbody tr").len() > 10);
     let names = page.all("tbody th");
-    let parameters = report["parameters"].as_array().expect("a list");
-    let bases = report["base_parameters"].as_array().expect("a list");
+    let (parameters, bases) = (list(&report, "parameters"), list(&report, "base_parameters"));
     assert_eq!((parameters.len(), bases.len()), (28, 13));
     for parameter in parameters.iter().chain(bases) {
         let name = parameter["name"].as_str().expect("a name");
@@ -75,14 +68,13 @@ fn a_page_shows_the_whole_run_and_fetches_nothing() {
     }
     let limits = page.one(".limits");
     for name in ["ZZ1", "HX1", "IA1", "M2", "XX1", "HY1", "OFF1"] {
-        assert!(limits.contains(name), "{name}: {limits}");
+        assert_contains(&limits, name);
     }
 }
 
 #[test]
 fn counts_are_whole_numbers_and_values_have_the_digits_of_their_sigma() {
-    let (folder, _, page) = reported("identify --seed 1", 0);
-    let report = folder.json("run.json");
+    let (_, report, page) = reported(&Folder::new(), "identify --seed 1", 0);
     let replaced = &report["outliers"]["replaced"];
     let rows = page.all("table.outliers tbody tr");
     assert_eq!(rows.len(), 2);
@@ -106,8 +98,8 @@ fn counts_are_whole_numbers_and_values_have_the_digits_of_their_sigma() {
     assert!(row("XZ1").starts_with("XZ10\u{2013}"), "{}", row("XZ1"));
     // Two digits of sigma and the value to the same decimal place; three digits without sigma.
     let digits = |name: &str| row(name)[name.len()..].split_once(['k', 'N']).expect("a unit").0.to_owned();
-    let known = report["parameters"].as_array().expect("a list").iter().find(|one| one["name"] == "FC1");
-    let of = |key: &str| known.expect("FC1")[key].as_f64().expect("a number");
+    let known = list(&report, "parameters").iter().find(|one| one["name"] == "FC1").expect("FC1");
+    let of = |key: &str| number(known, key);
     assert!((0.01..0.1).contains(&of("sigma")));
     assert_eq!(digits("FC1"), format!("{:.3}{:.3}", of("value"), of("sigma")));
     assert_eq!(digits("YY1").chars().filter(char::is_ascii_digit).count(), 4, "0.xxx: {}", digits("YY1"));
@@ -115,15 +107,14 @@ fn counts_are_whole_numbers_and_values_have_the_digits_of_their_sigma() {
 
 #[test]
 fn every_section_has_a_title_and_no_reason_is_truncated() {
-    let (folder, _, page) = reported("identify --seed 1", 0);
+    let (_, report, page) = reported(&Folder::new(), "identify --seed 1", 0);
     let titles = page.all("h2");
     for key in ["Validated", "Model choice", "Outliers", "Drive"] {
         assert!(!titles.iter().any(|title| title == key), "{key} is a key of the JSON");
     }
     let facts = page.all(".facts div");
     assert!(facts.iter().any(|fact| fact.starts_with("Drivesimulated; currents follow")), "{facts:?}");
-    let report = folder.json("run.json");
-    let choices = report["model_choice"].as_array().expect("a list");
+    let choices = list(&report, "model_choice");
     let reasons = page.all("table.choices td.words");
     assert_eq!(reasons.len(), choices.len());
     for (reason, choice) in reasons.iter().zip(choices) {
@@ -142,10 +133,8 @@ fn the_name_of_a_leg_is_escaped() {
         1,
     );
     assert!(text.contains("<script>") && text.contains("<i>hip</i>"), "the leg file has other names");
-    let leg = folder.write("leg.toml", &text);
-    let page = folder.path("report.html");
-    scarab(&format!("identify --leg {} --report", leg.display()), &[&page]).ends_with(0);
-    let page = Page::read(&folder);
+    folder.write("leg.toml", &text);
+    let (_, _, page) = reported(&folder, "identify --leg @leg.toml", 0);
     assert_eq!(page.one("h1"), "</title></svg><script>alert(1)</script><b>&\"'");
     assert_eq!((page.all("script").len(), page.all("b").len(), page.all("i").len()), (0, 0, 0));
     assert!(page.one("head title").contains("<script>"), "the name is shown unchanged");
@@ -161,14 +150,10 @@ fn a_refused_run_is_marked_first_and_gives_every_reason() {
     for (number, row) in table.rows.iter_mut().enumerate() {
         row[torque] = (number % 480) as f64 / 6.0 - 40.0;
     }
-    let file = folder.write("wrong.csv", &table.text());
-    let (page, json) = (folder.path("report.html"), folder.path("run.json"));
-    let arguments = format!("replay {} --leg mujoco-leg --json {} --report", file.display(), json.display());
-    scarab(&arguments, &[&page]).ends_with(3);
-    let page = Page::read(&folder);
+    folder.write("wrong.csv", table.text());
+    let (_, report, page) = reported(&folder, "replay @wrong.csv --leg mujoco-leg", 3);
     assert_eq!(page.one(".verdict.refused .word"), "Refused");
     assert!(page.one("head title").contains("refused"));
-    let report = folder.json("run.json");
     let given = page.all(".verdict > ul > li");
     let reasons = crate::command::reasons(&report);
     assert!(reasons.contains(&"residual"), "{reasons:?}");
@@ -178,9 +163,10 @@ fn a_refused_run_is_marked_first_and_gives_every_reason() {
         assert!(words.len() > reason.len() + 20, "not a sentence: {words}");
     }
     let residual = given.iter().find(|words| words.starts_with("residual")).expect("a reason");
-    assert!(residual.contains("joint 1: ") && residual.contains("limit"), "{residual}");
+    assert_contains(residual, "joint 1: ");
+    assert_contains(residual, "limit");
     // Every failure is listed, and the table marks it.
-    for finding in report["findings"].as_array().expect("a list") {
+    for finding in list(&report, "findings") {
         let words = finding["words"].as_str().expect("a sentence");
         assert!(finding["passed"] == true || page.one(".verdict").contains(words), "{words}");
     }
@@ -190,14 +176,12 @@ fn a_refused_run_is_marked_first_and_gives_every_reason() {
 #[test]
 fn values_unknown_without_a_prior_are_dashes() {
     let folder = Folder::new();
-    let (page, json) = (folder.path("report.html"), folder.path("run.json"));
-    let arguments =
-        format!("replay {MUJOCO} --leg mujoco-leg --prior none --json {} --report", json.display());
+    let options = "--leg mujoco-leg --prior none --json @run.json --report @report.html";
     // The verdict is irrelevant in this test.
-    scarab(&arguments, &[&page]);
+    folder.scarab(&format!("replay {MUJOCO} {options}"));
     let page = Page::read(&folder);
     let report = folder.json("run.json");
-    let unknown = report["parameters"].as_array().expect("a list").iter();
+    let unknown = list(&report, "parameters").iter();
     let unknown: Vec<_> = unknown.filter(|parameter| parameter["value"].is_null()).collect();
     assert!(unknown.len() > 10, "without a prior few parameters of a planar leg are known");
     // Name, value and sigma of each parameter; an unknown value has no bar.
@@ -222,22 +206,21 @@ fn values_unknown_without_a_prior_are_dashes() {
 
 #[test]
 fn many_runs_are_a_page_of_their_errors() {
-    let (folder, _, page) = reported("identify --seeds 1..6", 0);
-    let report = folder.json("run.json");
-    let runs = report["runs"].as_array().expect("a list");
+    let (_, report, page) = reported(&Folder::new(), "identify --seeds 1..6", 0);
+    let runs = list(&report, "runs");
     assert_eq!((page.one(".verdict .word"), page.all("figure svg").len()), ("6 of 6 accepted".into(), 1));
     let rows = page.all("table.spread tbody tr");
     assert_eq!(rows.len(), 13);
-    for (row, base) in rows.iter().zip(runs[0]["base_parameters"].as_array().expect("a list")) {
+    for (row, base) in rows.iter().zip(list(&runs[0], "base_parameters")) {
         assert!(row.starts_with(base["name"].as_str().expect("a name")) && row.ends_with('6'), "{row}");
     }
     // Mean error of the first parameter in the sigma of each run, as printed on the page.
     let errors = runs.iter().map(|run| {
-        let of = |key: &str| run["base_parameters"][0][key].as_f64().expect("a number");
+        let of = |key: &str| number(&run["base_parameters"][0], key);
         (of("value") - of("truth")) / of("sigma")
     });
     let mean = format!("{:+.1}", errors.sum::<f64>() / 6.0).replace('-', "\u{2212}");
-    assert!(rows[0].contains(&mean), "{mean} in {}", rows[0]);
+    assert_contains(&rows[0], &mean);
     assert!(page.all("figure svg").iter().all(|figure| figure.contains("mean") && figure.contains("spread")));
     let title = "x2-wearer-75kg: errors of the base parameters in 6 runs";
     assert!(page.all("figure svg").iter().all(|figure| figure.contains(title)), "the figure has no title");
@@ -248,15 +231,17 @@ fn many_runs_are_a_page_of_their_errors() {
 
 #[test]
 fn refused_runs_are_reported_with_their_seeds() {
-    let (_, _, page) = reported("identify --seeds 3..4 --perturb stuck=knee", 3);
+    let (_, _, page) = reported(&Folder::new(), "identify --seeds 3..4 --perturb stuck=knee", 3);
     assert_eq!(page.one(".verdict.refused .word"), "0 of 2 accepted");
     assert!(page.one(".verdict.refused").contains("unexcited: 2 runs, seeds 3, 4"));
 }
 
 #[test]
 fn a_recording_without_held_out_part_is_not_called_validated() {
-    let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg"), 0);
-    assert!(page.one(".verdict.accepted").contains("Not validated"));
-    let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg --split 0.7"), 0);
-    assert!(!page.one(".verdict.accepted").contains("Not validated"));
+    let unvalidated = |options: &str| {
+        let arguments = format!("replay {MUJOCO} --leg mujoco-leg {options}");
+        let (_, _, page) = reported(&Folder::new(), &arguments, 0);
+        page.one(".verdict.accepted").contains("Not validated")
+    };
+    assert_eq!((unvalidated(""), unvalidated("--split 0.7")), (true, false));
 }

@@ -7,7 +7,7 @@ use scarab_identify::leg::from_robot::{FromRobot, RobotOptions, leg};
 use scarab_identify::leg::setup::links;
 use std::time::{Duration, Instant};
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, assert_contains, scarab};
 use nalgebra::Vector3;
 use scarab::ident::prior_parameters;
 use scarab::model::{JointState, rigid_body_torques};
@@ -180,7 +180,7 @@ fn limits_friction_and_gravity_are_those_of_the_description() {
     assert!(found.remarks.is_empty(), "{:?}", found.remarks);
     // What the description does not know is not stated.
     for key in ["torque_per_ampere", "encoder", "side", "acceleration_limit_deg_s2"] {
-        assert!(found.text.contains(&format!("\n# {key} = ")), "{key}: {}", found.text);
+        assert_contains(&found.text, &format!("\n# {key} = "));
     }
 }
 
@@ -235,7 +235,7 @@ fn values_that_a_leg_file_cannot_hold_are_left_out_with_a_remark() {
         assert!(found.remarks.iter().any(|found| found.starts_with(remark)), "{remark}: {:?}", found.remarks);
     }
     for key in ["speed_limit_deg_s", "torque_limit_nm", "range_deg"] {
-        assert!(found.text.contains(&format!("\n# {key} = ")), "{key}: {}", found.text);
+        assert_contains(&found.text, &format!("\n# {key} = "));
     }
 }
 
@@ -256,7 +256,7 @@ fn rounded_parallel_axes_are_refused_until_they_are_declared_parallel() {
         "3.7e-6 rad from parallel to that of `hip`",
         "--parallel 7e-6",
     ] {
-        assert!(refused.contains(word), "{word}: {refused}");
+        assert_contains(&refused, word);
     }
     let found = converted(&text, &RobotOptions { parallel_rad: 7e-6, ..plain() }).expect("declared parallel");
     assert_eq!((found.leg.joints[1].dh.alpha, found.leg.joints[1].dh.d), (0.0, 0.0));
@@ -381,12 +381,10 @@ fn all_joints_to_be_held_are_named_at_once_each_at_a_position_within_its_range()
          <link name=\"hand\"/><joint name=\"aside\" type=\"revolute\"><parent link=\"base\"/><child link=\"hand\"/></joint></robot>",
     );
     let refused = converted(&crowd, &joints(&["knee"])).expect_err("three joints are loose");
-    assert!(
-        refused.contains(
-            "joint `hip`: moves the leg and is neither chosen nor held, and so are `ankle roll`, `toes`: choose them \
-             (--joints), or hold at a position in rad or m, for example\n  --lock hip=0 --lock 'ankle roll=0.35' --lock toes=0"
-        ),
-        "{refused}"
+    assert_contains(
+        &refused,
+        "joint `hip`: moves the leg and is neither chosen nor held, and so are `ankle roll`, `toes`: choose them \
+             (--joints), or hold at a position in rad or m, for example\n  --lock hip=0 --lock 'ankle roll=0.35' --lock toes=0",
     );
     let held = [("hip", 0.0), ("ankle roll", 0.35), ("toes", 0.0)].map(|(name, at)| (name.to_owned(), at));
     let held = RobotOptions { locked: held.into(), ..joints(&["knee"]) };
@@ -454,7 +452,7 @@ fn bombs_and_endless_nesting_end_in_a_sentence() {
     }
     bomb += "]><robot name=\"&a29;\"><link name=\"a\"/></robot>";
     let refused = converted(&bomb, &plain()).expect_err("entities");
-    assert!(refused.contains("has a document type (`<!DOCTYPE`): entities are not expanded"), "{refused}");
+    assert_contains(&refused, "has a document type (`<!DOCTYPE`): entities are not expanded");
     let outside = "<!DOCTYPE robot [<!ENTITY a SYSTEM \"file:///etc/passwd\">]><robot name=\"&a;\"/>";
     assert!(converted(outside, &plain()).expect_err("entities").contains("<!DOCTYPE"));
     let nested = "<robot>".repeat(200_000);
@@ -481,21 +479,18 @@ fn bombs_and_endless_nesting_end_in_a_sentence() {
 #[test]
 fn the_command_writes_a_leg_that_every_other_command_takes_and_overwrites_nothing() {
     let folder = Folder::new();
-    let (urdf, out) = (folder.write("robot.urdf", SIMPLE), folder.path("leg.toml"));
-    let paths = [urdf.as_path(), "--out".as_ref(), &out];
-    let run = scarab("leg --joints hip,knee --urdf", &paths).ends_with(0);
-    assert!(run.printed.starts_with(&format!("leg file: {}\n", out.display())), "{}", run.printed);
-    let states = folder.write("states.csv", "q1,qd1,qdd1,q2,qd2,qdd2\n0.3,1,5,0.7,-2,9\n");
-    scarab("regressor --leg", &[&out, "--states".as_ref(), &states]).ends_with(0);
-    let text = std::fs::read_to_string(&out).expect("written");
-    let refused = scarab("leg --urdf", &paths).refusal();
-    assert!(
-        refused.contains("exists and is not overwritten: name another file, or remove it first"),
-        "{refused}"
-    );
-    assert_eq!(std::fs::read_to_string(&out).expect("kept"), text);
-    let itself = scarab("leg --urdf", &[urdf.as_path(), "--out".as_ref(), &urdf]).refusal();
-    assert!(itself.contains("is the same file as --urdf"), "{itself}");
+    folder.write("robot.urdf", SIMPLE);
+    let run = folder.scarab("leg --joints hip,knee --urdf @robot.urdf --out @leg.toml").ends_with(0);
+    let begin = format!("leg file: {}\n", folder.path("leg.toml").display());
+    assert!(run.printed.starts_with(&begin), "{}", run.printed);
+    folder.write("states.csv", "q1,qd1,qdd1,q2,qd2,qdd2\n0.3,1,5,0.7,-2,9\n");
+    folder.scarab("regressor --leg @leg.toml --states @states.csv").ends_with(0);
+    let text = folder.read("leg.toml");
+    folder
+        .scarab("leg --urdf @robot.urdf --out @leg.toml")
+        .refuses("exists and is not overwritten: name another file, or remove it first");
+    assert_eq!(folder.read("leg.toml"), text);
+    folder.scarab("leg --urdf @robot.urdf --out @robot.urdf").refuses("is the same file as --urdf");
     for (arguments, reason) in [
         ("--lock knee", "is not NAME=POSITION"),
         ("--lock knee=nan", "is not a position"),
@@ -504,11 +499,10 @@ fn the_command_writes_a_leg_that_every_other_command_takes_and_overwrites_nothin
         ("--parallel 1", "is not an angle from 0 to 0.01 rad"),
         ("--check sp", "cannot be used with"),
     ] {
-        let refused =
-            scarab(&format!("leg {arguments} --urdf"), &[&urdf, "--out".as_ref(), &folder.path("no.toml")])
-                .refusal();
-        assert!(refused.contains(reason), "{arguments}: {refused}");
+        folder.scarab(&format!("leg --urdf @robot.urdf --out @no.toml {arguments}")).refuses(reason);
     }
-    let none = scarab("leg", &[]).refusal();
-    assert!(none.contains("--urdf") && none.contains("--new") && none.contains("--check"), "{none}");
+    let none = scarab("leg").refusal();
+    assert_contains(&none, "--urdf");
+    assert_contains(&none, "--new");
+    assert_contains(&none, "--check");
 }

@@ -4,7 +4,7 @@ use scarab_base::random::Random;
 use scarab_base::stats::rms;
 use scarab_identify::formats::leg_file::LegFile;
 
-use crate::command::{Folder, MUJOCO, Table, base, reasons, recordings, scarab};
+use crate::command::{Folder, MUJOCO, Table, base, list, number, reasons, recordings};
 use scarab::real::{exp, sqrt};
 use serde_json::Value;
 use std::path::Path;
@@ -12,14 +12,10 @@ use std::path::Path;
 /// Errors of the base parameters of all runs over their Cramer-Rao bounds, root mean square;
 /// without static friction.
 fn pooled_error(runs: &Value) -> f64 {
-    let runs = runs["runs"].as_array().expect("runs").iter();
-    let bases = runs.flat_map(|run| run["base_parameters"].as_array().expect("a list"));
+    let bases = list(runs, "runs").iter().flat_map(|run| list(run, "base_parameters"));
     let errors: Vec<f64> = bases
         .filter(|base| !base["name"].as_str().expect("a name").starts_with("FS"))
-        .map(|base| {
-            let of = |key: &str| base[key].as_f64().expect("a number");
-            (of("value") - of("truth")) / of("cramer_rao")
-        })
+        .map(|base| (number(base, "value") - number(base, "truth")) / number(base, "cramer_rao"))
         .collect();
     rms(errors)
 }
@@ -28,10 +24,8 @@ fn pooled_error(runs: &Value) -> f64 {
 fn a_rough_leg_has_a_third_of_plain_least_squares_errors() {
     let run = |estimator: &str| {
         let folder = Folder::new();
-        let path = folder.path("runs.json");
-        let arguments =
-            format!("identify --leg x2-rough --seeds 1..2 --prior wrong:40 --estimator {estimator} --json");
-        scarab(&arguments, &[&path]);
+        let options = format!("--prior wrong:40 --estimator {estimator} --json @runs.json");
+        folder.scarab(&format!("identify --leg x2-rough --seeds 1..2 {options}"));
         folder.json("runs.json")
     };
     let (robust, plain) = (run("robust"), run("plain"));
@@ -40,19 +34,18 @@ fn a_rough_leg_has_a_third_of_plain_least_squares_errors() {
     // Over fifty seeds: 1.33 and 24.
     assert!(errors[1] > 3.0 * errors[0], "{errors:?}");
     assert!(errors[0] < 2.0, "{errors:?}");
-    for run in robust["runs"].as_array().expect("runs") {
-        let found = run["stribeck"].as_array().expect("a list");
-        assert_eq!(found.len(), 2, "both joints show Stribeck friction");
-        let replaced = run["outliers"]["replaced"].as_array().expect("a list");
+    for run in list(&robust, "runs") {
+        assert_eq!(list(run, "stribeck").len(), 2, "both joints show Stribeck friction");
+        let replaced = list(&run["outliers"], "replaced");
         // 3 % of 11,000 samples are 330; those of the size of the noise stay.
         assert!(
             replaced.iter().all(|count| (200..400).contains(&count.as_u64().expect("a count"))),
             "{replaced:?}"
         );
-        let disturbed = run["outliers"]["disturbed_share"].as_array().expect("a list");
+        let disturbed = list(&run["outliers"], "disturbed_share");
         assert!(disturbed.iter().any(|share| share.as_f64().expect("a share") > 0.02), "{disturbed:?}");
     }
-    for run in plain["runs"].as_array().expect("runs") {
+    for run in list(&plain, "runs") {
         assert_eq!(run["outliers"]["estimator"], "plain");
         assert_eq!(run["outliers"]["replaced"], serde_json::json!([0, 0]));
         assert_eq!(run["stribeck"], serde_json::json!([]));
@@ -62,13 +55,12 @@ fn a_rough_leg_has_a_third_of_plain_least_squares_errors() {
 #[test]
 fn the_default_leg_shows_no_stribeck_friction_and_few_excluded_samples() {
     let folder = Folder::new();
-    scarab("identify --seed 5 --json", &[&folder.path("run.json")]).ends_with(0);
-    let run = folder.json("run.json");
+    let (_, run) = folder.reported("identify --seed 5", 0);
     assert_eq!(run["stribeck"], serde_json::json!([]));
-    let replaced = run["outliers"]["replaced"].as_array().expect("a list").iter();
+    let replaced = list(&run["outliers"], "replaced").iter();
     // Measured over 200 seeds: 6 in 100,000, or three of 44,000 values.
     assert!(replaced.map(|count| count.as_u64().expect("a count")).sum::<u64>() < 12);
-    for share in run["outliers"]["disturbed_share"].as_array().expect("a list") {
+    for share in list(&run["outliers"], "disturbed_share") {
         assert!(share.as_f64().expect("a share") < 0.05, "{share}");
     }
 }
@@ -114,18 +106,17 @@ fn corrupted(recording: &Path, pushes_per_minute: f64) -> String {
 /// the clean one, in its sigma: robust and plain. The robust report is passed to `check`.
 fn distances(recording: &Path, arguments: &str, pushes_per_minute: f64, check: impl Fn(&Value)) -> [f64; 2] {
     let folder = Folder::new();
-    let bad = folder.write("bad.csv", &corrupted(recording, pushes_per_minute));
+    let bad = folder.write("bad.csv", corrupted(recording, pushes_per_minute));
     let report = |estimator: &str, recording: &Path| {
-        let json = folder.path("run.json");
-        let arguments = format!("replay {arguments} --estimator {estimator} --json");
-        scarab(&arguments, &[&json, recording]);
+        let options = format!("{arguments} --estimator {estimator} --json @run.json");
+        folder.scarab(&format!("replay {} {options}", recording.display()));
         folder.json("run.json")
     };
     let good = report("robust", recording);
     let distance = |report: &Value| {
         let names = good["least_squares"]["base_parameters"].as_object().expect("an object");
         let squares = names.iter().map(|(name, value)| {
-            let found = report["least_squares"]["base_parameters"][name].as_f64().expect("a number");
+            let found = number(&report["least_squares"]["base_parameters"], name);
             let sigmas = (found - value.as_f64().expect("a number")) / base(&good, name, "sigma");
             sigmas * sigmas
         });
@@ -143,7 +134,7 @@ fn a_corrupted_recording_gives_the_parameters_of_the_clean_one() {
     let [robust, plain] = distances(Path::new(MUJOCO), "--leg mujoco-leg --bandwidth 8", 8.0, |report| {
         // Whether pushes in both joints count as contact with the floor is irrelevant in this test. 3 % of
         // 15,000 angles and of as many torques of each joint are 900; a few are missed or are false.
-        for count in report["outliers"]["replaced"].as_array().expect("a list") {
+        for count in list(&report["outliers"], "replaced") {
             assert!((800..1000).contains(&count.as_u64().expect("a count")), "{count}");
         }
     });
@@ -173,17 +164,13 @@ fn the_band_of_a_prediction_includes_uncertain_stribeck_friction() {
     let mut calm = LegFile::load("x2-rough").expect("shipped");
     calm.pushes = None;
     calm.joints.iter_mut().for_each(|joint| joint.outliers = None);
-    let leg = folder.write("calm.toml", &calm.to_toml());
-    let (model, json) = (folder.path("model.toml"), folder.path("run.json"));
-    let arguments = "identify --torque-noise 5 --leg";
-    scarab(arguments, &[&leg, Path::new("--save-model"), &model, Path::new("--json"), &json]).ends_with(0);
-    let run = folder.json("run.json");
-    let hip = &run["stribeck"][0];
-    let of = |key: &str| hip[key].as_f64().expect("a number");
-    let (sigma, speed) = (of("surplus_sigma_nm"), of("speed_rad_s"));
-    let states =
-        folder.write("s.csv", "q1,q2,qd1,qd2,qdd1,qdd2\n0.5,-0.8,0.02,0.5,0,0\n0.5,-0.8,1.5,0.5,0,0\n");
-    let run = scarab("predict --dh --model", &[&model, Path::new("--states"), &states]).ends_with(0);
+    folder.write("calm.toml", calm.to_toml());
+    let arguments = "identify --torque-noise 5 --leg @calm.toml --save-model @model.toml";
+    let (_, report) = folder.reported(arguments, 0);
+    let hip = &report["stribeck"][0];
+    let (sigma, speed) = (number(hip, "surplus_sigma_nm"), number(hip, "speed_rad_s"));
+    folder.write("s.csv", "q1,q2,qd1,qd2,qdd1,qdd2\n0.5,-0.8,0.02,0.5,0,0\n0.5,-0.8,1.5,0.5,0,0\n");
+    let run = folder.scarab("predict --dh --model @model.toml --states @s.csv").ends_with(0);
     let band = Table::parse(&run.printed).column("tau1_sigma_Nm");
     println!("surplus +- {sigma:.3} N m: band {:.3} N m at 0.02 rad/s, {:.3} at 1.5", band[0], band[1]);
     let ratio = 0.02 / speed;

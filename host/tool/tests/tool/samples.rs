@@ -1,40 +1,35 @@
 //! Recordings with faulty columns: clipped, held, frozen, wrongly stamped, or given twice; and the duration
 //! of a push.
 
-use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
+use crate::command::{Folder, MUJOCO, Run, Table, base, list, number, reasons};
 use scarab_base::random::Random;
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
 
-/// The MuJoCo recording after a change of its table.
-fn changed(folder: &Folder, change: impl Fn(&mut Table)) -> PathBuf {
+/// Writes `walk.csv`: the MuJoCo recording after a change of its table.
+fn changed(folder: &Folder, change: impl Fn(&mut Table)) {
     let mut table = Table::read(MUJOCO);
     change(&mut table);
-    folder.write("walk.csv", &table.text())
+    folder.write("walk.csv", table.text());
 }
 
-/// Report and output of a replay of the MuJoCo leg.
-fn replay(folder: &Folder, file: &Path, arguments: &str) -> (Run, Value) {
-    let json = folder.path("run.json");
-    let arguments = format!("replay --leg mujoco-leg --split 0.66667 {arguments}");
-    let run = scarab(&arguments, &[file, Path::new("--json"), &json]);
-    (run, folder.json("run.json"))
+/// Output and report of a replay of the MuJoCo leg that ends with this code.
+fn replay(folder: &Folder, arguments: &str, code: i32) -> (Run, Value) {
+    folder.reported(&format!("replay --leg mujoco-leg --split 0.66667 {arguments}"), code)
 }
 
 /// Names of the findings in the columns, joint and whether they refuse.
 fn samples(report: &Value) -> Vec<(&str, Option<u64>, bool)> {
-    let list = report["samples"].as_array().expect("a list").iter();
-    list.map(|found| {
+    let found = list(report, "samples").iter().map(|found| {
         let name = found["name"].as_str().expect("a name");
         (name, found["joint"].as_u64(), found["refuses"].as_bool().expect("known"))
-    })
-    .collect()
+    });
+    found.collect()
 }
 
 /// Largest distance of the base parameters from those of another report, in its sigma.
 fn distance(report: &Value, other: &Value) -> f64 {
-    let names = other["base_parameters"].as_array().expect("a list").iter();
+    let names = list(other, "base_parameters").iter();
     names
         .map(|entry| {
             let name = entry["name"].as_str().expect("a name");
@@ -52,23 +47,20 @@ fn clip(table: &mut Table, name: &str, share: f64) {
 #[test]
 fn saturated_torque_is_refused_or_where_short_excluded() {
     let folder = Folder::new();
-    let (run, clean) = replay(&folder, Path::new(MUJOCO), "");
-    run.ends_with(0);
+    let (_, clean) = replay(&folder, MUJOCO, 0);
     assert_eq!(clean["samples"], serde_json::json!([]));
 
-    let file = changed(&folder, |table| clip(table, "tau2_Nm", 0.3));
-    let (run, report) = replay(&folder, &file, "");
-    let run = run.ends_with(3);
+    changed(&folder, |table| clip(table, "tau2_Nm", 0.3));
+    let (run, report) = replay(&folder, "@walk.csv", 3);
     assert!(reasons(&report).contains(&"input"), "{report}");
     assert!(samples(&report).contains(&("saturation", Some(2), true)), "{:?}", samples(&report));
-    assert!(run.printed.contains("tau2_Nm ends at a limit of 3.28"), "{}", run.printed);
-    assert!(run.printed.contains("of the samples lie, first at "), "{}", run.printed);
+    run.prints("tau2_Nm ends at a limit of 3.28");
+    run.prints("of the samples lie, first at ");
 
-    let file = changed(&folder, |table| clip(table, "tau1_Nm", 0.93));
-    let (run, report) = replay(&folder, &file, "");
-    let run = run.ends_with(0);
+    changed(&folder, |table| clip(table, "tau1_Nm", 0.93));
+    let (run, report) = replay(&folder, "@walk.csv", 0);
     assert_eq!(samples(&report), [("saturation", Some(1), false)]);
-    assert!(run.errors.contains("These stretches are excluded"), "{}", run.errors);
+    run.warns("These stretches are excluded");
     assert!(distance(&report, &clean) < 3.0, "{}", distance(&report, &clean));
 }
 
@@ -76,15 +68,19 @@ fn saturated_torque_is_refused_or_where_short_excluded() {
 fn a_recording_given_twice_is_bad_input_under_any_name() {
     let folder = Folder::new();
     let text = fs::read_to_string(MUJOCO).expect("the recording");
-    let (file, copy) = (folder.write("arm.csv", &text), folder.write("copy.csv", &text));
-    let refused = |paths: &[&Path]| scarab("replay --leg mujoco-leg", paths).refusal();
-    let message = refused(&[&file, Path::new("--validate"), &copy]);
-    assert!(message.contains("which is identified from: it cannot be held out"), "{message}");
-    let message = refused(&[&file, &copy]);
-    assert!(message.contains("holds the same samples as"), "{message}");
-    let other = changed(&folder, |table| clip(table, "tau1_Nm", 0.93));
-    let message = refused(&[&other, Path::new("--validate"), &file, Path::new("--validate"), &copy]);
-    assert!(message.contains(&format!("--validate {}: holds the same samples", copy.display())), "{message}");
+    folder.write("arm.csv", &text);
+    let copy = folder.write("copy.csv", &text);
+    changed(&folder, |table| clip(table, "tau1_Nm", 0.93));
+    for (files, words) in [
+        ("@arm.csv --validate @copy.csv", "which is identified from: it cannot be held out"),
+        ("@arm.csv @copy.csv", "holds the same samples as"),
+        (
+            "@walk.csv --validate @arm.csv --validate @copy.csv",
+            &format!("--validate {}: holds the same samples", copy.display()),
+        ),
+    ] {
+        folder.scarab(&format!("replay --leg mujoco-leg {files}")).refuses(words);
+    }
 }
 
 #[test]
@@ -102,7 +98,7 @@ fn the_duration_of_a_push_is_right_in_forty_minutes() {
 fn push_for(repetitions: &[usize]) {
     let folder = Folder::new();
     for &periods in repetitions {
-        let file = changed(&folder, |table| {
+        changed(&folder, |table| {
             let once = table.rows.clone();
             // The motion has a period of 10 s, so it continues without a step.
             for turn in 1..periods {
@@ -125,9 +121,8 @@ fn push_for(repetitions: &[usize]) {
                 }
             }
         });
-        let (run, report) = replay(&folder, &file, "");
-        run.ends_with(0);
-        let seen = report["outliers"]["longest_common_s"].as_f64().expect("a number");
+        let (_, report) = replay(&folder, "@walk.csv", 0);
+        let seen = number(&report["outliers"], "longest_common_s");
         println!("{} s: pushed for {seen} s", 30 * periods);
         assert!((0.48..=0.72).contains(&seen), "{} s: {seen} s", 30 * periods);
     }
@@ -136,7 +131,7 @@ fn push_for(repetitions: &[usize]) {
 #[test]
 fn wrong_time_stamps_are_refused_where_inertias_are_wrong() {
     let folder = Folder::new();
-    let file = changed(&folder, |table| {
+    changed(&folder, |table| {
         let column = table.index("t_s");
         // Late by up to 1.9 ms, irregularly: rows are stamped when the recorder has time.
         let mut random = Random::new("stamps", 5);
@@ -144,10 +139,9 @@ fn wrong_time_stamps_are_refused_where_inertias_are_wrong() {
             row[column] += random.uniform(0.0, 1.9e-3);
         }
     });
-    let (run, report) = replay(&folder, &file, "--bandwidth 25");
-    run.ends_with(3);
+    let (_, report) = replay(&folder, "@walk.csv --bandwidth 25", 3);
     assert_eq!(samples(&report), [("time_stamps", None, true)]);
-    let found = report["samples"][0]["value"].as_f64().expect("a number");
+    let found = number(&report["samples"][0], "value");
     // Uniform in 1.9 ms: 0.548 ms rms.
     assert!((found / 0.548e-3 - 1.0).abs() < 0.05, "{found}");
 }

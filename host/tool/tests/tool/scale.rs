@@ -1,16 +1,15 @@
 //! Known masses on the command line: results, messages, rejections.
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, list, reasons, scarab};
 
 #[test]
 fn without_a_known_mass_the_report_states_relative_scale() {
     let folder = Folder::new();
-    let run = scarab("identify --json", &[&folder.path("run.json")]).ends_with(0);
-    assert!(run.printed.contains("scale: relative to the torque constants used"), "{}", run.printed);
-    let json = folder.json("run.json");
+    let (run, json) = folder.reported("identify", 0);
+    run.prints("scale: relative to the torque constants used");
     assert_eq!(json["scale"], "relative");
     assert!(json["payload"].is_null() && json["load"].is_null());
-    for (joint, constant) in json["torque_constant"].as_array().expect("one per joint").iter().enumerate() {
+    for (joint, constant) in list(&json, "torque_constant").iter().enumerate() {
         assert_eq!(constant["joint"], joint + 1);
         assert_eq!(constant["used"], 1.5);
         assert!(constant["identified"].is_null() && constant["sigma"].is_null());
@@ -20,14 +19,13 @@ fn without_a_known_mass_the_report_states_relative_scale() {
 #[test]
 fn a_known_mass_makes_the_report_absolute_and_widens_sigma() {
     let folder = Folder::new();
-    scarab("identify --json", &[&folder.path("relative.json")]).ends_with(0);
-    let run = scarab("identify --payload 5@knee:0.2 --json", &[&folder.path("absolute.json")]).ends_with(0);
-    assert!(run.printed.contains("scale: absolute"), "{}", run.printed);
-    let (relative, absolute) = (folder.json("relative.json"), folder.json("absolute.json"));
+    let (_, relative) = folder.reported("identify", 0);
+    let (run, absolute) = folder.reported("identify --payload 5@knee:0.2", 0);
+    run.prints("scale: absolute");
     assert_eq!(absolute["scale"], "absolute");
     assert_eq!(absolute["payload"]["mass"], 5.0);
     assert_eq!(absolute["payload"]["joint"], 2);
-    for constant in absolute["torque_constant"].as_array().expect("one per joint") {
+    for constant in list(&absolute, "torque_constant") {
         let (found, sigma) = (constant["identified"].as_f64(), constant["sigma"].as_f64());
         // Sigma is at most 0.3 %; the tolerance is four times that.
         assert!((found.expect("found") - 1.5).abs() < 0.018 && sigma.expect("known") < 0.0045);
@@ -49,8 +47,7 @@ fn implausible_masses_are_refused_with_option_and_reason() {
         ("identify --payload 5@ankle:0.2", "--payload: `ankle` is not a joint of `x2-wearer-75kg`"),
         ("identify --load 5@hip:0.5", "--load: x 0.5 m, y 0 m lies outside the link of `hip`"),
     ] {
-        let refusal = scarab(arguments, &[]).refusal();
-        assert!(refusal.contains(reason), "{arguments}: {refusal}");
+        scarab(arguments).refuses(reason);
     }
 }
 
@@ -66,19 +63,17 @@ fn geometry_is_also_tested_with_corrected_torques() {
         "--perturb zero=5 --load 3@knee:0.2",
     ] {
         let folder = Folder::new();
-        scarab(&format!("identify {options} --json"), &[&folder.path("run.json")]).ends_with(3);
-        let json = folder.json("run.json");
-        let reasons = json["reasons"].as_array().expect("reasons");
-        assert!(reasons.iter().any(|reason| reason == "residual"), "{options}: {reasons:?}");
+        let (_, json) = folder.reported(&format!("identify {options}"), 3);
+        assert!(reasons(&json).contains(&"residual"), "{options}: {:?}", reasons(&json));
         assert_eq!(json["scale"], "relative", "{options}");
-        let findings = json["findings"].as_array().expect("findings");
+        let findings = list(&json, "findings");
         assert!(findings.iter().any(|finding| finding["test"] == "encoder_zero"), "{options}");
     }
 }
 
 #[test]
 fn a_mass_too_light_for_the_constants_is_reported() {
-    let run = scarab("identify --payload 0.001@knee:0.2", &[]).ends_with(0);
+    let run = scarab("identify --payload 0.001@knee:0.2").ends_with(0);
     assert!(
         run.printed.contains("too light to determine") && !run.printed.contains("contradicted"),
         "{}",
@@ -90,8 +85,7 @@ fn a_mass_too_light_for_the_constants_is_reported() {
 fn deliberate_errors_and_a_known_mass_exclude_each_other() {
     for mass in ["--payload 5@knee:0.2", "--load 3@knee:0.2"] {
         for tampering in ["inertia=0.7", "com=0.8"] {
-            let refusal = scarab(&format!("identify --perturb {tampering} {mass}"), &[]).refusal();
-            assert!(refusal.contains("give one of the two"), "{refusal}");
+            scarab(&format!("identify --perturb {tampering} {mass}")).refuses("give one of the two");
         }
     }
 }

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::command::Folder;
+use crate::command::{Folder, assert_contains};
 use crate::largest_memory_kb;
 
 const MS: Duration = Duration::from_millis(1);
@@ -477,12 +477,10 @@ fn impossible_options_are_refused_before_the_port_opens() {
         refusal(Command::new(tool).args(["serve", "--slcan"]).args(arguments))
     };
     let words = serve("127.0.0.1:0 --legs 4 --speed 100");
-    assert!(words.contains("100 cannot be held; this machine simulates 4 legs at "), "{words}");
-    let words = serve("nowhere.invalid:0");
-    assert!(words.contains("nowhere.invalid:0"), "{words}");
+    assert_contains(&words, "100 cannot be held; this machine simulates 4 legs at ");
+    assert_contains(&serve("nowhere.invalid:0"), "nowhere.invalid:0");
     // A file without an end.
-    let words = serve("127.0.0.1:0 --flash /dev/zero");
-    assert!(words.contains("/dev/zero: more than 32768 bytes"), "{words}");
+    assert_contains(&serve("127.0.0.1:0 --flash /dev/zero"), "/dev/zero: more than 32768 bytes");
     // Files may have 4 KB here; the flash has 256.
     let folder = Folder::new();
     let words = refusal(
@@ -494,7 +492,7 @@ fn impossible_options_are_refused_before_the_port_opens() {
             ])
             .arg(folder.path("flash")),
     );
-    assert!(words.contains("flash"), "{words}");
+    assert_contains(&words, "flash");
 }
 
 #[test]

@@ -1,12 +1,10 @@
 //! Campaigns divided into shards: joined, they equal the undivided ones to the last digit.
 
-use std::fs;
-use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use serde_json::{Value, json};
 
-use crate::command::{Folder, Run, scarab};
+use crate::command::{Folder, Run, assert_contains, scarab};
 
 /// Everything that a campaign prints and writes, but for times.
 #[derive(Debug, PartialEq)]
@@ -26,9 +24,7 @@ fn timeless(text: &str) -> String {
 }
 
 fn outcome(folder: &Folder, run: &Run, name: &str) -> Outcome {
-    let read = |extension: &str| {
-        fs::read_to_string(folder.path(&format!("{name}.{extension}"))).expect("it was written")
-    };
+    let read = |extension: &str| folder.read(&format!("{name}.{extension}"));
     let page = read("html");
     let (before, rest) = page.split_once("<p class=\"when\">").expect("a time");
     let (_, after) = rest.split_once("</p>").expect("its end");
@@ -42,20 +38,15 @@ fn outcome(folder: &Folder, run: &Run, name: &str) -> Outcome {
 }
 
 /// Runs the program with outputs of this name.
-fn with_outputs(folder: &Folder, arguments: &str, files: &[PathBuf], name: &str) -> Outcome {
-    let (json, page) = (folder.path(&format!("{name}.json")), folder.path(&format!("{name}.html")));
-    let mut paths: Vec<&Path> = vec![Path::new("--json"), &json, Path::new("--report"), &page];
-    paths.extend(files.iter().map(PathBuf::as_path));
-    let run = scarab(arguments, &paths);
+fn with_outputs(folder: &Folder, arguments: &str, name: &str) -> Outcome {
+    let run = folder.scarab(&format!("{arguments} --json @{name}.json --report @{name}.html"));
     assert!(matches!(run.code, Some(0 | 3)), "{arguments}: {}{}", run.printed, run.errors);
     outcome(folder, &run, name)
 }
 
-/// Runs a shard; returns its file.
-fn shard(folder: &Folder, arguments: &str, shard: &str) -> PathBuf {
-    let path = folder.path(&format!("{}.json", shard.replace('/', "-of-")));
-    scarab(&format!("{arguments} --shard {shard} --json"), &[&path]).ends_with(0);
-    path
+/// Runs the shard of this number and writes `NUMBER.json`.
+fn shard(folder: &Folder, arguments: &str, number: usize, count: usize) {
+    folder.scarab(&format!("{arguments} --shard {number}/{count} --json @{number}.json")).ends_with(0);
 }
 
 /// Arguments of one campaign; the order of the options does not matter.
@@ -67,16 +58,16 @@ fn texts() -> &'static [String; 3] {
     static TEXTS: OnceLock<[String; 3]> = OnceLock::new();
     TEXTS.get_or_init(|| {
         let folder = Folder::new();
-        let files = [shard(&folder, IDENTIFY[0], "1/2"), shard(&folder, IDENTIFY[1], "2/2")];
-        let whole = with_outputs(&folder, IDENTIFY[0], &[], "whole");
-        let joined = with_outputs(&folder, "merge", &[files[1].clone(), files[0].clone()], "joined");
+        shard(&folder, IDENTIFY[0], 1, 2);
+        shard(&folder, IDENTIFY[1], 2, 2);
+        let whole = with_outputs(&folder, IDENTIFY[0], "whole");
+        let joined = with_outputs(&folder, "merge @2.json @1.json", "joined");
         assert_eq!(joined, whole);
         assert!(
             whole.page.contains("cargo sim identify --prior wrong:40 --seeds 4..6</code>"),
             "its command"
         );
-        let read = |path: &Path| fs::read_to_string(path).expect("written");
-        [read(&files[0]), read(&files[1]), read(&folder.path("whole.json"))]
+        ["1.json", "2.json", "whole.json"].map(|name| folder.read(name))
     })
 }
 
@@ -99,10 +90,10 @@ fn joined_fault_campaigns_equal_the_undivided_ones_to_the_last_digit() {
         ("faults --seconds 1 --fault C2 --fault H1 --fault T1 --seeds 3 --blind", 2),
     ] {
         let folder = Folder::new();
-        let files: Vec<PathBuf> =
-            (1..=shards).map(|index| shard(&folder, arguments, &format!("{index}/{shards}"))).collect();
-        let whole = with_outputs(&folder, arguments, &[], "whole");
-        let joined = with_outputs(&folder, "merge", &files, "joined");
+        (1..=shards).for_each(|number| shard(&folder, arguments, number, shards));
+        let files: String = (1..=shards).map(|number| format!(" @{number}.json")).collect();
+        let whole = with_outputs(&folder, arguments, "whole");
+        let joined = with_outputs(&folder, &format!("merge{files}"), "joined");
         assert_eq!(joined, whole, "{arguments}");
     }
 }
@@ -113,19 +104,16 @@ type Changed = (usize, Vec<(&'static str, Value)>);
 /// Merges these files; returns the message.
 fn refusal(shards: &[Changed], further: &str) -> String {
     let folder = Folder::new();
-    let files: Vec<PathBuf> = shards
-        .iter()
-        .enumerate()
-        .map(|(number, (shard, changes))| {
-            let mut value: Value = serde_json::from_str(&texts()[*shard]).expect("JSON");
-            for (pointer, new) in changes {
-                *value.pointer_mut(pointer).unwrap_or_else(|| panic!("no {pointer}")) = new.clone();
-            }
-            folder.write(&format!("{number}.json"), &value.to_string())
-        })
-        .collect();
-    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    scarab(&format!("merge {further}"), &files).refusal()
+    let mut line = format!("merge {further}");
+    for (number, (shard, changes)) in shards.iter().enumerate() {
+        let mut value: Value = serde_json::from_str(&texts()[*shard]).expect("JSON");
+        for (pointer, new) in changes {
+            *value.pointer_mut(pointer).unwrap_or_else(|| panic!("no {pointer}")) = new.clone();
+        }
+        folder.write(&format!("{number}.json"), value.to_string());
+        line += &format!(" @{number}.json");
+    }
+    folder.scarab(&line).refusal()
 }
 
 #[test]
@@ -158,20 +146,17 @@ fn shards_that_do_not_make_one_campaign_are_refused_with_what_differs() {
         (vec![whole(2), whole(1)], "is no shard of a campaign: missing field `shard`"),
     ] {
         let message = refusal(&shards, "");
-        assert!(message.contains(words), "{words}: {message}");
-        assert!(
-            message.contains(".json: ") || words.contains("given") || words.contains("both"),
-            "{message}"
-        );
+        assert_contains(&message, words);
+        let is_named = message.contains(".json: ") || words.contains("given") || words.contains("both");
+        assert!(is_named, "{message}");
     }
     let message = refusal(&[whole(0), whole(1)], "--docs README.md");
-    assert!(message.contains("merge: shards of `identify`: unexpected argument '--docs"), "{message}");
+    assert_contains(&message, "merge: shards of `identify`: unexpected argument '--docs");
 }
 
 #[test]
 fn a_shard_that_does_not_exist_or_has_no_file_is_refused() {
     let folder = Folder::new();
-    let path = folder.path("shard.json");
     for (arguments, words) in [
         ("identify --seeds 1..2 --shard 0/2 --json", "shard 0 of 2; shards are numbered from 1 to 2"),
         ("identify --seeds 1..2 --shard 3/2 --json", "shard 3 of 2"),
@@ -183,10 +168,8 @@ fn a_shard_that_does_not_exist_or_has_no_file_is_refused() {
         ("faults --shard 1/2 --docs", "cannot be used with"),
         ("merge", "cannot be read"),
     ] {
-        let message = scarab(arguments, &[&path]).refusal();
-        assert!(message.contains(words), "{arguments}: {message}");
+        folder.scarab(&format!("{arguments} @shard.json")).refuses(words);
     }
-    let message = scarab("identify --seeds 1..2 --shard 1/2", &[]).refusal();
-    assert!(message.contains("--json"), "{message}");
-    assert!(!path.exists());
+    scarab("identify --seeds 1..2 --shard 1/2").refuses("--json");
+    assert!(!folder.path("shard.json").exists());
 }

@@ -1,14 +1,12 @@
 //! Messages of a simulated run beside its parameters.
 
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, list};
 
 #[test]
 fn parameters_of_a_blocked_joint_have_neither_value_nor_sigma() {
     let folder = Folder::new();
-    let json = folder.path("run.json");
-    scarab("identify --perturb stuck=knee --json", &[&json]).ends_with(3);
-    let run = folder.json("run.json");
-    let all = run["base_parameters"].as_array().expect("a list");
+    let (_, run) = folder.reported("identify --perturb stuck=knee", 3);
+    let all = list(&run, "base_parameters");
     let unknown: Vec<_> = all.iter().filter(|base| base["sigma"].is_null()).collect();
     assert!(!unknown.is_empty() && unknown.len() < all.len(), "{all:?}");
     for base in unknown {
@@ -24,9 +22,7 @@ fn compensating_errors_of_length_and_zero_are_detected_together() {
     // Their apparent misalignments cancel. In some seeds noise leaves too little of both (16 of 20 are
     // rejected).
     let folder = Folder::new();
-    scarab("identify --perturb length=1.1 --perturb zero=-5 --json", &[&folder.path("run.json")])
-        .ends_with(3);
-    let json = folder.json("run.json");
+    let (_, json) = folder.reported("identify --perturb length=1.1 --perturb zero=-5", 3);
     assert_eq!(json["reasons"], serde_json::json!(["residual"]));
 }
 
@@ -53,8 +49,9 @@ truth = { mass = 4.8, com = [0.18, 0.0, 0.0], inertia_com = [0.01, 0.0, 0.0, 0.0
 #[test]
 fn without_noise_the_search_is_refused_with_the_noise_that_helps() {
     let folder = Folder::new();
-    let leg = folder.write("exo.toml", WITHOUT_VISCOUS);
-    let refused = scarab("identify --leg", &[&leg]).ends_with(3).printed;
-    assert!(refused.contains("has not converged") && refused.contains("--torque-noise 1"), "{refused}");
-    scarab("identify --torque-noise 1 --leg", &[&leg]).ends_with(0);
+    folder.write("exo.toml", WITHOUT_VISCOUS);
+    let run = folder.scarab("identify --leg @exo.toml").ends_with(3);
+    run.prints("has not converged");
+    run.prints("--torque-noise 1");
+    folder.scarab("identify --torque-noise 1 --leg @exo.toml").ends_with(0);
 }

@@ -304,20 +304,15 @@ impl<R: BufRead, P: FnMut(&str) -> Result<(), ToolError>> Dialogue<R, P> {
         let mut bytes = Vec::new();
         let read = self.input.by_ref().take(LONGEST_ANSWER).read_until(b'\n', &mut bytes);
         let count = read.map_err(|error| ToolError::input(format!("the answers cannot be read: {error}")))?;
+        let answer = format!("answer {} ({question})", self.asked);
         if count == 0 {
-            return Err(ToolError::input(format!(
-                "the input ended before answer {} ({question}); nothing was written",
-                self.asked
-            )));
+            return Err(ToolError::input(format!("the input ended before {answer}; nothing was written")));
         }
         if count as u64 == LONGEST_ANSWER {
-            return Err(ToolError::input(format!(
-                "answer {} ({question}) is longer than {LONGEST_ANSWER} bytes; nothing was written",
-                self.asked
-            )));
+            let reason = format!("{answer} is longer than {LONGEST_ANSWER} bytes; nothing was written");
+            return Err(ToolError::input(reason));
         }
-        String::from_utf8(bytes)
-            .map_err(|_| ToolError::input(format!("answer {} ({question}) is not text", self.asked)))
+        String::from_utf8(bytes).map_err(|_| ToolError::input(format!("{answer} is not text")))
     }
 
     fn word(&mut self, question: &str, usual: Option<&str>, taken: &[&str]) -> Result<String, Interrupt> {

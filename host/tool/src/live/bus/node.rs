@@ -93,7 +93,7 @@ enum Asked {
 }
 
 /// What the frames have shown about one node.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Node {
     id: u8,
     values: BTreeMap<(u16, u8), Known>,
@@ -114,14 +114,7 @@ impl Node {
     /// A node of this ID, of which nothing is known.
     #[must_use]
     pub fn new(id: u8) -> Self {
-        Self {
-            id,
-            values: BTreeMap::new(),
-            asked: None,
-            state: None,
-            heard_s: None,
-            unmapped: BTreeSet::new(),
-        }
+        Self { id, ..Self::default() }
     }
 
     /// Node-ID.

@@ -1,4 +1,4 @@
-//! Tables for keys of the report's JSON without a section of their own.
+//! Tables for values of the report's JSON without a section of their own.
 //!
 //! A count stays a whole number, other numbers get three digits. A list of objects becomes a table
 //! with a column for each key, an object a table of two columns.
@@ -13,65 +13,20 @@ use serde_json::{Map, Value};
 use crate::view::html::number;
 use crate::view::html::table::{ToHtml, html_cell};
 
-/// Keys with their own sections on the page.
-const KNOWN: [&str; 44] = [
-    "schema",
-    "leg",
-    "seed",
-    "swarm_seed",
-    "prior",
-    "plan",
-    "temperature_c",
-    "verdict",
-    "reasons",
-    "rank",
-    "columns",
-    "condition",
-    "parameters",
-    "base_parameters",
-    "training",
-    "validation",
-    "least_squares",
-    "bso",
-    "tracking",
-    "scale",
-    "torque_constant",
-    "payload",
-    "load",
-    "simulated_s",
-    "wall_s",
-    "findings",
-    "consistent",
-    "validated",
-    "drive",
-    "model_choice",
-    "asymmetric_coulomb",
-    "stribeck",
-    "outliers",
-    "compared",
-    "likely_cause",
-    "directions",
-    "misfit_over_noise",
-    "at_prior_limit",
-    "recordings",
-    "bandwidth_hz",
-    "bandwidth_chosen",
-    "bandwidth_proposed_hz",
-    "bandwidth_for_stribeck_hz",
-    "read",
-];
 /// Limit of nesting on the page.
 const DEEPEST: usize = 3;
 
-/// Keys of a report without a section, in their order; empty ones are omitted.
-pub fn unknown_keys(run: &RunReport) -> Result<Map<String, Value>, ToolError> {
-    let value = serde_json::to_value(run)
-        .map_err(|error| ToolError::input(format!("the report cannot be shown: {error}")))?;
-    let Value::Object(mut keys) = value else {
-        return Ok(Map::new());
-    };
-    keys.retain(|key, value| !KNOWN.contains(&key.as_str()) && !is_empty(value));
-    Ok(keys)
+/// Sections of findings in the samples and of a board's trace; empty ones are omitted.
+pub fn sections(run: &RunReport) -> Result<Markup, ToolError> {
+    let values =
+        [("samples", serde_json::to_value(&run.samples)), ("trace", serde_json::to_value(&run.trace))];
+    let mut sections = Vec::new();
+    for (name, value) in values {
+        let value =
+            value.map_err(|error| ToolError::input(format!("the report cannot be shown: {error}")))?;
+        sections.extend((!is_empty(&value)).then(|| section(name, &value)));
+    }
+    Ok(html! { @for section in &sections { (section) } })
 }
 
 fn is_empty(value: &Value) -> bool {
@@ -97,7 +52,7 @@ pub fn words(key: &str) -> String {
 }
 
 /// Section of one key.
-pub fn section(name: &str, value: &Value) -> Markup {
+fn section(name: &str, value: &Value) -> Markup {
     html! { section { h2 { (words(name)) } (content(value, 0)) } }
 }
 

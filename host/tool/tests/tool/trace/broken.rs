@@ -7,7 +7,7 @@ use scarab_rig::traced::run::StreamReader;
 use scarab_rig::traced::run_report;
 
 use super::session::{RecordWriter, accepted, default_leg, quiet, read, text};
-use crate::command::{Folder, scarab};
+use crate::command::{Folder, assert_contains};
 use scarab::trace::Record;
 
 #[test]
@@ -76,7 +76,7 @@ fn lost_records_are_reported_by_number_and_invalidate_a_result() {
         let trace = read(&gap);
         assert_eq!((trace.lost(), trace.results.len()), (1, 0), "{}", lines[lost]);
         let error = run_report(&trace, &default_leg()).expect_err("incomplete").to_string();
-        assert!(error.contains("holds no complete result"), "{error}");
+        assert_contains(&error, "holds no complete result");
     }
     // Listener that joined late.
     let trace = read(&lines[4..]);
@@ -97,7 +97,7 @@ fn an_unreadable_line_is_reported_with_its_number() {
         "line 6: `state`: `drive=` is not key=value",
         "line 7: `state`: `phase` is missing",
     ] {
-        assert!(reported.contains(words), "{reported}");
+        assert_contains(&reported, words);
     }
     assert_eq!(trace.unknown, 1);
 }
@@ -144,10 +144,9 @@ fn faults_and_crashes_are_printed_before_tables_and_after_verdict() {
     let lines = [writer.lines, after.lines].concat();
     assert!(boot < lines.len());
     let folder = Folder::new();
-    let (trace, json) = (folder.write("trace.txt", &text(&lines)), folder.path("reported.json"));
-    let page = folder.path("reported.html");
-    let run = scarab("trace --json", &[&json, &trace, "--report".as_ref(), &page]).ends_with(0);
-    let page = std::fs::read_to_string(page).expect("written");
+    folder.write("trace.txt", text(&lines));
+    let (run, report) = folder.reported("trace @trace.txt --report @reported.html", 0);
+    let page = folder.read("reported.html");
     let alarm = page.find("3 faults of the drive").expect("the page begins with the faults");
     assert!(alarm < page.find("The model explains").expect("a verdict"));
     let (before, behind) = run.printed.split_once("verdict: accepted").expect("a verdict");
@@ -159,46 +158,39 @@ fn faults_and_crashes_are_printed_before_tables_and_after_verdict() {
     ] {
         assert!(before.contains(words) && behind.contains(words), "{words}\n{}", run.printed);
     }
-    assert!(
-        behind.contains("ATTENTION, 3 faults") && behind.contains("3 servo ticks were MISSED"),
-        "{behind}"
-    );
-    let reported = &folder.json("reported.json")["trace"];
+    assert_contains(behind, "ATTENTION, 3 faults");
+    assert_contains(behind, "3 servo ticks were MISSED");
+    let reported = &report["trace"];
     assert_eq!(reported["faults"].as_array().map(Vec::len), Some(3), "{reported}");
     assert_eq!(
         (&reported["loops"]["servo_missed"], &reported["loops"]["servo_worst"]),
         (&3.into(), &21_000.into())
     );
-    assert!(before.contains("worst servo tick 21000 of 42000 cycles (50.0 %)"), "{before}");
+    assert_contains(before, "worst servo tick 21000 of 42000 cycles (50.0 %)");
 }
 
 #[test]
 fn bad_input_is_refused_with_its_reason() {
     let folder = Folder::new();
-    let trace = folder.write("trace.txt", &text(&quiet()));
-    let refused = |arguments: &str, path: &Path| {
-        let run = scarab(arguments, &[path]).ends_with(2);
-        run.errors
-    };
-    for (arguments, words) in [
-        ("trace --leg sp", "the image is built for the leg `x2-wearer-75kg`"),
-        ("trace --leg none-such", "not the name of a shipped leg"),
-        ("trace --csv log.csv", "holds no log of a motion"),
-    ] {
-        let reported = refused(arguments, &trace);
-        assert!(reported.contains(words), "{arguments}: {reported}");
-    }
-    let empty = folder.write("empty.txt", "nothing here\n");
-    assert!(refused("trace", &empty).contains("contains no trace record"));
-    assert!(refused("trace", &folder.path("none.txt")).contains("cannot be read"));
+    folder.write("trace.txt", text(&quiet()));
+    folder.write("empty.txt", "nothing here\n");
     // Image of another leg under this leg's name: joints or base parameters differ.
     let other: Vec<String> =
         quiet().iter().map(|line| line.replace("symbol=FC grouped", "symbol=FV grouped")).collect();
-    let other = folder.write("other.txt", &text(&other));
-    assert!(refused("trace", &other).contains("its base parameter"), "carriers are compared");
+    folder.write("other.txt", text(&other));
     // Trace that does not name its leg.
-    let nameless = folder.write("nameless.txt", &text(&quiet()[1..]));
-    assert!(refused("trace", &nameless).contains("--leg"));
-    scarab("trace --leg x2-wearer-75kg", &[&nameless]).ends_with(0);
+    folder.write("nameless.txt", text(&quiet()[1..]));
+    for (arguments, words) in [
+        ("@trace.txt --leg sp", "the image is built for the leg `x2-wearer-75kg`"),
+        ("@trace.txt --leg none-such", "not the name of a shipped leg"),
+        ("@trace.txt --csv @log.csv", "holds no log of a motion"),
+        ("@empty.txt", "contains no trace record"),
+        ("@none.txt", "cannot be read"),
+        ("@other.txt", "its base parameter"),
+        ("@nameless.txt", "--leg"),
+    ] {
+        folder.scarab(&format!("trace {arguments}")).ends_with(2).warns(words);
+    }
+    folder.scarab("trace @nameless.txt --leg x2-wearer-75kg").ends_with(0);
     assert!(accepted().len() > quiet().len());
 }

@@ -13,7 +13,7 @@ use scarab_rig::trace::Decoder;
 use scarab_rig::traced::run::StreamReader;
 
 use super::session::{accepted, quiet, text};
-use crate::command::{Folder, scarab};
+use crate::command::Folder;
 
 /// Formats of types used by records besides their own, and their addresses in the image.
 const PRIMITIVES: [(u16, &str); 4] = [(1, "{=[?;2]}"), (2, "{=f32}"), (3, "{=i32}"), (4, "{=bool}")];
@@ -209,25 +209,18 @@ fn decoding_resumes_at_the_next_frame_after_lost_bytes() {
 #[test]
 fn a_stream_and_its_text_are_reported_alike() {
     let folder = Folder::new();
-    let (lines, elf) = (quiet(), folder.path("leg.elf"));
-    std::fs::write(&elf, own_image()).expect("written");
-    let (bytes, plain) = (folder.path("trace.bin"), folder.write("trace.txt", &text(&lines)));
-    std::fs::write(&bytes, stream(&lines)).expect("written");
-    let [one, other] = ["one.json", "other.json"].map(|name| folder.path(name));
-    let lines_again = folder.path("again.txt");
-    let decoded =
-        scarab("trace --image", &[&elf, &bytes, "--json".as_ref(), &one, "--text".as_ref(), &lines_again])
-            .ends_with(0);
-    let read = scarab("trace --json", &[&other, &plain]).ends_with(0);
-    assert_eq!(decoded.printed, read.printed);
-    assert_eq!(folder.json("one.json"), folder.json("other.json"));
-    let again = std::fs::read_to_string(lines_again).expect("written");
+    let lines = quiet();
+    folder.write("leg.elf", own_image());
+    folder.write("trace.txt", text(&lines));
+    folder.write("trace.bin", stream(&lines));
+    let (decoded, one) = folder.reported("trace --image @leg.elf @trace.bin --text @again.txt", 0);
+    let (read, other) = folder.reported("trace @trace.txt", 0);
+    assert_eq!((decoded.printed, one), (read.printed, other));
+    let again = folder.read("again.txt");
     assert!(again.lines().map(meaning).eq(lines.iter().map(|line| meaning(line))), "the lines need no image");
     // Stream without its image, text with one.
-    let errors = scarab("trace", &[&bytes]).ends_with(2).errors;
-    assert!(errors.contains("--image"), "{errors}");
-    let errors = scarab("trace --image", &[&elf, &plain]).ends_with(2).errors;
-    assert!(errors.contains("no frame of this image"), "{errors}");
+    folder.scarab("trace @trace.bin").ends_with(2).warns("--image");
+    folder.scarab("trace --image @leg.elf @trace.txt").ends_with(2).warns("no frame of this image");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use scarab_rig::traced::run_report;
 use serde_json::Value;
 
 use super::session::{accepted, default_leg, quiet, read, refused, renumbered, text};
-use crate::command::{Folder, base, reasons, scarab};
+use crate::command::{Folder, assert_contains, base, list, reasons};
 
 /// Keys of a run's report that a board does not send: searches in double precision, gains of
 /// columns, the noise's seed, noise-free torques, the truth, the Cramer-Rao bound, tracking, constants.
@@ -90,45 +90,32 @@ fn the_report_of_a_trace_equals_that_of_its_run() {
 #[test]
 fn the_log_of_a_trace_equals_the_run_s_and_replay_agrees() {
     let folder = Folder::new();
-    let trace = folder.write("trace.txt", &text(accepted()));
-    let [own_log, own_json] = ["own.csv", "own.json"].map(|name| folder.path(name));
-    scarab("identify --seed 1 --log", &[&own_log, "--json".as_ref(), &own_json]).ends_with(0);
-    let [log, json, page] = ["log.csv", "reported.json", "reported.html"].map(|name| folder.path(name));
-    let run = scarab("trace --csv", &[&log, &trace, "--json".as_ref(), &json, "--report".as_ref(), &page])
-        .ends_with(0);
-    assert!(run.printed.contains("verdict: accepted"), "{}", run.printed);
-    let same = std::fs::read(&own_log).expect("written") == std::fs::read(&log).expect("written");
-    assert!(same, "the trace's log differs from the run's");
-    assert!(
-        run.printed.contains("samples of motion 0; the trace contains motions 1, 2, 3"),
-        "{}",
-        run.printed
-    );
+    folder.write("trace.txt", text(accepted()));
+    folder.scarab("identify --seed 1 --log @own.csv").ends_with(0);
+    let (run, reported) = folder.reported("trace --csv @log.csv @trace.txt --report @reported.html", 0);
+    run.prints("verdict: accepted");
+    assert!(folder.read("own.csv") == folder.read("log.csv"), "the trace's log differs from the run's");
+    run.prints("samples of motion 0; the trace contains motions 1, 2, 3");
 
     // Another motion on request: the expected number of samples at its own angles.
-    let other = folder.path("other.csv");
-    scarab("trace --csv-motion 2 --csv", &[&other, &trace]).ends_with(0);
-    let reported = accepted().iter().filter(|line| line.contains("segment=validation motion=2 ")).count();
+    folder.scarab("trace --csv-motion 2 --csv @other.csv @trace.txt").ends_with(0);
+    let count = accepted().iter().filter(|line| line.contains("segment=validation motion=2 ")).count();
     let (first, other) = (folder.table("log.csv"), folder.table("other.csv"));
-    assert_eq!((&other.header, other.rows.len()), (&first.header, reported));
+    assert_eq!((&other.header, other.rows.len()), (&first.header, count));
     assert_ne!(other.rows[100], first.rows[100]);
-    let none = scarab("trace --csv-motion 9 --csv", &[&folder.path("none.csv"), &trace]).ends_with(2).errors;
-    assert!(none.contains("no log of motion 9, but of 0, 1, 2, 3"), "{none}");
-    let page = std::fs::read_to_string(page).expect("written");
-    assert!(
-        page.contains("board 000000330000002200000011") && page.contains("trace of a board"),
-        "not the page of a board"
-    );
+    let none = folder.scarab("trace --csv-motion 9 --csv @none.csv @trace.txt").ends_with(2);
+    none.warns("no log of motion 9, but of 0, 1, 2, 3");
+    let page = folder.read("reported.html");
+    assert_contains(&page, "board 000000330000002200000011");
+    assert_contains(&page, "trace of a board");
     for figure in ["motions.svg", "torque-1.svg", "torque-2.svg", "residuals.svg", "base-parameters.svg"] {
         assert!(page.contains(figure), "{figure} is drawn from the log");
     }
 
     // The host resamples and filters again: its result from the log differs from the board's by less than a
     // quarter of a sigma.
-    let replayed = folder.path("replayed.json");
-    scarab("replay --leg x2-wearer-75kg --json", &[&replayed, &log]).ends_with(0);
-    let (reported, replayed) = (folder.json("reported.json"), folder.json("replayed.json"));
-    for entry in reported["base_parameters"].as_array().expect("a list") {
+    let (_, replayed) = folder.reported("replay --leg x2-wearer-75kg @log.csv", 0);
+    for entry in list(&reported, "base_parameters") {
         let name = entry["name"].as_str().expect("a name");
         let Some(sigma) = entry["sigma"].as_f64() else { continue };
         let off = base(&reported, name, "value") - base(&replayed, name, "value");
@@ -139,18 +126,14 @@ fn the_log_of_a_trace_equals_the_run_s_and_replay_agrees() {
 #[test]
 fn a_refused_result_exits_with_three_and_its_reasons() {
     let folder = Folder::new();
-    let trace = folder.write("trace.txt", &text(refused()));
-    let json = folder.path("reported.json");
-    let run = scarab("trace --json", &[&json, &trace]).ends_with(3);
-    let report = folder.json("reported.json");
+    folder.write("trace.txt", text(refused()));
+    let (run, report) = folder.reported("trace @trace.txt", 3);
     let reasons = reasons(&report);
     assert!(!reasons.is_empty());
-    assert!(run.printed.contains(&format!("verdict: refused, {}", reasons.join(", "))), "{}", run.printed);
-    assert!(run.printed.contains("identification REFUSED"), "{}", run.printed);
-    let failed =
-        report["findings"].as_array().expect("a list").iter().filter(|found| found["passed"] == false);
-    for finding in failed {
-        assert!(run.printed.contains(finding["words"].as_str().expect("words")), "{finding}");
+    run.prints(&format!("verdict: refused, {}", reasons.join(", ")));
+    run.prints("identification REFUSED");
+    for finding in list(&report, "findings").iter().filter(|found| found["passed"] == false) {
+        run.prints(finding["words"].as_str().expect("words"));
     }
 }
 
@@ -172,17 +155,12 @@ fn the_last_of_two_identifications_is_reported() {
 #[test]
 fn a_model_identified_by_the_board_can_be_stored() {
     let folder = Folder::new();
-    let trace = folder.write("trace.txt", &text(&quiet()));
-    let [model, own] = ["reported.toml", "own.toml"].map(|name| folder.path(name));
-    scarab("trace --save-model", &[&model, &trace]).ends_with(0);
-    scarab("identify --seed 1 --save-model", &[&own]).ends_with(0);
-    let compared = scarab("identify --seed 1 --compare-model", &[&model]).ends_with(0);
-    assert!(compared.printed.contains("same"), "{}", compared.printed);
-    let base = |path| {
-        let text = std::fs::read_to_string(path).expect("written");
-        text.split("[base_set").nth(1).map(str::to_owned).expect("a base set")
-    };
-    assert_eq!(base(model), base(own), "values and covariance to the last bit");
+    folder.write("trace.txt", text(&quiet()));
+    folder.scarab("trace --save-model @reported.toml @trace.txt").ends_with(0);
+    folder.scarab("identify --seed 1 --save-model @own.toml").ends_with(0);
+    folder.scarab("identify --seed 1 --compare-model @reported.toml").ends_with(0).prints("same");
+    let base = |name| folder.read(name).split("[base_set").nth(1).map(str::to_owned).expect("a base set");
+    assert_eq!(base("reported.toml"), base("own.toml"), "values and covariance to the last bit");
 }
 
 #[test]
