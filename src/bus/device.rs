@@ -339,6 +339,8 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             self.coupling.follow_leg(self.axes.each_mut(), drive);
         }
         let power = self.coupling.power(self.axes.each_mut(), drive, refused).filter(|_| self.hosted);
+        let is_rising = matches!(drive, DriveState::ReadyToSwitchOn | DriveState::SwitchedOn);
+        let is_up = is_rising || drive.permission() != Permission::Off;
         // A step of the drive goes first; other requests wait for the next tick. An identification requested
         // on the way up is discarded: nothing requested before the leg is enabled starts afterwards.
         let requested = match power {
@@ -352,7 +354,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
                 None
             }
             (Some(power), _) => Some(LegRequest::Power(power)),
-            (None, _) if stops && !self.hosted && drive.permission() != Permission::Off => {
+            (None, _) if stops && !self.hosted && is_up => {
                 Some(LegRequest::Power(PowerRequest::DisableVoltage))
             }
             // While the operator controls the leg, a host must not start a motion.

@@ -18,6 +18,9 @@
 //! A host on the bus may ask for calibration, reference and reset too ([`Operator::refusal`]): the rules are
 //! those of the button, and the switch stays with the operator.
 //!
+//! A switch that closes while the drive damps enables nothing: it must be opened again. Otherwise whatever
+//! ends the damping, a host's stop for instance, would enable the leg.
+//!
 //! A contact counts after 20 ms without change; an opened enabling switch counts at once. With the switch
 //! open the button counts only after it was open too. So a button that is welded closed neither resets nor
 //! takes a reference each time the operator lets go. Ticked at [`RATE_HZ`]. A request may be refused and is
@@ -183,8 +186,13 @@ impl Operator {
             // A stop is accepted at any time.
             return if now.enabling { None } else { stop(now) };
         }
+        let damps = now.drive.is_some_and(|drive| drive.permission() == Permission::Damp);
+        self.steps = match now.enabling {
+            false => 0,
+            true if damps => u8::MAX,
+            true => self.steps,
+        };
         if !self.enabling.closed {
-            self.steps = 0;
             return self.without_the_switch(now, before);
         }
         (self.ready, self.pressed) = (false, 0);
@@ -333,6 +341,25 @@ mod tests {
             let mut operator = holding();
             let held = Situation { enabling: true, drive, calibrating, ..READY };
             assert_eq!(operator.tick(&Situation { enabling: false, ..held }), Some(expected));
+        }
+    }
+
+    #[test]
+    fn a_switch_that_closes_while_the_drive_damps_enables_nothing() {
+        let off = Situation { enabling: true, ..READY };
+        // Ticks for which the switch is closed before the damping ends: half of the debouncing, and more.
+        for ticks in [STEADY_TICKS / 2, RATE_HZ] {
+            let mut operator = holding();
+            let damps =
+                Situation { drive: Some(DriveState::QuickStopActive { remaining_ticks: 1 }), ..READY };
+            assert_eq!(requested(&mut operator, damps, STEADY_TICKS).count(), 0);
+            let held = Situation { enabling: true, ..damps };
+            assert_eq!(requested(&mut operator, held, ticks).count(), 0);
+            assert_eq!(requested(&mut operator, off, RATE_HZ).count(), 0, "{ticks}");
+            // Once more, with the drive off.
+            assert_eq!(requested(&mut operator, READY, 1).count(), 0);
+            let request = requested(&mut operator, off, RATE_HZ).next();
+            assert_eq!(request, Some(OperatorRequest::Power(PowerRequest::Shutdown)));
         }
     }
 

@@ -2,20 +2,24 @@
 
 use scarab::hal::Contacts;
 use scarab::leg::Activity;
-use scarab::safety::DriveState;
+use scarab::safety::{DriveState, Permission};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 
 use crate::faulty_board::{PERIODS_PER_S, Rig};
 
-/// Periods until the operator's contacts count, and until the drive has to be enabled.
+/// Periods until the operator's contacts count, and until the drive has to be off or enabled.
 const OPEN: u64 = PERIODS_PER_S / 5;
 const ENABLED: u64 = PERIODS_PER_S;
 
-/// Opens both contacts, then holds the enabling switch until the drive is enabled; returns whether it is.
+/// Opens both contacts until the drive is off, then holds the enabling switch until it is enabled; returns
+/// whether it is.
 pub fn enable<const N: usize, const B: usize>(rig: &mut Rig<N, B>) -> bool {
     rig.hand = Contacts::default();
-    for _ in 0..OPEN {
+    for period in 0..ENABLED {
+        if period >= OPEN && rig.state().permission() == Permission::Off {
+            break;
+        }
         rig.advance();
     }
     rig.hand.enabling = true;

@@ -189,11 +189,13 @@ fn the_operator_controls_the_leg_until_a_host_sends_a_controlword() {
 
 #[test]
 fn a_host_that_disables_the_operators_leg_stops_it_and_does_not_take_it() {
-    let mut bench = Bench::new();
-    bench.drive = DriveState::OperationEnabled;
-    bench.write(1, 0x6040, 0, 0, 2);
-    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, false));
-    assert_eq!(bench.read(2, 0x6041) & 0x6F, 0x40);
+    for drive in [DriveState::ReadyToSwitchOn, DriveState::SwitchedOn, DriveState::OperationEnabled] {
+        let mut bench = Bench::new();
+        bench.drive = drive;
+        bench.write(1, 0x6040, 0, 0, 2);
+        assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, false));
+        assert_eq!(bench.read(2, 0x6041) & 0x6F, 0x40);
+    }
 }
 
 #[test]

@@ -274,6 +274,8 @@ impl Commanded {
             let value;
             (value, rest) = rest.split_at(usize::from(length).min(rest.len()));
             self.write(index, sub, tick);
+            // A node that is not Operational ignores the frame.
+            self.is_certain &= index != 0x60FF;
             match (index, value) {
                 (WORD, [low, high]) if is_certain => self.word(u16::from_le_bytes([*low, *high]), tick),
                 (WORD, _) => bytes.into_iter().for_each(|byte| self.word(u16::from(byte), tick)),
