@@ -8,7 +8,7 @@ use scarab::model::{
 use scarab::real::Real;
 use serde_json::Value;
 
-const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/planar_hip_knee");
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/planar_hip_knee");
 
 struct Sample {
     state: JointState<f64, 2>,

@@ -22,7 +22,7 @@ const FILES: [&str; 5] = [
 const NOT_OF_THE_DEFAULT: [&str; 1] = ["WHISKER_DECAY"];
 
 fn read(path: &str) -> String {
-    let whole = format!("{}/{path}", env!("CARGO_MANIFEST_DIR"));
+    let whole = format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"));
     fs::read_to_string(&whole).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
