@@ -165,6 +165,8 @@ pub struct Device<const N: usize, const LOG: usize> {
     stored: [StoredNode; N],
     /// Whether a host controls the drive.
     hosted: bool,
+    /// A host that does not control the drive has stopped it.
+    stopped: bool,
     /// A request was held back because the leg would refuse it.
     refused: bool,
     /// Last refusal, while its reason lasts.
@@ -205,6 +207,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             identity,
             stored: [StoredNode::NOTHING; N],
             hosted: false,
+            stopped: false,
             refused: false,
             refusal: None,
             report: None,
@@ -330,7 +333,10 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             stops |= axis.take_stop();
         }
         let commanded = self.axes.iter().any(Axis::is_commanded);
-        self.hosted = commanded || self.hosted && drive.permission() != Permission::Off;
+        // Also a leg that is about to be enabled: nobody would step it down.
+        let is_rising = matches!(drive, DriveState::ReadyToSwitchOn | DriveState::SwitchedOn);
+        let is_up = is_rising || drive.permission() != Permission::Off;
+        self.hosted = commanded || self.hosted && is_up;
         let refused = core::mem::take(&mut self.refused) || status.refused.is_some();
         for axis in &mut self.axes {
             axis.hosted = self.hosted && (axis.is_commanded() || axis.hosted);
@@ -339,8 +345,6 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             self.coupling.follow_leg(self.axes.each_mut(), drive);
         }
         let power = self.coupling.power(self.axes.each_mut(), drive, refused).filter(|_| self.hosted);
-        let is_rising = matches!(drive, DriveState::ReadyToSwitchOn | DriveState::SwitchedOn);
-        let is_up = is_rising || drive.permission() != Permission::Off;
         // A step of the drive goes first; other requests wait for the next tick. An identification requested
         // on the way up is discarded: nothing requested before the leg is enabled starts afterwards.
         let requested = match power {
@@ -348,6 +352,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             Some(power) if power.enables() && self.leg.requests_motion() => self.leg.take_request(),
             Some(_) => None,
         };
+        self.stopped = !self.hosted && (stops || matches!(requested, Some(LegCommand::Cancel)));
         self.request = match (power, requested) {
             (Some(power), _) if power.enables() && status.blocking_reason().is_some() => {
                 self.refused = true;
@@ -449,6 +454,12 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     #[must_use]
     pub const fn is_hosted(&self) -> bool {
         self.hosted
+    }
+
+    /// Whether a host that does not control the drive has stopped it since the update before.
+    #[must_use]
+    pub const fn is_stopped(&self) -> bool {
+        self.stopped
     }
 
     /// Takes over the board's state and telemetry.

@@ -191,7 +191,7 @@ impl BusRound {
             return;
         }
         if take_first(&mut ends.status, |status| device.update(status)).is_some() {
-            signals.set_hosted(device.is_hosted());
+            signals.set_host(device.is_hosted(), device.is_stopped());
             self.due = true;
         }
         if self.due {

@@ -18,8 +18,9 @@
 //! A host on the bus may ask for calibration, reference and reset too ([`Operator::refusal`]): the rules are
 //! those of the button, and the switch stays with the operator.
 //!
-//! A switch that closes while the drive damps enables nothing: it must be opened again. Otherwise whatever
-//! ends the damping, a host's stop for instance, would enable the leg.
+//! A closed switch enables nothing if, since it closed, the drive damped, a host had or stopped the drive, or
+//! the leg was blocked, not calibrated or without reference: it must be opened again, for 20 ms or more.
+//! Otherwise the end of such a reason would enable the leg, and a host's stop would not last.
 //!
 //! A contact counts after 20 ms without change; an opened enabling switch counts at once. With the switch
 //! open the button counts only after it was open too. So a button that is welded closed neither resets nor
@@ -33,6 +34,7 @@ use crate::leg::{DriveState, Permission, PowerRequest};
 pub const RATE_HZ: u32 = 500;
 const STEADY_TICKS: u32 = RATE_HZ / 50;
 const RESET_TICKS: u32 = 2 * RATE_HZ;
+const VOID: u8 = u8::MAX;
 
 /// Inputs of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +45,8 @@ pub struct Situation {
     pub start: bool,
     /// An inhibit reason is active.
     pub blocked: bool,
+    /// A host has the drive, or had or stopped it since the last tick.
+    pub host_acts: bool,
     /// Both axes have a calibration.
     pub calibrated: bool,
     /// A calibration is under way.
@@ -130,9 +134,10 @@ pub struct Operator {
     ready: bool,
     /// Ticks for which the button has been pressed since then.
     pressed: u32,
-    /// Ticks for which the switch has been open.
+    /// Ticks for which the switch has been open, and without a bounce.
     opened: u32,
-    /// Steps towards enabled requested during this closing of the switch.
+    released: u32,
+    /// Steps towards enabled requested during this closing of the switch; [`VOID`] if it must enable nothing.
     steps: u8,
 }
 
@@ -179,6 +184,7 @@ impl Operator {
         // An opened switch counts at once.
         self.enabling.closed &= now.enabling;
         self.opened = if self.enabling.closed { 0 } else { self.opened.saturating_add(1) };
+        self.released = if now.enabling { 0 } else { self.released.saturating_add(1) };
         if !self.trusted {
             let open = !now.enabling && !now.start;
             self.open = if open { self.open + 1 } else { 0 };
@@ -187,11 +193,11 @@ impl Operator {
             return if now.enabling { None } else { stop(now) };
         }
         let damps = now.drive.is_some_and(|drive| drive.permission() == Permission::Damp);
-        self.steps = match now.enabling {
-            false => 0,
-            true if damps => u8::MAX,
-            true => self.steps,
-        };
+        if self.released >= STEADY_TICKS {
+            self.steps = 0;
+        } else if damps || now.host_acts || now.blocked || !now.calibrated || !now.referenced {
+            self.steps = VOID;
+        }
         if !self.enabling.closed {
             return self.without_the_switch(now, before);
         }
@@ -203,11 +209,6 @@ impl Operator {
                 return Some(OperatorRequest::Calibrate);
             }
             _ => {}
-        }
-        if now.blocked || !now.calibrated || !now.referenced {
-            // The reason may end by itself, also a missing reference. This closing must not enable then.
-            self.steps = u8::MAX;
-            return None;
         }
         self.next_step(now.drive?)
     }
@@ -264,6 +265,7 @@ mod tests {
         enabling: false,
         start: false,
         blocked: false,
+        host_acts: false,
         calibrated: false,
         calibrating: false,
         referenced: false,
@@ -345,6 +347,28 @@ mod tests {
     }
 
     #[test]
+    fn a_host_that_acts_voids_the_present_closing_of_the_switch() {
+        // During the debouncing, and after each of the steps; then the reset of the nodes ends its control.
+        let states = [DriveState::SwitchOnDisabled, DriveState::ReadyToSwitchOn, DriveState::SwitchedOn];
+        for (ticks, drive) in (0..).step_by(STEADY_TICKS as usize).zip(states) {
+            let mut operator = trusted();
+            let held = Situation { enabling: true, ..READY };
+            assert!(requested(&mut operator, held, ticks).count() <= 1);
+            let acts = Situation { host_acts: true, drive: Some(drive), ..held };
+            assert_eq!(operator.tick(&acts), None);
+            for drive in states {
+                let now = Situation { drive: Some(drive), ..held };
+                assert_eq!(requested(&mut operator, now, RATE_HZ).count(), 0, "{drive:?}");
+            }
+            // What it did while the switch was open does not matter.
+            let open = Situation { enabling: false, host_acts: true, ..READY };
+            assert_eq!(requested(&mut operator, open, STEADY_TICKS).count(), 0);
+            let request = requested(&mut operator, held, RATE_HZ).next();
+            assert_eq!(request, Some(OperatorRequest::Power(PowerRequest::Shutdown)));
+        }
+    }
+
+    #[test]
     fn a_switch_that_closes_while_the_drive_damps_enables_nothing() {
         let off = Situation { enabling: true, ..READY };
         // Ticks for which the switch is closed before the damping ends: half of the debouncing, and more.
@@ -356,8 +380,10 @@ mod tests {
             let held = Situation { enabling: true, ..damps };
             assert_eq!(requested(&mut operator, held, ticks).count(), 0);
             assert_eq!(requested(&mut operator, off, RATE_HZ).count(), 0, "{ticks}");
-            // Once more, with the drive off.
-            assert_eq!(requested(&mut operator, READY, 1).count(), 0);
+            // A bounce does not open it.
+            assert_eq!(requested(&mut operator, READY, STEADY_TICKS - 1).count(), 0);
+            assert_eq!(requested(&mut operator, off, RATE_HZ).count(), 0, "{ticks}");
+            assert_eq!(requested(&mut operator, READY, STEADY_TICKS).count(), 0);
             let request = requested(&mut operator, off, RATE_HZ).next();
             assert_eq!(request, Some(OperatorRequest::Power(PowerRequest::Shutdown)));
         }

@@ -249,7 +249,10 @@ impl<const N: usize> Housekeeper<N> {
         self.send_passed(level);
         self.set_bandwidths(level);
         let situation = self.situation(level);
-        if let Some(request) = self.operator.tick(&situation) {
+        let request = self.operator.tick(&situation);
+        // Before the request, because the servo drops a step that the operator does not permit.
+        level.signals.set_permits(self.permits());
+        if let Some(request) = request {
             self.accept(request, level);
         } else {
             self.take_step(&situation, level);
@@ -361,6 +364,7 @@ impl<const N: usize> Housekeeper<N> {
             enabling,
             start,
             blocked: self.is_blocked(level.signals),
+            host_acts: level.signals.take_host_action(),
             calibrated: self.is_calibrated(),
             calibrating: self.calibrating.is_some(),
             referenced: level.signals.has_begun(),

@@ -279,7 +279,8 @@ pub struct Signals<const N: usize> {
     /// Duty of the brake resistor that the servo wants, and the one that it was given, as bits.
     brake: [Word; 2],
     permission: Word,
-    hosted: Word,
+    /// Whether a host has the drive, and whether one had or stopped it since the housekeeper's last round.
+    hosted: [Word; 2],
     permits: Word,
     board_state: Word,
     /// Bandwidths of position and current loop of each joint that a host has set, Hz, as bits; 0.0 for none.
@@ -311,7 +312,7 @@ impl<const N: usize> Signals<N> {
             powers: [const { Word::new(0) }; N],
             brake: [const { Word::new(0) }; 2],
             permission: Word::new(0),
-            hosted: Word::new(0),
+            hosted: [const { Word::new(0) }; 2],
             permits: Word::new(0),
             board_state: Word::new(0),
             bandwidths: [const { [const { Word::new(0) }; 2] }; N],
@@ -636,12 +637,21 @@ impl<const N: usize> Signals<N> {
     /// Returns whether a host has the drive; then closing the enabling switch permits but requests nothing.
     #[must_use]
     pub fn is_hosted(&self) -> bool {
-        self.hosted.get() != 0
+        self.hosted[0].get() != 0
     }
 
-    /// Sets whether a host has the drive.
-    pub fn set_hosted(&self, hosted: bool) {
-        self.hosted.set(hosted.into());
+    /// Sets whether a host has the drive. `stopped`: one that does not have it has stopped it.
+    pub fn set_host(&self, hosted: bool, stopped: bool) {
+        let [now, acted] = &self.hosted;
+        now.set(hosted.into());
+        if hosted || stopped {
+            acted.set(1);
+        }
+    }
+
+    /// Returns whether a host has the drive, or had or stopped it since the last call.
+    pub fn take_host_action(&self) -> bool {
+        self.hosted[1].swap(0) != 0 || self.is_hosted()
     }
 
     /// Returns the operator's permission: the debounced enabling switch, false during a reset.

@@ -25,6 +25,8 @@ struct Bench {
     velocity: f32,
     now_us: u64,
     orders: Vec<LegOrder<2>>,
+    /// A host that does not have the drive has stopped it.
+    stopped: bool,
 }
 
 impl Bench {
@@ -48,6 +50,7 @@ impl Bench {
             velocity: 0.0,
             now_us: 0,
             orders: Vec::new(),
+            stopped: false,
         };
         assert_eq!(bench.run(4).len(), 2);
         bench
@@ -86,6 +89,7 @@ impl Bench {
             refused: self.refused.take(),
             ..LegStatus::NONE
         });
+        self.stopped |= self.device.is_stopped();
         let order = self.device.order();
         if order.request == Some(LegRequest::Power(PowerRequest::EnableOperation)) {
             self.refused = self.refuses;
@@ -189,12 +193,35 @@ fn the_operator_controls_the_leg_until_a_host_sends_a_controlword() {
 
 #[test]
 fn a_host_that_disables_the_operators_leg_stops_it_and_does_not_take_it() {
-    for drive in [DriveState::ReadyToSwitchOn, DriveState::SwitchedOn, DriveState::OperationEnabled] {
+    use DriveState::{OperationEnabled, ReadyToSwitchOn, SwitchOnDisabled, SwitchedOn};
+    for drive in [SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, OperationEnabled] {
+        for (index, sub, value, bytes) in [(0x6040, 0, 0, 2), (0x2100, 1, 2, 1)] {
+            let mut bench = Bench::new();
+            bench.drive = drive;
+            bench.run(4);
+            assert!(!bench.stopped);
+            bench.write(1, index, sub, value, bytes);
+            // The operator hears of it in each state.
+            assert!(bench.stopped, "{drive:?}");
+            assert!(!bench.device.is_hosted());
+            if index == 0x6040 {
+                assert_eq!((bench.drive, bench.read(2, 0x6041) & 0x6F), (SwitchOnDisabled, 0x40));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_reset_of_all_nodes_on_the_way_up_steps_the_leg_down() {
+    for words in [&[6][..], &[6, 7]] {
         let mut bench = Bench::new();
-        bench.drive = drive;
-        bench.write(1, 0x6040, 0, 0, 2);
+        for (word, node) in words.iter().flat_map(|word| [(*word, 1), (*word, 2)]) {
+            bench.write(node, 0x6040, 0, word, 2);
+        }
+        assert!(bench.drive != DriveState::SwitchOnDisabled && bench.device.is_hosted());
+        bench.send(0, &[129, 0]);
+        bench.run(8);
         assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, false));
-        assert_eq!(bench.read(2, 0x6041) & 0x6F, 0x40);
     }
 }
 

@@ -19,7 +19,8 @@
 //! as written.
 //!
 //! **Disable voltage from a host that does not control the leg** (0 by SDO, while the operator's contacts
-//! have enabled it) turns the leg off too, and leaves it to the operator. A 0 that a PDO repeats is idle.
+//! have enabled it, or are about to) turns the leg off too. The operator has to open the switch and close it
+//! again. A 0 that a PDO repeats is idle.
 //!
 //! A controlword that asks for a step which does not exist from the present state has no effect, such as 7
 //! or F at switch on disabled, or any step during a quick stop or with bit 7 set. A new word of that kind is

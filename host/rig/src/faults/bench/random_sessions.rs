@@ -97,7 +97,30 @@ fn sessions(fault: &Fault, leg: &LegFile, seeds: &[u64], _: bool) -> Result<Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::faults::random_hosts::Step;
     use scarab_identify::formats::leg_file::DEFAULT_LEG;
+
+    #[test]
+    fn a_host_that_acts_while_the_switch_closes_keeps_the_leg_off() {
+        let leg = LegFile::load(DEFAULT_LEG).expect("a shipped leg");
+        let ([_, by_hand], bounds) =
+            (SimulatedLeg::both(&leg).expect("legs"), JointBounds::from_leg(&leg).expect("bounds"));
+        // The stop of a host that does not have the leg, and one that takes it and leaves.
+        for acts in [vec![Step::Word(JOINTS, 0)], vec![Step::Word(JOINTS, 6), Step::Nmt(129, 0)]] {
+            // The leg damps, or is off; the switch counts after 80 ticks, and its steps take some more.
+            for (open, closed) in
+                [(20, 20), (20, 120), (1300, 4), (1300, 40), (1300, 76), (1300, 80), (1300, 84)]
+            {
+                let closing = [Step::Wait(open), Step::Contacts(true, false, closed)];
+                let opened = [Step::Contacts(false, false, 4)];
+                let steps =
+                    opened.into_iter().chain(closing).chain(acts.clone()).chain([Step::Wait(400)]).collect();
+                let session = HostSession { by_hand: true, steps };
+                let found = check_session(by_hand.clone(), bounds, &session);
+                assert_eq!(found, Ok(()), "{session:?}");
+            }
+        }
+    }
 
     #[test]
     fn no_random_session_breaks_an_invariant() {

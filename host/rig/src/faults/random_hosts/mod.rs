@@ -23,7 +23,7 @@ const MOST_STEPS: u64 = 40;
 
 /// Object that hosts write: index, subindex, bytes.
 #[derive(Clone, Copy)]
-struct Object(u16, u8, u8);
+pub(super) struct Object(u16, u8, u8);
 
 impl fmt::Debug for Object {
     fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -159,7 +159,7 @@ const VALUES: [i32; 7] = [0, 1, -1, i32::MIN, i32::MAX, 0x7FFF, 0xFFFF];
 
 /// One step. A joint of [`JOINTS`] means every joint.
 #[derive(Clone, Copy, Debug)]
-enum Step {
+pub(super) enum Step {
     /// SDO write to a node.
     Write(usize, Object, i32),
     /// Controlword by SDO.
@@ -205,7 +205,7 @@ enum Step {
     Lss(u8, u8),
     /// A host's heartbeat, after its time in milliseconds was written to the node, as entry 1 or 2.
     Watch(usize, u8, u8),
-    Contacts(bool, bool),
+    Contacts(bool, bool, u8),
     Plug(bool),
     /// Ticks without a frame, then the statuswords are compared.
     Wait(u16),
@@ -250,7 +250,7 @@ impl Step {
             27 => Self::Watch(joint, 1 + random.below(2) as u8, random.below(250) as u8),
             28 => Self::Sync(1 + random.below(39) as u8, 1 + random.below(19) as u8, random.coin()),
             29 => Self::Nmt(any_of(random, &NMT_COMMANDS), random.below(3) as u8),
-            30 => Self::Contacts(random.coin(), random.coin()),
+            30 => Self::Contacts(random.coin(), random.coin(), random.below(251) as u8),
             31 => Self::Plug(random.coin()),
             32 => Self::Map(joint, 1 + random.below(4) as u16, [(); 2].map(|()| any_of(random, &MAPPED))),
             33..35 => {
@@ -295,7 +295,8 @@ impl Step {
 pub struct HostSession {
     /// Whether the operator's contacts have enabled the leg before.
     pub by_hand: bool,
-    steps: Vec<Step>,
+    /// What hosts and operator do, in this order.
+    pub(super) steps: Vec<Step>,
 }
 
 impl HostSession {

@@ -79,6 +79,8 @@ impl<L: HostedLeg> Play<L> {
         let is_confirmed = self.request(joint, (index, sub, bytes), value)?;
         if is_confirmed {
             self.commanded[joint].confirm(index, sub, value);
+            // A host that stops or takes the leg: the operator has to close the switch again.
+            self.by_hand &= index != WORD;
         }
         Ok(is_confirmed)
     }
@@ -297,9 +299,9 @@ impl<L: HostedLeg> Play<L> {
                 self.send(0x77F, &[5]);
                 self.run(2)
             }
-            Step::Contacts(enabling, start) => {
+            Step::Contacts(enabling, start, ticks) => {
                 self.hand(enabling, start);
-                self.run(SERVO_RATE_HZ / 20)
+                self.run(ticks.into())
             }
             Step::Plug(plugged) => {
                 (self.plugged, self.unheard) = (plugged, None);

@@ -179,7 +179,7 @@ pub(super) struct Play<L> {
     pub writes_flash_until: u64,
     pub plugged: bool,
     /// Whether the operator may have enabled the leg.
-    by_hand: bool,
+    pub by_hand: bool,
     is_switch_closed: bool,
     pub answer: Option<[u8; 8]>,
 }
