@@ -134,8 +134,9 @@ pub struct Operator {
     ready: bool,
     /// Ticks for which the button has been pressed since then.
     pressed: u32,
-    /// Ticks for which the switch has been open, and without a bounce.
+    /// Ticks for which the switch has been open, debounced.
     opened: u32,
+    /// Ticks for which its contact has been open.
     released: u32,
     /// Steps towards enabled requested during this closing of the switch; [`VOID`] if it must enable nothing.
     steps: u8,

@@ -291,11 +291,16 @@ impl Motor {
         let swings = [first, second, third];
         let off = terminals.iter().filter(|terminal| matches!(terminal, Terminal::Off(..))).count();
         for _ in 0..if off == 1 { 1 } else { SWEEPS } {
+            let before = voltages;
             for phase in 0..3 {
                 let Terminal::Off(low, high) = terminals[phase] else { continue };
                 let current = phases(&self.currents_of(&flux_at(&voltages), &end))[phase];
                 let slope = 2.0 / 3.0 * (self.mean + self.swing * swings[phase]) * duration;
                 voltages[phase] = (voltages[phase] - current / slope).clamp(low, high);
+            }
+            // Another sweep would change nothing either.
+            if voltages == before {
+                break;
             }
         }
         let before = self.flux;

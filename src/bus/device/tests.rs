@@ -213,15 +213,23 @@ fn a_host_that_disables_the_operators_leg_stops_it_and_does_not_take_it() {
 
 #[test]
 fn a_reset_of_all_nodes_on_the_way_up_steps_the_leg_down() {
-    for words in [&[6][..], &[6, 7]] {
-        let mut bench = Bench::new();
-        for (word, node) in words.iter().flat_map(|word| [(*word, 1), (*word, 2)]) {
-            bench.write(node, 0x6040, 0, word, 2);
+    // Also where the leg has not followed the last word yet.
+    for (words, last) in [(&[6][..], None), (&[6, 7], None), (&[6], Some(0xF)), (&[6, 7], Some(0xF))] {
+        for option in 0..=3 {
+            let mut bench = Bench::new();
+            for (word, node) in words.iter().flat_map(|word| [(*word, 1), (*word, 2)]) {
+                bench.write(node, 0x6007, 0, option, 2);
+                bench.write(node, 0x6040, 0, word, 2);
+            }
+            assert!(bench.drive != DriveState::SwitchOnDisabled && bench.device.is_hosted());
+            for node in last.iter().flat_map(|_| [1, 2]) {
+                bench.receive(0x600 + node, &[0x2B, 0x40, 0x60, 0, 0xF, 0, 0, 0]);
+            }
+            bench.send(0, &[129, 0]);
+            bench.run(8);
+            let found = (bench.drive, bench.device.is_hosted());
+            assert_eq!(found, (DriveState::SwitchOnDisabled, false), "{words:?} {last:?} {option}");
         }
-        assert!(bench.drive != DriveState::SwitchOnDisabled && bench.device.is_hosted());
-        bench.send(0, &[129, 0]);
-        bench.run(8);
-        assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, false));
     }
 }
 

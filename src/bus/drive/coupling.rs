@@ -61,11 +61,12 @@ impl Coupling {
                 || axis.own == DriveState::NotReadyToSwitchOn
                 || axis.own.fault().is_some()
                 || is_stopping
-                || has_gone_down && is_above
-                // A quick stop without power ends at once.
-                || wants_stop && !drive.is_enabled();
+                || has_gone_down && is_above;
             if follows {
                 axis.own = drive;
+            } else if wants_stop && !drive.is_enabled() {
+                // A quick stop without power ends at once.
+                axis.own = DriveState::SwitchOnDisabled;
             }
             stops |= wants_stop && drive.is_enabled();
             lowest = lowest.min(level(axis.own));
