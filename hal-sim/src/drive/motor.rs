@@ -36,6 +36,8 @@ const AMBIENT: f64 = 20.0;
 const SIN_60: f64 = 0.866_025_403_784_438_6;
 /// Sweeps over outputs that are off; each reduces the remaining error by a factor of four.
 const SWEEPS: usize = 6;
+/// Change of a voltage after which no further sweep is made, V.
+const SETTLED: f64 = 1e-9;
 /// Currents below this count as zero, A.
 const NO_CURRENT: f64 = 1e-6;
 
@@ -285,21 +287,27 @@ impl Motor {
                 self.flux[part] + duration * (driving[part] - self.resistance * start[part])
             })
         };
-        // Cosines of twice the angle, turned to each phase: cos(2 angle - 240 k).
+        // Change of the currents by the voltages. Between two phases the third one's direction counts.
         let [cosine, sine] = end.doubled();
         let [first, third, second] = phases(&[cosine, sine]);
-        let swings = [first, second, third];
-        let off = terminals.iter().filter(|terminal| matches!(terminal, Terminal::Off(..))).count();
-        for _ in 0..if off == 1 { 1 } else { SWEEPS } {
-            let before = voltages;
+        let changes = [first, second, third].map(|direction| self.swing * direction);
+        let factor = 2.0 / 3.0 * duration;
+        let own = changes.map(|change| factor * (self.mean + change));
+        let mutual = changes.map(|change| factor * (change - 0.5 * self.mean));
+        let mut currents = phases(&self.currents_of(&flux_at(&voltages), &end));
+        for _ in 0..SWEEPS {
+            let mut largest = 0.0_f64;
             for phase in 0..3 {
                 let Terminal::Off(low, high) = terminals[phase] else { continue };
-                let current = phases(&self.currents_of(&flux_at(&voltages), &end))[phase];
-                let slope = 2.0 / 3.0 * (self.mean + self.swing * swings[phase]) * duration;
-                voltages[phase] = (voltages[phase] - current / slope).clamp(low, high);
+                let voltage = (voltages[phase] - currents[phase] / own[phase]).clamp(low, high);
+                let change = voltage - core::mem::replace(&mut voltages[phase], voltage);
+                let (next, last) = ((phase + 1) % 3, (phase + 2) % 3);
+                currents[phase] += own[phase] * change;
+                currents[next] += mutual[last] * change;
+                currents[last] += mutual[next] * change;
+                largest = largest.max(change.abs());
             }
-            // Another sweep would change nothing either.
-            if voltages == before {
+            if largest < SETTLED {
                 break;
             }
         }
