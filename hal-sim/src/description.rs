@@ -118,23 +118,12 @@ pub struct DriveDescription {
     pub lag: f64,
 }
 
-/// Mounting side of the encoder, relative to the gear.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EncoderSide {
-    /// On the motor, which turns `ratio` times per joint turn.
-    Motor,
-    /// On the joint.
-    Joint,
-}
-
 /// Encoder; its count 0 lies at the anatomical zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EncoderDescription {
-    /// Mounting side.
-    pub side: EncoderSide,
-    /// Counts per encoder turn.
+    /// Counts per encoder turn; for one at the joint, per joint turn.
     pub counts: f64,
-    /// Encoder turns per joint turn.
+    /// Motor turns per joint turn; 1 for an encoder at the joint.
     pub ratio: f64,
 }
 

@@ -13,7 +13,7 @@
 //! faults.
 //! Cost: one random number per joint and tick while noise is on.
 
-use crate::description::{CurrentSensorDescription, EncoderDescription, EncoderSide, OutlierDescription};
+use crate::description::{CurrentSensorDescription, EncoderDescription, OutlierDescription};
 use crate::maths::nearest;
 use core::f64::consts::{SQRT_2, TAU};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
@@ -31,15 +31,10 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Creates an encoder. On the motor side the gear's ratio multiplies the joint's angle. On the joint side
-    /// the ratio of a faster encoder is part of its counts.
+    /// Creates an encoder.
     #[must_use]
     pub fn new(description: &EncoderDescription) -> Self {
-        let (ratio, counts) = match description.side {
-            EncoderSide::Motor => (description.ratio, description.counts),
-            EncoderSide::Joint => (1.0, description.counts * description.ratio),
-        };
-        Self { ratio, counts_per_radian: counts / TAU }
+        Self { ratio: description.ratio, counts_per_radian: description.counts / TAU }
     }
 
     /// Counts at an anatomical joint angle in rad.

@@ -23,6 +23,7 @@ use scarab::motion::{MotionError, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::Second;
 use scarab_base::error::ToolError;
+use scarab_base::stats::rms;
 use scarab_base::words::exact;
 use scarab_identify::formats::leg_file::{LegFile, Switch};
 use scarab_identify::leg::motions::EXCITATION_CYCLES;
@@ -167,12 +168,10 @@ impl Verification {
     fn sample_error(&self, model: &RowModel<f32, JOINTS, ROOM>, joint: usize, values: &[f32; ROOM]) -> f64 {
         let moving =
             self.samples.iter().filter(|sample| f64::from(sample.velocity[joint].abs()) >= STILL_SPEED);
-        let errors = moving.map(|sample| {
+        rms(moving.map(|sample| {
             let rows = model.rows(sample);
-            (predicted(&rows.regressor[joint], values) - f64::from(sample.torque[joint])).powi(2)
-        });
-        let (sum, count) = errors.fold((0.0, 0_u32), |(sum, count), error| (sum + error, count + 1));
-        (sum / f64::from(count.max(1))).sqrt()
+            predicted(&rows.regressor[joint], values) - f64::from(sample.torque[joint])
+        }))
     }
 }
 
@@ -199,8 +198,9 @@ pub fn run(plant: &LegFile, believed: &LegFile, options: &ChainOptions) -> Resul
     let unfit = |error| ToolError::input(format!("{}: no such exciting motion: {error:?}", believed.name));
     let excitation = repeated(&context.motions.excitation, options.cycles).map_err(unfit)?;
     (context.motions.excitation, context.configuration.excitation) = (excitation, excitation);
-    verify_on(&mut context, verification::motion(believed)?);
-    let Driven { pair, watch, stopped, .. } = drive(believed, plant, &context, &simulation)?;
+    let verifying = verification::motion(believed)?;
+    (context.motions.validation[0], context.configuration.validation[0]) = (verifying, verifying);
+    let Driven { pair, watch, stopped, .. } = drive(believed, plant, &context, &simulation, &mut ())?;
     let identification = pair.leg.identification();
     let found = identification.solver().zip(identification.validation().first().cloned().flatten());
     let Some((solver, measured)) = found.filter(|_| stopped.is_none()) else {
@@ -239,12 +239,6 @@ fn unweighted(record: &Record<f32, JOINTS, ROOM>, rank: usize) -> [f32; ROOM] {
         all.merge(&factor.convert());
     }
     all.solve(rank).map(|value| value as f32)
-}
-
-/// Replaces the first validation motion by the paper's.
-fn verify_on(context: &mut Context<JOINTS, ROOM>, motion: Periodic<JOINTS>) {
-    context.motions.validation[0] = motion;
-    context.configuration.validation[0] = motion;
 }
 
 /// Motion and torque of every sample with complete windows, and the filtered torque of the rows.

@@ -101,18 +101,6 @@ impl Algorithm {
             Self::CmaEsRestarts => "cma-es-restarts",
         }
     }
-
-    /// Whether the search is CMA-ES.
-    #[must_use]
-    pub const fn is_cma_es(self) -> bool {
-        matches!(self, Self::CmaEs | Self::CmaEsTwenty | Self::CmaEsRestarts)
-    }
-
-    /// Whether the search is a particle swarm.
-    #[must_use]
-    pub const fn is_pso(self) -> bool {
-        matches!(self, Self::Pso | Self::PsoConstriction | Self::PsoArgmin)
-    }
 }
 
 impl Serialize for Algorithm {
@@ -137,38 +125,35 @@ pub fn run_own<T: Real>(
     const N: usize = SWARM as usize;
     let refused = |error: SwarmError| ToolError::input(format!("{}: {error:?}", algorithm.id()));
     let evaluations = budget(recorder.dimension());
-    let constriction = PsoSettings {
-        inertia_weight: InertiaWeight::constant(T::from_double(0.7298)),
-        individual_learning: T::from_double(1.496),
-        global_learning: T::from_double(1.496),
-        ..PsoSettings::default()
+    let pso = |settings| -> Result<(), ToolError> {
+        let search = Pso::<T, N, D>::new(recorder, settings, seed).map_err(refused)?;
+        follow(search, recorder, SWARM, u32::MAX, evaluations);
+        Ok(())
+    };
+    let bso = |settings| -> Result<(), ToolError> {
+        let search = Bso::<T, N, D>::new(recorder, settings, seed).map_err(refused)?;
+        follow(search, recorder, SWARM, ITERATIONS, u32::MAX);
+        Ok(())
     };
     match algorithm {
-        Algorithm::PsoConstriction => {
-            let search = Pso::<T, N, D>::new(recorder, constriction, seed).map_err(refused)?;
-            follow(search, recorder, SWARM, u32::MAX, evaluations);
-        }
+        Algorithm::Pso => pso(PsoSettings::default()),
+        Algorithm::PsoConstriction => pso(PsoSettings {
+            inertia_weight: InertiaWeight::constant(T::from_double(0.7298)),
+            individual_learning: T::from_double(1.496),
+            global_learning: T::from_double(1.496),
+            ..PsoSettings::default()
+        }),
+        Algorithm::BsoPaper => bso(BsoSettings::paper()),
+        Algorithm::Bso => bso(BsoSettings::default()),
         Algorithm::Bas => {
             let search = Bas::<T, D>::new(recorder, BasSettings::default(), seed).map_err(refused)?;
             follow(search, recorder, 1, ITERATIONS, u32::MAX);
-        }
-        Algorithm::BsoPaper => {
-            let search = Bso::<T, N, D>::new(recorder, BsoSettings::paper(), seed).map_err(refused)?;
-            follow(search, recorder, SWARM, ITERATIONS, u32::MAX);
-        }
-        Algorithm::Bso => {
-            let search = Bso::<T, N, D>::new(recorder, BsoSettings::default(), seed).map_err(refused)?;
-            follow(search, recorder, SWARM, ITERATIONS, u32::MAX);
-        }
-        Algorithm::Pso => {
-            let search = Pso::<T, N, D>::new(recorder, PsoSettings::default(), seed).map_err(refused)?;
-            follow(search, recorder, SWARM, u32::MAX, evaluations);
+            Ok(())
         }
         Algorithm::CmaEs | Algorithm::CmaEsTwenty | Algorithm::CmaEsRestarts | Algorithm::PsoArgmin => {
-            return Err(ToolError::input("this search runs in double precision only"));
+            Err(ToolError::input("this search runs in double precision only"))
         }
     }
-    Ok(())
 }
 
 /// Runs any search in double precision.

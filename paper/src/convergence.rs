@@ -279,9 +279,8 @@ fn words(report: &ConvergenceReport) -> String {
     }
     let runs = report.rows.first().map_or(0, |row| row.runs);
     format!(
-        "Default beetle swarm, cold start, {} precision, {runs} runs of each row over {} exciting motions, each with noise of \
+        "Default beetle swarm, cold start, single precision, {runs} runs of each row over {} exciting motions, each with noise of \
          its own; iterations to J / J_opt - 1 <= {:.0e}, failures counted as endless.\n\n{}",
-        "single",
         report.motions,
         report.tolerance,
         table.to_markdown()

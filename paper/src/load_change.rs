@@ -18,6 +18,7 @@ use scarab::model::{INERTIAL_PARAMETERS, Payload, RigidBody};
 use scarab_base::error::ToolError;
 use scarab_base::number::Number;
 use scarab_base::shard::Shard;
+use scarab_base::stats::rms;
 use scarab_base::table::Table;
 use scarab_identify::formats::leg_file::{LegFile, LinkParameters};
 use scarab_identify::leg::setup;
@@ -200,8 +201,7 @@ fn change_line(base: &BaseReport, pairs: &[LoadRun]) -> ChangeLine {
     let changes = differences(pairs, &base.name);
     let of = |value: fn(&Difference) -> f64| -> Number { median(changes.iter().map(value)).into() };
     let count = changes.len().max(1) as f64;
-    let squares =
-        changes.iter().map(|change| ((change.found - change.truth) / change.sigma).powi(2)).sum::<f64>();
+    let scores = changes.iter().map(|change| (change.found - change.truth) / change.sigma);
     let told = changes.iter().filter(|change| change.found.abs() > TOLD * change.sigma).count();
     // Rounding error between two sums of the same numbers.
     let rounding = 1e-12 * base.truth.known().map_or(1.0, f64::abs).max(1.0);
@@ -214,7 +214,7 @@ fn change_line(base: &BaseReport, pairs: &[LoadRun]) -> ChangeLine {
         found_change: of(|change| change.found),
         sigma: of(|change| change.sigma),
         found_over_sigma: of(|change| change.found / change.sigma),
-        error_over_sigma: (squares / count).sqrt().into(),
+        error_over_sigma: rms(scores).into(),
         told_share: told as f64 / count,
     }
 }

@@ -10,7 +10,7 @@
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab::real::Real;
+use scarab::real::{Real, dot};
 use scarab::swarm::{Objective, TestFunction, TestProblem};
 use serde::Serialize;
 
@@ -146,10 +146,6 @@ impl<T: Real> Motion<T> {
         let rows = rows.into_iter().map(|row| row.into_iter().map(T::from_double).collect()).collect();
         Self { centre, rows }
     }
-}
-
-fn dot(one: &[f64], other: &[f64]) -> f64 {
-    one.iter().zip(other).map(|(one, other)| one * other).sum()
 }
 
 impl<T: Real> Objective<T> for Problem<T> {

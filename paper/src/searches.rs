@@ -10,10 +10,9 @@ use scarab_base::error::ToolError;
 use scarab_base::shard::Shard;
 
 use super::contenders::{self, Algorithm};
-use super::problems::{CASES, Case};
+use super::problems::{CASES, Case, Problem};
 use super::recorder::{Hit, Recorder};
 use super::runs::{RowRuns, run_rows};
-use super::seeds::ReportSeed;
 use super::statistics::Row;
 
 /// The paper's tolerance, and one that requires precision; largest first.
@@ -43,11 +42,13 @@ fn contests(algorithms: &[Algorithm]) -> Vec<Contest> {
 /// Runs of every contest of these searches.
 pub fn runs(algorithms: &[Algorithm], runs: u64, shard: Shard) -> Result<RowRuns<Hits>, ToolError> {
     run_rows("Table IV", &contests(algorithms), runs, shard, |contest, seed| {
-        let Contest { case, algorithm, is_single } = contest;
-        if *is_single {
-            run_own::<f32>(case, *algorithm, seed, &TOLERANCES[..1])
+        let (case, algorithm, own) = (contest.case, contest.algorithm, seed.search());
+        if contest.is_single {
+            let search = |recorder: &Recorder<'_, f32, _>| contenders::run_own(algorithm, recorder, own);
+            hits(&case.problem(seed), case, &TOLERANCES[..1], search)
         } else {
-            run_double(case, *algorithm, seed)
+            let search = |recorder: &Recorder<'_, f64, _>| contenders::run(algorithm, recorder, own);
+            hits(&case.problem(seed), case, &TOLERANCES, search)
         }
     })
 }
@@ -56,42 +57,25 @@ pub fn runs(algorithms: &[Algorithm], runs: u64, shard: Shard) -> Result<RowRuns
 #[must_use]
 pub fn rows(algorithms: &[Algorithm], runs: &[Vec<Hits>]) -> Vec<Row> {
     let rows = |(contest, hits): (&Contest, &Vec<Hits>)| {
-        let (precision, tolerances) =
-            if contest.is_single { ("f32", &TOLERANCES[..1]) } else { ("f64", &TOLERANCES[..]) };
-        tabulated(contest.case, contest.algorithm, precision, tolerances, hits)
+        let (precision, count) = if contest.is_single { ("f32", 1) } else { ("f64", TOLERANCES.len()) };
+        let (case, algorithm) = (contest.case, contest.algorithm);
+        let row = |(index, tolerance): (usize, &f64)| {
+            let hits: Hits = hits.iter().map(|hits| hits.get(index).copied().flatten()).collect();
+            Row::new(case, algorithm, precision, *tolerance, &hits)
+        };
+        TOLERANCES.iter().take(count).enumerate().map(row).collect::<Vec<_>>()
     };
     contests(algorithms).iter().zip(runs).flat_map(rows).collect()
 }
 
-fn run_double(case: &Case, algorithm: Algorithm, seed: ReportSeed) -> Result<Hits, ToolError> {
-    let problem = case.problem::<f64>(seed);
-    let recorder = Recorder::new(&problem, case.minimum(), &TOLERANCES);
-    contenders::run(algorithm, &recorder, seed.search())?;
-    Ok(recorder.into_hits())
-}
-
-fn run_own<T: Real>(
+/// Hits of one search on one problem.
+fn hits<T: Real>(
+    problem: &Problem<T>,
     case: &Case,
-    algorithm: Algorithm,
-    seed: ReportSeed,
     tolerances: &[f64],
+    search: impl Fn(&Recorder<'_, T, Problem<T>>) -> Result<(), ToolError>,
 ) -> Result<Hits, ToolError> {
-    let problem = case.problem::<T>(seed);
-    let recorder = Recorder::new(&problem, case.minimum(), tolerances);
-    contenders::run_own(algorithm, &recorder, seed.search())?;
+    let recorder = Recorder::new(problem, case.minimum(), tolerances);
+    search(&recorder)?;
     Ok(recorder.into_hits())
-}
-
-fn tabulated(
-    case: &Case,
-    algorithm: Algorithm,
-    precision: &'static str,
-    tolerances: &[f64],
-    runs: &[Hits],
-) -> Vec<Row> {
-    let row = |(index, tolerance): (usize, &f64)| {
-        let hits: Hits = runs.iter().map(|hits| hits.get(index).copied().flatten()).collect();
-        Row::new(case, algorithm, precision, *tolerance, &hits)
-    };
-    tolerances.iter().enumerate().map(row).collect()
 }

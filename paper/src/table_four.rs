@@ -2,7 +2,6 @@
 
 use scarab_base::error::ToolError;
 use scarab_base::table::Table;
-use serde_json::Map;
 
 use super::contenders::{Algorithm, ITERATIONS};
 use super::goals::GOALS;
@@ -55,15 +54,7 @@ pub fn section(options: &PaperOptions, runs: &[Vec<Hits>]) -> Result<Section, To
         of_default(goals),
     ];
     parts.retain(|part| !part.is_empty());
-    let mut json = Map::new();
-    let list = serde_json::to_value(&rows).map_err(|error| ToolError::input(error.to_string()))?;
-    json.insert("rows".into(), list);
-    Ok(Section {
-        name: Part::TableFour.section_name(),
-        markdown: parts.join("\n\n") + "\n",
-        figures: Vec::new(),
-        json,
-    })
+    Section::new(Part::TableFour, "rows", &rows, parts.join("\n\n") + "\n", Vec::new())
 }
 
 fn find<'r>(
@@ -157,19 +148,17 @@ fn beside_the_paper(rows: &[Row]) -> String {
 /// succeeds.
 fn comparisons(rows: &[Row]) -> String {
     let mut lines = Vec::new();
-    for (kind, is_kind) in [
-        ("CMA-ES variants", Algorithm::is_cma_es as fn(Algorithm) -> bool),
-        ("particle swarms", Algorithm::is_pso),
+    for (kind, others) in [
+        ("CMA-ES variants", [Algorithm::CmaEs, Algorithm::CmaEsTwenty, Algorithm::CmaEsRestarts]),
+        ("particle swarms", [Algorithm::Pso, Algorithm::PsoConstriction, Algorithm::PsoArgmin]),
     ] {
         for (tolerance, digits) in TOLERANCES.into_iter().zip(["0.1", "1e-6"]) {
             let mut fewer = Vec::new();
             let mut contests = 0;
             for case in &CASES {
                 let of = |algorithm| find(rows, case, algorithm, tolerance, "f64")?.evaluations_median;
-                let others = Algorithm::ALL.into_iter().filter(|algorithm| is_kind(*algorithm));
-                let best =
-                    others.filter_map(|other| Some((of(other)?, other))).min_by_key(|(count, _)| *count);
-                let Some((best, other)) = best else { continue };
+                let counts = others.iter().filter_map(|other| Some((of(*other)?, other)));
+                let Some((best, other)) = counts.min_by_key(|(count, _)| *count) else { continue };
                 let own = of(Algorithm::Bso);
                 contests += 1;
                 if own.is_none_or(|own| best < own) {

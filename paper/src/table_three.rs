@@ -9,13 +9,10 @@
 //! Cost: 4 million evaluations of functions of the plane, a fraction of a second. Known limits: a
 //! minimum narrower than the grid's spacing of 1/1000 of the box could hide between its points.
 
-use std::fmt::Write;
-
 use scarab::swarm::{Objective, TestFunction, TestProblem};
 use scarab_base::error::ToolError;
 use scarab_base::table::Table;
 use serde::Serialize;
-use serde_json::Map;
 
 use super::{Part, Section};
 
@@ -128,17 +125,12 @@ pub fn section() -> Result<Section, ToolError> {
             decimals(found.coarse_grid_minimum, 4),
         ]);
     }
-    let mut markdown = table.to_markdown();
-    write!(
-        markdown,
-        "\nLeast values by a grid of {GRID_POINTS} x {GRID_POINTS} points and a compass search from \
-         its best {STARTS}; the box is plus and minus the number given.\n"
-    )
-    .map_err(|error| ToolError::input(error.to_string()))?;
-    let mut json = Map::new();
-    let list = serde_json::to_value(&found).map_err(|error| ToolError::input(error.to_string()))?;
-    json.insert("minima".into(), list);
-    Ok(Section { name: Part::TableThree.section_name(), markdown, figures: Vec::new(), json })
+    let markdown = format!(
+        "{}\nLeast values by a grid of {GRID_POINTS} x {GRID_POINTS} points and a compass search from \
+         its best {STARTS}; the box is plus and minus the number given.\n",
+        table.to_markdown()
+    );
+    Section::new(Part::TableThree, "minima", &found, markdown, Vec::new())
 }
 
 /// Formats a number with `digits` decimals; zero has no sign.

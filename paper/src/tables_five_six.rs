@@ -14,6 +14,7 @@
 use scarab_base::error::ToolError;
 use scarab_base::number::Number;
 use scarab_base::shard::Shard;
+use scarab_base::stats::rms;
 use scarab_base::table::Table;
 use scarab_identify::report::RunReport;
 use serde::Serialize;
@@ -50,14 +51,13 @@ impl Found {
         let errors = |truth: f64| median(values().map(|value| 100.0 * ((value - truth) / truth).abs()));
         let scores: Vec<_> = runs
             .iter()
-            .filter_map(|(value, sigma)| Some(((value.known()? - truth?) / sigma.known()?).powi(2)))
+            .filter_map(|(value, sigma)| Some((value.known()? - truth?) / sigma.known()?))
             .collect();
-        let mean = scores.iter().sum::<f64>() / scores.len().max(1) as f64;
         Self {
             value: median(values()).into(),
             sigma: median(sigmas()).into(),
             error_percent: truth.filter(|&truth| truth != 0.0).and_then(errors).into(),
-            error_over_sigma: (!scores.is_empty()).then(|| mean.sqrt()).into(),
+            error_over_sigma: (!scores.is_empty()).then(|| rms(scores)).into(),
         }
     }
 

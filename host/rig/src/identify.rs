@@ -81,8 +81,7 @@ pub fn recorded<const N: usize>(name: &Path, leg: &LegFile, log: &[LoggedSample<
         recording.time_s.push(f64::from(ticks) / f64::from(SERVO_RATE_HZ));
         for (joint, series) in recording.joints.iter_mut().enumerate() {
             let file = &leg.joints[joint];
-            let radian_per_count =
-                core::f64::consts::TAU / (f64::from(file.encoder.counts) * file.encoder.ratio);
+            let radian_per_count = file.encoder.step_rad();
             let counts = f64::from(logged.sample.counts_sum[joint]) / f64::from(TICKS_PER_LOG);
             let direction = if file.direction < 0 { -1.0 } else { 1.0 };
             series.position_rad.push(leg.side.mounting() * counts * radian_per_count);

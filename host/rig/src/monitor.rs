@@ -7,7 +7,6 @@
 mod update;
 
 use crate::report::monitor::{AlarmReport, MonitorRun};
-use hal_sim::description::PushDescription;
 use hal_sim::world::TICK_S;
 use scarab::leg::{Activity, ControlRequest, ProvedMotion, Step};
 use scarab::model::Payload;
@@ -112,11 +111,7 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
     ) -> Result<Self, ToolError> {
         let motion = gait(leg, context, seconds)?;
         let mut walk = Self { leg, context, pair, changing: None, squared: 0.0, count: 0 };
-        walk.pair.world.set_pushes(pushes.map(|pushes| PushDescription {
-            rate: pushes.per_minute / 60.0,
-            torque: pushes.torque_nm,
-            duration: pushes.duration_s,
-        }));
+        walk.pair.world.set_pushes(pushes.as_ref().map(PushesFile::description));
         if !walk.pair.leg.set_tracked(motion) {
             return Err(ToolError::input("the leg tracks another motion"));
         }

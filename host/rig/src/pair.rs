@@ -9,10 +9,12 @@ use hal_sim::world::{TICK_S, World};
 use scarab::hal::{LegDrives, Sample};
 use scarab::ident::{Kernel, LowPass, Record, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
 use scarab::leg::{Activity, AssistLaw, ControlOutput, ControlRequest, IdentifyPhase, Leg, LegConfiguration};
-use scarab::motion::Periodic;
+use scarab::model::AnatomicalJoint;
+use scarab::motion::{MotionState, Periodic};
 use scarab::safety::{DriveState, PowerRequest};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::leg_file::geometry::anatomy;
 use scarab_identify::leg::background::Background;
 use scarab_identify::leg::board_words::axis_fault;
 use scarab_identify::leg::motions::Motions;
@@ -75,7 +77,7 @@ impl<const N: usize, const B: usize> Context<N, B> {
         let percent = options.torque_noise_percent.unwrap_or(leg.torque_noise_percent);
         // The percentage always refers to the default motion, because a sensor's noise does not depend on its
         // later use.
-        let mean = mean_absolute_torque(leg, &world, &motions.excitation);
+        let mean = mean_absolute_torque(&anatomy(leg)?, &world, &motions.excitation);
         if let Some(excitation) = &options.excitation {
             motions.excitation = excitation.motion()?;
             configuration.excitation = motions.excitation;
@@ -104,6 +106,12 @@ impl<const N: usize, const B: usize> Context<N, B> {
         })
     }
 
+    /// Anatomical to D-H angles of every joint, as the firmware holds them.
+    #[must_use]
+    pub fn anatomy(&self) -> [AnatomicalJoint<f64>; N] {
+        self.configuration.joints.map(|joint| joint.scale.anatomy.convert())
+    }
+
     /// Noise of each joint's current, A.
     #[must_use]
     pub fn current_noise(&self, leg: &LegFile) -> [f64; N] {
@@ -121,22 +129,33 @@ pub fn start_position<const N: usize>(leg: &LegFile) -> [f64; N] {
     })
 }
 
+/// Motor torque of the plant in a state of the model, anatomical.
+pub fn torque_at<const N: usize>(
+    anatomy: &[AnatomicalJoint<f64>; N],
+    world: &World<N>,
+    state: &MotionState<N>,
+) -> [f64; N] {
+    let angle = |joint: usize| anatomy[joint].angle_from_chain(f64::from(state.position_rad[joint]));
+    let from_chain =
+        |of: &[f32; N]| core::array::from_fn(|joint| anatomy[joint].from_chain(f64::from(of[joint])));
+    world.inverse_dynamics(
+        &core::array::from_fn(angle),
+        &from_chain(&state.velocity_rad_per_s),
+        &from_chain(&state.acceleration_rad_per_s2),
+    )
+}
+
 /// Mean absolute motor torque along a motion, anatomical.
-fn mean_absolute_torque<const N: usize>(leg: &LegFile, world: &World<N>, motion: &Periodic<N>) -> [f64; N] {
+fn mean_absolute_torque<const N: usize>(
+    anatomy: &[AnatomicalJoint<f64>; N],
+    world: &World<N>,
+    motion: &Periodic<N>,
+) -> [f64; N] {
     let mut sum = [0.0; N];
     let ticks = (motion.blend_ticks()..motion.duration_ticks() - motion.blend_ticks()).step_by(8);
     let count = ticks.len().max(1) as f64;
     for tick in ticks {
-        let state = motion.state_at(tick);
-        let sign = |joint: usize| if leg.joints[joint].direction < 0 { -1.0 } else { 1.0 };
-        let offset = |joint: usize| leg.joints[joint].zero_offset_deg.to_radians();
-        let torque = world.inverse_dynamics(
-            &core::array::from_fn(|joint| {
-                sign(joint) * (f64::from(state.position_rad[joint]) - offset(joint))
-            }),
-            &core::array::from_fn(|joint| sign(joint) * f64::from(state.velocity_rad_per_s[joint])),
-            &core::array::from_fn(|joint| sign(joint) * f64::from(state.acceleration_rad_per_s2[joint])),
-        );
+        let torque = torque_at(anatomy, world, &motion.state_at(tick));
         sum = core::array::from_fn(|joint| sum[joint] + torque[joint].abs() / count);
     }
     sum

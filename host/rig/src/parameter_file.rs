@@ -24,6 +24,7 @@ mod text;
 
 pub use flash::FlashContents;
 
+use scarab::leg::{Constant, CounterDirection, EncoderSetting};
 use scarab::store::Key;
 use serde::Deserialize;
 
@@ -117,7 +118,8 @@ pub struct AxisCalibration {
     /// Electrical angle at the index, from -pi to pi.
     pub offset_rad: f64,
     /// Encoder settings of the calibration.
-    pub encoder: Encoder,
+    #[serde(with = "Encoder")]
+    pub encoder: EncoderSetting,
     /// Temperature of the winding at the calibration, degrees Celsius, if known.
     #[serde(default)]
     pub winding_c: Option<f64>,
@@ -138,28 +140,23 @@ pub struct JointZeroPart {
     pub setting: u8,
 }
 
-/// Settings for which a calibration is valid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Encoder {
-    /// Direction of the counter while the field turns from A over B to C.
-    pub counter: Counter,
-    /// Pole pairs of the motor.
-    pub pole_pairs: u8,
-    /// Encoder counts per turn.
-    pub counts_per_turn: u32,
-    /// Whether positions count from an absolute encoder's zero.
+/// Keys of the settings for which a calibration is valid.
+#[derive(Deserialize)]
+#[serde(remote = "EncoderSetting", deny_unknown_fields)]
+struct Encoder {
+    #[serde(with = "Counter")]
+    counter: CounterDirection,
+    pole_pairs: u8,
+    counts_per_turn: u32,
     #[serde(default)]
-    pub absolute: bool,
+    absolute: bool,
 }
 
-/// Direction of a counter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Counter {
-    /// Counter runs with the field.
+/// Words of a counter that runs with or against the field.
+#[derive(Deserialize)]
+#[serde(remote = "CounterDirection", rename_all = "lowercase")]
+enum Counter {
     Up,
-    /// Counter runs against the field.
     Down,
 }
 
@@ -197,7 +194,8 @@ pub struct ModelJoint {
     /// Friction that decreases with speed.
     pub stribeck: StribeckPart,
     /// Meaning of the constant column.
-    pub constant: ConstantPart,
+    #[serde(with = "ConstantPart")]
+    pub constant: Constant,
     /// Friction that is certain by 2 sigma; 0 if unknown.
     #[serde(default)]
     pub friction_lower_bound: FrictionBound,
@@ -253,13 +251,11 @@ pub struct FrictionBound {
     pub viscous_nm_s_rad: f64,
 }
 
-/// Meaning of a joint's constant column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ConstantPart {
-    /// Torque offset.
+/// Words of a joint's constant column.
+#[derive(Deserialize)]
+#[serde(remote = "Constant", rename_all = "lowercase")]
+enum ConstantPart {
     Offset,
-    /// Difference of friction between the directions.
     Asymmetry,
 }
 

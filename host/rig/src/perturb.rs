@@ -165,20 +165,7 @@ pub fn drives<const N: usize>(drives: &mut CompleteDescription<N>, perturbations
 
 /// Index of a joint from its name or its number from 1.
 fn joint_index(leg: &LegFile, joint: &str) -> Result<usize, ToolError> {
-    let by_number = joint.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
-    leg.joints
-        .iter()
-        .position(|file| file.name == joint)
-        .or(by_number.filter(|&index| index < leg.joints.len()))
-        .ok_or_else(|| {
-            let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
-            ToolError::input(format!(
-                "--perturb: `{joint}` is not a joint of {}: {} or 1 to {}",
-                leg.name,
-                names.join(", "),
-                names.len()
-            ))
-        })
+    leg.joint_index(joint).map_err(|reason| ToolError::input(format!("--perturb: {reason}")))
 }
 
 /// Leg assumed by the firmware.

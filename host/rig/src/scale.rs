@@ -10,8 +10,8 @@
 
 use hal_sim::world::TICK_S;
 use scarab::ident::{
-    Ends, HeldOut, Misalignments, Record, Recorder, Residual, SearchState, Solver, Thresholds,
-    Unused as HeldOutMotion, Verdict, torque_constant_ratio,
+    Ends, HeldOut, Misalignments, Record, Recorder, Residual, Solver, Thresholds, Unused as HeldOutMotion,
+    Verdict, torque_constant_ratio,
 };
 use scarab::leg::{LoggedSample, Segment, VALIDATION_MOTIONS};
 use scarab::model::Payload;
@@ -26,8 +26,6 @@ use crate::pair::{Context, PENDING, Pair, TAPS};
 const ATTACHING_S: f64 = 2.0;
 /// Limit of the second run, s.
 const LONGEST_RUN_S: f64 = 120.0;
-/// Evaluations between two updates of the search.
-const SLICE: u32 = 20;
 
 /// Records of the predicted motions.
 pub type Unused<const N: usize, const B: usize> = [Option<Record<f32, N, B>>; VALIDATION_MOTIONS];
@@ -110,7 +108,7 @@ pub fn corrected<const N: usize, const B: usize>(
         moved[joint] += found.map_or(0.0, |found| found[joint].sigma);
         again.widen(solve(&moved).least_squares());
     }
-    let iterations_to_half_chi2 = search(context, &mut again);
+    let iterations_to_half_chi2 = context.background.search(&mut again).to_half;
     let unused = unused
         .each_ref()
         .map(|record| record.as_ref().map(|record| record.corrected(&ratios, &scale.load_base)));
@@ -169,25 +167,6 @@ fn revalidate<const N: usize, const B: usize>(
         *residual = *held_out.residual();
     }
     Some(SeenAgain { residuals, asked: held_out.alignment().misalignments() })
-}
-
-/// Runs the search to its end; returns the first iteration with an excess of at most 0.5.
-fn search<const N: usize, const B: usize>(
-    context: &Context<N, B>,
-    solver: &mut Solver<f32, N, B>,
-) -> Option<u32> {
-    let optimum = context.background.costs(solver);
-    let mut to_half = None;
-    loop {
-        let state = solver.advance(&context.background.device, SLICE);
-        let excess = optimum.factor.excess(&solver.search().values().map(f64::from)) - optimum.above;
-        if excess <= 0.5 && !matches!(state, SearchState::Failed(_)) {
-            to_half = to_half.or(Some(solver.search().iterations()));
-        }
-        if state != SearchState::Running {
-            return to_half;
-        }
-    }
 }
 
 /// Repeats the excitation with a mass on the leg and returns its record.

@@ -11,14 +11,13 @@
 
 use hal_sim::world::{TICK_S, World};
 use scarab::ident::Reason;
+use scarab::model::AnatomicalJoint;
 use scarab::motion::MotionState;
 use scarab::real::sqrt;
 use scarab_base::number::Number;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::RunReport;
 use scarab_identify::report::findings::FindingReport;
-
-use crate::excite::obstacle::torque_limit;
 
 /// Share of the command's speed that a leg may deviate.
 const LARGEST_SHARE: f64 = 0.5;
@@ -31,8 +30,7 @@ const STRIDE: u64 = 40;
 /// Speed of each joint beside its command, and the weight of the commanded postures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shaking<const N: usize> {
-    sign: [f64; N],
-    zero_rad: [f64; N],
+    anatomy: [AnatomicalJoint<f64>; N],
     before: Option<[f64; N]>,
     ticks: u64,
     /// Sums of squares of the present second.
@@ -43,12 +41,12 @@ pub struct Shaking<const N: usize> {
 }
 
 impl<const N: usize> Shaking<N> {
-    /// Begins without ticks. D-H angle = sign * anatomical angle + zero.
+    /// Begins without ticks.
     #[must_use]
-    pub fn new(sign: [f64; N], zero_rad: [f64; N]) -> Self {
+    pub fn new(anatomy: [AnatomicalJoint<f64>; N]) -> Self {
         let none = [0.0; N];
         let (window, largest, command, weight_nm) = (none, none, none, none);
-        Self { sign, zero_rad, before: None, ticks: 0, window, largest, command, weight_nm }
+        Self { anatomy, before: None, ticks: 0, window, largest, command, weight_nm }
     }
 
     /// Takes the plant after a tick, and the motion commanded in it.
@@ -56,7 +54,7 @@ impl<const N: usize> Shaking<N> {
         let now = world.anatomical_position();
         if let Some(before) = self.before.replace(now) {
             for joint in 0..N {
-                let command = self.sign[joint] * f64::from(motion.velocity_rad_per_s[joint]);
+                let command = self.anatomy[joint].from_chain(f64::from(motion.velocity_rad_per_s[joint]));
                 let speed = (now[joint] - before[joint]) / TICK_S;
                 self.window[joint] += (speed - command) * (speed - command);
                 self.command[joint] += command * command;
@@ -64,7 +62,7 @@ impl<const N: usize> Shaking<N> {
         }
         if self.ticks.is_multiple_of(STRIDE) {
             let posture = core::array::from_fn(|joint| {
-                self.sign[joint] * (f64::from(motion.position_rad[joint]) - self.zero_rad[joint])
+                self.anatomy[joint].angle_from_chain(f64::from(motion.position_rad[joint]))
             });
             let needed = world.inverse_dynamics(&posture, &[0.0; N], &[0.0; N]);
             self.weight_nm = core::array::from_fn(|joint| self.weight_nm[joint].max(needed[joint].abs()));
@@ -107,10 +105,10 @@ impl<const N: usize> Shaking<N> {
             .joints
             .iter()
             .zip(self.weight_nm)
-            .position(|(joint, weight)| weight > torque_limit(joint));
+            .position(|(joint, weight)| weight > joint.torque_cap());
         let lacks = lacking(simulated);
         let (test, joint, value, limit, words) = if let Some(joint) = heavy {
-            let (weight, limit) = (self.weight_nm[joint], torque_limit(&simulated.joints[joint]));
+            let (weight, limit) = (self.weight_nm[joint], simulated.joints[joint].torque_cap());
             let words = format!(
                 "joint {} needs up to {weight:.1} N m to hold its weight on these motions, limit {limit:.1} N m \
                  (`torque_limit_nm`): raise it, narrow `range_deg`, or correct `truth`",

@@ -65,8 +65,7 @@ pub fn simulate_observed<const N: usize, const B: usize>(
     let mut context = Context::<N, B>::new(&perturb::believed(leg, wrong)?, options)?;
     perturb::configure(&mut context, wrong)?;
     observer.begin(&context);
-    let Driven { pair, mut watch, stopped, shaking } =
-        drive_observed(leg, &simulated, &context, options, observer)?;
+    let Driven { pair, mut watch, stopped, shaking } = drive(leg, &simulated, &context, options, observer)?;
     let mut run = if stopped.is_some() {
         watch.report(&pair, options, Vec::new(), stopped, started)?
     } else {
@@ -97,15 +96,6 @@ pub fn drive<'a, const N: usize, const B: usize>(
     simulated: &LegFile,
     context: &'a Context<N, B>,
     options: &SimulationOptions,
-) -> Result<Driven<'a, N, B>, ToolError> {
-    drive_observed(leg, simulated, context, options, &mut ())
-}
-
-fn drive_observed<'a, const N: usize, const B: usize>(
-    leg: &LegFile,
-    simulated: &LegFile,
-    context: &'a Context<N, B>,
-    options: &SimulationOptions,
     observer: &mut impl Observer<N, B>,
 ) -> Result<Driven<'a, N, B>, ToolError> {
     let wrong = options.perturbations.as_slice();
@@ -114,11 +104,7 @@ fn drive_observed<'a, const N: usize, const B: usize>(
         pair.world.attach(load.joint, load.mass, load.position.into());
     }
     perturb::at_start(leg, &mut pair, wrong)?;
-    let anatomy = context.configuration.joints.map(|joint| joint.scale.anatomy);
-    let mut shaking = Shaking::new(
-        anatomy.map(|anatomy| f64::from(anatomy.direction())),
-        anatomy.map(|anatomy| f64::from(anatomy.zero_offset())),
-    );
+    let mut shaking = Shaking::new(context.anatomy());
     let mut watch = Watch::new(context);
     if !pair.enable(context.gravity) {
         let words = "the drive refused to be enabled at the start: the leg is outside its range";
@@ -184,7 +170,7 @@ fn tracking_error<const N: usize, const B: usize>(
     motion: Periodic<N>,
     with_model: bool,
 ) -> Option<[f64; N]> {
-    let scales = context.configuration.joints.map(|joint| joint.scale);
+    let anatomy = context.anatomy();
     let motion = context.configuration.prove(motion).ok()?;
     if !pair.leg.set_tracked(motion) {
         return None;
@@ -198,9 +184,7 @@ fn tracking_error<const N: usize, const B: usize>(
         match pair.leg.control().activity() {
             Activity::Track(Step::Run) => {
                 for joint in 0..N {
-                    let scale = &scales[joint];
-                    let angle = f64::from(scale.anatomy.direction()) * truth[joint]
-                        + f64::from(scale.anatomy.zero_offset());
+                    let angle = anatomy[joint].angle_to_chain(truth[joint]);
                     let error = f64::from(output.motion.position_rad[joint]) - angle;
                     squared[joint] += error * error;
                 }

@@ -16,7 +16,7 @@ use scarab_base::names::VALIDATION_NAMES;
 use scarab_identify::report::TrackingReport;
 use scarab_identify::report::findings::FindingReport;
 use scarab_identify::report::scale::ScaleReport;
-use scarab_identify::report::series::{Anatomy, Reader, Role, Series};
+use scarab_identify::report::series::{Reader, Role, Series};
 use scarab_identify::run::analysis::{Circumstances, Costs, Motion as RecordedMotion, TruthFit};
 use scarab_identify::run::information::Information;
 use scarab_identify::run::scale::{Scale, loaded};
@@ -189,9 +189,8 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             self.segment = logged.segment;
         }
         if logged.segment.is_some() {
-            let direction =
-                |joint: usize| f64::from(self.context.configuration.joints[joint].scale.anatomy.direction());
-            let torque = core::array::from_fn(|joint| (direction(joint) * self.torque_sum[joint]) as f32);
+            let anatomy = self.context.anatomy();
+            let torque = core::array::from_fn(|joint| anatomy[joint].to_chain(self.torque_sum[joint]) as f32);
             let sticking = self.sticking_sum.map(|share| share as f32);
             self.chain.push(self.context, &logged.sample.position_rad, &torque, &sticking);
         }
@@ -207,19 +206,18 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
     /// Adds the information of this sample's noise-free motion about the base parameters.
     fn inform(&mut self, pair: &Pair<N, B>) {
         let truth = pair.world.truth();
-        let scales = self.context.configuration.joints.map(|joint| joint.scale);
-        let sign = |joint: usize| f64::from(scales[joint].anatomy.direction());
-        let rows = self.context.background.model.rows(&Smoothed {
-            position: core::array::from_fn(|joint| {
-                sign(joint) * truth.position[joint] + f64::from(scales[joint].anatomy.zero_offset())
-            }),
-            velocity: core::array::from_fn(|joint| sign(joint) * truth.velocity[joint]),
-            acceleration: core::array::from_fn(|joint| sign(joint) * truth.acceleration[joint]),
+        let anatomy = self.context.anatomy();
+        let to_chain = |of: &[f64; N]| core::array::from_fn(|joint| anatomy[joint].to_chain(of[joint]));
+        let state = Smoothed {
+            position: core::array::from_fn(|joint| anatomy[joint].angle_to_chain(truth.position[joint])),
+            velocity: to_chain(&truth.velocity),
+            acceleration: to_chain(&truth.acceleration),
             torque: [0.0; N],
-        });
+        };
+        let rows = self.context.background.model.rows(&state);
         for joint in 0..N {
             if !truth.sticking[joint] {
-                let (regressor, velocity) = (&rows.regressor[joint], sign(joint) * truth.velocity[joint]);
+                let (regressor, velocity) = (&rows.regressor[joint], state.velocity[joint]);
                 self.information.insert(joint, regressor, velocity, self.context.noise[joint]);
             }
         }
@@ -260,11 +258,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         values: &[f32; B],
     ) -> Result<Series, ToolError> {
         let ratios = scale.and_then(Scale::trusted).map_or([1.0; N], |found| found.map(|ratio| ratio.ratio));
-        let scales = self.context.configuration.joints.map(|joint| joint.scale);
-        let anatomy = Anatomy {
-            direction: scales.map(|scale| f64::from(scale.anatomy.direction())),
-            zero_rad: scales.map(|scale| f64::from(scale.anatomy.zero_offset())),
-        };
+        let anatomy = self.context.anatomy();
         let bandwidth_hz = self.context.configuration.bandwidth_hz;
         let mut reader = Reader::<N, B, TAPS, PENDING>::new(model, anatomy, *values, bandwidth_hz)
             .map_err(|error| ToolError::input(format!("the filter does not fit the device: {error:?}")))?;
@@ -288,15 +282,13 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             let mut motion = reader.motion(name, role, 0.0, samples);
             let points = motion.time_s.len();
             for (joint, curves) in motion.joints.iter_mut().enumerate() {
-                let noise_free = truth
-                    .iter()
-                    .take(points)
-                    .map(|row| anatomy.direction[joint] * f64::from(row.torque[joint]));
+                let rows = truth.iter().take(points);
+                let noise_free = rows.map(|row| anatomy[joint].from_chain(f64::from(row.torque[joint])));
                 curves.noise_free_nm = noise_free.collect();
                 let angle = |time_s: &f64| {
                     let tick = (time_s / TICK_S + MIDDLE_OF_A_SAMPLE_TICKS).round() as u32;
                     let angle = commanded?.state_at(tick).position_rad[joint];
-                    Some(anatomy.degrees(joint, f64::from(angle)))
+                    Some(anatomy[joint].angle_from_chain(f64::from(angle)).to_degrees())
                 };
                 curves.commanded_deg = motion.time_s.iter().filter_map(angle).collect();
             }

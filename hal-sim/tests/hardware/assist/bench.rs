@@ -1,12 +1,10 @@
 //! Firmware, exoskeleton and wearer, ticked together.
 
-use hal_sim::description::{
-    BodyDescription, CurrentSensorDescription, DenavitHartenberg, DriveDescription, EncoderDescription,
-    EncoderSide, FrictionDescription, JointDescription, LegDescription,
-};
+use crate::plant::common::{self, DRIVES, Lengths, joined, limb, limb_segments};
+use hal_sim::description::{BodyDescription, DriveDescription, EncoderDescription, LegDescription};
 use hal_sim::wearer::WearerTruth;
 use hal_sim::wearer::description::{
-    CuffDescription, CuffSpring, Impedance, MuscleDescription, SegmentDescription, WearerDescription,
+    CuffDescription, CuffSpring, Impedance, MuscleDescription, WearerDescription,
 };
 use hal_sim::wearer::muscles::Intention;
 use hal_sim::world::World;
@@ -21,80 +19,17 @@ use scarab::model::{LegParameters, Parameter, RigidBody};
 /// Servo ticks per second.
 pub const SECOND: u32 = 4000;
 const GRAVITY: [f32; 3] = [9.81, 0.0, 0.0];
-const THIGH_M: f64 = 0.39;
-const SHANK_M: f64 = 0.40;
-const BODY_KG: f64 = 75.0;
-/// Rotor inertia, Coulomb and viscous friction of hip and knee.
-pub const DRIVES: [[f64; 3]; 2] = [[1.9, 4.58, 5.01], [1.9, 4.67, 3.26]];
+/// Lengths of the default leg.
+const LENGTHS: Lengths = [0.39, 0.40, 0.27];
 
-/// Mass, centre of mass in the plane, sagittal inertia about it.
-type Segment = (f64, [f64; 2], f64);
-
-fn joined(parts: &[Segment]) -> Segment {
-    let mass: f64 = parts.iter().map(|part| part.0).sum();
-    let com = [0, 1].map(|axis| parts.iter().map(|part| part.0 * part.1[axis]).sum::<f64>() / mass);
-    let about = |part: &Segment| part.2 + part.0 * (part.1[0] - com[0]).hypot(part.1[1] - com[1]).powi(2);
-    (mass, com, parts.iter().map(about).sum())
-}
-
-/// Thigh and shank of the default exoskeleton without wearer.
-fn exoskeleton_segments() -> [Segment; 2] {
-    [
-        joined(&[(0.70, [0.0811, 0.0], 0.002_197), (2.14, [THIGH_M - 0.055_64, 0.0], 0.005_901)]),
-        joined(&[
-            (0.64, [0.0908, 0.0], 0.002_346),
-            (0.47, [SHANK_M - 0.0562, 0.0], 0.000_794_1),
-            (1.25, [SHANK_M, 0.088_34], 0.004_441),
-        ]),
-    ]
-}
-
-/// Thigh, and shank with foot, of a wearer of 75 kg by Winter's fractions.
-fn limb_segments() -> [Segment; 2] {
-    let segment = |fraction: f64, length: f64, gyration: f64| {
-        let mass = fraction * BODY_KG;
-        (mass, [0.433 * length, 0.0], mass * (gyration * length).powi(2))
-    };
-    let foot = 0.0145 * BODY_KG;
-    [
-        segment(0.100, THIGH_M, 0.323),
-        joined(&[
-            segment(0.0465, SHANK_M, 0.302),
-            (foot, [SHANK_M, 0.083], foot * (0.475_f64 * 0.27).powi(2)),
-        ]),
-    ]
-}
-
+/// The exoskeleton with the drives and encoders of the device.
 pub fn exoskeleton() -> LegDescription<2> {
-    let [thigh, shank] = exoskeleton_segments();
-    let joint =
-        |a: f64, (mass, [x, y], sagittal): Segment, direction: f64, drive: [f64; 3]| JointDescription {
-            stops: None,
-            frame: DenavitHartenberg { alpha: 0.0, a, d: 0.0 },
-            direction,
-            zero_offset: 0.0,
-            body: BodyDescription {
-                mass,
-                com: [x, y, 0.0],
-                inertia_com: [0.2 * sagittal, 0.0, 0.0, sagittal, 0.0, sagittal],
-            },
-            rotor_inertia: drive[0],
-            friction: FrictionDescription {
-                coulomb: drive[1],
-                viscous: drive[2],
-                offset: 0.0,
-                stribeck: None,
-            },
-            drive: DriveDescription { torque_per_ampere: 1.5, current_limit: 57.0, lag: 1e-3 },
-            encoder: EncoderDescription { side: EncoderSide::Motor, counts: 8192.0, ratio: 50.0 },
-            current_sensor: CurrentSensorDescription::default(),
-        };
-    LegDescription {
-        gravity: GRAVITY.map(f64::from),
-        joints: [joint(0.0, thigh, 1.0, DRIVES[0]), joint(THIGH_M, shank, -1.0, DRIVES[1])],
-        mirrored: false,
-        pushes: None,
+    let mut description = common::exoskeleton(LENGTHS);
+    for joint in &mut description.joints {
+        joint.drive = DriveDescription { torque_per_ampere: 1.5, current_limit: 57.0, lag: 1e-3 };
+        joint.encoder = EncoderDescription { counts: 8192.0, ratio: 50.0 };
     }
+    description
 }
 
 /// Cuff that yields 5 mm across and 20 mm along under 100 N; firmer than the plant's padded one, whose
@@ -106,10 +41,13 @@ pub fn firm_cuff(distance: f64) -> CuffDescription {
 
 /// A wearer of 75 kg with firm muscles.
 pub fn person() -> WearerDescription {
-    let segments =
-        limb_segments().map(|(mass, com, inertia_com)| SegmentDescription { mass, com, inertia_com });
     let muscles = [MuscleDescription::FIRM_HIP, MuscleDescription::FIRM_KNEE];
-    WearerDescription::aligned(segments, THIGH_M, muscles, [firm_cuff(0.28), firm_cuff(0.25)])
+    WearerDescription::aligned(
+        limb_segments(LENGTHS),
+        LENGTHS[0],
+        muscles,
+        [firm_cuff(0.28), firm_cuff(0.25)],
+    )
 }
 
 /// A wearer who moves as intended, whatever the exoskeleton does: experiments with and without assistance
@@ -124,14 +62,11 @@ pub fn insisting() -> WearerDescription {
     WearerDescription { muscles: [stiff(2000.0, 60.0), stiff(1500.0, 30.0)], ..person() }
 }
 
-fn parameters(segments: [Segment; 2]) -> LegParameters<f32, 2> {
+fn parameters(bodies: [BodyDescription; 2]) -> LegParameters<f32, 2> {
     core::array::from_fn(|joint| {
-        let (mass, [x, y], sagittal) = segments[joint];
-        let body = RigidBody {
-            mass,
-            centre_of_mass: Vector3::new(x, y, 0.0),
-            inertia: Matrix3::from_diagonal(&Vector3::new(0.2 * sagittal, sagittal, sagittal)),
-        };
+        let BodyDescription { mass, com, inertia_com: [xx, xy, xz, yy, yz, zz] } = bodies[joint];
+        let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let body = RigidBody { mass, centre_of_mass: Vector3::from(com), inertia };
         let mut all = [0.0_f32; 14];
         for (slot, value) in all.iter_mut().zip(body.to_parameters().into_iter().chain(DRIVES[joint])) {
             *slot = value as f32;
@@ -154,14 +89,15 @@ fn certain(
 /// True models of the empty and the worn leg; friction of the first times a factor.
 pub fn models(friction: f32) -> [IdentifiedModel<2>; 2] {
     let configuration: LegConfiguration<2, BASE> = super::x2::LEG.configuration().expect("shipped");
-    let mut empty = parameters(exoskeleton_segments());
+    let own = exoskeleton().joints.map(|joint| joint.body);
+    let mut empty = parameters(own);
     for joint in &mut empty {
         for parameter in [Parameter::FC, Parameter::FV] {
             joint[parameter.index()] *= friction;
         }
     }
-    let (own, limb) = (exoskeleton_segments(), limb_segments());
-    let worn = parameters([0, 1].map(|joint| joined(&[own[joint], limb[joint]])));
+    let limb = limb(LENGTHS);
+    let worn = parameters([0, 1].map(|joint| joined(&own[joint], &limb[joint])));
     [certain(&configuration, &empty), certain(&configuration, &worn)]
 }
 
@@ -193,10 +129,7 @@ impl Bench {
         let mut bench = Self::off(wearer, posture);
         let [empty, worn] = models(1.0);
         assert!(bench.leg.set_model(Wearing::Empty, empty) && bench.leg.set_model(Wearing::Worn, worn));
-        bench.tick(None);
-        for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
-            bench.tick(Some(ControlRequest::Power(power)));
-        }
+        bench.power_up();
         assert!(bench.leg.control().state().is_enabled());
         bench
     }
@@ -219,6 +152,13 @@ impl Bench {
         bench.run(SECOND + 100);
         assert_eq!(bench.leg.control().activity(), Activity::Assist(AssistPhase::Run));
         bench
+    }
+
+    pub fn power_up(&mut self) {
+        self.tick(None);
+        for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
+            self.tick(Some(ControlRequest::Power(power)));
+        }
     }
 
     pub fn begin(&mut self, shares: AssistShares) {

@@ -1,13 +1,11 @@
 //! Energy given to the wearer: the firmware's observer against the simulated bodies and cuffs.
 
 use super::bench::{Bench, SECOND, exoskeleton, insisting, person};
-use super::{MOST, walking};
+use super::{MOST, POSTURE, walking};
 use hal_sim::mechanism::Mechanism;
 use hal_sim::wearer::muscles::Intention;
 use scarab::assist::energy::BUDGET_J;
 use scarab::leg::AssistShares;
-
-const POSTURE: [f64; 2] = [0.5, 0.6];
 
 /// Energy that the motors injected besides weight and friction: what passed to the wearer, and the kinetic
 /// energy that the compensation does not lend, J.

@@ -19,6 +19,8 @@ mod x2 {
     include!("../../../../host/legs/x2-wearer-75kg.rs");
 }
 
+/// Hip and knee at the start of a test, rad.
+const POSTURE: [f64; 2] = [0.5, 0.6];
 /// Friction and half of the inertia compensated.
 const HALF: AssistShares = AssistShares { friction: 1.0, inertia: 0.5, ..AssistShares::GRAVITY_ONLY };
 /// Friction and four fifths of the inertia compensated.

@@ -1,12 +1,10 @@
 //! Assistance of a periodic motion.
 
 use super::bench::{Bench, SECOND, insisting};
-use super::{MOST, gait, walking};
+use super::{MOST, POSTURE, gait, walking};
 use hal_sim::wearer::motion::{CadenceChange, IntendedMotion};
 use hal_sim::wearer::muscles::Intention;
 use scarab::leg::AssistShares;
-
-const POSTURE: [f64; 2] = [0.5, 0.6];
 
 fn shares(periodic: f32) -> AssistShares {
     AssistShares { periodic, ..MOST }

@@ -1,11 +1,10 @@
 //! Beginning and end of a session: what is refused, and torque without steps.
 
 use super::bench::{Bench, SECOND, insisting, models, person};
-use super::{HALF, MOST, walking};
+use super::{HALF, MOST, POSTURE, walking};
 use hal_sim::wearer::muscles::Intention;
 use scarab::leg::{Activity, AssistPhase, AssistShares, ControlRequest, PowerRequest, Wearing};
 
-const POSTURE: [f64; 2] = [0.5, 0.6];
 /// A tenth of the torque cap, N m.
 const TENTH_OF_CAP: f64 = 8.5;
 
@@ -45,11 +44,7 @@ fn a_session_begins_and_ends_in_motion_without_a_step_of_torque() {
 #[test]
 fn a_session_without_its_models_is_refused() {
     let mut bench = Bench::off(&person(), POSTURE);
-    let powers = [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation];
-    bench.tick(None);
-    for power in powers {
-        bench.tick(Some(ControlRequest::Power(power)));
-    }
+    bench.power_up();
     let weight = AssistShares { weight: 0.5, ..HALF };
     assert!(bench.tick(Some(ControlRequest::Assist(HALF))).refused, "no model");
     let [empty, worn] = models(1.0);

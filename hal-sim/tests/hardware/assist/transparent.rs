@@ -1,12 +1,10 @@
 //! Interaction torque with the drives off and with a transparent leg, at the same motion of the wearer.
 
 use super::bench::{Bench, Measured, SECOND, insisting};
-use super::{HALF, MOST, walking};
+use super::{HALF, MOST, POSTURE, walking};
 use hal_sim::wearer::motion::IntendedMotion;
 use hal_sim::wearer::muscles::Intention;
 use scarab::leg::AssistShares;
-
-const POSTURE: [f64; 2] = [0.5, 0.6];
 
 /// Steady motion of an insisting wearer; `None` leaves the drives off.
 fn measured(motion: IntendedMotion, shares: Option<AssistShares>) -> Measured {

@@ -162,6 +162,19 @@ fn duties(voltage: f64, angle: f64) -> AxisCommand {
     AxisCommand { enabled: true, duty }
 }
 
+/// Runs one period under a command; its sample without noise, and impulse, charge and heat.
+fn period(axis: &mut Axis, command: &AxisCommand) -> (AxisSample, AxisFlow) {
+    let sample = axis.begin(command, 0, &mut Xoshiro256PlusPlus::seed_from_u64(1));
+    let mut sum = AxisFlow::default();
+    for _ in 0..4 {
+        let flow = axis.advance(BUS);
+        sum.impulse += flow.impulse;
+        sum.charge += flow.charge;
+        sum.heat += flow.heat;
+    }
+    (sample, sum)
+}
+
 /// Rotor at constant speed under a rotating voltage vector; impulse, charge and heat of each period.
 fn turning(
     description: &AxisDescription,
@@ -171,21 +184,12 @@ fn turning(
     periods: u32,
 ) -> (Axis, Vec<AxisFlow>) {
     let mut axis = Axis::new(description, 0.0, 0);
-    let mut noise = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut flows = Vec::new();
     for number in 0..periods {
         let angle = speed * PERIOD_S * f64::from(number);
         axis.set_rotor(angle, speed);
         let electrical = 7.0 * (angle + 0.5 * speed * PERIOD_S) + MOTOR.electrical_zero;
-        axis.begin(&duties(voltage, electrical + lead), 0, &mut noise);
-        let mut sum = AxisFlow::default();
-        for _ in 0..4 {
-            let flow = axis.advance(BUS);
-            sum.impulse += flow.impulse;
-            sum.charge += flow.charge;
-            sum.heat += flow.heat;
-        }
-        flows.push(sum);
+        flows.push(period(&mut axis, &duties(voltage, electrical + lead)).1);
     }
     (axis, flows)
 }
@@ -223,12 +227,8 @@ fn dead_time_reduces_the_voltage_against_the_current() {
     let resistance = MOTOR.resistance;
     let settle = |description: &AxisDescription, voltage: f64| {
         let mut axis = Axis::new(description, 0.0, 0);
-        let mut noise = Xoshiro256PlusPlus::seed_from_u64(1);
         for _ in 0..500 {
-            axis.begin(&duties(voltage, 0.0), 0, &mut noise);
-            for _ in 0..4 {
-                axis.advance(BUS);
-            }
+            period(&mut axis, &duties(voltage, 0.0));
         }
         axis.currents()[0]
     };
@@ -248,8 +248,7 @@ fn codes_are_the_currents_at_the_middle_of_the_lower_zero_vector() {
     description.bridge.dead_time = 0.0;
     let (mut axis, _) = turning(&description, 150.0, 4.5, 1.9, 2001);
     let expected = axis.currents();
-    let mut noise = Xoshiro256PlusPlus::seed_from_u64(1);
-    let sample: AxisSample = axis.begin(&AxisCommand::OFF, 0, &mut noise);
+    let (sample, _) = period(&mut axis, &AxisCommand::OFF);
     let step = description.shunts.ampere_per_code();
     for (channel, code) in sample.shunt_codes.iter().enumerate() {
         let read = (f64::from(*code) - 2048.0) * step;
@@ -395,13 +394,9 @@ fn wiring_connects_outputs_to_the_described_phases() {
         description.wiring = wiring;
         description.bridge.dead_time = 0.0;
         let mut axis = Axis::new(&description, 0.0, 0);
-        let mut noise = Xoshiro256PlusPlus::seed_from_u64(1);
         let mut sample = AxisSample::default();
         for _ in 0..200 {
-            sample = axis.begin(&duties(1.0, TAU / 3.0), 0, &mut noise);
-            for _ in 0..4 {
-                axis.advance(BUS);
-            }
+            sample = period(&mut axis, &duties(1.0, TAU / 3.0)).0;
         }
         sample.shunt_codes.map(|code| (f64::from(code) - 2048.0) * description.shunts.ampere_per_code())
     };
@@ -424,11 +419,9 @@ fn a_loaded_winding_warms_by_thermal_resistance_times_power() {
     let mut description = axis();
     description.motor.thermal_time = 0.05;
     let mut axis = Axis::new(&description, 0.0, 0);
-    let mut noise = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut heat = 0.0;
     for _ in 0..24_000 {
-        axis.begin(&duties(1.0, 0.0), 0, &mut noise);
-        heat = (0..4).map(|_| axis.advance(BUS).heat).sum::<f64>();
+        heat = period(&mut axis, &duties(1.0, 0.0)).1.heat;
     }
     let power = heat / PERIOD_S;
     // 1 K/W, twenty time constants; the power itself falls as the resistance rises.

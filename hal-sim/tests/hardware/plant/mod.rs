@@ -1,6 +1,6 @@
 //! Simulated hardware against textbook formulas.
 
-mod common;
+pub mod common;
 mod complete_drive;
 mod end_stop;
 mod friction;

@@ -1,14 +1,16 @@
 //! Wearer and exoskeleton as two bodies: energies, reaction, a rigid witness, muscles and motions.
 #![expect(clippy::disallowed_methods, reason = "expected values by another library than the plant's")]
 
-use crate::plant::common::{joined, joint, leg, worn_leg};
+use crate::plant::common::{
+    Lengths, bare_exoskeleton, exoskeleton, joined, leg, limb, limb_segments, turned, worn_leg,
+};
 use crate::plant::complete_drive::board;
 use hal_sim::description::{FrictionDescription, LegDescription, PushDescription};
 use hal_sim::mechanism::Mechanism;
 use hal_sim::wearer::WearerTruth;
 use hal_sim::wearer::description::{
-    CuffDescription, CuffSpring, Impedance, MuscleDescription, PassiveDescription, SegmentDescription,
-    WearerDescription, WearerError,
+    CuffDescription, CuffSpring, Impedance, MuscleDescription, PassiveDescription, WearerDescription,
+    WearerError,
 };
 use hal_sim::wearer::motion::{CadenceChange, Gait, IntendedMotion, Reaching, Strokes};
 use hal_sim::wearer::muscles::Intention;
@@ -16,34 +18,14 @@ use hal_sim::world::{TICK_S, World};
 use scarab::hal::DriveCommand;
 use scarab::units::Ampere;
 
-/// Segments of a person of 75 kg and 1.75 m by Winter's fractions of mass and height, m.
-const THIGH_M: f64 = 0.245 * 1.75;
-const SHANK_M: f64 = 0.246 * 1.75;
-const FOOT_M: f64 = 0.152 * 1.75;
-const BODY_KG: f64 = 75.0;
-
-/// Thigh, and shank with foot, of that person: mass, centre of mass, sagittal inertia about it.
-fn limb() -> [SegmentDescription; 2] {
-    let segment = |mass: f64, length: f64, gyration: f64| {
-        let gyration = gyration * length;
-        (mass, [0.433 * length, 0.0], mass * gyration * gyration, 0.05, false)
-    };
-    let foot_kg = 0.0145 * BODY_KG;
-    let foot_gyration = 0.475 * FOOT_M;
-    let foot = (foot_kg, [SHANK_M, 0.307 * FOOT_M], foot_kg * foot_gyration * foot_gyration, 0.04, true);
-    let thigh = joined(&[segment(0.100 * BODY_KG, THIGH_M, 0.323)]);
-    let shank = joined(&[segment(0.0465 * BODY_KG, SHANK_M, 0.302), foot]);
-    [thigh, shank].map(|body| SegmentDescription {
-        mass: body.mass,
-        com: [body.com[0], body.com[1]],
-        inertia_com: body.inertia_com[5],
-    })
-}
+/// Segments of a person of 1.75 m by Winter's fractions of height.
+const PERSON: Lengths = [0.245 * 1.75, 0.246 * 1.75, 0.152 * 1.75];
+const THIGH_M: f64 = PERSON[0];
 
 fn person() -> WearerDescription {
     let muscles = [MuscleDescription::HIP, MuscleDescription::KNEE];
     let cuffs = [CuffDescription::padded(0.28), CuffDescription::padded(0.25)];
-    WearerDescription::aligned(limb(), THIGH_M, muscles, cuffs)
+    WearerDescription::aligned(limb_segments(PERSON), THIGH_M, muscles, cuffs)
 }
 
 /// Person without passive torques; cuffs without damping.
@@ -54,34 +36,6 @@ fn elastic_person(stiffness: f64, play: f64) -> WearerDescription {
         cuffs: person().cuffs.map(|cuff| CuffDescription { along: spring, across: spring, ..cuff }),
         ..person()
     }
-}
-
-/// Links of the default exoskeleton without wearer, telescopes set to the person's segments; no friction, no
-/// rotors.
-fn bare_exoskeleton() -> LegDescription<2> {
-    let thigh = joined(&[
-        (0.70, [0.0811, 0.0], 0.002_197, 0.05, false),
-        (2.14, [THIGH_M - 0.055_64, 0.0], 0.005_901, 0.05, false),
-    ]);
-    let shank = joined(&[
-        (0.64, [0.0908, 0.0], 0.002_346, 0.05, false),
-        (0.47, [SHANK_M - 0.0562, 0.0], 0.000_794_1, 0.04, false),
-        (1.25, [SHANK_M, 0.088_34], 0.004_441, 0.05, true),
-    ]);
-    let mut hip = joint([0.0; 3], thigh.mass, thigh.com, thigh.inertia_com);
-    let mut knee = joint([0.0, THIGH_M, 0.0], shank.mass, shank.com, shank.inertia_com);
-    (hip.zero_offset, knee.zero_offset, knee.direction) = (0.0, 0.0, -1.0);
-    leg([9.81, 0.0, 0.0], [hip, knee])
-}
-
-/// Default exoskeleton with rotors and friction.
-fn exoskeleton() -> LegDescription<2> {
-    let mut description = bare_exoskeleton();
-    for (joint, (coulomb, viscous)) in description.joints.iter_mut().zip([(4.58, 5.01), (4.67, 3.26)]) {
-        joint.rotor_inertia = 1.9;
-        joint.friction = FrictionDescription { coulomb, viscous, offset: 0.0, stribeck: None };
-    }
-    description
 }
 
 fn worn(leg: &LegDescription<2>, wearer: &WearerDescription, posture: [f64; 2]) -> World<2> {
@@ -117,7 +71,7 @@ fn energy(description: &LegDescription<2>, world: &World<2>) -> f64 {
 /// Largest deviation of the energy in 10 s of free swinging, mean deviation in the last second, J, and
 /// largest deflection across the thigh's cuff, m.
 fn energy_deviation(wearer_description: &WearerDescription) -> [f64; 3] {
-    let description = bare_exoskeleton();
+    let description = bare_exoskeleton(PERSON);
     let mut world = worn(&description, wearer_description, [1.2, 0.3]);
     let initial = energy(&description, &world);
     let (mut largest, mut late, mut deflection) = (0.0_f64, 0.0, 0.0_f64);
@@ -147,7 +101,7 @@ fn energy_of_both_bodies_and_elastic_cuffs_is_conserved() {
 
 #[test]
 fn no_permitted_cuff_makes_a_step_unstable() {
-    let description = bare_exoskeleton();
+    let description = bare_exoskeleton(PERSON);
     for (stiffness, damping) in [(1e3, 2e4), (1e7, 10.0), (5e7, 0.0), (0.0, 2e4)] {
         let mut wearer_description = elastic_person(stiffness, 0.0);
         for cuff in &mut wearer_description.cuffs {
@@ -166,7 +120,7 @@ fn no_permitted_cuff_makes_a_step_unstable() {
 
 #[test]
 fn accelerations_are_those_of_the_motion() {
-    let mut world = worn(&bare_exoskeleton(), &person(), [0.9, 0.4]);
+    let mut world = worn(&bare_exoskeleton(PERSON), &person(), [0.9, 0.4]);
     let path: Vec<_> = (0..4000)
         .map(|_| {
             world.advance();
@@ -235,7 +189,7 @@ fn balance(description: &LegDescription<2>, mut world: World<2>) -> Balance {
 
 #[test]
 fn work_of_motors_and_muscles_is_energy_and_loss() {
-    let description = exoskeleton();
+    let description = exoskeleton(PERSON);
     let with_play = |play: f64| {
         let mut wearer = person();
         for cuff in &mut wearer.cuffs {
@@ -273,13 +227,11 @@ fn work_of_motors_and_muscles_is_energy_and_loss() {
     }
 }
 
-/// Both bodies as one rigid leg.
-fn merged(description: &LegDescription<2>, wearer: &WearerDescription) -> LegDescription<2> {
+/// Exoskeleton and person as one rigid leg.
+fn merged(description: &LegDescription<2>) -> LegDescription<2> {
     let mut merged = *description;
-    for (joint, segment) in merged.joints.iter_mut().zip([wearer.thigh, wearer.shank]) {
-        let [x, y] = segment.com;
-        joint.body = joint.body.with_point_mass(segment.mass, [x, y, 0.0]);
-        joint.body.inertia_com[5] += segment.inertia_com;
+    for (joint, limb) in merged.joints.iter_mut().zip(limb(PERSON)) {
+        joint.body = joined(&joint.body, &limb);
     }
     merged
 }
@@ -287,12 +239,12 @@ fn merged(description: &LegDescription<2>, wearer: &WearerDescription) -> LegDes
 #[test]
 fn with_stiff_cuffs_both_bodies_move_as_one_rigid_leg() {
     // The thigh is not vertical at the anatomical zero.
-    let mut description = bare_exoskeleton();
+    let mut description = bare_exoskeleton(PERSON);
     description.gravity = [8.0, 5.7, 0.0];
     let deviation = |stiffness: f64| {
         let wearer = elastic_person(stiffness, 0.0);
         let mut two = worn(&description, &wearer, [0.6, 0.8]);
-        let mut one = World::new(&merged(&description, &wearer), 1);
+        let mut one = World::new(&merged(&description), 1);
         one.move_to(&[0.6, 0.8]);
         let mut largest = 0.0_f64;
         for tick in 0..8000 {
@@ -317,20 +269,16 @@ fn with_stiff_cuffs_both_bodies_move_as_one_rigid_leg() {
 }
 
 /// The person's limb as a leg of its own, for the inverse dynamics of the exoskeleton's code path.
-fn limb_alone(wearer: &WearerDescription) -> World<2> {
-    let mut alone = bare_exoskeleton();
-    for joint in &mut alone.joints {
-        joint.body = hal_sim::description::BodyDescription { mass: 1e-12, ..Default::default() };
-    }
-    World::new(&merged(&alone, wearer), 1)
+fn limb_alone() -> World<2> {
+    let mut alone = bare_exoskeleton(PERSON);
+    alone.joints.iter_mut().zip(limb(PERSON)).for_each(|(joint, limb)| joint.body = limb);
+    World::new(&alone, 1)
 }
 
 #[test]
 fn interaction_torque_is_what_the_wearers_own_accelerations_demand() {
-    let description = exoskeleton();
-    let wearer_description = person();
-    let alone = limb_alone(&wearer_description);
-    let mut world = worn(&description, &wearer_description, [0.3, 0.4]);
+    let alone = limb_alone();
+    let mut world = worn(&exoskeleton(PERSON), &person(), [0.3, 0.4]);
     world.intend(walking(0.8)).expect("a valid motion");
     let path: Vec<WearerTruth> = (0..12_000)
         .map(|tick| {
@@ -372,7 +320,7 @@ fn reflexes_answer_exactly_after_the_neural_delay() {
         for muscle in &mut wearer_description.muscles {
             muscle.intrinsic = Impedance::default();
         }
-        let mut quiet = worn(&bare_exoskeleton(), &wearer_description, posture);
+        let mut quiet = worn(&bare_exoskeleton(PERSON), &wearer_description, posture);
         quiet.intend(Intention::Follow(IntendedMotion::Rest(posture))).expect("a valid motion");
         (0..8000).for_each(|_| quiet.advance());
         let mut pushed = quiet.clone();
@@ -400,7 +348,7 @@ fn uncoupled() -> WearerDescription {
 #[test]
 fn a_wearer_alone_walks_as_intended_by_feedforward() {
     let change = Some(CadenceChange { at: 4.0, cadence_hz: 1.0, within: 0.5 });
-    let mut world = worn(&exoskeleton(), &uncoupled(), [0.3, 0.4]);
+    let mut world = worn(&exoskeleton(PERSON), &uncoupled(), [0.3, 0.4]);
     let gait = Gait { change, ..Gait::at_cadence(0.8) };
     world.intend(Intention::Follow(IntendedMotion::Gait(gait))).expect("a valid motion");
     let mut largest = 0.0_f64;
@@ -421,8 +369,8 @@ fn a_wearer_alone_walks_as_intended_by_feedforward() {
 
 #[test]
 fn an_exoskeleton_with_loose_cuffs_moves_as_without_wearer() {
-    let mut loose = worn(&exoskeleton(), &uncoupled(), [0.3, 0.4]);
-    let mut empty = World::new(&exoskeleton(), 1);
+    let mut loose = worn(&exoskeleton(PERSON), &uncoupled(), [0.3, 0.4]);
+    let mut empty = World::new(&exoskeleton(PERSON), 1);
     empty.move_to(&[0.3, 0.4]);
     let mut starts = 0;
     for tick in 0..12_000 {
@@ -441,7 +389,8 @@ fn an_exoskeleton_with_loose_cuffs_moves_as_without_wearer() {
 #[test]
 fn a_disturbed_wearer_settles_with_any_neural_delay() {
     for neural_delay in [0.0, 0.05, 0.1] {
-        let mut world = worn(&exoskeleton(), &WearerDescription { neural_delay, ..uncoupled() }, [0.8, 0.3]);
+        let mut world =
+            worn(&exoskeleton(PERSON), &WearerDescription { neural_delay, ..uncoupled() }, [0.8, 0.3]);
         (0..1200).for_each(|_| world.advance());
         let thrown = wearer(&world).velocity;
         assert!(thrown.iter().any(|rate| rate.abs() > 0.5), "{thrown:?}");
@@ -465,7 +414,7 @@ struct Rms {
 }
 
 fn rms(wearer_description: &WearerDescription, motion: IntendedMotion) -> Rms {
-    let mut world = worn(&exoskeleton(), wearer_description, [0.4, 0.5]);
+    let mut world = worn(&exoskeleton(PERSON), wearer_description, [0.4, 0.5]);
     world.intend(Intention::Follow(motion)).expect("a valid motion");
     (0..12_000).for_each(|_| world.advance());
     let path: Vec<WearerTruth> = (0..40_000)
@@ -521,7 +470,7 @@ fn interaction_torque_of_an_unpowered_exoskeleton_is_plausible_for_every_motion(
 
 #[test]
 fn a_limp_wearer_is_moved_by_the_exoskeleton_alone() {
-    let mut world = worn(&exoskeleton(), &person(), [0.4, 0.5]);
+    let mut world = worn(&exoskeleton(PERSON), &person(), [0.4, 0.5]);
     let begin = wearer(&world);
     let mut farthest = 0.0_f64;
     for tick in 0..20_000 {
@@ -546,7 +495,7 @@ fn a_limp_wearer_is_moved_by_the_exoskeleton_alone() {
 #[test]
 fn a_resisting_wearer_holds_the_exoskeleton_where_a_limp_one_yields() {
     let turned = |intention: Intention| {
-        let mut world = worn(&exoskeleton(), &person(), [0.4, 0.5]);
+        let mut world = worn(&exoskeleton(PERSON), &person(), [0.4, 0.5]);
         world.intend(intention).expect("no motion to refuse");
         let command = DriveCommand { enabled: true, currents: [Ampere(30.0), Ampere(20.0)] };
         for _ in 0..12_000 {
@@ -566,7 +515,7 @@ fn a_resisting_wearer_holds_the_exoskeleton_where_a_limp_one_yields() {
 fn muscles_are_limited_to_their_largest_torque() {
     let mut weak = person();
     weak.muscles.iter_mut().for_each(|muscle| muscle.torque_limit = 6.0);
-    let mut world = worn(&exoskeleton(), &weak, [0.4, 0.5]);
+    let mut world = worn(&exoskeleton(PERSON), &weak, [0.4, 0.5]);
     world.intend(walking(1.0)).expect("a valid motion");
     let mut largest = [0.0_f64; 2];
     for _ in 0..12_000 {
@@ -582,8 +531,8 @@ fn muscles_are_limited_to_their_largest_torque() {
 fn offset_axes_load_the_cuffs_of_a_bent_leg() {
     let forces = |hip_offset: [f64; 2], thigh_length: f64| {
         let wearer_description = WearerDescription { hip_offset, thigh_length, ..person() };
-        let straight = wearer(&worn(&bare_exoskeleton(), &wearer_description, [0.0; 2]));
-        let bent = wearer(&worn(&bare_exoskeleton(), &wearer_description, [0.6, 1.2]));
+        let straight = wearer(&worn(&bare_exoskeleton(PERSON), &wearer_description, [0.0; 2]));
+        let bent = wearer(&worn(&bare_exoskeleton(PERSON), &wearer_description, [0.6, 1.2]));
         assert!(straight.cuffs.iter().flat_map(|cuff| cuff.deflection).all(|d| d.abs() < 1e-12));
         bent.cuffs.map(|cuff| cuff.force)
     };
@@ -598,20 +547,8 @@ fn offset_axes_load_the_cuffs_of_a_bent_leg() {
 
 #[test]
 fn a_turned_description_wears_identically() {
-    let plain = exoskeleton();
-    // Equivalent description: the knee's axis is reversed, the hip's angle counted from another zero.
-    let mut turned = plain;
-    let (sine, cosine) = 0.3_f64.sin_cos();
-    turned.gravity = [9.81 * cosine, 9.81 * sine, 0.0];
-    turned.joints[0].zero_offset = 0.3;
-    let knee = &mut turned.joints[1];
-    knee.direction = 1.0;
-    knee.frame.alpha = core::f64::consts::PI;
-    let [x, y, z] = knee.body.com;
-    knee.body.com = [x, -y, -z];
-    let [xx, xy, xz, yy, yz, zz] = knee.body.inertia_com;
-    knee.body.inertia_com = [xx, -xy, -xz, yy, yz, zz];
-    let [one, other] = [plain, turned].map(|description| {
+    let plain = exoskeleton(PERSON);
+    let [one, other] = [plain, turned(&plain)].map(|description| {
         let mut world = worn(&description, &person(), [0.4, 0.5]);
         world.intend(walking(0.8)).expect("a valid motion");
         (0..8000).for_each(|tick| {
@@ -628,8 +565,8 @@ fn a_turned_description_wears_identically() {
 
 #[test]
 fn a_wearer_walks_alike_with_ideal_and_with_complete_drives_off() {
-    let ideal = World::new(&exoskeleton(), 1);
-    let complete = World::with_complete_drives(&exoskeleton(), &board(), 1);
+    let ideal = World::new(&exoskeleton(PERSON), 1);
+    let complete = World::with_complete_drives(&exoskeleton(PERSON), &board(), 1);
     let [ideal, complete] = [ideal, complete].map(|mut world| {
         world.move_to(&[0.4, 0.5]);
         world.wear(&person()).expect("a leg of hip and knee");
@@ -648,7 +585,7 @@ fn a_wearer_walks_alike_with_ideal_and_with_complete_drives_off() {
 
 #[test]
 fn placing_a_worn_leg_places_the_wearer() {
-    let mut world = worn(&exoskeleton(), &person(), [0.4, 0.5]);
+    let mut world = worn(&exoskeleton(PERSON), &person(), [0.4, 0.5]);
     world.intend(walking(1.0)).expect("a valid motion");
     (0..8000).for_each(|_| world.advance());
     world.move_to(&[0.7, 0.9]);
@@ -662,7 +599,7 @@ fn placing_a_worn_leg_places_the_wearer() {
 
 #[test]
 fn copies_of_a_worn_world_continue_identically() {
-    let mut description = exoskeleton();
+    let mut description = exoskeleton(PERSON);
     description.pushes = Some(PushDescription { rate: 3.0, torque: 20.0, duration: 0.2 });
     let mut world = worn(&description, &person(), [0.4, 0.5]);
     let reaching = Reaching { low: [0.1, 0.2], high: [0.85, 1.6], durations: [0.5, 1.2], seed: 9 };
@@ -681,11 +618,11 @@ fn copies_of_a_worn_world_continue_identically() {
 #[test]
 fn legs_and_wearers_that_do_not_fit_are_refused() {
     let refused = |change: fn(&mut LegDescription<2>, &mut WearerDescription)| {
-        let (mut description, mut wearer) = (exoskeleton(), person());
+        let (mut description, mut wearer) = (exoskeleton(PERSON), person());
         change(&mut description, &mut wearer);
         World::new(&description, 1).wear(&wearer).expect_err("does not fit")
     };
-    let one_joint = leg([9.81, 0.0, 0.0], [exoskeleton().joints[0]]);
+    let one_joint = leg([9.81, 0.0, 0.0], [exoskeleton(PERSON).joints[0]]);
     let three_joints = crate::plant::common::spatial_chain();
     for (error, joints) in
         [(World::new(&one_joint, 1).wear(&person()), 1), (World::new(&three_joints, 1).wear(&person()), 3)]
@@ -721,7 +658,7 @@ fn legs_and_wearers_that_do_not_fit_are_refused() {
             "{error}"
         );
     }
-    let mut bare = World::new(&exoskeleton(), 1);
+    let mut bare = World::new(&exoskeleton(PERSON), 1);
     assert_eq!(bare.intend(Intention::Limp), Err(WearerError::NotWorn));
     assert_eq!(bare.wearer_truth(), None);
 }

@@ -1,9 +1,9 @@
 //! Simulated world at its interface to the firmware: sensors, drives, seeds, copies and signs.
 #![expect(clippy::disallowed_methods, reason = "expected values by another library than the plant's")]
 
-use crate::plant::common::{planar_leg, worn_leg};
+use crate::plant::common::{planar_leg, turned, worn_leg};
 use core::f64::consts::TAU;
-use hal_sim::description::{EncoderDescription, EncoderSide, LegDescription, PushDescription};
+use hal_sim::description::{EncoderDescription, LegDescription, PushDescription};
 use hal_sim::sensors::Encoder;
 use hal_sim::world::{TICK_S, World};
 use scarab::hal::{DriveCommand, LegDrives, Sample};
@@ -45,7 +45,7 @@ fn reading_the_sensors_twice_changes_nothing() {
 
 #[test]
 fn encoder_rounds_to_counts_and_wraps_in_32_bits() {
-    let motor = EncoderDescription { side: EncoderSide::Motor, counts: 8192.0, ratio: 50.0 };
+    let motor = EncoderDescription { counts: 8192.0, ratio: 50.0 };
     let encoder = Encoder::new(&motor);
     let count = TAU / (8192.0 * 50.0);
     for counts in [-70_000, -1, 0, 1, 12_345, 409_600] {
@@ -57,7 +57,7 @@ fn encoder_rounds_to_counts_and_wraps_in_32_bits() {
     let last = (f64::from(i32::MAX) + 0.25) * count;
     assert_eq!(encoder.read(last), i32::MAX);
     assert_eq!(encoder.read(last + count), i32::MIN);
-    let joint = EncoderDescription { side: EncoderSide::Joint, counts: 16384.0, ratio: 1.0 };
+    let joint = EncoderDescription { counts: 16384.0, ratio: 1.0 };
     assert_eq!(Encoder::new(&joint).read(-TAU / 4.0), -4096);
 }
 
@@ -126,21 +126,7 @@ fn drive_follows_its_target_with_the_exact_lag_and_never_beyond_its_limit() {
 #[test]
 fn a_mirrored_or_turned_description_behaves_identically_at_the_ports() {
     let plain = worn_leg();
-    // Equivalent description of the leg. The knee's axis is reversed (its frame turned by half a turn about
-    // x). The hip's angle is counted from another zero (the base turned about the hip's axis).
-    let mut described = plain;
-    let (sine, cosine) = 0.3_f64.sin_cos();
-    described.gravity = [9.81 * cosine, 9.81 * sine, 0.0];
-    described.joints[0].zero_offset = 0.3;
-    let knee = &mut described.joints[1];
-    knee.direction = -1.0;
-    knee.frame.alpha = core::f64::consts::PI;
-    knee.friction.offset = -knee.friction.offset;
-    let [x, y, z] = knee.body.com;
-    knee.body.com = [x, -y, -z];
-    let [xx, xy, xz, yy, yz, zz] = knee.body.inertia_com;
-    knee.body.inertia_com = [xx, -xy, -xz, yy, yz, zz];
-    let (mut one, mut other) = (World::new(&plain, 1), World::new(&described, 1));
+    let (mut one, mut other) = (World::new(&plain, 1), World::new(&turned(&plain), 1));
     for tick in 0..8000 {
         one.tick(&shaken(tick));
         other.tick(&shaken(tick));

@@ -64,6 +64,12 @@ impl Wearer {
         };
         [limb(0.0465 * self.mass, self.shank, 0.302, 0.055), foot]
     }
+
+    /// Segments of the thigh's link and of the shank's.
+    #[must_use]
+    pub fn links(&self) -> [Vec<Segment>; 2] {
+        [vec![self.thigh()], self.shank().to_vec()]
+    }
 }
 
 /// Long axis of a solid of revolution.

@@ -226,27 +226,17 @@ impl Excitation {
     /// Coefficients for a leg of `N` joints, unchecked.
     #[must_use]
     pub fn numbers<const N: usize>(&self) -> Option<ExcitationTable<N>> {
-        if self.joints.len() != N {
-            return None;
-        }
-        let mut table = ExcitationTable {
+        let joints: &[ExcitedJoint; N] = self.joints.as_slice().try_into().ok()?;
+        let filled =
+            |stated: &[f32]| core::array::from_fn(|order| stated.get(order).copied().unwrap_or_default());
+        Some(ExcitationTable {
             period_s: self.period_s,
             blend_s: self.blend_s,
             cycles: self.cycles,
-            centre_rad: [0.0; N],
-            sine_rad: [[0.0; HARMONICS]; N],
-            cosine_rad: [[0.0; HARMONICS]; N],
-        };
-        for (index, joint) in self.joints.iter().enumerate() {
-            table.centre_rad[index] = joint.centre_rad;
-            for (slot, value) in table.sine_rad[index].iter_mut().zip(&joint.sine_rad) {
-                *slot = *value;
-            }
-            for (slot, value) in table.cosine_rad[index].iter_mut().zip(&joint.cosine_rad) {
-                *slot = *value;
-            }
-        }
-        Some(table)
+            centre_rad: joints.each_ref().map(|joint| joint.centre_rad),
+            sine_rad: joints.each_ref().map(|joint| filled(&joint.sine_rad)),
+            cosine_rad: joints.each_ref().map(|joint| filled(&joint.cosine_rad)),
+        })
     }
 
     /// Motion for a leg of `N` joints; not yet proved, nor checked against the leg.

@@ -61,7 +61,9 @@ pub use switch::Switch;
 use scarab::units::Hertz;
 use scarab_base::error::FileError;
 use scarab_base::toml_file;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::formats::leg_file::assist::AssistFile;
 
@@ -343,6 +345,13 @@ defaults! {
     never: Switch = Switch::Off;
 }
 
+/// A part of a leg file that states these keys only. Numbers that are not finite, which JSON lacks, must be
+/// replaced by the caller.
+fn with_defaults<T: DeserializeOwned>(stated: serde_json::Value) -> T {
+    serde_json::from_value(stated)
+        .unwrap_or_else(|fault| unreachable!("every other key has a default: {fault}"))
+}
+
 /// Whether a key has its type's default, so that it is not written.
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
@@ -352,32 +361,8 @@ impl JointFile {
     /// Joint with defaults for every other key.
     #[must_use]
     pub fn new(name: &str, dh: DhFile) -> Self {
-        Self {
-            name: name.to_owned(),
-            dh,
-            direction: default_direction(),
-            zero_offset_deg: 0.0,
-            range_deg: default_range(),
-            speed_limit_deg_s: default_speed_limit(),
-            acceleration_limit_deg_s2: default_acceleration_limit(),
-            torque_limit_nm: default_torque_limit(),
-            torque_per_ampere: default_torque_per_ampere(),
-            current_limit_a: None,
-            drive_lag_s: default_lag(),
-            encoder: default_encoder(),
-            current_noise_a: 0.0,
-            current_offset_a: 0.0,
-            current_step_a: 0.0,
-            outliers: None,
-            offset: Switch::On,
-            rotor: Switch::On,
-            stribeck_model: Switch::Auto,
-            asymmetric_coulomb: Switch::Off,
-            stribeck: None,
-            truth: None,
-            prior: None,
-            motor: None,
-        }
+        let stated = json!({ "name": name, "dh": DhFile::default() });
+        Self { dh, ..with_defaults(stated) }
     }
 }
 
@@ -385,22 +370,22 @@ impl LegFile {
     /// Leg of these joints with defaults for every other key.
     #[must_use]
     pub fn plain(name: &str, gravity: [f64; 3], joints: Vec<JointFile>) -> Self {
-        Self {
-            name: name.to_owned(),
-            gravity,
-            torque_noise_percent: 0.0,
-            bandwidth_hz: default_bandwidth(),
-            pushes: None,
-            temperature_c: None,
-            side: BodySide::default(),
-            segments: None,
-            supply: SupplyFile::default(),
-            supply_current_a: None,
-            charge_current_a: None,
-            brake: None,
-            assist: None,
-            joints,
-        }
+        let stated = json!({ "name": name, "gravity": [0.0, 0.0, 0.0], "joint": [] });
+        Self { gravity, joints, ..with_defaults(stated) }
+    }
+
+    /// Index of a joint from its name or its number from 1; the error names the joints.
+    ///
+    /// # Errors
+    /// No joint has this name or number.
+    pub fn joint_index(&self, joint: &str) -> Result<usize, String> {
+        let names: Vec<_> = self.joints.iter().map(|joint| joint.name.as_str()).collect();
+        let number = joint.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let found = names.iter().position(|name| *name == joint);
+        found.or(number.filter(|&number| number < names.len())).ok_or_else(|| {
+            let (leg, count) = (&self.name, names.len());
+            format!("`{joint}` is not a joint of `{leg}`: {} or 1 to {count}", names.join(", "))
+        })
     }
 
     /// Loads a shipped leg by name, or the file at a path.

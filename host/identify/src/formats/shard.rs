@@ -13,7 +13,7 @@
 
 use std::path::{Path, PathBuf};
 
-use scarab_base::error::{EXIT_ACCEPTED, ToolError};
+use scarab_base::error::{EXIT_ACCEPTED, FileError, ToolError};
 use scarab_base::shard::Shard;
 use scarab_base::{files, output};
 use serde::de::DeserializeOwned;
@@ -53,6 +53,10 @@ impl Argument {
 
 /// Digits of a digest in a message.
 const SHOWN: usize = 12;
+
+fn refused(path: &Path, reason: impl std::fmt::Display) -> ToolError {
+    FileError::new(path.display(), reason).into()
+}
 
 /// Program that computes a campaign.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -169,11 +173,9 @@ impl<R> ShardResults<R> {
     /// Error of results that are not those of the shard's runs.
     #[must_use]
     pub fn damaged(&self, what: &str) -> ToolError {
-        ToolError::input(format!(
-            "{}: {what}, which are not the results of shard {}: the file was changed; compute it again",
-            self.path.display(),
-            self.shard
-        ))
+        let shard = self.shard;
+        let why = format!("{what}, which are not the results of shard {shard}");
+        refused(&self.path, format!("{why}: the file was changed; compute it again"))
     }
 
     /// Rejects results with another number of runs than the shard's of `runs`.
@@ -235,16 +237,13 @@ impl ShardFiles {
     pub fn read(paths: &[&Path], own: &Program, commands: &[&str]) -> Result<Self, ToolError> {
         let mut found = Vec::with_capacity(paths.len());
         for &path in paths {
-            let text = std::fs::read_to_string(path)
-                .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))?;
+            let text = files::read_text(path)?;
             let header = header(path, &text)?;
             let command = header.campaign.command.as_str();
             if !commands.contains(&command) {
                 let program = if command == "paper" { "cargo paper" } else { "cargo sim" };
-                return Err(ToolError::input(format!(
-                    "{}: is a shard of `{command}`: join it with `{program} merge`",
-                    path.display()
-                )));
+                let words = format!("is a shard of `{command}`: join it with `{program} merge`");
+                return Err(refused(path, words));
             }
             found.push((path.to_owned(), header, text));
         }
@@ -292,10 +291,8 @@ impl ShardFiles {
     pub fn parts<R: DeserializeOwned>(&self) -> Result<Vec<ShardResults<R>>, ToolError> {
         let part = |(path, shard, text): &(PathBuf, Shard, String)| {
             let results = serde_json::from_str(text).map_err(|error| {
-                ToolError::input(format!(
-                    "{}: its results cannot be read: {error}: the file was changed; compute the shard again",
-                    path.display()
-                ))
+                let words = format!("its results cannot be read: {error}: the file was changed");
+                refused(path, words + "; compute the shard again")
             })?;
             Ok(ShardResults { path: path.clone(), shard: *shard, results })
         };
@@ -306,17 +303,11 @@ impl ShardFiles {
 /// Reads the beginning of a file.
 fn header(path: &Path, text: &str) -> Result<Header, ToolError> {
     let header: Header = serde_json::from_str(text).map_err(|error| {
-        ToolError::input(format!(
-            "{}: is no shard of a campaign: {error}; `--shard I/N --json FILE` writes one",
-            path.display()
-        ))
+        refused(path, format!("is no shard of a campaign: {error}; `--shard I/N --json FILE` writes one"))
     })?;
     if header.schema != SCHEMA {
-        return Err(ToolError::input(format!(
-            "{}: schema {}, this program reads {SCHEMA}: join the shards with the commit that computed them",
-            path.display(),
-            header.schema
-        )));
+        let words = format!("schema {}, this program reads {SCHEMA}: join the shards", header.schema);
+        return Err(refused(path, words + " with the commit that computed them"));
     }
     Ok(header)
 }

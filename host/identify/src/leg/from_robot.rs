@@ -280,14 +280,7 @@ fn prior(robot: &Robot, joint: &Joint, body: &LumpedBody, dh: &DhJoint) -> Resul
     Ok(DraftPrior {
         mass: without_noise(body.mass, 0.0),
         com: com.into(),
-        inertia_com: [
-            tensor[(0, 0)],
-            tensor[(0, 1)],
-            tensor[(0, 2)],
-            tensor[(1, 1)],
-            tensor[(1, 2)],
-            tensor[(2, 2)],
-        ],
+        inertia_com: [tensor.m11, tensor.m12, tensor.m13, tensor.m22, tensor.m23, tensor.m33],
         coulomb: positive("friction", joint.friction)?,
         viscous: positive("damping", joint.damping)?,
     })

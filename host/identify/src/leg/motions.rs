@@ -175,15 +175,8 @@ fn walk<const N: usize>(
     period: Second,
     cycles: u32,
 ) -> Option<Periodic<N>> {
-    let walking = core::array::from_fn(|joint| {
-        if joint + 2 < N || (joint == 0 && N == 1) {
-            GaitJoint::Hip
-        } else if joint + 1 == N {
-            GaitJoint::Knee
-        } else {
-            GaitJoint::Hip
-        }
-    });
+    let is_knee = |joint: usize| N > 1 && joint + 1 == N;
+    let walking = core::array::from_fn(|joint| if is_knee(joint) { GaitJoint::Knee } else { GaitJoint::Hip });
     let anatomical = gait::curve(walking, period).ok()?;
     let scale = core::array::from_fn(|joint| if leg.joints[joint].direction < 0 { -1.0 } else { 1.0 });
     let offset = core::array::from_fn(|joint| Radian(leg.joints[joint].zero_offset_deg.to_radians() as f32));

@@ -51,22 +51,7 @@ impl PlacedMass {
     /// Places the mass on this leg; `option` is named in error messages.
     pub fn on(&self, leg: &LegFile, option: &str) -> Result<Payload<f64>, ToolError> {
         let refused = |reason: String| ToolError::input(format!("{option}: {reason}"));
-        let number = self.joint.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
-        let joint = leg
-            .joints
-            .iter()
-            .position(|joint| joint.name == self.joint)
-            .or(number.filter(|&number| number < leg.joints.len()))
-            .ok_or_else(|| {
-                let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
-                refused(format!(
-                    "`{}` is not a joint of `{}`: {} or 1 to {}",
-                    self.joint,
-                    leg.name,
-                    names.join(", "),
-                    names.len()
-                ))
-            })?;
+        let joint = leg.joint_index(&self.joint).map_err(refused)?;
         let length = leg.link_length(joint);
         if !(0.0..=length).contains(&self.x) || self.y.abs() > length {
             return Err(refused(format!(

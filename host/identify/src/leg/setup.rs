@@ -288,9 +288,7 @@ pub fn configuration<const N: usize, const B: usize>(
         let ends = joint.range_deg.map(|end| anatomy[index].angle_to_chain(end.to_radians()) as f32);
         JointConfiguration {
             scale: JointScale {
-                radian_per_count: Radian(
-                    (TAU / (f64::from(joint.encoder.counts) * joint.encoder.ratio)) as f32,
-                ),
+                radian_per_count: Radian(joint.encoder.step_rad() as f32),
                 anatomy: anatomy[index].convert(),
                 mirrored: leg.side == BodySide::Left,
                 torque_per_ampere: NewtonMetrePerAmpere(joint.torque_per_ampere as f32),

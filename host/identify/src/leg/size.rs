@@ -25,7 +25,7 @@ use nalgebra::{Matrix3, Vector3};
 use scarab::model::RigidBody;
 use scarab_base::error::ToolError;
 
-use crate::formats::anthropometry::{Segment, Wearer};
+use crate::formats::anthropometry::Wearer;
 use crate::formats::leg_file::{LegFile, LinkParameters, SegmentsFile};
 use crate::leg::link_body::{body, joined_with, linked, without};
 
@@ -74,14 +74,6 @@ pub struct Size {
     pub wearer: Option<Person>,
 }
 
-/// One link before and after.
-struct Change {
-    name: &'static str,
-    stretch: f64,
-    /// Segments of a wearer that belong to it.
-    segments: fn(&Wearer) -> Vec<Segment>,
-}
-
 impl Size {
     /// Leg of this size.
     pub fn apply_to(&self, leg: &LegFile) -> Result<LegFile, ToolError> {
@@ -106,25 +98,15 @@ impl Size {
 
         let mut sized = leg.clone();
         let weight = after.mass / before.mass;
-        let changes = [
-            Change {
-                name: "thigh",
-                stretch: thigh / before.thigh,
-                segments: |wearer: &Wearer| vec![wearer.thigh()],
-            },
-            Change {
-                name: "shank",
-                stretch: shank / before.shank,
-                segments: |wearer: &Wearer| wearer.shank().to_vec(),
-            },
-        ];
-        for (joint, change) in sized.joints.iter_mut().skip(knee.saturating_sub(1)).zip(&changes) {
+        let stretches = [thigh / before.thigh, shank / before.shank];
+        for (index, joint) in sized.joints.iter_mut().skip(knee.saturating_sub(1)).enumerate() {
             for (link, mass) in [(&mut joint.truth, old.wearer_kg), (&mut joint.prior, old.prior_wearer_kg)] {
                 if let Some(link) = link {
                     let another = self.wearer.map(|_| Wearer { mass: weight * mass, ..after });
-                    *link = change.link(link, Wearer { mass, ..before }, another).map_err(|reason| {
-                        ToolError::input(format!("{}: joint `{}`: {reason}", leg.name, joint.name))
-                    })?;
+                    *link = changed(link, index, stretches[index], Wearer { mass, ..before }, another)
+                        .map_err(|reason| {
+                            ToolError::input(format!("{}: joint `{}`: {reason}", leg.name, joint.name))
+                        })?;
                 }
             }
         }
@@ -166,27 +148,28 @@ impl Size {
     }
 }
 
-impl Change {
-    /// Link at its new length, with the segments of `another` wearer for those of `before`, if there is one.
-    fn link(
-        &self,
-        link: &LinkParameters,
-        before: Wearer,
-        another: Option<Wearer>,
-    ) -> Result<LinkParameters, String> {
-        let Some(another) = another else {
-            let whole = body(link.mass, link.com, link.inertia_com);
-            return Ok(linked(link, &stretched(&whole, self.stretch)));
-        };
-        let machine = without(link, &(self.segments)(&before)).ok_or_else(|| {
-            format!(
-                "its link is lighter than the {} of a wearer of {} kg, which it contains by `segments`",
-                self.name, before.mass
-            )
-        })?;
-        let sum = joined_with(&stretched(&machine, self.stretch), &(self.segments)(&another));
-        sum.map(|sum| linked(link, &sum)).ok_or_else(|| "has no mass".into())
-    }
+/// Link of the thigh (0) or shank at its new length, with the segments of `another` wearer for those of
+/// `before`, if there is one.
+fn changed(
+    link: &LinkParameters,
+    index: usize,
+    stretch: f64,
+    before: Wearer,
+    another: Option<Wearer>,
+) -> Result<LinkParameters, String> {
+    let Some(another) = another else {
+        let whole = body(link.mass, link.com, link.inertia_com);
+        return Ok(linked(link, &stretched(&whole, stretch)));
+    };
+    let machine = without(link, &before.links()[index]).ok_or_else(|| {
+        format!(
+            "its link is lighter than the {} of a wearer of {} kg, which it contains by `segments`",
+            ["thigh", "shank"][index],
+            before.mass
+        )
+    })?;
+    let sum = joined_with(&stretched(&machine, stretch), &another.links()[index]);
+    sum.map(|sum| linked(link, &sum)).ok_or_else(|| "has no mass".into())
 }
 
 fn stretched(body: &RigidBody<f64>, stretch: f64) -> RigidBody<f64> {

@@ -75,10 +75,10 @@ impl<const N: usize> States<N> {
             let mut numbers = [[0.0; N]; 3];
             for (group, columns) in numbers.iter_mut().zip(columns) {
                 for (number, column) in group.iter_mut().zip(columns) {
-                    *number = column.number(row, f64::INFINITY)?;
+                    *number = column.number(row)?;
                 }
             }
-            let time = time.as_ref().map(|column| column.number(row, f64::INFINITY)).transpose()?;
+            let time = time.as_ref().map(|column| column.number(row)).transpose()?;
             let [q, qd, qdd] = numbers;
             let motion = JointState {
                 q: core::array::from_fn(|joint| to_chain[joint].angle_to_chain(q[joint])),
@@ -107,12 +107,12 @@ fn find_columns<const N: usize>(header: &StringRecord) -> Result<Columns, Fault>
     };
     let columns = [group("q", "rad")?, group("qd", "radps")?, group("qdd", "radps2")?];
     let is_timed = header.iter().any(|name| name == "t_s");
-    Ok((columns, is_timed.then(|| Column::find(header, "t_s".into(), &needed)).transpose()?))
+    Ok((columns, is_timed.then(|| Column::find(header, "t_s", &needed)).transpose()?))
 }
 
 /// Column of this name, with or without the unit appended.
 fn find(header: &StringRecord, name: &str, unit: &str, needed: &[String]) -> Result<Column, Fault> {
     let with_unit = format!("{name}_{unit}");
     let is_with_unit = header.iter().any(|present| present == with_unit);
-    Column::find(header, if is_with_unit { with_unit } else { name.to_owned() }, needed)
+    Column::find(header, if is_with_unit { &with_unit } else { name }, needed)
 }

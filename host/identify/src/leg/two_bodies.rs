@@ -109,9 +109,7 @@ impl TwoBodies {
                 ("prior", &mut joint.prior, segments.prior_wearer_kg),
             ] {
                 if let Some(link) = link {
-                    let [thigh, shank] = parts(&person(mass));
-                    let part = if number == 0 { thigh } else { shank };
-                    *link = machine(link, &part).ok_or_else(|| {
+                    *link = machine(link, &person(mass).links()[number]).ok_or_else(|| {
                         ToolError::input(format!(
                             "{}: joint `{}`: {key} without the segment of a wearer of {mass} kg is no physically \
                              consistent body; correct the masses in the leg file",
@@ -131,11 +129,6 @@ impl TwoBodies {
     }
 }
 
-/// Thigh, and shank with foot.
-fn parts(person: &Wearer) -> [Vec<Segment>; 2] {
-    [vec![person.thigh()], person.shank().to_vec()]
-}
-
 /// Link without the wearer's part.
 fn machine(link: &LinkParameters, part: &[Segment]) -> Option<LinkParameters> {
     let body = without(link, part)?;
@@ -145,7 +138,7 @@ fn machine(link: &LinkParameters, part: &[Segment]) -> Option<LinkParameters> {
 /// A person for the simulated hardware: aligned joint axes, padded cuffs.
 #[must_use]
 pub fn description(person: &Wearer, tone: MuscleTone) -> WearerDescription {
-    let segments = parts(person).map(|part| {
+    let segments = person.links().map(|part| {
         let (mass, [along, forward, _], inertia) = joined(&part);
         SegmentDescription { mass, com: [along, forward], inertia_com: inertia[5] }
     });

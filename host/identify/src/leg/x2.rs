@@ -36,21 +36,6 @@ fn tube(mass: f64, x: f64, sagittal: f64, radius: f64) -> Segment {
     Segment { mass, x, y: 0.0, sagittal, radius, along: Along::X }
 }
 
-/// Upper and lower thigh of the exoskeleton for a length, m. It is a telescope: the upper part
-/// keeps its position below the hip, the lower one above the knee.
-fn exoskeleton_thigh(length: f64) -> [Segment; 2] {
-    [tube(0.70, 0.0811, 0.002_197, 0.05), tube(2.14, length - 0.055_64, 0.005_901, 0.05)]
-}
-
-/// Upper and lower shank and foot of the exoskeleton, also a telescope.
-fn exoskeleton_shank(length: f64) -> [Segment; 3] {
-    [
-        tube(0.64, 0.0908, 0.002_346, 0.05),
-        tube(0.47, length - 0.0562, 0.000_794_1, 0.04),
-        Segment { mass: 1.25, x: length, y: 0.088_34, sagittal: 0.004_441, radius: 0.05, along: Along::Y },
-    ]
-}
-
 /// Rotor inertia, Coulomb and viscous friction of a joint.
 type Drive = [f64; 3];
 
@@ -71,14 +56,20 @@ fn link(segments: &[Segment], [rotor_inertia, coulomb, viscous]: Drive) -> LinkP
     }
 }
 
+/// Thighs of exoskeleton and wearer. The exoskeleton's is a telescope: its upper part keeps its position
+/// below the hip, its lower one above the knee.
 fn thigh(wearer: &Wearer, drive: Drive) -> LinkParameters {
-    let [upper, lower] = exoskeleton_thigh(wearer.thigh);
-    link(&[upper, lower, wearer.thigh()], drive)
+    let upper = tube(0.70, 0.0811, 0.002_197, 0.05);
+    link(&[upper, tube(2.14, wearer.thigh - 0.055_64, 0.005_901, 0.05), wearer.thigh()], drive)
 }
 
+/// Shanks and feet of exoskeleton and wearer; the exoskeleton's shank is a telescope too.
 fn shank(wearer: &Wearer, drive: Drive) -> LinkParameters {
-    let [upper, lower, foot] = exoskeleton_shank(wearer.shank);
-    let [calf, wearer_foot] = wearer.shank();
+    let (length, [calf, wearer_foot]) = (wearer.shank, wearer.shank());
+    let upper = tube(0.64, 0.0908, 0.002_346, 0.05);
+    let lower = tube(0.47, length - 0.0562, 0.000_794_1, 0.04);
+    let foot =
+        Segment { mass: 1.25, x: length, y: 0.088_34, sagittal: 0.004_441, radius: 0.05, along: Along::Y };
     link(&[upper, lower, foot, calf, wearer_foot], drive)
 }
 

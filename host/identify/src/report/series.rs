@@ -7,6 +7,8 @@ use scarab::ident::{
     DECIMATION, Ends, KernelError, LARGEST_STILL_SHARE, LowPass, Recorder, RowModel, SAMPLE_RATE_HZ, Solver,
     noise,
 };
+use scarab::model::AnatomicalJoint;
+use scarab::real::dot;
 
 /// Longest lag of the autocorrelation, s.
 const LONGEST_LAG_S: f64 = 0.6;
@@ -84,28 +86,11 @@ impl JointCurves {
     }
 }
 
-/// Conversion from model angles and torques to anatomical ones.
-#[derive(Clone, Copy, Debug)]
-pub struct Anatomy<const N: usize> {
-    /// Direction of each joint, 1 or -1.
-    pub direction: [f64; N],
-    /// Model angle at the anatomical zero, rad.
-    pub zero_rad: [f64; N],
-}
-
-impl<const N: usize> Anatomy<N> {
-    /// Anatomical angle, degrees.
-    #[must_use]
-    pub fn degrees(&self, joint: usize, model_rad: f64) -> f64 {
-        (self.direction[joint] * (model_rad - self.zero_rad[joint])).to_degrees()
-    }
-}
-
 /// Passes motions through the filter chain and multiplies their rows by a result.
 pub struct Reader<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
     recorder: Box<Recorder<f32, N, B, TAPS, PENDING>>,
     model: &'a RowModel<f32, N, B>,
-    anatomy: Anatomy<N>,
+    anatomy: [AnatomicalJoint<f64>; N],
     values: [f32; B],
     /// Samples between the newest one and the centre of the rows it finishes.
     lag: usize,
@@ -118,7 +103,7 @@ impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize
     /// Creates a reader with the filter chain of a bandwidth.
     pub fn new(
         model: &'a RowModel<f32, N, B>,
-        anatomy: Anatomy<N>,
+        anatomy: [AnatomicalJoint<f64>; N],
         values: [f32; B],
         bandwidth_hz: f32,
     ) -> Result<Self, KernelError> {
@@ -159,15 +144,12 @@ impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize
             let (Some(rows), Some(centre)) = (rows, centre) else { continue };
             motion.time_s.push(start_s + centre as f64 / SAMPLE_RATE_HZ);
             for (joint, curves) in motion.joints.iter_mut().enumerate() {
-                let predicted: f32 = rows.regressor[joint]
-                    .iter()
-                    .zip(&self.values)
-                    .map(|(element, value)| element * value)
-                    .sum();
-                let direction = self.anatomy.direction[joint];
-                curves.measured_deg.push(self.anatomy.degrees(joint, f64::from(positions[centre][joint])));
-                curves.measured_nm.push(direction * f64::from(rows.torque[joint]));
-                curves.predicted_nm.push(direction * f64::from(predicted));
+                let predicted = dot(&rows.regressor[joint], &self.values);
+                let anatomy = &self.anatomy[joint];
+                let angle = anatomy.angle_from_chain(f64::from(positions[centre][joint]));
+                curves.measured_deg.push(angle.to_degrees());
+                curves.measured_nm.push(anatomy.from_chain(f64::from(rows.torque[joint])));
+                curves.predicted_nm.push(anatomy.from_chain(f64::from(predicted)));
                 curves.still.push(f64::from(rows.still[joint]) > LARGEST_STILL_SHARE);
             }
         }

@@ -167,6 +167,28 @@ impl<const N: usize, const B: usize> Background<N, B> {
         Costs { least_squares: all.residual(), above: all.excess(&optimum), factor: all }
     }
 
+    /// Runs the swarm to its end.
+    pub fn search(&self, solver: &mut Solver<f32, N, B>) -> Search {
+        let optimum = self.costs(solver);
+        let mut course = Search { excess: Vec::new(), to_half: None, floor: optimum.above };
+        loop {
+            let state = solver.advance(&self.device, SLICE);
+            if !matches!(state, SearchState::Failed(_)) {
+                let excess = optimum.factor.excess(&solver.search().values().map(f64::from)) - optimum.above;
+                let iterations = solver.search().iterations();
+                if course.excess.last().is_none_or(|(last, _)| *last != iterations) {
+                    course.excess.push((iterations, excess));
+                }
+                if excess <= 0.5 && course.to_half.is_none() {
+                    course.to_half = Some(iterations);
+                }
+            }
+            if state != SearchState::Running {
+                return course;
+            }
+        }
+    }
+
     /// Report of a run from its solver.
     #[must_use]
     pub fn report(
@@ -397,6 +419,20 @@ impl<const N: usize, const B: usize> Background<N, B> {
         }
         reports
     }
+}
+
+/// Evaluations between two updates of the search.
+const SLICE: u32 = 20;
+
+/// Course of the search, in chi-square units.
+#[derive(Clone, Debug)]
+pub struct Search {
+    /// Iterations and excess over the constrained optimum.
+    pub excess: Vec<(u32, f64)>,
+    /// First iteration with an excess of at most 0.5.
+    pub to_half: Option<u32>,
+    /// Excess of that optimum over least squares.
+    pub floor: f64,
 }
 
 /// Costs in chi-square units.

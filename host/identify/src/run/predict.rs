@@ -58,25 +58,20 @@ pub struct Predictor<'a, const N: usize> {
     model: &'a ModelFile,
     chain: Chain<f64, N>,
     gravity: Vector3<f64>,
-    carriers: Vec<(usize, Parameter)>,
-    /// Whether a carrier acts only while its joint moves.
-    moving_only: Vec<bool>,
+    /// Joint and parameter of each base parameter's carrier, and whether it acts only while its joint moves.
+    carriers: Vec<(usize, Parameter, bool)>,
 }
 
 impl<'a, const N: usize> Predictor<'a, N> {
     /// Prepares a checked model of a leg of `N` joints.
     pub fn new(model: &'a ModelFile) -> Result<Self, ToolError> {
         let leg = model.leg.to_leg_file();
-        let carriers = model.base_set.parameters.iter().filter_map(|base| model.parameter(&base.carrier));
-        Ok(Self {
-            model,
-            chain: chain(&leg)?,
-            gravity: Vector3::from(leg.gravity),
-            carriers: carriers.collect(),
-            moving_only: (model.base_set.parameters.iter())
-                .map(|base| ModelFile::is_asymmetry(&base.carrier))
-                .collect(),
-        })
+        let carriers = model.base_set.parameters.iter().filter_map(|base| {
+            let (joint, parameter) = model.parameter(&base.carrier)?;
+            Some((joint, parameter, ModelFile::is_asymmetry(&base.carrier)))
+        });
+        let (chain, gravity) = (chain(&leg)?, Vector3::from(leg.gravity));
+        Ok(Self { model, chain, gravity, carriers: carriers.collect() })
     }
 
     /// Torques of a state in D-H angles.
@@ -84,17 +79,15 @@ impl<'a, const N: usize> Predictor<'a, N> {
     pub fn torques(&self, state: &JointState<f64, N>) -> [Prediction; N] {
         let set = &self.model.base_set;
         let mut torques = regressor(&self.chain, state, &self.gravity).map(|row| {
-            let columns = self.carriers.iter().zip(&self.moving_only);
-            let columns: Vec<f64> = columns
-                .map(|((joint, parameter), &moving_only)| {
-                    let moves = if moving_only { sign(state.qd[*joint]).abs() } else { 1.0 };
+            let columns: Vec<f64> = (self.carriers.iter())
+                .map(|(joint, parameter, moving_only)| {
+                    let moves = if *moving_only { sign(state.qd[*joint]).abs() } else { 1.0 };
                     moves * row[*joint][parameter.index()]
                 })
                 .collect();
             let mut torque = Prediction::default();
-            let kinds = self.carriers.iter().zip(&self.moving_only);
-            for ((element, base), ((_, parameter), moving_only)) in
-                columns.iter().zip(&set.parameters).zip(kinds)
+            for ((element, base), (_, parameter, moving_only)) in
+                columns.iter().zip(&set.parameters).zip(&self.carriers)
             {
                 let part = match parameter {
                     Parameter::FC | Parameter::FV => &mut torque.friction,

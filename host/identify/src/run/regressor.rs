@@ -19,7 +19,8 @@ use std::path::Path;
 use nalgebra::Vector3;
 use scarab::ident::prior_parameters;
 use scarab::model::{
-    AnatomicalJoint, Chain, JointState, LegParameters, Parameter, regressor, rigid_body_torques,
+    AnatomicalJoint, Chain, INERTIAL_PARAMETERS, JointState, LegParameters, Parameter, regressor,
+    rigid_body_torques,
 };
 use scarab::real::Real;
 use scarab_base::error::ToolError;
@@ -28,9 +29,6 @@ use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::chain;
 use crate::leg::setup::links;
 use crate::leg::states::{Angles, States};
-
-/// Parameters of a rigid body: the first of a joint's fourteen.
-const INERTIAL: usize = 10;
 
 /// Options of the computation.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +73,7 @@ fn header<const N: usize>() -> String {
     (1..=N).for_each(|joint| text += &format!(",tau{joint}"));
     for row in 1..=N {
         for link in 1..=N {
-            for parameter in &Parameter::ALL[..INERTIAL] {
+            for parameter in &Parameter::ALL[..INERTIAL_PARAMETERS] {
                 text += &format!(",y{row}_{}{link}", parameter.symbol());
             }
         }
@@ -121,7 +119,7 @@ struct Row<const N: usize> {
     /// Torques, N m.
     torques: Option<[f64; N]>,
     /// Elements by torque, link and inertial parameter.
-    elements: [[[f64; INERTIAL]; N]; N],
+    elements: [[[f64; INERTIAL_PARAMETERS]; N]; N],
 }
 
 impl<const N: usize> Row<N> {

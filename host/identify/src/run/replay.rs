@@ -27,7 +27,7 @@ use crate::formats::recording::import::Import;
 use crate::leg::background::Background;
 use crate::leg::setup::{DEFAULT_SEED, PriorChoice, background};
 use crate::report::scale::{MassReport, ScaleReport};
-use crate::report::series::{Anatomy, Reader, Role, Series};
+use crate::report::series::{Reader, Role, Series};
 use crate::report::{RunReport, Source};
 use crate::run::analysis::{Circumstances, Motion};
 use crate::run::logging_errors::encoder::Encoders;
@@ -36,7 +36,7 @@ use logging_errors::{Subject, chosen_bandwidth, encoders, noise_density};
 use predictions::write_predictions;
 use read::{Parts, parts};
 use rows::{PENDING, Samples, TAPS, bandwidth_error, new_recorder};
-use solve::{Search, Solved, solve};
+use solve::{Solved, solve};
 
 /// Lowest bandwidth, tenths of a Hz.
 const LOWEST_TENTHS: u32 = 10;
@@ -221,7 +221,7 @@ fn identified<const N: usize, const B: usize>(
     };
     warnings.extend(subject.examine(&mut run)?);
     run.scale.load = options.load.as_ref().map(MassReport::from);
-    run.samples = Some(parts.screening.into_findings());
+    run.samples = Some(parts.screening.findings);
     run.read = Some(parts.read);
     run.wall_s = started.elapsed().as_secs_f64();
     let series = series(&background, &anatomy, &solved, options.bandwidth_hz, &training, &held_out)?;
@@ -308,13 +308,10 @@ fn series<const N: usize, const B: usize>(
     training: &[Samples<N>],
     held_out: &[Samples<N>],
 ) -> Result<Series, ToolError> {
-    let anatomy = Anatomy {
-        direction: anatomy.map(|joint| joint.direction()),
-        zero_rad: anatomy.map(|joint| joint.zero_offset()),
-    };
     let model = &background.device;
-    let mut reader = Reader::<N, B, TAPS, PENDING>::new(model, anatomy, solved.values(), bandwidth_hz as f32)
-        .map_err(|error| bandwidth_error(bandwidth_hz, error))?;
+    let mut reader =
+        Reader::<N, B, TAPS, PENDING>::new(model, *anatomy, solved.values(), bandwidth_hz as f32)
+            .map_err(|error| bandwidth_error(bandwidth_hz, error))?;
     let parts = training.iter().map(|file| (file, Role::Training));
     let parts = parts.chain(held_out.iter().map(|file| (file, Role::Validation)));
     let motions = parts.map(|(file, role)| {
@@ -323,7 +320,6 @@ fn series<const N: usize, const B: usize>(
         reader.motion(name, role, file.start_s, samples)
     });
     let motions = motions.collect();
-    let Search { excess, floor, .. } = &solved.search;
-    let series = reader.series(&solved.solver, motions);
-    Ok(Series { excess: excess.clone(), floor_chi2: Some(*floor), ..series })
+    let (series, search) = (reader.series(&solved.solver, motions), &solved.search);
+    Ok(Series { excess: search.excess.clone(), floor_chi2: Some(search.floor), ..series })
 }

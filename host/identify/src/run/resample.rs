@@ -30,8 +30,6 @@
 //! [`Resampled::bandwidth_warning`]. Source of the cubic: Catmull and Rom, A class of local
 //! interpolating splines, 1974. Cost: linear in the number of samples.
 
-use std::fmt;
-
 use crate::formats::recording::{JointSeries, Recording};
 use scarab::ident::SAMPLE_RATE_HZ;
 
@@ -62,27 +60,6 @@ pub struct Resampled {
     pub method: Method,
     /// Joints, proximal first.
     pub joints: Vec<JointSeries>,
-}
-
-/// Warning that the requested bandwidth exceeds the recording's.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BandwidthWarning {
-    /// Requested bandwidth, Hz.
-    pub bandwidth_hz: f64,
-    /// Rate of the recording, Hz.
-    pub native_rate_hz: f64,
-}
-
-impl fmt::Display for BandwidthWarning {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            formatter,
-            "a bandwidth of {} Hz is too large for a recording at {:.0} Hz: choose at most {:.1} Hz",
-            self.bandwidth_hz,
-            self.native_rate_hz,
-            TRUSTED_BANDWIDTH * self.native_rate_hz
-        )
-    }
 }
 
 impl Resampled {
@@ -146,10 +123,13 @@ impl Resampled {
     }
 
     /// Warning if the recording is too slow for the bandwidth of the filter chain.
-    pub fn bandwidth_warning(&self, bandwidth_hz: f64) -> Option<BandwidthWarning> {
-        let native_rate_hz = self.native_rate_hz;
-        (bandwidth_hz > TRUSTED_BANDWIDTH * native_rate_hz)
-            .then_some(BandwidthWarning { bandwidth_hz, native_rate_hz })
+    pub fn bandwidth_warning(&self, bandwidth_hz: f64) -> Option<String> {
+        let (rate_hz, most_hz) = (self.native_rate_hz, TRUSTED_BANDWIDTH * self.native_rate_hz);
+        (bandwidth_hz > most_hz).then(|| {
+            format!(
+                "a bandwidth of {bandwidth_hz} Hz is too large for a recording at {rate_hz:.0} Hz: choose at most {most_hz:.1} Hz"
+            )
+        })
     }
 
     fn row<const N: usize>(

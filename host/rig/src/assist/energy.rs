@@ -23,11 +23,12 @@ use scarab_base::error::ToolError;
 use scarab_base::number::Number;
 use scarab_base::random::Random;
 use scarab_base::stats::rms;
+use scarab_identify::formats::leg_file::JointFile;
 use scarab_identify::leg::exercise::{Exercise, hip_and_knee};
 
 use super::draws;
 use super::subject::{Models, Subject};
-use super::trial::{Drives, GivenEnergy, LimbAlone, Stage};
+use super::trial::{Drives, LimbAlone, Stage};
 use crate::options::SimulationOptions;
 use crate::pair::Context;
 use crate::worn::certain;
@@ -78,25 +79,15 @@ fn given<const B: usize>(subject: &Subject<B>, shares: AssistShares, seed: u64) 
         Some(worn) => Drives::Assist(shares, [&empty, worn]),
         None => Drives::AssistEmpty(shares, &empty),
     };
-    let mut stage = Stage::at_posture(
-        subject,
-        &wearer,
-        drives,
-        hip_and_knee(&subject.exoskeleton).map(|joints| {
-            joints.map(|joint| {
-                let [low, high] = joint.range_deg;
-                random.uniform(low + 0.15 * (high - low), high - 0.15 * (high - low)).to_radians()
-            })
-        }),
-    )?;
+    let mut within = |joint: &JointFile| {
+        let [low, high] = joint.range_deg;
+        random.uniform(low + 0.15 * (high - low), high - 0.15 * (high - low)).to_radians()
+    };
+    let posture = hip_and_knee(&subject.exoskeleton).map(|joints| joints.map(&mut within));
+    let mut stage = Stage::begin(subject, &wearer, drives, posture)?;
     stage.pair.world.attach(1, random.uniform(0.0, LARGEST_PAYLOAD_KG), [random.uniform(0.1, 0.4), 0.0, 0.0]);
     stage.intend(if random.coin() { Intention::Limp } else { Intention::Resist })?;
-    let mut found = GivenEnergy::default();
-    for _ in 0..(ENERGY_S / TICK_S) as u64 {
-        stage.tick();
-        found.take(&limb, &stage.wearer());
-    }
-    Ok(found.largest())
+    Ok(stage.given(&limb, ENERGY_S))
 }
 
 /// Energy of many random runs against a budget, J.
@@ -139,7 +130,7 @@ fn oscillates<const B: usize>(
     );
     let wearer = draws::wearer(&subject.bodies.person, seed);
     let drawn = Subject { exoskeleton: exoskeleton.clone(), context, seed, ..subject.clone() };
-    let mut stage = Stage::begin(&drawn, &wearer, Drives::AssistEmpty(shares, &model))?;
+    let mut stage = Stage::begin(&drawn, &wearer, Drives::AssistEmpty(shares, &model), None)?;
     stage.intend(Intention::Follow(motion))?;
     stage.run(WALK_S);
     stage.intend(Intention::Resist)?;

@@ -24,7 +24,7 @@ use scarab_base::stats::rms;
 use scarab_identify::leg::exercise::{Exercise, hip_and_knee};
 
 use super::subject::Subject;
-use super::trial::{Drives, GivenEnergy, LimbAlone, Stage};
+use super::trial::{Drives, LimbAlone, Stage};
 
 /// Time of the change of cadence, its size and duration.
 const CHANGE_S: f64 = 14.0;
@@ -78,7 +78,7 @@ fn walk<const B: usize>(
     let change = CadenceChange { at: CHANGE_S, cadence_hz: CHANGE * cadence_hz, within: CHANGE_WITHIN_S };
     let gait = Gait { change: Some(change), ..gait(subject, cadence_hz)? };
     let models = [&subject.empty.identified, &subject.worn()?.identified];
-    let mut stage = Stage::begin(subject, rig, Drives::Assist(shares, models))?;
+    let mut stage = Stage::begin(subject, rig, Drives::Assist(shares, models), None)?;
     stage.intend(Intention::Follow(IntendedMotion::Gait(gait)))?;
     let (mut steps, mut strides, mut effort) = (Vec::new(), 0.0, 0.0);
     for tick in 1..=(RUN_S / TICK_S) as u64 {
@@ -139,17 +139,12 @@ fn stopped<const B: usize>(
 ) -> Result<f64, ToolError> {
     let models = [&subject.empty.identified, &subject.worn()?.identified];
     let limb = LimbAlone::new(subject, rig)?;
-    let mut stage = Stage::begin(subject, rig, Drives::Assist(shares, models))?;
+    let mut stage = Stage::begin(subject, rig, Drives::Assist(shares, models), None)?;
     stage.intend(Intention::Follow(IntendedMotion::Gait(gait(subject, cadence_hz)?)))?;
     stage.run(CHANGE_S);
     stage.intend(intention)?;
     stage.run(1.0 / cadence_hz);
-    let mut given = GivenEnergy::default();
-    for _ in 0..(STOPPED_S / TICK_S) as u64 {
-        stage.tick();
-        given.take(&limb, &stage.wearer());
-    }
-    Ok(given.largest())
+    Ok(stage.given(&limb, STOPPED_S))
 }
 
 /// Measures one cadence; `wearer` is a person, `rig` one who insists on the motion.

@@ -51,6 +51,7 @@ use rayon::prelude::*;
 use scarab::assist::differentiator::LEAD_S;
 use scarab::assist::law::AHEAD_S;
 
+use crate::assist::subject::Cuffs;
 use crate::report::assist::{StabilityCurve, StabilityReport};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
@@ -412,22 +413,6 @@ pub fn largest_inertia(
     })
 }
 
-/// Wearer with other cuffs: stiffness (N/m) and damping (N s/m) across the segments; those along keep their
-/// ratio.
-#[must_use]
-pub fn with_cuffs(wearer: &WearerDescription, stiffness: f64, damping: f64) -> WearerDescription {
-    let cuffs = wearer.cuffs.map(|mut cuff| {
-        let stiffer = stiffness / cuff.across.stiffness;
-        let damped = damping / cuff.across.damping;
-        for spring in [&mut cuff.along, &mut cuff.across] {
-            spring.stiffness *= stiffer;
-            spring.damping *= damped;
-        }
-        cuff
-    });
-    WearerDescription { cuffs, ..*wearer }
-}
-
 /// Limits for these cuffs, and curves over other ones, with a compensated share of viscous friction.
 ///
 /// # Errors
@@ -445,7 +430,7 @@ pub fn limits(
             let largest_share = STIFFNESSES
                 .iter()
                 .map(|stiffness| {
-                    let wearer = with_cuffs(wearer, *stiffness, damping);
+                    let wearer = Cuffs { stiffness: *stiffness, damping }.on(wearer);
                     largest_inertia(exoskeleton, &wearer, limb, friction)
                 })
                 .collect::<Result<_, _>>()?;

@@ -63,7 +63,16 @@ impl Cuffs {
     /// A wearer with these cuffs; stiffness and damping along the segment keep their ratio.
     #[must_use]
     pub fn on(&self, wearer: &WearerDescription) -> WearerDescription {
-        super::stability::with_cuffs(wearer, self.stiffness, self.damping)
+        let cuffs = wearer.cuffs.map(|mut cuff| {
+            let stiffer = self.stiffness / cuff.across.stiffness;
+            let damped = self.damping / cuff.across.damping;
+            for spring in [&mut cuff.along, &mut cuff.across] {
+                spring.stiffness *= stiffer;
+                spring.damping *= damped;
+            }
+            cuff
+        });
+        WearerDescription { cuffs, ..*wearer }
     }
 }
 

@@ -61,23 +61,12 @@ pub struct Stage<'a, const B: usize> {
 }
 
 impl<'a, const B: usize> Stage<'a, B> {
-    /// Puts the exoskeleton on a wearer, who is limp, and begins what the drives do.
+    /// Puts the exoskeleton on a wearer, who is limp, and begins what the drives do; `None` for the leg's
+    /// initial posture (rad).
     ///
     /// # Errors
     /// The wearer does not fit, or the firmware refuses the session.
     pub fn begin(
-        subject: &'a Subject<B>,
-        wearer: &WearerDescription,
-        drives: Drives<'_>,
-    ) -> Result<Self, ToolError> {
-        Self::at_posture(subject, wearer, drives, None)
-    }
-
-    /// [`Self::begin`] at a posture (rad) instead of the leg's initial one.
-    ///
-    /// # Errors
-    /// See [`Self::begin`].
-    pub fn at_posture(
         subject: &'a Subject<B>,
         wearer: &WearerDescription,
         drives: Drives<'_>,
@@ -128,6 +117,21 @@ impl<'a, const B: usize> Stage<'a, B> {
         (0..(seconds / TICK_S) as u64).for_each(|_| self.tick());
     }
 
+    /// Runs for a time, s. Returns the energy that the wearer receives besides the gravity energy of the
+    /// limb: the largest rise since any instant, J.
+    pub fn given(&mut self, limb: &LimbAlone, seconds: f64) -> f64 {
+        let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
+        for _ in 0..(seconds / TICK_S) as u64 {
+            self.tick();
+            let truth = self.wearer();
+            let received: f64 = truth.cuffs.iter().map(|cuff| cuff.received).sum();
+            let energy = received - limb.gravity_energy(&truth.position);
+            least = least.min(energy);
+            largest = largest.max(energy - least);
+        }
+        largest
+    }
+
     /// True state of the wearer.
     ///
     /// # Panics
@@ -168,46 +172,10 @@ impl LimbAlone {
         })
     }
 
-    /// Torque against gravity at anatomical angles (rad), N m.
-    #[must_use]
-    pub fn gravity_torque(&self, position: &[f64; 2]) -> [f64; 2] {
-        self.world.inverse_dynamics(position, &[0.0; 2], &[0.0; 2])
-    }
-
     /// Energy in gravity at anatomical angles (rad), J.
-    #[must_use]
-    pub fn gravity_energy(&self, position: &[f64; 2]) -> f64 {
+    fn gravity_energy(&self, position: &[f64; 2]) -> f64 {
         let angles = [0, 1].map(|joint| self.directions[joint] * position[joint] + self.zeros[joint]);
         self.mechanism.potential_energy(&angles)
-    }
-}
-
-/// Energy that a wearer receives besides the gravity energy of the limb: the largest rise since any instant.
-#[derive(Clone, Copy, Debug)]
-pub struct GivenEnergy {
-    least: f64,
-    largest: f64,
-}
-
-impl Default for GivenEnergy {
-    fn default() -> Self {
-        Self { least: f64::INFINITY, largest: 0.0 }
-    }
-}
-
-impl GivenEnergy {
-    /// Takes the next instant.
-    pub fn take(&mut self, limb: &LimbAlone, truth: &WearerTruth) {
-        let received: f64 = truth.cuffs.iter().map(|cuff| cuff.received).sum();
-        let energy = received - limb.gravity_energy(&truth.position);
-        self.least = self.least.min(energy);
-        self.largest = self.largest.max(energy - self.least);
-    }
-
-    /// Largest rise so far, J.
-    #[must_use]
-    pub fn largest(&self) -> f64 {
-        self.largest
     }
 }
 
@@ -222,7 +190,7 @@ pub fn trial<const B: usize>(
     drives: Drives<'_>,
 ) -> Result<Trial, ToolError> {
     let limb = LimbAlone::new(subject, wearer)?;
-    let mut stage = Stage::begin(subject, wearer, drives)?;
+    let mut stage = Stage::begin(subject, wearer, drives, None)?;
     stage.intend(Intention::Follow(motion))?;
     stage.run(SETTLING_S);
     let mut found = Trial::default();
@@ -238,7 +206,8 @@ pub fn trial<const B: usize>(
             deviation[joint] += (truth.position[joint] - intended[joint]).powi(2) / ticks as f64;
         }
         if tick.is_multiple_of(TICKS_PER_SAMPLE) {
-            let weight = limb.gravity_torque(&truth.position);
+            // Torque against gravity.
+            let weight = limb.world.inverse_dynamics(&truth.position, &[0.0; 2], &[0.0; 2]);
             for joint in 0..2 {
                 projected[joint] += truth.muscle_torque[joint] * weight[joint];
                 needed[joint] += weight[joint] * weight[joint];

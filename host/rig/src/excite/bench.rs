@@ -16,9 +16,8 @@ use scarab_identify::leg::words::leg_error;
 
 use crate::excite::assumption::{Assumption, assumed};
 use crate::excite::demand::demand;
-use crate::excite::design::{BLEND_S, Candidate, DesignOptions, Frame};
+use crate::excite::design::{BLEND_S, Candidate, DesignOptions};
 use crate::excite::expectation::{Rehearsal, rehearse};
-use crate::excite::obstacle::torque_limit;
 use crate::excite::score::Scorer;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
@@ -116,11 +115,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         // Noise is a property of the sensors, which already exist and can be measured at rest. The simulated
         // leg's noise is therefore used even if its torque is not.
         let simulated = file.joints.iter().all(|joint| joint.truth.is_some());
-        let noise = if simulated {
-            Context::<N, B>::new(file, &simulation)?.noise
-        } else {
-            Context::<N, B>::new(&leg, &simulation)?.noise
-        };
+        let noise = Context::<N, B>::new(if simulated { file } else { &leg }, &simulation)?.noise;
         let percent = options.torque_noise_percent.unwrap_or(file.torque_noise_percent);
         let origin = NoiseOrigin { percent, of: if simulated { "truth" } else { word } };
         let leg = leg.with_torque_noise(&noise);
@@ -136,14 +131,15 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             model,
             values,
             leg.bandwidth_hz,
-            reference_noise(&context.noise),
+            // Weights of the joints; a motion that is only checked needs none.
+            context.noise.map(|noise| if noise > 0.0 { noise } else { 1.0 }),
             options.margin_percent / 100.0,
             context.configuration.joints.map(|joint| Barrier::new(&joint.limits())),
         )
         .ok_or_else(|| {
             ToolError::input(format!("{}: bandwidth_hz does not fit the device's filter", leg.name))
         })?;
-        let torque_limit = core::array::from_fn(|joint| torque_limit(&leg.joints[joint]));
+        let torque_limit = core::array::from_fn(|joint| leg.joints[joint].torque_cap());
         Ok(Self { leg, assumed: word, context, scorer, torque_limit, noise: origin })
     }
 
@@ -160,25 +156,6 @@ impl<const N: usize, const B: usize> Bench<N, B> {
              --torque-noise or `torque_noise_percent`",
             self.leg.name, joint.name
         )))
-    }
-
-    /// Leg, scorer, configuration and limits of a design.
-    #[must_use]
-    pub fn frame(&self) -> Frame<'_, N, B> {
-        Frame {
-            leg: &self.leg,
-            scorer: &self.scorer,
-            configuration: &self.context.configuration,
-            torque_limit: self.torque_limit,
-        }
-    }
-
-    /// Runs the motion on the assumed leg.
-    ///
-    /// # Errors
-    /// The drive stops.
-    pub fn rehearse(&self, table: &ExcitationTable<N>) -> Result<Rehearsal<N, B>, ToolError> {
-        rehearse(&self.leg, table)
     }
 
     /// Reads a motion from a file; the firmware must accept it, and its torque without margin must
@@ -223,13 +200,8 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         let table = ExcitationTable { cycles: cycles.min(fitting.max(1)), ..table };
         let demand = demand(&self.scorer, &self.context.configuration, &motion);
         let keeps = (0..N).all(|joint| demand[joint].is_within(self.torque_limit[joint]));
-        Some((self.rehearse(&table).ok()?, keeps))
+        Some((rehearse(&self.leg, &table).ok()?, keeps))
     }
-}
-
-/// Noise that weights the joints, N m; a motion that is only checked needs none.
-fn reference_noise<const N: usize>(noise_nm: &[f64; N]) -> [f64; N] {
-    noise_nm.map(|noise| if noise > 0.0 { noise } else { 1.0 })
 }
 
 fn table_of<const N: usize>(motion: &Periodic<N>) -> ExcitationTable<N> {

@@ -152,11 +152,5 @@ fn at_rest<const N: usize>(position_rad: [f32; N]) -> MotionState<N> {
 const APPROACH_STEP: usize = 8;
 
 fn torques<const N: usize, const B: usize>(scorer: &Scorer<N, B>, state: &MotionState<N>) -> [(f64, f64); N] {
-    scorer
-        .rows(
-            state.position_rad.map(f64::from),
-            state.velocity_rad_per_s.map(f64::from),
-            state.acceleration_rad_per_s2.map(f64::from),
-        )
-        .map(|row| scorer.torque(&row))
+    scorer.rows(state).map(|row| scorer.torque(&row))
 }

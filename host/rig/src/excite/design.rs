@@ -21,18 +21,16 @@
 
 use indicatif::ProgressBar;
 use rayon::prelude::*;
-use scarab::leg::LegConfiguration;
 use scarab::motion::{ExcitationTable, Fourier, HARMONICS, JointEnvelope, Motion, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::swarm::{Bso, BsoSettings, Objective, Search};
 use scarab::units::{Radian, Second};
 use scarab_base::error::ToolError;
-use scarab_identify::formats::leg_file::LegFile;
 
+use crate::excite::bench::Bench;
 use crate::excite::candidate::{self, PER_JOINT};
 use crate::excite::demand::{Demand, demand};
 use crate::excite::obstacle::Obstacle;
-use crate::excite::score::Scorer;
 
 /// Duration of a blend between rest and full speed, s.
 pub const BLEND_S: f32 = 1.0;
@@ -82,19 +80,6 @@ pub enum Goal {
     LeastTorque,
 }
 
-/// Limits of a design.
-#[derive(Clone, Debug)]
-pub struct Frame<'a, const N: usize, const B: usize> {
-    /// Leg, named in messages.
-    pub leg: &'a LegFile,
-    /// Scores a curve.
-    pub scorer: &'a Scorer<N, B>,
-    /// Configuration of the firmware.
-    pub configuration: &'a LegConfiguration<N, B>,
-    /// Largest torque of each joint, N m.
-    pub torque_limit: [f64; N],
-}
-
 /// A motion within all limits.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<const N: usize> {
@@ -111,12 +96,12 @@ pub struct Candidate<const N: usize> {
 /// # Errors
 /// No pace fits the duration, or no motion fits the limits.
 pub fn candidates<const N: usize, const B: usize>(
-    frame: &Frame<'_, N, B>,
+    bench: &Bench<N, B>,
     options: &DesignOptions,
     goal: Goal,
     progress: &ProgressBar,
 ) -> Result<Vec<Candidate<N>>, ToolError> {
-    let paces = paces(options.duration_s, frame.leg.bandwidth_hz);
+    let paces = paces(options.duration_s, bench.leg.bandwidth_hz);
     if paces.is_empty() {
         return Err(ToolError::input(format!(
             "--duration: {} s leave no room for a cycle of {SHORTEST_PERIOD_S} to {LONGEST_PERIOD_S} s between two \
@@ -129,7 +114,7 @@ pub fn candidates<const N: usize, const B: usize>(
     let searched: Vec<_> = paces
         .into_par_iter()
         .map(|(period_s, cycles)| {
-            let cost = Cost::new(frame, goal, Second(period_s as f32), cycles);
+            let cost = Cost::new(bench, goal, Second(period_s as f32), cycles);
             search(&cost, options.seed, share, progress)
         })
         .collect();
@@ -142,18 +127,19 @@ pub fn candidates<const N: usize, const B: usize>(
         }
     }
     if found.is_empty() {
-        return Err(frame.refusal(obstacles));
+        return Err(bench.refusal(obstacles));
     }
     Ok(found)
 }
 
-impl<const N: usize, const B: usize> Frame<'_, N, B> {
+impl<const N: usize, const B: usize> Bench<N, B> {
     /// Refusal of a design that names the obstacle which comes nearest to its limit.
     pub fn refusal(&self, obstacles: Vec<Obstacle>) -> ToolError {
         let nearest = obstacles.into_iter().min_by(|one, other| one.excess().total_cmp(&other.excess()));
         let words = nearest.map_or(String::new(), |obstacle| {
-            let inertia = self.configuration.joints.get(obstacle.joint).map_or(0.0, |joint| joint.inertia.0);
-            format!(": {}", obstacle.words(self.leg, f64::from(inertia), self.scorer.margin))
+            let joints = &self.context.configuration.joints;
+            let inertia = joints.get(obstacle.joint).map_or(0.0, |joint| joint.inertia.0);
+            format!(": {}", obstacle.words(&self.leg, f64::from(inertia), self.scorer.margin))
         });
         self.leg.error(format!("no exciting motion fits the limits{words}")).into()
     }
@@ -183,7 +169,7 @@ fn paces(duration_s: f64, bandwidth_hz: f64) -> Vec<(f64, u32)> {
 
 /// Cost for the swarm.
 struct Cost<'a, const N: usize, const B: usize> {
-    frame: &'a Frame<'a, N, B>,
+    bench: &'a Bench<N, B>,
     goal: Goal,
     envelope: [JointEnvelope; N],
     period: Second,
@@ -191,8 +177,8 @@ struct Cost<'a, const N: usize, const B: usize> {
 }
 
 impl<'a, const N: usize, const B: usize> Cost<'a, N, B> {
-    fn new(frame: &'a Frame<'a, N, B>, goal: Goal, period: Second, cycles: u32) -> Self {
-        Self { frame, goal, envelope: frame.configuration.envelope(), period, cycles }
+    fn new(bench: &'a Bench<N, B>, goal: Goal, period: Second, cycles: u32) -> Self {
+        Self { bench, goal, envelope: bench.context.configuration.envelope(), period, cycles }
     }
 
     fn curve(&self, coordinates: &[f64]) -> Option<Fourier<N>> {
@@ -216,9 +202,9 @@ impl<const N: usize, const B: usize> Objective<f64> for Cost<'_, N, B> {
         }) else {
             return f64::INFINITY;
         };
-        let score = self.frame.scorer.score(&curve, self.cycles);
+        let score = self.bench.scorer.score(&curve, self.cycles);
         let shares = (0..N).map(|joint| {
-            let limit = self.frame.torque_limit[joint];
+            let limit = self.bench.torque_limit[joint];
             (score.torque[joint] / limit, score.cut[joint] / limit)
         });
         let excess: f64 = shares.clone().map(|(torque, cut)| (torque - 1.0).max(0.0) + cut).sum();
@@ -249,7 +235,7 @@ fn search<const N: usize, const B: usize>(
         progress.inc(u64::from(SLICE));
     }
     let curve = swarm.best().and_then(|best| cost.curve(best.position)).ok_or(None)?;
-    within_limits(cost.frame, &curve, cost.cycles, 1.0)
+    within_limits(cost.bench, &curve, cost.cycles, 1.0)
 }
 
 /// Motion shrunk by a factor about its centre.
@@ -257,31 +243,32 @@ fn search<const N: usize, const B: usize>(
 /// # Errors
 /// The limit that the smallest motion exceeds.
 pub fn smaller<const N: usize, const B: usize>(
-    frame: &Frame<'_, N, B>,
+    bench: &Bench<N, B>,
     candidate: &Candidate<N>,
     factor: f32,
 ) -> Result<Candidate<N>, Option<Obstacle>> {
-    within_limits(frame, candidate.motion.curve(), candidate.table.cycles, factor)
+    within_limits(bench, candidate.motion.curve(), candidate.table.cycles, factor)
 }
 
 /// Rounds the curve as in the file and shrinks it about its centre until everything is proved.
 fn within_limits<const N: usize, const B: usize>(
-    frame: &Frame<'_, N, B>,
+    bench: &Bench<N, B>,
     curve: &Fourier<N>,
     cycles: u32,
     first_scale: f32,
 ) -> Result<Candidate<N>, Option<Obstacle>> {
     let (mut scale, mut obstacle) = (first_scale, None);
+    let configuration = &bench.context.configuration;
     for _ in 0..SHRINKINGS {
         let table = rounded(curve, scale, cycles);
         scale *= SHRINK;
         let Ok(motion) = table.motion(SERVO_RATE_HZ) else { continue };
-        if let Err(violation) = Motion::Periodic(motion).prove(&frame.configuration.envelope()) {
+        if let Err(violation) = Motion::Periodic(motion).prove(&configuration.envelope()) {
             obstacle = Some(Obstacle::from_motion(&violation));
             continue;
         }
-        let demand = demand(frame.scorer, frame.configuration, &motion);
-        let exceeded = |joint: usize| demand[joint].obstacle(joint, frame.torque_limit[joint]);
+        let demand = demand(&bench.scorer, configuration, &motion);
+        let exceeded = |joint: usize| demand[joint].obstacle(joint, bench.torque_limit[joint]);
         let worst = (0..N).filter_map(exceeded).max_by(|one, other| one.excess().total_cmp(&other.excess()));
         if worst.is_none() {
             return Ok(Candidate { table, motion, demand });

@@ -29,7 +29,7 @@ use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::excite::Seen;
 
-use crate::excite::obstacle::{Limit, Obstacle, OperatingPoint, torque_limit};
+use crate::excite::obstacle::{Limit, Obstacle, OperatingPoint};
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair, start_position};
 
@@ -131,15 +131,13 @@ pub fn rehearse<const N: usize, const B: usize>(
 /// Places a leg at the begin of its motion if it cannot hold its weight where it usually begins.
 fn stand<const N: usize, const B: usize>(leg: &LegFile, context: &Context<N, B>, pair: &mut Pair<N, B>) {
     let needed = pair.world.inverse_dynamics(&start_position(leg), &[0.0; N], &[0.0; N]);
-    if needed.iter().zip(&leg.joints).all(|(needed, joint)| needed.abs() <= torque_limit(joint)) {
+    if needed.iter().zip(&leg.joints).all(|(needed, joint)| needed.abs() <= joint.torque_cap()) {
         return;
     }
     let start = context.motions.excitation.state_at(0).position_rad;
-    let start = core::array::from_fn(|joint| {
-        let anatomy = &context.configuration.joints[joint].scale.anatomy;
-        f64::from(anatomy.direction()) * f64::from(start[joint] - anatomy.zero_offset())
-    });
-    pair.world.move_to(&start);
+    let anatomy = context.configuration.joints.map(|joint| joint.scale.anatomy);
+    pair.world
+        .move_to(&core::array::from_fn(|joint| f64::from(anatomy[joint].angle_from_chain(start[joint]))));
     pair.sample = pair.world.sample();
 }
 

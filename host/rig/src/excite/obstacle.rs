@@ -99,7 +99,7 @@ impl Obstacle {
                      the end. Lower `speed_limit_deg_s` (now {:.0}) or `acceleration_limit_deg_s2` (now {:.0}), widen \
                      `range_deg`, or raise the torque limit",
                     point.velocity_rad_s.abs().to_degrees(),
-                    torque_limit(joint),
+                    joint.torque_cap(),
                     joint.speed_limit_deg_s,
                     joint.acceleration_limit_deg_s2
                 )
@@ -129,12 +129,6 @@ impl Obstacle {
     }
 }
 
-/// Lower of torque limit and current limit, N m.
-#[must_use]
-pub fn torque_limit(joint: &JointFile) -> f64 {
-    joint.torque_limit_nm.min(joint.current_limit() * joint.torque_per_ampere)
-}
-
 /// Commanded angle, speed or acceleration beyond its limit; rad and s.
 fn motion_words(quantity: Quantity, value: f64, allowed: f64) -> String {
     let (word, key, unit) = match quantity {
@@ -148,7 +142,7 @@ fn motion_words(quantity: Quantity, value: f64, allowed: f64) -> String {
 
 /// Key that limits the torque.
 fn torque_key(joint: &JointFile) -> &'static str {
-    if torque_limit(joint) < joint.torque_limit_nm {
+    if joint.torque_cap() < joint.torque_limit_nm {
         "`current_limit_a` times `torque_per_ampere`"
     } else {
         "`torque_limit_nm`"

@@ -21,7 +21,7 @@ use scarab_identify::report::excite::{
 use crate::excite::assumption::with_rotors;
 use crate::excite::bench::{Bench, ExciteOptions};
 use crate::excite::design::{Candidate, DesignOptions, Goal, SHRINK, candidates, smaller};
-use crate::excite::expectation::{Expectation, Rehearsal};
+use crate::excite::expectation::{Expectation, Rehearsal, rehearse};
 use crate::excite::warnings::warnings;
 
 /// Duration of a design, s, and error of each base parameter that its torque covers, percent, by default.
@@ -132,7 +132,7 @@ fn excited<const N: usize, const B: usize>(
     let rehearsed: Vec<_> = found
         .into_par_iter()
         .map(|candidate| match &options.given {
-            Some(_) => bench.rehearse(&candidate.table).map(|rehearsal| (candidate, rehearsal)),
+            Some(_) => rehearse(&bench.leg, &candidate.table).map(|rehearsal| (candidate, rehearsal)),
             None => untouched(&bench, candidate),
         })
         .collect();
@@ -150,7 +150,7 @@ fn excited<const N: usize, const B: usize>(
     match (best, fault) {
         (Some((_, candidate, rehearsal)), _) => Ok(bench.excited(options, &candidate, &rehearsal)),
         (None, Some(error)) => Err(error),
-        (None, None) => Err(bench.frame().refusal(Vec::new())),
+        (None, None) => Err(bench.refusal(Vec::new())),
     }
 }
 
@@ -182,7 +182,7 @@ fn untouched<const N: usize, const B: usize>(
 ) -> Result<(Candidate<N>, Rehearsal<N, B>), ToolError> {
     let (mut obstacles, mut failure) = (Vec::new(), None);
     for step in 0..STEPS {
-        match bench.rehearse(&candidate.table) {
+        match rehearse(&bench.leg, &candidate.table) {
             Ok(rehearsal) if rehearsal.seen.iter().all(|joint| joint.limited_ticks == 0) => {
                 return Ok((candidate, rehearsal));
             }
@@ -192,7 +192,7 @@ fn untouched<const N: usize, const B: usize>(
             Err(error) => failure = Some(error),
         }
         let factor = if step < FINE_STEPS { SHRINK } else { COARSE_SHRINK };
-        match smaller(&bench.frame(), &candidate, factor) {
+        match smaller(bench, &candidate, factor) {
             Ok(next) => candidate = next,
             Err(obstacle) => {
                 obstacles.extend(obstacle);
@@ -204,7 +204,7 @@ fn untouched<const N: usize, const B: usize>(
         return Err(failure);
     }
     let worst = obstacles.into_iter().max_by(|one, other| one.excess().total_cmp(&other.excess()));
-    Err(bench.frame().refusal(worst.into_iter().collect()))
+    Err(bench.refusal(worst.into_iter().collect()))
 }
 
 /// Shrinking steps, and how many of them are fine; the smallest motion has a tenth of the first one's size.
@@ -239,7 +239,7 @@ fn searched<const N: usize, const B: usize>(
         Goal::Information => *options,
         Goal::LeastTorque => DesignOptions { evaluations: LEAST_TORQUE_SEARCH, ..*options },
     };
-    candidates(&bench.frame(), &options, goal, progress)
+    candidates(bench, &options, goal, progress)
 }
 
 impl<const N: usize, const B: usize> Bench<N, B> {
@@ -302,10 +302,10 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     fn joint(&self, candidate: &Candidate<N>, rehearsal: &Rehearsal<N, B>, joint: usize) -> JointReport {
         let (file, demand) = (&self.leg.joints[joint], &candidate.demand[joint]);
         let bounds = Motion::Periodic(candidate.motion).envelope()[joint];
-        let anatomy = &self.context.configuration.joints[joint].scale.anatomy;
-        let (sign, zero) = (f64::from(anatomy.direction()), f64::from(anatomy.zero_offset()));
-        let ends = [bounds.low.0, bounds.high.0].map(|angle| (sign * (f64::from(angle) - zero)).to_degrees());
-        let torque = [sign * demand.low_nm, sign * demand.high_nm];
+        let anatomy = self.context.anatomy()[joint];
+        let ends = [bounds.low.0, bounds.high.0];
+        let ends = ends.map(|angle| anatomy.angle_from_chain(f64::from(angle)).to_degrees());
+        let torque = [demand.low_nm, demand.high_nm].map(|torque| anatomy.from_chain(torque));
         let sorted = |[one, other]: [f64; 2]| [one.min(other), one.max(other)];
         JointReport {
             name: file.name.clone(),

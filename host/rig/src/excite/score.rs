@@ -25,7 +25,7 @@
 
 use nalgebra::SMatrix;
 use scarab::ident::{DECIMATION, LARGEST_STILL_SHARE, LowPass, RowModel, SAMPLE_RATE_HZ, Smoothed};
-use scarab::motion::{Fourier, Phase};
+use scarab::motion::{Fourier, MotionState, Phase};
 use scarab::safety::Barrier;
 use scarab::units::{NewtonMetre, Radian, RadianPerSecond};
 
@@ -104,8 +104,14 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
 
     /// Base rows at one state, N m per unit.
     #[must_use]
-    pub fn rows(&self, position: [f64; N], velocity: [f64; N], acceleration: [f64; N]) -> [[f64; B]; N] {
-        self.model.rows(&Smoothed { position, velocity, acceleration, torque: [0.0; N] }).regressor
+    pub fn rows(&self, state: &MotionState<N>) -> [[f64; B]; N] {
+        let state = Smoothed {
+            position: state.position_rad.map(f64::from),
+            velocity: state.velocity_rad_per_s.map(f64::from),
+            acceleration: state.acceleration_rad_per_s2.map(f64::from),
+            torque: [0.0; N],
+        };
+        self.model.rows(&state).regressor
     }
 
     /// Torque of one row, and its error bound.
@@ -155,12 +161,7 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
             self.still_shares(speed, self.model.still_speed[joint], speeds)
         });
         for (index, state) in states.iter().enumerate().step_by(SPEEDS_PER_ROW) {
-            let regressor = self.rows(
-                state.position_rad.map(f64::from),
-                state.velocity_rad_per_s.map(f64::from),
-                state.acceleration_rad_per_s2.map(f64::from),
-            );
-            for (joint, row) in regressor.iter().enumerate() {
+            for (joint, row) in self.rows(state).iter().enumerate() {
                 let (value, uncertainty) = self.torque(row);
                 torque[joint] = torque[joint].max(value.abs() + uncertainty);
                 let (position, velocity) = (state.position_rad[joint], state.velocity_rad_per_s[joint]);

@@ -3,16 +3,15 @@
 use std::f64::consts::PI;
 
 use scarab::leg::{
-    AbsoluteAngle, Assured, Constant, CounterDirection, ElectricalAngle, EncoderSetting, Fingerprint,
-    JointZero, StoredCalibration, StoredModel, Stribeck,
+    AbsoluteAngle, Assured, Constant, ElectricalAngle, Fingerprint, JointZero, StoredCalibration,
+    StoredModel, Stribeck,
 };
 use scarab::store::{CalibrationRecord, JointProvenance, Key, ModelRecord, Provenance};
 use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
 use scarab_identify::formats::temperature::RANGE_C;
 
 use crate::parameter_file::{
-    AxisCalibration, ConstantPart, Counter, Encoder, FrictionBound, Joint, JointZeroPart, ModelJoint,
-    ModelPart, Parameters, StribeckPart,
+    AxisCalibration, FrictionBound, Joint, JointZeroPart, ModelJoint, ModelPart, Parameters, StribeckPart,
 };
 
 /// Units of an electrical angle.
@@ -59,15 +58,7 @@ impl AxisCalibration {
             direct_inductance_h: direct_inductance.0.into(),
             quadrature_inductance_h: quadrature_inductance.0.into(),
             offset_rad: f64::from(offset.units()) / UNITS_PER_RAD,
-            encoder: Encoder {
-                counter: match encoder.counter {
-                    CounterDirection::Up => Counter::Up,
-                    CounterDirection::Down => Counter::Down,
-                },
-                pole_pairs: encoder.pole_pairs,
-                counts_per_turn: encoder.counts_per_turn,
-                absolute: encoder.absolute,
-            },
+            encoder,
             winding_c: winding_c.map(f64::from),
             joint_zero: joint_zero.map(|zero| JointZeroPart {
                 rotor_counts: zero.rotor,
@@ -82,8 +73,7 @@ impl AxisCalibration {
         if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&units) {
             return Err(format!("`offset_rad` is {}; it must be from -pi to pi", self.offset_rad));
         }
-        let Encoder { counter, pole_pairs, counts_per_turn, absolute } = self.encoder;
-        if pole_pairs == 0 || counts_per_turn == 0 {
+        if self.encoder.pole_pairs == 0 || self.encoder.counts_per_turn == 0 {
             return Err("`encoder`: pole pairs and counts per turn must be above 0".into());
         }
         let winding_c = self.winding_c.map(|celsius| finite("winding_c", celsius)).transpose()?;
@@ -102,15 +92,7 @@ impl AxisCalibration {
                 self.quadrature_inductance_h,
             )?),
             offset: ElectricalAngle::from_units(units as i32),
-            encoder: EncoderSetting {
-                counter: match counter {
-                    Counter::Up => CounterDirection::Up,
-                    Counter::Down => CounterDirection::Down,
-                },
-                pole_pairs,
-                counts_per_turn,
-                absolute,
-            },
+            encoder: self.encoder,
             winding_c,
             joint_zero: self.joint_zero.map(|zero| JointZero {
                 rotor: zero.rotor_counts,
@@ -160,10 +142,7 @@ impl ModelJoint {
                 excess: not_below_zero("excess", self.stribeck.excess)?,
                 velocity: above_zero("velocity_rad_s", self.stribeck.velocity_rad_s)?,
             },
-            constant: match self.constant {
-                ConstantPart::Offset => Constant::Offset,
-                ConstantPart::Asymmetry => Constant::Asymmetry,
-            },
+            constant: self.constant,
             coulomb_bound_nm: not_below_zero("coulomb_nm", self.friction_lower_bound.coulomb_nm)?,
             viscous_bound: not_below_zero("viscous_nm_s_rad", self.friction_lower_bound.viscous_nm_s_rad)?,
             from: JointProvenance {
@@ -200,10 +179,7 @@ impl ModelPart {
                 joint,
                 parameters: Parameters::from_array(model.parameters.get(index)?.map(f64::from)),
                 stribeck: StribeckPart { excess: curve.excess.into(), velocity_rad_s: curve.velocity.into() },
-                constant: match model.constant.get(index)? {
-                    Constant::Offset => ConstantPart::Offset,
-                    Constant::Asymmetry => ConstantPart::Asymmetry,
-                },
+                constant: *model.constant.get(index)?,
                 friction_lower_bound: FrictionBound {
                     coulomb_nm: (*model.assured.coulomb_nm.get(index)?).into(),
                     viscous_nm_s_rad: (*model.assured.viscous.get(index)?).into(),

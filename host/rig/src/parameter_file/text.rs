@@ -1,12 +1,13 @@
 //! Writes TOML text: one line for each object and each part of a joint.
 
+use scarab::leg::{Constant, CounterDirection};
 use scarab_base::toml_file::quoted;
 use std::fmt::Display;
 
 use crate::parameter_file::objects::{is_pattern, is_wide};
 use crate::parameter_file::{
-    AxisCalibration, ConstantPart, Counter, FrictionBound, JointZeroPart, ModelJoint, ModelPart, NodeObjects,
-    ObjectValue, ParameterFile,
+    AxisCalibration, FrictionBound, JointZeroPart, ModelJoint, ModelPart, NodeObjects, ObjectValue,
+    ParameterFile,
 };
 
 const HEAD: &str = "\
@@ -69,8 +70,8 @@ fn calibration(out: &mut String, axis: &AxisCalibration) {
     line(out, "quadrature_inductance_h", float(axis.quadrature_inductance_h));
     line(out, "offset_rad", format!("{:?}", axis.offset_rad));
     let counter = match axis.encoder.counter {
-        Counter::Up => "up",
-        Counter::Down => "down",
+        CounterDirection::Up => "up",
+        CounterDirection::Down => "down",
     };
     let (pairs, counts) = (axis.encoder.pole_pairs, axis.encoder.counts_per_turn);
     let absolute = if axis.encoder.absolute { ", absolute = true" } else { "" };
@@ -109,8 +110,8 @@ fn model_joint(out: &mut String, table: &str, joint: &ModelJoint) {
     let (excess, velocity) = (float(joint.stribeck.excess), float(joint.stribeck.velocity_rad_s));
     line(out, "stribeck", format!("{{ excess = {excess}, velocity_rad_s = {velocity} }}"));
     let constant = match joint.constant {
-        ConstantPart::Offset => "offset",
-        ConstantPart::Asymmetry => "asymmetry",
+        Constant::Offset => "offset",
+        Constant::Asymmetry => "asymmetry",
     };
     line(out, "constant", quoted(constant));
     let FrictionBound { coulomb_nm, viscous_nm_s_rad } = joint.friction_lower_bound;

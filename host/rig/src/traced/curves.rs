@@ -11,7 +11,7 @@ use scarab_base::error::ToolError;
 use scarab_base::names::VALIDATION_NAMES;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::leg_file::geometry::anatomy;
-use scarab_identify::report::series::{Anatomy, Reader, Role, Series};
+use scarab_identify::report::series::{Reader, Role, Series};
 use scarab_identify::with_leg_size;
 
 use crate::pair::{PENDING, TAPS};
@@ -47,14 +47,9 @@ fn of_size<const N: usize, const B: usize>(
         }
     }
     background.device.stribeck = stribeck;
-    let joints = anatomy::<N>(leg)?;
-    let anatomy = Anatomy {
-        direction: joints.map(|joint| joint.direction()),
-        zero_rad: joints.map(|joint| joint.zero_offset()),
-    };
     let mut reader = Reader::<N, B, TAPS, PENDING>::new(
         &background.device,
-        anatomy,
+        anatomy(leg)?,
         estimate.values,
         leg.bandwidth_hz as f32,
     )

@@ -2,12 +2,11 @@
 
 use hal_sim::description::{
     BodyDescription, CurrentSensorDescription, DenavitHartenberg, DriveDescription, EncoderDescription,
-    EncoderSide, FrictionDescription, JointDescription, LegDescription, OutlierDescription, PushDescription,
-    Stribeck,
+    FrictionDescription, JointDescription, LegDescription, OutlierDescription, PushDescription, Stribeck,
 };
 use scarab_base::error::FileError;
 
-use crate::formats::leg_file::{BodySide, JointFile, LegFile, LinkParameters, PushesFile, Side};
+use crate::formats::leg_file::{BodySide, EncoderFile, JointFile, LegFile, LinkParameters, PushesFile, Side};
 
 /// Distance of the simulated mechanical end stops from the range, degrees: wide enough for the default leg,
 /// which hangs at its anatomical zero.
@@ -33,7 +32,7 @@ impl LegFile {
             gravity: self.gravity,
             joints: self.each_joint(described)?,
             mirrored: self.side == BodySide::Left,
-            pushes: self.pushes.as_ref().map(pushes),
+            pushes: self.pushes.as_ref().map(PushesFile::description),
         })
     }
 
@@ -48,11 +47,28 @@ impl LegFile {
     }
 }
 
+impl EncoderFile {
+    /// At the joint the ratio of a faster encoder is part of its counts.
+    fn description(&self) -> EncoderDescription {
+        let (counts, ratio) = (f64::from(self.counts), self.ratio);
+        match self.side {
+            Side::Motor => EncoderDescription { counts, ratio },
+            Side::Joint => EncoderDescription { counts: counts * ratio, ratio: 1.0 },
+        }
+    }
+}
+
 impl JointFile {
     /// Limit of the drive's current, A.
     #[must_use]
     pub fn current_limit(&self) -> f64 {
         self.current_limit_a.unwrap_or(self.torque_limit_nm / self.torque_per_ampere)
+    }
+
+    /// Lower of torque limit and current limit, N m.
+    #[must_use]
+    pub fn torque_cap(&self) -> f64 {
+        self.torque_limit_nm.min(self.current_limit() * self.torque_per_ampere)
     }
 
     fn description(&self, truth: &LinkParameters) -> JointDescription {
@@ -79,14 +95,7 @@ impl JointFile {
                 current_limit: self.current_limit(),
                 lag: self.drive_lag_s,
             },
-            encoder: EncoderDescription {
-                side: match self.encoder.side {
-                    Side::Motor => EncoderSide::Motor,
-                    Side::Joint => EncoderSide::Joint,
-                },
-                counts: f64::from(self.encoder.counts),
-                ratio: self.encoder.ratio,
-            },
+            encoder: self.encoder.description(),
             current_sensor: CurrentSensorDescription {
                 noise: self.current_noise_a,
                 offset: self.current_offset_a,
@@ -100,6 +109,10 @@ impl JointFile {
     }
 }
 
-fn pushes(file: &PushesFile) -> PushDescription {
-    PushDescription { rate: file.per_minute / 60.0, torque: file.torque_nm, duration: file.duration_s }
+impl PushesFile {
+    /// Pushes as the plant takes them.
+    #[must_use]
+    pub fn description(&self) -> PushDescription {
+        PushDescription { rate: self.per_minute / 60.0, torque: self.torque_nm, duration: self.duration_s }
+    }
 }

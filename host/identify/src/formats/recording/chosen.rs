@@ -8,7 +8,8 @@ use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
 use crate::formats::recording::suggest::{
-    Reading, advice, by_number, choices_of_joint, command, nearest, readings, required, unit_in_name,
+    Reading, advice, by_number, choices_of_joint, command, documented, nearest, readings, required,
+    unit_in_name,
 };
 use crate::formats::recording::{LARGEST_POSITION_RAD, LARGEST_TIME_S, LARGEST_TORQUE_NM};
 use crate::report::reading::ColumnReport;
@@ -162,12 +163,7 @@ impl Finder<'_> {
 
     /// Only column of this name.
     fn named(&self, name: &str) -> Result<Option<Column>, Fault> {
-        let mut matches = self.names.names.iter().enumerate().filter(|(_, present)| *present == name);
-        match (matches.next(), matches.next()) {
-            (Some((index, _)), None) => Ok(Some(Column { index, name: name.to_owned() })),
-            (Some(_), Some(_)) => Err(Fault::RepeatedColumn(name.to_owned())),
-            (None, _) => Ok(None),
-        }
+        Column::named(self.names.names.iter().map(String::as_str), name)
     }
 
     fn has_documented(&self, choices: &[Signal]) -> bool {
@@ -236,14 +232,12 @@ impl Finder<'_> {
     }
 
     fn missing_column(&self, column: String, advice: String) -> Fault {
-        let joints = 1..=self.import.drives.len();
-        let signals = std::iter::once(Signal::Time)
-            .chain(joints.flat_map(|joint| [Signal::Angle(joint), Signal::Torque(joint)]));
-        let needed = signals.map(|signal| match self.import.columns.get(&signal) {
-            Some(ColumnName::Name(name)) => name.clone(),
-            Some(ColumnName::Number(number)) => format!("column {number}"),
-            None => signal.column(self.import.unit(signal).0),
-        });
+        let needed =
+            documented(self.import.drives.len()).map(|signal| match self.import.columns.get(&signal) {
+                Some(ColumnName::Name(name)) => name.clone(),
+                Some(ColumnName::Number(number)) => format!("column {number}"),
+                None => signal.column(self.import.unit(signal).0),
+            });
         Fault::MissingColumn {
             column,
             present: self.names.names.join(", "),

@@ -128,28 +128,29 @@ pub(crate) struct Column {
 }
 
 impl Column {
-    /// Finds a column; the error names all that are `needed`.
-    pub(crate) fn find(header: &StringRecord, name: String, needed: &[String]) -> Result<Self, Fault> {
-        let mut matches = header.iter().enumerate().filter(|(_, present)| *present == name);
+    /// Only column of this name.
+    pub(crate) fn named<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Result<Option<Self>, Fault> {
+        let mut matches = names.enumerate().filter(|(_, present)| *present == name);
         match (matches.next(), matches.next()) {
-            (Some((index, _)), None) => Ok(Self { index, name }),
-            (Some(_), Some(_)) => Err(Fault::RepeatedColumn(name)),
-            (None, _) => {
-                let present = header.iter().collect::<Vec<_>>().join(", ");
-                Err(Fault::MissingColumn {
-                    column: name,
-                    present,
-                    needed: needed.join(", "),
-                    advice: String::new(),
-                })
-            }
+            (Some((index, _)), None) => Ok(Some(Self { index, name: name.to_owned() })),
+            (Some(_), Some(_)) => Err(Fault::RepeatedColumn(name.to_owned())),
+            (None, _) => Ok(None),
         }
     }
 
-    /// Finite number in this column, at most `limit` in magnitude.
-    pub(crate) fn number(&self, row: &StringRecord, limit: f64) -> Result<f64, Fault> {
-        let text = row.get(self.index).unwrap_or("");
-        self.check(self.parsed(text, Decimal::Point)?, limit)
+    /// Finds a column; the error names all that are `needed`.
+    pub(crate) fn find(header: &StringRecord, name: &str, needed: &[String]) -> Result<Self, Fault> {
+        Self::named(header.iter(), name)?.ok_or_else(|| Fault::MissingColumn {
+            column: name.to_owned(),
+            present: header.iter().collect::<Vec<_>>().join(", "),
+            needed: needed.join(", "),
+            advice: String::new(),
+        })
+    }
+
+    /// Finite number in this column.
+    pub(crate) fn number(&self, row: &StringRecord) -> Result<f64, Fault> {
+        self.parsed(row.get(self.index).unwrap_or(""), Decimal::Point)
     }
 
     /// Finite number, as the file holds it.
@@ -167,14 +168,6 @@ impl Column {
     pub(crate) fn finite(&self, value: f64) -> Result<f64, Fault> {
         if !value.is_finite() {
             return Err(Fault::NotFinite { column: self.name.clone(), text: value.to_string() });
-        }
-        Ok(value)
-    }
-
-    fn check(&self, value: f64, limit: f64) -> Result<f64, Fault> {
-        if value.abs() > limit {
-            let advice = String::new();
-            return Err(Fault::Absurd { column: self.name.clone(), value, limit, advice });
         }
         Ok(value)
     }

@@ -13,7 +13,7 @@ use crate::formats::recording::dialect::{Decimal, Dialect, LOOKED_AT};
 use crate::formats::recording::fault::{Fault, rounded};
 use crate::formats::recording::import::{ColumnName, Import};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
-use crate::formats::recording::suggest::{Reading, command};
+use crate::formats::recording::suggest::{Reading, command, documented};
 use crate::formats::recording::{
     JointSeries, MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MOST_BAD_PERCENT, MOST_SAMPLES, Recording,
     median_step_s,
@@ -234,12 +234,8 @@ impl Skipped {
 /// Checks samples that a program holds.
 pub(crate) fn samples(name: &Path, time_s: &[f64], joints: &[JointSeries]) -> Result<Read, FileError> {
     let import = Import::plain(joints.len());
-    let signals = (1..=joints.len()).flat_map(|joint| [Signal::Angle(joint), Signal::Torque(joint)]);
-    let documented = std::iter::once(Signal::Time)
-        .chain(signals)
-        .map(|signal| signal.column(signal.quantity().si()))
-        .collect();
-    let names = Names { names: documented, units: Vec::new(), are_stated: true };
+    let columns = documented(joints.len()).map(|signal| signal.column(signal.quantity().si())).collect();
+    let names = Names { names: columns, units: Vec::new(), are_stated: true };
     let mut decoder = Decoder::new(name, &names, &import).map_err(|fault| refuse(name, None, fault))?;
     let series: Vec<&[f64]> = std::iter::once(time_s)
         .chain(joints.iter().flat_map(|joint| [&joint.position_rad[..], &joint.torque_nm[..]]))

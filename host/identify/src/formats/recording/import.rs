@@ -92,7 +92,7 @@ pub struct Drive {
 }
 
 /// Everything stated about the files.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Import {
     pub columns: BTreeMap<Signal, ColumnName>,
     pub by_quantity: Vec<Unit>,
@@ -112,16 +112,8 @@ impl Import {
     pub fn plain(joints: usize) -> Self {
         let drive =
             |joint: usize| Drive { joint: joint.to_string(), torque_per_ampere: None, motor_ratio: None };
-        Self {
-            columns: BTreeMap::new(),
-            by_quantity: Vec::new(),
-            by_signal: BTreeMap::new(),
-            delimiter: None,
-            decimal: None,
-            skip_bad: false,
-            drives: (1..=joints).map(drive).collect(),
-            command: "cargo sim replay".to_owned(),
-        }
+        let drives = (1..=joints).map(drive).collect();
+        Self { drives, command: "cargo sim replay".to_owned(), ..Self::default() }
     }
 
     /// Documented format for a leg whose file holds this text.

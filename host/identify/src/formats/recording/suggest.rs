@@ -62,6 +62,7 @@ const OTHER: [&str; 27] = [
 ];
 
 /// Words of a column's name.
+#[derive(Default)]
 struct Name {
     words: Vec<String>,
     numbers: Vec<usize>,
@@ -73,7 +74,7 @@ impl Name {
         let text = ["N m", "N*m", "N.m", "N·m", "N-m"]
             .iter()
             .fold(text.to_owned(), |text, spelt| text.replace(spelt, "Nm"));
-        let mut name = Self { words: Vec::new(), numbers: Vec::new(), unit: Vec::new() };
+        let mut name = Self::default();
         let mut parts: Vec<&str> =
             text.split(|c: char| !c.is_alphanumeric() && c != '°').filter(|part| !part.is_empty()).collect();
         // The first part is what is measured: `t`, `i` or `m` there is not a unit.
@@ -296,6 +297,11 @@ pub(crate) fn choices_of_joint(joint: usize) -> [Vec<Signal>; 2] {
 /// Signals that a recording of so many joints must have, each with those that replace it.
 pub(crate) fn required(joints: usize) -> impl Iterator<Item = Vec<Signal>> {
     std::iter::once(vec![Signal::Time]).chain((1..=joints).flat_map(choices_of_joint))
+}
+
+/// Signals of a recording of so many joints in the documented format.
+pub(crate) fn documented(joints: usize) -> impl Iterator<Item = Signal> {
+    required(joints).map(|choices| choices[0])
 }
 
 /// Signal that is read from a column in a unit.

@@ -14,11 +14,12 @@
 use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
 use crate::report::findings::FindingReport;
 use crate::run::logging_errors::directions::{CHANCE, Directions, Found, label};
+use crate::run::logging_errors::fit::segment_sigma;
 use crate::run::logging_errors::lag::{self, Lag};
 use crate::run::logging_errors::midway::Midway;
 use crate::run::logging_errors::rows::{Equations, Motion};
 use crate::run::logging_errors::samples::SATURATION;
-use crate::run::logging_errors::{LoggingErrors, Question, midway_words, sample_cause};
+use crate::run::logging_errors::{LoggingErrors, Question, joint_words, midway_words, sample_cause};
 
 /// Sigma by which a parameter may be negative.
 const NEGATIVE_SIGMA: f64 = 5.0;
@@ -89,7 +90,8 @@ pub fn likely<const N: usize, const B: usize>(
         _ => (question, errors),
     };
     let here = quality(question, &errors.equations);
-    let mut tried = refits(question);
+    let corrections = corrections(question);
+    let mut tried: Vec<_> = corrections.iter().filter_map(|correction| refit(question, correction)).collect();
     // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
     let lags = lag::all(&errors.equations).into_iter().filter(|lag| lag.significance > CHANCE);
     tried.extend(lags.map(|lag| of_lag(question, errors, lag, here)));
@@ -303,10 +305,6 @@ fn changed_midway(midway: &Midway, here: Quality) -> Tried {
     Tried { cause, quality: Quality { remaining, sound: true }, is_shared: false }
 }
 
-fn refits<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Tried> {
-    corrections(question).iter().filter_map(|correction| refit(question, correction)).collect()
-}
-
 /// Equations with all angles in one other unit, for each unit that is possible.
 #[must_use]
 pub fn with_other_angles<const N: usize, const B: usize>(
@@ -385,10 +383,6 @@ fn subjects<const N: usize>() -> impl Iterator<Item = Option<usize>> {
     std::iter::once(None).chain((0..N).filter(|_| N > 1).map(Some))
 }
 
-fn words_of(joint: Option<usize>) -> String {
-    joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1))
-}
-
 /// Torque in mN m.
 fn millinewton_metres<const N: usize>() -> Correction<N> {
     Correction {
@@ -412,7 +406,7 @@ fn angle_units<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
         all.push(Correction {
             name: "angle_unit",
             joint,
-            words: format!("angle of {} read as {unit}", words_of(joint)),
+            words: format!("angle of {} read as {unit}", joint_words(joint)),
             reads: vec![reads],
             apply: Box::new(move |angles, _| {
                 angles.iter_mut().zip(factors).for_each(|(angle, factor)| *angle *= factor);
@@ -462,7 +456,7 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
         all.push(Correction {
             name: "torque_sign",
             joint,
-            words: format!("torque of {} negated", words_of(joint)),
+            words: format!("torque of {} negated", joint_words(joint)),
             reads: Vec::new(),
             apply: Box::new(move |_, torques| {
                 let each = torques.iter_mut().enumerate();
@@ -515,14 +509,8 @@ fn quality<const N: usize, const B: usize>(
     equations: &Equations<N, B>,
 ) -> Quality {
     let fit = equations.fit(&equations.columns, &equations.torque, false);
-    let segments: Vec<usize> = equations.sources.iter().map(|source| source.cluster).collect();
-    let scatter = crate::run::logging_errors::fit::segment_sigma(
-        &fit,
-        &equations.columns,
-        &equations.torque,
-        &equations.weight,
-        &segments,
-    );
+    let Equations { columns, torque, weight, .. } = equations;
+    let scatter = segment_sigma(&fit, columns, torque, weight, &equations.clusters());
     let sigma = core::array::from_fn(|base| fit.inverse[base][base].max(0.0).sqrt().max(scatter[base]));
     let shares = (0..N).map(|joint| {
         let torques = equations.sources.iter().zip(&equations.torque);

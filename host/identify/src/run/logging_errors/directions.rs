@@ -30,8 +30,9 @@ use std::borrow::Cow;
 use nalgebra::{Rotation3, Unit, Vector3};
 use rayon::prelude::*;
 use scarab::ident::{RowModel, Smoothed};
+use scarab::real::dot;
 
-use crate::run::logging_errors::fit::{Fit, Score, score};
+use crate::run::logging_errors::fit::{Fit, Score};
 use crate::run::logging_errors::rows::Equations;
 
 /// Standard deviations that chance exceeds once in ten million tests.
@@ -277,10 +278,8 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     }
 
     fn score(&self, kind: Kind, value: f64, system: &System<'_, B>, fit: &Fit<B>) -> Score {
-        let all = self.equations;
         let z = self.column(kind, value, &system.0, fit);
-        let segments: Vec<usize> = all.sources.iter().map(|source| source.cluster).collect();
-        score(fit, &system.0, &system.1, &z, &all.weight, &segments)
+        self.equations.score(fit, &system.0, &system.1, &z)
     }
 
     fn start(&self, kind: Kind, plain: &Fit<B>) -> f64 {
@@ -387,7 +386,6 @@ pub fn label(kind: Kind) -> String {
 }
 
 fn correlation(one: &[f64], other: &[f64]) -> f64 {
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let size = (product(one, one) * product(other, other)).sqrt();
-    if size > 0.0 { product(one, other) / size } else { 0.0 }
+    let size = (dot(one, one) * dot(other, other)).sqrt();
+    if size > 0.0 { dot(one, other) / size } else { 0.0 }
 }

@@ -23,6 +23,7 @@ use std::path::PathBuf;
 use scarab::ident::{KernelError, RowModel, SAMPLE_RATE_HZ, Smoothed};
 use scarab::model::Parameter;
 use scarab::real::Real;
+use scarab_base::stats::rms;
 
 use crate::formats::leg_file::LegFile;
 use crate::formats::recording::{JointSeries, Recording};
@@ -202,7 +203,7 @@ impl<const N: usize> Encoders<N> {
             let Some((read, values)) = refit(Some(phase as f64 / PHASES as f64))? else { return Ok(None) };
             shifts.push(core::array::from_fn::<f64, B, _>(|base| values[base] - before[base]));
             if phase == 0 {
-                let before_steps = smooth.columns_at(&read.sources);
+                let before_steps = smooth.columns_at(&read.sources, smooth.model(), &|_| {});
                 noise = column_noise(&before_steps, &read);
                 predicted = prediction_noise(&before_steps, &read, fit);
             }
@@ -210,10 +211,7 @@ impl<const N: usize> Encoders<N> {
         let count = shifts.len() as f64;
         let mean: [f64; B] =
             core::array::from_fn(|base| shifts.iter().map(|shift| shift[base]).sum::<f64>() / count);
-        let sigma = core::array::from_fn(|base| {
-            let squares: f64 = shifts.iter().map(|shift| shift[base].powi(2)).sum();
-            (squares / count).sqrt()
-        });
+        let sigma = core::array::from_fn(|base| rms(shifts.iter().map(|shift| shift[base])));
         let torque_share = core::array::from_fn(|joint| {
             let (mut missed, mut all) = (0.0, 0.0);
             let rows = equations.sources.iter().zip(&equations.columns).zip(&equations.torque);

@@ -10,6 +10,8 @@
 //! g are the segments (clusters). The second sigma needs no model of the noise, only that segments err
 //! independently (Liang and Zeger 1986). The covariance of the parameters has the same two forms.
 
+use scarab::real::dot;
+
 /// Smallest independent share of a column that counts as determined.
 const DETERMINED_SHARE: f64 = 1e-9;
 
@@ -24,10 +26,6 @@ pub struct Fit<const B: usize> {
     pub cost: f64,
     /// Number of determined columns.
     pub rank: usize,
-}
-
-fn dot<const B: usize>(one: &[f64; B], other: &[f64; B]) -> f64 {
-    one.iter().zip(other).map(|(one, other)| one * other).sum()
 }
 
 impl<const B: usize> Fit<B> {

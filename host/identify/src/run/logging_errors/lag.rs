@@ -12,7 +12,8 @@
 //! all.
 
 use crate::report::doubt::CauseReport;
-use crate::run::logging_errors::fit::{Fit, score};
+use crate::run::logging_errors::fit::Fit;
+use crate::run::logging_errors::joint_words;
 use crate::run::logging_errors::rows::Equations;
 
 /// Times tried by the scan, s.
@@ -113,8 +114,7 @@ impl<const N: usize, const B: usize> Search<'_, N, B> {
                 beside.iter().zip(&predicted).map(|(beside, here)| (beside - here) / step_s).collect()
             }
         };
-        let segments: Vec<usize> = all.sources.iter().map(|source| source.cluster).collect();
-        let scored = score(&fit, &columns, &torque, &slope, &all.weight, &segments);
+        let scored = all.score(&fit, &columns, &torque, &slope);
         let remaining = (fit.cost / plain.max(1e-300)).min(1.0);
         let rows = fit.residuals(&columns, &torque).into_iter().zip(&all.weight).zip(&all.sources);
         let own_cost = rows
@@ -153,7 +153,7 @@ fn least(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f64 {
 }
 
 fn cause(kind: Kind, joint: Option<usize>, time_s: f64, sigma_s: f64, remaining: f64) -> CauseReport {
-    let joints = joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
+    let joints = joint_words(joint);
     let (time_ms, sigma_ms) = (1e3 * time_s, 1e3 * sigma_s);
     let explained = 100.0 * (1.0 - remaining);
     let (name, words) = match kind {

@@ -10,7 +10,7 @@
 //! sigma is that of s with the columns of the parameters: the larger of noise and segments.
 
 use crate::run::logging_errors::directions::CHANCE;
-use crate::run::logging_errors::fit::{Fit, score};
+use crate::run::logging_errors::fit::Fit;
 use crate::run::logging_errors::rows::{Equations, RowSource};
 
 /// Change of the gain that is tolerated beside chance: the temperature of a drive changes it by 5 %.
@@ -115,17 +115,10 @@ fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Mi
     let plain = all.fit(&all.columns, &all.torque, false);
     let whole = Sums::new(all, |_| true);
     let motions = all.sources.iter().map(|source| source.motion).max()? + 1;
-    let mut scopes: Vec<Option<usize>> = vec![None];
-    if motions > 1 {
-        scopes.extend((0..motions).map(Some));
-    }
-    let mut joints: Vec<Option<usize>> = (0..N).map(Some).collect();
-    if N > 1 {
-        joints.push(None);
-    }
+    let scopes = std::iter::once(None).chain((0..motions).filter(|_| motions > 1).map(Some));
     let mut best: Option<(Midway, Option<usize>, f64)> = None;
     for scope in scopes {
-        for joint in joints.iter().copied() {
+        for joint in (0..N).map(Some).chain((N > 1).then_some(None)) {
             let own = Sums::new(all, |source| is_after(source, scope, joint, -1.0));
             // A gain of the whole recording is another error: a torque scale, or another machine.
             let always = if own.power < 0.999 * whole.power { change(&plain, &whole, &own).1 } else { 0.0 };
@@ -155,8 +148,7 @@ fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Mi
     let predicted = fit.predictions(&all.columns);
     let column = |(source, torque): (&RowSource, &f64)| if is_changed(source) { *torque } else { 0.0 };
     let z: Vec<f64> = all.sources.iter().zip(&predicted).map(column).collect();
-    let segments: Vec<usize> = all.sources.iter().map(|source| source.cluster).collect();
-    let scored = score(&fit, &all.columns, &torque, &z, &all.weight, &segments);
+    let scored = all.score(&fit, &all.columns, &torque, &z);
     // Chi-square of one for each independent row, independent of the previous misfit.
     let rows = all.sources.len() as f64 * all.information().min(1.0) - fit.rank as f64;
     let noise = scored.noise_sigma * (fit.cost / rows.max(1.0)).sqrt();

@@ -320,7 +320,7 @@ pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
 /// Message about a change midway.
 #[must_use]
 pub fn midway_words(midway: &Midway) -> String {
-    let joints = midway.joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
+    let joints = joint_words(midway.joint);
     let what = if midway.change < -1.0 {
         "changes its sign".into()
     } else {
@@ -331,6 +331,11 @@ pub fn midway_words(midway: &Midway) -> String {
         100.0 * midway.share,
         100.0 * midway.explained
     )
+}
+
+/// One joint, or all, in words.
+fn joint_words(joint: Option<usize>) -> String {
+    joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1))
 }
 
 /// Part of the misfit's power that is not noise, 0..1; one where the noise is unknown.

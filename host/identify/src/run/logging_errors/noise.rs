@@ -12,6 +12,8 @@
 //! recorder's own filter removed. Limits: a motion at half the bandwidth leaves 1.3 % of its amplitude; the
 //! density of noise that is not white is wrong.
 
+use scarab_base::stats::quantile;
+
 /// Median of the absolute value of a standard normal number.
 const NORMAL_MEDIAN: f64 = 0.674_490;
 /// Least number of differences for an estimate.
@@ -44,13 +46,8 @@ pub fn scatter(time_s: &[f64], torque: &[f64], bandwidth_hz: f64) -> Vec<f64> {
 
 /// Density of the noise, (N m)^2 s, from the scatter of all files; `None` with too few differences.
 #[must_use]
-pub fn density(mut scatter: Vec<f64>) -> Option<f64> {
-    if scatter.len() < FEWEST {
-        return None;
-    }
-    scatter.sort_by(f64::total_cmp);
-    let median = scatter[scatter.len() / 2];
-    Some((median / NORMAL_MEDIAN).powi(2))
+pub fn density(scatter: Vec<f64>) -> Option<f64> {
+    (scatter.len() >= FEWEST).then(|| (quantile(scatter, 0.5) / NORMAL_MEDIAN).powi(2))
 }
 
 #[cfg(test)]

@@ -17,7 +17,9 @@ use scarab::ident::{
     SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS, Smoothed,
 };
 
-use crate::run::logging_errors::fit::{Fit, segment_sigma, solve};
+use scarab_base::stats::{quantile, rms};
+
+use crate::run::logging_errors::fit::{Fit, Score, score, segment_sigma, solve};
 
 /// Reserved filter taps: bandwidths from 1 Hz.
 const TAPS: usize = 2048;
@@ -64,18 +66,6 @@ impl Filters {
             smoothing: Box::new(Kernel::new(SMOOTHING_BANDWIDTHS * bandwidth_hz, SAMPLE_RATE_HZ)?),
             low_pass: Box::new(LowPass::new(bandwidth_hz, SAMPLE_RATE_HZ)?),
         })
-    }
-
-    /// Information of one row in independent rows.
-    #[must_use]
-    pub fn information(&self) -> f64 {
-        DECIMATION as f64 * self.low_pass.energy()
-    }
-
-    /// Share of a 500 Hz sample's noise variance that the low-pass leaves.
-    #[must_use]
-    pub fn energy(&self) -> f64 {
-        self.low_pass.energy()
     }
 }
 
@@ -167,7 +157,9 @@ impl<const N: usize> Part<N> {
 /// Origin of an equation.
 #[derive(Clone, Copy, Debug)]
 pub struct RowSource {
-    part: usize,
+    /// Index of its motion.
+    pub motion: usize,
+    /// Index of the row in its motion, at 50 Hz.
     row: usize,
     /// Joint, from 0.
     pub joint: usize,
@@ -177,16 +169,6 @@ pub struct RowSource {
     pub cluster: usize,
     /// Time from the start of its motion, as a share of the motion's duration.
     pub share: f64,
-    /// Index of its motion.
-    pub motion: usize,
-}
-
-impl RowSource {
-    /// Index of the row in its motion, at 50 Hz.
-    #[must_use]
-    pub fn row(&self) -> usize {
-        self.row
-    }
 }
 
 /// All usable rows of all joints, one equation each.
@@ -205,8 +187,6 @@ pub struct Equations<const N: usize, const B: usize> {
     pub torque: Vec<f64>,
     /// Weight of each equation, 1/(N m).
     pub weight: Vec<f64>,
-    /// Number of clusters.
-    pub clusters: usize,
     /// Standard deviation of an independent row of each joint, N m, from the residual.
     pub row_sigma: [f64; N],
     /// Rows of each joint's factor that count, in complete rows.
@@ -232,7 +212,6 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             columns: Vec::new(),
             torque: Vec::new(),
             weight: Vec::new(),
-            clusters: 0,
             row_sigma: [1.0; N],
             rows: [0.0; N],
         };
@@ -258,45 +237,45 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     /// Information of one row in independent rows.
     #[must_use]
     pub fn information(&self) -> f64 {
-        self.filters.information()
+        DECIMATION as f64 * self.energy()
     }
 
     /// Share of a 500 Hz sample's noise variance that the low-pass leaves.
     #[must_use]
     pub fn energy(&self) -> f64 {
-        self.filters.energy()
+        self.filters.low_pass.energy()
     }
 
     fn collect(&mut self) {
         let row_s = DECIMATION as f64 / SAMPLE_RATE_HZ;
         let total: f64 = self.parts.iter().map(|part| part.instants.len() as f64 / SAMPLE_RATE_HZ).sum();
         let length = (total / CLUSTERS).clamp(SMALLEST_CLUSTER_S, LARGEST_CLUSTER_S);
+        let mut clusters = 0;
         for (number, part) in self.parts.iter().enumerate() {
             let rows = part.rows(&self.filters, &self.model, &|_| {});
             let count = rows.len().max(1) as f64;
             let pieces = (count * row_s / length).round().max(1.0);
             let start_s = part.first as f64 / SAMPLE_RATE_HZ;
             for (row, filtered) in rows.iter().enumerate() {
-                let cluster = self.clusters + (row as f64 / count * pieces) as usize;
+                let cluster = clusters + (row as f64 / count * pieces) as usize;
                 for joint in 0..N {
                     if filtered.still[joint] > LARGEST_STILL_SHARE || !filtered.is_finite() {
                         continue;
                     }
                     let time_s = start_s + row as f64 * row_s;
                     self.sources.push(RowSource {
-                        part: number,
+                        motion: number,
                         row,
                         joint,
                         training: time_s < part.training_s,
                         cluster,
                         share: time_s / (count * row_s + 2.0 * start_s),
-                        motion: number,
                     });
                     self.columns.push(filtered.regressor[joint]);
                     self.torque.push(filtered.torque[joint]);
                 }
             }
-            self.clusters += pieces as usize;
+            clusters += pieces as usize;
         }
         self.weight = vec![1.0; self.torque.len()];
     }
@@ -308,8 +287,19 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         model: &RowModel<f64, N, B>,
         change: &dyn Fn(&mut Smoothed<f64, N>),
     ) -> Vec<[f64; B]> {
-        let parts: Vec<_> = self.parts.iter().map(|part| part.rows(&self.filters, model, change)).collect();
-        self.sources.iter().map(|source| parts[source.part][source.row].regressor[source.joint]).collect()
+        self.columns_at(&self.sources, model, change)
+    }
+
+    /// [`Self::columns_of`] for the equations of another motion with the same number of samples.
+    #[must_use]
+    pub fn columns_at(
+        &self,
+        sources: &[RowSource],
+        model: &RowModel<f64, N, B>,
+        change: &dyn Fn(&mut Smoothed<f64, N>),
+    ) -> Vec<[f64; B]> {
+        let rows: Vec<_> = self.parts.iter().map(|part| part.rows(&self.filters, model, change)).collect();
+        sources.iter().map(|source| rows[source.motion][source.row].regressor[source.joint]).collect()
     }
 
     /// Smoothed motion of every recording on the 500 Hz grid, with the duration of its training part, s.
@@ -321,16 +311,19 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     /// Standard deviations of the parameters of a fit to the training motion, by the scatter of its segments.
     #[must_use]
     pub fn scatter(&self, fit: &Fit<B>) -> [f64; B] {
-        let segments: Vec<usize> = self.sources.iter().map(|source| source.cluster).collect();
-        segment_sigma(fit, &self.columns, &self.torque, &self.training_weight(), &segments)
+        segment_sigma(fit, &self.columns, &self.torque, &self.training_weight(), &self.clusters())
     }
 
-    /// Columns for the equations of a motion with the same number of samples.
+    /// Cluster of each equation.
     #[must_use]
-    pub fn columns_at(&self, sources: &[RowSource]) -> Vec<[f64; B]> {
-        let rows: Vec<_> =
-            self.parts.iter().map(|part| part.rows(&self.filters, &self.model, &|_| {})).collect();
-        sources.iter().map(|source| rows[source.part][source.row].regressor[source.joint]).collect()
+    pub fn clusters(&self) -> Vec<usize> {
+        self.sources.iter().map(|source| source.cluster).collect()
+    }
+
+    /// Estimates column `z` beside the parameters of `fit`, which are those of these columns and torques.
+    #[must_use]
+    pub fn score(&self, fit: &Fit<B>, columns: &[[f64; B]], torque: &[f64], z: &[f64]) -> Score {
+        score(fit, columns, torque, z, &self.weight, &self.clusters())
     }
 
     /// Unchanged row model.
@@ -346,7 +339,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         pairs
             .map(|(source, &torque)| {
                 if joint.is_none_or(|joint| joint == source.joint) {
-                    self.parts[source.part].torque(source.joint, source.row, late_s)
+                    self.parts[source.motion].torque(source.joint, source.row, late_s)
                 } else {
                     torque
                 }
@@ -387,17 +380,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             behind
         });
         let behind: Vec<_> = behind.collect();
-        self.sources.iter().map(|source| behind[source.part][source.row][source.joint]).collect()
-    }
-
-    /// Torque of all equations in another order of the joints: the equation of joint `j` gets that of
-    /// `of[j]`.
-    #[must_use]
-    pub fn exchanged(&self, of: &[usize; N]) -> Vec<f64> {
-        self.sources
-            .iter()
-            .map(|source| self.parts[source.part].torque(of[source.joint], source.row, 0.0))
-            .collect()
+        self.sources.iter().map(|source| behind[source.motion][source.row][source.joint]).collect()
     }
 
     /// Rate of change of a series given at the equations, within each joint and motion; zero at gaps and
@@ -412,12 +395,12 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             slots.resize(slots.len() + part.instants.len() / DECIMATION + 2, [usize::MAX; N]);
         }
         for (index, source) in self.sources.iter().enumerate() {
-            slots[starts[source.part] + source.row][source.joint] = index;
+            slots[starts[source.motion] + source.row][source.joint] = index;
         }
         let at = |source: &RowSource, offset: isize| -> Option<f64> {
             let row = source.row.checked_add_signed(offset)?;
-            let end = starts.get(source.part + 1).copied().unwrap_or(slots.len());
-            let slot = starts[source.part] + row;
+            let end = starts.get(source.motion + 1).copied().unwrap_or(slots.len());
+            let slot = starts[source.motion] + row;
             let index = *slots.get(slot).filter(|_| slot < end)?.get(source.joint)?;
             series.get(index).copied()
         };
@@ -460,9 +443,8 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     fn weigh(&mut self) {
         let mut trust = vec![1.0; self.torque.len()];
         for joint in 0..N {
-            let square: f64 = self.of_joint(joint).map(|index| self.torque[index].powi(2)).sum();
-            let count = self.of_joint(joint).count().max(1) as f64;
-            self.row_sigma[joint] = (square / count).sqrt().max(1e-9);
+            let torque = self.of_joint(joint).map(|index| self.torque[index]);
+            self.row_sigma[joint] = rms(torque).max(1e-9);
         }
         for round in 0..10 {
             self.weight = self
@@ -488,19 +470,15 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         let mut blocks: Vec<(usize, usize, Vec<usize>)> = Vec::new();
         for index in self.of_joint(joint) {
             let source = &self.sources[index];
-            let key = (source.part, source.row / BLOCK_ROWS);
+            let key = (source.motion, source.row / BLOCK_ROWS);
             match blocks.last_mut() {
                 Some((part, block, list)) if (*part, *block) == key => list.push(index),
                 _ => blocks.push((key.0, key.1, vec![index])),
             }
         }
-        let size = |list: &[usize]| {
-            (list.iter().map(|&index| residual[index].powi(2)).sum::<f64>() / list.len() as f64).sqrt()
-        };
+        let size = |list: &[usize]| rms(list.iter().map(|&index| residual[index]));
         let sizes: Vec<f64> = blocks.iter().map(|(_, _, list)| size(list)).collect();
-        let mut sorted = sizes.clone();
-        sorted.sort_by(f64::total_cmp);
-        let Some(&median) = sorted.get(sorted.len() / 2) else { return };
+        let median = quantile(sizes.clone(), 0.5);
         for ((_, _, list), size) in blocks.iter().zip(&sizes) {
             let ratio = size / median.max(1e-12);
             let (from, to) = DISTURBED;
@@ -517,10 +495,9 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         let list: Vec<usize> = self.of_joint(joint).collect();
         let counted: f64 = list.iter().map(|&index| trust[index]).sum();
         let square: f64 = list.iter().map(|&index| trust[index] * residual[index].powi(2)).sum();
-        let torque: f64 = list.iter().map(|&index| self.torque[index].powi(2)).sum::<f64>();
         let information = self.information().max(1e-3);
         let free = (counted - rank as f64 / information).max(1.0);
-        let floor = 1e-5 * (torque / list.len().max(1) as f64).sqrt();
+        let floor = 1e-5 * rms(list.iter().map(|&index| self.torque[index]));
         self.rows[joint] = counted;
         self.row_sigma[joint] = (square / free / information).sqrt().max(floor).max(1e-9);
     }

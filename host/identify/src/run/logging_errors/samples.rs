@@ -22,12 +22,14 @@
 //! ratio of such a peak. A sample without neighbours of its own size is an outlier, not a limit.
 //!
 //! Saturated and frozen stretches are excluded ([`Screened::spans`]) while they are few. A held column is
-//! late by half of its holding time on average, and is refused. Cost: linear in the samples, except two
+//! late by half of its holding time on average, and is refused. Cost: linear in the samples, except
 //! sorts. Known limits: a drive at its own limit gives the same torque column as a sensor at its limit; its
 //! rows are excluded although they are right. The step of an interpolated angle is found here, but possibly
 //! not in `encoder.rs`; its sigma then lacks the bias by the encoder's steps.
 
 use std::ops::Range;
+
+use scarab_base::stats::quantile;
 
 use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
@@ -518,7 +520,7 @@ fn within_band(samples: usize, band: f64, below: impl Fn(usize) -> f64) -> Vec<b
 /// Whether the samples `near` a limit are far less noisy than the others: a filter has flattened them.
 fn is_flattened(parts: &[Part], near: &[Vec<bool>], range: f64) -> bool {
     let roughness = |inside: bool| {
-        let mut rough: Vec<f64> = parts
+        let rough: Vec<f64> = parts
             .iter()
             .zip(near)
             .flat_map(|(part, near)| {
@@ -527,7 +529,7 @@ fn is_flattened(parts: &[Part], near: &[Vec<bool>], range: f64) -> bool {
                     .map(move |last| third_difference(&part.values[last - 3..=last]))
             })
             .collect();
-        (rough.len() >= 8).then(|| median(&mut rough))
+        (rough.len() >= 8).then(|| quantile(rough, 0.5))
     };
     match (roughness(true), roughness(false)) {
         (Some(inside), Some(outside)) => inside < 0.3 * outside && outside > NOISY * range,
@@ -550,8 +552,9 @@ fn is_noisy(values: &[f64]) -> bool {
     let (low, high) = range(values);
     let repeated =
         runs(values).filter(|run| run.len() < FROZEN_SAMPLES).map(|run| run.len() - 1).sum::<usize>();
-    let mut rough: Vec<f64> = values.windows(4).map(third_difference).collect();
-    20 * repeated < values.len() && !rough.is_empty() && median(&mut rough) > NOISY * (high - low)
+    let rough = values.windows(4).map(third_difference).collect();
+    // NaN of a short column is not above.
+    20 * repeated < values.len() && quantile(rough, 0.5) > NOISY * (high - low)
 }
 
 /// Samples on either side over which a speed is measured.
@@ -624,12 +627,6 @@ pub(super) fn step(values: &[f64]) -> f64 {
 fn level_step(values: &[f64]) -> f64 {
     let levels: Vec<f64> = runs(values).filter(|run| run.len() > 1).map(|run| values[run.start]).collect();
     if levels.len() < LEAST_LEVELS { 0.0 } else { step(&levels) }
-}
-
-/// Median; zero for an empty list.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 #[cfg(test)]

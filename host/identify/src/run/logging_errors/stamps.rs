@@ -20,12 +20,11 @@
 //! Known limits: a constant error of the stamps delays all columns alike and changes nothing; drifts slower
 //! than half a second do not show.
 
-use scarab_base::stats::rms;
+use scarab_base::stats::{quantile, rms};
 use std::f64::consts::TAU;
 
 use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
-use crate::run::logging_errors::samples::median;
 
 /// Finding of wrong time stamps.
 pub const TIME_STAMPS: &str = "time_stamps";
@@ -112,14 +111,14 @@ fn time_error(clock: &[f64], angle: &[f64], speeds: &[f64]) -> Option<f64> {
     sorted.sort_by(f64::total_cmp);
     let (slow, fast) = (*sorted.get(sorted.len() / 3)?, *sorted.get(2 * sorted.len() / 3)?);
     let part = |is_part: &dyn Fn(f64) -> bool| {
-        let (mut residuals, mut squares): (Vec<f64>, Vec<f64>) = speeds
+        let (residuals, squares): (Vec<f64>, Vec<f64>) = speeds
             .iter()
             .enumerate()
             .filter(|(_, speed)| is_part(**speed))
             .map(|(index, &speed)| (residual(clock, angle, index + 2).abs(), speed * speed))
             .unzip();
-        let deviation = median(&mut residuals) / 0.6745;
-        (deviation * deviation, median(&mut squares))
+        let deviation = quantile(residuals, 0.5) / 0.6745;
+        (deviation * deviation, quantile(squares, 0.5))
     };
     let (quiet, slow_square) = part(&|speed| speed <= slow);
     let (noisy, fast_square) = part(&|speed| speed >= fast);

@@ -1,6 +1,7 @@
 //! From the swarm's result to the verdict, with the held-out part.
 
 use scarab::ident::{HeldOut, Record, Thresholds, Unused, Verdict};
+use scarab::real::dot;
 
 use super::logging_errors::sample_noise;
 use super::predictions::Prediction;
@@ -45,9 +46,7 @@ pub(super) fn judge<const N: usize, const B: usize>(
             file,
             time_s,
             measured: progress.instant.torque,
-            predicted: core::array::from_fn(|joint| {
-                rows.regressor[joint].iter().zip(&values).map(|(element, value)| element * value).sum()
-            }),
+            predicted: rows.regressor.each_ref().map(|row| dot(row, &values)),
         });
     });
     evaluation.break_off();

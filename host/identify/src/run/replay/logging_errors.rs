@@ -160,7 +160,7 @@ pub(super) struct Subject<'a, const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> Subject<'_, N, B> {
     /// Adds directions, sigma, tests and the likely cause of a refusal to the report.
     pub(super) fn examine(&self, run: &mut RunReport) -> Result<Option<String>, ToolError> {
-        let samples = self.screening.findings();
+        let samples = &self.screening.findings;
         let (question, file_of) = self.question();
         let mut errors = LoggingErrors::fit(&question)
             .map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
@@ -220,7 +220,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         suspected: &mut Option<&CauseReport>,
     ) -> CauseReport {
         let import = self.options.import.as_ref();
-        let mut cause = cause::likely(question, errors, self.screening.findings(), findings);
+        let mut cause = cause::likely(question, errors, &self.screening.findings, findings);
         // A torque in mN m and a current in mA differ by the torque constants only.
         let is_scale = cause.name == "unknown" || cause.reads.contains(&ReadAs::MillinewtonMetres);
         if let Some(current) = suspected.take_if(|_| is_scale) {

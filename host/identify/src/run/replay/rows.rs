@@ -13,7 +13,7 @@ use super::screening::Screening;
 use crate::formats::recording::Recording;
 use crate::leg::background::Background;
 use crate::report::Source;
-use crate::run::resample::{BandwidthWarning, Resampled};
+use crate::run::resample::Resampled;
 
 /// Reserved filter taps: bandwidths from 1 Hz.
 pub(super) const TAPS: usize = 2048;
@@ -32,7 +32,7 @@ pub(super) struct Samples<const N: usize> {
     /// Outliers replaced before resampling, converted to samples of the grid.
     pub(super) replaced: [u32; N],
     /// Doubt about the bandwidth at this rate.
-    warning: Option<BandwidthWarning>,
+    warning: Option<String>,
     rate_hz: f64,
     pub(super) start_s: f64,
     /// Points without a valid sample, in order.

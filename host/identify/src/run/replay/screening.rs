@@ -16,7 +16,8 @@ const REACH_PERIODS: f64 = 0.983;
 
 /// Findings about the recordings, and their stretches to be excluded.
 pub(super) struct Screening {
-    findings: Vec<SampleFinding>,
+    /// Everything that was found.
+    pub findings: Vec<SampleFinding>,
     spans: Vec<(PathBuf, Vec<Range<f64>>)>,
 }
 
@@ -53,16 +54,6 @@ impl Screening {
             })
             .filter(|points| !points.is_empty())
             .collect()
-    }
-
-    /// Everything that was found.
-    pub(super) fn findings(&self) -> &[SampleFinding] {
-        &self.findings
-    }
-
-    /// The findings for the report.
-    pub(super) fn into_findings(self) -> Vec<SampleFinding> {
-        self.findings
     }
 }
 

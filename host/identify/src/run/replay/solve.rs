@@ -1,6 +1,6 @@
 //! From samples to the swarm's result.
 
-use scarab::ident::{ConstantRatio, Ends, Estimator, SearchState, Solver, Stretches};
+use scarab::ident::{ConstantRatio, Ends, Estimator, Solver, Stretches};
 
 use super::ReplayOptions;
 use super::known_mass::{load_base, settled};
@@ -9,9 +9,7 @@ use super::rows::{HostRecorder, Samples, feed};
 use super::screening::Continuity;
 use crate::leg::background::Background;
 use crate::report::Source;
-
-/// Evaluations between two updates of the search.
-const SLICE: u32 = 20;
+use crate::run::analysis::Search;
 
 /// Result of the search over the training part.
 pub(super) struct Solved<const N: usize, const B: usize> {
@@ -31,16 +29,6 @@ impl<const N: usize, const B: usize> Solved<N, B> {
     pub(super) fn values(&self) -> [f32; B] {
         with(self.solver.values(), &self.load.unwrap_or([0.0; B]))
     }
-}
-
-/// Course of the search, in chi-square units.
-pub(super) struct Search {
-    /// Iterations and excess over the constrained optimum.
-    pub excess: Vec<(u32, f64)>,
-    /// First iteration with an excess of at most 0.5.
-    pub to_half: Option<u32>,
-    /// Excess of that optimum over least squares.
-    pub floor: f64,
 }
 
 /// Identifies from the training part, whose torques have this noise. `scale` is the recorded over the true
@@ -76,7 +64,7 @@ pub(super) fn solve<const N: usize, const B: usize>(
         let moved = settled(background, as_recorded.corrected(&moved, &load), options);
         solver.widen(moved.least_squares());
     }
-    let search = search(background, &mut solver);
+    let search = background.search(&mut solver);
     background.device.stribeck = solver.stribeck(&background.device);
     recorder.clear(Ends::Whole);
     if options.estimator == Estimator::Robust {
@@ -94,31 +82,6 @@ pub(super) fn solve<const N: usize, const B: usize>(
 
 fn with<const B: usize>(values: [f32; B], load: &[f32; B]) -> [f32; B] {
     core::array::from_fn(|base| values[base] + load[base])
-}
-
-/// Runs the swarm to its end.
-fn search<const N: usize, const B: usize>(
-    background: &Background<N, B>,
-    solver: &mut Solver<f32, N, B>,
-) -> Search {
-    let optimum = background.costs(solver);
-    let mut course = Search { excess: Vec::new(), to_half: None, floor: optimum.above };
-    loop {
-        let state = solver.advance(&background.device, SLICE);
-        if !matches!(state, SearchState::Failed(_)) {
-            let excess = optimum.factor.excess(&solver.search().values().map(f64::from)) - optimum.above;
-            let iterations = solver.search().iterations();
-            if course.excess.last().is_none_or(|(last, _)| *last != iterations) {
-                course.excess.push((iterations, excess));
-            }
-            if excess <= 0.5 && course.to_half.is_none() {
-                course.to_half = Some(iterations);
-            }
-        }
-        if state != SearchState::Running {
-            return course;
-        }
-    }
 }
 
 /// Takes the durations of disturbances from the rows themselves, because blocks of a long motion are long.

@@ -206,7 +206,7 @@ fn spectral_radius_is_that_of_the_eigenvalues() {
 fn limit_falls_with_the_stiffness_of_the_cuffs_and_without_damping() {
     let (exoskeleton, wearer) = bodies();
     let limit = |stiffness, damping| {
-        let wearer = with_cuffs(&wearer, stiffness, damping);
+        let wearer = Cuffs { stiffness, damping }.on(&wearer);
         largest_inertia(&exoskeleton, &wearer, Limb::Held, 1.0).expect("simulated")
     };
     let [soft, usual, stiff, undamped] =

@@ -10,16 +10,18 @@ use hal_sim::world::World;
 use rayon::prelude::*;
 use scarab::ident::{Estimator, Reason, Verdict};
 use scarab::leg::IdentifiedModel;
+use scarab::model::AnatomicalJoint;
 use scarab::servo::TorqueModel;
 use scarab_base::error::ToolError;
 use scarab_base::random::Random;
+use scarab_identify::formats::leg_file::geometry::anatomy;
 use scarab_identify::formats::leg_file::{LegFile, PushesFile};
 
-use crate::faults::bench::{Bench, Outcomes, outcome};
-use crate::faults::catalogue::{self, Fault};
+use crate::faults::bench::{Outcomes, outcome};
+use crate::faults::catalogue::Fault;
 use crate::faults::run::Outcome;
 use crate::options::SimulationOptions;
-use crate::pair::Context;
+use crate::pair::{Context, torque_at};
 use crate::perturb::{self, Perturbation};
 use crate::simulate::drive;
 use scarab::model::planar::{BASE, JOINTS};
@@ -31,25 +33,15 @@ const SLOW_RAD_PER_S: f32 = 0.05;
 /// Share of excluded rows above which a motion counts as disturbed; an undisturbed one has less.
 const NOTICED_SHARE: f32 = 0.005;
 
-pub(super) const WEARER: Bench =
-    Bench { fault: &catalogue::H2, run: |fault, leg, seeds, blind| all(fault, leg, seeds, blind, pushed) };
-
-pub(super) const CONTACT: Bench =
-    Bench { fault: &catalogue::H4, run: |fault, leg, seeds, blind| all(fault, leg, seeds, blind, touching) };
-
-pub(super) const OTHER_LEG: Bench =
-    Bench { fault: &catalogue::H3, run: |fault, leg, seeds, blind| all(fault, leg, seeds, blind, other) };
-
 /// Leg, disturbances, magnitude.
 type Drawn = (LegFile, Vec<Perturbation>, Option<f64>);
 
-fn all(
-    fault: &Fault,
-    leg: &LegFile,
-    seeds: &[u64],
-    blind: bool,
-    draw: fn(&mut Random, &LegFile) -> Drawn,
-) -> Outcomes {
+pub(super) fn run(fault: &Fault, leg: &LegFile, seeds: &[u64], blind: bool) -> Outcomes {
+    let draw = match fault.id {
+        "H2" => pushed,
+        "H3" => other,
+        _ => touching,
+    };
     let one = |seed: &u64| {
         let (leg, perturbations, magnitude) = draw(&mut Random::new(fault.id, *seed), leg);
         judge(fault, &leg, perturbations, magnitude, *seed, blind)
@@ -71,7 +63,7 @@ fn judge(
     let (believed, simulated) = (perturb::believed(leg, wrong)?, perturb::simulated(leg, wrong)?);
     let mut context = Context::<JOINTS, BASE>::new(&believed, &options)?;
     perturb::configure(&mut context, wrong)?;
-    let pair = drive(leg, &simulated, &context, &options)?.pair;
+    let pair = drive(leg, &simulated, &context, &options, &mut ())?.pair;
     let model = if blind {
         // Any result, from an estimate with equal weights: as without weights and verdict.
         let finding = pair.leg.identification();
@@ -80,7 +72,8 @@ fn judge(
     } else {
         pair.leg.control().model().copied()
     };
-    let error = model.map(|model| error_percent(&believed, &context, &pair.world, &model));
+    let anatomy = anatomy(&believed)?;
+    let error = model.map(|model| error_percent(&anatomy, &context, &pair.world, &model));
     let shares = pair.leg.identification().solver().map(|solver| solver.record().outliers.disturbed_share);
     let noticed = shares.is_some_and(|shares| shares.iter().any(|share| *share > NOTICED_SHARE));
     let harmless = error.is_some_and(|error| error <= HARMFUL_PERCENT);
@@ -108,14 +101,12 @@ fn refused(fault: &Fault, verdict: Option<Verdict>) -> &'static str {
 /// Error of a model's torque on the predicted motions against the present leg, in percent of the mean, for
 /// the worse joint. Rows with a nearly resting joint are excluded, since dry friction is undetermined there.
 fn error_percent(
-    believed: &LegFile,
+    anatomy: &[AnatomicalJoint<f64>; JOINTS],
     context: &Context<JOINTS, BASE>,
     world: &World<JOINTS>,
     model: &IdentifiedModel<JOINTS>,
 ) -> f64 {
     let (mut error, mut mean) = ([0.0; JOINTS], [0.0; JOINTS]);
-    let sign = |joint: usize| if believed.joints[joint].direction < 0 { -1.0 } else { 1.0 };
-    let zero = |joint: usize| believed.joints[joint].zero_offset_deg.to_radians();
     for motion in context.motions.validation {
         for tick in (0..motion.duration_ticks()).step_by(40) {
             let state = motion.state_at(tick);
@@ -123,14 +114,10 @@ fn error_percent(
             if qd.iter().any(|speed| speed.abs() < SLOW_RAD_PER_S) {
                 continue;
             }
-            let truth = world.inverse_dynamics(
-                &core::array::from_fn(|joint| sign(joint) * (f64::from(q[joint]) - zero(joint))),
-                &core::array::from_fn(|joint| sign(joint) * f64::from(qd[joint])),
-                &core::array::from_fn(|joint| sign(joint) * f64::from(qdd[joint])),
-            );
+            let truth = torque_at(anatomy, world, &state);
             let predicted = model.torques(&q, &qd, &qdd, context.gravity);
             for joint in 0..JOINTS {
-                error[joint] += (sign(joint) * f64::from(predicted[joint]) - truth[joint]).abs();
+                error[joint] += (anatomy[joint].from_chain(f64::from(predicted[joint])) - truth[joint]).abs();
                 mean[joint] += truth[joint].abs();
             }
         }
