@@ -49,7 +49,6 @@ const LARGEST_DIFFERENCE: f64 = 0.05;
 /// Result of one session on the image and on the host; pairs are hip and knee.
 #[derive(Clone, Debug, Serialize)]
 pub struct AssistComparison {
-    /// Mode.
     pub mode: &'static str,
     /// Interaction torque of the image, N m rms.
     pub image_rms_nm: [f64; 2],
@@ -57,11 +56,9 @@ pub struct AssistComparison {
     pub host_rms_nm: [f64; 2],
     /// Phases of the image's session in order, and of the host's.
     pub image_phases: Vec<String>,
-    /// Phases of the host's session in order.
     pub host_phases: Vec<String>,
     /// Share of the processor that the law takes in the session, 0..1.
     pub law_share: f64,
-    /// Ticks of the current loops that the image missed.
     pub missed_current_ticks: u32,
 }
 

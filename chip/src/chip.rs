@@ -81,11 +81,8 @@ const ANALOG: [(u32, Pin); 10] = [
 
 /// Contact of the emergency stop, closed while the leg may move.
 pub const STOP: Pin = ('C', 4);
-/// Enabling switch.
 pub const ENABLING: Pin = ('A', 2);
-/// Start button.
 pub const START: Pin = ('A', 3);
-/// Status light.
 pub const STATUS_LIGHT: Pin = ('B', 2);
 /// Fault line of both gate drivers, active low.
 pub const GATE_FAULT: Pin = ('D', 2);
@@ -93,11 +90,8 @@ pub const GATE_FAULT: Pin = ('D', 2);
 /// Conversion of an axis' shunts, for measurements of the sampling instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Axis.
     pub axis: usize,
-    /// Instant of the trigger, and of the hold.
     pub trigger: Ticks,
-    /// Instant of the hold.
     pub hold: Ticks,
     /// Middle of the lower zero vector: the counter's last zero.
     pub middle: Ticks,
@@ -144,31 +138,21 @@ impl LostTriggers {
 /// The chip and the board, except the processor core.
 #[derive(Clone, Debug)]
 pub struct Chip {
-    /// Present time.
     pub now: Ticks,
     /// Instant of the next event.
     pub due: Ticks,
     dues: [Ticks; SOURCES],
-    /// Interrupt controller.
     pub nvic: Nvic,
-    /// System control block.
     pub system: System,
-    /// Accesses that silicon would refuse.
     pub findings: Findings,
-    /// Use of the processor.
     pub load: Load,
-    /// Clocks and resets.
     pub rcc: Rcc,
-    /// Flash.
     pub flash: Flash,
-    /// Ports.
     pub gpio: Gpio,
-    /// External interrupts.
     pub exti: Exti,
     /// Timers, in the order of [`NAMES`].
     pub timers: [Timer; 6],
     outputs: [Outputs; JOINTS],
-    /// Converters.
     pub adcs: [Adc; adc::COUNT],
     common: adc::Common,
     spi: Spi,
@@ -176,17 +160,12 @@ pub struct Chip {
     pub drivers: Drivers,
     /// Absolute encoders of each axis, by select line.
     pub encoders: [[Encoder; 2]; JOINTS],
-    /// CAN controller and wire.
     pub can: Can,
-    /// Watchdog.
     pub iwdg: Iwdg,
-    /// Debug unit.
     pub debug: Debug,
-    /// Board and leg.
     pub plant: Plant,
     /// Event flag of WFE.
     pub event: bool,
-    /// A reset was requested.
     pub reset_request: Option<ResetReason>,
     /// Last conversions of both axes' shunts, if recorded.
     pub samplings: Option<Vec<Sampling>>,
@@ -275,7 +254,6 @@ impl Chip {
         }
     }
 
-    /// Stops the crystal.
     pub fn stop_crystal(&mut self) {
         self.advance_plant();
         if self.rcc.stop_crystal() {
@@ -754,12 +732,10 @@ impl Chip {
         (self.rcc.supply_v, self.flash.supply_v) = (volts, volts);
     }
 
-    /// Reads bytes of the flash.
     pub fn load_flash(&mut self, offset: u32, size: usize) -> u32 {
         self.flash.load(offset, size, &mut Access { now: self.now, findings: &mut self.findings })
     }
 
-    /// Programs the flash.
     pub fn program_flash(&mut self, offset: u32, size: usize, value: u32) {
         self.flash.store(offset, size, value, &mut Access { now: self.now, findings: &mut self.findings });
     }

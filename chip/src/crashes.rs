@@ -101,15 +101,12 @@ struct Seen {
 /// Result of a crash.
 #[derive(Clone, Debug, Serialize)]
 pub struct CrashReport {
-    /// Kind.
     pub kind: &'static str,
-    /// Situation.
     pub situation: &'static str,
     /// Time until both bridges were off, us; `None` if they stayed on.
     pub released_us: Option<f64>,
     /// Times of the first and the last store to the record, us.
     pub stored_us: Option<[f64; 2]>,
-    /// Time until the reset, us.
     pub reset_us: Option<f64>,
     /// Crash as the next start reports it.
     pub record: String,

@@ -61,13 +61,11 @@ const EXCEPTIONS: [u32; 70] = [
 /// Comparison of one promise with the model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Peripheral.
     pub peripheral: &'static str,
     /// Request to the driver.
     pub requested: String,
     /// Behaviour of the model.
     pub shown: String,
-    /// Whether both agree.
     pub agrees: bool,
     /// Reason for a permitted difference: the driver breaks its own promise on silicon too, or nothing was
     /// compared.
@@ -81,7 +79,6 @@ impl Row {
         self.agrees || self.reason.is_some()
     }
 
-    /// Verdict in words.
     #[must_use]
     pub fn verdict(&self) -> &'static str {
         if self.agrees { "equal" } else { self.reason.unwrap_or("DIFFERS") }

@@ -11,13 +11,10 @@ use serde::Serialize;
 /// One kind of harmless finding.
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
-    /// Text of the finding.
     pub what: &'static str,
-    /// Register.
     pub register: &'static str,
     /// Part of the function's name.
     pub function: &'static str,
-    /// Reason why it is harmless.
     pub reason: &'static str,
 }
 
@@ -52,9 +49,7 @@ pub struct Finding {
     pub register: String,
     /// Start of the basic block.
     pub pc: u32,
-    /// Function of the image.
     pub function: String,
-    /// Number of occurrences.
     pub count: u64,
 }
 
@@ -109,7 +104,6 @@ impl Findings {
         self.found.len()
     }
 
-    /// Whether there are no findings.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
@@ -119,9 +113,7 @@ impl Findings {
 /// Access to a register: its time, and the list of findings.
 #[derive(Debug)]
 pub struct Access<'a> {
-    /// Present time.
     pub now: crate::time::Ticks,
-    /// Findings of the run.
     pub findings: &'a mut Findings,
 }
 
@@ -140,7 +132,5 @@ impl Access<'_> {
     }
 }
 
-/// Text of findings about registers that the chip lacks.
 pub const NO_REGISTER: &str = "register does not exist on an STM32F405";
-/// Text of findings about functions that the model lacks.
 pub const NOT_MODELLED: &str = "not modelled";

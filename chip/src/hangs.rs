@@ -33,7 +33,6 @@ const FEEDING_MS: f64 = 4.0;
 /// Hang of one level.
 #[derive(Clone, Debug, Serialize)]
 pub struct HangReport {
-    /// Level.
     pub level: &'static str,
     /// Time until both bridges were off, ms; `None` if they stayed on.
     pub released_ms: Option<f64>,
@@ -58,9 +57,6 @@ impl HangReport {
 }
 
 /// Lets each level hang, from a saved machine that is enabled.
-///
-/// # Errors
-/// The model does not support an action of the processor.
 pub fn run(
     session: &mut Session,
     enabled: &Snapshot,

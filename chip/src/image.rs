@@ -25,7 +25,6 @@ struct Symbol {
 pub struct Image {
     /// Whole file, for the decoder of records.
     pub elf: Vec<u8>,
-    /// Content of the flash.
     pub flash: Vec<u8>,
     functions: Vec<Symbol>,
     objects: Vec<Symbol>,
@@ -105,7 +104,6 @@ impl Image {
         Self { elf: Vec::new(), flash, functions: Vec::new(), objects: Vec::new() }
     }
 
-    /// Word of the flash.
     #[must_use]
     pub fn word(&self, address: u32) -> Option<u32> {
         let at = address.checked_sub(FLASH)? as usize;

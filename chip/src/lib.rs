@@ -28,6 +28,7 @@
 //! | [`serve`] | the image on the simulated bus, for existing host software |
 //! | [`cli`] | the command line |
 
+#![expect(missing_docs, reason = "part of a program: names and units are stated where they are not obvious")]
 #![expect(
     clippy::disallowed_methods,
     reason = "the model runs on the host only and may use std's mathematics"

@@ -32,7 +32,6 @@ pub const LEVELS: [(&str, u8); 10] = [
 /// Use by one exception; 0 is the thread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Use {
-    /// Entries.
     pub entries: u64,
     /// Own time.
     pub ticks: Ticks,
@@ -57,9 +56,7 @@ struct Frame {
 /// Use of the processor since the last [`Load::clear`].
 #[derive(Clone, Debug)]
 pub struct Load {
-    /// Instructions so far.
     pub instructions: u64,
-    /// Time asleep.
     pub asleep: Ticks,
     /// Basic blocks so far.
     pub blocks: u64,
@@ -71,7 +68,6 @@ pub struct Load {
 }
 
 impl Load {
-    /// Without any use.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -130,7 +126,6 @@ impl Load {
         used.longest = used.longest.max(now - frame.begun);
     }
 
-    /// Adds a sleep.
     pub fn sleep(&mut self, duration: Ticks) {
         self.asleep += duration;
         // The thread sleeps; its own time does not include it.

@@ -113,7 +113,6 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// The saved chip.
     #[must_use]
     pub const fn chip(&self) -> &Chip {
         &self.chip
@@ -165,18 +164,15 @@ impl Machine {
         Ok(machine)
     }
 
-    /// The chip.
     #[must_use]
     pub fn chip(&self) -> &Chip {
         &self.core.get_data().chip
     }
 
-    /// The chip, mutable.
     pub fn chip_mut(&mut self) -> &mut Chip {
         &mut self.core.get_data_mut().chip
     }
 
-    /// The image.
     #[must_use]
     pub fn image(&self) -> &Rc<Image> {
         &self.core.get_data().image
@@ -217,12 +213,10 @@ impl Machine {
         self.core.get_data().watched.iter().map(|watched| watched.calls).collect()
     }
 
-    /// Reads memory of the chip.
     pub fn memory(&self, address: u32, bytes: &mut [u8]) -> bool {
         self.core.mem_read(address.into(), bytes).is_ok()
     }
 
-    /// Writes memory of the chip.
     pub fn set_memory(&mut self, address: u32, bytes: &[u8]) -> bool {
         self.core.mem_write(address.into(), bytes).is_ok()
     }
@@ -239,7 +233,6 @@ impl Machine {
         }
     }
 
-    /// Whether the processor sleeps.
     #[must_use]
     pub fn is_asleep(&self) -> bool {
         self.core.get_data().asleep
@@ -375,9 +368,6 @@ impl Machine {
     }
 
     /// Saves processor, peripherals and plant.
-    ///
-    /// # Errors
-    /// Unicorn cannot save its registers.
     pub fn save(&self) -> Result<Snapshot, ToolError> {
         let mut memory = vec![0; RAM_BYTES + CCM_BYTES];
         let (ram, ccm) = memory.split_at_mut(RAM_BYTES);

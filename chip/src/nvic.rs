@@ -8,13 +8,10 @@
 pub const EXCEPTIONS: usize = 16 + 82;
 /// Non-maskable interrupt.
 pub const NMI: u8 = 2;
-/// Hard fault.
 pub const HARD_FAULT: u8 = 3;
-/// Supervisor call.
 pub const SUPERVISOR_CALL: u8 = 11;
 /// Request for a system service (PendSV).
 pub const PENDING_SERVICE: u8 = 14;
-/// System timer.
 pub const SYSTEM_TICK: u8 = 15;
 /// Priority of the thread.
 pub const THREAD: i16 = 256;
@@ -143,7 +140,6 @@ impl Nvic {
         self.group_of(self.priority(exception)) < running
     }
 
-    /// Enters an exception.
     pub fn enter(&mut self, exception: u8) {
         self.pending &= !(1 << exception);
         self.active.push(exception);

@@ -79,18 +79,14 @@ pub struct EncoderFault {
 /// Main output of a bridge that was turned on or off at the pins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Switching {
-    /// Instant.
     pub at: Ticks,
-    /// Axis.
     pub axis: usize,
-    /// Whether it went on.
     pub on: bool,
 }
 
 /// Change of a bridge's pins: its time, and the edges of its references.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edges {
-    /// Instant.
     pub at: Ticks,
     /// Number of references that changed.
     pub count: u32,
@@ -128,7 +124,6 @@ pub struct Axis {
     pub pin_changes: Option<Vec<(Ticks, [Pins; 3])>>,
     /// Faults of shunts B and C.
     pub shunt_faults: [Option<ShuntFault>; 2],
-    /// Fault of the encoder.
     pub encoder_fault: EncoderFault,
     /// Outputs with a broken wire.
     pub open: [bool; 3],
@@ -345,7 +340,6 @@ pub type Bridge<'a> = (&'a Timer, &'a mut Outputs);
 /// Board and leg around the chip.
 #[derive(Clone, Debug)]
 pub struct Plant {
-    /// Axes with their motors.
     pub axes: [Axis; JOINTS],
     /// Bus of the bridges.
     pub supply: Supply,

@@ -23,7 +23,6 @@ pub struct LoadReport {
     pub total: f64,
     /// Current loops, index pulses and the emergency stop's contact.
     pub level0: f64,
-    /// Servo.
     pub servo: f64,
     /// Bus, both levels.
     pub bus: f64,
@@ -31,7 +30,6 @@ pub struct LoadReport {
     pub assist: f64,
     /// Housekeeping and its clock.
     pub housekeeping: f64,
-    /// Thread.
     pub thread: f64,
 }
 
@@ -55,9 +53,7 @@ pub struct InterruptReport {
 pub struct ChipReport {
     /// `accepted`, `refused`, or `none` without an identification.
     pub verdict: String,
-    /// Reasons for a refusal.
     pub reasons: Vec<String>,
-    /// Base parameters.
     pub base_parameters: Vec<BaseReport>,
     /// Error of each base parameter against the plant, over the sigma for the leg file's torque noise.
     pub errors: BTreeMap<String, f64>,
@@ -79,19 +75,15 @@ pub struct ChipReport {
     pub worst_instructions: BTreeMap<&'static str, u64>,
     /// Emergency stops at the end of the run; `None` if no bridge was on then.
     pub stop: Option<crate::stops::Situation>,
-    /// Resets.
     pub resets: Vec<String>,
     /// Deepest use of the stack, bytes, and its size.
     pub stack: [u32; 2],
     /// Records read and lost.
     pub records: [u64; 2],
-    /// Simulated time, s.
     pub simulated_s: f64,
-    /// Instructions executed.
     pub instructions: u64,
     /// Cycles per instruction.
     pub time_factor: f64,
-    /// Seed.
     pub seed: u64,
 }
 

@@ -19,11 +19,8 @@ use crate::time::{TICK_HZ, Ticks};
 /// Sampling of one axis in one situation.
 #[derive(Clone, Debug, Serialize)]
 pub struct SamplingReport {
-    /// Situation.
     pub situation: &'static str,
-    /// Axis.
     pub axis: usize,
-    /// Conversions.
     pub conversions: usize,
     /// Time from the middle of the lower zero vector to the trigger, ns: least and greatest.
     pub trigger_ns: [f64; 2],
@@ -53,7 +50,6 @@ const FEWEST: usize = 20;
 pub struct SweepStep {
     /// Lower end, V.
     pub from_v: u32,
-    /// Conversions.
     pub conversions: usize,
     /// Conversions with an edge of the other bridge within 1.2 us before the hold.
     pub disturbed: usize,
@@ -62,13 +58,11 @@ pub struct SweepStep {
 /// Sweep over the other bridge's voltage.
 #[derive(Clone, Debug, Serialize)]
 pub struct SweepReport {
-    /// Bus voltage, V.
     pub bus_v: f64,
     /// Steps of a volt.
     pub steps: Vec<SweepStep>,
     /// Voltage up to which no conversion was disturbed, V.
     pub clean_v: f64,
-    /// Largest voltage, V.
     pub highest_v: f64,
     /// Share of disturbed conversions above the documented voltage.
     pub share_above: f64,
@@ -126,9 +120,6 @@ impl Report {
 }
 
 /// Measures at rest, in motion and over the voltage, from a session whose drive is enabled.
-///
-/// # Errors
-/// The model does not know what the processor does.
 pub fn run(session: &mut Session) -> Result<Report, ToolError> {
     let resting = session.save()?;
     let mut situations = measure(session, "rest", 0.5)?;

@@ -67,13 +67,9 @@ pub enum Step {
 
 /// Image, board, leg and operator.
 pub struct Session {
-    /// The microcontroller.
     pub machine: Machine,
-    /// The probe.
     pub probe: Probe,
-    /// The leg.
     pub leg: LegFile,
-    /// Resets so far.
     pub resets: Vec<ResetReason>,
     /// Whether records of the timeline are printed when they arrive.
     pub prints: bool,
@@ -145,24 +141,17 @@ impl Session {
         })
     }
 
-    /// Present time.
     #[must_use]
     pub fn now(&self) -> Ticks {
         self.machine.chip().now
     }
 
     /// Runs for a time, s.
-    ///
-    /// # Errors
-    /// The model does not support an action of the processor.
     pub fn run(&mut self, duration: f64) -> Result<(), ToolError> {
         self.run_until(self.now() + ticks(duration))
     }
 
     /// Runs until an instant.
-    ///
-    /// # Errors
-    /// The model does not support an action of the processor.
     pub fn run_until(&mut self, end: Ticks) -> Result<(), ToolError> {
         while self.now() < end {
             let next = end.min(self.now() + ticks(POLL_S));
@@ -225,9 +214,6 @@ impl Session {
     }
 
     /// Presses the start button for 0.1 s.
-    ///
-    /// # Errors
-    /// The model does not support an action of the processor.
     pub fn press_start(&mut self) -> Result<(), ToolError> {
         self.set(START, true);
         self.run(0.1)?;
@@ -627,9 +613,6 @@ impl Session {
     }
 
     /// Saves the machine.
-    ///
-    /// # Errors
-    /// Unicorn cannot save its registers.
     pub fn save(&self) -> Result<Snapshot, ToolError> {
         self.machine.save()
     }

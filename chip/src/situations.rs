@@ -53,11 +53,8 @@ pub(crate) const OTHER: u16 = 0x5FF;
 /// Load in one situation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Situation {
-    /// Situation.
     pub name: &'static str,
-    /// Shares of the processor's time.
     pub load: LoadReport,
-    /// Use by interrupt.
     pub interrupts: BTreeMap<&'static str, InterruptReport>,
     /// Calls of the identification's functions.
     pub calls: BTreeMap<&'static str, CallReport>,
@@ -69,11 +66,8 @@ pub struct Situation {
 /// Calls of one function, with the functions that it calls.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CallReport {
-    /// Number of calls.
     pub count: u64,
-    /// Mean instructions of a call.
     pub mean_instructions: f64,
-    /// Most instructions of a call.
     pub worst_instructions: u64,
     /// Instructions of all calls at 8 ns each, s.
     pub seconds: f64,

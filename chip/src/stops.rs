@@ -24,7 +24,6 @@ const PHASES: u32 = 20;
 /// Stops in one situation.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Situation {
-    /// Situation.
     pub name: &'static str,
     /// Phases at which the contact opened.
     pub phases: u32,
@@ -47,7 +46,6 @@ pub struct Situation {
 /// Stops in all situations.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StopReport {
-    /// Situations.
     pub situations: Vec<Situation>,
     /// Cycles per instruction.
     pub time_factor: f64,
@@ -71,9 +69,6 @@ impl Situation {
 }
 
 /// Runs some stops from the end of a run, and returns to it; `None` if no bridge is on.
-///
-/// # Errors
-/// The model does not know what the processor does.
 pub fn at_end(session: &mut Session) -> Result<Option<Situation>, ToolError> {
     if !session.machine.chip().plant.axes.iter().any(|axis| axis.is_armed()) {
         return Ok(None);

@@ -36,7 +36,6 @@ pub struct SaveReport {
 /// Result of all cuts.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CutReport {
-    /// Saves.
     pub saves: Vec<SaveReport>,
     /// Cuts within an erase.
     pub erasures: u32,

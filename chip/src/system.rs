@@ -29,7 +29,6 @@ pub struct System {
     control: u32,
     /// Configurable fault status, hard fault status, address of a bus fault.
     pub faults: [u32; 2],
-    /// Address of the last bus fault.
     pub fault_address: u32,
     coprocessors: u32,
     floating_point: [u32; 3],

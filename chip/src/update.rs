@@ -54,11 +54,9 @@ pub struct Trial {
 pub struct UpdateReport {
     /// Bytes of the image.
     pub bytes: usize,
-    /// Time of the download, s.
     pub download_s: f64,
     /// Time from the start command to the boot-up message of the new image, s.
     pub restart_s: f64,
-    /// Trials in their order.
     pub trials: Vec<Trial>,
 }
 
@@ -69,7 +67,6 @@ impl UpdateReport {
         self.trials.iter().filter(|trial| !trial.passes).count()
     }
 
-    /// Formats the result.
     #[must_use]
     pub fn text(&self) -> String {
         let mut text = format!(

@@ -111,9 +111,7 @@ impl Row {
 pub struct RowReport {
     /// Number in the catalogue.
     pub id: &'static str,
-    /// Fault.
     pub fault: &'static str,
-    /// Runs.
     pub runs: u32,
     /// Runs without the expected reaction in time.
     pub missed: u32,
@@ -121,7 +119,6 @@ pub struct RowReport {
     pub deadline_ms: f64,
     /// Slowest reaction, ms.
     pub worst_ms: f64,
-    /// What went wrong.
     pub complaints: Vec<String>,
 }
 

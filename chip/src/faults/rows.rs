@@ -57,7 +57,6 @@ const fn own(fault: &'static Fault, run: OwnRun) -> Row {
     Row { fault, case: None, within_s: None, run: Run::Own(run) }
 }
 
-/// All rows.
 pub(super) const ROWS: &[Row] = &[
     injected(&catalogue::E1, Situation::Motion, Expected::Shorted, |chip, random| {
         let (axis, now) = (axis(random), chip.now);

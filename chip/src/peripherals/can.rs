@@ -380,7 +380,6 @@ impl Can {
         }
     }
 
-    /// Reads a register.
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         match offset {
             0x00 => self.mcr,
@@ -412,7 +411,6 @@ impl Can {
         }
     }
 
-    /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32, access: &mut Access<'_>) {
         match offset {
             0x00 => self.write_control(access.implemented(value, 0x1_80FF, "CAN_MCR"), access),

@@ -8,7 +8,6 @@ use crate::time::Ticks;
 
 /// Address of the system memory that is readable: one-time programmable memory, unique number, flash size.
 pub const SYSTEM_MEMORY: u32 = 0x1FFF_0000;
-/// Size of that memory.
 pub const SYSTEM_BYTES: usize = 0x8000;
 
 /// Content of the system memory of an ODrive of this version (major, minor, voltage).
@@ -101,7 +100,6 @@ impl Debug {
         self.counts = counts.unwrap_or(self.counts);
     }
 
-    /// Sets the cycle counter.
     pub fn set_cycles(&mut self, count: u32, now: Ticks) {
         (self.count, self.since) = (count, now);
     }

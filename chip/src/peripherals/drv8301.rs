@@ -38,7 +38,6 @@ pub struct Drivers {
     disabled_at: Ticks,
     /// End of the last frame's selection.
     released: Ticks,
-    /// Frames of each driver.
     pub frames: [u64; 2],
     /// Whether a driver has lost its supply: it answers with zeros.
     pub silent: [bool; 2],

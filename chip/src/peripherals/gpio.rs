@@ -8,13 +8,10 @@ const PORTS: usize = 9;
 /// Mode of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Digital input.
     Input,
-    /// Digital output.
     Output,
     /// Alternate function, by number.
     Alternate(u32),
-    /// Analog.
     Analog,
 }
 

@@ -75,7 +75,6 @@ impl Iwdg {
         (self.count, self.since) = (self.reload.into(), now);
     }
 
-    /// Reads a register.
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         let busy = self.busy.map(|until| access.now < until);
         if matches!((offset, busy), (4, [true, _]) | (8, [_, true])) {
@@ -93,7 +92,6 @@ impl Iwdg {
         }
     }
 
-    /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32, access: &mut Access<'_>) {
         let now = access.now;
         match (offset, value) {

@@ -44,11 +44,8 @@ const STORED: [(u32, &str, u32, u32); 15] = [
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum ResetReason {
-    /// Power-on.
     PowerOn = 1 << 27 | 1 << 25,
-    /// Reset pin.
     Pin = 0,
-    /// Software.
     Software = 1 << 28,
     /// Independent watchdog.
     Watchdog = 1 << 29,
@@ -71,7 +68,6 @@ pub struct Rcc {
     crystal_ready: Ticks,
     pll_ready: Ticks,
     slow_ready: Ticks,
-    /// Whether the crystal oscillates.
     pub crystal_works: bool,
     /// Processor clock, Hz.
     system_hz: u64,
@@ -119,7 +115,6 @@ impl Rcc {
         TICK_HZ / self.processor_hz()
     }
 
-    /// Processor clock, Hz.
     #[must_use]
     pub fn processor_hz(&self) -> u64 {
         let divider = match self.configuration >> 4 & 0xF {
@@ -180,7 +175,6 @@ impl Rcc {
         watched
     }
 
-    /// Reads a register.
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         let ready = |at: Ticks| u32::from(access.now >= at);
         match offset {

@@ -48,7 +48,6 @@ impl Spi {
         }
     }
 
-    /// Reads a register.
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         self.settle(access.now);
         match offset {

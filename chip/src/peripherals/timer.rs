@@ -166,7 +166,6 @@ impl Timer {
         }
     }
 
-    /// Whether the counter runs.
     #[must_use]
     pub fn runs(&self) -> bool {
         self.cr1 & 1 == 1
