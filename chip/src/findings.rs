@@ -8,36 +8,26 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// One kind of harmless finding.
-#[derive(Clone, Copy, Debug)]
-pub struct Known {
-    pub what: &'static str,
-    pub register: &'static str,
-    /// Part of the function's name.
-    pub function: &'static str,
-    pub reason: &'static str,
-}
-
-/// Findings that are known and harmless.
-pub const KNOWN: [Known; 3] = [
-    Known {
-        what: "register does not exist on an STM32F405",
-        register: "RCC+0x8c",
-        function: "",
-        reason: "embassy_stm32::init writes RCC_DCKCFGR of larger parts of the family; an F405 ignores the write",
-    },
-    Known {
-        what: "reserved bit set",
-        register: "PWR_CR",
-        function: "",
-        reason: "embassy_stm32::init writes a voltage scale of two bits; an F405 has the lower one, which is right",
-    },
-    Known {
-        what: "not modelled",
-        register: "0xe000ef50",
-        function: "embassy_boot_stm32::BootLoader",
-        reason: "embassy_boot_stm32 invalidates the instruction cache of larger processors; a Cortex-M4 has none (ICIALLU)",
-    },
+/// Harmless findings: violated rule, register, part of the function's name, and the reason.
+const KNOWN: [(&str, &str, &str, &str); 3] = [
+    (
+        NO_REGISTER,
+        "RCC+0x8c",
+        "",
+        "embassy_stm32::init writes RCC_DCKCFGR of larger parts of the family; an F405 ignores the write",
+    ),
+    (
+        RESERVED,
+        "PWR_CR",
+        "",
+        "embassy_stm32::init writes a voltage scale of two bits; an F405 has the lower one, which is right",
+    ),
+    (
+        NOT_MODELLED,
+        "0xe000ef50",
+        "embassy_boot_stm32::BootLoader",
+        "embassy_boot_stm32 invalidates the instruction cache of larger processors; a Cortex-M4 has none (ICIALLU)",
+    ),
 ];
 
 /// Finding with its location in the image.
@@ -57,12 +47,10 @@ impl Finding {
     /// Reason why a finding is harmless, if known.
     #[must_use]
     pub fn known(&self) -> Option<&'static str> {
-        let same = |known: &&Known| {
-            known.what == self.what
-                && known.register == self.register
-                && self.function.contains(known.function)
+        let is_same = |(what, register, function, _): &(&str, &str, &str, &str)| {
+            (*what, *register) == (self.what, self.register.as_str()) && self.function.contains(function)
         };
-        KNOWN.iter().find(same).map(|known| known.reason)
+        KNOWN.into_iter().find(is_same).map(|(.., reason)| reason)
     }
 }
 
@@ -123,10 +111,16 @@ impl Access<'_> {
         self.findings.add(what, register);
     }
 
+    /// Reports a read of a register that the chip lacks; the value is 0.
+    pub fn no_register(&mut self, register: impl Into<String>) -> u32 {
+        self.refuse(NO_REGISTER, register);
+        0
+    }
+
     /// Reports reserved bits that a write sets, and returns the value without them.
     pub fn implemented(&mut self, value: u32, mask: u32, register: &str) -> u32 {
         if value & !mask != 0 {
-            self.refuse("reserved bit set", register);
+            self.refuse(RESERVED, register);
         }
         value & mask
     }
@@ -134,3 +128,4 @@ impl Access<'_> {
 
 pub const NO_REGISTER: &str = "register does not exist on an STM32F405";
 pub const NOT_MODELLED: &str = "not modelled";
+const RESERVED: &str = "reserved bit set";

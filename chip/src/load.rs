@@ -54,12 +54,10 @@ struct Frame {
 }
 
 /// Use of the processor since the last [`Load::clear`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Load {
     pub instructions: u64,
     pub asleep: Ticks,
-    /// Basic blocks so far.
-    pub blocks: u64,
     uses: Vec<Use>,
     frames: Vec<Frame>,
     since: Ticks,
@@ -70,16 +68,7 @@ pub struct Load {
 impl Load {
     #[must_use]
     pub fn new() -> Self {
-        Self {
-            instructions: 0,
-            asleep: 0,
-            blocks: 0,
-            uses: vec![Use::default(); EXCEPTIONS],
-            frames: Vec::new(),
-            since: 0,
-            counted: 0,
-            cleared: 0,
-        }
+        Self { uses: vec![Use::default(); EXCEPTIONS], ..Self::default() }
     }
 
     /// Starts a new measurement; exceptions in progress continue.
@@ -154,12 +143,6 @@ impl Load {
     #[must_use]
     pub fn awake(&self, now: Ticks) -> f64 {
         1.0 - self.asleep as f64 / (now - self.cleared).max(1) as f64
-    }
-}
-
-impl Default for Load {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

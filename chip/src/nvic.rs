@@ -27,8 +27,8 @@ pub struct Nvic {
     priorities: Vec<u8>,
     /// Instant at which each exception became pending, and worst latency to its entry.
     pub pended: Vec<u64>,
-    /// Bits of the priority that are a group (AIRCR PRIGROUP).
-    group: u32,
+    /// Split of a priority into group and sub-priority (AIRCR PRIGROUP): 0 to 7.
+    pub group: u32,
 }
 
 impl Nvic {
@@ -226,11 +226,6 @@ impl Nvic {
                 *priority = (value >> (8 * byte)) as u8 & 0xF0;
             }
         }
-    }
-
-    /// Sets the split of a priority into group and sub-priority (AIRCR PRIGROUP).
-    pub fn set_group(&mut self, group: u32) {
-        self.group = group.min(7);
     }
 }
 

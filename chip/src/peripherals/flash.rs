@@ -151,10 +151,7 @@ impl Flash {
             0x10 => self.control,
             0x14 => self.options,
             0x04 | 0x08 => 0,
-            _ => {
-                access.refuse(NO_REGISTER, format!("FLASH+{offset:#x}"));
-                0
-            }
+            _ => access.no_register(format!("FLASH+{offset:#x}")),
         }
     }
 
