@@ -167,7 +167,8 @@ pub(super) const ROWS: &[Row] = &[
     })
     .case("controller goes bus-off while the operator has control"),
     own(&catalogue::K4, memory::crash).case("panic, hard fault, unhandled interrupt in motion"),
-    injected(&catalogue::K5, Situation::Motion, Expected::Released, |chip, _| chip.stop_crystal()),
+    injected(&catalogue::K5, Situation::Motion, Expected::Released, |chip, _| chip.stop_crystal())
+        .within(50e-6),
     own(&catalogue::B6, bus::taken_over),
     own(&catalogue::B7, random_sessions::played),
     own(&catalogue::B3, bus::hostile).within(JITTER_S),
