@@ -4,8 +4,6 @@
 //! identifications. The motors are calibrated free of their gears, the leg is put on its wearer while the
 //! drive holds it, and the start button begins and ends the session (table `assist` of the leg file).
 
-use std::rc::Rc;
-
 use hal_sim::wearer::WearerTruth;
 use hal_sim::wearer::motion::IntendedMotion;
 use hal_sim::wearer::muscles::Intention;
@@ -20,17 +18,15 @@ use scarab_identify::leg::exercise::{Exercise, hip_and_knee};
 use scarab_identify::leg::two_bodies::MuscleTone;
 use scarab_rig::assist::study::Mode;
 use scarab_rig::assist::subject::{Cuffs, Subject};
-use scarab_rig::image::build;
 use scarab_rig::options::{DriveModel, SimulationOptions};
 use scarab_rig::pair::{Context, Pair};
 use scarab_rig::parameter_file::memory::Memory;
 use serde::Serialize;
 
 use crate::image::Image;
-use crate::machine::Options;
 use crate::plant::JOINTS;
 use crate::rtt::field;
-use crate::session::{Session, Step};
+use crate::session::Session;
 
 /// Strides per second of the wearer.
 const CADENCE_HZ: f64 = 0.8;
@@ -49,7 +45,6 @@ const LARGEST_DIFFERENCE: f64 = 0.05;
 /// Result of one session on the image and on the host; pairs are hip and knee.
 #[derive(Clone, Debug, Serialize)]
 pub struct AssistComparison {
-    /// Mode.
     pub mode: &'static str,
     /// Interaction torque of the image, N m rms.
     pub image_rms_nm: [f64; 2],
@@ -57,11 +52,9 @@ pub struct AssistComparison {
     pub host_rms_nm: [f64; 2],
     /// Phases of the image's session in order, and of the host's.
     pub image_phases: Vec<String>,
-    /// Phases of the host's session in order.
     pub host_phases: Vec<String>,
     /// Share of the processor that the law takes in the session, 0..1.
     pub law_share: f64,
-    /// Ticks of the current loops that the image missed.
     pub missed_current_ticks: u32,
 }
 
@@ -105,7 +98,7 @@ struct Subjected {
     motion: IntendedMotion,
 }
 
-/// Runs one session on the image and on the host.
+/// Runs one session on the image, at `factor` cycles per instruction, and on the host.
 ///
 /// # Errors
 /// The leg has no wearer, the image cannot be built, or a session does not begin.
@@ -114,7 +107,7 @@ pub fn compare(
     mode: Mode,
     cuffs: &Cuffs,
     seed: u64,
-    options: &Options,
+    factor: f64,
 ) -> Result<AssistComparison, ToolError> {
     let subject = Subject::<BASE>::identify(leg, cuffs, seed)?
         .map_err(|refused| leg.error(format!("model `{}` refused: {:?}", refused.model, refused.reasons)))?;
@@ -124,11 +117,8 @@ pub fn compare(
     let motion = Exercise::Gait(CADENCE_HZ).intended(joints, seed);
     let wearer = cuffs.on(&subject.bodies.wearer(MuscleTone::Firm));
     let subjected = Subjected { subject, exoskeleton, shares, wearer, motion };
-    let (host_rms_nm, host_phases) = subjected.on_host(seed)?;
-    let mut comparison = subjected.on_image(seed, options)?;
-    (comparison.mode, comparison.host_rms_nm, comparison.host_phases) =
-        (mode.name(), host_rms_nm, host_phases);
-    Ok(comparison)
+    let host = subjected.on_host(seed)?;
+    subjected.on_image(mode, host, seed, factor)
 }
 
 impl Subjected {
@@ -199,18 +189,17 @@ impl Subjected {
         Ok((mean.rms(), phases))
     }
 
-    fn on_image(&self, seed: u64, options: &Options) -> Result<AssistComparison, ToolError> {
-        let build = build::Options {
-            leg: self.exoskeleton.clone(),
-            log: false,
-            brake_resistor: true,
-            status_light: self.exoskeleton.brake.is_none(),
-            board_volts: None,
-        };
-        let image: Rc<Image> = Image::load(&build::build(&build)?.image)?;
-        let mut session = Session::new(&image, &self.exoskeleton, options, seed)?;
+    fn on_image(
+        &self,
+        mode: Mode,
+        (host_rms_nm, host_phases): ([f64; 2], Vec<String>),
+        seed: u64,
+        factor: f64,
+    ) -> Result<AssistComparison, ToolError> {
+        let image = Image::build(&self.exoskeleton)?;
+        let mut session = Session::new(&image, &self.exoskeleton, factor, seed)?;
         session.prints = true;
-        let mut memory = Memory::new(Some(session.machine.chip_mut().flash.parameters_mut()));
+        let mut memory = Memory::new(Some(session.chip_mut().flash.parameters_mut()));
         let [empty, worn] = self.models()?;
         let off = DriveState::SwitchOnDisabled;
         let is_stored = memory.keep_any(off, &self.record(&empty, false))
@@ -218,12 +207,10 @@ impl Subjected {
         if !is_stored {
             return Err(self.error("the models do not fit the image's flash"));
         }
-        session.machine.chip_mut().flash.parameters_mut().copy_from_slice(memory.bytes());
+        session.chip_mut().flash.parameters_mut().copy_from_slice(memory.bytes());
         session.boot()?;
-        for step in [Step::Calibrate, Step::Reference, Step::Enable] {
-            session.step(step)?;
-        }
-        let worn = session.machine.chip_mut().plant.wear(&self.wearer);
+        session.enable_drive()?;
+        let worn = session.chip_mut().plant.wear(&self.wearer);
         worn.map_err(|error| self.error(error.to_string()))?;
         session.run(0.5)?;
         session.begin_measurement();
@@ -231,17 +218,17 @@ impl Subjected {
         session.press_start()?;
         session.wait("state", &["activity=assist", "phase=run"], FADE_S)?;
         session.run(0.4)?;
-        let intended = session.machine.chip_mut().plant.intend(Intention::Follow(self.motion));
+        let intended = session.chip_mut().plant.intend(Intention::Follow(self.motion));
         intended.map_err(|error| self.error(error.to_string()))?;
         session.run(SETTLING_S)?;
         let mut mean = Mean::default();
         for _ in 0..(MEASURED_S / SAMPLE_S) as u32 {
             session.run(SAMPLE_S)?;
-            if let Some(truth) = session.machine.chip().plant.wearer_truth() {
+            if let Some(truth) = session.chip().plant.wearer_truth() {
                 mean.take(&truth);
             }
         }
-        let report = crate::report::ChipReport::new(&mut session, false, options.time_factor, seed)?;
+        let report = crate::report::ChipReport::new(&mut session, false, factor, seed)?;
         session.press_start()?;
         session.wait("state", &["activity=idle"], FADE_S)?;
         let phases = session.probe.lines.iter().skip(from).filter_map(|(_, line)| {
@@ -249,11 +236,11 @@ impl Subjected {
             is_assist.then(|| field(line, "phase").unwrap_or("-").to_owned())
         });
         Ok(AssistComparison {
-            mode: "",
+            mode: mode.name(),
             image_rms_nm: mean.rms(),
-            host_rms_nm: [f64::NAN; 2],
+            host_rms_nm,
             image_phases: phases.collect(),
-            host_phases: Vec::new(),
+            host_phases,
             law_share: report.load.assist,
             missed_current_ticks: report.missed_current_ticks,
         })

@@ -15,7 +15,7 @@ use crate::peripherals::exti::Exti;
 use crate::peripherals::flash::Flash;
 use crate::peripherals::gpio::{Gpio, Mode, Pin};
 use crate::peripherals::iwdg::Iwdg;
-use crate::peripherals::pwm::{Outputs, Pins};
+use crate::peripherals::pwm::Outputs;
 use crate::peripherals::rcc::{Rcc, ResetReason};
 use crate::peripherals::spi::Spi;
 use crate::peripherals::timer::{Event, Kind, NAMES, Timer};
@@ -62,6 +62,8 @@ const SPI_PINS: [Pin; 3] = [('C', 10), ('C', 11), ('C', 12)];
 const SELECTS: [Pin; 2] = [('C', 13), ('C', 14)];
 /// Select lines of absolute encoders: an axis' first on GPIO7 or GPIO8, its second on the index input.
 const ENCODER_SELECTS: [[Pin; 2]; JOINTS] = [[('A', 15), ('C', 9)], [('B', 3), ('C', 15)]];
+/// Axis and number of every such line.
+const LINES: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
 const GATE_ENABLE: Pin = ('B', 12);
 const CAN_PINS: [Pin; 2] = [('B', 8), ('B', 9)];
 const CHOPPER_PIN: Pin = ('B', 11);
@@ -81,11 +83,8 @@ const ANALOG: [(u32, Pin); 10] = [
 
 /// Contact of the emergency stop, closed while the leg may move.
 pub const STOP: Pin = ('C', 4);
-/// Enabling switch.
 pub const ENABLING: Pin = ('A', 2);
-/// Start button.
 pub const START: Pin = ('A', 3);
-/// Status light.
 pub const STATUS_LIGHT: Pin = ('B', 2);
 /// Fault line of both gate drivers, active low.
 pub const GATE_FAULT: Pin = ('D', 2);
@@ -93,11 +92,8 @@ pub const GATE_FAULT: Pin = ('D', 2);
 /// Conversion of an axis' shunts, for measurements of the sampling instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Axis.
     pub axis: usize,
-    /// Instant of the trigger, and of the hold.
     pub trigger: Ticks,
-    /// Instant of the hold.
     pub hold: Ticks,
     /// Middle of the lower zero vector: the counter's last zero.
     pub middle: Ticks,
@@ -144,31 +140,21 @@ impl LostTriggers {
 /// The chip and the board, except the processor core.
 #[derive(Clone, Debug)]
 pub struct Chip {
-    /// Present time.
     pub now: Ticks,
     /// Instant of the next event.
     pub due: Ticks,
     dues: [Ticks; SOURCES],
-    /// Interrupt controller.
     pub nvic: Nvic,
-    /// System control block.
     pub system: System,
-    /// Accesses that silicon would refuse.
     pub findings: Findings,
-    /// Use of the processor.
     pub load: Load,
-    /// Clocks and resets.
     pub rcc: Rcc,
-    /// Flash.
     pub flash: Flash,
-    /// Ports.
     pub gpio: Gpio,
-    /// External interrupts.
     pub exti: Exti,
     /// Timers, in the order of [`NAMES`].
     pub timers: [Timer; 6],
     outputs: [Outputs; JOINTS],
-    /// Converters.
     pub adcs: [Adc; adc::COUNT],
     common: adc::Common,
     spi: Spi,
@@ -176,17 +162,12 @@ pub struct Chip {
     pub drivers: Drivers,
     /// Absolute encoders of each axis, by select line.
     pub encoders: [[Encoder; 2]; JOINTS],
-    /// CAN controller and wire.
     pub can: Can,
-    /// Watchdog.
     pub iwdg: Iwdg,
-    /// Debug unit.
     pub debug: Debug,
-    /// Board and leg.
     pub plant: Plant,
     /// Event flag of WFE.
     pub event: bool,
-    /// A reset was requested.
     pub reset_request: Option<ResetReason>,
     /// Last conversions of both axes' shunts, if recorded.
     pub samplings: Option<Vec<Sampling>>,
@@ -221,8 +202,8 @@ impl Chip {
             gpio: Gpio::new(),
             exti: Exti::default(),
             timers: core::array::from_fn(|index| Timer::new(NAMES[index], kinds[index])),
-            outputs: [Outputs::default(), Outputs::default()],
-            adcs: [Adc::default(), Adc::default(), Adc::default()],
+            outputs: Default::default(),
+            adcs: Default::default(),
             common: adc::Common::default(),
             spi: Spi::default(),
             drivers: Drivers::default(),
@@ -254,7 +235,7 @@ impl Chip {
         self.flash.reset();
         self.gpio.reset();
         self.timers.iter_mut().for_each(Timer::reset);
-        self.adcs = [Adc::default(), Adc::default(), Adc::default()];
+        self.adcs = Default::default();
         (self.common, self.spi) = (adc::Common::default(), Spi::default());
         (self.exti, self.system, self.nvic) = (Exti::default(), System::default(), Nvic::new());
         self.can.reset();
@@ -275,7 +256,6 @@ impl Chip {
         }
     }
 
-    /// Stops the crystal.
     pub fn stop_crystal(&mut self) {
         self.advance_plant();
         if self.rcc.stop_crystal() {
@@ -397,7 +377,7 @@ impl Chip {
         let window = crate::time::ticks(1.2e-6);
         let (edges, _) = self.plant.axes[1 - axis].edges_within(window, self.now);
         let duties = [0, 1, 2].map(|channel| self.timers[1 - axis].duty(channel));
-        let is_on = self.plant.axes[1 - axis].is_armed();
+        let is_on = self.plant.axes[1 - axis].is_armed;
         let other_v = if is_on { self.plant.supply.voltage() * amplitude(duties) } else { 0.0 };
         samplings.push(Sampling {
             axis,
@@ -468,20 +448,19 @@ impl Chip {
         for (index, timer) in self.timers.iter_mut().enumerate() {
             timer.set_clock(self.rcc.timer_cycle(if index < JOINTS { 2 } else { 1 }), self.now);
         }
-        self.can.set_clock(self.rcc.bus_hz(1));
+        self.can.bus_hz = self.rcc.bus_hz(1);
         self.debug.set_cycle(self.rcc.cycle(), self.now);
         (0..SOURCES).for_each(|source| self.update(source));
     }
 
     fn follow_pins(&mut self) {
         for (outputs, (pins, function)) in self.outputs.iter_mut().zip(BRIDGE_PINS) {
-            let connected: [Pins; 3] =
+            outputs.connected =
                 pins.map(|pins| pins.map(|pin| self.gpio.mode(pin) == Mode::Alternate(function)));
-            outputs.connect(connected);
         }
         let access = &mut Access { now: self.now, findings: &mut self.findings };
         self.drivers.set_enabled(self.gpio.is_driven_high(GATE_ENABLE), access);
-        self.plant.set_gates(self.drivers.drive());
+        self.plant.gates = self.drivers.drive();
     }
 
     fn is_selected(&self, pin: Pin) -> bool {
@@ -494,8 +473,7 @@ impl Chip {
 
     /// Axis and line of the selected encoder.
     fn selected_encoder(&self) -> Option<(usize, usize)> {
-        let lines = (0..JOINTS).flat_map(|axis| [(axis, 0), (axis, 1)]);
-        lines.into_iter().find(|(axis, line)| {
+        LINES.into_iter().find(|(axis, line)| {
             self.plant.encoder_at(*axis, *line).is_some() && self.is_selected(ENCODER_SELECTS[*axis][*line])
         })
     }
@@ -596,23 +574,13 @@ impl Chip {
             return self.write_timer(index, address & 0x3FF, value);
         }
         let offset = address & 0x3FF;
-        match address & !0x3FF {
-            0x4001_2000 => self.write_adc(offset, value),
-            0x4002_0000..0x4002_2400 => self.write_gpio(address - 0x4002_0000, value),
-            0x4002_3800 => self.write_rcc(offset, value),
-            0x4000_3C00 => self.write_spi(offset, value, size),
-            _ => self.write_simple(address, value),
-        }
-    }
-
-    fn write_simple(&mut self, address: u32, value: u32) {
-        let offset = address & 0x3FF;
         let access = &mut Access { now: self.now, findings: &mut self.findings };
         match address & !0x3FF {
             0x4000_3000 => {
                 self.iwdg.write(offset, value, access);
                 self.update(WATCHDOG);
             }
+            0x4000_3C00 => self.write_spi(offset, value, size),
             0x4000_6400 => {
                 self.can.write(offset, value, access);
                 if CAN_PINS.iter().any(|pin| self.gpio.mode(*pin) != Mode::Alternate(9)) {
@@ -622,11 +590,14 @@ impl Chip {
                 self.update(CAN);
             }
             0x4000_7000 => self.rcc.write_power(offset, value, access),
+            0x4001_2000 => self.write_adc(offset, value),
             0x4001_3800 => self.exti.write_selection(offset, value, access),
             0x4001_3C00 => {
                 self.exti.write(offset, value, access);
                 self.update_exti();
             }
+            0x4002_0000..0x4002_2400 => self.write_gpio(address - 0x4002_0000, value),
+            0x4002_3800 => self.write_rcc(offset, value),
             0x4002_3C00 => self.flash.write(offset, value, access),
             _ => access.refuse(NOT_MODELLED, format!("{address:#010x}")),
         }
@@ -676,13 +647,13 @@ impl Chip {
             if self.spi.is_busy(self.now) {
                 self.findings.add("gate driver deselected while a frame is on the wire", "GPIOC_BSRR");
             }
-            self.drivers.release(self.now);
+            self.drivers.released = self.now;
         }
         if let Some((axis, line)) = encoder.filter(|_| self.selected_encoder().is_none()) {
             if self.spi.is_busy(self.now) {
                 self.findings.add("encoder deselected while a frame is on the wire", "GPIO_BSRR");
             }
-            self.encoders[axis][line].release(self.now);
+            self.encoders[axis][line].released = self.now;
         }
         if changes_outputs {
             self.follow_pins();
@@ -732,8 +703,7 @@ impl Chip {
             self.findings.add("frame sent while the pins are not connected", "SPI3_DR");
             return self.spi.answer(u16::MAX);
         }
-        let lines = (0..JOINTS).flat_map(|axis| [(axis, 0), (axis, 1)]);
-        let encoders = lines.filter(|(axis, line)| self.plant.encoder_at(*axis, *line).is_some());
+        let encoders = LINES.into_iter().filter(|(axis, line)| self.plant.encoder_at(*axis, *line).is_some());
         let mut selects = encoders.map(|(axis, line)| ENCODER_SELECTS[axis][line]).chain(SELECTS);
         if selects.any(|pin| self.gpio.is_floating(pin)) {
             self.findings.add("frame sent while a device's select line floats", "SPI3_DR");
@@ -754,14 +724,18 @@ impl Chip {
         (self.rcc.supply_v, self.flash.supply_v) = (volts, volts);
     }
 
-    /// Reads bytes of the flash.
     pub fn load_flash(&mut self, offset: u32, size: usize) -> u32 {
         self.flash.load(offset, size, &mut Access { now: self.now, findings: &mut self.findings })
     }
 
-    /// Programs the flash.
     pub fn program_flash(&mut self, offset: u32, size: usize, value: u32) {
         self.flash.store(offset, size, value, &mut Access { now: self.now, findings: &mut self.findings });
+    }
+
+    /// Conversions that were overwritten before they were read.
+    #[must_use]
+    pub fn lost_conversions(&self) -> u64 {
+        self.adcs.iter().flat_map(|adc| adc.lost).sum()
     }
 
     /// Adds a frame that the partner on the bus sends.

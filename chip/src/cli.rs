@@ -3,27 +3,28 @@
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::rc::Rc;
 use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
-use scarab_base::error::ToolError;
+use scarab_base::error::{EXIT_REFUSED, ToolError};
 use scarab_base::files;
 use scarab_base::number::Number;
 use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_rig::assist::study::Mode;
 use scarab_rig::assist::subject::Cuffs;
-use scarab_rig::image::build;
 use serde::Serialize;
 
 use crate::assist::{self, AssistComparison};
+use crate::findings::Finding;
 use crate::image::Image;
 use crate::load::LEVELS;
-use crate::machine::Options;
+use crate::machine::TIME_FACTOR;
 use crate::report::{ChipReport, LoadReport};
 use crate::session::{Session, Step};
 use crate::time::seconds;
-use crate::{crashes, drivers, faults, hangs, sampling, serve, situations, stops, store_cuts, update};
+use crate::{
+    crashes, drivers, faults, hangs, report, sampling, serve, situations, stops, store_cuts, update,
+};
 
 /// Run the flash image on a model of its microcontroller.
 #[derive(Parser, Debug)]
@@ -36,30 +37,110 @@ struct Arguments {
 #[derive(Subcommand, Debug)]
 enum Command {
     /// Start the board and operate it by its contacts.
-    Run(RunArguments),
+    Run {
+        #[command(flatten)]
+        common: Common,
+        /// Steps, in order.
+        #[arg(long = "do", value_enum, value_delimiter = ',')]
+        steps: Vec<Step>,
+        /// Write the image's records as text here.
+        #[arg(long, value_name = "FILE")]
+        records: Option<PathBuf>,
+        /// Time to run after the last step, s.
+        #[arg(long, value_name = "S", default_value_t = 0.0)]
+        seconds: f64,
+    },
     /// Let the image assist a walking wearer, and compare the interaction torque with the host's complete
     /// drives; exit code 3 if they differ by more than 5 %.
-    Assist(AssistArguments),
+    Assist {
+        /// Shipped leg or leg file with a wearer (`segments`).
+        #[arg(long, default_value = DEFAULT_LEG)]
+        leg: String,
+        /// Mode; may be repeated. All three unless given.
+        #[arg(long, value_enum)]
+        mode: Vec<Mode>,
+        #[command(flatten)]
+        run: Simulated,
+    },
     /// Open the emergency stop's contact at many phases of the PWM period.
-    Stops(StopArguments),
+    Stops {
+        #[command(flatten)]
+        common: Common,
+        /// Phases in each situation.
+        #[arg(long, default_value_t = 100)]
+        phases: u32,
+    },
     /// Measure the sampling instants of both axes.
     Sampling(Common),
     /// Cut the power at every word of a save and within an erase.
     StoreCuts(Common),
     /// Update the image over the bus: the whole way, damaged images, power cuts.
-    Update(UpdateArguments),
+    Update {
+        #[command(flatten)]
+        common: Common,
+        /// Power cuts in each long part of the way.
+        #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..))]
+        cuts: u64,
+        /// Cut the power after every block of the download.
+        #[arg(long)]
+        every_block: bool,
+    },
     /// Measure the load in each situation: idle, calibrating, holding, identifying, following a host.
-    Load(LoadArguments),
+    Load {
+        #[command(flatten)]
+        common: Common,
+        /// Write the instructions of each function here, as CSV.
+        #[arg(long, value_name = "FILE")]
+        profile: Option<PathBuf>,
+    },
     /// Connect the image to the simulated bus, for existing host software.
-    Serve(ServeArguments),
+    Serve {
+        #[command(flatten)]
+        common: Common,
+        /// Address of the TCP port with the slcan protocol.
+        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:29536")]
+        slcan: SocketAddr,
+        /// Begin with a board as delivered: not calibrated. The simulated operator does what `cargo sim
+        /// commission` asks for.
+        #[arg(long)]
+        delivered: bool,
+        /// Write a new image for this board here, which differs in its version only, for an update.
+        #[arg(long, value_name = "FILE.bin")]
+        next: Option<PathBuf>,
+        /// Simulated time to serve, s; without it until the process ends.
+        #[arg(long, value_name = "S")]
+        seconds: Option<f64>,
+    },
     /// Inject rows of the fault catalogue.
-    Faults(FaultArguments),
+    Faults {
+        #[command(flatten)]
+        common: Common,
+        /// Runs of each row.
+        #[arg(long, default_value_t = 20)]
+        seeds: u32,
+        /// Rows, such as X1; all unless given.
+        #[arg(long, value_delimiter = ',')]
+        rows: Vec<String>,
+    },
     /// Let each level hang and check the watchdog.
-    Hangs(HangArguments),
+    Hangs {
+        #[command(flatten)]
+        common: Common,
+        /// Frequency of the watchdog's oscillator, Hz: 17000 to 47000.
+        #[arg(long, default_value_t = 32_000)]
+        oscillator_hz: u64,
+    },
     /// Let the image crash and check that bridges are off before the record, and the next start refuses.
     Crashes(Common),
     /// Check the model by a program that uses embassy-stm32's drivers only.
-    Drivers(DriverArguments),
+    Drivers {
+        /// Program (ELF); built unless given.
+        #[arg(long)]
+        image: Option<PathBuf>,
+        /// Write the result as JSON here.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
 }
 
 /// Seed, time and result of a simulation.
@@ -69,7 +150,7 @@ struct Simulated {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Cycles per instruction, 1 to 2.
-    #[arg(long, default_value_t = 1.34, value_parser = factor)]
+    #[arg(long, default_value_t = TIME_FACTOR, value_parser = factor)]
     time_factor: f64,
     /// Write the result as JSON here.
     #[arg(long, value_name = "FILE")]
@@ -95,113 +176,6 @@ struct Common {
     run: Simulated,
 }
 
-#[derive(Args, Debug)]
-struct RunArguments {
-    #[command(flatten)]
-    common: Common,
-    /// Steps, in order.
-    #[arg(long = "do", value_enum, value_delimiter = ',')]
-    steps: Vec<Step>,
-    /// Write the image's records as text here.
-    #[arg(long, value_name = "FILE")]
-    records: Option<PathBuf>,
-    /// Time to run after the last step, s.
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
-    seconds: f64,
-}
-
-#[derive(Args, Debug)]
-struct UpdateArguments {
-    #[command(flatten)]
-    common: Common,
-    /// Power cuts in each long part of the way.
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..))]
-    cuts: u64,
-    /// Cut the power after every block of the download.
-    #[arg(long)]
-    every_block: bool,
-}
-
-#[derive(Args, Debug)]
-struct AssistArguments {
-    /// Shipped leg or leg file with a wearer (`segments`).
-    #[arg(long, default_value = DEFAULT_LEG)]
-    leg: String,
-    /// Mode; may be repeated. All three unless given.
-    #[arg(long, value_enum)]
-    mode: Vec<Mode>,
-    #[command(flatten)]
-    run: Simulated,
-}
-
-#[derive(Args, Debug)]
-struct StopArguments {
-    #[command(flatten)]
-    common: Common,
-    /// Phases in each situation.
-    #[arg(long, default_value_t = 100)]
-    phases: u32,
-}
-
-#[derive(Args, Debug)]
-struct LoadArguments {
-    #[command(flatten)]
-    common: Common,
-    /// Write the instructions of each function here, as CSV.
-    #[arg(long, value_name = "FILE")]
-    profile: Option<PathBuf>,
-}
-
-#[derive(Args, Debug)]
-struct ServeArguments {
-    #[command(flatten)]
-    common: Common,
-    /// Address of the TCP port with the slcan protocol.
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:29536")]
-    slcan: SocketAddr,
-    /// Begin with a board as delivered: not calibrated. The simulated operator does what `cargo sim
-    /// commission` asks for.
-    #[arg(long)]
-    delivered: bool,
-    /// Write a new image for this board here, which differs in its version only, for an update.
-    #[arg(long, value_name = "FILE.bin")]
-    next: Option<PathBuf>,
-    /// Simulated time to serve, s; without it until the process ends.
-    #[arg(long, value_name = "S")]
-    seconds: Option<f64>,
-}
-
-#[derive(Args, Debug)]
-struct FaultArguments {
-    #[command(flatten)]
-    common: Common,
-    /// Runs of each row.
-    #[arg(long, default_value_t = 20)]
-    seeds: u32,
-    /// Rows, such as X1; all unless given.
-    #[arg(long, value_delimiter = ',')]
-    rows: Vec<String>,
-}
-
-#[derive(Args, Debug)]
-struct HangArguments {
-    #[command(flatten)]
-    common: Common,
-    /// Frequency of the watchdog's oscillator, Hz: 17000 to 47000.
-    #[arg(long, default_value_t = 32_000)]
-    oscillator_hz: u64,
-}
-
-#[derive(Args, Debug)]
-struct DriverArguments {
-    /// Program (ELF); built unless given.
-    #[arg(long)]
-    image: Option<PathBuf>,
-    /// Write the result as JSON here.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-}
-
 fn factor(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(factor) if (1.0..=2.0).contains(&factor) => Ok(factor),
@@ -213,22 +187,24 @@ fn factor(text: &str) -> Result<f64, String> {
 #[must_use]
 pub fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
-        Command::Run(arguments) => run(&arguments),
-        Command::Assist(arguments) => run_assist(&arguments),
-        Command::Stops(arguments) => run_stops(&arguments),
+        Command::Run { common, steps, records, seconds } => run(&common, &steps, records.as_deref(), seconds),
+        Command::Assist { leg, mode, run } => run_assist(&leg, &mode, &run),
+        Command::Stops { common, phases } => run_stops(&common, phases),
         Command::Sampling(common) => run_sampling(&common),
         Command::StoreCuts(common) => run_store_cuts(&common),
-        Command::Update(arguments) => run_update(&arguments),
-        Command::Load(arguments) => run_load(&arguments),
-        Command::Serve(arguments) => run_serve(&arguments),
-        Command::Faults(arguments) => run_faults(&arguments),
-        Command::Hangs(arguments) => run_hangs(&arguments),
+        Command::Update { common, cuts, every_block } => run_update(&common, cuts, every_block),
+        Command::Load { common, profile } => run_load(&common, profile.as_deref()),
+        Command::Serve { common, slcan, delivered, next, seconds } => {
+            run_serve(&common, slcan, delivered, next.as_deref(), seconds)
+        }
+        Command::Faults { common, seeds, rows } => run_faults(&common, seeds, &rows),
+        Command::Hangs { common, oscillator_hz } => run_hangs(&common, oscillator_hz),
         Command::Crashes(common) => run_crashes(&common),
-        Command::Drivers(arguments) => run_drivers(&arguments),
+        Command::Drivers { image, json } => run_drivers(image, json.as_deref()),
     };
     match outcome {
         Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(3),
+        Ok(false) => ExitCode::from(EXIT_REFUSED),
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(error.exit_code())
@@ -241,20 +217,25 @@ impl Common {
         let leg = LegFile::load_for_image(&self.leg, false)?;
         let leg = if self.absolute_encoders { leg.with_absolute_encoders() } else { leg };
         let leg = if self.thermistors { leg.with_thermistors() } else { leg };
-        let options = build::Options {
-            leg: leg.clone(),
-            log: false,
-            brake_resistor: true,
-            status_light: leg.brake.is_none(),
-            board_volts: None,
+        let image = match &self.image {
+            Some(path) => Image::load(path)?,
+            None => Image::build(&leg)?,
         };
-        let path = match &self.image {
-            Some(path) => path.clone(),
-            None => build::build(&options)?.image,
-        };
-        let image: Rc<Image> = Image::load(&path)?;
-        let options = Options { time_factor: self.run.time_factor, ..Options::default() };
-        Session::new(&image, &leg, &options, self.run.seed)
+        Session::new(&image, &leg, self.run.time_factor, self.run.seed)
+    }
+
+    /// A session whose board has started.
+    fn booted(&self) -> Result<Session, ToolError> {
+        let mut session = self.session()?;
+        session.boot()?;
+        Ok(session)
+    }
+
+    /// A session with the drive enabled.
+    fn enabled(&self) -> Result<Session, ToolError> {
+        let mut session = self.booted()?;
+        session.enable_drive()?;
+        Ok(session)
     }
 
     fn write(&self, result: &impl Serialize) -> Result<(), ToolError> {
@@ -269,20 +250,20 @@ fn write(path: Option<&Path>, result: &impl Serialize) -> Result<(), ToolError> 
     files::write(path, &(text + "\n"))
 }
 
-fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
+fn run(common: &Common, steps: &[Step], records: Option<&Path>, duration: f64) -> Result<bool, ToolError> {
     let begun = Instant::now();
-    let common = &arguments.common;
     let mut session = common.session()?;
     session.prints = true;
-    let outcome = operate(&mut session, arguments);
-    if let Some(path) = &arguments.records {
+    let outcome = operate(&mut session, steps, duration);
+    if let Some(path) = records {
         files::write(path, session.probe.text())?;
     }
     if let Err(error) = outcome {
-        print_findings(&session);
+        let (unknown, known) = report::findings(&session);
+        print_findings(&unknown, &known);
         return Err(error);
     }
-    let identified = arguments.steps.contains(&Step::Identify);
+    let identified = steps.contains(&Step::Identify);
     let mut report = ChipReport::new(&mut session, identified, common.run.time_factor, common.run.seed)?;
     report.stop = stops::at_end(&mut session)?;
     print_run(&report, begun.elapsed().as_secs_f64());
@@ -296,26 +277,25 @@ fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
         && report.agrees_with_the_plant())
 }
 
-fn operate(session: &mut Session, arguments: &RunArguments) -> Result<(), ToolError> {
+fn operate(session: &mut Session, steps: &[Step], duration: f64) -> Result<(), ToolError> {
     session.boot()?;
-    for step in &arguments.steps {
+    for step in steps {
         session.begin_measurement();
         session.step(*step)?;
-        let [hip, knee] = session.position_deg();
+        let [hip, knee] = session.chip().plant.position().map(f64::to_degrees);
         println!("{:9.3} s  {step:?} done; joints {hip:.2} {knee:.2} degrees", seconds(session.now()));
     }
-    session.run(arguments.seconds)
+    session.run(duration)
 }
 
-fn print_findings(session: &Session) {
-    let (unknown, known) = crate::report::findings(session);
-    for finding in &unknown {
+fn print_findings(unknown: &[Finding], known: &[(Finding, &str)]) {
+    for finding in unknown {
         println!(
             "finding: {}: {} at {:#010x} in {} ({} times)",
             finding.register, finding.what, finding.pc, finding.function, finding.count
         );
     }
-    for (finding, reason) in &known {
+    for (finding, reason) in known {
         println!("known finding: {}: {} ({reason})", finding.register, finding.what);
     }
 }
@@ -346,15 +326,7 @@ fn print_load(report: &ChipReport) {
 }
 
 fn print_run(report: &ChipReport, wall_s: f64) {
-    for finding in &report.findings {
-        println!(
-            "finding: {}: {} at {:#010x} in {} ({} times)",
-            finding.register, finding.what, finding.pc, finding.function, finding.count
-        );
-    }
-    for (finding, reason) in &report.known_findings {
-        println!("known finding: {}: {} ({reason})", finding.register, finding.what);
-    }
+    print_findings(&report.findings, &report.known_findings);
     for base in &report.base_parameters {
         let show = |number: Number| number.known().map_or("-".to_owned(), |value| format!("{value:.6}"));
         println!(
@@ -397,16 +369,15 @@ fn print_run(report: &ChipReport, wall_s: f64) {
     );
 }
 
-fn run_assist(arguments: &AssistArguments) -> Result<bool, ToolError> {
-    let leg = LegFile::load(&arguments.leg)?;
-    let options = Options { time_factor: arguments.run.time_factor, ..Options::default() };
+fn run_assist(leg: &str, modes: &[Mode], run: &Simulated) -> Result<bool, ToolError> {
+    let leg = LegFile::load(leg)?;
     let all = [Mode::Transparent, Mode::Weight, Mode::Periodic];
-    let modes = if arguments.mode.is_empty() { &all[..] } else { &arguments.mode };
+    let modes = if modes.is_empty() { &all[..] } else { modes };
     // Firm cuffs: their resonance lies above a gait's harmonics, where small differences would grow.
     let cuffs = Cuffs { stiffness: 20e3, damping: 400.0 };
     let mut found = Vec::new();
     for mode in modes {
-        let comparison = assist::compare(&leg, *mode, &cuffs, arguments.run.seed, &options)?;
+        let comparison = assist::compare(&leg, *mode, &cuffs, run.seed, run.time_factor)?;
         println!(
             "{:<12} interaction torque, N m rms: image {:.3} {:.3}, host {:.3} {:.3}; phases {}; law {:.1} % of the processor; missed {}",
             comparison.mode,
@@ -420,15 +391,12 @@ fn run_assist(arguments: &AssistArguments) -> Result<bool, ToolError> {
         );
         found.push(comparison);
     }
-    write(arguments.run.json.as_deref(), &found)?;
+    write(run.json.as_deref(), &found)?;
     Ok(found.iter().all(AssistComparison::is_good))
 }
 
-fn run_stops(arguments: &StopArguments) -> Result<bool, ToolError> {
-    let common = &arguments.common;
-    let mut session = common.session()?;
-    session.boot()?;
-    let report = stops::run(&mut session, arguments.phases, common.run.time_factor)?;
+fn run_stops(common: &Common, phases: u32) -> Result<bool, ToolError> {
+    let report = stops::run(&mut common.booted()?, phases, common.run.time_factor)?;
     for situation in &report.situations {
         println!(
             "{:<12} {} stops, a bridge on at {}: off after {:.2} us mean, {:.2} us worst, permanently {:.2} us; on again {} ({:.2} us), stayed on {}",
@@ -447,20 +415,8 @@ fn run_stops(arguments: &StopArguments) -> Result<bool, ToolError> {
     Ok(report.is_sound())
 }
 
-/// A session with the drive enabled.
-fn enabled(common: &Common) -> Result<Session, ToolError> {
-    let mut session = common.session()?;
-    session.boot()?;
-    for step in [Step::Calibrate, Step::Reference, Step::Enable] {
-        session.step(step)?;
-    }
-    Ok(session)
-}
-
 fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
-    let mut session = common.session()?;
-    session.boot()?;
-    let report = store_cuts::run(&mut session)?;
+    let report = store_cuts::run(&mut common.booted()?)?;
     for save in &report.saves {
         println!(
             "{} of {} words, power cut at each and once after: {} starts with the old value, {} with the new one",
@@ -476,18 +432,16 @@ fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
     Ok(report.violations.is_empty())
 }
 
-fn run_update(arguments: &UpdateArguments) -> Result<bool, ToolError> {
-    let mut session = arguments.common.session()?;
-    session.boot()?;
-    let report = update::run(&mut session, arguments.cuts, arguments.every_block)?;
+fn run_update(common: &Common, cuts: u64, every_block: bool) -> Result<bool, ToolError> {
+    let report = update::run(&mut common.booted()?, cuts, every_block)?;
     print!("{}", report.text());
-    arguments.common.write(&report)?;
+    common.write(&report)?;
     Ok(report.failed() == 0)
 }
 
-fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
-    let mut session = arguments.common.session()?;
-    let found = situations::run(&mut session, arguments.profile.is_some())?;
+fn run_load(common: &Common, profile: Option<&Path>) -> Result<bool, ToolError> {
+    let mut session = common.booted()?;
+    let found = situations::run(&mut session, profile.is_some())?;
     println!("mean and largest instructions of each interrupt, and shares of the processor");
     let names: Vec<String> = found.iter().map(|situation| format!("{:>14}", situation.name)).collect();
     println!("{:<18}{}", "", names.concat());
@@ -519,7 +473,7 @@ fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
             );
         }
     }
-    if let Some(path) = &arguments.profile {
+    if let Some(path) = profile {
         let mut text = String::from("situation,exception,instructions,function\n");
         for situation in &found {
             for (exception, function, instructions) in &situation.profile {
@@ -528,17 +482,23 @@ fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
         }
         files::write(path, &text)?;
     }
-    arguments.common.write(&found)?;
-    print_findings(&session);
+    common.write(&found)?;
+    let (unknown, known) = report::findings(&session);
+    print_findings(&unknown, &known);
     let missed = situations::missed_goals(&found);
     missed.iter().for_each(|goal| println!("missed goal: {goal}"));
-    Ok(missed.is_empty() && crate::report::findings(&session).0.is_empty())
+    Ok(missed.is_empty() && unknown.is_empty())
 }
 
-fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
-    let mut session = arguments.common.session()?;
-    session.boot()?;
-    if !arguments.delivered {
+fn run_serve(
+    common: &Common,
+    slcan: SocketAddr,
+    delivered: bool,
+    next: Option<&Path>,
+    duration: Option<f64>,
+) -> Result<bool, ToolError> {
+    let mut session = common.booted()?;
+    if !delivered {
         for (step, words) in
             [(Step::Calibrate, "calibrates both motors"), (Step::Reference, "takes the reference")]
         {
@@ -548,21 +508,21 @@ fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
         // A host enables the drive; the leg is let go at its last position.
         session.hold_switch(true);
     }
-    if let Some(path) = &arguments.next {
+    if let Some(path) = next {
         let [_, next] = update::programs(&session)?;
         files::write(path, &next)?;
     }
-    session.machine.chip_mut().can.connected = false;
+    session.chip_mut().can.connected = false;
     session.prints = true;
-    let operator = arguments.delivered.then(serve::Operator::default);
-    serve::serve(&mut session, arguments.slcan, arguments.seconds, operator)?;
-    print_findings(&session);
-    Ok(crate::report::findings(&session).0.is_empty())
+    let operator = delivered.then(serve::Operator::default);
+    serve::serve(&mut session, slcan, duration, operator)?;
+    let (unknown, known) = report::findings(&session);
+    print_findings(&unknown, &known);
+    Ok(unknown.is_empty())
 }
 
-fn run_faults(arguments: &FaultArguments) -> Result<bool, ToolError> {
-    let mut session = arguments.common.session()?;
-    let reports = faults::run(&mut session, arguments.seeds, &arguments.rows)?;
+fn run_faults(common: &Common, seeds: u32, rows: &[String]) -> Result<bool, ToolError> {
+    let reports = faults::run(&mut common.booted()?, seeds, rows)?;
     for report in &reports {
         println!(
             "{:<3} {:<56} missed {} of {}, worst {:.4} ms, deadline {:.4} ms",
@@ -570,14 +530,12 @@ fn run_faults(arguments: &FaultArguments) -> Result<bool, ToolError> {
         );
         report.complaints.iter().take(3).for_each(|complaint| println!("      {complaint}"));
     }
-    arguments.common.write(&reports)?;
+    common.write(&reports)?;
     Ok(reports.iter().all(|report| report.missed == 0))
 }
 
-fn run_hangs(arguments: &HangArguments) -> Result<bool, ToolError> {
-    let mut session = enabled(&arguments.common)?;
-    let saved = session.save()?;
-    let reports = hangs::run(&mut session, &saved, arguments.oscillator_hz)?;
+fn run_hangs(common: &Common, oscillator_hz: u64) -> Result<bool, ToolError> {
+    let reports = hangs::run(&mut common.enabled()?, oscillator_hz)?;
     for report in &reports {
         let time = |time: Option<f64>| time.map_or("never".to_owned(), |time| format!("after {time:.3} ms"));
         println!(
@@ -588,14 +546,12 @@ fn run_hangs(arguments: &HangArguments) -> Result<bool, ToolError> {
             if report.on_again { ", on again" } else { "" }
         );
     }
-    arguments.common.write(&reports)?;
+    common.write(&reports)?;
     Ok(reports.iter().all(hangs::HangReport::is_sound))
 }
 
 fn run_crashes(common: &Common) -> Result<bool, ToolError> {
-    let mut session = enabled(common)?;
-    let saved = session.save()?;
-    let reports = crashes::run(&mut session, &saved)?;
+    let reports = crashes::run(&mut common.enabled()?)?;
     for report in &reports {
         let time = |time: Option<f64>| time.map_or("never".to_owned(), |time| format!("after {time:.2} us"));
         println!(
@@ -614,9 +570,8 @@ fn run_crashes(common: &Common) -> Result<bool, ToolError> {
     Ok(reports.iter().all(|report| report.complaints.is_empty()))
 }
 
-fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {
-    let built = arguments.image.clone().map_or_else(drivers::build, Ok)?;
-    let rows = drivers::check(&built)?;
+fn run_drivers(image: Option<PathBuf>, json: Option<&Path>) -> Result<bool, ToolError> {
+    let rows = drivers::check(&image.map_or_else(drivers::build, Ok)?)?;
     println!(
         "{:<10} | {:<56} | {:<56} | verdict",
         "peripheral", "request to the driver", "what the model shows"
@@ -624,13 +579,12 @@ fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {
     for row in &rows {
         println!("{:<10} | {:<56} | {:<56} | {}", row.peripheral, row.requested, row.shown, row.verdict());
     }
-    write(arguments.json.as_deref(), &rows)?;
+    write(json, &rows)?;
     Ok(rows.iter().all(drivers::Row::is_sound))
 }
 
 fn run_sampling(common: &Common) -> Result<bool, ToolError> {
-    let mut session = enabled(common)?;
-    let report = sampling::run(&mut session)?;
+    let report = sampling::run(&mut common.enabled()?)?;
     for report in &report.situations {
         println!(
             "{:<8} axis {}: {} conversions, trigger {:.1} to {:.1} ns and hold {:.1} to {:.1} ns after the middle; edges of the other bridge before {}",

@@ -20,9 +20,9 @@ use scarab_rig::image::panics::Panics;
 use serde::Serialize;
 
 use crate::load::{CURRENT_INTERRUPT, SERVO};
-use crate::machine::{End, Snapshot};
+use crate::machine::{End, RAM};
 use crate::peripherals::rcc::ResetReason;
-use crate::plant::{JOINTS, STEP};
+use crate::plant::{Reaction, STEP};
 use crate::rtt::field;
 use crate::session::Session;
 use crate::system::fault;
@@ -73,7 +73,6 @@ const ENABLES: u32 = 0xE104;
 const REQUESTS: u32 = 0xE204;
 /// Bytes below the stack that the call or entry beyond its end may touch.
 const BEYOND: u32 = 0x800;
-const RAM: u32 = 0x2000_0000;
 /// Longest time until both bridges are off, us (docs/safety.md, K4 and M1).
 const LONGEST_US: f64 = 10.0;
 /// Longest search for an instant, and longest time from a crash to its reset, s.
@@ -101,15 +100,12 @@ struct Seen {
 /// Result of a crash.
 #[derive(Clone, Debug, Serialize)]
 pub struct CrashReport {
-    /// Kind.
     pub kind: &'static str,
-    /// Situation.
     pub situation: &'static str,
     /// Time until both bridges were off, us; `None` if they stayed on.
     pub released_us: Option<f64>,
     /// Times of the first and the last store to the record, us.
     pub stored_us: Option<[f64; 2]>,
-    /// Time until the reset, us.
     pub reset_us: Option<f64>,
     /// Crash as the next start reports it.
     pub record: String,
@@ -117,17 +113,17 @@ pub struct CrashReport {
     pub complaints: Vec<String>,
 }
 
-/// Lets the image crash in every way, from a saved machine that is enabled.
+/// Lets the image crash in every way, from a session that is enabled.
 ///
 /// # Errors
 /// The image lacks a symbol, or does not come to an instant that is searched.
-pub fn run(session: &mut Session, enabled: &Snapshot) -> Result<Vec<CrashReport>, ToolError> {
-    session.machine.restore(enabled)?;
+pub fn run(session: &mut Session) -> Result<Vec<CrashReport>, ToolError> {
+    let enabled = session.machine.save()?;
     session.press_start()?;
     session.run(6.0)?;
-    let moving = session.save()?;
+    let moving = session.machine.save()?;
     let mut reports = Vec::new();
-    for (situation, saved) in [("holding", enabled), ("identifying", &moving)] {
+    for (situation, saved) in [("holding", &enabled), ("identifying", &moving)] {
         for kind in KINDS {
             session.machine.restore(saved)?;
             let mut report = crash(session, kind)?;
@@ -146,32 +142,26 @@ pub fn run(session: &mut Session, enabled: &Snapshot) -> Result<Vec<CrashReport>
 /// # Errors
 /// The image lacks a symbol, or does not come to an instant that is searched.
 pub fn crash(session: &mut Session, kind: CrashKind) -> Result<CrashReport, ToolError> {
-    let image = session.machine.image();
-    let record = image
-        .variable(RECORD)
-        .ok_or_else(|| ToolError::input(format!("the image has no variable {RECORD}")))?;
+    let record = session.machine.image().variable(RECORD)?;
     let mut seen = Seen { tick: reach(session, kind)?, begun: session.now(), ..Seen::default() };
-    let mut armed = [0, 1].map(|axis| session.machine.chip().plant.axes[axis].is_armed());
-    let chip = session.machine.chip_mut();
+    let chip = session.chip_mut();
+    let mut reaction = Reaction::new(&chip.plant);
     seen.cycles = chip.debug.cycles(chip.now);
-    chip.plant.switchings = Some(Vec::new());
+    chip.plant.switchings.clear();
     chip.hard_fault = None;
     seen.expected = inject(session, kind)?;
     let injected = seen.begun;
     let end = injected + ticks(RESET_S);
     run_to_reset(session, record, end, &mut seen)?;
     if matches!(kind, CrashKind::StackOverflow(_)) {
-        let fault = session.machine.chip().hard_fault;
+        let fault = session.chip().hard_fault;
         seen.begun = fault.ok_or_else(|| ToolError::input("the stack did not overflow"))?;
         seen.cycles += ((seen.begun - injected) / FULL_SPEED) as u32;
     }
     let reset = seen.reset.map_or(end, |(at, _)| at);
-    let switchings = session.machine.chip_mut().plant.switchings.replace(Vec::new()).unwrap_or_default();
-    for switching in switchings.iter().filter(|switching| switching.at < reset) {
-        seen.on_again |= seen.released.is_some() && switching.on;
-        armed[switching.axis] = switching.on;
-        seen.released = seen.released.or((armed == [false; JOINTS]).then_some(switching.at));
-    }
+    let switchings = core::mem::take(&mut session.chip_mut().plant.switchings);
+    reaction.follow(switchings.iter().filter(|switching| switching.at < reset));
+    (seen.released, seen.on_again) = (reaction.released, reaction.on_again);
     session.hold_switch(false);
     let records = session.probe.lines.len();
     if seen.reset.is_some() {
@@ -182,8 +172,7 @@ pub fn crash(session: &mut Session, kind: CrashKind) -> Result<CrashReport, Tool
     if session.probe.find(records, "refused", &["why=crash"]).is_none() {
         complaints.push("the next start does not name the crash as a reason to refuse".into());
     }
-    let plant = &session.machine.chip().plant;
-    if plant.switchings.iter().flatten().any(|switching| switching.on) {
+    if session.chip().plant.switchings.iter().any(|switching| switching.on) {
         complaints.push("a bridge was on after the next start".into());
     }
     let since = |at: Ticks| microseconds(at.saturating_sub(seen.begun));
@@ -231,14 +220,14 @@ fn reach(session: &mut Session, kind: CrashKind) -> Result<Ticks, ToolError> {
     let level = if kind == CrashKind::HardFault { SERVO } else { 0 };
     while session.now() < end {
         // Ticks of both axes come half a period apart.
-        let last = session.machine.chip().nvic.pended[usize::from(CURRENT_INTERRUPT)];
+        let last = session.chip().nvic.pended[usize::from(CURRENT_INTERRUPT)];
         let due = last + STEP / 2;
         let Range { start, end } = kind.before_tick();
         session.run_until(due.saturating_sub(end).max(session.now()))?;
         while session.now() + start < due {
-            let chip = session.machine.chip();
+            let chip = session.chip();
             let awake = kind == CrashKind::Interrupt || !session.machine.is_asleep();
-            let is_armed = chip.plant.axes.iter().all(|axis| axis.is_armed());
+            let is_armed = chip.plant.axes.iter().all(|axis| axis.is_armed);
             if chip.nvic.current() == level && awake && session.now() + end >= due && is_armed {
                 return Ok(due);
             }
@@ -335,8 +324,8 @@ fn judge(kind: CrashKind, seen: &Seen) -> Vec<String> {
 /// After the start that reported a crash: no bridge comes on before the operator's reset, then one does; the
 /// start after that knows of no crash.
 fn refusal(session: &mut Session) -> Result<Vec<String>, ToolError> {
-    let (now, position) = (session.now(), session.machine.chip().plant.position());
-    session.machine.chip_mut().plant.move_by_hand(position, now, 0.1);
+    let (now, position) = (session.now(), session.chip().plant.position());
+    session.chip_mut().plant.move_by_hand(position, now, 0.1);
     let refused = !begins(session)?;
     session.reset_fault()?;
     let reset = begins(session)?;
@@ -357,15 +346,14 @@ fn refusal(session: &mut Session) -> Result<Vec<String>, ToolError> {
 
 /// Lets the operator begin a calibration; returns whether a bridge came on.
 fn begins(session: &mut Session) -> Result<bool, ToolError> {
-    session.machine.chip_mut().plant.switchings = Some(Vec::new());
+    session.chip_mut().plant.switchings.clear();
     session.hold_switch(true);
     session.run(0.1)?;
     session.press_start()?;
     session.run(0.3)?;
     session.hold_switch(false);
     session.run(0.3)?;
-    let switchings = session.machine.chip_mut().plant.switchings.take().unwrap_or_default();
-    Ok(switchings.iter().any(|switching| switching.on))
+    Ok(session.chip().plant.switchings.iter().any(|switching| switching.on))
 }
 
 #[cfg(test)]

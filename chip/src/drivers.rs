@@ -18,10 +18,10 @@ use serde::Serialize;
 
 use crate::chip::{Chip, STOP};
 use crate::image::Image;
-use crate::machine::{End, Machine, Options};
+use crate::machine::{End, Machine, TIME_FACTOR};
 use crate::peripherals::gpio::Mode;
 use crate::peripherals::rcc::ResetReason;
-use crate::plant::{JOINTS, Plant};
+use crate::plant::Plant;
 use crate::time::{TICK_HZ, Ticks, seconds, ticks};
 
 #[path = "../drivers/src/computation.rs"]
@@ -61,13 +61,11 @@ const EXCEPTIONS: [u32; 70] = [
 /// Comparison of one promise with the model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Peripheral.
     pub peripheral: &'static str,
     /// Request to the driver.
     pub requested: String,
     /// Behaviour of the model.
     pub shown: String,
-    /// Whether both agree.
     pub agrees: bool,
     /// Reason for a permitted difference: the driver breaks its own promise on silicon too, or nothing was
     /// compared.
@@ -81,7 +79,6 @@ impl Row {
         self.agrees || self.reason.is_some()
     }
 
-    /// Verdict in words.
     #[must_use]
     pub fn verdict(&self) -> &'static str {
         if self.agrees { "equal" } else { self.reason.unwrap_or("DIFFERS") }
@@ -109,18 +106,13 @@ pub fn check(path: &Path) -> Result<Vec<Row>, ToolError> {
     Ok(check.rows)
 }
 
-/// Addresses of the program's words.
-#[derive(Clone, Copy)]
-struct Symbols {
-    step: u32,
-    go: u32,
-    count: u32,
-    results: u32,
-}
-
 struct Check {
     machine: Machine,
-    symbols: Symbols,
+    /// Addresses of the program's words.
+    step_at: u32,
+    go_at: u32,
+    count_at: u32,
+    results_at: u32,
     rows: Vec<Row>,
     /// Steps, results and findings so far.
     step: u32,
@@ -131,33 +123,42 @@ struct Check {
 impl Check {
     fn new(path: &Path) -> Result<Self, ToolError> {
         let image: Rc<Image> = Image::load(path)?;
-        let leg = LegFile::load(DEFAULT_LEG)?;
-        let drives = leg.complete_description::<JOINTS>()?;
-        let plant = Plant::new(&leg.description::<JOINTS>()?, &drives, 1);
+        let plant = Plant::new(&LegFile::load(DEFAULT_LEG)?, 1)?;
         let symbol = |name: &str| {
             let missing = || ToolError::input(format!("{}: no symbol {name}", path.display()));
             image.address(name).ok_or_else(missing)
         };
-        let symbols = Symbols {
-            step: symbol("DRIVERS_STEP")?,
-            go: symbol("DRIVERS_GO")?,
-            count: symbol("DRIVERS_COUNT")?,
-            results: symbol("DRIVERS_RESULTS")?,
-        };
-        let machine = Machine::new(&image, Chip::new(plant, 1), &Options::default())?;
-        Ok(Self { machine, symbols, rows: Vec::new(), step: 0, results: 0, findings: 0 })
+        Ok(Self {
+            machine: Machine::new(&image, Chip::new(plant, 1), TIME_FACTOR)?,
+            step_at: symbol("DRIVERS_STEP")?,
+            go_at: symbol("DRIVERS_GO")?,
+            count_at: symbol("DRIVERS_COUNT")?,
+            results_at: symbol("DRIVERS_RESULTS")?,
+            rows: Vec::new(),
+            step: 0,
+            results: 0,
+            findings: 0,
+        })
     }
 
     fn run(&mut self) -> Result<(), ToolError> {
-        self.processor()?;
-        self.clocks()?;
-        self.pins()?;
-        self.bridge()?;
-        self.analog()?;
-        self.gates()?;
-        self.frames()?;
-        self.flash()?;
-        self.watchdog()
+        type Step = fn(&mut Check) -> Result<(), ToolError>;
+        let steps: [(&str, Step); 9] = [
+            ("processor", Self::processor),
+            ("RCC", Self::clocks),
+            ("GPIO, EXTI", Self::pins),
+            ("TIM1, TIM2", Self::bridge),
+            ("ADC1", Self::analog),
+            ("SPI3", Self::gates),
+            ("CAN1", Self::frames),
+            ("FLASH", Self::flash),
+            ("IWDG", Self::watchdog),
+        ];
+        for (peripheral, step) in steps {
+            step(self)?;
+            self.note_findings(peripheral);
+        }
+        Ok(())
     }
 
     fn word(&self, address: u32) -> u32 {
@@ -170,22 +171,22 @@ impl Check {
     fn take<const N: usize>(&mut self) -> [u32; N] {
         let first = self.results;
         self.results += N as u32;
-        core::array::from_fn(|index| self.word(self.symbols.results + 4 * (first + index as u32)))
+        core::array::from_fn(|index| self.word(self.results_at + 4 * (first + index as u32)))
     }
 
     /// Lets the program run until its next step, at most for a time, s; `with` is added to the release.
     fn next(&mut self, longest: f64, with: u32) -> Result<(), ToolError> {
-        self.machine.set_memory(self.symbols.go, &(self.step | with).to_le_bytes());
+        self.machine.set_memory(self.go_at, &(self.step | with).to_le_bytes());
         let end = self.machine.chip().now + ticks(longest);
         while self.machine.chip().now < end {
             self.pass(POLL_S)?;
-            if self.word(self.symbols.step) == self.step + 1 {
+            if self.word(self.step_at) == self.step + 1 {
                 self.step += 1;
                 return Ok(());
             }
         }
         self.note_findings("last step");
-        let results = self.word(self.symbols.count);
+        let results = self.word(self.count_at);
         Err(ToolError::input(format!(
             "step {} was not reached within {longest} s, after {results} results",
             self.step + 1
@@ -234,10 +235,9 @@ impl Check {
             .filter(|(_, (word, other))| word != other)
             .map(|(index, (word, other))| format!("[{index}] {word:08x}, QEMU {other:08x}"))
             .collect();
-        let count = self.word(self.symbols.count);
+        let count = self.word(self.count_at);
         let shown = format!("{} words, {} differ {}", words.len(), differ.len(), differ.join("; "));
         self.row("processor", "exceptions as in QEMU", shown, differ.is_empty() && count == self.results);
-        self.note_findings("processor");
         Ok(())
     }
 
@@ -262,7 +262,6 @@ impl Check {
             let agrees = (expected - 1e-6..expected + 12e-6).contains(&taken);
             self.row("time", requested, format!("{:.4} ms by the cycle counter", 1e3 * taken), agrees);
         }
-        self.note_findings("RCC");
         Ok(())
     }
 
@@ -283,12 +282,12 @@ impl Check {
         // Open drain: low while driven, otherwise the level from outside.
         let requested = "pulled up 1, down 0, PB2 0 then 1, PA1 0 then 0 from outside, PA0 set 1";
         self.row("GPIO", requested, format!("read {levels:07b} from the last"), levels == 0b100_1001);
-        self.machine.set_memory(self.symbols.go, &self.step.to_le_bytes());
+        self.machine.set_memory(self.go_at, &self.step.to_le_bytes());
         let mut steps = Vec::new();
         for level in [true, false, true] {
             self.machine.chip_mut().set_pin(STOP, level);
             self.pass(2e-4)?;
-            steps.push(self.word(self.symbols.step) == self.step + 1);
+            steps.push(self.word(self.step_at) == self.step + 1);
         }
         self.step += 1;
         let entries = self.machine.chip().load.usage(16 + 10).entries;
@@ -299,7 +298,6 @@ impl Check {
             shown,
             steps == [false, false, true] && entries == 1,
         );
-        self.note_findings("GPIO, EXTI");
         Ok(())
     }
 
@@ -355,7 +353,6 @@ impl Check {
             format!("brake at {:.2} %", 100.0 * duty),
             (duty - 0.3).abs() < 1e-3,
         );
-        self.note_findings("TIM1, TIM2");
         Ok(())
     }
 
@@ -378,7 +375,6 @@ impl Check {
             format!("{short} and {long} of {code}"),
             long == code && short == code >> 4,
         );
-        self.note_findings("ADC1");
         Ok(())
     }
 
@@ -397,7 +393,6 @@ impl Check {
         let (taken, wire) = (f64::from(cycles) / CLOCK_HZ, 16.0 / 2.625e6);
         let shown = format!("{:.2} us for {:.2} us on the wire", 1e6 * taken, 1e6 * wire);
         self.row("SPI3", "16 bits at 2.6 MHz", shown, (wire..wire + 1e-6).contains(&taken));
-        self.note_findings("SPI3");
         Ok(())
     }
 
@@ -433,7 +428,6 @@ impl Check {
         self.pass(2e-3)?;
         let sent: Vec<u16> = self.machine.chip().can.sent.iter().map(|(_, frame)| frame.id()).collect();
         self.row("CAN1", "then 50, 100, 124 leave", format!("{sent:x?}"), sent == [0x50, 0x100, 0x124]);
-        self.note_findings("CAN1");
         Ok(())
     }
 
@@ -459,7 +453,6 @@ impl Check {
         let shown = format!("{erase:.3} s, {:.1} us a word", 1e6 * write / 4.0);
         let agrees = (2.0..2.01).contains(&erase) && (16e-6..20e-6).contains(&(write / 4.0));
         self.row("FLASH", "erase by bytes 2 s, word 16 us", shown, agrees);
-        self.note_findings("FLASH");
         Ok(())
     }
 
@@ -484,7 +477,6 @@ impl Check {
                 );
             }
         }
-        self.note_findings("IWDG");
         Ok(())
     }
 }

@@ -8,39 +8,26 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// One kind of harmless finding.
-#[derive(Clone, Copy, Debug)]
-pub struct Known {
-    /// Text of the finding.
-    pub what: &'static str,
-    /// Register.
-    pub register: &'static str,
-    /// Part of the function's name.
-    pub function: &'static str,
-    /// Reason why it is harmless.
-    pub reason: &'static str,
-}
-
-/// Findings that are known and harmless.
-pub const KNOWN: [Known; 3] = [
-    Known {
-        what: "register does not exist on an STM32F405",
-        register: "RCC+0x8c",
-        function: "",
-        reason: "embassy_stm32::init writes RCC_DCKCFGR of larger parts of the family; an F405 ignores the write",
-    },
-    Known {
-        what: "reserved bit set",
-        register: "PWR_CR",
-        function: "",
-        reason: "embassy_stm32::init writes a voltage scale of two bits; an F405 has the lower one, which is right",
-    },
-    Known {
-        what: "not modelled",
-        register: "0xe000ef50",
-        function: "embassy_boot_stm32::BootLoader",
-        reason: "embassy_boot_stm32 invalidates the instruction cache of larger processors; a Cortex-M4 has none (ICIALLU)",
-    },
+/// Harmless findings: violated rule, register, part of the function's name, and the reason.
+const KNOWN: [(&str, &str, &str, &str); 3] = [
+    (
+        NO_REGISTER,
+        "RCC+0x8c",
+        "",
+        "embassy_stm32::init writes RCC_DCKCFGR of larger parts of the family; an F405 ignores the write",
+    ),
+    (
+        RESERVED,
+        "PWR_CR",
+        "",
+        "embassy_stm32::init writes a voltage scale of two bits; an F405 has the lower one, which is right",
+    ),
+    (
+        NOT_MODELLED,
+        "0xe000ef50",
+        "embassy_boot_stm32::BootLoader",
+        "embassy_boot_stm32 invalidates the instruction cache of larger processors; a Cortex-M4 has none (ICIALLU)",
+    ),
 ];
 
 /// Finding with its location in the image.
@@ -52,9 +39,7 @@ pub struct Finding {
     pub register: String,
     /// Start of the basic block.
     pub pc: u32,
-    /// Function of the image.
     pub function: String,
-    /// Number of occurrences.
     pub count: u64,
 }
 
@@ -62,12 +47,10 @@ impl Finding {
     /// Reason why a finding is harmless, if known.
     #[must_use]
     pub fn known(&self) -> Option<&'static str> {
-        let same = |known: &&Known| {
-            known.what == self.what
-                && known.register == self.register
-                && self.function.contains(known.function)
+        let is_same = |(what, register, function, _): &(&str, &str, &str, &str)| {
+            (*what, *register) == (self.what, self.register.as_str()) && self.function.contains(function)
         };
-        KNOWN.iter().find(same).map(|known| known.reason)
+        KNOWN.into_iter().find(is_same).map(|(.., reason)| reason)
     }
 }
 
@@ -109,7 +92,6 @@ impl Findings {
         self.found.len()
     }
 
-    /// Whether there are no findings.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
@@ -119,9 +101,7 @@ impl Findings {
 /// Access to a register: its time, and the list of findings.
 #[derive(Debug)]
 pub struct Access<'a> {
-    /// Present time.
     pub now: crate::time::Ticks,
-    /// Findings of the run.
     pub findings: &'a mut Findings,
 }
 
@@ -131,16 +111,21 @@ impl Access<'_> {
         self.findings.add(what, register);
     }
 
+    /// Reports a read of a register that the chip lacks; the value is 0.
+    pub fn no_register(&mut self, register: impl Into<String>) -> u32 {
+        self.refuse(NO_REGISTER, register);
+        0
+    }
+
     /// Reports reserved bits that a write sets, and returns the value without them.
     pub fn implemented(&mut self, value: u32, mask: u32, register: &str) -> u32 {
         if value & !mask != 0 {
-            self.refuse("reserved bit set", register);
+            self.refuse(RESERVED, register);
         }
         value & mask
     }
 }
 
-/// Text of findings about registers that the chip lacks.
 pub const NO_REGISTER: &str = "register does not exist on an STM32F405";
-/// Text of findings about functions that the model lacks.
 pub const NOT_MODELLED: &str = "not modelled";
+const RESERVED: &str = "reserved bit set";

@@ -11,6 +11,7 @@ use scarab_base::error::ToolError;
 use crate::load::{CURRENT_INTERRUPT, SERVO};
 use crate::machine::{End, Snapshot};
 use crate::peripherals::rcc::ResetReason;
+use crate::plant::Reaction;
 use crate::session::Session;
 use crate::time::{seconds, ticks};
 
@@ -33,7 +34,6 @@ const FEEDING_MS: f64 = 4.0;
 /// Hang of one level.
 #[derive(Clone, Debug, Serialize)]
 pub struct HangReport {
-    /// Level.
     pub level: &'static str,
     /// Time until both bridges were off, ms; `None` if they stayed on.
     pub released_ms: Option<f64>,
@@ -57,19 +57,11 @@ impl HangReport {
     }
 }
 
-/// Lets each level hang, from a saved machine that is enabled.
-///
-/// # Errors
-/// The model does not support an action of the processor.
-pub fn run(
-    session: &mut Session,
-    enabled: &Snapshot,
-    oscillator_hz: u64,
-) -> Result<Vec<HangReport>, ToolError> {
-    LEVELS
-        .into_iter()
-        .map(|(level, exception)| hang(session, enabled, level, exception, oscillator_hz))
-        .collect()
+/// Lets each level hang, from a session that is enabled.
+pub fn run(session: &mut Session, oscillator_hz: u64) -> Result<Vec<HangReport>, ToolError> {
+    let enabled = session.machine.save()?;
+    let hang = |(level, exception)| hang(session, &enabled, level, exception, oscillator_hz);
+    LEVELS.into_iter().map(hang).collect()
 }
 
 fn hang(
@@ -81,31 +73,23 @@ fn hang(
 ) -> Result<HangReport, ToolError> {
     session.machine.restore(enabled)?;
     let begun = session.now();
-    let chip = session.machine.chip_mut();
+    let chip = session.chip_mut();
+    let mut reaction = Reaction::new(&chip.plant);
     chip.iwdg.oscillator_hz = oscillator_hz;
     chip.reschedule();
-    chip.plant.switchings = Some(Vec::new());
+    chip.plant.switchings.clear();
     session.machine.hang(Some(exception));
     // The receiving level runs only when a frame arrives.
-    session.machine.chip_mut().send_frame(Frame::new(0x80, &[]));
+    session.chip_mut().send_frame(Frame::new(0x80, &[]));
     let end = session.machine.run(begun + ticks(LONGEST_S))?;
     let reset = session.now();
-    let mut armed = [0, 1].map(|axis| enabled.chip().plant.axes[axis].is_armed());
-    let (mut released, mut on_again) = (None, false);
-    let switchings = session.machine.chip_mut().plant.switchings.take().unwrap_or_default();
-    for switching in switchings.iter().filter(|switching| switching.at <= reset) {
-        armed[switching.axis] = switching.on;
-        if armed == [false; 2] {
-            released = released.or(Some(switching.at));
-        }
-        on_again |= released.is_some() && switching.on;
-    }
+    reaction.follow(session.chip().plant.switchings.iter().filter(|switching| switching.at <= reset));
     let since = |at| 1e3 * seconds(at - begun);
     Ok(HangReport {
         level,
-        released_ms: released.map(since),
+        released_ms: reaction.released.map(since),
         reset_ms: (end == End::Reset(ResetReason::Watchdog)).then(|| since(reset)),
         longest_ms: FEEDING_MS + 1e3 * WATCHDOG_CLOCKS / oscillator_hz as f64 + 0.1,
-        on_again,
+        on_again: reaction.on_again,
     })
 }

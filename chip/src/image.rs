@@ -3,11 +3,13 @@
 use std::path::Path;
 use std::rc::Rc;
 
-use object::elf::{FileHeader32, PT_LOAD};
-use object::read::elf::{ElfFile32, FileHeader, ProgramHeader};
+use object::elf::PT_LOAD;
+use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, Object, ObjectSymbol, SymbolKind};
 use scarab_base::error::{FileError, ToolError};
 use scarab_boot::{FLASH, FLASH_BYTES, Region};
+use scarab_identify::formats::leg_file::LegFile;
+use scarab_rig::image::build;
 
 /// Name of the bootloader's file.
 const BOOTLOADER: &str = "scarab-boot";
@@ -20,12 +22,18 @@ struct Symbol {
     name: String,
 }
 
+impl Symbol {
+    /// Name as in the source, without the crate's hash.
+    fn path(&self) -> String {
+        format!("{:#}", rustc_demangle::demangle(&self.name))
+    }
+}
+
 /// A flash image, as the linker wrote it.
 #[derive(Clone, Debug)]
 pub struct Image {
     /// Whole file, for the decoder of records.
     pub elf: Vec<u8>,
-    /// Content of the flash.
     pub flash: Vec<u8>,
     functions: Vec<Symbol>,
     objects: Vec<Symbol>,
@@ -50,6 +58,21 @@ impl Image {
         Ok(Rc::new(image))
     }
 
+    /// Builds the image of a leg.
+    ///
+    /// # Errors
+    /// The compiler is missing or fails.
+    pub fn build(leg: &LegFile) -> Result<Rc<Self>, ToolError> {
+        let options = build::Options {
+            leg: leg.clone(),
+            log: false,
+            brake_resistor: true,
+            status_light: leg.brake.is_none(),
+            board_volts: None,
+        };
+        Self::load(&build::build(&options)?.image)
+    }
+
     /// Adds the bytes and names of a bootloader.
     fn add(&mut self, bootloader: Self) {
         let end = (Region::IMAGE.address - FLASH) as usize;
@@ -66,10 +89,11 @@ impl Image {
         let mut flash = vec![0xFF; FLASH_BYTES as usize];
         let (mut functions, mut objects) = (Vec::new(), Vec::new());
         {
-            let header = FileHeader32::<Endianness>::parse(&*elf).map_err(|error| error.to_string())?;
-            let endian = header.endian().map_err(|error| error.to_string())?;
-            let segments = header.program_headers(endian, &*elf).map_err(|error| error.to_string())?;
-            for segment in segments.iter().filter(|segment| segment.p_type(endian) == PT_LOAD) {
+            let file = ElfFile32::<Endianness>::parse(&*elf).map_err(|error| error.to_string())?;
+            let endian = file.endian();
+            for segment in
+                file.elf_program_headers().iter().filter(|segment| segment.p_type(endian) == PT_LOAD)
+            {
                 let bytes = segment.data(endian, &*elf).map_err(|()| "damaged segment")?;
                 let at = segment.p_paddr(endian).wrapping_sub(FLASH) as usize;
                 if bytes.is_empty() {
@@ -78,7 +102,6 @@ impl Image {
                 let slot = flash.get_mut(at..at + bytes.len()).ok_or("a segment lies outside the flash")?;
                 slot.copy_from_slice(bytes);
             }
-            let file = ElfFile32::<Endianness>::parse(&*elf).map_err(|error| error.to_string())?;
             for symbol in file.symbols() {
                 let Ok(name) = symbol.name() else { continue };
                 let entry = |address: u64| Symbol {
@@ -105,7 +128,6 @@ impl Image {
         Self { elf: Vec::new(), flash, functions: Vec::new(), objects: Vec::new() }
     }
 
-    /// Word of the flash.
     #[must_use]
     pub fn word(&self, address: u32) -> Option<u32> {
         let at = address.checked_sub(FLASH)? as usize;
@@ -117,9 +139,7 @@ impl Image {
     pub fn function(&self, address: u32) -> String {
         let after = self.functions.partition_point(|symbol| symbol.address <= address);
         match after.checked_sub(1).and_then(|index| self.functions.get(index)) {
-            Some(symbol) if address < symbol.address + symbol.size.max(2) => {
-                format!("{:#}", rustc_demangle::demangle(&symbol.name))
-            }
+            Some(symbol) if address < symbol.address + symbol.size.max(2) => symbol.path(),
             _ => format!("{address:#010x}"),
         }
     }
@@ -134,19 +154,18 @@ impl Image {
     /// Address of the function whose name contains `within` and ends with `name`.
     #[must_use]
     pub fn function_in(&self, within: &str, name: &str) -> Option<u32> {
-        let is_meant = |symbol: &&Symbol| {
-            let full = format!("{:#}", rustc_demangle::demangle(&symbol.name));
-            full.contains(within) && full.ends_with(name)
-        };
+        let is_meant = |symbol: &&Symbol| symbol.path().contains(within) && symbol.path().ends_with(name);
         self.functions.iter().find(is_meant).map(|symbol| symbol.address)
     }
 
     /// Address and size of the variable whose name ends so, without the crate's hash.
-    #[must_use]
-    pub fn variable(&self, path: &str) -> Option<(u32, u32)> {
-        let named =
-            |symbol: &&Symbol| format!("{:#}", rustc_demangle::demangle(&symbol.name)).ends_with(path);
-        self.objects.iter().find(named).map(|symbol| (symbol.address, symbol.size))
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn variable(&self, path: &str) -> Result<(u32, u32), ToolError> {
+        let found = self.objects.iter().find(|symbol| symbol.path().ends_with(path));
+        let missing = || ToolError::input(format!("the image has no variable {path}"));
+        found.map(|symbol| (symbol.address, symbol.size)).ok_or_else(missing)
     }
 
     /// Addresses of all halfwords with a value, which may be instructions.

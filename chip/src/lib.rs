@@ -6,55 +6,56 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`time`] | ticks of 1/336 MHz |
-//! | [`findings`] | violated rules, with function and reason |
-//! | [`nvic`], [`system`] | interrupt controller, system control block |
-//! | [`peripherals`] | one file each |
-//! | [`plant`] | motors, shunts, encoders, supply, leg at the pins |
-//! | [`chip`] | all of it: address map, events, interrupt lines |
-//! | [`image`], [`load`] | the ELF; use of the processor |
-//! | [`machine`] | the processor core around the chip; save and restore |
-//! | [`rtt`] | records of the image, as a debug probe reads them |
-//! | [`session`] | an operator at the contacts: calibrate, reference, enable, identify |
-//! | [`assist`] | a session of assistance on a wearer, image against host |
-//! | [`report`] | results as JSON |
-//! | [`situations`] | the processor's load, from idle to a host at 1 kHz |
-//! | [`stops`], [`sampling`] | emergency stops over the PWM period; sampling instants |
-//! | [`update`] | a new image over the bus, with damaged images and power cuts |
-//! | [`store_cuts`], [`hangs`] | power cuts within flash operations; levels that hang |
-//! | [`crashes`] | panic, hard fault, stack overflow, unhandled interrupt |
-//! | [`faults`] | rows of the fault catalogue |
-//! | [`drivers`] | another project's drivers on the model, against their documentation |
-//! | [`serve`] | the image on the simulated bus, for existing host software |
-//! | [`cli`] | the command line |
+//! | `time` | ticks of 1/336 MHz |
+//! | `findings` | violated rules, with function and reason |
+//! | `nvic`, `system` | interrupt controller, system control block |
+//! | `peripherals` | one file each |
+//! | `plant` | motors, shunts, encoders, supply, leg at the pins |
+//! | `chip` | all of it: address map, events, interrupt lines |
+//! | `image`, `load` | the ELF; use of the processor |
+//! | `machine` | the processor core around the chip; save and restore |
+//! | `rtt` | records of the image, as a debug probe reads them |
+//! | `session` | an operator at the contacts: calibrate, reference, enable, identify |
+//! | `assist` | a session of assistance on a wearer, image against host |
+//! | `report` | results as JSON |
+//! | `situations` | the processor's load, from idle to a host at 1 kHz |
+//! | `stops`, `sampling` | emergency stops over the PWM period; sampling instants |
+//! | `update` | a new image over the bus, with damaged images and power cuts |
+//! | `store_cuts`, `hangs` | power cuts within flash operations; levels that hang |
+//! | `crashes` | panic, hard fault, stack overflow, unhandled interrupt |
+//! | `faults` | rows of the fault catalogue |
+//! | `drivers` | another project's drivers on the model, against their documentation |
+//! | `serve` | the image on the simulated bus, for existing host software |
+//! | `cli` | the command line |
 
+#![expect(missing_docs, reason = "part of a program: names and units are stated where they are not obvious")]
 #![expect(
     clippy::disallowed_methods,
     reason = "the model runs on the host only and may use std's mathematics"
 )]
 
-pub mod assist;
+mod assist;
 pub mod chip;
 pub mod cli;
-pub mod crashes;
-pub mod drivers;
-pub mod faults;
-pub mod findings;
-pub mod hangs;
+mod crashes;
+mod drivers;
+mod faults;
+mod findings;
+mod hangs;
 pub mod image;
-pub mod load;
+mod load;
 pub mod machine;
-pub mod nvic;
-pub mod peripherals;
+mod nvic;
+mod peripherals;
 pub mod plant;
-pub mod report;
-pub mod rtt;
-pub mod sampling;
-pub mod serve;
-pub mod session;
-pub mod situations;
-pub mod stops;
-pub mod store_cuts;
-pub mod system;
+mod report;
+mod rtt;
+mod sampling;
+mod serve;
+mod session;
+mod situations;
+mod stops;
+mod store_cuts;
+mod system;
 pub mod time;
-pub mod update;
+mod update;

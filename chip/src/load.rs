@@ -32,7 +32,6 @@ pub const LEVELS: [(&str, u8); 10] = [
 /// Use by one exception; 0 is the thread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Use {
-    /// Entries.
     pub entries: u64,
     /// Own time.
     pub ticks: Ticks,
@@ -55,14 +54,10 @@ struct Frame {
 }
 
 /// Use of the processor since the last [`Load::clear`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Load {
-    /// Instructions so far.
     pub instructions: u64,
-    /// Time asleep.
     pub asleep: Ticks,
-    /// Basic blocks so far.
-    pub blocks: u64,
     uses: Vec<Use>,
     frames: Vec<Frame>,
     since: Ticks,
@@ -71,19 +66,9 @@ pub struct Load {
 }
 
 impl Load {
-    /// Without any use.
     #[must_use]
     pub fn new() -> Self {
-        Self {
-            instructions: 0,
-            asleep: 0,
-            blocks: 0,
-            uses: vec![Use::default(); EXCEPTIONS],
-            frames: Vec::new(),
-            since: 0,
-            counted: 0,
-            cleared: 0,
-        }
+        Self { uses: vec![Use::default(); EXCEPTIONS], ..Self::default() }
     }
 
     /// Starts a new measurement; exceptions in progress continue.
@@ -130,7 +115,6 @@ impl Load {
         used.longest = used.longest.max(now - frame.begun);
     }
 
-    /// Adds a sleep.
     pub fn sleep(&mut self, duration: Ticks) {
         self.asleep += duration;
         // The thread sleeps; its own time does not include it.
@@ -159,12 +143,6 @@ impl Load {
     #[must_use]
     pub fn awake(&self, now: Ticks) -> f64 {
         1.0 - self.asleep as f64 / (now - self.cleared).max(1) as f64
-    }
-}
-
-impl Default for Load {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

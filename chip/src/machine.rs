@@ -16,6 +16,7 @@ mod calls;
 mod changes;
 
 use std::collections::HashMap;
+use std::fmt::Debug;
 use std::rc::Rc;
 
 use scarab_base::error::ToolError;
@@ -34,7 +35,7 @@ use crate::peripherals::rcc::ResetReason;
 use crate::system::{PRIVATE, fault};
 use crate::time::{NEVER, Ticks};
 
-const RAM: u32 = 0x2000_0000;
+pub const RAM: u32 = 0x2000_0000;
 const RAM_BYTES: usize = 128 * 1024;
 const CCM: u32 = 0x1000_0000;
 const CCM_BYTES: usize = 64 * 1024;
@@ -105,19 +106,11 @@ pub enum End {
 pub struct Snapshot {
     registers: Vec<u32>,
     memory: Vec<u8>,
-    chip: Chip,
+    pub chip: Chip,
     rest: u64,
     resume: u32,
     paid: bool,
     asleep: bool,
-}
-
-impl Snapshot {
-    /// The saved chip.
-    #[must_use]
-    pub const fn chip(&self) -> &Chip {
-        &self.chip
-    }
 }
 
 /// Bytes of the bootloader, which nothing changes.
@@ -128,36 +121,24 @@ pub struct Machine {
     core: Core<'static>,
 }
 
-/// Options of a machine.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    /// Cycles per instruction.
-    pub time_factor: f64,
-    /// Factory version: major, minor, voltage.
-    pub version: [u8; 3],
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { time_factor: 1.34, version: [3, 6, 56] }
-    }
-}
+/// Usual number of cycles per instruction.
+pub const TIME_FACTOR: f64 = 1.34;
 
 fn broken(what: &str) -> impl Fn(unicorn_engine::uc_error) -> ToolError + '_ {
     move |error| ToolError::input(format!("the processor model rejects {what}: {error:?}"))
 }
 
 impl Machine {
-    /// A machine after power-on.
+    /// A machine after power-on; `factor` is the number of cycles per instruction.
     ///
     /// # Errors
     /// Unicorn cannot be initialised.
-    pub fn new(image: &Rc<Image>, chip: Chip, options: &Options) -> Result<Self, ToolError> {
-        let state = State::new(Rc::clone(image), chip, options.time_factor);
+    pub fn new(image: &Rc<Image>, chip: Chip, factor: f64) -> Result<Self, ToolError> {
+        let state = State::new(Rc::clone(image), chip, factor);
         let mut core = Unicorn::new_with_data(Arch::ARM, Mode::THUMB | Mode::MCLASS, state)
             .map_err(broken("its architecture"))?;
         core.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32).map_err(broken("a Cortex-M4"))?;
-        map_memory(&mut core, options).map_err(broken("its memory"))?;
+        map_memory(&mut core).map_err(broken("its memory"))?;
         map_registers(&mut core).map_err(broken("its registers"))?;
         add_hooks(&mut core).map_err(broken("its hooks"))?;
         let mut machine = Self { core };
@@ -165,18 +146,15 @@ impl Machine {
         Ok(machine)
     }
 
-    /// The chip.
     #[must_use]
     pub fn chip(&self) -> &Chip {
         &self.core.get_data().chip
     }
 
-    /// The chip, mutable.
     pub fn chip_mut(&mut self) -> &mut Chip {
         &mut self.core.get_data_mut().chip
     }
 
-    /// The image.
     #[must_use]
     pub fn image(&self) -> &Rc<Image> {
         &self.core.get_data().image
@@ -217,12 +195,10 @@ impl Machine {
         self.core.get_data().watched.iter().map(|watched| watched.calls).collect()
     }
 
-    /// Reads memory of the chip.
     pub fn memory(&self, address: u32, bytes: &mut [u8]) -> bool {
         self.core.mem_read(address.into(), bytes).is_ok()
     }
 
-    /// Writes memory of the chip.
     pub fn set_memory(&mut self, address: u32, bytes: &[u8]) -> bool {
         self.core.mem_write(address.into(), bytes).is_ok()
     }
@@ -239,7 +215,6 @@ impl Machine {
         }
     }
 
-    /// Whether the processor sleeps.
     #[must_use]
     pub fn is_asleep(&self) -> bool {
         self.core.get_data().asleep
@@ -375,9 +350,6 @@ impl Machine {
     }
 
     /// Saves processor, peripherals and plant.
-    ///
-    /// # Errors
-    /// Unicorn cannot save its registers.
     pub fn save(&self) -> Result<Snapshot, ToolError> {
         let mut memory = vec![0; RAM_BYTES + CCM_BYTES];
         let (ram, ccm) = memory.split_at_mut(RAM_BYTES);
@@ -461,7 +433,6 @@ impl State {
     fn pay(&mut self, address: u32, size: u32) {
         let instructions = self.instructions(address, size);
         self.chip.load.instructions += instructions;
-        self.chip.load.blocks += 1;
         if let Some(profile) = &mut self.profile {
             *profile.entry((self.chip.nvic.current(), address)).or_default() += instructions;
         }
@@ -498,17 +469,17 @@ impl State {
     }
 }
 
-fn get(core: &Core<'_>, register: Register) -> u32 {
+fn get(core: &Core<'_>, register: impl Into<i32>) -> u32 {
     core.reg_read(register).map_or(0, |value| value as u32)
 }
 
-fn put(core: &mut Core<'_>, register: Register, value: u32) {
+fn put(core: &mut Core<'_>, register: impl Into<i32> + Copy + Debug, value: u32) {
     if core.reg_write(register, u64::from(value)).is_err() {
         core.get_data_mut().broken = Some(format!("register {register:?} cannot be written"));
     }
 }
 
-fn map_memory(core: &mut Core<'_>, options: &Options) -> Result<(), unicorn_engine::uc_error> {
+fn map_memory(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
     let image = Rc::clone(&core.get_data().image);
     // All sectors but the bootloader's and the image's hold data only; `map_registers` maps them. The
     // bootloader appears at address 0 too.
@@ -530,7 +501,7 @@ fn map_memory(core: &mut Core<'_>, options: &Options) -> Result<(), unicorn_engi
         core.mem_write(address.into(), &vec![0xA5; bytes])?;
     }
     core.mem_map(SYSTEM_MEMORY.into(), SYSTEM_BYTES as u64, Prot::READ)?;
-    core.mem_write(SYSTEM_MEMORY.into(), &system_memory(options.version))
+    core.mem_write(SYSTEM_MEMORY.into(), &system_memory())
 }
 
 fn map_registers(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
@@ -647,23 +618,11 @@ fn interrupt(core: &mut Core<'_>, pc: u32) -> Option<u32> {
 const STACKED: [Register; 6] =
     [Register::R0, Register::R1, Register::R2, Register::R3, Register::R12, Register::LR];
 
-/// Registers that a saved machine holds; Unicorn's own saved contexts belong to one instance.
-const SAVED: [Register; 21] = [
+/// Registers that a saved machine holds besides R0 to R12 and the single-precision ones. Unicorn's own saved
+/// contexts belong to one instance.
+const SAVED: [Register; 8] = [
     Register::CONTROL,
     Register::XPSR_NZCVQG,
-    Register::R0,
-    Register::R1,
-    Register::R2,
-    Register::R3,
-    Register::R4,
-    Register::R5,
-    Register::R6,
-    Register::R7,
-    Register::R8,
-    Register::R9,
-    Register::R10,
-    Register::R11,
-    Register::R12,
     Register::SP,
     Register::LR,
     Register::PRIMASK,
@@ -674,13 +633,13 @@ const SAVED: [Register; 21] = [
 
 /// All saved registers, as Unicorn's numbers.
 fn registers() -> impl Iterator<Item = i32> {
-    SAVED.into_iter().map(|register| register as i32).chain((0..32).map(single))
+    let general = Register::R0 as i32..=Register::R12 as i32;
+    SAVED.into_iter().map(|register| register as i32).chain(general).chain((0..32).map(single))
 }
 
 /// Value of a saved register; the program status is read whole.
 fn read(core: &Core<'_>, register: i32) -> u32 {
-    let register = if register == Register::XPSR_NZCVQG as i32 { Register::XPSR as i32 } else { register };
-    core.reg_read(register).map_or(0, |value| value as u32)
+    get(core, if register == Register::XPSR_NZCVQG as i32 { Register::XPSR as i32 } else { register })
 }
 
 /// Number of a single-precision register for Unicorn.
@@ -698,7 +657,7 @@ fn enter(core: &mut Core<'_>, exception: u8, pc: u32) -> u32 {
     frame.extend(STACKED.map(|register| get(core, register)));
     frame.extend([pc & !1, status & !(1 << 9) | odd << 9]);
     if floats {
-        frame.extend((0..16).map(|number| core.reg_read(single(number)).map_or(0, |value| value as u32)));
+        frame.extend((0..16).map(|number| get(core, single(number))));
         frame.extend([get(core, Register::FPSCR), 0]);
     }
     let sp = sp.wrapping_sub(4 * odd + 4 * frame.len() as u32);
@@ -796,10 +755,7 @@ fn leave(core: &mut Core<'_>, link: u32) -> u32 {
     }
     if floats {
         for number in 0..16 {
-            let value = word(8 + number as usize);
-            if core.reg_write(single(number), value.into()).is_err() {
-                core.get_data_mut().broken = Some("a floating-point register cannot be written".into());
-            }
+            put(core, single(number), word(8 + number as usize));
         }
         put(core, Register::FPSCR, word(24));
     }

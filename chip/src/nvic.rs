@@ -8,13 +8,10 @@
 pub const EXCEPTIONS: usize = 16 + 82;
 /// Non-maskable interrupt.
 pub const NMI: u8 = 2;
-/// Hard fault.
 pub const HARD_FAULT: u8 = 3;
-/// Supervisor call.
 pub const SUPERVISOR_CALL: u8 = 11;
 /// Request for a system service (PendSV).
 pub const PENDING_SERVICE: u8 = 14;
-/// System timer.
 pub const SYSTEM_TICK: u8 = 15;
 /// Priority of the thread.
 pub const THREAD: i16 = 256;
@@ -30,8 +27,8 @@ pub struct Nvic {
     priorities: Vec<u8>,
     /// Instant at which each exception became pending, and worst latency to its entry.
     pub pended: Vec<u64>,
-    /// Bits of the priority that are a group (AIRCR PRIGROUP).
-    group: u32,
+    /// Split of a priority into group and sub-priority (AIRCR PRIGROUP): 0 to 7.
+    pub group: u32,
 }
 
 impl Nvic {
@@ -143,7 +140,6 @@ impl Nvic {
         self.group_of(self.priority(exception)) < running
     }
 
-    /// Enters an exception.
     pub fn enter(&mut self, exception: u8) {
         self.pending &= !(1 << exception);
         self.active.push(exception);
@@ -230,11 +226,6 @@ impl Nvic {
                 *priority = (value >> (8 * byte)) as u8 & 0xF0;
             }
         }
-    }
-
-    /// Sets the split of a priority into group and sub-priority (AIRCR PRIGROUP).
-    pub fn set_group(&mut self, group: u32) {
-        self.group = group.min(7);
     }
 }
 

@@ -18,9 +18,7 @@ use hal_sim::conventions::Anatomy;
 use hal_sim::description::LegDescription;
 use hal_sim::drive::axis::PERIOD_S;
 use hal_sim::drive::counter::{Counter, steps};
-use hal_sim::drive::description::{
-    AxisDescription, CompleteDescription, CouplingDescription, SupplyDescription,
-};
+use hal_sim::drive::description::{AxisDescription, CouplingDescription, SupplyDescription};
 use hal_sim::drive::motor::{Direction, Motor, Terminal};
 use hal_sim::drive::shunts::ShuntState;
 use hal_sim::drive::supply::Supply;
@@ -33,6 +31,8 @@ use hal_sim::world::periods::PERIODS_PER_TICK;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use scarab_base::error::FileError;
+use scarab_identify::formats::leg_file::LegFile;
 
 use crate::peripherals::pwm::{Outputs, Pins};
 use crate::peripherals::timer::Timer;
@@ -72,25 +72,56 @@ pub struct EncoderFault {
     pub frozen: Option<u16>,
     /// Counts added to every position.
     pub added: i32,
-    /// No index pulses.
-    pub no_index: bool,
 }
 
 /// Main output of a bridge that was turned on or off at the pins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Switching {
-    /// Instant.
     pub at: Ticks,
-    /// Axis.
     pub axis: usize,
-    /// Whether it went on.
     pub on: bool,
+}
+
+/// Both bridges, followed through their switchings.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reaction {
+    pub armed: [bool; JOINTS],
+    /// First instant with both bridges off, and the last.
+    pub released: Option<Ticks>,
+    pub last: Ticks,
+    /// Whether a bridge was on again after the first, and the longest such time that ended.
+    pub on_again: bool,
+    pub again: Ticks,
+    pub on_since: Option<Ticks>,
+}
+
+impl Reaction {
+    /// Begins with the bridges as they are.
+    #[must_use]
+    pub fn new(plant: &Plant) -> Self {
+        Self { armed: plant.axes.each_ref().map(|axis| axis.is_armed), ..Self::default() }
+    }
+
+    pub fn follow<'a>(&mut self, switchings: impl IntoIterator<Item = &'a Switching>) {
+        for switching in switchings {
+            self.armed[switching.axis] = switching.on;
+            if self.armed == [false; JOINTS] {
+                self.released = self.released.or(Some(switching.at));
+                self.last = switching.at;
+                if let Some(since) = self.on_since.take() {
+                    self.again = self.again.max(switching.at - since);
+                }
+            } else if self.released.is_some() {
+                self.on_again |= switching.on;
+                self.on_since = self.on_since.or(Some(switching.at));
+            }
+        }
+    }
 }
 
 /// Change of a bridge's pins: its time, and the edges of its references.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edges {
-    /// Instant.
     pub at: Ticks,
     /// Number of references that changed.
     pub count: u32,
@@ -103,7 +134,7 @@ pub struct Edges {
 pub struct Axis {
     description: AxisDescription,
     output_of: [usize; 3],
-    motor: Motor,
+    pub motor: Motor,
     counter: Counter,
     /// Rotor's angle at the last mechanical step, rad, and its speed since then, rad/s.
     angle: f64,
@@ -121,14 +152,13 @@ pub struct Axis {
     low_since: [Option<Ticks>; 3],
     edges: [Edges; REMEMBERED],
     /// Whether the main output is on and the gate drivers follow.
-    is_armed: bool,
+    pub is_armed: bool,
     /// Last instant at which a high side was on.
     pub last_high: Ticks,
     /// Pin changes, if recorded.
     pub pin_changes: Option<Vec<(Ticks, [Pins; 3])>>,
     /// Faults of shunts B and C.
     pub shunt_faults: [Option<ShuntFault>; 2],
-    /// Fault of the encoder.
     pub encoder_fault: EncoderFault,
     /// Outputs with a broken wire.
     pub open: [bool; 3],
@@ -171,42 +201,6 @@ impl Axis {
         }
     }
 
-    /// Whether any switch is on.
-    #[must_use]
-    pub fn is_on(&self) -> bool {
-        self.pins.as_flattened().contains(&true)
-    }
-
-    /// Whether the main output is on and the gate drivers follow.
-    #[must_use]
-    pub const fn is_armed(&self) -> bool {
-        self.is_armed
-    }
-
-    /// Currents into the motor's phases, A.
-    #[must_use]
-    pub fn currents(&self) -> [f64; 3] {
-        self.motor.currents()
-    }
-
-    /// Temperature of the winding, degrees Celsius.
-    #[must_use]
-    pub fn winding_c(&self) -> f64 {
-        self.motor.temperature()
-    }
-
-    /// Amplitudes of the currents along and across the magnets' axis, A.
-    #[must_use]
-    pub fn rotor_currents(&self) -> [f64; 2] {
-        self.motor.rotor_currents()
-    }
-
-    /// Rotor's speed, rad/s.
-    #[must_use]
-    pub const fn speed(&self) -> f64 {
-        self.speed
-    }
-
     /// Edges of the bridge that lie within a window before an instant, the dead time included.
     #[must_use]
     pub fn edges_within(&self, window: Ticks, before: Ticks) -> (u32, i32) {
@@ -217,9 +211,27 @@ impl Axis {
         inside.fold((0, 0), |(count, rising), edges| (count + edges.count, rising + edges.rising))
     }
 
-    fn remember(&mut self, edges: Edges) {
-        self.edges.rotate_right(1);
-        self.edges[0] = edges;
+    fn read_pins(&mut self, (timer, outputs): &mut Bridge<'_>, now: Ticks, gates: bool) {
+        let (rising, count) = outputs.follow(timer, now);
+        if count > 0 {
+            self.edges.rotate_right(1);
+            self.edges[0] = Edges { at: now, count, rising };
+        }
+        self.set_pins(if gates { outputs.pins(timer, now) } else { [[false; 2]; 3] }, now);
+    }
+
+    /// Advances the motor from edge to edge of the pins; returns the charge drawn from the bus.
+    fn advance(&mut self, bridge: &mut Bridge<'_>, from: Ticks, end: Ticks, bus: f64, gates: bool) -> f64 {
+        let (mut now, mut charge) = (from, 0.0);
+        while now < end {
+            let next = bridge.1.next_change(bridge.0, now).min(end);
+            charge += self.step(bus, seconds(next - now));
+            now = next;
+            if now < end {
+                self.read_pins(bridge, now, gates);
+            }
+        }
+        charge
     }
 
     fn set_pins(&mut self, pins: [Pins; 3], now: Ticks) {
@@ -297,14 +309,10 @@ impl Axis {
         }
     }
 
-    /// Whether no index pulses come.
-    fn has_no_index(&self) -> bool {
-        self.encoder_fault.no_index || self.description.counter.absolute
-    }
-
     /// Instants within the next step at which the index line rises and falls, if it does.
     fn index_pulse(&self, now: Ticks) -> Vec<(Ticks, bool)> {
-        if self.speed == 0.0 || self.has_no_index() {
+        // An absolute encoder has no index.
+        if self.speed == 0.0 || self.description.counter.absolute {
             return Vec::new();
         }
         let width = TAU / self.description.counter.counts;
@@ -345,7 +353,6 @@ pub type Bridge<'a> = (&'a Timer, &'a mut Outputs);
 /// Board and leg around the chip.
 #[derive(Clone, Debug)]
 pub struct Plant {
-    /// Axes with their motors.
     pub axes: [Axis; JOINTS],
     /// Bus of the bridges.
     pub supply: Supply,
@@ -372,18 +379,19 @@ pub struct Plant {
     pub thermistors: [u16; 3],
     /// Codes of the thermistors in the motors, instead of those of the motors' temperatures.
     pub motor_thermistors: [Option<u16>; JOINTS],
-    /// Whether the enable line lets the gates follow.
-    gates: bool,
-    /// A half bridge had both switches requested.
-    pub shoot_through: u64,
-    /// Main outputs turned on or off, if recorded.
-    pub switchings: Option<Vec<Switching>>,
+    /// Whether the gates follow their inputs, or are held low.
+    pub gates: bool,
+    /// Main outputs turned on or off, since this was cleared.
+    pub switchings: Vec<Switching>,
 }
 
 impl Plant {
     /// Free rotors at rest; the leg held at its anatomical zero.
-    #[must_use]
-    pub fn new(leg: &LegDescription<JOINTS>, drives: &CompleteDescription<JOINTS>, seed: u64) -> Self {
+    ///
+    /// # Errors
+    /// The leg has not two joints with motors.
+    pub fn new(leg: &LegFile, seed: u64) -> Result<Self, FileError> {
+        let (leg, drives) = (leg.description::<JOINTS>()?, leg.complete_description::<JOINTS>()?);
         let anatomy = leg.joints.map(|joint| Anatomy::from_joint(&joint));
         let state = LegState {
             angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(0.0)),
@@ -391,14 +399,14 @@ impl Plant {
         };
         // Rotors at arbitrary angles.
         let axes = core::array::from_fn(|axis| Axis::new(&drives.axes[axis], 0.4 + 0.7 * axis as f64));
-        Self {
+        Ok(Self {
             axes,
             supply: Supply::new(&drives.supply),
             brake: 0.0,
             source: drives.supply,
             coupling: drives.coupling,
-            leg: Leg::new(leg),
-            description: *leg,
+            leg: Leg::new(&leg),
+            description: leg,
             state,
             anatomy,
             mirrored: if leg.mirrored { -1.0 } else { 1.0 },
@@ -412,9 +420,8 @@ impl Plant {
             thermistors: [WARM; 3],
             motor_thermistors: [None; JOINTS],
             gates: false,
-            shoot_through: 0,
-            switchings: None,
-        }
+            switchings: Vec::new(),
+        })
     }
 
     /// Connects a motor or its sensors differently, at rest and before the bridges were on.
@@ -502,11 +509,6 @@ impl Plant {
         self.supply = Supply::new(&SupplyDescription { voltage, ..self.source });
     }
 
-    /// Lets the gates follow their inputs, or holds them low.
-    pub fn set_gates(&mut self, gates: bool) {
-        self.gates = gates;
-    }
-
     /// Position of an encoder at an instant, quadrature counts.
     pub fn encoder(&mut self, axis: usize, now: Ticks) -> u16 {
         let since = seconds(now.saturating_sub(self.mechanic));
@@ -548,15 +550,7 @@ impl Plant {
             let end = now.min(self.electric + QUARTER);
             let (bus, mut charge) = (self.supply.voltage(), 0.0);
             for (axis, bridge) in self.axes.iter_mut().zip(bridges.iter_mut()) {
-                charge += Self::advance_axis(
-                    axis,
-                    bridge,
-                    self.electric,
-                    end,
-                    bus,
-                    self.gates,
-                    &mut self.shoot_through,
-                );
+                charge += axis.advance(bridge, self.electric, end, bus, self.gates);
             }
             self.supply.advance(charge, self.brake, seconds(end - self.electric));
             self.electric = end;
@@ -571,46 +565,13 @@ impl Plant {
     /// Reads the pins again after registers changed at this instant.
     pub fn refresh(&mut self, now: Ticks, bridges: &mut [Bridge<'_>; JOINTS]) {
         for (index, (axis, bridge)) in self.axes.iter_mut().zip(bridges.iter_mut()).enumerate() {
-            Self::read_pins(axis, bridge, now, self.gates, &mut self.shoot_through);
+            axis.read_pins(bridge, now, self.gates);
             let armed = bridge.1.is_on() && self.gates;
             if armed != axis.is_armed {
                 axis.is_armed = armed;
-                if let Some(switchings) = &mut self.switchings {
-                    switchings.push(Switching { at: now, axis: index, on: armed });
-                }
+                self.switchings.push(Switching { at: now, axis: index, on: armed });
             }
         }
-    }
-
-    fn read_pins(axis: &mut Axis, bridge: &mut Bridge<'_>, now: Ticks, gates: bool, both: &mut u64) {
-        let (rising, count) = bridge.1.follow(bridge.0, now);
-        if count > 0 {
-            axis.remember(Edges { at: now, count, rising });
-        }
-        let pins = if gates { bridge.1.pins(bridge.0, now) } else { [[false; 2]; 3] };
-        *both += pins.iter().filter(|pins| pins[0] && pins[1]).count() as u64;
-        axis.set_pins(pins, now);
-    }
-
-    fn advance_axis(
-        axis: &mut Axis,
-        bridge: &mut Bridge<'_>,
-        from: Ticks,
-        end: Ticks,
-        bus: f64,
-        gates: bool,
-        both: &mut u64,
-    ) -> f64 {
-        let (mut now, mut charge) = (from, 0.0);
-        while now < end {
-            let next = bridge.1.next_change(bridge.0, now).min(end);
-            charge += axis.step(bus, seconds(next - now));
-            now = next;
-            if now < end {
-                Self::read_pins(axis, bridge, now, gates, both);
-            }
-        }
-        charge
     }
 
     /// Instant of the next mechanical step or edge of an index line.
@@ -758,20 +719,34 @@ fn turn_freely(axis: &Axis, torque: f64) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::peripherals::pwm::tests::bridge;
-    use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
+    use scarab_identify::formats::leg_file::DEFAULT_LEG;
+
+    #[test]
+    fn a_bridge_that_is_on_again_is_detected_with_its_time() {
+        let switching = |at, axis, on| Switching { at, axis, on };
+        let log = [
+            switching(100, 0, false),
+            switching(110, 1, false),
+            switching(200, 0, true),
+            switching(230, 0, false),
+        ];
+        let armed = Reaction { armed: [true; 2], ..Reaction::default() };
+        let mut reaction = armed;
+        reaction.follow(&log);
+        let Reaction { released, last, again, armed: at_end, .. } = reaction;
+        assert_eq!((released, last, again, at_end), (Some(110), 230, 30, [false; 2]));
+        let mut reaction = armed;
+        reaction.follow(&log[..1]);
+        assert_eq!(reaction.released, None);
+    }
 
     #[test]
     fn an_edge_at_the_end_of_a_slice_is_not_late() {
-        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let plant = Plant::new(
-            &leg.description().expect("two joints"),
-            &leg.complete_description().expect("motors"),
-            1,
-        );
+        let plant = Plant::new(&LegFile::load(DEFAULT_LEG).expect("shipped"), 1).expect("motors");
         // A slice of the motors' integration has 1,750 counts.
         for compare in [1700, 1749, 1750, 1751] {
             let (mut plant, mut bridges) = (plant.clone(), [bridge(compare), bridge(compare)]);
-            plant.set_gates(true);
+            plant.gates = true;
             plant.axes[0].pin_changes = Some(Vec::new());
             let [first, second] = &mut bridges;
             let mut bridges = [(&first.0, &mut first.1), (&second.0, &mut second.1)];

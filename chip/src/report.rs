@@ -17,13 +17,12 @@ use crate::session::Session;
 use crate::time::{TICK_HZ, microseconds, seconds};
 
 /// Shares of the processor's time.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct LoadReport {
     /// Time awake.
     pub total: f64,
     /// Current loops, index pulses and the emergency stop's contact.
     pub level0: f64,
-    /// Servo.
     pub servo: f64,
     /// Bus, both levels.
     pub bus: f64,
@@ -31,12 +30,11 @@ pub struct LoadReport {
     pub assist: f64,
     /// Housekeeping and its clock.
     pub housekeeping: f64,
-    /// Thread.
     pub thread: f64,
 }
 
 /// Use by one interrupt.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct InterruptReport {
     /// Entries per second.
     pub per_second: f64,
@@ -51,13 +49,11 @@ pub struct InterruptReport {
 }
 
 /// Result of a run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct ChipReport {
     /// `accepted`, `refused`, or `none` without an identification.
     pub verdict: String,
-    /// Reasons for a refusal.
     pub reasons: Vec<String>,
-    /// Base parameters.
     pub base_parameters: Vec<BaseReport>,
     /// Error of each base parameter against the plant, over the sigma for the leg file's torque noise.
     pub errors: BTreeMap<String, f64>,
@@ -79,19 +75,15 @@ pub struct ChipReport {
     pub worst_instructions: BTreeMap<&'static str, u64>,
     /// Emergency stops at the end of the run; `None` if no bridge was on then.
     pub stop: Option<crate::stops::Situation>,
-    /// Resets.
     pub resets: Vec<String>,
     /// Deepest use of the stack, bytes, and its size.
     pub stack: [u32; 2],
     /// Records read and lost.
     pub records: [u64; 2],
-    /// Simulated time, s.
     pub simulated_s: f64,
-    /// Instructions executed.
     pub instructions: u64,
     /// Cycles per instruction.
     pub time_factor: f64,
-    /// Seed.
     pub seed: u64,
 }
 
@@ -99,22 +91,16 @@ pub struct ChipReport {
 #[must_use]
 pub fn findings(session: &Session) -> (Vec<Finding>, Vec<(Finding, &'static str)>) {
     let image = session.machine.image();
-    let mut unknown = session.machine.chip().findings.list(|pc| image.function(pc));
-    let mut known = Vec::new();
-    unknown.retain(|finding| match finding.known() {
-        Some(reason) => {
-            known.push((finding.clone(), reason));
-            false
-        }
-        None => true,
-    });
-    (unknown, known)
+    let all = session.chip().findings.list(|pc| image.function(pc)).into_iter();
+    let (known, unknown): (Vec<_>, Vec<_>) = all.partition(|finding| finding.known().is_some());
+    let with_reason = |finding: Finding| finding.known().map(|reason| (finding, reason));
+    (unknown, known.into_iter().filter_map(with_reason).collect())
 }
 
 /// Shares of the processor's time.
 #[must_use]
 pub fn load(session: &Session) -> LoadReport {
-    let chip = session.machine.chip();
+    let chip = session.chip();
     let share = |names: &[&str]| {
         let levels = LEVELS.iter().filter(|(name, _)| names.contains(name));
         levels.map(|(_, exception)| chip.load.share(*exception, chip.now)).sum()
@@ -133,7 +119,7 @@ pub fn load(session: &Session) -> LoadReport {
 /// Use of the processor by interrupt.
 #[must_use]
 pub fn interrupts(session: &Session) -> BTreeMap<&'static str, InterruptReport> {
-    let chip = session.machine.chip();
+    let chip = session.chip();
     let measured = chip.load.measured(chip.now);
     let report = |exception: u8| {
         let used = chip.load.usage(exception);
@@ -183,12 +169,7 @@ impl ChipReport {
     ///
     /// # Errors
     /// The records belong to another leg.
-    pub fn new(
-        session: &mut Session,
-        identified: bool,
-        time_factor: f64,
-        seed: u64,
-    ) -> Result<Self, ToolError> {
+    pub fn new(session: &mut Session, identified: bool, factor: f64, seed: u64) -> Result<Self, ToolError> {
         session.probe.trace.finish();
         let run = if identified { Some(run_report(&session.probe.trace, &session.leg)?) } else { None };
         let errors = match &run {
@@ -198,7 +179,7 @@ impl ChipReport {
         let (unknown, known) = findings(session);
         let interrupts = interrupts(session);
         let loops = session.probe.trace.statistics.loops();
-        let chip = session.machine.chip();
+        let chip = session.chip();
         Ok(Self {
             verdict: run.as_ref().map_or_else(|| "none".into(), |run| run.verdict.into()),
             reasons: run
@@ -210,7 +191,7 @@ impl ChipReport {
             known_findings: known,
             missed_current_ticks: loops.as_ref().map_or(0, |loops| loops.current_missed),
             servo_missed: loops.as_ref().map_or(0, |loops| loops.servo_missed),
-            lost_conversions: chip.adcs.iter().map(|adc| adc.lost[0] + adc.lost[1]).sum(),
+            lost_conversions: chip.lost_conversions(),
             load: load(session),
             worst_instructions: interrupts
                 .iter()
@@ -223,7 +204,7 @@ impl ChipReport {
             records: [session.probe.trace.records, session.probe.trace.lost()],
             simulated_s: seconds(chip.now),
             instructions: chip.load.instructions,
-            time_factor,
+            time_factor: factor,
             seed,
         })
     }
@@ -249,13 +230,6 @@ mod tests {
             truth: Number::UNKNOWN,
             cramer_rao: Number::UNKNOWN,
         };
-        let used = InterruptReport {
-            per_second: 4000.0,
-            mean_instructions: 2874.0,
-            worst_instructions: 3315,
-            worst_latency_us: 0.1,
-            longest_us: 33.0,
-        };
         let finding = Finding {
             what: "reserved bit set",
             register: "CAN_MCR".into(),
@@ -264,34 +238,15 @@ mod tests {
             count: 1,
         };
         ChipReport {
-            verdict: "accepted".into(),
             reasons: vec!["residual".into()],
             base_parameters: vec![base],
             errors: BTreeMap::from([("ZZR1".into(), 0.1)]),
             findings: vec![finding],
-            known_findings: Vec::new(),
-            missed_current_ticks: 0,
-            servo_missed: 0,
-            lost_conversions: 0,
-            load: LoadReport {
-                total: 0.5,
-                level0: 0.3,
-                servo: 0.1,
-                bus: 0.03,
-                assist: 0.0,
-                housekeeping: 0.03,
-                thread: 0.04,
-            },
-            interrupts: BTreeMap::from([("servo", used)]),
+            interrupts: BTreeMap::from([("servo", InterruptReport::default())]),
             worst_instructions: LEVELS.into_iter().map(|(name, _)| (name, 0)).collect(),
-            stop: Some(crate::stops::Situation { name: "end of the run", ..Default::default() }),
+            stop: Some(crate::stops::Situation::default()),
             resets: vec!["Software".into()],
-            stack: [29608, 57344],
-            records: [384, 0],
-            simulated_s: 70.7,
-            instructions: 1,
-            time_factor: 1.34,
-            seed: 1,
+            ..ChipReport::default()
         }
     }
 

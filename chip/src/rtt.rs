@@ -25,8 +25,6 @@ pub struct Probe {
     pub trace: Trace,
     /// Records with the time at which they were read.
     pub lines: Vec<(Ticks, String)>,
-    /// Bytes read.
-    pub bytes: u64,
 }
 
 impl Probe {
@@ -40,7 +38,7 @@ impl Probe {
             .address(CONTROL_BLOCK)
             .ok_or_else(|| ToolError::input(format!("the image has no symbol {CONTROL_BLOCK}")))?;
         let decoder = Decoder::new(&image.elf)?;
-        Ok(Self { block, decoder, trace: Trace::default(), lines: Vec::new(), bytes: 0 })
+        Ok(Self { block, decoder, trace: Trace::default(), lines: Vec::new() })
     }
 
     /// Reads what the image has written since the last call.
@@ -63,7 +61,6 @@ impl Probe {
             machine.memory(buffer + part.start, &mut bytes[start..]);
         }
         machine.set_memory(self.block + CHANNEL + 16, &writer.to_le_bytes());
-        self.bytes += bytes.len() as u64;
         let (now, trace, lines) = (machine.chip().now, &mut self.trace, &mut self.lines);
         self.decoder.feed(&bytes, |line| {
             trace.push(line);

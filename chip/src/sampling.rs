@@ -19,11 +19,8 @@ use crate::time::{TICK_HZ, Ticks};
 /// Sampling of one axis in one situation.
 #[derive(Clone, Debug, Serialize)]
 pub struct SamplingReport {
-    /// Situation.
     pub situation: &'static str,
-    /// Axis.
     pub axis: usize,
-    /// Conversions.
     pub conversions: usize,
     /// Time from the middle of the lower zero vector to the trigger, ns: least and greatest.
     pub trigger_ns: [f64; 2],
@@ -53,7 +50,6 @@ const FEWEST: usize = 20;
 pub struct SweepStep {
     /// Lower end, V.
     pub from_v: u32,
-    /// Conversions.
     pub conversions: usize,
     /// Conversions with an edge of the other bridge within 1.2 us before the hold.
     pub disturbed: usize,
@@ -62,13 +58,11 @@ pub struct SweepStep {
 /// Sweep over the other bridge's voltage.
 #[derive(Clone, Debug, Serialize)]
 pub struct SweepReport {
-    /// Bus voltage, V.
     pub bus_v: f64,
     /// Steps of a volt.
     pub steps: Vec<SweepStep>,
     /// Voltage up to which no conversion was disturbed, V.
     pub clean_v: f64,
-    /// Largest voltage, V.
     pub highest_v: f64,
     /// Share of disturbed conversions above the documented voltage.
     pub share_above: f64,
@@ -126,11 +120,8 @@ impl Report {
 }
 
 /// Measures at rest, in motion and over the voltage, from a session whose drive is enabled.
-///
-/// # Errors
-/// The model does not know what the processor does.
 pub fn run(session: &mut Session) -> Result<Report, ToolError> {
-    let resting = session.save()?;
+    let resting = session.machine.save()?;
     let mut situations = measure(session, "rest", 0.5)?;
     session.press_start()?;
     session.run(4.0)?;
@@ -142,7 +133,7 @@ fn sweep(session: &mut Session, resting: &Snapshot) -> Result<SweepReport, ToolE
     let (mut samplings, mut bus_v) = (Vec::new(), 0.0);
     for direction in 0..DIRECTIONS {
         session.machine.restore(resting)?;
-        let plant = &mut session.machine.chip_mut().plant;
+        let plant = &mut session.chip_mut().plant;
         bus_v = plant.supply.voltage();
         for (axis, number) in plant.axes.iter_mut().zip([0, DIRECTIONS / 5]) {
             let angle = TAU * f64::from(direction + number) / f64::from(DIRECTIONS);
@@ -150,9 +141,9 @@ fn sweep(session: &mut Session, resting: &Snapshot) -> Result<SweepReport, ToolE
             axis.shunt_faults = [-1.0, 1.0]
                 .map(|side| Some(ShuntFault::Offset(ERROR_CODES * (angle + side * TAU / 3.0).cos())));
         }
-        session.machine.chip_mut().samplings = Some(Vec::new());
+        session.chip_mut().samplings = Some(Vec::new());
         session.run(RUN_S)?;
-        samplings.extend(session.machine.chip_mut().samplings.take().unwrap_or_default());
+        samplings.extend(session.chip_mut().samplings.take().unwrap_or_default());
     }
     Ok(SweepReport::new(&samplings, bus_v))
 }
@@ -181,9 +172,9 @@ fn measure(
     situation: &'static str,
     duration: f64,
 ) -> Result<Vec<SamplingReport>, ToolError> {
-    session.machine.chip_mut().samplings = Some(Vec::new());
+    session.chip_mut().samplings = Some(Vec::new());
     session.run(duration)?;
-    let samplings = session.machine.chip_mut().samplings.take().unwrap_or_default();
+    let samplings = session.chip_mut().samplings.take().unwrap_or_default();
     Ok((0..2).map(|axis| report(situation, axis, &samplings)).collect())
 }
 

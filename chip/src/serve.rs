@@ -65,8 +65,8 @@ impl Operator {
         let asked = if lacks_zeros { *self.asked.get_or_insert(now) } else { now };
         if now - asked > ticks(READS_S) && !self.is_at_zero {
             self.is_at_zero = true;
-            session.machine.chip_mut().plant.couple(now);
-            session.machine.chip_mut().plant.move_by_hand([0.0; JOINTS], now, BY_HAND_S);
+            session.chip_mut().plant.couple(now);
+            session.chip_mut().plant.move_by_hand([0.0; JOINTS], now, BY_HAND_S);
             session.hold_switch(true);
             self.opens = Some(now + ticks(STANDS_S));
         }
@@ -75,7 +75,7 @@ impl Operator {
         if (has(BoardState::REFERENCED) || is_taken) && !self.is_in_range {
             self.is_in_range = true;
             let to = start_position(&session.leg);
-            session.machine.chip_mut().plant.move_by_hand(to, now, BY_HAND_S);
+            session.chip_mut().plant.move_by_hand(to, now, BY_HAND_S);
             session.hold_switch(false);
             self.closes = Some(now + ticks(STANDS_S));
         }
@@ -109,7 +109,7 @@ pub fn serve(
     let begun = session.now();
     let mut due = Instant::now();
     while duration.is_none_or(|duration| seconds(session.now() - begun) < duration) {
-        let queued = session.machine.chip().can.partner.len();
+        let queued = session.chip().can.partner.len();
         let mut frames: Vec<Frame> = Vec::new();
         let events = server.poll(Instant::now(), |frame, _| {
             let taken = queued + frames.len() < QUEUE;
@@ -119,23 +119,22 @@ pub fn serve(
         for event in events {
             eprintln!("{event}");
             match event.what {
-                What::Opened => session.machine.chip_mut().can.connected = true,
-                _ if event.ends() => session.machine.chip_mut().can.connected = false,
+                What::Opened => session.chip_mut().can.connected = true,
+                _ if event.ends() => session.chip_mut().can.connected = false,
                 _ => {}
             }
         }
         for frame in frames {
             server.show(&frame);
-            session.machine.chip_mut().send_frame(frame);
+            session.chip_mut().send_frame(frame);
         }
         session.run(SLICE_S)?;
         // The hand releases the leg once the drive holds it.
-        let plant = &mut session.machine.chip_mut().plant;
-        if plant.is_held() && plant.axes.iter().all(|axis| axis.is_armed()) {
+        let plant = &mut session.chip_mut().plant;
+        if plant.is_held() && plant.axes.iter().all(|axis| axis.is_armed) {
             plant.let_go();
         }
-        let sent: Vec<Frame> =
-            session.machine.chip_mut().can.sent.drain(..).map(|(_, frame)| frame).collect();
+        let sent: Vec<Frame> = session.chip_mut().can.sent.drain(..).map(|(_, frame)| frame).collect();
         for frame in &sent {
             server.show(frame);
             server.send(frame);

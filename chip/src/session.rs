@@ -20,10 +20,11 @@ use scarab_rig::pair::start_position;
 use crate::chip::{Chip, ENABLING, START, STATUS_LIGHT};
 use crate::image::Image;
 use crate::load::{CURRENT_INTERRUPT, SERVO};
-use crate::machine::{End, Machine, Options, Snapshot};
+use crate::machine::{End, Machine};
 use crate::peripherals::rcc::ResetReason;
 use crate::plant::{Axis, JOINTS, Plant, WARM_C};
 use crate::rtt::{Probe, field};
+use crate::store_cuts::{Request, SAVE};
 use crate::time::{Ticks, microseconds, seconds, ticks};
 
 /// Interval in which the probe reads, s.
@@ -67,13 +68,9 @@ pub enum Step {
 
 /// Image, board, leg and operator.
 pub struct Session {
-    /// The microcontroller.
     pub machine: Machine,
-    /// The probe.
     pub probe: Probe,
-    /// The leg.
     pub leg: LegFile,
-    /// Resets so far.
     pub resets: Vec<ResetReason>,
     /// Whether records of the timeline are printed when they arrive.
     pub prints: bool,
@@ -123,14 +120,12 @@ const STORE_S: f64 = 5.0;
 const TURNED_RAD: f64 = 0.262;
 
 impl Session {
-    /// Powers a board with this image and leg.
+    /// Powers a board with this image and leg; `factor` is the number of cycles per instruction.
     ///
     /// # Errors
     /// The leg cannot be simulated, or the image sends no records.
-    pub fn new(image: &Rc<Image>, leg: &LegFile, options: &Options, seed: u64) -> Result<Self, ToolError> {
-        let drives = leg.complete_description::<JOINTS>()?;
-        let plant = Plant::new(&leg.description::<JOINTS>()?, &drives, seed);
-        let machine = Machine::new(image, Chip::new(plant, seed), options)?;
+    pub fn new(image: &Rc<Image>, leg: &LegFile, factor: f64, seed: u64) -> Result<Self, ToolError> {
+        let machine = Machine::new(image, Chip::new(Plant::new(leg, seed)?, seed), factor)?;
         let probe = Probe::new(&machine)?;
         Ok(Self {
             machine,
@@ -145,24 +140,17 @@ impl Session {
         })
     }
 
-    /// Present time.
     #[must_use]
     pub fn now(&self) -> Ticks {
-        self.machine.chip().now
+        self.chip().now
     }
 
     /// Runs for a time, s.
-    ///
-    /// # Errors
-    /// The model does not support an action of the processor.
     pub fn run(&mut self, duration: f64) -> Result<(), ToolError> {
         self.run_until(self.now() + ticks(duration))
     }
 
     /// Runs until an instant.
-    ///
-    /// # Errors
-    /// The model does not support an action of the processor.
     pub fn run_until(&mut self, end: Ticks) -> Result<(), ToolError> {
         while self.now() < end {
             let next = end.min(self.now() + ticks(POLL_S));
@@ -216,7 +204,7 @@ impl Session {
     }
 
     fn set(&mut self, pin: (char, u32), level: bool) {
-        self.machine.chip_mut().set_pin(pin, level);
+        self.chip_mut().set_pin(pin, level);
     }
 
     /// Holds or releases the enabling switch.
@@ -225,9 +213,6 @@ impl Session {
     }
 
     /// Presses the start button for 0.1 s.
-    ///
-    /// # Errors
-    /// The model does not support an action of the processor.
     pub fn press_start(&mut self) -> Result<(), ToolError> {
         self.set(START, true);
         self.run(0.1)?;
@@ -260,9 +245,17 @@ impl Session {
     /// Counts load and lost conversions from now on.
     pub fn begin_measurement(&mut self) {
         let now = self.now();
-        let chip = self.machine.chip_mut();
+        let chip = self.chip_mut();
         chip.load.clear(now);
         chip.adcs.iter_mut().for_each(|adc| adc.lost = [0; 2]);
+    }
+
+    /// Calibrates, takes the reference and enables the drive, which then holds the leg's pose.
+    ///
+    /// # Errors
+    /// The image refuses a step, or does not answer.
+    pub fn enable_drive(&mut self) -> Result<(), ToolError> {
+        [Step::Calibrate, Step::Reference, Step::Enable].into_iter().try_for_each(|step| self.step(step))
     }
 
     /// Runs a step.
@@ -276,7 +269,7 @@ impl Session {
             Step::Reference => self.reference(),
             Step::Enable => self.enable(),
             Step::Identify => self.identify(),
-            Step::Save => self.store(0x1010, *b"save", STORE_S),
+            Step::Save => self.store(SAVE, STORE_S),
             Step::Reset => self.reset(),
             Step::PowerCycle => self.power_cycle(),
             Step::Turn => self.turn(),
@@ -289,7 +282,7 @@ impl Session {
 
     fn mount(&mut self) -> Result<(), ToolError> {
         let now = self.now();
-        let plant = &mut self.machine.chip_mut().plant;
+        let plant = &mut self.chip_mut().plant;
         plant.couple(now);
         plant.let_go();
         self.run(0.5)
@@ -313,7 +306,7 @@ impl Session {
 
     fn reference(&mut self) -> Result<(), ToolError> {
         let now = self.now();
-        self.machine.chip_mut().plant.couple(now);
+        self.chip_mut().plant.couple(now);
         self.move_by_hand([0.0; JOINTS], 1.0)?;
         let from = self.probe.lines.len();
         self.press_start()?;
@@ -328,7 +321,7 @@ impl Session {
     /// Moves both joints to these angles (rad, anatomical) within a duration, s, and holds them there.
     fn move_by_hand(&mut self, to: [f64; JOINTS], duration: f64) -> Result<(), ToolError> {
         let now = self.now();
-        self.machine.chip_mut().plant.move_by_hand(to, now, duration);
+        self.chip_mut().plant.move_by_hand(to, now, duration);
         self.run(duration + 0.3)
     }
 
@@ -336,7 +329,7 @@ impl Session {
     fn rest(&mut self) -> Result<(), ToolError> {
         self.hold_switch(false);
         self.run(1.0)?;
-        let position = self.machine.chip().plant.position();
+        let position = self.chip().plant.position();
         self.move_by_hand(position, 0.1)
     }
 
@@ -392,21 +385,21 @@ impl Session {
             let node = 1 + joint as u16;
             let [rated_a, rated_nm] = [0x6075, 0x6076].map(|index| self.read_object(node, index, 0));
             let (rated_a, rated_nm) = (f64::from(rated_a?) * 1e-6, f64::from(rated_nm?) * 1e-6);
-            let phase = |number: usize| move |session: &Self| session.axis(joint).currents()[number];
+            let phase = |number: usize| move |session: &Self| session.axis(joint).motor.currents()[number];
             // The plant's torque contains the motor's cogging, which its current does not show.
             let rows: [Telemetry<'_>; 9] = [
                 ("bus voltage, V", 0x6079, 0, 1e-3, Some(0.5), &|session| session.plant().supply.voltage()),
                 ("position, rad", 0x6064, 0, 1e-6, Some(1e-3), &|session| session.plant().position()[joint]),
                 ("torque, N m", 0x6077, 0, rated_nm, Some(1.5), &|session| session.plant().torque()[joint]),
                 ("current of the motor, A", 0x6078, 0, rated_a, Some(0.1), &|session| {
-                    session.axis(joint).rotor_currents()[1]
+                    session.axis(joint).motor.rotor_currents()[1]
                 }),
                 ("current of phase A, A", 0x2170, 4, 0.01, Some(0.1), &phase(0)),
                 ("current of phase B, A", 0x2170, 5, 0.01, Some(0.1), &phase(1)),
                 ("current of phase C, A", 0x2170, 6, 0.01, Some(0.1), &phase(2)),
                 ("bridge, degrees Celsius", 0x2170, 2, 0.1, Some(1.0), &|_| WARM_C),
                 ("winding, degrees Celsius", 0x2170, 3, 0.1, None, &|session| {
-                    session.axis(joint).winding_c()
+                    session.axis(joint).motor.temperature()
                 }),
             ];
             for (name, index, sub, unit, tolerance, truth) in rows {
@@ -442,7 +435,7 @@ impl Session {
         for (name, sub, exception) in [("current interrupt", 7, CURRENT_INTERRUPT), ("servo tick", 8, SERVO)]
         {
             let shown = f64::from(self.read_object(1, 0x2170, sub)?) * 1e-3;
-            let used = self.machine.chip().load.usage(exception);
+            let used = self.chip().load.usage(exception);
             let mean = microseconds(used.ticks) / used.entries.max(1) as f64;
             let row = format!(
                 "longest {name}: {shown:.2} us, the model's mean {mean:.2} us, longest {:.2} us",
@@ -461,7 +454,7 @@ impl Session {
         let is_on = self.read_object(1, 0x6041, 0)? & 0x6F == 0x27;
         let sample = |session: &mut Self| {
             session.run(LIGHT_CYCLE_S / f64::from(LIGHT_SAMPLES))?;
-            Ok::<_, ToolError>(session.machine.chip().gpio.is_driven_high(STATUS_LIGHT))
+            Ok::<_, ToolError>(session.chip().gpio.is_driven_high(STATUS_LIGHT))
         };
         // A cycle from the end of a flash on.
         for wanted in [true, false] {
@@ -497,7 +490,7 @@ impl Session {
     }
 
     fn plant(&self) -> &Plant {
-        &self.machine.chip().plant
+        &self.chip().plant
     }
 
     fn axis(&self, axis: usize) -> &Axis {
@@ -508,10 +501,10 @@ impl Session {
         let cold = self.windings()?;
         // From 20 to 90.7 degrees: 12.1 and 1.25 kOhm of 10 kOhm at 25 degrees, beta 3435 K, with 3.3 kOhm.
         for code in (1125..=3215).rev().step_by(50) {
-            self.machine.chip_mut().plant.motor_thermistors[0] = Some(code);
+            self.chip_mut().plant.motor_thermistors[0] = Some(code);
             self.run(0.1)?;
         }
-        self.machine.chip_mut().plant.motor_thermistors[0] = Some(1125);
+        self.chip_mut().plant.motor_thermistors[0] = Some(1125);
         // A mean of eight readings.
         self.run(3.0)?;
         let hot = self.windings()?;
@@ -524,12 +517,12 @@ impl Session {
             );
             return Err(ToolError::Refused(why));
         }
-        self.machine.chip_mut().plant.motor_thermistors[1] = Some(4095);
+        self.chip_mut().plant.motor_thermistors[1] = Some(4095);
         self.wait("fault", &["name=motor_thermistor", "joint=2"], 0.5).map(drop)
     }
 
     fn turn(&mut self) -> Result<(), ToolError> {
-        let from = self.machine.chip().plant.position();
+        let from = self.chip().plant.position();
         self.move_by_hand(from.map(|angle| angle + TURNED_RAD), 2.0)?;
         self.is_known = true;
         self.move_by_hand(from, 2.0)
@@ -538,7 +531,7 @@ impl Session {
     fn enable(&mut self) -> Result<(), ToolError> {
         self.hold_switch(true);
         self.wait("state", &["drive=operation_enabled"], 2.0)?;
-        self.machine.chip_mut().plant.let_go();
+        self.chip_mut().plant.let_go();
         self.run(0.3)
     }
 
@@ -549,16 +542,22 @@ impl Session {
         self.run(0.1)
     }
 
-    /// Joint angles, degrees, anatomical.
-    #[must_use]
-    pub fn position_deg(&self) -> [f64; JOINTS] {
-        self.machine.chip().plant.position().map(f64::to_degrees)
-    }
-
     /// Forgets the frames that the board has sent so far.
     pub fn forget_frames(&mut self) {
-        self.machine.chip_mut().can.sent.clear();
+        self.chip_mut().can.sent.clear();
         self.received = 0;
+    }
+
+    /// Emergency codes of a node among the frames that the board has sent.
+    #[must_use]
+    pub fn emergencies(&self, node: u16) -> Vec<u16> {
+        let own = |(_, frame): &(Ticks, Frame)| match *frame.data() {
+            [low, high, _, _, _, _, _, _] if frame.id() == 0x80 + node => {
+                Some(u16::from_le_bytes([low, high]))
+            }
+            _ => None,
+        };
+        self.chip().can.sent.iter().filter_map(own).collect()
     }
 
     /// Client of the board's nodes.
@@ -595,14 +594,11 @@ impl Session {
     ///
     /// # Errors
     /// The node refuses the request, fails, or does not finish in time.
-    pub fn store(&mut self, index: u16, word: [u8; 4], longest: f64) -> Result<(), ToolError> {
+    pub fn store(&mut self, (index, word): Request, longest: f64) -> Result<(), ToolError> {
         self.write_object(1, index, 1, u32::from_le_bytes(word))?;
         let end = self.now() + ticks(longest);
-        while self.now() < end && !self.machine.chip().flash.is_cut {
-            let sent = &self.machine.chip().can.sent;
-            let codes = sent.iter().filter(|(_, frame)| frame.id() == 0x81 && frame.data().len() == 8);
-            let codes: Vec<u16> =
-                codes.map(|(_, frame)| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect();
+        while self.now() < end && !self.chip().flash.is_cut {
+            let codes = self.emergencies(1);
             if codes.contains(&NoticeCode::StoreFailed.number()) {
                 return Err(ToolError::Refused("the board reports that it could not store (5530)".into()));
             }
@@ -611,7 +607,7 @@ impl Session {
             }
             self.run(POLL_S)?;
         }
-        if self.machine.chip().flash.is_cut {
+        if self.chip().flash.is_cut {
             return Ok(());
         }
         Err(ToolError::input(format!("{index:04x} did not finish within {longest} s")))
@@ -626,12 +622,13 @@ impl Session {
         self.client().try_read(node, object).map_err(|error| error.refused(node, object))
     }
 
-    /// Saves the machine.
-    ///
-    /// # Errors
-    /// Unicorn cannot save its registers.
-    pub fn save(&self) -> Result<Snapshot, ToolError> {
-        self.machine.save()
+    #[must_use]
+    pub fn chip(&self) -> &Chip {
+        self.machine.chip()
+    }
+
+    pub fn chip_mut(&mut self) -> &mut Chip {
+        self.machine.chip_mut()
     }
 }
 
@@ -639,7 +636,7 @@ impl bus::Bus for Session {
     /// Sends a frame, and forgets all that the board sent before.
     fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
         self.forget_frames();
-        self.machine.chip_mut().send_frame(*frame);
+        self.chip_mut().send_frame(*frame);
         Ok(())
     }
 

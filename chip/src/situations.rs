@@ -53,11 +53,8 @@ pub(crate) const OTHER: u16 = 0x5FF;
 /// Load in one situation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Situation {
-    /// Situation.
     pub name: &'static str,
-    /// Shares of the processor's time.
     pub load: LoadReport,
-    /// Use by interrupt.
     pub interrupts: BTreeMap<&'static str, InterruptReport>,
     /// Calls of the identification's functions.
     pub calls: BTreeMap<&'static str, CallReport>,
@@ -69,53 +66,48 @@ pub struct Situation {
 /// Calls of one function, with the functions that it calls.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CallReport {
-    /// Number of calls.
     pub count: u64,
-    /// Mean instructions of a call.
     pub mean_instructions: f64,
-    /// Most instructions of a call.
     pub worst_instructions: u64,
     /// Instructions of all calls at 8 ns each, s.
     pub seconds: f64,
 }
 
-/// Measures idle, calibrating, holding, identifying and following, from a session that was just powered.
+/// Measures idle, calibrating, holding, identifying and following, from a session that has just started.
 ///
 /// # Errors
 /// The image does not reach a situation.
 pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, ToolError> {
-    let mut found = Vec::new();
     let image = session.machine.image();
     let entry = |(_, within, name)| {
         let missing = || ToolError::input(format!("the image has no function {within}..{name}"));
         image.function_in(within, name).ok_or_else(missing)
     };
     let entries = CALLED.into_iter().map(entry).collect::<Result<Vec<_>, _>>()?;
-    session.boot()?;
-    begin(session, &entries, profiled);
-    session.run(MEASURED_S)?;
-    end(session, "idle", &mut found);
-
-    begin(session, &entries, profiled);
-    session.step(Step::Calibrate)?;
-    end(session, "calibrating", &mut found);
-
+    let mut found = Vec::new();
+    let mut measure = |session: &mut Session, name, act: &dyn Fn(&mut Session) -> Result<(), ToolError>| {
+        session.begin_measurement();
+        session.machine.watch(&entries);
+        if profiled {
+            session.machine.begin_profile();
+        }
+        act(session)?;
+        let (load, interrupts) = (load(session), interrupts(session));
+        let profile = session.machine.profile();
+        found.push(Situation { name, load, interrupts, calls: calls(session), profile });
+        Ok::<_, ToolError>(())
+    };
+    measure(session, "idle", &|session| session.run(MEASURED_S))?;
+    measure(session, "calibrating", &|session| session.step(Step::Calibrate))?;
     session.step(Step::Reference)?;
     session.step(Step::Enable)?;
-    begin(session, &entries, profiled);
-    session.run(MEASURED_S)?;
-    end(session, HOLDING, &mut found);
-
-    begin(session, &entries, profiled);
-    session.step(Step::Identify)?;
-    end(session, IDENTIFYING, &mut found);
-
+    measure(session, HOLDING, &|session| session.run(MEASURED_S))?;
+    measure(session, IDENTIFYING, &|session| session.step(Step::Identify))?;
     let start = take_over(session)?;
     // The first cycles bring the leg into the motion.
     follow(session, start, 0..LEAD)?;
-    begin(session, &entries, profiled);
-    follow(session, start, LEAD..LEAD + (MEASURED_S / CYCLE_S) as u32)?;
-    end(session, FOLLOWING, &mut found);
+    let cycles = LEAD..LEAD + (MEASURED_S / CYCLE_S) as u32;
+    measure(session, FOLLOWING, &|session| follow(session, start, cycles.clone()))?;
     Ok(found)
 }
 
@@ -126,21 +118,20 @@ pub fn missed_goals(found: &[Situation]) -> Vec<String> {
     for Situation { name, load, interrupts, calls, .. } in
         found.iter().filter(|one| SWITCHING.contains(&one.name))
     {
-        let InterruptReport { mean_instructions: mean, worst_instructions: worst, .. } = interrupts[CURRENT];
-        if mean > MOST_MEAN || worst > MOST_WORST {
-            missed.push(format!(
-                "{name}: the current interrupt takes {mean:.1} instructions in the mean and {worst} at worst; goals \
-                 {MOST_MEAN} and {MOST_WORST}"
-            ));
-        }
-        let InterruptReport { mean_instructions: mean, worst_instructions: worst, .. } =
-            interrupts[SERVO_NAME];
         let goal = MOST_SERVO.into_iter().find(|(situation, ..)| situation == name);
-        let (_, most_mean, most) = goal.unwrap_or_default();
-        if mean > most_mean || worst > most {
-            missed.push(format!(
-                "{name}: the servo takes {mean:.1} instructions in the mean and {worst} at worst; goals {most_mean} and {most}"
-            ));
+        let (_, mean_of_servo, most_of_servo) = goal.unwrap_or_default();
+        let goals = [
+            ("current interrupt", CURRENT, MOST_MEAN, MOST_WORST),
+            ("servo", SERVO_NAME, mean_of_servo, most_of_servo),
+        ];
+        for (what, interrupt, most_mean, most) in goals {
+            let InterruptReport { mean_instructions: mean, worst_instructions: worst, .. } =
+                interrupts[interrupt];
+            if mean > most_mean || worst > most {
+                missed.push(format!(
+                    "{name}: the {what} takes {mean:.1} instructions in the mean and {worst} at worst; goals {most_mean} and {most}"
+                ));
+            }
         }
         if *name == IDENTIFYING {
             missed.extend(missed_calls(calls));
@@ -170,24 +161,6 @@ fn missed_calls(calls: &BTreeMap<&'static str, CallReport>) -> Vec<String> {
     missed.collect()
 }
 
-fn begin(session: &mut Session, entries: &[u32], profiled: bool) {
-    session.begin_measurement();
-    session.machine.watch(entries);
-    if profiled {
-        session.machine.begin_profile();
-    }
-}
-
-fn end(session: &Session, name: &'static str, found: &mut Vec<Situation>) {
-    found.push(Situation {
-        name,
-        load: load(session),
-        interrupts: interrupts(session),
-        calls: calls(session),
-        profile: session.machine.profile(),
-    });
-}
-
 /// Calls of the watched functions.
 fn calls(session: &Session) -> BTreeMap<&'static str, CallReport> {
     let calls = session.machine.calls();
@@ -205,7 +178,7 @@ fn calls(session: &Session) -> BTreeMap<&'static str, CallReport> {
 
 /// A host with the compact mapping (docs/bus.md) enables both joints; returns their positions.
 pub(crate) fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
-    session.machine.chip_mut().send_frame(Frame::new(0, &[1, 0]));
+    session.chip_mut().send_frame(Frame::new(0, &[1, 0]));
     session.run(0.1)?;
     for node in [1_u16, 2] {
         let mut write = |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes);
@@ -260,19 +233,19 @@ fn follow(session: &mut Session, start: [i32; 2], cycles: Range<u32>) -> Result<
     let expected = 2 * cycles.len();
     for cycle in cycles {
         let time = f64::from(cycle) * CYCLE_S;
-        let waiting = &mut session.machine.chip_mut().can.partner;
+        let waiting = &mut session.chip_mut().can.partner;
         // The first frame may be on the wire.
         let next = waiting.len().min(1);
         waiting.insert(next, targets(start, time));
         waiting.insert(next, Frame::new(0x80, &[]));
         for _ in 0..FILLINGS {
-            while session.machine.chip().can.partner.len() < 3 {
-                session.machine.chip_mut().send_frame(Frame::new(OTHER, &[0x55; 8]));
+            while session.chip().can.partner.len() < 3 {
+                session.chip_mut().send_frame(Frame::new(OTHER, &[0x55; 8]));
             }
             session.run(CYCLE_S / f64::from(FILLINGS))?;
         }
     }
-    let sent = &session.machine.chip().can.sent;
+    let sent = &session.chip().can.sent;
     let feedback = sent.iter().filter(|(_, frame)| frame.id() & !3 == 0x180).count();
     if feedback + 4 < expected {
         return Err(ToolError::Refused(format!("{feedback} of {expected} feedback frames arrived")));
@@ -286,28 +259,15 @@ mod tests {
 
     fn situation(name: &'static str, mean: f64, worst: u64, total: f64) -> Situation {
         let call = CallReport { count: 2, mean_instructions: 0.0, worst_instructions: 4000, seconds: 0.5 };
-        let interrupt = InterruptReport {
-            per_second: 48_000.0,
-            mean_instructions: mean,
-            worst_instructions: worst,
-            worst_latency_us: 0.0,
-            longest_us: 0.0,
+        let interrupt = |mean_instructions, worst_instructions| InterruptReport {
+            mean_instructions,
+            worst_instructions,
+            ..InterruptReport::default()
         };
-        let load = LoadReport {
-            total,
-            level0: 0.0,
-            servo: 0.0,
-            bus: 0.0,
-            assist: 0.0,
-            housekeeping: 0.0,
-            thread: 0.0,
-        };
-        let servo =
-            InterruptReport { mean_instructions: 800.0, worst_instructions: 1200, ..interrupt.clone() };
         Situation {
             name,
-            load,
-            interrupts: BTreeMap::from([(CURRENT, interrupt), (SERVO_NAME, servo)]),
+            load: LoadReport { total, ..LoadReport::default() },
+            interrupts: [(CURRENT, interrupt(mean, worst)), (SERVO_NAME, interrupt(800.0, 1200))].into(),
             calls: CALLED.map(|(name, ..)| (name, call)).into(),
             profile: Vec::new(),
         }

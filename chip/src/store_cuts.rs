@@ -13,8 +13,10 @@ use crate::time::ticks;
 pub(crate) const OBJECT: u16 = 0x6065;
 const OLD: u32 = 1000;
 const NEW: u32 = 2000;
-pub(crate) const SAVE: (u16, [u8; 4]) = (0x1010, *b"save");
-pub(crate) const LOAD: (u16, [u8; 4]) = (0x1011, *b"load");
+/// Request that changes the flash: index of its object, and the word that is written there.
+pub(crate) type Request = (u16, [u8; 4]);
+pub(crate) const SAVE: Request = (0x1010, *b"save");
+pub(crate) const LOAD: Request = (0x1011, *b"load");
 /// Longest answer to a request that changes the flash, s.
 pub(crate) const LONGEST_S: f64 = 12.0;
 /// Longest start that repairs the flash, s: two sectors are erased.
@@ -36,7 +38,6 @@ pub struct SaveReport {
 /// Result of all cuts.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CutReport {
-    /// Saves.
     pub saves: Vec<SaveReport>,
     /// Cuts within an erase.
     pub erasures: u32,
@@ -52,13 +53,21 @@ impl Session {
         self.forget_frames();
         self.machine.power_cycle();
         self.boot()?;
-        let end = self.now() + ticks(REPAIR_S);
         // Frames before the boot-up message are not answered.
-        while !self.machine.chip().can.sent.iter().any(|(_, frame)| frame.id() == 0x701) {
+        self.await_boot_up(REPAIR_S, 1e-3)
+    }
+
+    /// Runs until the first node's boot-up message, or until the power is cut.
+    pub(crate) fn await_boot_up(&mut self, longest: f64, poll: f64) -> Result<(), ToolError> {
+        let end = self.now() + ticks(longest);
+        while !self.chip().can.sent.iter().any(|(_, frame)| frame.id() == 0x701) {
             if self.now() >= end {
-                return Err(ToolError::input(format!("no boot-up message within {REPAIR_S} s")));
+                return Err(ToolError::input(format!("no boot-up message within {longest} s")));
             }
-            self.run(1e-3)?;
+            if self.chip().flash.is_cut {
+                return Ok(());
+            }
+            self.run(poll)?;
         }
         Ok(())
     }
@@ -77,13 +86,13 @@ impl Session {
 /// The image does not store at all.
 pub fn run(session: &mut Session) -> Result<CutReport, ToolError> {
     let default = session.read_object(1, OBJECT, 0)?;
-    let empty = session.save()?;
+    let empty = session.machine.save()?;
     let mut report = CutReport::default();
     cut_saves(session, "first save", &empty, [default, OLD], &mut report)?;
     session.machine.restore(&empty)?;
     session.write_object(1, OBJECT, 0, OLD)?;
-    session.store(SAVE.0, SAVE.1, LONGEST_S)?;
-    let old = session.save()?;
+    session.store(SAVE, LONGEST_S)?;
+    let old = session.machine.save()?;
     cut_saves(session, "second save", &old, [OLD, NEW], &mut report)?;
     cut_erasures(session, &old, default, &mut report)?;
     session.machine.restore(&old)?;
@@ -99,17 +108,17 @@ fn cut_saves(
 ) -> Result<(), ToolError> {
     let mut cuts = SaveReport { save, ..SaveReport::default() };
     session.machine.restore(saved)?;
-    let words = session.machine.chip().flash.words;
+    let words = session.chip().flash.words;
     session.write_object(1, OBJECT, 0, after)?;
-    session.store(SAVE.0, SAVE.1, LONGEST_S)?;
-    cuts.words = session.machine.chip().flash.words - words;
+    session.store(SAVE, LONGEST_S)?;
+    cuts.words = session.chip().flash.words - words;
     // One more than the words: the save is then complete.
     for word in 0..=cuts.words {
         session.machine.restore(saved)?;
         session.write_object(1, OBJECT, 0, after)?;
-        session.machine.chip_mut().flash.cut = Some(Cut::Word(word));
-        session.store(SAVE.0, SAVE.1, LONGEST_S)?;
-        if session.machine.chip().flash.is_cut == (word == cuts.words) {
+        session.chip_mut().flash.cut = Some(Cut::Word(word));
+        session.store(SAVE, LONGEST_S)?;
+        if session.chip().flash.is_cut == (word == cuts.words) {
             report.violations.push(format!("{save}: the power was not cut at word {word}"));
             continue;
         }
@@ -132,9 +141,9 @@ fn cut_erasures(
     for step in 0..ERASURES {
         session.machine.restore(old)?;
         let share = (f64::from(step) + 0.5) / f64::from(ERASURES);
-        session.machine.chip_mut().flash.cut = Some(Cut::Erasure(0, share));
-        session.store(LOAD.0, LOAD.1, LONGEST_S)?;
-        if !session.machine.chip().flash.is_cut {
+        session.chip_mut().flash.cut = Some(Cut::Erasure(0, share));
+        session.store(LOAD, LONGEST_S)?;
+        if !session.chip().flash.is_cut {
             report.violations.push(format!("the power was not cut within erase {step}"));
             continue;
         }

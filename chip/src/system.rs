@@ -1,7 +1,7 @@
 //! System control block and debug registers in the processor's private address range (ARMv7-M B3.2, C1.6).
 
 use crate::chip::Chip;
-use crate::findings::NOT_MODELLED;
+use crate::findings::{Access, NOT_MODELLED};
 use crate::nvic::{NMI, PENDING_SERVICE, SYSTEM_TICK};
 use crate::peripherals::rcc::ResetReason;
 
@@ -29,11 +29,9 @@ pub struct System {
     control: u32,
     /// Configurable fault status, hard fault status, address of a bus fault.
     pub faults: [u32; 2],
-    /// Address of the last bus fault.
     pub fault_address: u32,
     coprocessors: u32,
     floating_point: [u32; 3],
-    group: u32,
 }
 
 impl Chip {
@@ -41,36 +39,29 @@ impl Chip {
     pub fn read_private(&mut self, offset: u32, size: usize) -> u32 {
         let system = &self.system;
         match offset {
-            0x1000 => u32::from(self.debug.enabled()[1]) | 0x4000_0000,
+            0x1000 => u32::from(self.debug.counts) | 0x4000_0000,
             0x1004 => self.debug.cycles(self.now),
             0xE004 => 2,
             0xED00 => 0x410F_C241,
             0xED04 => self.nvic.state(),
             0xED08 => system.vectors,
-            0xED0C => 0xFA05_0000 | system.group << 8,
+            0xED0C => 0xFA05_0000 | self.nvic.group << 8,
             0xED10 => system.control,
             0xED14 => 0x200,
-            0xED24 => 0,
             0xED28 => system.faults[0],
             0xED2C => system.faults[1],
-            0xED30..=0xED3C => {
-                if offset == 0xED38 {
-                    system.fault_address
-                } else {
-                    0
-                }
-            }
+            0xED38 => system.fault_address,
+            0xED24 | 0xED30..=0xED3C | 0xEDF0 => 0,
             0xED88 => system.coprocessors,
             0xED90 => 0x800,
-            0xEDF0 => 0,
-            0xEDFC => u32::from(self.debug.enabled()[0]) << 24,
+            0xEDFC => u32::from(self.debug.trace) << 24,
             0xEF34 => system.floating_point[0] | 0xC000_0000,
             0xEF38 | 0xEF3C => system.floating_point[(offset as usize - 0xEF34) / 4],
             0xEF40 => 0x1011_0021,
             0xEF44 => 0x1100_0011,
             0xE000..0xF000 => self.nvic.read(offset - 0xE000, size),
             _ if offset & !0x3FF == DEBUG_UNIT => {
-                let access = &mut crate::findings::Access { now: self.now, findings: &mut self.findings };
+                let access = &mut Access { now: self.now, findings: &mut self.findings };
                 self.debug.read(offset & 0x3FF, access)
             }
             _ => {
@@ -118,7 +109,7 @@ impl Chip {
                 }
             }
             _ if offset & !0x3FF == DEBUG_UNIT => {
-                let access = &mut crate::findings::Access { now: self.now, findings: &mut self.findings };
+                let access = &mut Access { now: self.now, findings: &mut self.findings };
                 self.debug.write(offset & 0x3FF, value, access);
             }
             _ => self.findings.add(NOT_MODELLED, format!("{:#010x}", PRIVATE + offset)),
@@ -129,8 +120,7 @@ impl Chip {
         if value >> 16 != 0x05FA {
             return self.findings.add("written without its key", "SCB_AIRCR");
         }
-        self.system.group = value >> 8 & 7;
-        self.nvic.set_group(self.system.group);
+        self.nvic.group = value >> 8 & 7;
         if value & 4 != 0 {
             self.reset_request = Some(ResetReason::Software);
         }

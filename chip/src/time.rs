@@ -6,7 +6,6 @@
 /// Instant or duration, ticks since power-on.
 pub type Ticks = u64;
 
-/// Ticks per second.
 pub const TICK_HZ: u64 = 336_000_000;
 /// Instant that never comes.
 pub const NEVER: Ticks = u64::MAX;
@@ -19,13 +18,11 @@ pub fn ticks(seconds: f64) -> Ticks {
     (seconds * TICK_HZ as f64).round() as Ticks
 }
 
-/// Converts ticks to seconds.
 #[must_use]
 pub fn seconds(ticks: Ticks) -> f64 {
     ticks as f64 / TICK_HZ as f64
 }
 
-/// Converts ticks to microseconds.
 #[must_use]
 pub fn microseconds(ticks: Ticks) -> f64 {
     1e6 * seconds(ticks)

@@ -17,7 +17,7 @@ use serde::Serialize;
 use crate::machine::Snapshot;
 use crate::peripherals::flash::Cut;
 use crate::session::Session;
-use crate::time::{seconds, ticks};
+use crate::time::seconds;
 
 /// Node through which the image comes.
 const NODE: u8 = 1;
@@ -54,11 +54,9 @@ pub struct Trial {
 pub struct UpdateReport {
     /// Bytes of the image.
     pub bytes: usize,
-    /// Time of the download, s.
     pub download_s: f64,
     /// Time from the start command to the boot-up message of the new image, s.
     pub restart_s: f64,
-    /// Trials in their order.
     pub trials: Vec<Trial>,
 }
 
@@ -69,7 +67,6 @@ impl UpdateReport {
         self.trials.iter().filter(|trial| !trial.passes).count()
     }
 
-    /// Formats the result.
     #[must_use]
     pub fn text(&self) -> String {
         let mut text = format!(
@@ -118,17 +115,7 @@ fn changed(program: &[u8]) -> Result<Vec<u8>, ToolError> {
 impl Session {
     /// Runs until the first node's boot-up message, without a request of the host.
     fn await_start(&mut self, longest: f64) -> Result<(), ToolError> {
-        let end = self.now() + ticks(longest);
-        let started = 0x700 + u16::from(NODE);
-        while !self.machine.chip().can.sent.iter().any(|(_, frame)| frame.id() == started) {
-            if self.now() >= end {
-                return Err(ToolError::input(format!("no boot-up message within {longest} s")));
-            }
-            if self.machine.chip().flash.is_cut {
-                return Ok(());
-            }
-            self.run(5e-3)?;
-        }
+        self.await_boot_up(longest, 5e-3)?;
         self.run(1e-2)
     }
 
@@ -203,7 +190,7 @@ impl Bench<'_> {
             return Err(format!("1F56 is {software:#x}, of neither image"));
         }
         let (name, program) = if is_new { ("new", &self.new) } else { ("old", &self.old) };
-        if !self.session.machine.chip().flash.region(&Region::IMAGE).starts_with(program) {
+        if !self.session.chip().flash.region(&Region::IMAGE).starts_with(program) {
             return Err(format!("the sectors of the {name} image differ from it"));
         }
         let trial = if ProgramStatus(status).has(ProgramStatus::ON_TRIAL) { ", on trial" } else { "" };
@@ -223,18 +210,18 @@ impl Bench<'_> {
 
     /// The whole way to a new image on trial; returns the states after clearing, writing and restarting.
     fn whole(&mut self) -> Result<[Snapshot; 4], ToolError> {
-        let idle = self.session.save()?;
+        let idle = self.session.machine.save()?;
         self.session.command_done(ProgramCommand::Stop)?;
         let cleared = self.session.command_done(ProgramCommand::Clear)?;
         let is_cleared = cleared.has(ProgramStatus::CLEARED);
         self.note("clear", if is_cleared { Ok("cleared".into()) } else { Err(format!("{cleared:x?}")) });
-        let cleared = self.session.save()?;
+        let cleared = self.session.machine.save()?;
         let begun = self.session.now();
         let program = self.new.clone();
         self.session.download(&program, |_| Ok(()))?;
         self.session.settled()?;
         self.report.download_s = seconds(self.session.now() - begun);
-        let written = self.session.save()?;
+        let written = self.session.machine.save()?;
         let (begun, resets) = (self.session.now(), self.session.resets.len());
         self.session.command(ProgramCommand::Start)?;
         self.session.await_start(SWAPPED_S)?;
@@ -242,7 +229,7 @@ impl Bench<'_> {
         let found = self.running(Expected::New);
         let once = self.session.resets.len() == resets + 1;
         self.note("start", if once { found } else { Err("the board did not restart once".into()) });
-        Ok([idle, cleared, written, self.session.save()?])
+        Ok([idle, cleared, written, self.session.machine.save()?])
     }
 
     /// What becomes of an image on trial.
@@ -266,7 +253,7 @@ impl Bench<'_> {
         self.session.machine.restore(trial)?;
         // During the trial the old image begins at the second sector of the space.
         let old = Region::NEW_IMAGE.sector_bytes as usize;
-        self.session.machine.chip_mut().flash.region_mut(&Region::NEW_IMAGE)[old + 1000] ^= 1;
+        self.session.chip_mut().flash.region_mut(&Region::NEW_IMAGE)[old + 1000] ^= 1;
         let found = self.start_up(Expected::New);
         self.note("power cut without confirmation, and the old image has decayed", found);
         self.session.machine.restore(trial)?;
@@ -304,7 +291,7 @@ impl Bench<'_> {
         ];
         for (name, damage, error) in &cases {
             self.session.machine.restore(written)?;
-            damage(self.session.machine.chip_mut().flash.region_mut(&Region::NEW_IMAGE));
+            damage(self.session.chip_mut().flash.region_mut(&Region::NEW_IMAGE));
             let status = self.session.command_done(ProgramCommand::Start)?;
             let is_refused = status.error() == *error as u8 && status.has(ProgramStatus::STOPPED);
             let found = format!("refused: {}", error.words());
@@ -315,7 +302,7 @@ impl Bench<'_> {
         }
         for (name, damage, _) in cases.iter().skip(1).step_by(3) {
             self.session.machine.restore(idle)?;
-            let flash = &mut self.session.machine.chip_mut().flash;
+            let flash = &mut self.session.chip_mut().flash;
             let space = flash.region_mut(&Region::NEW_IMAGE);
             space[..self.new.len()].copy_from_slice(&self.new);
             damage(space);
@@ -339,10 +326,10 @@ impl Bench<'_> {
         begin: impl Fn(&mut Session) -> Result<(), ToolError>,
     ) -> Result<(), ToolError> {
         self.session.machine.restore(from)?;
-        let flash = &self.session.machine.chip().flash;
+        let flash = &self.session.chip().flash;
         let before = (flash.words, flash.erasures);
         begin(self.session)?;
-        let flash = &self.session.machine.chip().flash;
+        let flash = &self.session.chip().flash;
         let (words, erasures) = (flash.words - before.0, flash.erasures - before.1);
         let at_words = (0..points.min(words)).map(|point| Cut::Word(point * words / points.min(words)));
         let at_erasures = (0..erasures).flat_map(|erasure| SHARES.map(|share| Cut::Erasure(erasure, share)));
@@ -350,10 +337,10 @@ impl Bench<'_> {
         let cuts: Vec<Cut> = at_words.chain(at_erasures).collect();
         for cut in &cuts {
             self.session.machine.restore(from)?;
-            self.session.machine.chip_mut().flash.cut = Some(*cut);
+            self.session.chip_mut().flash.cut = Some(*cut);
             // The board is silent after the cut, which ends the wait of a host.
             let _ = begin(self.session);
-            if !self.session.machine.chip().flash.is_cut {
+            if !self.session.chip().flash.is_cut {
                 wrong.push(format!("{cut:?}: the power was not cut"));
                 continue;
             }
@@ -384,7 +371,7 @@ impl Bench<'_> {
         self.session.download(&program, |session| {
             count += 1;
             if count % every == 0 {
-                states.push(session.save()?);
+                states.push(session.machine.save()?);
             }
             Ok(())
         })?;
@@ -435,7 +422,7 @@ impl Bench<'_> {
 /// # Errors
 /// The image does not contain its version.
 pub fn programs(session: &Session) -> Result<[Vec<u8>; 2], ToolError> {
-    let image = session.machine.chip().flash.region(&Region::IMAGE);
+    let image = session.chip().flash.region(&Region::IMAGE);
     let at = HEADER_AT as usize + 8;
     let length = u32::from_le_bytes([image[at], image[at + 1], image[at + 2], image[at + 3]]) as usize;
     let old = image.get(..length).ok_or_else(|| ToolError::input("the image is not sealed"))?.to_vec();

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use scarab_chip::chip::Chip;
 use scarab_chip::image::Image;
-use scarab_chip::machine::{End, Machine, Options};
+use scarab_chip::machine::{End, Machine, TIME_FACTOR};
 use scarab_chip::plant::Plant;
 use scarab_chip::time::{Ticks, ticks};
 use scarab_identify::formats::leg_file::{DEFAULT_LEG, LegFile};
@@ -76,14 +76,9 @@ impl Program {
         vectors[0] = RAM + 0x1_0000;
         bytes.extend(vectors.iter().flat_map(|vector| vector.to_le_bytes()));
         bytes.extend(self.code.iter().flat_map(|half| half.to_le_bytes()));
-        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let plant = Plant::new(
-            &leg.description().expect("two joints"),
-            &leg.complete_description().expect("motors"),
-            1,
-        );
+        let plant = Plant::new(&LegFile::load(DEFAULT_LEG).expect("shipped"), 1).expect("motors");
         let image = Rc::new(Image::from_bytes(&bytes));
-        Machine::new(&image, Chip::new(plant, 1), &Options::default()).expect("Unicorn")
+        Machine::new(&image, Chip::new(plant, 1), TIME_FACTOR).expect("Unicorn")
     }
 }
 

@@ -12,7 +12,7 @@ use scarab_rig::faults::bench::hostile::{frame, malformed};
 
 use crate::faults::{DAMP_S, Machines, Verdict, begin, jitter};
 use crate::machine::Snapshot;
-use crate::plant::JOINTS;
+use crate::plant::{JOINTS, Reaction};
 use crate::session::Session;
 use crate::situations::{CYCLE_S, OTHER, take_over, targets};
 use crate::time::{Ticks, seconds, ticks};
@@ -53,34 +53,20 @@ impl Machines<'_> {
         let resting = self.resting()?;
         self.session.machine.restore(&resting)?;
         let positions = take_over(self.session)?;
-        let hosted = Rc::new(Hosted { saved: self.session.save()?, positions });
-        self.hosted = Some(Rc::clone(&hosted));
-        Ok(hosted)
+        let hosted = Hosted { saved: self.session.machine.save()?, positions };
+        Ok(Rc::clone(self.hosted.insert(Rc::new(hosted))))
     }
 }
 
 fn send(session: &mut Session, frame: Frame) {
-    session.machine.chip_mut().send_frame(frame);
-}
-
-/// Emergency codes that a node has sent.
-fn emergencies(session: &Session, node: u16) -> Vec<u16> {
-    let sent = session.machine.chip().can.sent.iter();
-    let own = sent.filter(|(_, frame)| frame.id() == SYNC + node && frame.data().len() == 8);
-    own.map(|(_, frame)| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect()
+    session.chip_mut().send_frame(frame);
 }
 
 /// Instant at which both bridges went off, of those that were on; an error if one went on again.
-fn release(session: &mut Session) -> Result<Option<Ticks>, String> {
-    let (mut armed, mut released) = ([true; JOINTS], None);
-    for switching in session.machine.chip_mut().plant.switchings.iter().flatten() {
-        armed[switching.axis] = switching.on;
-        released = released.or((armed == [false; JOINTS]).then_some(switching.at));
-        if released.is_some() && switching.on {
-            return Err("a bridge was on again".into());
-        }
-    }
-    Ok(released)
+fn release(session: &Session) -> Result<Option<Ticks>, String> {
+    let mut reaction = Reaction { armed: [true; JOINTS], ..Reaction::default() };
+    reaction.follow(&session.chip().plant.switchings);
+    if reaction.on_again { Err("a bridge was on again".into()) } else { Ok(reaction.released) }
 }
 
 /// B1: heartbeat, targets or both end. The leg is damped in time after the host's timeout, then off; the
@@ -102,7 +88,7 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
         write(0x2013, 0, 0, 1)?;
     }
     session.forget_frames();
-    session.machine.chip_mut().can.heard = Some(Vec::new());
+    session.chip_mut().can.heard = Some(Vec::new());
     // So often that one lost heartbeat has no effect.
     let beat = u64::from(times_ms[0] * 4 / 10).max(1);
     let lead = LEAD + random.below(LEAD);
@@ -118,7 +104,7 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
         }
         session.run(CYCLE_S)?;
     }
-    let heard = session.machine.chip_mut().can.heard.take().unwrap_or_default();
+    let heard = session.chip_mut().can.heard.take().unwrap_or_default();
     let last = |id| heard.iter().rev().find(|(_, frame)| frame.id() == id).map_or(0, |(at, _)| *at);
     let due = [(0, HEARTBEAT), (1, TARGETS)].into_iter().filter(|(way, _)| silent[*way]);
     let due = due.map(|(way, id)| last(id) + ticks(1e-3 * f64::from(times_ms[way]))).min().unwrap_or(0);
@@ -134,7 +120,7 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
     }
     let codes = [FaultCode::Heartbeat, FaultCode::LatePdo].map(FaultCode::number);
     for node in NODES {
-        if !emergencies(session, node).iter().any(|code| codes.contains(code)) {
+        if !session.emergencies(node).iter().any(|code| codes.contains(code)) {
             return Ok(Err(format!("{what}: node {node} sends no emergency message")));
         }
     }
@@ -187,13 +173,13 @@ pub fn hostile(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolEr
 
 /// Both nodes start again and answer.
 fn answers(session: &mut Session) -> Result<Result<(), String>, ToolError> {
-    session.machine.chip_mut().can.partner.clear();
+    session.chip_mut().can.partner.clear();
     session.run(5e-3)?;
     session.forget_frames();
     send(session, Frame::new(0, &[129, 0]));
     session.run(20e-3)?;
     // Hostile frames may have set other node-IDs.
-    let sent = session.machine.chip().can.sent.iter();
+    let sent = session.chip().can.sent.iter();
     let started = sent.filter(|(_, frame)| frame.id() & 0x780 == 0x700 && frame.data() == [0]);
     let nodes: Vec<u16> = started.map(|(_, frame)| frame.id() & 0x7F).collect();
     if nodes.len() != JOINTS {
@@ -210,7 +196,7 @@ fn answers(session: &mut Session) -> Result<Result<(), String>, ToolError> {
 
 /// Keeps the wire full of any frames for a millisecond.
 fn flood(session: &mut Session, random: &mut Random) -> Result<(), ToolError> {
-    while session.machine.chip().can.partner.len() < WAITING {
+    while session.chip().can.partner.len() < WAITING {
         send(session, frame(random));
     }
     session.run(CYCLE_S)
@@ -222,7 +208,7 @@ fn flooded_off(machines: &mut Machines<'_>, random: &mut Random) -> Result<Resul
     session.machine.restore(&resting)?;
     session.hold_switch(false);
     session.run(2.0 * DAMP_S)?;
-    let off = session.save()?;
+    let off = session.machine.save()?;
     begin(session, &off, random.below(ticks(10e-3)))?;
     for _ in 0..FLOOD {
         if random.below(2) == 0 {
@@ -233,8 +219,8 @@ fn flooded_off(machines: &mut Machines<'_>, random: &mut Random) -> Result<Resul
         }
         flood(session, random)?;
     }
-    let switchings = session.machine.chip_mut().plant.switchings.iter().flatten();
-    Ok(if switchings.count() == 0 { Ok(()) } else { Err("a drive that was off switched".into()) })
+    let is_off = session.chip().plant.switchings.is_empty();
+    Ok(if is_off { Ok(()) } else { Err("a drive that was off switched".into()) })
 }
 
 fn flooded_on(machines: &mut Machines<'_>, random: &mut Random) -> Result<Result<(), String>, ToolError> {
@@ -263,7 +249,7 @@ fn moved_on(machines: &mut Machines<'_>, random: &mut Random) -> Result<Result<(
             send(session, if is_hostile { malformed(random) } else { Frame::new(OTHER, &[0x55; 8]) });
             session.run(CYCLE_S)?;
         }
-        *end = session.machine.chip().plant.position();
+        *end = session.chip().plant.position();
     }
     let off = (0..JOINTS).map(|joint| (ends[0][joint] - ends[1][joint]).abs()).fold(0.0, f64::max);
     Ok(match release(session) {
@@ -298,12 +284,12 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
         write(0x2020, 1, 0xFFFF, 2)?;
         write(0x2020, 2, 0xFFFF, 2)?;
     }
-    let plant = &session.machine.chip().plant;
+    let plant = &session.chip().plant;
     let (torque, position) = (plant.torque(), plant.position());
     session.forget_frames();
     let mut codes = [const { Vec::new() }; JOINTS];
     let collect = |session: &Session, codes: &mut [Vec<u16>; JOINTS]| {
-        codes.iter_mut().zip(NODES).for_each(|(codes, node)| codes.extend(emergencies(session, node)));
+        codes.iter_mut().zip(NODES).for_each(|(codes, node)| codes.extend(session.emergencies(node)));
     };
     for node in NODES {
         session.write_sized(node, 0x6040, 0, 0xF, 2)?;
@@ -312,7 +298,7 @@ pub fn taken_over(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, Too
     }
     for _ in 0..TAKEN {
         session.run(CYCLE_S)?;
-        let plant = &session.machine.chip().plant;
+        let plant = &session.chip().plant;
         for joint in 0..JOINTS {
             let change = plant.torque()[joint] - torque[joint];
             let moved = plant.position()[joint] - position[joint];

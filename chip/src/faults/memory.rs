@@ -55,9 +55,7 @@ impl Machines<'_> {
             let names: Vec<_> = constants.iter().map(|constant| constant.name).collect();
             return Err(ToolError::input(format!("only these constants were found in memory: {names:?}")));
         }
-        let constants = Rc::new(constants);
-        self.constants = Some(Rc::clone(&constants));
-        Ok(constants)
+        Ok(Rc::clone(self.constants.insert(Rc::new(constants))))
     }
 }
 
@@ -106,10 +104,7 @@ fn find(
     variable: &str,
     values: &[(&'static str, f32)],
 ) -> Result<Vec<Constant>, ToolError> {
-    let image = session.machine.image();
-    let (address, size) = image
-        .variable(variable)
-        .ok_or_else(|| ToolError::input(format!("the image has no variable {variable}")))?;
+    let (address, size) = session.machine.image().variable(variable)?;
     let mut bytes = vec![0; size as usize];
     session.machine.memory(address, &mut bytes);
     let mut expected: BTreeMap<u32, (usize, &'static str)> = BTreeMap::new();

@@ -24,9 +24,10 @@ use scarab_base::error::ToolError;
 use scarab_rig::faults::catalogue::Fault;
 
 use crate::chip::Chip;
+use crate::load::CURRENT_INTERRUPT;
 use crate::machine::Snapshot;
-use crate::plant::{JOINTS, STEP};
-use crate::session::{Session, Step};
+use crate::plant::{JOINTS, Reaction, STEP};
+use crate::session::Session;
 use crate::time::{Ticks, microseconds, seconds, ticks};
 
 /// Longest time that is watched, s.
@@ -107,13 +108,11 @@ impl Row {
 }
 
 /// Result of one row.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct RowReport {
     /// Number in the catalogue.
     pub id: &'static str,
-    /// Fault.
     pub fault: &'static str,
-    /// Runs.
     pub runs: u32,
     /// Runs without the expected reaction in time.
     pub missed: u32,
@@ -121,11 +120,10 @@ pub struct RowReport {
     pub deadline_ms: f64,
     /// Slowest reaction, ms.
     pub worst_ms: f64,
-    /// What went wrong.
     pub complaints: Vec<String>,
 }
 
-/// Runs all rows, or the named ones, from a session that has just been powered.
+/// Runs all rows, or the named ones, from a session that has just started.
 ///
 /// # Errors
 /// The image does not reach a situation, or the model does not know what the processor does.
@@ -137,10 +135,8 @@ pub fn run(session: &mut Session, seeds: u32, only: &[String]) -> Result<Vec<Row
             id: row.fault.id,
             fault: row.case.unwrap_or(row.fault.fault),
             runs: seeds,
-            missed: 0,
             deadline_ms: 1e3 * row.deadline_s().unwrap_or(0.0),
-            worst_ms: 0.0,
-            complaints: Vec::new(),
+            ..RowReport::default()
         };
         for seed in 0..u64::from(seeds) {
             let verdict = match &row.run {
@@ -170,7 +166,7 @@ pub fn run(session: &mut Session, seeds: u32, only: &[String]) -> Result<Vec<Row
 /// A session with the machines from which runs start; each is made when the first run asks for it.
 struct Machines<'a> {
     session: &'a mut Session,
-    booted: Rc<Snapshot>,
+    booted: Snapshot,
     resting: Option<Rc<Snapshot>>,
     /// Records of the calibration before the resting machine.
     calibrations: Vec<String>,
@@ -184,8 +180,7 @@ struct Machines<'a> {
 
 impl<'a> Machines<'a> {
     fn new(session: &'a mut Session) -> Result<Self, ToolError> {
-        session.boot()?;
-        let booted = Rc::new(session.save()?);
+        let booted = session.machine.save()?;
         Ok(Self {
             session,
             booted,
@@ -207,14 +202,10 @@ impl<'a> Machines<'a> {
         }
         self.session.machine.restore(&self.booted)?;
         let from = self.session.probe.lines.len();
-        for step in [Step::Calibrate, Step::Reference, Step::Enable] {
-            self.session.step(step)?;
-        }
+        self.session.enable_drive()?;
         let records = self.session.probe.lines[from..].iter().map(|(_, line)| line);
         self.calibrations = records.filter(|line| line.starts_with("calibration ")).cloned().collect();
-        let resting = Rc::new(self.session.save()?);
-        self.resting = Some(Rc::clone(&resting));
-        Ok(resting)
+        Ok(Rc::clone(self.resting.insert(Rc::new(self.session.machine.save()?))))
     }
 
     /// The exciting motion of an identification.
@@ -226,9 +217,7 @@ impl<'a> Machines<'a> {
         self.session.machine.restore(&resting)?;
         self.session.press_start()?;
         self.session.run(6.0)?;
-        let moving = Rc::new(self.session.save()?);
-        self.moving = Some(Rc::clone(&moving));
-        Ok(moving)
+        Ok(Rc::clone(self.moving.insert(Rc::new(self.session.machine.save()?))))
     }
 
     fn inject(&mut self, injected: &Injected, seed: u64) -> Result<Verdict, ToolError> {
@@ -240,8 +229,8 @@ impl<'a> Machines<'a> {
         let spread = if injected.situation == Situation::Motion { ticks(0.5) } else { ticks(10e-3) };
         let begun = begin(self.session, &saved, random.next_u64() % spread)?;
         let records = self.session.probe.lines.len();
-        (injected.inject)(self.session.machine.chip_mut(), &mut random);
-        self.session.machine.chip_mut().reschedule();
+        (injected.inject)(self.session.chip_mut(), &mut random);
+        self.session.chip_mut().reschedule();
         let seen = watch(self.session, injected.expected, injected.later, begun, records)?;
         Ok(judge(injected.expected, &seen))
     }
@@ -250,23 +239,20 @@ impl<'a> Machines<'a> {
 /// Returns to a saved machine, runs on for a time and records the bridges from then on; returns the instant.
 fn begin(session: &mut Session, saved: &Snapshot, delay: Ticks) -> Result<Ticks, ToolError> {
     session.machine.restore(saved)?;
-    session.run_until(saved.chip().now + delay)?;
-    let now = session.now();
-    let chip = session.machine.chip_mut();
-    chip.plant.switchings = Some(Vec::new());
-    chip.load.clear(now);
-    chip.adcs.iter_mut().for_each(|adc| adc.lost = [0; 2]);
-    Ok(now)
+    session.run_until(saved.chip.now + delay)?;
+    session.chip_mut().plant.switchings.clear();
+    session.begin_measurement();
+    Ok(session.now())
 }
 
 /// Longest delay of a current tick since [`begin`], s; an error if one was lost.
 fn jitter(session: &Session) -> Verdict {
-    let chip = session.machine.chip();
-    let lost: u64 = chip.adcs.iter().map(|adc| adc.lost[0] + adc.lost[1]).sum();
+    let chip = session.chip();
+    let lost = chip.lost_conversions();
     if lost > 0 {
         return Err(format!("{lost} conversions were lost"));
     }
-    Ok(1e-6 * microseconds(chip.load.usage(rows::CURRENT).latency))
+    Ok(1e-6 * microseconds(chip.load.usage(CURRENT_INTERRUPT).latency))
 }
 
 /// Reaction seen at the pins and in the records.
@@ -287,7 +273,7 @@ fn watch(
     records: usize,
 ) -> Result<Seen, ToolError> {
     let (mut seen, mut count) = (Seen::default(), 0);
-    let mut armed = [0, 1].map(|axis| session.machine.chip().plant.axes[axis].is_armed());
+    let mut reaction = Reaction::new(&session.chip().plant);
     let longest = if expected == Expected::Damped { WATCHED_S + DAMP_S } else { WATCHED_S };
     while session.now() < begun + ticks(longest) {
         session.run_until(session.now() + STEP)?;
@@ -296,16 +282,12 @@ fn watch(
             later = step(session, now - begun, count).then_some(step);
             count += 1;
         }
-        let plant = &mut session.machine.chip_mut().plant;
-        for switching in plant.switchings.replace(Vec::new()).unwrap_or_default() {
-            seen.on_again |= seen.released.is_some() && switching.on;
-            armed[switching.axis] = switching.on;
-            if armed == [false; JOINTS] && seen.released.is_none() {
-                seen.released = Some(seconds(switching.at - begun));
-            }
-        }
+        let plant = &mut session.chip_mut().plant;
+        reaction.follow(&core::mem::take(&mut plant.switchings));
+        seen.released = reaction.released.map(|at| seconds(at - begun));
+        seen.on_again = reaction.on_again;
         let high = plant.axes.iter().map(|axis| axis.last_high).max().unwrap_or(now);
-        if armed != [false; JOINTS] && now > high + 2 * STEP && seen.shorted.is_none() {
+        if reaction.armed != [false; JOINTS] && now > high + 2 * STEP && seen.shorted.is_none() {
             seen.shorted = Some(seconds(high.saturating_sub(begun)));
         }
         if seen.recorded.is_none()
@@ -323,15 +305,11 @@ fn watch(
 }
 
 fn judge(expected: Expected, seen: &Seen) -> Verdict {
-    let earliest = |one: Option<f64>, other: Option<f64>| match (one, other) {
-        (Some(one), Some(other)) => Some(one.min(other)),
-        (one, other) => one.or(other),
-    };
     let reaction = match expected {
         Expected::Nothing if seen.released.or(seen.shorted).or(seen.recorded).is_none() => return Ok(0.0),
         Expected::Nothing => return Err(format!("reacted without need: {seen:?}")),
         Expected::Released => seen.released,
-        Expected::Shorted => earliest(seen.released, seen.shorted),
+        Expected::Shorted => [seen.released, seen.shorted].into_iter().flatten().reduce(f64::min),
         Expected::Damped => seen.released.map(|at| if is_damped(seen, at) { at - DAMP_S } else { at }),
     };
     match reaction {

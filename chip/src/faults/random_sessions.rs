@@ -78,7 +78,7 @@ impl HostedLeg for ChipLeg<'_> {
     const OVERSHOOT: f64 = 1.1;
 
     fn send(&mut self, frame: Frame) {
-        let chip = self.session.machine.chip_mut();
+        let chip = self.session.chip_mut();
         if chip.can.connected {
             chip.send_frame(frame);
         }
@@ -89,7 +89,7 @@ impl HostedLeg for ChipLeg<'_> {
     }
 
     fn plug(&mut self, plugged: bool) {
-        let can = &mut self.session.machine.chip_mut().can;
+        let can = &mut self.session.chip_mut().can;
         can.connected = plugged;
         if !plugged {
             can.partner.clear();
@@ -99,9 +99,9 @@ impl HostedLeg for ChipLeg<'_> {
     fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<LegState>, String> {
         self.session.forget_frames();
         self.session.run(1.0 / f64::from(SERVO_RATE_HZ)).map_err(|error| error.to_string())?;
-        self.session.machine.chip().can.sent.iter().for_each(|(_, frame)| heard(frame));
+        self.session.chip().can.sent.iter().for_each(|(_, frame)| heard(frame));
         self.read_records();
-        let plant = &self.session.machine.chip().plant;
+        let plant = &self.session.chip().plant;
         let position = plant.position();
         let is_near_end = |margin: f64| {
             core::array::from_fn(|joint| {

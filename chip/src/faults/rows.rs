@@ -9,12 +9,9 @@ use scarab_rig::faults::catalogue::{self, Fault};
 use crate::chip::{GATE_FAULT, LostTriggers, STOP};
 use crate::faults::{Expected, Inject, Injected, JITTER_S, Later, OwnRun, PERIOD_S, Row, Run, Situation};
 use crate::faults::{bus, memory, random_sessions, search, stored, wiring};
+use crate::load::{CURRENT_INTERRUPT, SERVO};
 use crate::plant::{JOINTS, STEP, ShuntFault};
 use crate::time::ticks;
-
-/// Exceptions of the current loops and of the servo.
-pub(super) const CURRENT: u8 = 16 + 18;
-const SERVO: u8 = 16 + 77;
 
 fn axis(random: &mut Xoshiro256PlusPlus) -> usize {
     random.next_u32() as usize % JOINTS
@@ -57,7 +54,6 @@ const fn own(fault: &'static Fault, run: OwnRun) -> Row {
     Row { fault, case: None, within_s: None, run: Run::Own(run) }
 }
 
-/// All rows.
 pub(super) const ROWS: &[Row] = &[
     injected(&catalogue::E1, Situation::Motion, Expected::Shorted, |chip, random| {
         let (axis, now) = (axis(random), chip.now);
@@ -70,7 +66,7 @@ pub(super) const ROWS: &[Row] = &[
     .case("single jump of the counter")
     .changing(|session, since, _| {
         if since >= STEP {
-            let axes = &mut session.machine.chip_mut().plant.axes;
+            let axes = &mut session.chip_mut().plant.axes;
             axes.iter_mut().for_each(|axis| axis.encoder_fault.added = 0);
         }
         since < STEP
@@ -121,7 +117,7 @@ pub(super) const ROWS: &[Row] = &[
         .case("emergency stop that bounces for 20 ms and closes")
         .changing(|session, since, count| {
             let bounces = since < ticks(20e-3);
-            session.machine.chip_mut().set_pin(STOP, !bounces || count % 7 < 3);
+            session.chip_mut().set_pin(STOP, !bounces || count % 7 < 3);
             bounces
         }),
     injected(
@@ -152,7 +148,7 @@ pub(super) const ROWS: &[Row] = &[
         .case("all current ticks held up for 8 periods")
         .changing(|session, since, _| {
             let held_up = since < 9 * STEP;
-            session.machine.hang(held_up.then_some(CURRENT));
+            session.machine.hang(held_up.then_some(CURRENT_INTERRUPT));
             held_up
         }),
     own(&catalogue::K1, search::counted).case("one current tick missing: counted, no reaction"),
@@ -171,7 +167,8 @@ pub(super) const ROWS: &[Row] = &[
     })
     .case("controller goes bus-off while the operator has control"),
     own(&catalogue::K4, memory::crash).case("panic, hard fault, unhandled interrupt in motion"),
-    injected(&catalogue::K5, Situation::Motion, Expected::Released, |chip, _| chip.stop_crystal()),
+    injected(&catalogue::K5, Situation::Motion, Expected::Released, |chip, _| chip.stop_crystal())
+        .within(50e-6),
     own(&catalogue::B6, bus::taken_over),
     own(&catalogue::B7, random_sessions::played),
     own(&catalogue::B3, bus::hostile).within(JITTER_S),

@@ -27,9 +27,7 @@ impl Machines<'_> {
         let moving = self.moving()?;
         self.session.machine.restore(&moving)?;
         self.session.wait("state", &["phase=solve"], LONGEST_S)?;
-        let searching = Rc::new(self.session.save()?);
-        self.searching = Some(Rc::clone(&searching));
-        Ok(searching)
+        Ok(Rc::clone(self.searching.insert(Rc::new(self.session.machine.save()?))))
     }
 }
 
@@ -46,8 +44,8 @@ pub fn starves(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolEr
         session.machine.hang(Some(0));
     }
     while session.now() < begun + ticks(WATCHED_S) {
-        while is_full && session.machine.chip().can.partner.len() < 3 {
-            session.machine.chip_mut().send_frame(Frame::new(OTHER, &[0x55; 8]));
+        while is_full && session.chip().can.partner.len() < 3 {
+            session.chip_mut().send_frame(Frame::new(OTHER, &[0x55; 8]));
         }
         let next = session.now() + ticks(125e-6);
         if is_full {
@@ -57,9 +55,10 @@ pub fn starves(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolEr
             session.run_until(next)?;
         }
     }
-    let plant = &session.machine.chip().plant;
-    let switched = plant.switchings.iter().flatten().count();
-    if switched > 0 || plant.axes.iter().any(|axis| session.now() > axis.last_high + ticks(1e-4)) {
+    let plant = &session.chip().plant;
+    if !plant.switchings.is_empty()
+        || plant.axes.iter().any(|axis| session.now() > axis.last_high + ticks(1e-4))
+    {
         return Ok(Err("reacted without need".into()));
     }
     Ok(jitter(session))
@@ -73,11 +72,11 @@ pub fn counted(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolEr
     begin(session, &moving, random.below(ticks(0.5)))?;
     let axis = random.below(2) as usize;
     let lost = LostTriggers::new(1, 0, 1);
-    session.machine.chip_mut().lost_triggers[axis] = lost;
+    session.chip_mut().lost_triggers[axis] = lost;
     let missed = |line: &str| field(line, "current_missed").and_then(|count| count.parse::<u32>().ok());
     session.run(PERIOD_S)?;
     let line = session.wait("loops", &[], 1.1)?;
-    let switched = session.machine.chip().plant.switchings.iter().flatten().count();
+    let switched = session.chip().plant.switchings.len();
     Ok(match missed(&line) {
         Some(1) if switched == 0 => Ok(0.0),
         count => Err(format!("{count:?} missed ticks counted, {switched} switchings")),

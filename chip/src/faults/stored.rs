@@ -16,7 +16,7 @@ use crate::faults::{DAMP_S, Machines, Verdict, begin};
 use crate::machine::Snapshot;
 use crate::plant::JOINTS;
 use crate::session::Session;
-use crate::store_cuts::{LOAD, LONGEST_S, OBJECT, SAVE};
+use crate::store_cuts::{LOAD, LONGEST_S, OBJECT, Request, SAVE};
 use crate::time::ticks;
 
 /// Values that are stored one after the other.
@@ -49,16 +49,16 @@ impl Machines<'_> {
         if let Some(stored) = &self.stored {
             return Ok(Rc::clone(stored));
         }
-        let booted = Rc::clone(&self.booted);
-        self.session.machine.restore(&booted)?;
+        let session = &mut *self.session;
+        session.machine.restore(&self.booted)?;
         for window in WINDOWS {
             for node in [1, 2] {
-                self.session.write_object(node, OBJECT, 0, window)?;
+                session.write_object(node, OBJECT, 0, window)?;
             }
-            self.session.store(SAVE.0, SAVE.1, LONGEST_S)?;
+            session.store(SAVE, LONGEST_S)?;
         }
-        let mut memory = Memory::new(Some(self.session.machine.chip_mut().flash.parameters_mut()));
-        let leg = self.session.leg.clone();
+        let mut memory = Memory::new(Some(session.chip_mut().flash.parameters_mut()));
+        let leg = session.leg.clone();
         let mut longer = leg.clone();
         longer.joints.iter_mut().for_each(|joint| joint.torque_per_ampere *= 1.1);
         let [older, own, other] = [identified(&leg, 2)?, identified(&leg, 1)?, identified(&longer, 3)?];
@@ -73,27 +73,21 @@ impl Machines<'_> {
             generation: of_worn.provenance.generation,
             reports: [false; 2],
         };
-        let found = start(self.session, &booted, &stored.flash)?;
+        let found = start(session, &self.booted, &stored.flash)?;
         if !kept || found != expected {
             return Err(ToolError::input(format!("a sound memory gives {found:?} instead of {expected:?}")));
         }
-        let stored = Rc::new(stored);
-        self.stored = Some(Rc::clone(&stored));
-        Ok(stored)
+        Ok(Rc::clone(self.stored.insert(Rc::new(stored))))
     }
 }
 
 /// Starts a board with this flash.
 fn start(session: &mut Session, booted: &Snapshot, flash: &[u8]) -> Result<Start, ToolError> {
     session.machine.restore(booted)?;
-    session.machine.chip_mut().flash.parameters_mut().copy_from_slice(flash);
+    session.chip_mut().flash.parameters_mut().copy_from_slice(flash);
     session.power_up()?;
     session.run(20e-3)?;
-    let reports = [1, 2].map(|node: u16| {
-        let code = NoticeCode::StoreFailed.number().to_le_bytes();
-        let sent = session.machine.chip().can.sent.iter();
-        sent.filter(|(_, frame)| frame.id() == 0x80 + node).any(|(_, frame)| frame.data().starts_with(&code))
-    });
+    let reports = [1, 2].map(|node| session.emergencies(node).contains(&NoticeCode::StoreFailed.number()));
     let mut read = |node, (index, sub)| session.read_object(node, index, sub);
     let windows = [read(1, (OBJECT, 0))?, read(2, (OBJECT, 0))?];
     Ok(Start { windows, generation: read(1, MODELS)?, reports })
@@ -123,14 +117,13 @@ pub fn corrupted_records(machines: &mut Machines<'_>, seed: u64) -> Result<Verdi
     if !expected.windows.iter().all(|value| WINDOWS.contains(value) || *value == default) {
         return Err(ToolError::input(format!("the store reads what was never stored: {expected:?}")));
     }
-    let booted = Rc::clone(&machines.booted);
     let session = &mut *machines.session;
     let resets = session.resets.len();
-    let found = start(session, &booted, &flash)?;
-    session.machine.chip_mut().plant.switchings = Some(Vec::new());
+    let found = start(session, &machines.booted, &flash)?;
+    session.chip_mut().plant.switchings.clear();
     session.hold_switch(true);
     session.run(0.3)?;
-    let switched = session.machine.chip().plant.switchings.iter().flatten().count();
+    let switched = session.chip().plant.switchings.len();
     if found != expected || switched > 0 || session.resets.len() != resets {
         return Ok(Err(format!("way {way}: {found:?} instead of {expected:?}; {switched} switchings")));
     }
@@ -163,19 +156,15 @@ fn drive_off<'a>(machines: &'a mut Machines<'_>, random: &mut Random) -> Result<
     Ok(session)
 }
 
-fn low(
-    machines: &mut Machines<'_>,
-    request: (u16, [u8; 4]),
-    random: &mut Random,
-) -> Result<Verdict, ToolError> {
+fn low(machines: &mut Machines<'_>, request: Request, random: &mut Random) -> Result<Verdict, ToolError> {
     let session = drive_off(machines, random)?;
-    let cells = session.machine.chip_mut().flash.parameters_mut().to_vec();
+    let cells = session.chip_mut().flash.parameters_mut().to_vec();
     // Between the supply that words of 32 bits need and the detector's level.
-    session.machine.chip_mut().set_supply(random.uniform(2.7, 2.9));
-    let refused = session.store(request.0, request.1, LONGEST_S);
+    session.chip_mut().set_supply(random.uniform(2.7, 2.9));
+    let refused = session.store(request, LONGEST_S);
     let (index, sub) = INHIBIT;
     let causes = session.read_object(1, index, sub)?;
-    let is_same = session.machine.chip_mut().flash.parameters_mut() == cells;
+    let is_same = session.chip_mut().flash.parameters_mut() == cells;
     if !matches!(refused, Err(ToolError::Refused(_)))
         || causes != InhibitReason::ProcessorSupply.bit()
         || !is_same
@@ -185,18 +174,15 @@ fn low(
     session.power_up()?;
     session.run(20e-3)?;
     session.write_object(1, OBJECT, 0, WINDOWS[0])?;
-    Ok(session.store(request.0, request.1, LONGEST_S).map(|()| 0.0).map_err(|error| error.to_string()))
+    Ok(session.store(request, LONGEST_S).map(|()| 0.0).map_err(|error| error.to_string()))
 }
 
-fn armed(
-    machines: &mut Machines<'_>,
-    (index, word): (u16, [u8; 4]),
-    random: &mut Random,
-) -> Result<Verdict, ToolError> {
+fn armed(machines: &mut Machines<'_>, request: Request, random: &mut Random) -> Result<Verdict, ToolError> {
+    let (index, word) = request;
     let moving = machines.moving()?;
     let session = &mut *machines.session;
     begin(session, &moving, random.below(ticks(0.5)))?;
-    let cells = session.machine.chip_mut().flash.parameters_mut().to_vec();
+    let cells = session.chip_mut().flash.parameters_mut().to_vec();
     let node = 1 + random.below(2) as u8;
     let answer = session.client().try_write(node, Object(index, 1), u32::from_le_bytes(word), 4);
     if let Err(RequestError::Failed(why)) = answer {
@@ -204,41 +190,37 @@ fn armed(
     }
     session.run(0.1)?;
     let is_refused = answer.as_ref().is_err_and(|error| error.is(Abort::State));
-    let is_same = session.machine.chip_mut().flash.parameters_mut() == cells;
-    let switched = session.machine.chip().plant.switchings.iter().flatten().count();
+    let is_same = session.chip_mut().flash.parameters_mut() == cells;
+    let switched = session.chip().plant.switchings.len();
     if !is_refused || !is_same || switched > 0 {
         return Ok(Err(format!("answer {answer:?}, flash unchanged {is_same}, {switched} switchings")));
     }
     Ok(Ok(0.0))
 }
 
-fn off(
-    machines: &mut Machines<'_>,
-    request: (u16, [u8; 4]),
-    random: &mut Random,
-) -> Result<Verdict, ToolError> {
+fn off(machines: &mut Machines<'_>, request: Request, random: &mut Random) -> Result<Verdict, ToolError> {
     let session = drive_off(machines, random)?;
     let resets = session.resets.len();
-    let chip = session.machine.chip_mut();
+    let chip = session.chip_mut();
     chip.flash.slowness = random.uniform(1.0, 2.0);
     chip.iwdg.oscillator_hz = random.uniform(17e3, 47e3) as u64;
     chip.reschedule();
-    chip.plant.switchings = Some(Vec::new());
+    chip.plant.switchings.clear();
     let erasures = chip.flash.erasures;
     // The bus says FF0D before and 0000 afterwards, else this fails.
-    if let Err(error) = session.store(request.0, request.1, LONGEST_S) {
+    if let Err(error) = session.store(request, LONGEST_S) {
         return Ok(Err(error.to_string()));
     }
     session.run(0.1)?;
-    let erased = session.machine.chip().flash.erasures > erasures;
-    let switched = session.machine.chip().plant.switchings.iter().flatten().count();
+    let erased = session.chip().flash.erasures > erasures;
+    let switched = session.chip().plant.switchings.len();
     if session.resets.len() != resets || switched > 0 {
         return Ok(Err(format!("resets {:?}, {switched} switchings", &session.resets[resets..])));
     }
     // After an erasure the joints may have moved by any angle: no enabling without a new reference.
     session.hold_switch(true);
     session.run(0.5)?;
-    let enabled = session.machine.chip().plant.axes.iter().any(|axis| axis.is_armed());
+    let enabled = session.chip().plant.axes.iter().any(|axis| axis.is_armed);
     if enabled == erased {
         return Ok(Err(format!("sector erased {erased}, enabled afterwards {enabled}")));
     }

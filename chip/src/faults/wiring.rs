@@ -1,5 +1,7 @@
 //! E3, E5: encoders that start at another count, and motors that are wired wrongly, from the calibration on.
 
+use std::rc::Rc;
+
 use scarab_base::error::ToolError;
 
 use hal_sim::drive::description::{AxisDescription, EncoderWiring};
@@ -7,7 +9,7 @@ use hal_sim::drive::description::{AxisDescription, EncoderWiring};
 use crate::faults::{Machines, Verdict, begin};
 use crate::plant::JOINTS;
 use crate::rtt::field;
-use crate::session::{Session, Step};
+use crate::session::Session;
 use crate::time::ticks;
 
 /// Motion after the start, s, and the interval in which positions are compared.
@@ -28,30 +30,23 @@ pub struct Unshifted {
 }
 
 impl Machines<'_> {
-    fn unshifted(&mut self) -> Result<std::rc::Rc<Unshifted>, ToolError> {
+    fn unshifted(&mut self) -> Result<Rc<Unshifted>, ToolError> {
         if let Some(unshifted) = &self.unshifted {
-            return Ok(std::rc::Rc::clone(unshifted));
+            return Ok(Rc::clone(unshifted));
         }
-        let booted = std::rc::Rc::clone(&self.booted);
-        self.session.machine.restore(&booted)?;
-        let plant = &mut self.session.machine.chip_mut().plant;
+        let session = &mut *self.session;
+        session.machine.restore(&self.booted)?;
+        let plant = &mut session.chip_mut().plant;
         (0..JOINTS).for_each(|axis| plant.reconnect(axis, |_| {}));
         let counts = |session: &mut Session| {
             let now = session.now();
-            [0, 1].map(|axis| session.machine.chip_mut().plant.encoder(axis, now))
+            [0, 1].map(|axis| session.chip_mut().plant.encoder(axis, now))
         };
-        let booted = counts(self.session);
-        enable(self.session)?;
-        let resting = counts(self.session);
-        let positions = moved(self.session)?;
-        let unshifted = std::rc::Rc::new(Unshifted { positions, booted, resting });
-        self.unshifted = Some(std::rc::Rc::clone(&unshifted));
-        Ok(unshifted)
+        let booted = counts(session);
+        session.enable_drive()?;
+        let unshifted = Unshifted { booted, resting: counts(session), positions: moved(session)? };
+        Ok(Rc::clone(self.unshifted.insert(Rc::new(unshifted))))
     }
-}
-
-fn enable(session: &mut Session) -> Result<(), ToolError> {
-    [Step::Calibrate, Step::Reference, Step::Enable].into_iter().try_for_each(|step| session.step(step))
 }
 
 /// Positions while the leg approaches and begins to excite itself.
@@ -60,7 +55,7 @@ fn moved(session: &mut Session) -> Result<Vec<[u64; JOINTS]>, ToolError> {
     let mut positions = Vec::new();
     for _ in 0..(MOTION_S / INTERVAL_S) as u32 {
         session.run(INTERVAL_S)?;
-        positions.push(session.machine.chip().plant.position().map(f64::to_bits));
+        positions.push(session.chip().plant.position().map(f64::to_bits));
     }
     Ok(positions)
 }
@@ -69,8 +64,7 @@ fn moved(session: &mut Session) -> Result<Vec<[u64; JOINTS]>, ToolError> {
 /// without a wrap.
 pub fn wraps(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let expected = machines.unshifted()?;
-    let booted = std::rc::Rc::clone(&machines.booted);
-    begin(machines.session, &booted, 0)?;
+    begin(machines.session, &machines.booted, 0)?;
     let from = if seed.is_multiple_of(2) { expected.booted } else { expected.resting };
     let session = &mut *machines.session;
     for axis in 0..JOINTS {
@@ -79,14 +73,14 @@ pub fn wraps(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErro
         let below = (seed as u16 / 2).wrapping_mul(APART) / 2 + 2;
         let below = if seed % 4 < 3 { below } else { below.wrapping_neg() };
         let shift = below.wrapping_neg().wrapping_sub(from[axis]);
-        let plant = &mut session.machine.chip_mut().plant;
+        let plant = &mut session.chip_mut().plant;
         plant.reconnect(axis, |axis| axis.counter.start = axis.counter.start.wrapping_add(shift));
     }
-    if let Err(error) = enable(session) {
+    if let Err(error) = session.enable_drive() {
         return Ok(Err(error.to_string()));
     }
     let positions = moved(session)?;
-    let wraps = [0, 1].map(|axis| session.machine.chip().plant.axes[axis].wraps);
+    let wraps = [0, 1].map(|axis| session.chip().plant.axes[axis].wraps);
     if wraps.contains(&0) {
         return Ok(Err(format!("a counter did not wrap: {wraps:?}")));
     }
@@ -120,10 +114,9 @@ const WAYS: [fn(&mut AxisDescription); 11] = [
 /// E5: a calibration refuses a wrongly connected axis, and the drive is never enabled afterwards.
 pub fn wrong(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let (way, axis) = (seed as usize % WAYS.len(), seed as usize / WAYS.len() % JOINTS);
-    let booted = std::rc::Rc::clone(&machines.booted);
-    begin(machines.session, &booted, 0)?;
+    begin(machines.session, &machines.booted, 0)?;
     let session = &mut *machines.session;
-    session.machine.chip_mut().plant.reconnect(axis, WAYS[way]);
+    session.chip_mut().plant.reconnect(axis, WAYS[way]);
     session.hold_switch(true);
     session.run(0.2)?;
     session.press_start()?;
@@ -138,15 +131,14 @@ pub fn wrong(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolErro
     session.hold_switch(false);
     session.run(0.5)?;
     let now = session.now();
-    let plant = &mut session.machine.chip_mut().plant;
-    plant.switchings = Some(Vec::new());
+    let plant = &mut session.chip_mut().plant;
+    plant.switchings.clear();
     plant.couple(now);
     session.press_start()?;
     session.run(1.0)?;
     session.hold_switch(true);
     session.run_until(session.now() + ticks(0.5))?;
-    let switchings = session.machine.chip_mut().plant.switchings.take().unwrap_or_default();
-    if switchings.iter().any(|switching| switching.on) {
+    if session.chip().plant.switchings.iter().any(|switching| switching.on) {
         return Ok(Err(format!("way {way} of axis {axis}: a bridge was on after the refusal")));
     }
     Ok(Ok(0.0))

@@ -9,7 +9,6 @@ use super::*;
 /// Calls of one function so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Calls {
-    /// Number of finished calls.
     pub count: u64,
     /// Instructions of all.
     pub instructions: u64,

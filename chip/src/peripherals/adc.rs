@@ -35,8 +35,6 @@ pub enum Trigger {
     First,
     /// Trigger output of TIM8.
     Second,
-    /// Software.
-    Software,
 }
 
 /// Group of conversions in progress.
@@ -124,15 +122,9 @@ impl Adc {
     /// Takes a rising edge of a trigger.
     pub fn trigger(&mut self, number: usize, source: Trigger, clock: Ticks, access: &mut Access<'_>) {
         let control = self.cr[1];
-        let selected = |edge: u32, event: u32, wanted: u32| {
-            source == Trigger::Software || control >> edge & 1 == 1 && control >> event & 0xF == wanted
-        };
-        if control & 1 == 0 {
-            return;
-        }
-        let injected = source == Trigger::First && selected(20, 16, 1);
-        let regular = source == Trigger::Second && selected(28, 24, 14);
-        if !(injected || regular) {
+        let injected = source == Trigger::First;
+        let (edge, event, wanted) = if injected { (20, 16, 1) } else { (28, 24, 14) };
+        if control & 1 == 0 || control >> edge & 1 == 0 || control >> event & 0xF != wanted {
             return;
         }
         if access.now < self.on_since + SETTLING {
@@ -241,10 +233,7 @@ impl Adc {
                 self.sr &= !EOC;
                 self.result
             }
-            _ => {
-                access.refuse(NO_REGISTER, Self::name(number, &format!("{offset:#x}")));
-                0
-            }
+            _ => access.no_register(Self::name(number, &format!("{offset:#x}"))),
         }
     }
 
@@ -317,10 +306,7 @@ impl Common {
         match offset {
             0x300 => (0..COUNT).fold(0, |value, number| value | (adcs[number].sr & 0x3F) << (8 * number)),
             0x304 => self.control,
-            _ => {
-                access.refuse(NO_REGISTER, format!("ADC+{offset:#x}"));
-                0
-            }
+            _ => access.no_register(format!("ADC+{offset:#x}")),
         }
     }
 

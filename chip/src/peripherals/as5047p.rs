@@ -29,19 +29,11 @@ pub struct Encoder {
     answer: u16,
     /// Contents of the error register: bit 2 parity, bit 1 invalid command.
     errors: u16,
-    released: Ticks,
-    /// Frames so far.
-    pub frames: u64,
-    /// The next answer has a wrong bit.
-    pub disturbed: bool,
+    /// End of the last frame's selection.
+    pub released: Ticks,
 }
 
 impl Encoder {
-    /// Ends the selection.
-    pub fn release(&mut self, now: Ticks) {
-        self.released = now;
-    }
-
     /// Exchanges a frame; `angle` is the reading, 14 bits.
     pub fn frame(&mut self, sent: &Sent, angle: u16, access: &mut Access<'_>) -> u16 {
         if !sent.wide || sent.mode != 1 || sent.hz > FASTEST_HZ {
@@ -51,8 +43,7 @@ impl Encoder {
         if access.now < self.released + BETWEEN {
             access.refuse("less than 350 ns between two frames", "AS5047P");
         }
-        self.frames += 1;
-        let answer = self.answer ^ u16::from(core::mem::take(&mut self.disturbed));
+        let answer = self.answer;
         let is_even = sent.word.count_ones().is_multiple_of(2);
         let (reads, register) = (sent.word & ERROR != 0, sent.word & ANGLE);
         let data = match (is_even, reads, register) {

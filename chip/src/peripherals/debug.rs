@@ -8,14 +8,14 @@ use crate::time::Ticks;
 
 /// Address of the system memory that is readable: one-time programmable memory, unique number, flash size.
 pub const SYSTEM_MEMORY: u32 = 0x1FFF_0000;
-/// Size of that memory.
 pub const SYSTEM_BYTES: usize = 0x8000;
 
-/// Content of the system memory of an ODrive of this version (major, minor, voltage).
+/// Content of the system memory of an ODrive v3.6-56V.
 #[must_use]
-pub fn system_memory(version: [u8; 3]) -> Vec<u8> {
+pub fn system_memory() -> Vec<u8> {
     let mut bytes = vec![0xFF; SYSTEM_BYTES];
-    bytes[0x7803..0x7806].copy_from_slice(&version);
+    // Factory version: major, minor, voltage.
+    bytes[0x7803..0x7806].copy_from_slice(&[3, 6, 56]);
     for (index, byte) in bytes[0x7A10..0x7A1C].iter_mut().enumerate() {
         *byte = 0x31 + index as u8;
     }
@@ -29,8 +29,9 @@ pub fn system_memory(version: [u8; 3]) -> Vec<u8> {
 pub struct Debug {
     control: u32,
     freeze: [u32; 2],
-    trace: bool,
-    counts: bool,
+    /// Whether tracing is on (DEMCR TRCENA), and whether the cycle counter counts (DWT_CTRL CYCCNTENA).
+    pub trace: bool,
+    pub counts: bool,
     /// Count at an instant, and the length of a cycle since then.
     count: u32,
     since: Ticks,
@@ -42,11 +43,6 @@ impl Debug {
     #[must_use]
     pub fn new() -> Self {
         Self { cycle: 21, ..Self::default() }
-    }
-
-    /// Whether the processor's clock runs on in sleep.
-    fn counts_in_sleep(&self) -> bool {
-        self.control & 1 != 0
     }
 
     /// Cycle counter.
@@ -64,7 +60,8 @@ impl Debug {
     /// Leaves a sleep that began at an instant.
     #[inline]
     pub fn woke(&mut self, begun: Ticks, now: Ticks) {
-        if !self.counts_in_sleep() {
+        // The bit keeps the processor's clock on.
+        if self.control & 1 == 0 {
             self.since += now - begun;
         }
     }
@@ -75,12 +72,8 @@ impl Debug {
             // Device F405, revision 1.
             0x00 => 0x1001_6413,
             0x04 => self.control,
-            0x08 => self.freeze[0],
-            0x0C => self.freeze[1],
-            _ => {
-                access.refuse(NO_REGISTER, format!("DBGMCU+{offset:#x}"));
-                0
-            }
+            0x08 | 0x0C => self.freeze[(offset as usize - 8) / 4],
+            _ => access.no_register(format!("DBGMCU+{offset:#x}")),
         }
     }
 
@@ -94,22 +87,15 @@ impl Debug {
         }
     }
 
-    /// Sets whether tracing is on (DEMCR TRCENA) or the cycle counter counts (DWT_CTRL CYCCNTENA).
+    /// Sets whether tracing is on, or the cycle counter counts.
     pub fn enable(&mut self, trace: Option<bool>, counts: Option<bool>, now: Ticks) {
         (self.count, self.since) = (self.cycles(now), now);
         self.trace = trace.unwrap_or(self.trace);
         self.counts = counts.unwrap_or(self.counts);
     }
 
-    /// Sets the cycle counter.
     pub fn set_cycles(&mut self, count: u32, now: Ticks) {
         (self.count, self.since) = (count, now);
-    }
-
-    /// Whether tracing is on, and whether the cycle counter counts.
-    #[must_use]
-    pub const fn enabled(&self) -> [bool; 2] {
-        [self.trace, self.counts]
     }
 }
 

@@ -37,11 +37,8 @@ pub struct Drivers {
     enabled: Option<Ticks>,
     disabled_at: Ticks,
     /// End of the last frame's selection.
-    released: Ticks,
-    /// Frames of each driver.
+    pub released: Ticks,
     pub frames: [u64; 2],
-    /// Whether a driver has lost its supply: it answers with zeros.
-    pub silent: [bool; 2],
 }
 
 impl Drivers {
@@ -77,11 +74,6 @@ impl Drivers {
         self.drivers[axis].registers = [0; 4];
     }
 
-    /// Ends the selection of a driver.
-    pub fn release(&mut self, now: Ticks) {
-        self.released = now;
-    }
-
     /// Exchanges a frame with the selected drivers; returns the answer.
     pub fn frame(&mut self, sent: &Sent, selected: [bool; 2], access: &mut Access<'_>) -> u16 {
         let axis = match selected {
@@ -104,9 +96,6 @@ impl Drivers {
             return u16::MAX;
         }
         self.frames[axis] += 1;
-        if self.silent[axis] {
-            return 0;
-        }
         let driver = &mut self.drivers[axis];
         let (reads, register, data) = (sent.word >> 15 == 1, sent.word >> 11 & 0xF, sent.word & 0x7FF);
         let answer = driver.answer;

@@ -3,7 +3,7 @@
 //! An edge of the selected port's pin sets a pending bit if it is enabled for that direction; writing a one
 //! clears it. Lines 0 to 4 have an interrupt each, 5 to 9 and 10 to 15 share one.
 
-use crate::findings::{Access, NO_REGISTER};
+use crate::findings::{Access, NO_REGISTER, NOT_MODELLED};
 
 /// Lines of the chip.
 const LINES: u32 = 0x007F_FFFF;
@@ -47,10 +47,7 @@ impl Exti {
             0x0C => self.falling,
             0x10 => 0,
             0x14 => self.pending,
-            _ => {
-                access.refuse(NO_REGISTER, format!("EXTI+{offset:#x}"));
-                0
-            }
+            _ => access.no_register(format!("EXTI+{offset:#x}")),
         }
     }
 
@@ -75,10 +72,7 @@ impl Exti {
             0x08..=0x14 => self.selection[(offset as usize - 8) / 4],
             // The compensation cell is off.
             0x20 => 0,
-            _ => {
-                access.refuse(NO_REGISTER, format!("SYSCFG+{offset:#x}"));
-                0
-            }
+            _ => access.no_register(format!("SYSCFG+{offset:#x}")),
         }
     }
 
@@ -87,7 +81,7 @@ impl Exti {
         match offset {
             0x00 | 0x04 => {
                 if value != 0 {
-                    access.refuse("not modelled", format!("SYSCFG+{offset:#x}"));
+                    access.refuse(NOT_MODELLED, format!("SYSCFG+{offset:#x}"));
                 }
                 self.remap[offset as usize / 4] = value;
             }
@@ -95,7 +89,7 @@ impl Exti {
                 self.selection[(offset as usize - 8) / 4] =
                     access.implemented(value, 0xFFFF, "SYSCFG_EXTICR");
             }
-            0x20 => access.refuse("not modelled", "SYSCFG_CMPCR"),
+            0x20 => access.refuse(NOT_MODELLED, "SYSCFG_CMPCR"),
             _ => access.refuse(NO_REGISTER, format!("SYSCFG+{offset:#x}")),
         }
     }

@@ -80,13 +80,11 @@ pub struct Flash {
     pub slowness: f64,
     /// Words programmed and sectors erased so far.
     pub words: u64,
-    /// Erased sectors so far.
     pub erasures: u64,
     /// Bytes of the image's sectors, from its first, that changed and that the processor does not see yet.
     pub changed: Option<Range<usize>>,
     /// Next power cut.
     pub cut: Option<Cut>,
-    /// Power was cut.
     pub is_cut: bool,
     noise: Xoshiro256PlusPlus,
 }
@@ -134,7 +132,6 @@ impl Flash {
         &mut self.cells[range(region)]
     }
 
-    /// Bytes of a region.
     #[must_use]
     pub fn region(&self, region: &Region) -> &[u8] {
         &self.cells[range(region)]
@@ -147,7 +144,6 @@ impl Flash {
         }
     }
 
-    /// Reads a register.
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         match offset {
             0x00 => self.access,
@@ -155,14 +151,10 @@ impl Flash {
             0x10 => self.control,
             0x14 => self.options,
             0x04 | 0x08 => 0,
-            _ => {
-                access.refuse(NO_REGISTER, format!("FLASH+{offset:#x}"));
-                0
-            }
+            _ => access.no_register(format!("FLASH+{offset:#x}")),
         }
     }
 
-    /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32, access: &mut Access<'_>) {
         match offset {
             0x00 => self.write_access(access.implemented(value, 0x1F07, "FLASH_ACR"), access),

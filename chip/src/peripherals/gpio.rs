@@ -1,6 +1,6 @@
 //! Ports A to I (RM0090 8.4): modes, pulls, outputs, alternate functions, and levels from outside.
 
-use crate::findings::{Access, NO_REGISTER};
+use crate::findings::{Access, NO_REGISTER, NOT_MODELLED};
 
 /// Ports of the chip.
 const PORTS: usize = 9;
@@ -8,13 +8,10 @@ const PORTS: usize = 9;
 /// Mode of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Digital input.
     Input,
-    /// Digital output.
     Output,
     /// Alternate function, by number.
     Alternate(u32),
-    /// Analog.
     Analog,
 }
 
@@ -148,12 +145,8 @@ impl Gpio {
             0x10 => port.inputs,
             0x14 => port.output,
             0x18 | 0x1C => 0,
-            0x20 => port.functions[0],
-            0x24 => port.functions[1],
-            other => {
-                access.refuse(NO_REGISTER, name(number, other));
-                0
-            }
+            offset @ (0x20 | 0x24) => port.functions[(offset as usize - 0x20) / 4],
+            other => access.no_register(name(number, other)),
         }
     }
 
@@ -175,18 +168,11 @@ impl Gpio {
             0x14 => port.output = access.implemented(value, 0xFFFF, "GPIO_ODR"),
             // Setting has priority over resetting.
             0x18 => port.output = port.output & !(value >> 16) | value & 0xFFFF,
-            0x1C => access.refuse("not modelled", name(number, 0x1C)),
-            0x20 => port.functions[0] = value,
-            0x24 => port.functions[1] = value,
+            0x1C => access.refuse(NOT_MODELLED, name(number, 0x1C)),
+            offset @ (0x20 | 0x24) => port.functions[(offset as usize - 0x20) / 4] = value,
             other => access.refuse(NO_REGISTER, name(number, other)),
         }
         port.update_inputs();
-    }
-}
-
-impl Default for Gpio {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

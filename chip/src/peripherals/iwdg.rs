@@ -10,7 +10,7 @@ use crate::time::{NEVER, TICK_HZ, Ticks};
 const UPDATE: u64 = 6;
 
 /// State of the watchdog.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Iwdg {
     /// Frequency of the oscillator, Hz: 17,000 to 47,000.
     pub oscillator_hz: u64,
@@ -23,28 +23,13 @@ pub struct Iwdg {
     since: Ticks,
     /// Instants until which prescaler and reload are busy.
     busy: [Ticks; 2],
-    /// Number of feeds, and least remaining time at a feed.
-    pub feeds: u64,
-    /// Least remaining time at a feed.
-    pub least: Ticks,
 }
 
 impl Iwdg {
     /// A stopped watchdog.
     #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            oscillator_hz: 32_000,
-            runs: false,
-            unlocked: false,
-            prescaler: 0,
-            reload: 0xFFF,
-            count: 0xFFF,
-            since: 0,
-            busy: [0; 2],
-            feeds: 0,
-            least: NEVER,
-        }
+    pub fn new() -> Self {
+        Self { oscillator_hz: 32_000, reload: 0xFFF, count: 0xFFF, ..Self::default() }
     }
 
     /// Stops the watchdog, as a reset does.
@@ -67,15 +52,6 @@ impl Iwdg {
         if self.runs { self.since + (self.count + 1) * self.step() } else { NEVER }
     }
 
-    fn feed(&mut self, now: Ticks) {
-        if self.runs {
-            self.feeds += 1;
-            self.least = self.least.min(self.due().saturating_sub(now));
-        }
-        (self.count, self.since) = (self.reload.into(), now);
-    }
-
-    /// Reads a register.
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         let busy = self.busy.map(|until| access.now < until);
         if matches!((offset, busy), (4, [true, _]) | (8, [_, true])) {
@@ -86,14 +62,10 @@ impl Iwdg {
             4 => self.prescaler,
             8 => self.reload,
             12 => u32::from(busy[0]) | u32::from(busy[1]) << 1,
-            _ => {
-                access.refuse(NO_REGISTER, format!("IWDG+{offset:#x}"));
-                0
-            }
+            _ => access.no_register(format!("IWDG+{offset:#x}")),
         }
     }
 
-    /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32, access: &mut Access<'_>) {
         let now = access.now;
         match (offset, value) {
@@ -101,7 +73,7 @@ impl Iwdg {
             (0, key) => {
                 self.unlocked = false;
                 match key {
-                    0xAAAA => self.feed(now),
+                    0xAAAA => (self.count, self.since) = (self.reload.into(), now),
                     // A start counts from the present value, 0xFFF without a feed before (RM0090 21.3).
                     0xCCCC if !self.runs => (self.runs, self.since) = (true, now),
                     0xCCCC => {}
@@ -129,12 +101,6 @@ impl Iwdg {
         }
         (self.count, self.since) = (count, access.now);
         self.busy[which] = access.now + UPDATE * self.step();
-    }
-}
-
-impl Default for Iwdg {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -26,8 +26,8 @@ pub type Pins = [bool; 2];
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
     references: [Reference; 3],
-    /// Whether each pin is connected to its channel, as bits of channel and side.
-    connected: [Pins; 3],
+    /// Whether each pin is connected to its channel.
+    pub connected: [Pins; 3],
     main: bool,
 }
 
@@ -44,11 +44,6 @@ pub fn dead_time(code: u32) -> u64 {
 }
 
 impl Outputs {
-    /// Sets which pins are connected to the timer.
-    pub fn connect(&mut self, connected: [Pins; 3]) {
-        self.connected = connected;
-    }
-
     /// Follows the timer to an instant, after its registers changed or an edge was due. Returns the edges of
     /// references: rising ones less falling ones, and their number.
     pub fn follow(&mut self, timer: &Timer, now: Ticks) -> (i32, u32) {
@@ -153,8 +148,6 @@ pub(crate) mod tests {
         for (offset, value) in setup {
             timer.write(offset, value, 0, &mut Access { now: 0, findings: &mut findings });
         }
-        let mut outputs = Outputs::default();
-        outputs.connect([[true; 2]; 3]);
-        (timer, outputs)
+        (timer, Outputs { connected: [[true; 2]; 3], ..Outputs::default() })
     }
 }

@@ -5,7 +5,7 @@
 //! 2. A dead crystal never becomes ready; one that dies later raises the clock security's interrupt if
 //! enabled.
 
-use crate::findings::{Access, NO_REGISTER};
+use crate::findings::{Access, NO_REGISTER, NOT_MODELLED};
 use crate::time::{NEVER, TICK_HZ, Ticks};
 
 /// Start-up of the crystal and lock of the PLL: 2 ms and 0.2 ms.
@@ -16,7 +16,7 @@ const SLOW: Ticks = TICK_HZ / 33_000;
 
 const HSI_HZ: u64 = 16_000_000;
 /// Frequency of the board's crystal, Hz.
-pub const CRYSTAL_HZ: u64 = 8_000_000;
+const CRYSTAL_HZ: u64 = 8_000_000;
 
 /// Levels of the voltage detector by PLS, V: falling edge, typical (DS8626 table 22).
 const DETECTOR_V: [f64; 8] = [2.04, 2.19, 2.35, 2.51, 2.66, 2.82, 2.92, 3.03];
@@ -44,18 +44,15 @@ const STORED: [(u32, &str, u32, u32); 15] = [
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum ResetReason {
-    /// Power-on.
     PowerOn = 1 << 27 | 1 << 25,
-    /// Reset pin.
     Pin = 0,
-    /// Software.
     Software = 1 << 28,
     /// Independent watchdog.
     Watchdog = 1 << 29,
 }
 
 /// State of clocks and resets.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Rcc {
     control: u32,
     pll: u32,
@@ -71,8 +68,7 @@ pub struct Rcc {
     crystal_ready: Ticks,
     pll_ready: Ticks,
     slow_ready: Ticks,
-    /// Whether the crystal oscillates.
-    pub crystal_works: bool,
+    crystal_works: bool,
     /// Processor clock, Hz.
     system_hz: u64,
 }
@@ -81,22 +77,7 @@ impl Rcc {
     /// State after power-on.
     #[must_use]
     pub fn new() -> Self {
-        let mut rcc = Self {
-            control: 0x81,
-            pll: 0x2400_3010,
-            configuration: 0,
-            interrupts: 0,
-            stored: STORED.map(|(.., reset)| reset),
-            backup: 0,
-            status: 0,
-            power: 0x4000,
-            supply_v: 3.3,
-            crystal_ready: NEVER,
-            pll_ready: NEVER,
-            slow_ready: NEVER,
-            crystal_works: true,
-            system_hz: HSI_HZ,
-        };
+        let mut rcc = Self { supply_v: 3.3, crystal_works: true, ..Self::default() };
         rcc.reset(ResetReason::PowerOn);
         rcc
     }
@@ -119,7 +100,6 @@ impl Rcc {
         TICK_HZ / self.processor_hz()
     }
 
-    /// Processor clock, Hz.
     #[must_use]
     pub fn processor_hz(&self) -> u64 {
         let divider = match self.configuration >> 4 & 0xF {
@@ -157,12 +137,6 @@ impl Rcc {
         index.is_some_and(|index| self.stored[index] & bits != 0)
     }
 
-    /// Whether the power controller has scale 1.
-    #[must_use]
-    pub fn is_scale_1(&self) -> bool {
-        self.power & 0x4000 != 0
-    }
-
     /// Stops the crystal. Returns whether the clock security detected it and switched to the internal
     /// oscillator.
     pub fn stop_crystal(&mut self) -> bool {
@@ -180,7 +154,6 @@ impl Rcc {
         watched
     }
 
-    /// Reads a register.
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         let ready = |at: Ticks| u32::from(access.now >= at);
         match offset {
@@ -198,10 +171,7 @@ impl Rcc {
             0x80 | 0x84 => 0,
             _ => match STORED.iter().position(|(known, ..)| *known == offset) {
                 Some(index) => self.stored[index],
-                None => {
-                    access.refuse(NO_REGISTER, format!("RCC+{offset:#x}"));
-                    0
-                }
+                None => access.no_register(format!("RCC+{offset:#x}")),
             },
         }
     }
@@ -232,7 +202,7 @@ impl Rcc {
                     self.slow_ready = access.now + SLOW;
                 }
             }
-            0x80 | 0x84 => access.refuse("not modelled", format!("RCC+{offset:#x}")),
+            0x80 | 0x84 => access.refuse(NOT_MODELLED, format!("RCC+{offset:#x}")),
             _ => match STORED.iter().position(|(known, ..)| *known == offset) {
                 Some(index) => {
                     let (_, name, mask, _) = STORED[index];
@@ -316,7 +286,7 @@ impl Rcc {
         };
         self.configuration = value & !0xC;
         self.system_hz = hz;
-        if hz > 144_000_000 && !self.is_scale_1() {
+        if hz > 144_000_000 && self.power & 0x4000 == 0 {
             access.refuse("more than 144 MHz at voltage scale 2", "RCC_CFGR");
         }
         if self.bus_hz(1) > 42_000_000 || self.bus_hz(2) > 84_000_000 {
@@ -340,10 +310,7 @@ impl Rcc {
             0 => self.power,
             // The regulator's output is ready; the voltage detector.
             4 => 1 << 14 | u32::from(self.supply_is_low()) << 2,
-            _ => {
-                access.refuse(NO_REGISTER, format!("PWR+{offset:#x}"));
-                0
-            }
+            _ => access.no_register(format!("PWR+{offset:#x}")),
         }
     }
 
@@ -367,12 +334,6 @@ impl Rcc {
             }
             _ => access.refuse(NO_REGISTER, format!("PWR+{offset:#x}")),
         }
-    }
-}
-
-impl Default for Rcc {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -48,7 +48,6 @@ impl Spi {
         }
     }
 
-    /// Reads a register.
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         self.settle(access.now);
         match offset {
@@ -67,10 +66,7 @@ impl Spi {
             0x10 => 7,
             0x14 | 0x18 | 0x1C => 0,
             0x20 => 2,
-            _ => {
-                access.refuse(NO_REGISTER, format!("SPI3+{offset:#x}"));
-                0
-            }
+            _ => access.no_register(format!("SPI3+{offset:#x}")),
         }
     }
 

@@ -37,18 +37,19 @@ pub const MOE: u32 = 1 << 15;
 const UPDATE: u32 = 1;
 
 /// Kind of a timer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kind {
     /// Advanced: complementary outputs and repetition counter.
     Advanced,
     /// General purpose, 16 bits.
+    #[default]
     General,
     /// General purpose, 32 bits.
     Wide,
 }
 
 /// Values that act, apart from the buffered ones in the registers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Acting {
     prescaler: u32,
     top: u32,
@@ -85,7 +86,7 @@ impl CounterState {
 }
 
 /// State of one timer.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Timer {
     /// Name in the reference manual.
     pub name: &'static str,
@@ -123,31 +124,8 @@ impl Timer {
     #[must_use]
     pub fn new(name: &'static str, kind: Kind) -> Self {
         let top = if kind == Kind::Wide { u32::MAX } else { 0xFFFF };
-        Self {
-            name,
-            kind,
-            cr1: 0,
-            cr2: 0,
-            smcr: 0,
-            dier: 0,
-            sr: 0,
-            ccmr: [0; 2],
-            ccer: 0,
-            psc: 0,
-            arr: top,
-            rcr: 0,
-            ccr: [0; 4],
-            bdtr: 0,
-            acting: Acting { prescaler: 0, top, compare: [0; 4] },
-            repetitions: 0,
-            clock: 21,
-            phase: 0,
-            origin: 0,
-            rest: 0,
-            processed: 0,
-            matched: 0,
-            base: 0,
-        }
+        let acting = Acting { top, ..Acting::default() };
+        Self { name, kind, arr: top, acting, clock: 21, ..Self::default() }
     }
 
     /// Returns to the state after a reset; the clock stays.
@@ -166,7 +144,6 @@ impl Timer {
         }
     }
 
-    /// Whether the counter runs.
     #[must_use]
     pub fn runs(&self) -> bool {
         self.cr1 & 1 == 1
@@ -232,10 +209,6 @@ impl Timer {
     fn counter_of(&self, phase: u64) -> u32 {
         let top = self.top();
         (if self.is_centred() && phase > top { 2 * top - phase } else { phase }) as u32
-    }
-
-    fn is_falling(&self, now: Ticks) -> bool {
-        self.is_centred() && self.phase(now) >= self.top()
     }
 
     /// Takes the present phase as the new origin.
@@ -484,8 +457,8 @@ impl Timer {
         let now = access.now;
         match offset {
             CR1 => {
-                self.cr1 & !0x10
-                    | if self.is_centred() { u32::from(self.is_falling(now)) << 4 } else { self.cr1 & 0x10 }
+                let falling = u32::from(self.phase(now) >= self.top()) << 4;
+                self.cr1 & !0x10 | if self.is_centred() { falling } else { self.cr1 & 0x10 }
             }
             CR2 => self.cr2,
             SMCR => self.smcr,
@@ -506,10 +479,7 @@ impl Timer {
             0x34..=0x40 => self.ccr[(offset as usize - 0x34) / 4],
             BDTR if self.kind == Kind::Advanced => self.bdtr,
             0x48 | 0x4C => 0,
-            _ => {
-                access.refuse(NO_REGISTER, self.register(offset));
-                0
-            }
+            _ => access.no_register(self.register(offset)),
         }
     }
 
@@ -533,16 +503,9 @@ impl Timer {
         format!("{}_{register}", self.name)
     }
 
-    fn implemented(
-        &self,
-        value: u32,
-        advanced: u32,
-        general: u32,
-        register: &str,
-        access: &mut Access<'_>,
-    ) -> u32 {
-        let mask = if self.kind == Kind::Advanced { advanced } else { general };
-        self.masked(value, mask, register, access)
+    /// Value without reserved bits; the masks are those of an advanced and of a general timer.
+    fn implemented(&self, value: u32, masks: [u32; 2], register: &str, access: &mut Access<'_>) -> u32 {
+        self.masked(value, masks[usize::from(self.kind != Kind::Advanced)], register, access)
     }
 
     /// Value without reserved bits; the name is composed only for a finding.
@@ -564,7 +527,7 @@ impl Timer {
         match offset {
             CR1 => return self.write_control(value, position, access),
             CR2 => {
-                let value = self.implemented(value, 0x7FFD, 0xF8, "CR2", access);
+                let value = self.implemented(value, [0x7FFD, 0xF8], "CR2", access);
                 if value >> 4 & 7 == 3 {
                     access.refuse(NOT_MODELLED, self.named("CR2"));
                 }
@@ -572,7 +535,7 @@ impl Timer {
                 self.cr2 = value & !0x7F00 | idle;
             }
             SMCR => self.write_slave(value, position, access),
-            DIER => self.dier = self.implemented(value, 0x7FFF, 0x5F5F, "DIER", access),
+            DIER => self.dier = self.implemented(value, [0x7FFF, 0x5F5F], "DIER", access),
             // Zeros clear, ones do nothing.
             SR => {
                 self.collect_matches(now);
@@ -581,7 +544,7 @@ impl Timer {
             EGR => self.generate(value, access),
             CCMR1 | CCMR2 => self.write_mode((offset - CCMR1) as usize / 4, value, access),
             CCER => {
-                let value = self.implemented(value, 0x3FFF, 0xBBBB, "CCER", access);
+                let value = self.implemented(value, [0x3FFF, 0xBBBB], "CCER", access);
                 let polarity = if self.kind == Kind::Advanced { 0x2AAA } else { 0 };
                 if self.lock() >= 2 && (value ^ self.ccer) & polarity != 0 {
                     access.refuse("locked bits written", self.named("CCER"));
@@ -654,7 +617,7 @@ impl Timer {
     }
 
     fn generate(&mut self, value: u32, access: &mut Access<'_>) {
-        let value = self.implemented(value, 0xFF, 0x5F, "EGR", access);
+        let value = self.implemented(value, [0xFF, 0x5F], "EGR", access);
         self.sr |= value & 0x1E;
         if value & 1 == 1 {
             // The flag stays down where only ends of the counter raise it (URS).
@@ -730,6 +693,9 @@ mod tests {
     use super::*;
     use crate::findings::Findings;
 
+    /// Hundred counts of ten clocks, and the interrupt at their end.
+    const HUNDRED: [(u32, u32); 6] = [(PSC, 9), (ARR, 99), (EGR, 1), (SR, 0), (DIER, 1), (CR1, 1)];
+
     struct Bench {
         timer: Timer,
         findings: Findings,
@@ -737,10 +703,13 @@ mod tests {
     }
 
     impl Bench {
-        fn new(kind: Kind) -> Self {
+        /// A timer after these writes of registers.
+        fn new(kind: Kind, setup: &[(u32, u32)]) -> Self {
             let mut timer = Timer::new("TIM1", kind);
             timer.set_clock(2, 0);
-            Self { timer, findings: Findings::default(), position: 0 }
+            let mut bench = Self { timer, findings: Findings::default(), position: 0 };
+            setup.iter().for_each(|&(offset, value)| bench.write(0, offset, value));
+            bench
         }
 
         fn write(&mut self, now: Ticks, offset: u32, value: u32) {
@@ -765,10 +734,7 @@ mod tests {
 
     #[test]
     fn a_clock_changed_between_two_events_continues_from_there() {
-        let mut bench = Bench::new(Kind::General);
-        for (offset, value) in [(PSC, 9), (ARR, 99), (EGR, 1), (SR, 0), (DIER, 1), (CR1, 1)] {
-            bench.write(0, offset, value);
-        }
+        let mut bench = Bench::new(Kind::General, &HUNDRED);
         bench.run(2000);
         bench.timer.set_clock(21, 3000);
         assert_eq!(bench.timer.due(), 3000 + 50 * 10 * 21);
@@ -776,10 +742,7 @@ mod tests {
 
     #[test]
     fn an_up_counter_counts_its_prescaled_clock_and_updates_at_its_top() {
-        let mut bench = Bench::new(Kind::General);
-        for (offset, value) in [(PSC, 9), (ARR, 99), (EGR, 1), (SR, 0), (DIER, 1), (CR1, 1)] {
-            bench.write(0, offset, value);
-        }
+        let mut bench = Bench::new(Kind::General, &HUNDRED);
         assert_eq!(bench.read(20 * 42 + 19, CNT), 42);
         assert_eq!(bench.run(2000), [(2000, Event::End(true))]);
         assert_eq!((bench.read(2000, CNT), bench.read(2000, SR) & 1), (0, 1));
@@ -795,10 +758,7 @@ mod tests {
 
     #[test]
     fn a_compare_match_raises_its_flag_and_its_interrupt() {
-        let mut bench = Bench::new(Kind::Wide);
-        for (offset, value) in [(ARR, 0xFFFF), (0x38, 500), (DIER, 1 << 2), (CR1, 1)] {
-            bench.write(0, offset, value);
-        }
+        let mut bench = Bench::new(Kind::Wide, &[(ARR, 0xFFFF), (0x38, 500), (DIER, 1 << 2), (CR1, 1)]);
         assert_eq!(bench.timer.due(), 1000);
         assert_eq!(bench.run(1000), [(1000, Event::Match)]);
         assert_eq!(bench.timer.requests(), [false, true]);
@@ -806,10 +766,7 @@ mod tests {
 
     #[test]
     fn an_odd_repetition_written_while_falling_updates_at_zero_only() {
-        let mut bench = Bench::new(Kind::Advanced);
-        for (offset, value) in [(CR1, 0x60), (ARR, 3500), (EGR, 1), (CR1, 0x61)] {
-            bench.write(0, offset, value);
-        }
+        let mut bench = Bench::new(Kind::Advanced, &[(CR1, 0x60), (ARR, 3500), (EGR, 1), (CR1, 0x61)]);
         let updates = |events: Vec<(Ticks, Event)>| -> Vec<Ticks> {
             events.into_iter().filter(|(_, event)| *event == Event::End(true)).map(|(at, _)| at).collect()
         };
@@ -824,9 +781,8 @@ mod tests {
 
     #[test]
     fn buffered_compare_values_wait_for_the_update() {
-        let mut bench = Bench::new(Kind::Advanced);
         let setup = [(CR1, 0xE0), (ARR, 100), (CCMR1, 0x78), (0x34, 40), (EGR, 1), (CR1, 0xE1)];
-        setup.into_iter().for_each(|(offset, value)| bench.write(0, offset, value));
+        let mut bench = Bench::new(Kind::Advanced, &setup);
         assert_eq!(bench.timer.edges(0), Some([40, 160]));
         assert!(!bench.timer.references(78)[0] && bench.timer.references(80)[0]);
         assert!(bench.timer.references(318)[0] && !bench.timer.references(320)[0]);
@@ -838,10 +794,7 @@ mod tests {
 
     #[test]
     fn a_duty_is_below_the_compare_value_in_mode_1_and_above_it_in_mode_2() {
-        let mut bench = Bench::new(Kind::Wide);
-        for (offset, value) in [(ARR, 99), (CCMR2, 0x6060), (0x3C, 30), (0x40, 200)] {
-            bench.write(0, offset, value);
-        }
+        let mut bench = Bench::new(Kind::Wide, &[(ARR, 99), (CCMR2, 0x6060), (0x3C, 30), (0x40, 200)]);
         assert_eq!([2, 3].map(|channel| bench.timer.duty(channel)), [0.3, 1.0]);
         bench.write(0, CCMR2, 0x4070);
         assert_eq!([2, 3].map(|channel| bench.timer.duty(channel)), [0.7, 0.0]);
@@ -849,7 +802,7 @@ mod tests {
 
     #[test]
     fn an_encoder_counts_all_four_edges_in_mode_3_and_wraps() {
-        let mut bench = Bench::new(Kind::General);
+        let mut bench = Bench::new(Kind::General, &[]);
         bench.position = 100;
         for (offset, value) in [(CCMR1, 0x4141), (SMCR, 3), (CR1, 1)] {
             bench.write(0, offset, value);
@@ -864,7 +817,7 @@ mod tests {
 
     #[test]
     fn locked_bits_reserved_bits_and_a_running_counter_are_protected() {
-        let mut bench = Bench::new(Kind::Advanced);
+        let mut bench = Bench::new(Kind::Advanced, &[]);
         bench.write(0, CCER, 0b101);
         bench.write(0, BDTR, MOE | 20);
         assert!(!bench.findings.has("complementary outputs enabled without dead time"));
