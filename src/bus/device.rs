@@ -333,7 +333,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
             stops |= axis.take_stop();
         }
         let commanded = self.axes.iter().any(Axis::is_commanded);
-        // Also a leg that is about to be enabled: nobody would step it down.
+        // A leg that is about to be enabled needs an owner that steps it down.
         let is_rising = matches!(drive, DriveState::ReadyToSwitchOn | DriveState::SwitchedOn);
         let is_up = is_rising || drive.permission() != Permission::Off;
         self.hosted = commanded || self.hosted && is_up;

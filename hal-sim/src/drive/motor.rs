@@ -293,13 +293,14 @@ impl Motor {
         let changes = [first, second, third].map(|direction| self.swing * direction);
         let factor = 2.0 / 3.0 * duration;
         let own = changes.map(|change| factor * (self.mean + change));
+        let own_inverse = own.map(|change| 1.0 / change);
         let mutual = changes.map(|change| factor * (change - 0.5 * self.mean));
         let mut currents = phases(&self.currents_of(&flux_at(&voltages), &end));
         for _ in 0..SWEEPS {
             let mut largest = 0.0_f64;
             for phase in 0..3 {
                 let Terminal::Off(low, high) = terminals[phase] else { continue };
-                let voltage = (voltages[phase] - currents[phase] / own[phase]).clamp(low, high);
+                let voltage = (voltages[phase] - currents[phase] * own_inverse[phase]).clamp(low, high);
                 let change = voltage - core::mem::replace(&mut voltages[phase], voltage);
                 let (next, last) = ((phase + 1) % 3, (phase + 2) % 3);
                 currents[phase] += own[phase] * change;

@@ -16,6 +16,8 @@ const TEST_SPEED: i32 = 100_000;
 const BEYOND_LIMITS: i32 = 20_000_000;
 /// Attempts to enable a leg that states no reason.
 const ATTEMPTS: u32 = 2;
+/// Attempts to reset a leg: a reset is lost while the leg writes its flash and its receive queue is full.
+const RESETS: u32 = 3;
 /// Time for which a new value explains a step of the torque, ticks: a cyclic target that has jumped is
 /// interpolated over its period, and the joint then follows.
 const AFTER_VALUE: u64 = 500 * MILLISECOND as u64;
@@ -588,6 +590,20 @@ impl<L: HostedLeg> Play<L> {
         Ok(())
     }
 
+    /// Resets both nodes, until both have sent their boot-up message.
+    fn reset(&mut self) -> Result<(), String> {
+        self.has_booted = [false; JOINTS];
+        for _ in 0..RESETS {
+            self.send(0x7E5, &[4, 0, 0, 0, 0, 0, 0, 0]);
+            self.nmt(129, 0)?;
+            self.run(SERVO_RATE_HZ * 3 / 5)?;
+            if self.has_booted == [true; JOINTS] {
+                return Ok(());
+            }
+        }
+        Err(format!("reset: boot-up messages: {:?}", self.has_booted))
+    }
+
     /// A well-behaved host enables the leg, or hears why it cannot.
     pub(super) fn again(&mut self) -> Result<(), String> {
         self.unheard = None;
@@ -595,9 +611,7 @@ impl<L: HostedLeg> Play<L> {
         self.leg.plug(true);
         // A contact that is closed from the start on enables nothing.
         self.release_and_hold()?;
-        self.send(0x7E5, &[4, 0, 0, 0, 0, 0, 0, 0]);
-        self.nmt(129, 0)?;
-        self.run(SERVO_RATE_HZ * 3 / 5)?;
+        self.reset()?;
         self.check_session_settings()?;
         self.send(0, &[1, 0]);
         self.run(40)?;

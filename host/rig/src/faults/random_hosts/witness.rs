@@ -13,6 +13,7 @@
 //! words     the statusword is that of the leg, bit 12 of a cyclic mode means a target of this session, and
 //!           "target reached" in profile velocity that the joint has the commanded velocity
 //! faults    the code of a fault is heard from both nodes, if they can send
+//! reset     at the end both nodes reset when a host asks for it
 //! session   settings of the next identification and assistance end with the session
 //! again     at the end a well-behaved host enables and moves the leg, or a reason is stated
 //! ```
@@ -182,6 +183,8 @@ pub(super) struct Play<L> {
     pub by_hand: bool,
     is_switch_closed: bool,
     pub answer: Option<[u8; 8]>,
+    /// Nodes whose boot-up message came since the last reset.
+    pub has_booted: [bool; JOINTS],
 }
 
 impl<L: HostedLeg> Play<L> {
@@ -214,6 +217,7 @@ impl<L: HostedLeg> Play<L> {
             by_hand: false,
             is_switch_closed: true,
             answer: None,
+            has_booted: [false; JOINTS],
         }
     }
 
@@ -273,6 +277,7 @@ impl<L: HostedLeg> Play<L> {
             }
         }
         if let (Some(node), [0]) = (is_from(0x700), data) {
+            self.has_booted[node] = true;
             self.commanded[node].reset(ticks, L::DELAY);
         }
     }
@@ -429,9 +434,9 @@ mod tests {
         travel: f64,
         moves: bool,
         errs: Errs,
-        /// Value of an object that is read.
+        /// Value of an object that is read. With one of object 0 the leg does not reset.
         reads: fn(u16) -> u32,
-        answer: Option<Frame>,
+        answers: Vec<Frame>,
     }
 
     impl HostedLeg for FakeLeg {
@@ -440,10 +445,13 @@ mod tests {
 
         fn send(&mut self, frame: Frame) {
             self.moves |= frame.data().starts_with(&[0x23, 0xFF, 0x60]);
+            if frame.data().starts_with(&[129]) && (self.reads)(0) == 0 {
+                self.answers = NODES.map(|node| Frame::new(0x700 + node, &[0])).into();
+            }
             if let [service, low, high, sub, ..] = *frame.data() {
                 let [a, b, c, d] = (self.reads)(u16::from_le_bytes([low, high])).to_le_bytes();
                 let answer = [if service == 0x40 { 0x43 } else { 0x60 }, low, high, sub, a, b, c, d];
-                self.answer = Some(Frame::new(frame.id() - 0x80, &answer));
+                self.answers = vec![Frame::new(frame.id() - 0x80, &answer)];
             }
         }
 
@@ -453,7 +461,7 @@ mod tests {
 
         fn tick(&mut self, heard: &mut dyn FnMut(&Frame)) -> Result<Option<LegState>, String> {
             self.ticks += 1;
-            self.answer.take().iter().for_each(heard);
+            self.answers.drain(..).for_each(|frame| heard(&frame));
             self.travel += if self.moves { 2.5e-5 } else { 0.0 };
             let position = [0.5 - self.travel, 0.5 + self.travel];
             let mut state = LegState { torque: [20.0; JOINTS], position, ..LegState::AT_REST };
@@ -474,7 +482,7 @@ mod tests {
     fn complaint(errs: Errs, reads: fn(u16) -> u32, steps: Vec<Step>, begins: u64) -> String {
         let leg = LegFile::load(DEFAULT_LEG).expect("a shipped leg");
         let bounds = JointBounds::from_leg(&leg).expect("a leg that can be moved");
-        let leg = FakeLeg { ticks: begins, travel: 0.0, moves: false, errs, reads, answer: None };
+        let leg = FakeLeg { ticks: begins, travel: 0.0, moves: false, errs, reads, answers: vec![] };
         let found = check_session(leg, bounds, &HostSession { by_hand: true, steps });
         found.err().as_deref().unwrap_or("").split(':').next().unwrap_or("").into()
     }
@@ -512,6 +520,8 @@ mod tests {
         // A setting outlives its session.
         let keeps = |index| if index == 0x2150 { 100 } else { ENABLED(index) };
         assert_eq!(complaint(|_| {}, keeps, Vec::new(), 0), "session");
+        let stays = |index| if index == 0 { 1 } else { ENABLED(index) };
+        assert_eq!(complaint(|_| {}, stays, Vec::new(), 0), "reset");
         // No host can enable the leg, and no reason is stated.
         assert_eq!(complaint(|state| state.is_enabled = false, ENABLED, Vec::new(), ERRS), "again");
     }
