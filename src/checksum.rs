@@ -32,7 +32,7 @@ impl Checksum {
 
     /// Adds several numbers.
     #[must_use]
-    pub fn numbers(self, numbers: impl IntoIterator<Item = f32>) -> Self {
+    pub(crate) fn numbers(self, numbers: impl IntoIterator<Item = f32>) -> Self {
         numbers.into_iter().fold(self, Self::number)
     }
 

@@ -48,7 +48,7 @@ pub(crate) use fill;
 /// `field` points to memory for the value, with no other reference to it.
 #[expect(unsafe_code, reason = "see `in_place`")]
 #[inline(always)]
-pub unsafe fn write<T>(field: *mut T, make: impl FnOnce() -> T) {
+pub(crate) unsafe fn write<T>(field: *mut T, make: impl FnOnce() -> T) {
     /// Largest value written inline, bytes. A size-optimising compiler gives every value of an unsplit
     /// function its own stack slot.
     const SMALL: usize = 128;
@@ -64,12 +64,15 @@ unsafe fn write_apart<T>(field: *mut T, make: impl FnOnce() -> T) {
 }
 
 /// Casts the memory of a field to uninitialised memory for its value.
-pub const fn slot<T>(field: *mut T) -> *mut MaybeUninit<T> {
+pub(crate) const fn slot<T>(field: *mut T) -> *mut MaybeUninit<T> {
     field.cast()
 }
 
 /// Builds a value in place; panics if the builder returns another address.
-pub fn build<'a, T>(slot: &'a mut MaybeUninit<T>, build: impl FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) {
+pub(crate) fn build<'a, T>(
+    slot: &'a mut MaybeUninit<T>,
+    build: impl FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T,
+) {
     let address = slot.as_mut_ptr();
     let built: *mut T = build(slot);
     assert!(core::ptr::eq(address, built), "what was built lies elsewhere");
@@ -77,7 +80,7 @@ pub fn build<'a, T>(slot: &'a mut MaybeUninit<T>, build: impl FnOnce(&'a mut May
 
 /// Builds an array, element by element.
 #[expect(unsafe_code, reason = "see `in_place`")]
-pub fn each<T, const N: usize>(slot: &mut MaybeUninit<[T; N]>, make: impl Fn() -> T) -> &mut [T; N] {
+pub(crate) fn each<T, const N: usize>(slot: &mut MaybeUninit<[T; N]>, make: impl Fn() -> T) -> &mut [T; N] {
     let first = slot.as_mut_ptr().cast::<T>();
     for index in 0..N {
         // SAFETY: `first` points to memory for `N` elements, and `index` is below that.
@@ -89,7 +92,7 @@ pub fn each<T, const N: usize>(slot: &mut MaybeUninit<[T; N]>, make: impl Fn() -
 
 /// Builds a value in local memory and moves it from there; for callers with enough stack.
 #[expect(unsafe_code, reason = "see `in_place`")]
-pub fn made<T>(build_in: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) -> T {
+pub(crate) fn made<T>(build_in: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) -> T {
     let mut slot = MaybeUninit::uninit();
     build(&mut slot, build_in);
     // SAFETY: `build` has verified that the value was built here.
@@ -97,14 +100,14 @@ pub fn made<T>(build_in: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> &'a mut 
 }
 
 /// At most one value, built in place: an `Option` for values that are too large for the stack.
-pub struct Slot<T> {
+pub(crate) struct Slot<T> {
     full: bool,
     value: MaybeUninit<T>,
 }
 
 impl<T> Slot<T> {
     /// True if the slot holds no value.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         !self.full
     }
 
@@ -114,7 +117,7 @@ impl<T> Slot<T> {
     }
 
     /// Builds a value in place and replaces the previous one.
-    pub fn fill(&mut self, build_in: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) {
+    pub(crate) fn fill(&mut self, build_in: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) {
         self.full = false;
         build(&mut self.value, build_in);
         self.full = true;
@@ -122,14 +125,14 @@ impl<T> Slot<T> {
 
     /// Value, if there is one.
     #[expect(unsafe_code, reason = "see `in_place`")]
-    pub fn as_ref(&self) -> Option<&T> {
+    pub(crate) fn as_ref(&self) -> Option<&T> {
         // SAFETY: only `fill` sets `full`, after `build` has verified that the value was built here.
         self.full.then(|| unsafe { self.value.assume_init_ref() })
     }
 
     /// Mutable value, if there is one.
     #[expect(unsafe_code, reason = "see `in_place`")]
-    pub fn as_mut(&mut self) -> Option<&mut T> {
+    pub(crate) fn as_mut(&mut self) -> Option<&mut T> {
         // SAFETY: as above.
         self.full.then(|| unsafe { self.value.assume_init_mut() })
     }
@@ -137,7 +140,7 @@ impl<T> Slot<T> {
 
 /// Builds an empty [`Slot`] in place.
 #[expect(unsafe_code, reason = "see `in_place`")]
-pub fn empty_slot<T>(slot: &mut MaybeUninit<Slot<T>>) -> &mut Slot<T> {
+pub(crate) fn empty_slot<T>(slot: &mut MaybeUninit<Slot<T>>) -> &mut Slot<T> {
     const { assert!(!core::mem::needs_drop::<T>(), "a value that is overwritten is not dropped") };
     let whole = slot.as_mut_ptr();
     // SAFETY: `whole` points to memory for a `Slot`; its other field may be

@@ -8,9 +8,9 @@
 //! | function | `f32` | largest error |
 //! | --- | --- | --- |
 //! | [`sin_cos`] | Cody-Waite reduction, minimax polynomials, single precision only | 1.2e-7 (see below) |
-//! | [`sin_cos_of_turns`] | polynomials of [`sin_cos`], reduced exactly as an integer | 1.2e-7 |
+//! | `sin_cos_of_turns` | polynomials of [`sin_cos`], reduced exactly as an integer | 1.2e-7 |
 //! | [`sqrt`] | one instruction on the device, `libm` elsewhere | correctly rounded |
-//! | [`exp`], [`ln`], [`atan2`] | `libm` | 1 ulp |
+//! | [`exp`], `ln`, [`atan2`] | `libm` | 1 ulp |
 //!
 //! The polynomials are Moshier's (Cephes, 1984-1992). The error of [`sin_cos`] holds for arguments up to
 //! 8,192; beyond that the result is NaN.
@@ -54,7 +54,7 @@ pub fn sin_cos<T: Real>(angle: T) -> (T, T) {
 /// Sine and cosine of an angle in units of 2^-32 turns, wrong by up to 1.2e-7 each: no reduction needed.
 #[must_use]
 #[inline(always)]
-pub fn sin_cos_of_turns(units: u32) -> (f32, f32) {
+pub(crate) fn sin_cos_of_turns(units: u32) -> (f32, f32) {
     const RADIAN_PER_UNIT: f32 = core::f32::consts::TAU / 4_294_967_296.0;
     // Nearest quarter turn, and the angle from there.
     let quarter = units.wrapping_add(1 << 29) >> 30;
@@ -78,7 +78,7 @@ pub fn exp<T: Real>(value: T) -> T {
 
 /// Natural logarithm; NaN for negative numbers.
 #[must_use]
-pub fn ln<T: Real>(value: T) -> T {
+pub(crate) fn ln<T: Real>(value: T) -> T {
     value.door_ln()
 }
 
@@ -90,19 +90,19 @@ pub fn atan2<T: Real>(y: T, x: T) -> T {
 
 /// Magnitude; one instruction on the device.
 #[must_use]
-pub fn abs<T: Real>(value: T) -> T {
+pub(crate) fn abs<T: Real>(value: T) -> T {
     value.door_abs()
 }
 
 /// The smaller of two numbers; if one is NaN, the other.
 #[must_use]
-pub fn min<T: Real>(one: T, other: T) -> T {
+pub(crate) fn min<T: Real>(one: T, other: T) -> T {
     if other < one || is_nan(one) { other } else { one }
 }
 
 /// The larger of two numbers; if one is NaN, the other.
 #[must_use]
-pub fn max<T: Real>(one: T, other: T) -> T {
+pub(crate) fn max<T: Real>(one: T, other: T) -> T {
     if other > one || is_nan(one) { other } else { one }
 }
 
@@ -112,7 +112,7 @@ fn is_nan<T: Real>(value: T) -> bool {
 
 /// Limits `value` to `low..=high`; NaN gives `low`.
 #[must_use]
-pub fn clamp<T: Real>(value: T, low: T, high: T) -> T {
+pub(crate) fn clamp<T: Real>(value: T, low: T, high: T) -> T {
     if value > high {
         high
     } else if value >= low {
@@ -136,7 +136,7 @@ pub fn sign<T: Real>(value: T) -> T {
 
 /// True if neither NaN nor infinite.
 #[must_use]
-pub fn is_finite<T: Real>(value: T) -> bool {
+pub(crate) fn is_finite<T: Real>(value: T) -> bool {
     abs(value) <= T::LARGEST
 }
 
@@ -264,7 +264,7 @@ pub fn dot<T: Real>(one: &[T], other: &[T]) -> T {
 }
 
 /// Median of some numbers, the upper one of two; 0 for an empty slice. Sorts the slice.
-pub fn median<T: Real>(values: &mut [T]) -> T {
+pub(crate) fn median<T: Real>(values: &mut [T]) -> T {
     for end in 1..values.len() {
         for index in (0..end).rev() {
             if values[index] <= values[index + 1] {

@@ -12,7 +12,7 @@ pub(crate) struct TestRandom(Xoshiro256PlusPlus);
 #[allow(dead_code, reason = "each test program uses some of these")]
 impl TestRandom {
     /// Starts from a seed.
-    pub(crate) fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         Self(Xoshiro256PlusPlus::seed_from_u64(seed))
     }
 

@@ -30,7 +30,7 @@ const DAMPING_RATIO: f32 = 0.7;
 
 /// Constants of a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
+pub(crate) struct Gains {
     g: f32,
     w: f32,
     scale: f32,
@@ -38,9 +38,9 @@ pub struct Gains {
 
 impl Gains {
     /// 50 Hz at the servo's rate: g = tan(pi 50 / 4000).
-    pub const TICK: Self = Self::new(0.039_290_11, SERVO_RATE_HZ);
+    pub(crate) const TICK: Self = Self::new(0.039_290_11, SERVO_RATE_HZ);
     /// 50 Hz at the log's rate: g = tan(pi 50 / 500).
-    pub const LOG: Self = Self::new(0.324_919_7, LOG_RATE_HZ);
+    pub(crate) const LOG: Self = Self::new(0.324_919_7, LOG_RATE_HZ);
 
     const fn new(g: f32, rate_hz: u32) -> Self {
         let scale = 1.0 / (1.0 + 2.0 * DAMPING_RATIO * g + g * g);
@@ -50,18 +50,18 @@ impl Gains {
 
 /// Low-passed value with its derivatives, per s and per s^2.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Derivatives {
+pub(crate) struct Derivatives {
     /// Low-passed value.
-    pub value: f32,
+    pub(crate) value: f32,
     /// First derivative.
-    pub first: f32,
+    pub(crate) first: f32,
     /// Second derivative.
-    pub second: f32,
+    pub(crate) second: f32,
 }
 
 /// State of the filter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Differentiator {
+pub(crate) struct Differentiator {
     band: f32,
     low: f32,
 }

@@ -84,13 +84,13 @@ impl<const N: usize> EnergyObserver<N> {
 
     /// Damping that the energy requires, N m s/rad.
     #[must_use]
-    pub fn damping(&self) -> f32 {
+    pub(crate) fn damping(&self) -> f32 {
         STRONGEST * clamp((4.0 / BUDGET_J * self.given_j - 1.0) * (1.0 / 3.0), 0.0, 1.0)
     }
 
     /// Whether the budget is used up, or the energy is not a number.
     #[must_use]
-    pub fn is_exhausted(&self) -> bool {
+    pub(crate) fn is_exhausted(&self) -> bool {
         !(self.given_j < BUDGET_J)
     }
 }

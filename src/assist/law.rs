@@ -24,30 +24,30 @@ pub const AHEAD_S: f32 = 0.003;
 
 /// Shares and models of one session of assistance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AssistSession<const N: usize> {
+pub(crate) struct AssistSession<const N: usize> {
     /// Number of the session; torques of another one are ignored.
-    pub number: u32,
+    pub(crate) number: u32,
     /// Shares of the torques.
-    pub shares: AssistShares,
+    pub(crate) shares: AssistShares,
     /// Models of the empty and the worn leg.
-    pub model: CompensationModel<N>,
+    pub(crate) model: CompensationModel<N>,
 }
 
 /// Torque for the 4 kHz tick, joint (D-H) sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AssistTorque<const N: usize> {
+pub(crate) struct AssistTorque<const N: usize> {
     /// Number of the session.
-    pub session: u32,
+    pub(crate) session: u32,
     /// Whole torque besides inertia, friction and damping, N m.
-    pub torque_nm: [f32; N],
+    pub(crate) torque_nm: [f32; N],
     /// The part of `torque_nm` that carries weight, N m.
-    pub support_nm: [f32; N],
+    pub(crate) support_nm: [f32; N],
     /// Compensated mass matrix, kg m^2.
-    pub inertia: [[f32; N]; N],
+    pub(crate) inertia: [[f32; N]; N],
     /// Damping that the energy observer requires, N m s/rad.
-    pub damping: f32,
+    pub(crate) damping: f32,
     /// Whether the session must end: the energy budget is used up.
-    pub is_exhausted: bool,
+    pub(crate) is_exhausted: bool,
 }
 
 /// State during a session.
@@ -78,12 +78,12 @@ impl<const N: usize> AssistLaw<N> {
     }
 
     /// Begins a session with the next sample.
-    pub fn begin(&mut self, session: AssistSession<N>) {
+    pub(crate) fn begin(&mut self, session: AssistSession<N>) {
         (self.session, self.running) = (Some(session), None);
     }
 
     /// Ends the session.
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         (self.session, self.running) = (None, None);
     }
 
@@ -100,7 +100,7 @@ impl<const N: usize> AssistLaw<N> {
     }
 
     /// Takes a sample; `None` between sessions.
-    pub fn step(&mut self, sample: &LogSample<N>) -> Option<AssistTorque<N>> {
+    pub(crate) fn step(&mut self, sample: &LogSample<N>) -> Option<AssistTorque<N>> {
         if let Some(session) = self.session.take() {
             self.running = Some(Running::begin(session, sample));
         }

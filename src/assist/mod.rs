@@ -13,7 +13,7 @@
 //! | --- | --- | --- |
 //! | G, M, C | gravity, mass matrix and centrifugal terms of the model `empty`, rotors included | |
 //! | G_w | gravity of the difference `worn` - `empty`: the wearer's leg | N m |
-//! | tau_n | torque that the wearer of the leg gives without this share, see [`periodic`] | N m |
+//! | tau_n | torque that the wearer of the leg gives without this share, see `periodic` | N m |
 //! | FC_low, FV_low, k | value - 2 sigma of friction; the same bound of the mass matrix, relative | |
 //! | q* | motion that the oscillators predict | rad |
 //! | e | gate of the periodic assist, 0..1: periodic motion and effort of the wearer | |
@@ -26,8 +26,8 @@
 //! | [`shares`] | the shares s, and which are refused | |
 //! | [`model`] | parameters with bounds; torques and kinetic energy | |
 //! | [`differentiator`] | velocity and acceleration of the measured angles | 500 Hz |
-//! | [`oscillator`] | phase, frequency and waveform of a periodic motion | 500 Hz |
-//! | [`periodic`] | assistance of a periodic motion, and its gate | 500 Hz |
+//! | `oscillator` | phase, frequency and waveform of a periodic motion | 500 Hz |
+//! | `periodic` | assistance of a periodic motion, and its gate | 500 Hz |
 //! | [`energy`] | energy given to the wearer, and the damping that bounds it | 500 Hz |
 //! | [`law`] | all of it: one sample in, one torque out | 500 Hz |
 //! | [`tick`] | interpolation, friction, fading in and out | 4 kHz |
@@ -45,12 +45,16 @@ pub mod differentiator;
 pub mod energy;
 pub mod law;
 pub mod model;
-pub mod oscillator;
-pub mod periodic;
+pub(crate) mod oscillator;
+pub(crate) mod periodic;
 pub mod shares;
 pub mod tick;
 
-pub use law::{AssistLaw, AssistSession, AssistTorque};
+pub use law::AssistLaw;
+pub(crate) use law::{AssistSession, AssistTorque};
 pub use model::{Assured, CompensationModel};
+pub use oscillator::Oscillator;
+pub use periodic::PeriodicAssist;
 pub use shares::AssistShares;
-pub use tick::{AssistDemand, AssistEnd, AssistTick};
+pub use tick::AssistEnd;
+pub(crate) use tick::{AssistDemand, AssistTick};

@@ -25,7 +25,7 @@ impl<const N: usize> Assured<N> {
     /// [`FRICTION_BAND`].
     #[must_use]
     #[inline]
-    pub fn friction(&self, qd: &[f32; N]) -> [f32; N] {
+    pub(crate) fn friction(&self, qd: &[f32; N]) -> [f32; N] {
         let mut torque = [0.0; N];
         for joint in 0..N {
             let sign = clamp(qd[joint] * (1.0 / FRICTION_BAND), -1.0, 1.0);
@@ -39,23 +39,23 @@ impl<const N: usize> Assured<N> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompensationModel<const N: usize> {
     /// Geometry.
-    pub chain: Chain<f32, N>,
+    pub(crate) chain: Chain<f32, N>,
     /// Gravity in the base frame, m/s^2.
-    pub gravity: [f32; 3],
+    pub(crate) gravity: [f32; 3],
     /// Equivalent parameters of the empty leg.
-    pub empty: LegParameters<f32, N>,
+    pub(crate) empty: LegParameters<f32, N>,
     /// Equivalent parameters of the worn leg minus those of the empty one. Torque is linear in the
     /// parameters, so their difference gives the torque of the wearer's leg.
-    pub wearer: Option<LegParameters<f32, N>>,
+    pub(crate) wearer: Option<LegParameters<f32, N>>,
     /// Constant torque of each joint's drive, N m.
-    pub offset_nm: [f32; N],
+    pub(crate) offset_nm: [f32; N],
     /// Bounds of the empty leg.
-    pub assured: Assured<N>,
+    pub(crate) assured: Assured<N>,
 }
 
 /// Speed below which compensated Coulomb friction fades to zero, rad/s. Friction at rest is not compensated:
 /// it can take either sign there, and a torque that helps it one way pushes the other way.
-pub const FRICTION_BAND: f32 = 0.05;
+pub(crate) const FRICTION_BAND: f32 = 0.05;
 
 /// Torque of one set of parameters with their rotors' inertia, N m.
 fn torques<const N: usize>(
@@ -74,7 +74,7 @@ fn torques<const N: usize>(
 impl<const N: usize> CompensationModel<N> {
     /// Weight of the empty leg with the drives' offsets, N m.
     #[must_use]
-    pub fn weight(&self, q: &[f32; N]) -> [f32; N] {
+    pub(crate) fn weight(&self, q: &[f32; N]) -> [f32; N] {
         let state = JointState { q: *q, qd: [0.0; N], qdd: [0.0; N] };
         let mut torque = torques(&self.chain, &self.empty, &state, self.gravity);
         for (torque, offset) in torque.iter_mut().zip(self.offset_nm) {
@@ -85,7 +85,7 @@ impl<const N: usize> CompensationModel<N> {
 
     /// Torque of the empty leg's inertia and centrifugal terms, without gravity, N m.
     #[must_use]
-    pub fn inertia(&self, state: &JointState<f32, N>) -> [f32; N] {
+    pub(crate) fn inertia(&self, state: &JointState<f32, N>) -> [f32; N] {
         torques(&self.chain, &self.empty, state, [0.0; 3])
     }
 
@@ -97,7 +97,7 @@ impl<const N: usize> CompensationModel<N> {
 
     /// Torque that moves the wearer's leg alone, N m; zero while unknown.
     #[must_use]
-    pub fn wearer_torque(&self, state: &JointState<f32, N>) -> [f32; N] {
+    pub(crate) fn wearer_torque(&self, state: &JointState<f32, N>) -> [f32; N] {
         match &self.wearer {
             Some(wearer) => torques(&self.chain, wearer, state, self.gravity),
             None => [0.0; N],
@@ -107,7 +107,7 @@ impl<const N: usize> CompensationModel<N> {
     /// Torque that moves the wearer's leg and a share of the empty leg's inertia, less the carried share of
     /// the wearer's weight, N m: that of a wearer in a transparent leg.
     #[must_use]
-    pub fn wearer_needs(
+    pub(crate) fn wearer_needs(
         &self,
         state: &JointState<f32, N>,
         inertia_share: f32,
@@ -134,7 +134,7 @@ impl<const N: usize> CompensationModel<N> {
 
     /// Kinetic energy of the empty leg, J.
     #[must_use]
-    pub fn kinetic_energy(&self, q: &[f32; N], qd: &[f32; N]) -> f32 {
+    pub(crate) fn kinetic_energy(&self, q: &[f32; N], qd: &[f32; N]) -> f32 {
         let matrix = mass_matrix(&self.chain, &self.empty, q);
         let mut energy = 0.0;
         for row in 0..N {

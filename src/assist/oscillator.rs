@@ -211,7 +211,7 @@ impl<const N: usize> Oscillator<N> {
     /// Predicted share of the motion's mean square over about one cycle, at most 1; small motions count as
     /// not predicted.
     #[must_use]
-    pub fn predicted_share(&self) -> f32 {
+    pub(crate) fn predicted_share(&self) -> f32 {
         1.0 - (self.error + EPSILON * 0.1) / (self.motion + EPSILON * 0.1)
     }
 
@@ -229,7 +229,7 @@ impl<const N: usize> Oscillator<N> {
 
     /// Motion predicted for `ahead` s after the last sample: rad, rad/s, rad/s^2.
     #[must_use]
-    pub fn predict(&self, ahead: f32) -> JointState<f32, N> {
+    pub(crate) fn predict(&self, ahead: f32) -> JointState<f32, N> {
         let multiples = multiples(self.phase + self.frequency * ahead);
         let mut state = JointState { q: [0.0; N], qd: [0.0; N], qdd: [0.0; N] };
         for (joint, waveform) in self.waveforms.iter().enumerate() {

@@ -84,7 +84,7 @@ impl<const N: usize> PeriodicAssist<N> {
     /// earlier time, and returns the assistance for `ahead` s after the sample, N m. The shares are those of
     /// the assistance, of the empty leg's inertia that the wearer moves, and of the wearer's weight that is
     /// carried.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         model: &CompensationModel<N>,
         [share, inertia_share, carried_share]: [f32; 3],

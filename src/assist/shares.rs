@@ -27,7 +27,7 @@ impl AssistShares {
 
     /// Whether every share is finite and in its range.
     #[must_use]
-    pub fn are_permitted(&self) -> bool {
+    pub(crate) fn are_permitted(&self) -> bool {
         let Self { friction, inertia, weight, periodic } = *self;
         [friction, inertia, weight, periodic].into_iter().all(is_finite)
             && (0.0..=1.0).contains(&friction)
@@ -38,7 +38,7 @@ impl AssistShares {
 
     /// Whether the model of the worn leg is needed too.
     #[must_use]
-    pub fn need_worn_model(&self) -> bool {
+    pub(crate) fn need_worn_model(&self) -> bool {
         self.weight != 0.0 || self.periodic != 0.0
     }
 }

@@ -4,7 +4,7 @@
 //! tau = l (tau_law + S q'' + s_f friction(q') - b q') + (1 - l) (tau_0 - D q')
 //! ```
 //!
-//! `l` moves between 0 and 1 within [`FADE_S`]. D is the damping of the position controller. tau_0 is the
+//! `l` moves between 0 and 1 within `FADE_S`. D is the damping of the position controller. tau_0 is the
 //! torque that held the leg when the session began; while the session ends it moves to the torque that
 //! carries the leg's weight, by at most a tenth of the cap in each sample time. At l = 0 the torque is that
 //! of the controller without a position error: both ends are free of steps.
@@ -14,7 +14,7 @@
 //! ([`LedAcceleration`]): from the motion to the torque it takes 3 ms, of which the drive takes 1 ms.
 //!
 //! Torques of the law arrive every eighth tick, and each is reached on a ramp of eight ticks. One that fails
-//! to come for [`LATEST_TICKS`] ends the session. Cost: some 20 operations for each joint.
+//! to come for `LATEST_TICKS` ends the session. Cost: some 20 operations for each joint.
 
 use super::differentiator::LedAcceleration;
 use super::law::AssistTorque;
@@ -24,10 +24,10 @@ use crate::real::{clamp, is_finite};
 use crate::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 
 /// Time in which assistance fades in or out, s.
-pub const FADE_S: f32 = 1.0;
+pub(crate) const FADE_S: f32 = 1.0;
 const FADE_PER_TICK: f32 = 1.0 / (FADE_S * SERVO_RATE_HZ as f32);
 /// Ticks without a new torque after which the session ends: 10 ms.
-pub const LATEST_TICKS: u32 = 40;
+pub(crate) const LATEST_TICKS: u32 = 40;
 /// Largest change of torque from one sample to the next as a share of the cap.
 const LARGEST_STEP: f32 = 0.1;
 
@@ -56,16 +56,16 @@ listed! {
 
 /// Torque of one tick, joint (D-H) sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AssistDemand<const N: usize> {
+pub(crate) struct AssistDemand<const N: usize> {
     /// Torque, N m.
-    pub torque_nm: [f32; N],
+    pub(crate) torque_nm: [f32; N],
     /// Share of the controller's damping that acts beside it, 0..1.
-    pub damping_share: f32,
+    pub(crate) damping_share: f32,
 }
 
 /// State of a session between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AssistTick<const N: usize> {
+pub(crate) struct AssistTick<const N: usize> {
     share: f32,
     /// Number of the session.
     session: u32,
@@ -92,7 +92,7 @@ impl<const N: usize> AssistTick<N> {
     /// Begins a session at rest at these angles (rad), with the torque that holds the leg (N m), a share of
     /// the friction and its bounds. `cap_nm` are the joints' torque caps.
     #[must_use]
-    pub fn begin(
+    pub(crate) fn begin(
         number: u32,
         (friction_share, assured): (f32, Assured<N>),
         angles: [f32; N],
@@ -119,7 +119,7 @@ impl<const N: usize> AssistTick<N> {
     }
 
     /// Takes a torque of the law.
-    pub fn receive(&mut self, torque: &AssistTorque<N>) {
+    pub(crate) fn receive(&mut self, torque: &AssistTorque<N>) {
         if torque.session != self.session {
             return;
         }
@@ -150,25 +150,25 @@ impl<const N: usize> AssistTick<N> {
     }
 
     /// Ends the session; the torque fades out. The first reason stays.
-    pub fn leave(&mut self, why: AssistEnd) {
+    pub(crate) fn leave(&mut self, why: AssistEnd) {
         self.end = self.end.or(Some(why));
     }
 
     /// Reason of a session that is ending.
     #[must_use]
-    pub const fn end(&self) -> Option<AssistEnd> {
+    pub(crate) const fn end(&self) -> Option<AssistEnd> {
         self.end
     }
 
     /// Whether the session has faded out.
     #[must_use]
-    pub fn has_ended(&self) -> bool {
+    pub(crate) fn has_ended(&self) -> bool {
         self.end.is_some() && !(self.share > 0.0)
     }
 
     /// Whether the whole assistance acts.
     #[must_use]
-    pub fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.share >= 1.0
     }
 

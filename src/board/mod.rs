@@ -3,13 +3,13 @@
 //! Requirements on a board, and how to port: docs/board.md.
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
-pub mod copy;
+pub(crate) mod copy;
 #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
-pub mod crash;
+pub(crate) mod crash;
 #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
-pub mod critical_section;
+pub(crate) mod critical_section;
 pub mod odrive_v3_6;
 #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
-pub mod stack;
+pub(crate) mod stack;
 #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
-pub mod windings;
+pub(crate) mod windings;

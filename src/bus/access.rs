@@ -19,11 +19,11 @@ const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
 
 /// All objects of a node, in two ranges.
-pub struct Dictionary<'a, O> {
+pub(crate) struct Dictionary<'a, O> {
     /// Objects 1000 to 1FFF.
-    pub communication: &'a mut Communication,
+    pub(crate) communication: &'a mut Communication,
     /// Objects from 2000 on.
-    pub objects: &'a mut O,
+    pub(crate) objects: &'a mut O,
 }
 
 impl<O: Objects> Dictionary<'_, O> {
@@ -31,7 +31,7 @@ impl<O: Objects> Dictionary<'_, O> {
     ///
     /// # Errors
     /// [`Abort`] of an unknown object, or of the object itself.
-    pub fn read(&self, object: Object) -> Result<u32, Abort> {
+    pub(crate) fn read(&self, object: Object) -> Result<u32, Abort> {
         let row = find(object)?;
         match row.access {
             Access::Const => Ok(row.default),
@@ -43,7 +43,7 @@ impl<O: Objects> Dictionary<'_, O> {
     ///
     /// # Errors
     /// [`Abort`] of the object.
-    pub fn value(&self, object: Object) -> Result<u32, Abort> {
+    pub(crate) fn value(&self, object: Object) -> Result<u32, Abort> {
         match object.index {
             index if PROGRAM.contains(&index) => self.objects.read(object),
             ..PROFILE => self.communication.read(object),
@@ -57,7 +57,7 @@ impl<O: Objects> Dictionary<'_, O> {
     ///
     /// # Errors
     /// [`Abort::ReadOnly`], or the error of an unknown object.
-    pub fn writable(&self, object: Object) -> Result<&'static Row, Abort> {
+    pub(crate) fn writable(&self, object: Object) -> Result<&'static Row, Abort> {
         let row = find(object)?;
         if matches!(row.access, Access::Both | Access::Write) { Ok(row) } else { Err(Abort::ReadOnly) }
     }
@@ -66,7 +66,7 @@ impl<O: Objects> Dictionary<'_, O> {
     ///
     /// # Errors
     /// [`Abort`] of the object.
-    pub fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+    pub(crate) fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
         match (object.index, value) {
             (0x1010, SAVE) => self.objects.store(false),
             (0x1011, LOAD) => self.objects.store(true),
@@ -81,7 +81,7 @@ impl<O: Objects> Dictionary<'_, O> {
     ///
     /// # Errors
     /// [`Abort`] of an unknown object, or of the object itself.
-    pub fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
+    pub(crate) fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
         let row = find(object)?;
         if matches!(row.kind, Type::Text | Type::Domain) {
             return if object.index < *PROGRAM.start() {

@@ -31,7 +31,7 @@ listed! {
 impl CommissioningStep {
     /// Returns the step with this number.
     #[must_use]
-    pub fn from_number(number: u32) -> Option<Self> {
+    pub(crate) fn from_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|step| *step as u32 == number)
     }
 }
@@ -79,15 +79,15 @@ listed! {
 
 /// Result of the last step, and the axis and reason of a refused calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StepReport {
+pub(crate) struct StepReport {
     /// Progress or result.
-    pub result: u8,
+    pub(crate) result: u8,
     /// Axis that the calibration refused, from 1.
-    pub axis: u8,
+    pub(crate) axis: u8,
     /// Reason, see [`crate::leg::CalibrationRefusal::number`].
-    pub reason: u8,
+    pub(crate) reason: u8,
     /// Number beside the reason, see [`crate::leg::CalibrationRefusal::detail`]; 255 if it is larger.
-    pub detail: u8,
+    pub(crate) detail: u8,
 }
 
 impl StepReport {
@@ -108,28 +108,28 @@ impl BoardState {
     /// The joints have their zeros.
     pub const REFERENCED: u8 = 1 << 1;
     /// A calibration is under way.
-    pub const CALIBRATING: u8 = 1 << 2;
+    pub(crate) const CALIBRATING: u8 = 1 << 2;
     /// The enabling switch is closed and counts.
     pub const SWITCH_CLOSED: u8 = 1 << 3;
 }
 
 /// State and telemetry of a board with `N` axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoardStatus<const N: usize> {
+pub(crate) struct BoardStatus<const N: usize> {
     /// State of the board.
-    pub state: BoardState,
+    pub(crate) state: BoardState,
     /// Result of the last step.
-    pub report: StepReport,
+    pub(crate) report: StepReport,
     /// Inhibit reasons, one bit each.
-    pub causes: u32,
+    pub(crate) causes: u32,
     /// Temperature of each bridge, degrees Celsius.
-    pub bridge_c: [f32; N],
+    pub(crate) bridge_c: [f32; N],
     /// Temperature of each winding, degrees Celsius.
-    pub winding_c: [f32; N],
+    pub(crate) winding_c: [f32; N],
     /// Currents in the phases B and C of each motor, A; that in A is minus their sum.
-    pub currents_a: [[f32; 2]; N],
+    pub(crate) currents_a: [[f32; 2]; N],
     /// Longest interrupt of the current loops and longest tick of the servo, ns, in the last report's time.
-    pub longest_ns: [u32; 2],
+    pub(crate) longest_ns: [u32; 2],
 }
 
 impl<const N: usize> BoardStatus<N> {
@@ -147,7 +147,7 @@ impl<const N: usize> BoardStatus<N> {
 
 /// Objects 2160 and 2170 of a board.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BoardObjects<const N: usize> {
+pub(crate) struct BoardObjects<const N: usize> {
     status: BoardStatus<N>,
     command: u8,
     asked: Option<CommissioningStep>,
@@ -162,10 +162,10 @@ fn fixed(value: f32, unit: f32) -> u32 {
 
 impl<const N: usize> BoardObjects<N> {
     /// Objects before the first report.
-    pub const NEW: Self = Self { status: BoardStatus::NONE, command: 0, asked: None };
+    pub(crate) const NEW: Self = Self { status: BoardStatus::NONE, command: 0, asked: None };
 
     /// Takes over the board's state.
-    pub fn update(&mut self, status: &BoardStatus<N>) {
+    pub(crate) fn update(&mut self, status: &BoardStatus<N>) {
         self.status = *status;
         if self.asked.is_some() {
             self.status.report = StepReport::new(StepResult::UnderWay);
@@ -173,7 +173,7 @@ impl<const N: usize> BoardObjects<N> {
     }
 
     /// Takes the step that a host asked for.
-    pub fn take_step(&mut self) -> Option<CommissioningStep> {
+    pub(crate) fn take_step(&mut self) -> Option<CommissioningStep> {
         self.asked.take()
     }
 

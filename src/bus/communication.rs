@@ -27,11 +27,11 @@ pub struct Identity {
     /// Revision of the bus behaviour; major number in the upper half.
     pub revision: u32,
     /// Serial number of the board.
-    pub serial: u32,
+    pub(crate) serial: u32,
     /// Check sum of the running image (1F56); 0 where there is none.
-    pub checksum: u32,
+    pub(crate) checksum: u32,
     /// Device name, hardware version, software version.
-    pub texts: [&'static str; 3],
+    pub(crate) texts: [&'static str; 3],
 }
 
 impl Identity {
@@ -65,7 +65,7 @@ impl Identity {
 
 /// State of the communication objects of one node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Communication {
+pub(crate) struct Communication {
     pub(super) node: NodeId,
     pub(super) identity: Identity,
     pub(super) state: NmtState,
@@ -121,7 +121,7 @@ impl Communication {
     ///
     /// # Errors
     /// [`Abort`] of the object.
-    pub fn read(&self, object: Object) -> Result<u32, Abort> {
+    pub(crate) fn read(&self, object: Object) -> Result<u32, Abort> {
         let Object { index, sub } = object;
         let pdo = usize::from(index & 0xFF);
         Ok(match (index, sub) {
@@ -154,7 +154,7 @@ impl Communication {
     ///
     /// # Errors
     /// [`Abort`] of the object.
-    pub fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+    pub(crate) fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
         let Object { index, sub } = object;
         let pdo = usize::from(index & 0xFF);
         match (index, sub) {

@@ -51,25 +51,25 @@ const REFUSAL_US: u64 = 1_000_000;
 
 /// State of the leg after one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LegStatus<const N: usize> {
+pub(crate) struct LegStatus<const N: usize> {
     /// Status of each joint. The inputs are replaced here.
-    pub joints: [JointStatus; N],
+    pub(crate) joints: [JointStatus; N],
     /// Activity of the leg.
-    pub activity: Activity,
+    pub(crate) activity: Activity,
     /// Model monitor: the model no longer fits; an update is offered.
-    pub change: [bool; 2],
+    pub(crate) change: [bool; 2],
     /// Why the last power request was refused.
-    pub refused: Option<Refusal>,
+    pub(crate) refused: Option<Refusal>,
     /// Whether the operator holds the enabling switch.
-    pub held: bool,
+    pub(crate) held: bool,
     /// Whether an inhibit reason is active.
-    pub blocked: bool,
+    pub(crate) blocked: bool,
     /// Inhibit reasons, one bit each.
-    pub causes: u32,
+    pub(crate) causes: u32,
     /// Whether every axis is calibrated.
-    pub calibrated: bool,
+    pub(crate) calibrated: bool,
     /// Whether the leg does not tick, because calibration or reference is missing.
-    pub rests: bool,
+    pub(crate) rests: bool,
 }
 
 impl<const N: usize> LegStatus<N> {
@@ -106,7 +106,7 @@ impl<const N: usize> LegStatus<N> {
 
 /// Request to the leg, besides the joints' targets.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LegRequest {
+pub(crate) enum LegRequest {
     /// Step of the drive's power states.
     Power(PowerRequest),
     /// Start an identification.
@@ -130,17 +130,17 @@ pub enum LegRequest {
 
 /// Orders for the leg's next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LegOrder<const N: usize> {
+pub(crate) struct LegOrder<const N: usize> {
     /// Command of each joint; `None` while no host controls the drive.
-    pub commands: Option<[JointCommand; N]>,
+    pub(crate) commands: Option<[JointCommand; N]>,
     /// Request, issued once.
-    pub request: Option<LegRequest>,
+    pub(crate) request: Option<LegRequest>,
     /// Fault of each joint that the leg must react to; issued once.
-    pub faults: [Option<FaultCode>; N],
+    pub(crate) faults: [Option<FaultCode>; N],
     /// Whether each joint may be enabled outside its range.
-    pub may_return: [bool; N],
+    pub(crate) may_return: [bool; N],
     /// Request that the bus refused; issued once, for a record.
-    pub refused: Option<Refusal>,
+    pub(crate) refused: Option<Refusal>,
 }
 
 /// Store operation requested by a host.
@@ -230,7 +230,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Handles a frame for every node but its sender. Returns whether a node may have something to send or
     /// do. A reset node recalls its stored parameters at the next call, once for any number of frames.
-    pub fn receive<R: Results>(
+    pub(crate) fn receive<R: Results>(
         &mut self,
         frame: &Frame,
         now_us: u64,
@@ -260,7 +260,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Returns the next frame that a node has to send; call until `None`. While the controller is bus-off,
     /// nothing is returned: such a frame would be outdated when sent.
-    pub fn poll<R: Results>(&mut self, joint: usize, now_us: u64, results: &R) -> Option<Frame> {
+    pub(crate) fn poll<R: Results>(&mut self, joint: usize, now_us: u64, results: &R) -> Option<Frame> {
         self.recall_reset();
         if self.controller == Controller::Off {
             return None;
@@ -275,7 +275,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Restarts all timeouts if the board could not receive since the last call.
-    pub fn check_gap(&mut self, now_us: u64) {
+    pub(crate) fn check_gap(&mut self, now_us: u64) {
         let since_us = now_us.saturating_sub(self.last_call_us);
         self.last_call_us = self.last_call_us.max(now_us);
         if since_us > STOOD_US {
@@ -285,7 +285,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Checks all timeouts, independently of the bus load. Call it every millisecond; a longer gap restarts
     /// the timeouts.
-    pub fn watch<R: Results>(&mut self, now_us: u64, results: &R) {
+    pub(crate) fn watch<R: Results>(&mut self, now_us: u64, results: &R) {
         self.recall_reset();
         self.check_gap(now_us);
         for joint in 0..N {
@@ -294,7 +294,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Handles a change of the CAN controller's state.
-    pub fn on_controller<R: Results>(&mut self, controller: Controller, results: &R) {
+    pub(crate) fn on_controller<R: Results>(&mut self, controller: Controller, results: &R) {
         if controller != Controller::Overrun {
             self.controller = controller;
         }
@@ -315,7 +315,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Takes over the leg's state after a tick. Fetch the resulting request with [`Self::order`] before the
     /// next tick.
-    pub fn update(&mut self, status: &LegStatus<N>) {
+    pub(crate) fn update(&mut self, status: &LegStatus<N>) {
         let drive = status.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
         let inputs = self.inputs(status);
         let is_busy = !matches!(status.activity, Activity::Idle | Activity::Follow);
@@ -433,7 +433,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Returns the orders for the leg; targets received since [`Self::update`] are included.
-    pub fn order(&mut self) -> LegOrder<N> {
+    pub(crate) fn order(&mut self) -> LegOrder<N> {
         LegOrder {
             commands: self.hosted.then(|| self.axes.each_ref().map(Axis::command)),
             request: self.request.take(),
@@ -446,58 +446,58 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Bandwidths of each joint's loops that a host has set.
     #[must_use]
-    pub fn bandwidths(&self) -> [LoopBandwidths; N] {
+    pub(crate) fn bandwidths(&self) -> [LoopBandwidths; N] {
         self.axes.each_ref().map(Axis::bandwidths)
     }
 
     /// Whether a host controls the drive. The operator's contacts can then only inhibit it.
     #[must_use]
-    pub const fn is_hosted(&self) -> bool {
+    pub(crate) const fn is_hosted(&self) -> bool {
         self.hosted
     }
 
     /// Whether a host that does not control the drive has stopped it since the update before.
     #[must_use]
-    pub const fn is_stopped(&self) -> bool {
+    pub(crate) const fn is_stopped(&self) -> bool {
         self.stopped
     }
 
     /// Takes over the board's state and telemetry.
-    pub fn update_board(&mut self, status: &BoardStatus<N>) {
+    pub(crate) fn update_board(&mut self, status: &BoardStatus<N>) {
         self.leg.board.update(status);
     }
 
     /// Takes the commissioning step that a host asked for.
-    pub fn take_step(&mut self) -> Option<CommissioningStep> {
+    pub(crate) fn take_step(&mut self) -> Option<CommissioningStep> {
         self.leg.board.take_step()
     }
 
     /// Takes over the status of a new image. A change may follow an erase, in which nothing was received and
     /// a board's clock did not advance.
-    pub fn update_program(&mut self, status: ProgramStatus) {
+    pub(crate) fn update_program(&mut self, status: ProgramStatus) {
         if self.leg.program.update(status) {
             self.nodes.iter_mut().for_each(|node| node.stood_still(self.last_call_us));
         }
     }
 
     /// Takes the command for the program that a host wrote.
-    pub fn take_program_command(&mut self) -> Option<ProgramCommand> {
+    pub(crate) fn take_program_command(&mut self) -> Option<ProgramCommand> {
         self.leg.program.take_command()
     }
 
     /// Takes the next byte of a new image.
-    pub fn take_program_byte(&mut self) -> Option<u8> {
+    pub(crate) fn take_program_byte(&mut self) -> Option<u8> {
         self.leg.program.take_byte()
     }
 
     /// Adds a sample to the log.
-    pub fn log(&mut self, logged: &LoggedSample<N>) {
+    pub(crate) fn log(&mut self, logged: &LoggedSample<N>) {
         self.leg.log.push(logged);
     }
 
     /// Returns the number of models accepted and stored on this board (2100:7).
     #[must_use]
-    pub const fn generation(&self) -> u32 {
+    pub(crate) const fn generation(&self) -> u32 {
         self.leg.generation
     }
 

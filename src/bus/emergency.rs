@@ -18,14 +18,14 @@ use crate::hal::Frame;
 use crate::leg::NO_ERROR;
 
 /// Entries of the error history.
-pub const HISTORY: usize = 8;
+pub(crate) const HISTORY: usize = 8;
 const WAITING: usize = 4;
 /// Default of 1015: 10 ms.
 const INHIBIT: u16 = 100;
 
 /// Source of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+pub(crate) enum Source {
     /// Drive of the joint, see [`ErrorReport`].
     Drive,
     /// Monitored heartbeat, 0 or 1.
@@ -61,24 +61,24 @@ impl Source {
 
 /// Error as reported to hosts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ErrorReport {
+pub(crate) struct ErrorReport {
     /// Error code by CiA 301 or CiA 402.
-    pub code: u16,
+    pub(crate) code: u16,
     /// Manufacturer-specific information.
-    pub information: [u8; 5],
+    pub(crate) information: [u8; 5],
 }
 
 impl ErrorReport {
     /// Creates a report without information.
     #[must_use]
-    pub const fn code(code: u16) -> Self {
+    pub(crate) const fn code(code: u16) -> Self {
         Self { code, information: [0; 5] }
     }
 
     /// Error register: bit 0 always; 1 current, 2 voltage, 3 temperature, 4 communication, 5 device profile,
     /// 7 manufacturer-specific.
     #[must_use]
-    pub const fn register(&self) -> u8 {
+    pub(crate) const fn register(&self) -> u8 {
         1 | match self.code >> 8 {
             0x20..=0x2F => 1 << 1,
             0x30..=0x3F => 1 << 2,
@@ -93,7 +93,7 @@ impl ErrorReport {
 
 /// Active errors, waiting messages and history.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Emergency {
+pub(crate) struct Emergency {
     active: [Option<ErrorReport>; SOURCES],
     waiting: [Option<[u8; 8]>; WAITING],
     /// Sources whose last change found no space.
@@ -124,7 +124,7 @@ impl Emergency {
     }
 
     /// Sets or clears the error of a source; a change queues a message.
-    pub fn set(&mut self, source: Source, error: Option<ErrorReport>) {
+    pub(crate) fn set(&mut self, source: Source, error: Option<ErrorReport>) {
         let Some(slot) = self.active.get_mut(source.index()) else { return };
         if *slot == error {
             return;
@@ -169,7 +169,7 @@ impl Emergency {
 
     /// Returns object 1001.
     #[must_use]
-    pub fn register(&self) -> u8 {
+    pub(crate) fn register(&self) -> u8 {
         self.active.iter().flatten().fold(0, |register, error| register | error.register())
     }
 

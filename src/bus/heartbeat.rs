@@ -11,11 +11,11 @@
 use super::abort::Abort;
 
 /// Number of nodes that can be monitored.
-pub const WATCHED: usize = 2;
+pub(crate) const WATCHED: usize = 2;
 
 /// Change of a monitored node's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Change {
+pub(crate) enum Change {
     /// The heartbeat timed out.
     Lost,
     /// The heartbeat is back.
@@ -24,7 +24,7 @@ pub enum Change {
 
 /// Consumer of one other node's heartbeat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Consumer {
+pub(crate) struct Consumer {
     setting: u32,
     /// Deadline; `None` before the first heartbeat and while the node is lost.
     due_us: Option<u64>,
@@ -42,7 +42,7 @@ impl Consumer {
 
     /// Returns object 1016.
     #[must_use]
-    pub const fn setting(self) -> u32 {
+    pub(crate) const fn setting(self) -> u32 {
         self.setting
     }
 
@@ -50,7 +50,7 @@ impl Consumer {
     ///
     /// # Errors
     /// [`Abort::Range`] if the node-ID exceeds 127 or a reserved bit is set.
-    pub fn set(&mut self, setting: u32) -> Result<(), Abort> {
+    pub(crate) fn set(&mut self, setting: u32) -> Result<(), Abort> {
         if setting >> 16 > 127 {
             return Err(Abort::Range);
         }
@@ -59,7 +59,7 @@ impl Consumer {
     }
 
     /// Handles a heartbeat or boot-up message of `node`.
-    pub fn received(&mut self, node: u8, now_us: u64) -> Option<Change> {
+    pub(crate) fn received(&mut self, node: u8, now_us: u64) -> Option<Change> {
         if self.time_us() == 0 || node == 0 || node != self.node() {
             return None;
         }
@@ -68,13 +68,13 @@ impl Consumer {
     }
 
     /// Restarts the timeout after a time in which nothing could be received.
-    pub fn wait(&mut self, now_us: u64) {
+    pub(crate) fn wait(&mut self, now_us: u64) {
         let time_us = self.time_us();
         self.due_us = self.due_us.map(|_| now_us + time_us);
     }
 
     /// Checks the timeout.
-    pub fn poll(&mut self, now_us: u64) -> Option<Change> {
+    pub(crate) fn poll(&mut self, now_us: u64) -> Option<Change> {
         self.due_us.take_if(|due| now_us > *due).map(|_| {
             self.lost = true;
             Change::Lost
@@ -84,16 +84,16 @@ impl Consumer {
 
 /// Periodic timer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Clock {
+pub(crate) struct Clock {
     next_us: Option<u64>,
 }
 
 impl Clock {
     /// Not started.
-    pub const NEW: Self = Self { next_us: None };
+    pub(crate) const NEW: Self = Self { next_us: None };
 
     /// Whether the period has elapsed; never with a period of 0. Missed periods are not made up for.
-    pub fn is_due(&mut self, period_us: u64, now_us: u64) -> bool {
+    pub(crate) fn is_due(&mut self, period_us: u64, now_us: u64) -> bool {
         if period_us == 0 {
             self.next_us = None;
             return false;

@@ -22,8 +22,8 @@ use super::node_id::NodeId;
 use super::stored_parameters::{BIT_RATE, NODE_ID};
 
 /// COB-IDs of requests and answers.
-pub const REQUEST: u16 = 0x7E5;
-pub const ANSWER: u16 = 0x7E4;
+pub(crate) const REQUEST: u16 = 0x7E5;
+pub(crate) const ANSWER: u16 = 0x7E4;
 
 const SET_NODE_ID: u8 = 0x11;
 const SET_BIT_RATE: u8 = 0x13;
@@ -39,7 +39,7 @@ const NOT_NOW: u32 = 255 | 1 << 8;
 
 /// What a request asks of the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Setting {
+pub(crate) enum Setting {
     /// Writes an object; [`Lss::written`] reports the result.
     Write(Object, u32),
     /// Stores the parameters; [`Lss::stored`] reports the result.
@@ -71,7 +71,7 @@ enum Asked {
 
 /// LSS slave of one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Lss {
+pub(crate) struct Lss {
     configures: bool,
     selected: Matched,
     identified: Matched,
@@ -81,7 +81,7 @@ pub struct Lss {
 
 impl Lss {
     /// Handles a request.
-    pub fn request(&mut self, request: [u8; 8], identity: &Identity, node: NodeId) -> Option<Setting> {
+    pub(crate) fn request(&mut self, request: [u8; 8], identity: &Identity, node: NodeId) -> Option<Setting> {
         let [service, one, two, three, four, ..] = request;
         let number = u32::from_le_bytes([one, two, three, four]);
         let Identity { vendor, product, revision, serial, .. } = *identity;
@@ -137,19 +137,19 @@ impl Lss {
     }
 
     /// Answers a [`Setting::Write`].
-    pub fn written(&mut self, is_done: bool) {
+    pub(crate) fn written(&mut self, is_done: bool) {
         if let Some(Asked::Write(service)) = self.asked.take() {
             self.answer(service, if is_done { DONE } else { OUT_OF_RANGE });
         }
     }
 
     /// Answers a [`Setting::Store`] that the node refuses now.
-    pub fn refused(&mut self) {
+    pub(crate) fn refused(&mut self) {
         self.end_store(NOT_NOW);
     }
 
     /// Handles the begin of a store, or of one of the defaults instead.
-    pub fn store_begins(&mut self, of_defaults: bool) {
+    pub(crate) fn store_begins(&mut self, of_defaults: bool) {
         match self.asked {
             Some(Asked::Store) if of_defaults => self.end_store(NOT_STORED),
             Some(Asked::Store) => self.asked = Some(Asked::Storing),
@@ -170,7 +170,7 @@ impl Lss {
     }
 
     /// Takes the answer to be sent.
-    pub fn take_answer(&mut self) -> Option<[u8; 8]> {
+    pub(crate) fn take_answer(&mut self) -> Option<[u8; 8]> {
         self.answer.take()
     }
 

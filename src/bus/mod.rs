@@ -42,14 +42,11 @@ pub mod table;
 pub use crate::hal::{Controller, Frame};
 pub use abort::Abort;
 pub use communication::Identity;
-pub use emergency::ErrorReport;
 pub use nmt::{NmtState, Reset};
 pub use node::{FrameEffect, Node, Storing};
 pub use node_id::NodeId;
 pub use objects::{Lost, Objects};
-pub use stored_parameters::{
-    LONGEST, StoredNode, stored_bit_rate, stored_entries, stored_node_id, stored_objects, write_stored,
-};
+pub use stored_parameters::{LONGEST, StoredNode, stored_entries, stored_objects, write_stored};
 
 #[cfg(test)]
 pub(crate) mod tests;

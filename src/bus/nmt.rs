@@ -9,9 +9,9 @@
 //! Source: CiA 301, network management.
 
 /// COB-ID of NMT commands.
-pub const COMMAND: u16 = 0x000;
+pub(crate) const COMMAND: u16 = 0x000;
 /// Function base of boot-up and heartbeat messages; the node-ID is added.
-pub const HEARTBEAT: u16 = 0x700;
+pub(crate) const HEARTBEAT: u16 = 0x700;
 
 /// NMT state; the number is sent in the heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,14 +30,14 @@ pub enum NmtState {
 impl NmtState {
     /// Whether SDO is served.
     #[must_use]
-    pub const fn serves(self) -> bool {
+    pub(crate) const fn serves(self) -> bool {
         matches!(self, Self::Operational | Self::PreOperational)
     }
 }
 
 /// Command of the NMT master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
+pub(crate) enum Command {
     /// Changes the state.
     Go(NmtState),
     /// Resets the node.

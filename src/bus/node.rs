@@ -201,7 +201,7 @@ impl Node {
     }
 
     /// Handles a change of the CAN controller's state.
-    pub fn on_controller<O: Objects>(&mut self, controller: Controller, objects: &mut O) {
+    pub(crate) fn on_controller<O: Objects>(&mut self, controller: Controller, objects: &mut O) {
         match controller {
             Controller::Active => {}
             Controller::Passive => self.lose(Lost::Bus(false), objects),
@@ -217,7 +217,7 @@ impl Node {
     }
 
     /// Handles a change of the store's state.
-    pub fn on_store(&mut self, storing: Storing) {
+    pub(crate) fn on_store(&mut self, storing: Storing) {
         self.communication.emergency.set(Source::Store, storing.error());
     }
 
@@ -390,7 +390,7 @@ impl Node {
     }
 
     /// Checks all timeouts; [`Node::poll`] does so too.
-    pub fn check_timeouts<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
+    pub(crate) fn check_timeouts<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
         for index in 0..self.communication.consumers.len() {
             let consumer = self.communication.consumers.get_mut(index);
             let change = consumer.and_then(|consumer| consumer.poll(now_us));
@@ -416,7 +416,7 @@ impl Node {
 
     /// Restarts all timeouts after the board could not receive, as while it writes its flash. The hosts are
     /// not at fault for that time.
-    pub fn stood_still(&mut self, now_us: u64) {
+    pub(crate) fn stood_still(&mut self, now_us: u64) {
         self.communication.consumers.iter_mut().for_each(|consumer| consumer.wait(now_us));
         self.communication.receive.iter_mut().for_each(|pdo| pdo.wait(now_us));
         self.communication.silence.wait(now_us);

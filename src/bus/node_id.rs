@@ -19,7 +19,7 @@ impl NodeId {
 
     /// Returns a COB-ID of the predefined connection set: function base plus node-ID.
     #[must_use]
-    pub const fn on(self, base: u16) -> u16 {
+    pub(crate) const fn on(self, base: u16) -> u16 {
         base + self.0 as u16
     }
 }

@@ -47,7 +47,7 @@ listed! {
 impl ProgramCommand {
     /// Command with this number.
     #[must_use]
-    pub fn from_number(number: u32) -> Option<Self> {
+    pub(crate) fn from_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|command| *command as u32 == number)
     }
 }
@@ -101,7 +101,7 @@ impl ProgramStatus {
 
     /// Sets bits if `is_set`.
     #[must_use]
-    pub const fn with(self, bits: u32, is_set: bool) -> Self {
+    pub(crate) const fn with(self, bits: u32, is_set: bool) -> Self {
         Self(self.0 | if is_set { bits } else { 0 })
     }
 
@@ -114,7 +114,7 @@ impl ProgramStatus {
 
 /// Objects 1F50 to 1F57 of a board.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ProgramObjects {
+pub(crate) struct ProgramObjects {
     status: ProgramStatus,
     /// Check sum of the running image.
     checksum: u32,
@@ -130,7 +130,7 @@ impl ProgramObjects {
     }
 
     /// Takes over the status; returns whether it has changed.
-    pub fn update(&mut self, status: ProgramStatus) -> bool {
+    pub(crate) fn update(&mut self, status: ProgramStatus) -> bool {
         let changed = self.status != status;
         self.status = status;
         if !status.has(ProgramStatus::STOPPED) {
@@ -141,12 +141,12 @@ impl ProgramObjects {
     }
 
     /// Takes the command that a host wrote.
-    pub fn take_command(&mut self) -> Option<ProgramCommand> {
+    pub(crate) fn take_command(&mut self) -> Option<ProgramCommand> {
         self.asked.take()
     }
 
     /// Takes the next byte of the image.
-    pub fn take_byte(&mut self) -> Option<u8> {
+    pub(crate) fn take_byte(&mut self) -> Option<u8> {
         self.bytes.pop_front()
     }
 

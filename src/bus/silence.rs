@@ -41,7 +41,7 @@ const SLOWEST_PERIODS: u64 = 2;
 
 /// Kind of frame that a host may send cyclically.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// SYNC.
     Sync,
     /// Controlword, written by SDO.
@@ -99,7 +99,7 @@ impl Cycle {
 
 /// Cycles of all kinds received by one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Silence {
+pub(crate) struct Silence {
     cycles: [Cycle; KINDS],
     /// Instant after which the host is silent; `None` without an armed kind.
     silent_us: Option<u64>,
@@ -107,7 +107,7 @@ pub struct Silence {
 
 impl Silence {
     /// Handles a frame of a kind.
-    pub fn received(&mut self, kind: Kind, now_us: u64) {
+    pub(crate) fn received(&mut self, kind: Kind, now_us: u64) {
         let Some(cycle) = self.cycles.get_mut(kind.index()) else { return };
         cycle.received(now_us);
         if cycle.is_armed() {
@@ -119,7 +119,7 @@ impl Silence {
     }
 
     /// Whether the host has just fallen silent; reported once, until it is cyclic again.
-    pub fn begins(&mut self, now_us: u64) -> bool {
+    pub(crate) fn begins(&mut self, now_us: u64) -> bool {
         let begins = self.silent_us.is_some_and(|silent_us| now_us > silent_us);
         if begins {
             *self = Self::default();
@@ -140,7 +140,7 @@ impl Silence {
     }
 
     /// Restarts the timeout after a time in which nothing could be received.
-    pub fn wait(&mut self, now_us: u64) {
+    pub(crate) fn wait(&mut self, now_us: u64) {
         self.cycles.iter_mut().for_each(|cycle| cycle.last_us = cycle.last_us.max(now_us));
         self.plan();
     }

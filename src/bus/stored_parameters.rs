@@ -34,7 +34,7 @@ impl StoredNode {
 
     /// Copies `bytes`; those beyond [`LONGEST`] are discarded.
     #[must_use]
-    pub fn from_bytes(bytes: &[u8]) -> Self {
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
         let mut stored = Self::NOTHING;
         for (to, from) in stored.bytes.iter_mut().zip(bytes) {
             *to = *from;
@@ -97,13 +97,13 @@ fn number(bytes: &[u8], object: Object) -> Option<u32> {
 
 /// Returns the stored node-ID (2001), if there is one.
 #[must_use]
-pub fn stored_node_id(bytes: &[u8]) -> Option<NodeId> {
+pub(crate) fn stored_node_id(bytes: &[u8]) -> Option<NodeId> {
     number(bytes, NODE_ID).and_then(|number| NodeId::new(number as u8))
 }
 
 /// Returns the stored bit rate (2002) in kbit/s, if there is one.
 #[must_use]
-pub fn stored_bit_rate(bytes: &[u8]) -> Option<u16> {
+pub(crate) fn stored_bit_rate(bytes: &[u8]) -> Option<u16> {
     number(bytes, BIT_RATE).map(|rate| rate as u16)
 }
 
@@ -146,7 +146,7 @@ impl Node {
     ///
     /// # Errors
     /// [`Abort::Store`] if they do not fit into `out`.
-    pub fn store<O: Objects>(&mut self, objects: &mut O, out: &mut [u8]) -> Result<usize, Abort> {
+    pub(crate) fn store<O: Objects>(&mut self, objects: &mut O, out: &mut [u8]) -> Result<usize, Abort> {
         let node = self.id();
         let dictionary = Dictionary { communication: self.communication_mut(), objects };
         let mut length = 0;
@@ -166,14 +166,18 @@ impl Node {
     ///
     /// # Errors
     /// See [`Self::store`].
-    pub fn store_into<O: Objects>(&mut self, objects: &mut O, stored: &mut StoredNode) -> Result<(), Abort> {
+    pub(crate) fn store_into<O: Objects>(
+        &mut self,
+        objects: &mut O,
+        stored: &mut StoredNode,
+    ) -> Result<(), Abort> {
         stored.length = 0;
         stored.length = self.store(objects, &mut stored.bytes)?;
         Ok(())
     }
 
     /// Restores the objects after the start, or those that `reset` covers.
-    pub fn recall<O: Objects>(&mut self, bytes: &[u8], reset: Reset, objects: &mut O) {
+    pub(crate) fn recall<O: Objects>(&mut self, bytes: &[u8], reset: Reset, objects: &mut O) {
         let node = self.id();
         let mut dictionary = Dictionary { communication: self.communication_mut(), objects };
         let mut write = |object: Object, value: u32| {

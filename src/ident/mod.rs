@@ -13,8 +13,8 @@
 //!
 //! All code is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
 
-pub mod judge;
-pub mod monitor;
+pub(crate) mod judge;
+pub(crate) mod monitor;
 pub mod record;
 pub mod signal;
 pub mod solve;
@@ -24,8 +24,8 @@ pub use judge::held_out::HeldOut;
 pub use judge::residual::{JointResidual, Residual};
 pub use judge::verdict::{Evidence, Reason, Test, Thresholds, Unused, Verdict, VerdictBuilder};
 pub use monitor::baseline::Baseline;
-pub use monitor::detection::{Change, Monitor, MonitorSettings, ROWS_PER_BLOCK};
-pub use monitor::update::hypothesis::{DIRECTIONS, Hypothesis};
+pub use monitor::detection::{Change, Monitor, MonitorSettings};
+pub use monitor::update::hypothesis::Hypothesis;
 pub use monitor::update::{Cause, PAYLOAD_PARAMETERS, Update};
 pub use record::choice::{Choice, Constant, DriveChoice, Estimator};
 pub use record::factor::Factor;
@@ -39,11 +39,11 @@ pub use record::stretch::Stretches;
 pub use record::stribeck::StribeckFit;
 pub use signal::kernel::{Kernel, KernelError, LowPass};
 pub use signal::smoothing::{Smoothed, Smoother};
-pub use solve::bounds::{LinkPrior, parameter_box, prior_parameters, search_box};
-pub use solve::completion::{Status, complete, status};
+pub use solve::bounds::{LinkPrior, parameter_box, prior_parameters};
+pub use solve::completion::{Status, status};
 pub use solve::consistent::{Completion, Effort, FullObjective, FullSearch, LegCost, Limits};
 pub use solve::constrained::{ParameterBox, least_squares_in_box};
 pub use solve::estimate::{Estimate, Plan, Problem, Stage, noise};
-pub use solve::scale::{ConstantRatio, torque_constant_ratio, widen};
+pub use solve::scale::{ConstantRatio, torque_constant_ratio};
 pub use solve::search::{SearchState, SwarmSearch};
-pub use solve::solver::{Consistency, Solver};
+pub use solve::solver::Solver;

@@ -24,14 +24,14 @@ impl Activity {
     /// Whether the leg follows the commands of a host.
     #[must_use]
     #[inline]
-    pub const fn follows_host(self) -> bool {
+    pub(crate) const fn follows_host(self) -> bool {
         matches!(self, Self::Follow)
     }
 
     /// Whether the leg identifies itself.
     #[must_use]
     #[inline]
-    pub const fn is_identifying(self) -> bool {
+    pub(crate) const fn is_identifying(self) -> bool {
         matches!(self, Self::Identify(_))
     }
 
@@ -99,7 +99,7 @@ pub enum Segment {
 impl Activity {
     /// Use of the samples taken now.
     #[must_use]
-    pub const fn segment(self) -> Option<Segment> {
+    pub(crate) const fn segment(self) -> Option<Segment> {
         match self {
             Self::Identify(IdentifyPhase::Excite) => Some(Segment::Training),
             Self::Identify(IdentifyPhase::Validate { motion, step: Step::Run }) => {

@@ -3,8 +3,9 @@
 mod assist;
 mod host;
 
-pub use assist::{AssistNote, AssistRefusal, Wearing};
-pub use host::Host;
+pub(crate) use assist::AssistNote;
+pub use assist::{AssistRefusal, Wearing};
+pub(crate) use host::Host;
 
 use assist::Assistance;
 
@@ -54,7 +55,7 @@ pub enum ControlRequest {
 impl ControlRequest {
     /// Returns whether the request commands a motion.
     #[must_use]
-    pub const fn moves(&self) -> bool {
+    pub(crate) const fn moves(&self) -> bool {
         matches!(self, Self::Identify | Self::Track { .. } | Self::Assist(_))
     }
 }
@@ -140,7 +141,7 @@ impl<const N: usize> Control<N> {
     }
 
     /// Runs instead of a tick while the joints have no valid readings ([`Servo::stand_by`]).
-    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
+    pub(crate) fn stand_by(&mut self, resets: bool) -> Option<Fault> {
         self.servo.stand_by(resets)
     }
 
@@ -171,35 +172,35 @@ impl<const N: usize> Control<N> {
 
     /// Checksum over gains, scales and limits; only [`Self::set_bandwidths`] changes it.
     #[must_use]
-    pub fn checksum(&self) -> Checksum {
+    pub(crate) fn checksum(&self) -> Checksum {
         self.servo.checksum()
     }
 
     /// Flips a bit of the servo's constants ([`Servo::flip_bit`]). Host only.
     #[cfg(not(target_os = "none"))]
-    pub fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
+    pub(crate) fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
         self.servo.flip_bit(joint, number, bit);
     }
 
     /// Reports a fault detected by the board, for the next tick.
-    pub fn report(&mut self, fault: Fault) {
+    pub(crate) fn report(&mut self, fault: Fault) {
         self.servo.monitor.report(fault);
     }
 
     /// Sets which joints may be enabled outside their range, to return into it.
-    pub fn permit_return(&mut self, joints: [bool; N]) {
+    pub(crate) fn permit_return(&mut self, joints: [bool; N]) {
         self.servo.monitor.permit_return(joints);
     }
 
     /// Sets the bandwidth of each position loop ([`Servo::set_bandwidths`]).
     #[cold]
     #[inline(never)]
-    pub fn set_bandwidths(&mut self, bandwidths: &[Option<Hertz>; N]) {
+    pub(crate) fn set_bandwidths(&mut self, bandwidths: &[Option<Hertz>; N]) {
         self.servo.set_bandwidths(bandwidths);
     }
 
     /// Sets the derating of each joint's torque cap by temperatures and bus voltage, from the next tick on.
-    pub fn derate(&mut self, derating: &Derating<N>) {
+    pub(crate) fn derate(&mut self, derating: &Derating<N>) {
         self.servo.monitor.derate(derating);
     }
 
@@ -211,7 +212,7 @@ impl<const N: usize> Control<N> {
 
     /// Torque by a joint's measured current, with the model's sign.
     #[must_use]
-    pub fn torque(&self, joint: usize, sample: &Sample<N>) -> Option<NewtonMetre> {
+    pub(crate) fn torque(&self, joint: usize, sample: &Sample<N>) -> Option<NewtonMetre> {
         Some(self.servo.scales().get(joint)?.torque(sample.joints.get(joint)?.current))
     }
 
@@ -231,12 +232,6 @@ impl<const N: usize> Control<N> {
     #[must_use]
     pub fn change(&self) -> Option<&Change<f32, N>> {
         self.change.as_ref()
-    }
-
-    /// Cause found for the alarm; [`Cause::Unexplained`] requires a full identification.
-    #[must_use]
-    pub fn cause(&self) -> Option<Cause> {
-        self.cause
     }
 
     /// Whether an update is offered.
@@ -426,7 +421,7 @@ impl<const N: usize> Control<N> {
     /// Processes a finding of the identification half. Returns whether a result was taken; the result of a
     /// cancelled identification is dropped.
     #[must_use]
-    pub fn receive(&mut self, finding: Finding<N>) -> bool {
+    pub(crate) fn receive(&mut self, finding: Finding<N>) -> bool {
         match finding {
             Finding::Solved => {
                 if let (Activity::Identify(IdentifyPhase::Settle | IdentifyPhase::Solve), Some(first)) =
@@ -486,7 +481,7 @@ impl<const N: usize> Control<N> {
     /// Replaces the model by a restored one, from the next tick on. Refused (`false`) during an activity or
     /// while a model is in the feedforward, because the torque would step.
     #[must_use]
-    pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
+    pub(crate) fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
         self.activity == Activity::Idle && self.models.adopt(model)
     }
 

@@ -103,14 +103,14 @@ where
     ///
     /// # Errors
     /// See [`Identification::new`].
-    pub fn with_window(configuration: &LegConfiguration<N, B>, window: W) -> Result<Self, LegError> {
+    pub(crate) fn with_window(configuration: &LegConfiguration<N, B>, window: W) -> Result<Self, LegError> {
         let filters = Filters::new(configuration.bandwidth_hz).map_err(LegError::Kernel)?;
         Ok(made(|slot| Self::new_in(slot, configuration, &filters, window)))
     }
 
     /// Creates an identification in place, because it is larger than the device's stack. The filters must
     /// fit.
-    pub fn new_in<'a>(
+    pub(crate) fn new_in<'a>(
         slot: &'a mut MaybeUninit<Self>,
         configuration: &LegConfiguration<N, B>,
         filters: &Filters<f32, N, B, TAPS, PENDING>,
@@ -292,12 +292,12 @@ where
     }
 
     /// Discards the monitored model, because another one is in use.
-    pub fn forget_model(&mut self) {
+    pub(crate) fn forget_model(&mut self) {
         self.model_monitor.forget();
     }
 
     /// Uses the offered update as the monitored model.
-    pub fn take_update(&mut self) {
+    pub(crate) fn take_update(&mut self) {
         self.model_monitor.take();
     }
 
@@ -314,7 +314,7 @@ where
     ///
     /// This is separate from the verdict, because the operator may cancel the identification while it is
     /// judged. The model in use then remains the one that is monitored and stored.
-    pub fn took_result(&mut self) -> Option<IdentifiedModel<N>> {
+    pub(crate) fn took_result(&mut self) -> Option<IdentifiedModel<N>> {
         let solver = self.solver.as_ref().filter(|_| self.verdict.is_some_and(Verdict::is_accepted))?;
         let estimate = solver.estimate();
         let model = IdentifiedModel::from_estimate(&self.model, &estimate);
@@ -337,14 +337,8 @@ where
 
     /// Estimates errors of link lengths and joint zeros from the validation motions.
     #[must_use]
-    pub fn misalignments(&self) -> Misalignments<f32> {
+    pub(crate) fn misalignments(&self) -> Misalignments<f32> {
         self.held_out.alignment().misalignments()
-    }
-
-    /// Residuals of the validation motions, in order of time.
-    #[must_use]
-    pub fn residuals(&self) -> &[Residual<f32, N>; VALIDATION_MOTIONS] {
-        &self.residuals
     }
 
     /// Replaces the identified base values once the search is done, so that the following motions validate
@@ -358,7 +352,7 @@ where
     /// Cancels an identification, also before another one starts: a verdict that control no longer expects
     /// must not change the monitored model. Earlier results stay, and a tracked motion continues to be
     /// recorded.
-    pub fn cancel(&mut self) {
+    pub(crate) fn cancel(&mut self) {
         self.report_due = false;
         if self.work != Work::Recording(Segment::Tracking) {
             self.work = Work::Idle;
@@ -367,7 +361,7 @@ where
 
     /// Whether a search is running and was not cancelled.
     #[must_use]
-    pub fn is_searching(&self) -> bool {
+    pub(crate) fn is_searching(&self) -> bool {
         self.work == Work::Solving
     }
 
@@ -397,7 +391,7 @@ where
 
     /// Whether there is prior knowledge.
     #[must_use]
-    pub fn has_prior(&self) -> bool {
+    pub(crate) fn has_prior(&self) -> bool {
         self.prior.is_some()
     }
 

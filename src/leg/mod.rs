@@ -37,27 +37,30 @@ pub(crate) mod testing;
 
 pub use activity::{Activity, AssistPhase, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 pub use configuration::{LegConfiguration, LegError, ProvedMotion};
-pub use control::{
-    AssistNote, AssistRefusal, Control, ControlOutput, ControlRequest, Host, LoggedSample, Wearing,
-};
+pub(crate) use control::{AssistNote, Host};
+pub use control::{AssistRefusal, Control, ControlOutput, ControlRequest, LoggedSample, Wearing};
 pub use description::{
     DescriptionError, JointDescription, LegDescription, LinkDescription, MotorDescription,
 };
-pub use follow::{
-    Following, ImpedanceTarget, JointCommand, JointStatus, LONGEST_PERIOD, Mode, Reference, SetPoint, Target,
-};
+pub(crate) use follow::LONGEST_PERIOD;
+pub use follow::{Following, ImpedanceTarget, JointCommand, JointStatus, Mode, Reference, SetPoint, Target};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
 pub use model_monitor::{ModelMonitor, UPDATE_ROWS};
-pub use permitted::{axis_code, may_reset, permitted};
+pub use permitted::axis_code;
+pub(crate) use permitted::{may_reset, permitted};
 pub use results::{FoundBase, FoundFit, FoundParameter};
 pub use stored::{RestoreError, StoredModel};
 
 // Interface of the leg: other modules that report or store these values import them from here only.
-pub use crate::assist::{AssistEnd, AssistLaw, AssistSession, AssistShares, AssistTorque, Assured};
+pub use crate::assist::{AssistEnd, AssistLaw, AssistShares, Assured};
+pub(crate) use crate::assist::{AssistSession, AssistTorque};
+pub use crate::ident::Cause;
+#[cfg(test)]
+pub(crate) use crate::ident::Change;
 pub use crate::ident::{
-    Cause, Change, Constant, Estimate, Evidence, Filters, MotionWindow, Plan, Reason, SearchState, Status,
-    StribeckFit, Test, Verdict,
+    Constant, Estimate, Evidence, Filters, MotionWindow, Plan, Reason, SearchState, Status, StribeckFit,
+    Test, Verdict,
 };
 pub use crate::model::friction::Stribeck;
 pub use crate::model::planar::{BASE, JOINTS};
@@ -68,13 +71,13 @@ pub use crate::motor::{
     StoredCalibration,
 };
 pub use crate::safety::{
-    DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,
-    NoticeCode, Permission, PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
+    DeratingRamps, DriveState, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR, NoticeCode, Permission,
+    PowerRequest, Refusal, RefusalReason,
 };
+pub(crate) use crate::safety::{Event as DriveEvent, RETURN_SPEED};
 pub use crate::servo::{JointConfiguration, LogSample};
 
 use crate::hal::Sample;
-use crate::safety::Derating;
 
 /// Both halves of a leg in one value.
 #[derive(Clone, Debug, PartialEq)]
@@ -157,7 +160,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         &self.law
     }
 
-    /// Sets whether the leg of the next identifications is empty or worn, see [`Control::set_wearing`].
+    /// Sets whether the leg of the next identifications is empty or worn, see `Control::set_wearing`.
     pub fn set_wearing(&mut self, wearing: Option<Wearing>) {
         self.control.set_wearing(wearing);
     }
@@ -176,11 +179,6 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     /// Sets the commands of a host, from the next tick on.
     pub fn command(&mut self, commands: &[JointCommand; N]) {
         self.commands = Some(*commands);
-    }
-
-    /// Ends host commands, from the next tick on.
-    pub fn let_go(&mut self) {
-        self.commands = None;
     }
 
     /// Status of a joint for a host, after the tick that returned `output`.
@@ -206,7 +204,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.identification.examine(values);
     }
 
-    /// Uses a stored model, see [`Control::adopt`]. Its uncertainty is unknown, so the monitor does not watch
+    /// Uses a stored model, see `Control::adopt`. Its uncertainty is unknown, so the monitor does not watch
     /// it.
     #[must_use]
     pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
@@ -223,17 +221,12 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.control.set_tracked(motion)
     }
 
-    /// Reports a fault detected by the board, see [`Control::report`].
+    /// Reports a fault detected by the board, see `Control::report`.
     pub fn report(&mut self, fault: Fault) {
         self.control.report(fault);
     }
 
-    /// Sets the derating of each joint's torque cap, see [`Control::derate`].
-    pub fn derate(&mut self, derating: &Derating<N>) {
-        self.control.derate(derating);
-    }
-
-    /// Flips a bit of the servo's state, see [`crate::servo::Servo::flip_bit`]. Host only.
+    /// Flips a bit of the servo's state, see `Servo::flip_bit`. Host only.
     #[cfg(not(target_os = "none"))]
     pub fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
         self.control.flip_bit(joint, number, bit);

@@ -96,7 +96,7 @@ impl<const N: usize> IdentifiedModel<N> {
 
     /// Stribeck friction of each joint: a factor on its Coulomb friction.
     #[must_use]
-    pub fn stribeck(&self) -> &[Stribeck<f32>; N] {
+    pub(crate) fn stribeck(&self) -> &[Stribeck<f32>; N] {
         &self.stribeck
     }
 
@@ -110,7 +110,7 @@ impl<const N: usize> IdentifiedModel<N> {
     /// linear in the parameters. Both must be models of one leg with equal curves and constants, like a model
     /// and its update.
     #[must_use]
-    pub fn towards(&self, other: &Self, share: f32) -> Self {
+    pub(crate) fn towards(&self, other: &Self, share: f32) -> Self {
         let mut mixed = *self;
         for (from, to) in mixed.parameters.iter_mut().flatten().zip(other.parameters.iter().flatten()) {
             *from += share * (*to - *from);

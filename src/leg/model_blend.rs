@@ -29,7 +29,7 @@ enum Next<const N: usize> {
 
 /// The model of a leg and its share of the feedforward.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ModelBlend<const N: usize> {
+pub(crate) struct ModelBlend<const N: usize> {
     model: Option<IdentifiedModel<N>>,
     next: Next<N>,
     wanted: bool,
@@ -38,7 +38,7 @@ pub struct ModelBlend<const N: usize> {
 }
 
 /// A model scaled by its share.
-pub struct Faded<'a, const N: usize> {
+pub(crate) struct Faded<'a, const N: usize> {
     model: &'a IdentifiedModel<N>,
     share: f32,
 }
@@ -58,7 +58,7 @@ impl<const N: usize> ModelBlend<N> {
     }
 
     /// Sets whether the model is used as feedforward from now on.
-    pub fn want(&mut self, wanted: bool) {
+    pub(crate) fn want(&mut self, wanted: bool) {
         self.wanted = wanted;
     }
 
@@ -79,14 +79,14 @@ impl<const N: usize> ModelBlend<N> {
 
     /// Returns the feedforward of this tick.
     #[must_use]
-    pub fn faded<'a>(&'a self, mixed: Option<&'a IdentifiedModel<N>>) -> Option<Faded<'a, N>> {
+    pub(crate) fn faded<'a>(&'a self, mixed: Option<&'a IdentifiedModel<N>>) -> Option<Faded<'a, N>> {
         let model = mixed.or(self.model.as_ref())?;
         (self.share > 0.0).then_some(Faded { model, share: self.share })
     }
 
     /// Whether the model's share has not reached its target yet.
     #[must_use]
-    pub fn is_fading(&self) -> bool {
+    pub(crate) fn is_fading(&self) -> bool {
         self.model.is_some() && self.share != if self.wanted { 1.0 } else { 0.0 }
     }
 
@@ -96,14 +96,14 @@ impl<const N: usize> ModelBlend<N> {
     }
 
     /// Resets the share when the drive gives no torque; the model fades in again afterwards.
-    pub fn interrupt(&mut self) {
+    pub(crate) fn interrupt(&mut self) {
         self.share = 0.0;
     }
 
     /// Replaces the model. Refused (`false`) while the present one is in the feedforward, because the torque
     /// would step.
     #[must_use]
-    pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
+    pub(crate) fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
         let free = self.model.is_none() || !(self.share > 0.0);
         if free {
             self.accept(model);
@@ -113,25 +113,25 @@ impl<const N: usize> ModelBlend<N> {
     }
 
     /// Offers an update.
-    pub fn offer(&mut self, update: IdentifiedModel<N>) {
+    pub(crate) fn offer(&mut self, update: IdentifiedModel<N>) {
         self.next = Next::Offered(update);
     }
 
     /// Whether an update is offered.
     #[must_use]
-    pub fn is_offered(&self) -> bool {
+    pub(crate) fn is_offered(&self) -> bool {
         matches!(self.next, Next::Offered(_))
     }
 
     /// Withdraws the offer. An update that already fades in continues.
-    pub fn withdraw(&mut self) {
+    pub(crate) fn withdraw(&mut self) {
         if self.is_offered() {
             self.next = Next::Nothing;
         }
     }
 
     /// Uses the offered update; the previous model fades out.
-    pub fn take(&mut self) {
+    pub(crate) fn take(&mut self) {
         if let (Next::Offered(update), Some(from)) = (self.next, self.model) {
             self.model = Some(update);
             self.next = Next::Fading { from, share: 0.0 };

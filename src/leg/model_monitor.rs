@@ -68,14 +68,14 @@ impl<const N: usize, const B: usize> ModelMonitor<N, B> {
     }
 
     /// Starts a motion; the findings of earlier ones are discarded.
-    pub fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.monitor.clear();
         self.phase = Phase::Watching;
         (self.change, self.update) = (None, None);
     }
 
     /// Processes the rows of one instant. After an alarm the caller must restart the record.
-    pub fn watch(&mut self, rows: &FilteredRows<f32, N, B>) -> Option<Change<f32, N>> {
+    pub(crate) fn watch(&mut self, rows: &FilteredRows<f32, N, B>) -> Option<Change<f32, N>> {
         if self.phase != Phase::Watching {
             return None;
         }
@@ -87,7 +87,7 @@ impl<const N: usize, const B: usize> ModelMonitor<N, B> {
     }
 
     /// Whether each joint has enough rows, recorded since the alarm, for the update.
-    pub fn is_ready(&mut self, rows: &[u32; N]) -> bool {
+    pub(crate) fn is_ready(&mut self, rows: &[u32; N]) -> bool {
         if matches!(self.phase, Phase::Collecting | Phase::Offered)
             && rows.iter().all(|&rows| rows >= UPDATE_ROWS)
         {
@@ -120,7 +120,7 @@ impl<const N: usize, const B: usize> ModelMonitor<N, B> {
     }
 
     /// Uses the update; from now on it is the monitored model.
-    pub fn take(&mut self) {
+    pub(crate) fn take(&mut self) {
         let updated = match (&self.update, &self.baseline) {
             (Some(update), Some(before)) => update.baseline(before),
             _ => None,

@@ -6,7 +6,7 @@ use crate::safety::{DriveState, FaultCode, InhibitReason, PowerRequest};
 
 /// Whether a fault may be reset: no inhibit reason is active but a flash write, which is no fault.
 #[must_use]
-pub const fn may_reset(causes: u32) -> bool {
+pub(crate) const fn may_reset(causes: u32) -> bool {
     causes & !InhibitReason::Storing.bit() == 0
 }
 
@@ -15,7 +15,7 @@ pub const fn may_reset(causes: u32) -> bool {
 ///
 /// With an inhibit reason, a drive that is not off is switched off even without a request.
 #[must_use]
-pub fn permitted(
+pub(crate) fn permitted(
     request: Option<&ControlRequest>,
     causes: u32,
     state: DriveState,

@@ -14,49 +14,49 @@ use crate::model::{Parameter, Standing};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundParameter {
     /// Value in SI units; `None` if neither torque nor a prior determines it.
-    pub value: Option<f32>,
+    pub(crate) value: Option<f32>,
     /// Standard deviation; `None` unless the parameter was measured alone.
-    pub sigma: Option<f32>,
+    pub(crate) sigma: Option<f32>,
     /// Origin of the value.
-    pub status: Status,
+    pub(crate) status: Status,
 }
 
 /// Result for one base parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundBase {
     /// Joint (from 0) and parameter of its column.
-    pub carrier: (usize, Parameter),
+    pub(crate) carrier: (usize, Parameter),
     /// Whether other parameters are regrouped into it.
-    pub grouped: bool,
+    pub(crate) grouped: bool,
     /// Whether it was held at zero because the data do not determine it.
-    pub dropped: bool,
+    pub(crate) dropped: bool,
     /// Identified value; `None` if the data do not determine it.
-    pub value: Option<f32>,
+    pub(crate) value: Option<f32>,
     /// Standard deviation.
-    pub sigma: Option<f32>,
+    pub(crate) sigma: Option<f32>,
     /// Value of the closed-form least squares.
-    pub least_squares: f32,
+    pub(crate) least_squares: f32,
 }
 
 /// Quality of fit of one joint's torque for one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundFit {
     /// Filtered rows in which the joint moved.
-    pub rows: u32,
+    pub(crate) rows: u32,
     /// Root mean square of measured minus predicted torque, N m.
-    pub rms_nm: Option<f32>,
+    pub(crate) rms_nm: Option<f32>,
     /// Mean absolute torque, N m.
-    pub mean_absolute_nm: f32,
+    pub(crate) mean_absolute_nm: f32,
     /// Root mean square torque, N m.
-    pub torque_rms_nm: f32,
+    pub(crate) torque_rms_nm: f32,
     /// Root mean square speed, rad/s.
-    pub speed_rms: f32,
+    pub(crate) speed_rms: f32,
     /// Share of the rows that lost more than half of their weight.
-    pub disturbed_share: f32,
+    pub(crate) disturbed_share: f32,
     /// Longest stretch of such rows, s.
-    pub disturbed_longest_s: f32,
+    pub(crate) disturbed_longest_s: f32,
     /// Number of outliers that were replaced.
-    pub replaced: u32,
+    pub(crate) replaced: u32,
 }
 
 impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
@@ -66,13 +66,13 @@ where
 {
     /// Base parameters to be judged; `None` before there is a solver.
     #[must_use]
-    pub fn estimate(&self) -> Option<Estimate<f32, B>> {
+    pub(crate) fn estimate(&self) -> Option<Estimate<f32, B>> {
         Some(self.solver()?.estimate())
     }
 
     /// Result for one parameter of a joint (from 0), given [`Self::estimate`].
     #[must_use]
-    pub fn parameter(
+    pub(crate) fn parameter(
         &self,
         estimate: &Estimate<f32, B>,
         joint: usize,
@@ -104,7 +104,7 @@ where
 
     /// Result for one base parameter, given [`Self::estimate`]; `None` beyond the last.
     #[must_use]
-    pub fn base_parameter(&self, estimate: &Estimate<f32, B>, base: usize) -> Option<FoundBase> {
+    pub(crate) fn base_parameter(&self, estimate: &Estimate<f32, B>, base: usize) -> Option<FoundBase> {
         let solver = self.solver()?;
         let model = self.model();
         let carrier = model.base.independent(base)?;
@@ -123,7 +123,7 @@ where
     /// Fit of one joint (from 0) for one motion, given [`Self::estimate`]. Motion 0 is the training motion,
     /// the others are the validation motions. `None` if the motion was not recorded.
     #[must_use]
-    pub fn fit(&self, estimate: &Estimate<f32, B>, motion: usize, joint: usize) -> Option<FoundFit> {
+    pub(crate) fn fit(&self, estimate: &Estimate<f32, B>, motion: usize, joint: usize) -> Option<FoundFit> {
         let record = self.motion(motion)?;
         let size = record.torque.get(joint)?;
         Some(FoundFit {
@@ -140,7 +140,7 @@ where
 
     /// Record of a motion, counted as in [`Self::fit`].
     #[must_use]
-    pub fn motion(&self, motion: usize) -> Option<&Record<f32, N, B>> {
+    pub(crate) fn motion(&self, motion: usize) -> Option<&Record<f32, N, B>> {
         match motion.checked_sub(1) {
             None => Some(self.solver()?.record()),
             Some(unused) => self.validation().get(unused)?.as_ref(),

@@ -29,7 +29,7 @@ pub struct StoredModel<const N: usize> {
     pub fingerprint: Fingerprint,
     /// See [`IdentifiedModel::equivalent_parameters`].
     pub parameters: LegParameters<f32, N>,
-    /// See [`IdentifiedModel::stribeck`].
+    /// See `IdentifiedModel::stribeck`.
     pub stribeck: [Stribeck<f32>; N],
     /// See [`IdentifiedModel::constant`].
     pub constant: [Constant; N],

@@ -6,11 +6,11 @@ pub(crate) use super::BASE;
 
 include!("../../host/legs/x2-wearer-75kg.rs");
 
-pub(crate) fn configuration() -> LegConfiguration<2, BASE> {
+pub fn configuration() -> LegConfiguration<2, BASE> {
     LEG.configuration().expect("a leg that is shipped")
 }
 
 /// A model of the leg with zero torque.
-pub(crate) fn model() -> IdentifiedModel<2> {
+pub fn model() -> IdentifiedModel<2> {
     IdentifiedModel::new(&configuration().model, &[0.0; BASE])
 }

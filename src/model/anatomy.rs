@@ -29,15 +29,8 @@ pub enum AnatomyError {
 /// Conversion between one joint's anatomical angle and the chain's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnatomicalJoint<T> {
-    direction: T,
-    zero_offset: T,
-}
-
-impl AnatomicalJoint<f32> {
-    /// Identity: both angles are equal.
-    pub const SAME: Self = Self { direction: 1.0, zero_offset: 0.0 };
-    /// Reversal: the chain's angle falls as the anatomical one grows.
-    pub const OPPOSITE: Self = Self { direction: -1.0, zero_offset: 0.0 };
+    pub(crate) direction: T,
+    pub(crate) zero_offset: T,
 }
 
 impl<T: Real> AnatomicalJoint<T> {

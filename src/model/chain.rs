@@ -103,7 +103,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
 
     /// Distance between the axis points of the previous joint and of `joint`, m; `None` beyond the last.
     #[must_use]
-    pub fn distance_to(&self, joint: usize) -> Option<T> {
+    pub(crate) fn distance_to(&self, joint: usize) -> Option<T> {
         self.placements
             .get(joint)
             .map(|placement| sqrt(placement.a * placement.a + placement.d * placement.d))
@@ -111,13 +111,13 @@ impl<T: Real, const N: usize> Chain<T, N> {
 
     /// True if the common normal before `joint` has a nonzero length.
     #[must_use]
-    pub fn has_length(&self, joint: usize) -> bool {
+    pub(crate) fn has_length(&self, joint: usize) -> bool {
         self.placements.get(joint).is_some_and(|placement| placement.a != T::zero())
     }
 
     /// Returns the chain with the length before `joint` multiplied by `factor`.
     #[must_use]
-    pub fn with_length(&self, joint: usize, factor: T) -> Self {
+    pub(crate) fn with_length(&self, joint: usize, factor: T) -> Self {
         let mut changed = *self;
         if let Some(placement) = changed.placements.get_mut(joint) {
             placement.a *= factor;

@@ -15,7 +15,7 @@
 //! | h | first moment of mass: HX, HY, HZ | kg m |
 //!
 //! Source: Steiner's theorem. The paper's Eq. (4) swaps the two inertias' names and the two products of c.
-//! Limits: no test here whether such a body can exist; [`super::log_cholesky`] has it.
+//! Limits: no test here whether such a body can exist; `log_cholesky` has it.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -26,7 +26,7 @@ use crate::real::{Real, is_finite};
 pub const INERTIAL_PARAMETERS: usize = 10;
 
 /// XX XY XZ YY YZ ZZ HX HY HZ M about the joint frame's origin.
-pub type InertialParameters<T> = [T; INERTIAL_PARAMETERS];
+pub(crate) type InertialParameters<T> = [T; INERTIAL_PARAMETERS];
 
 /// Rigid body in the terms of a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -45,18 +45,18 @@ pub(super) fn scaled<T: Real>(a: &Vector3<T>, s: T) -> Vector3<T> {
 /// A joint's frame seen from the frame before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct JointFrame<T> {
-    pub sin_alpha: T,
-    pub cos_alpha: T,
-    pub sin_q: T,
-    pub cos_q: T,
+    pub(crate) sin_alpha: T,
+    pub(crate) cos_alpha: T,
+    pub(crate) sin_q: T,
+    pub(crate) cos_q: T,
     /// Origin of the joint's frame, m.
-    pub origin: Vector3<T>,
+    pub(crate) origin: Vector3<T>,
 }
 
 impl<T: Real> JointFrame<T> {
     /// Rotates a vector from the joint's frame to the frame before it: R v = Rx(alpha) Rz(q) v.
     #[inline(always)]
-    pub fn to_parent(self, v: &Vector3<T>) -> Vector3<T> {
+    pub(crate) fn to_parent(self, v: &Vector3<T>) -> Vector3<T> {
         let y = self.sin_q * v.x + self.cos_q * v.y;
         Vector3::new(
             self.cos_q * v.x - self.sin_q * v.y,
@@ -67,7 +67,7 @@ impl<T: Real> JointFrame<T> {
 
     /// Rotates a vector from the frame before to the joint's frame: R' v.
     #[inline(always)]
-    pub fn to_child(self, v: &Vector3<T>) -> Vector3<T> {
+    pub(crate) fn to_child(self, v: &Vector3<T>) -> Vector3<T> {
         let y = self.cos_alpha * v.y + self.sin_alpha * v.z;
         Vector3::new(
             self.cos_q * v.x + self.sin_q * y,
@@ -81,17 +81,17 @@ impl<T: Real> JointFrame<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LinkMotion<T> {
     /// Angular velocity, rad/s.
-    pub angular_velocity: Vector3<T>,
+    pub(crate) angular_velocity: Vector3<T>,
     /// Angular acceleration, rad/s2.
-    pub angular_acceleration: Vector3<T>,
+    pub(crate) angular_acceleration: Vector3<T>,
     /// Acceleration of the frame's origin, less gravity, m/s2.
-    pub acceleration: Vector3<T>,
+    pub(crate) acceleration: Vector3<T>,
 }
 
 impl<T: Real> LinkMotion<T> {
     /// Motion of a base at rest under `gravity` (m/s2, base frame).
     #[inline]
-    pub fn base(gravity: &Vector3<T>) -> Self {
+    pub(crate) fn base(gravity: &Vector3<T>) -> Self {
         let zero = Vector3::new(T::zero(), T::zero(), T::zero());
         Self {
             angular_velocity: zero,
@@ -102,7 +102,7 @@ impl<T: Real> LinkMotion<T> {
 
     /// Motion of the next link, across a joint with speed `qd` (rad/s) and acceleration `qdd` (rad/s2).
     #[inline(always)]
-    pub fn next(&self, frame: JointFrame<T>, qd: T, qdd: T) -> Self {
+    pub(crate) fn next(&self, frame: JointFrame<T>, qd: T, qdd: T) -> Self {
         let carried = frame.to_child(&self.angular_velocity);
         let turned = frame.to_child(&self.angular_acceleration);
         let tangential = cross(&self.angular_acceleration, &frame.origin);
@@ -125,15 +125,15 @@ impl<T: Real> LinkMotion<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct JointAxis<T> {
     /// Direction of the joint's axis.
-    pub angular: Vector3<T>,
+    pub(crate) angular: Vector3<T>,
     /// Velocity of the frame's origin, m.
-    pub linear: Vector3<T>,
+    pub(crate) linear: Vector3<T>,
 }
 
 impl<T: Real> JointAxis<T> {
     /// Column for the link's own joint: it turns about z and leaves the origin at rest.
     #[inline]
-    pub fn own() -> Self {
+    pub(crate) fn own() -> Self {
         Self {
             angular: Vector3::new(T::zero(), T::zero(), T::one()),
             linear: Vector3::new(T::zero(), T::zero(), T::zero()),
@@ -142,7 +142,7 @@ impl<T: Real> JointAxis<T> {
 
     /// Column of this axis in the frame of the next link.
     #[inline]
-    pub fn next(&self, frame: JointFrame<T>) -> Self {
+    pub(crate) fn next(&self, frame: JointFrame<T>) -> Self {
         Self {
             angular: frame.to_child(&self.angular),
             linear: frame.to_child(&sum(&self.linear, &cross(&self.angular, &frame.origin))),

@@ -33,19 +33,19 @@ use super::inertia::{INERTIAL_PARAMETERS, InertialParameters};
 use crate::real::{Real, clamp, exp, is_finite, ln, max, sqrt};
 
 /// Logarithms (alpha, d1, d2, d3) are limited to plus and minus this.
-pub const LOGARITHM_LIMIT: f64 = 10.0;
+pub(crate) const LOGARITHM_LIMIT: f64 = 10.0;
 
 /// Lengths (s12, s23, s13, t1, t2, t3) are limited to plus and minus this, m.
-pub const LENGTH_LIMIT_M: f64 = 1000.0;
+pub(crate) const LENGTH_LIMIT_M: f64 = 1000.0;
 
 /// Log-Cholesky coordinates of a body: alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LogCholesky<T>(pub [T; INERTIAL_PARAMETERS]);
+pub(crate) struct LogCholesky<T>(pub [T; INERTIAL_PARAMETERS]);
 
 impl<T: Real> LogCholesky<T> {
     /// Converts parameters to coordinates; `None` unless they are physically consistent.
     #[must_use]
-    pub fn from_parameters(parameters: &InertialParameters<T>) -> Option<Self> {
+    pub(crate) fn from_parameters(parameters: &InertialParameters<T>) -> Option<Self> {
         let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
         if !(mass > T::zero() && parameters.iter().all(|value| is_finite(*value))) {
             return None;
@@ -68,7 +68,7 @@ impl<T: Real> LogCholesky<T> {
     ///
     /// Each coordinate is limited to its range first; NaN counts as the lower limit.
     #[must_use]
-    pub fn to_parameters(&self) -> InertialParameters<T> {
+    pub(crate) fn to_parameters(&self) -> InertialParameters<T> {
         let [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = self.0;
         let logarithm = T::from_double(LOGARITHM_LIMIT);
         let length = T::from_double(LENGTH_LIMIT_M);

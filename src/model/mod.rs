@@ -2,12 +2,12 @@
 //!
 //! Every module that predicts or explains torque uses this one, so the conventions are fixed once:
 //!
-//! - **Frames**: modified Denavit-Hartenberg (Khalil, Craig), see [`chain`]. Joint
+//! - **Frames**: modified Denavit-Hartenberg (Khalil, Craig), see `chain`. Joint
 //!   i turns about z of frame i.
 //! - **Parameters**: 14 per joint in the order of [`Parameter`]. The ten inertial ones are about the origin
 //!   of the joint's frame, in that frame, and inertias are ELEMENTS of the tensor (XY = -integral of x y dm).
 //! - **Gravity** is an argument: the acceleration vector in the base frame, m/s2. It turns with the trunk.
-//! - **Angles** in this module are the chain's; [`anatomy`] converts from and to flexion.
+//! - **Angles** in this module are the chain's; `anatomy` converts from and to flexion.
 //!
 //! ```text
 //! torque = regressor(chain, q, qd, qdd, gravity) . parameters
@@ -16,31 +16,33 @@
 //! All code is generic over the scalar ([`crate::real::Real`]: `f32` on the board, `f64` for reference) and
 //! the number of joints.
 
-pub mod anatomy;
-pub mod base;
-pub mod chain;
+pub(crate) mod anatomy;
+pub(crate) mod base;
+pub(crate) mod chain;
 pub mod fingerprint;
 pub mod friction;
 pub mod inertia;
 mod kinematics;
-pub mod log_cholesky;
+pub(crate) mod log_cholesky;
 pub mod mass_matrix;
-pub mod newton_euler;
-pub mod parameter;
-pub mod payload;
+pub(crate) mod newton_euler;
+pub(crate) mod parameter;
+pub(crate) mod payload;
 pub mod planar;
 pub mod regressor;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub use anatomy::AnatomicalJoint;
-pub use base::{BaseError, BaseParameters, ColumnMask, Standing, regroup};
+pub use anatomy::{AnatomicalJoint, AnatomyError};
+pub use base::{BaseError, BaseParameters, ColumnMask, Separation, Standing, regroup};
 pub use chain::{Chain, ChainError, DenavitHartenberg};
 pub use fingerprint::Fingerprint;
-pub use inertia::{INERTIAL_PARAMETERS, InertialParameters, RigidBody};
-pub use log_cholesky::{LogCholesky, is_physically_consistent};
+pub use inertia::{INERTIAL_PARAMETERS, RigidBody};
+pub(crate) use log_cholesky::LogCholesky;
+pub use log_cholesky::is_physically_consistent;
 pub use mass_matrix::mass_matrix;
 pub use newton_euler::{JointState, joint_torques, rigid_body_torques};
-pub use parameter::{JointParameters, LegParameters, PARAMETERS_PER_JOINT, Parameter, RegressorRow};
+pub use parameter::{JointParameters, LegParameters, PARAMETERS_PER_JOINT, Parameter};
 pub use payload::Payload;
-pub use regressor::{regressor, row_torque};
+pub use regressor::regressor;
+pub(crate) use regressor::row_torque;

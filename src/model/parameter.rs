@@ -3,7 +3,6 @@
 //! Logs, reports, regressor columns and stored models all use this order, so it never changes.
 
 use crate::listed::listed;
-use crate::real::Real;
 
 /// Parameters of one joint: ten of the link's inertia, rotor inertia, three of friction.
 pub const PARAMETERS_PER_JOINT: usize = 14;
@@ -17,7 +16,7 @@ pub type JointParameters<T> = [T; PARAMETERS_PER_JOINT];
 pub type LegParameters<T, const N: usize> = [JointParameters<T>; N];
 
 /// Derivative of one torque by each parameter of each joint.
-pub type RegressorRow<T, const N: usize> = [JointParameters<T>; N];
+pub(crate) type RegressorRow<T, const N: usize> = [JointParameters<T>; N];
 
 listed! {
     /// One of the parameters of a joint; the discriminant is its index in [`JointParameters`].
@@ -87,7 +86,10 @@ impl Parameter {
 
 /// Converts parameters from double precision, each rounded once.
 #[must_use]
-pub fn rounded<T: Real, const N: usize>(parameters: &LegParameters<f64, N>) -> LegParameters<T, N> {
+#[cfg(test)]
+pub(crate) fn rounded<T: crate::real::Real, const N: usize>(
+    parameters: &LegParameters<f64, N>,
+) -> LegParameters<T, N> {
     parameters.map(|joint| joint.map(T::from_double))
 }
 

@@ -90,7 +90,10 @@ fn inertial_columns<T: Real>(axis: &JointAxis<T>, motion: &LinkMotion<T>) -> Ine
 /// Product of a regressor row and the parameters: the torque of its joint, N m.
 #[inline]
 #[must_use]
-pub fn row_torque<T: Real, const N: usize>(row: &RegressorRow<T, N>, parameters: &LegParameters<T, N>) -> T {
+pub(crate) fn row_torque<T: Real, const N: usize>(
+    row: &RegressorRow<T, N>,
+    parameters: &LegParameters<T, N>,
+) -> T {
     let mut torque = T::zero();
     for (columns, joint) in row.iter().zip(parameters) {
         for (column, parameter) in columns.iter().zip(joint) {

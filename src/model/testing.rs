@@ -12,7 +12,7 @@ pub(crate) use crate::testing::TestRandom;
 use nalgebra::Vector3;
 
 /// Gravity of the planar leg: straight down along x of the base.
-pub fn down_along_x<T: Real>() -> Vector3<T> {
+pub(crate) fn down_along_x<T: Real>() -> Vector3<T> {
     Vector3::new(T::from_double(9.81), T::zero(), T::zero())
 }
 
@@ -23,7 +23,7 @@ impl TestRandom {
         Chain::new(&core::array::from_fn(|_| joint())).unwrap()
     }
 
-    pub(crate) fn state<const N: usize>(&mut self) -> JointState<f64, N> {
+    pub fn state<const N: usize>(&mut self) -> JointState<f64, N> {
         JointState {
             q: core::array::from_fn(|_| self.within(PI)),
             qd: core::array::from_fn(|_| self.within(3.0)),
@@ -62,7 +62,7 @@ impl TestRandom {
     }
 }
 
-pub fn rounded_state<T: Real, const N: usize>(state: &JointState<f64, N>) -> JointState<T, N> {
+pub(crate) fn rounded_state<T: Real, const N: usize>(state: &JointState<f64, N>) -> JointState<T, N> {
     JointState {
         q: state.q.map(T::from_double),
         qd: state.qd.map(T::from_double),
@@ -71,13 +71,13 @@ pub fn rounded_state<T: Real, const N: usize>(state: &JointState<f64, N>) -> Joi
 }
 
 /// Hip and knee: parallel axes, thigh of `length` metres.
-pub fn planar_leg<T: Real>(length: f64) -> Chain<T, 2> {
+pub(crate) fn planar_leg<T: Real>(length: f64) -> Chain<T, 2> {
     let joint = |a: f64| DenavitHartenberg { alpha: T::zero(), a: T::from_double(a), d: T::zero() };
     Chain::new(&[joint(0.0), joint(length)]).unwrap()
 }
 
 /// The paper's chain: a vertical axis, then two parallel horizontal ones (gravity along -z of the base).
-pub fn paper_chain<T: Real>() -> Chain<T, 3> {
+pub(crate) fn paper_chain<T: Real>() -> Chain<T, 3> {
     let joint = |alpha: f64, a: f64| DenavitHartenberg {
         alpha: T::from_double(alpha),
         a: T::from_double(a),

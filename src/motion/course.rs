@@ -24,18 +24,18 @@ use crate::real::{abs, clamp, max, min, sqrt};
 
 /// Limits of a course's speed, rad/s, and acceleration, rad/s^2; all positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rates {
+pub(crate) struct Rates {
     /// Largest speed.
-    pub speed: f32,
+    pub(crate) speed: f32,
     /// Acceleration while speeding up.
-    pub acceleration: f32,
+    pub(crate) acceleration: f32,
     /// Acceleration while slowing down.
-    pub deceleration: f32,
+    pub(crate) deceleration: f32,
 }
 
 /// Commanded position and motion of one joint; rad and s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Course {
+pub(crate) struct Course {
     position: f32,
     /// Rounding error of the sum over the ticks.
     lost: f32,
@@ -52,31 +52,31 @@ impl Course {
 
     /// Course in motion.
     #[must_use]
-    pub const fn moving(position: f32, velocity: f32) -> Self {
+    pub(crate) const fn moving(position: f32, velocity: f32) -> Self {
         Self { position, lost: 0.0, velocity, acceleration: 0.0 }
     }
 
     /// Joint angle, rad.
     #[must_use]
-    pub const fn position(&self) -> f32 {
+    pub(crate) const fn position(&self) -> f32 {
         self.position
     }
 
     /// Joint velocity, rad/s.
     #[must_use]
-    pub const fn velocity(&self) -> f32 {
+    pub(crate) const fn velocity(&self) -> f32 {
         self.velocity
     }
 
     /// Joint acceleration, rad/s^2.
     #[must_use]
-    pub const fn acceleration(&self) -> f32 {
+    pub(crate) const fn acceleration(&self) -> f32 {
         self.acceleration
     }
 
     /// Sum of two courses.
     #[must_use]
-    pub fn plus(&self, other: &Self) -> Self {
+    pub(crate) fn plus(&self, other: &Self) -> Self {
         Self {
             position: self.position + other.position,
             lost: self.lost + other.lost,
@@ -86,17 +86,17 @@ impl Course {
     }
 
     /// Limits the position to at most `window` from `centre`.
-    pub fn keep_within(&mut self, window: f32, centre: f32) {
+    pub(crate) fn keep_within(&mut self, window: f32, centre: f32) {
         self.position = clamp(self.position, centre - window, centre + window);
     }
 
     /// Limits the position to a range.
-    pub fn keep_between(&mut self, low: f32, high: f32) {
+    pub(crate) fn keep_between(&mut self, low: f32, high: f32) {
         self.position = clamp(self.position, low, high);
     }
 
     /// Moves one tick towards a position.
-    pub fn approach(&mut self, target: f32, rates: &Rates, tick_s: f32) {
+    pub(crate) fn approach(&mut self, target: f32, rates: &Rates, tick_s: f32) {
         // Near the target the lost part of the sum is as large as the last steps.
         let distance = (target - self.position) + self.lost;
         let size = abs(distance);
@@ -112,13 +112,13 @@ impl Course {
     }
 
     /// Moves one tick towards a velocity; stops at the ends of a range.
-    pub fn accelerate(&mut self, target: f32, rates: &Rates, range: [f32; 2], tick_s: f32) {
+    pub(crate) fn accelerate(&mut self, target: f32, rates: &Rates, range: [f32; 2], tick_s: f32) {
         let wanted = self.within(clamp(target, -rates.speed, rates.speed), rates, range, tick_s);
         self.change(wanted, rates, tick_s);
     }
 
     /// Moves one tick of the `left` ticks that lead to a position.
-    pub fn interpolate_position(&mut self, target: f32, left: u32, speed: f32, tick_s: f32) {
+    pub(crate) fn interpolate_position(&mut self, target: f32, left: u32, speed: f32, tick_s: f32) {
         let before = self.velocity;
         let ticks = left.max(1) as f32;
         let velocity = clamp((target - self.position) / (ticks * tick_s), -speed, speed);
@@ -133,7 +133,7 @@ impl Course {
 
     /// Moves one tick of the `left` ticks that lead to a velocity, with an acceleration of `most` at most;
     /// stops at the ends of a range by the rates.
-    pub fn interpolate_velocity(
+    pub(crate) fn interpolate_velocity(
         &mut self,
         target: f32,
         left: u32,

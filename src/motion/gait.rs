@@ -24,7 +24,7 @@
 //! are anatomical: flexion positive at both joints.
 
 use super::{Fourier, HARMONICS, MotionError};
-use crate::real::{Real, abs, exp, is_finite, max, sin_cos};
+use crate::real::{abs, is_finite, max};
 use crate::units::{Radian, Second};
 
 /// A joint of the walking pattern.
@@ -60,22 +60,6 @@ impl GaitJoint {
         match self {
             Self::Hip => &HIP,
             Self::Knee => &KNEE,
-        }
-    }
-
-    /// Equation (31), or (32) with a tenth of its two large amplitudes: degrees at `percent` of the cycle.
-    #[must_use]
-    pub fn repaired_deg<T: Real>(self, percent: T) -> T {
-        let of = T::from_double;
-        let bell = |height: f64, centre: f64, width: f64| {
-            let x = (percent - of(centre)) / of(width);
-            of(height) * exp(-(x * x))
-        };
-        let wave =
-            |height: f64, rate: f64, phase: f64| of(height) * sin_cos(of(rate) * percent + of(phase)).0;
-        match self {
-            Self::Hip => wave(118.7, 0.092, 0.016) + wave(3.085, 0.025, 1.632) + wave(111.8, 0.0938, 3.02),
-            Self::Knee => bell(-508.9, 76.25, 13.44) + bell(567.7, 75.76, 12.88) + bell(5.3288, 19.74, 23.41),
         }
     }
 }
@@ -119,6 +103,7 @@ pub fn mapped_into<const N: usize, const H: usize>(
 mod tests {
     use super::super::Phase;
     use super::*;
+    use crate::real::{exp, sin_cos};
     use core::f64::consts::TAU;
 
     const JOINTS: [GaitJoint; 2] = [GaitJoint::Hip, GaitJoint::Knee];
@@ -127,10 +112,25 @@ mod tests {
     /// The paper's working range, degrees.
     const WORKING_RANGE_DEG: [(f32, f32); 2] = [(2.17, 50.18), (6.85, 95.53)];
 
+    /// Equation (31), or (32) with a tenth of its two large amplitudes: degrees at `percent` of the cycle.
+    fn repaired_deg(joint: GaitJoint, percent: f64) -> f64 {
+        let bell =
+            |height: f64, centre: f64, width: f64| height * (-((percent - centre) / width).powi(2)).exp();
+        let wave = |height: f64, rate: f64, phase: f64| height * (rate * percent + phase).sin();
+        match joint {
+            GaitJoint::Hip => {
+                wave(118.7, 0.092, 0.016) + wave(3.085, 0.025, 1.632) + wave(111.8, 0.0938, 3.02)
+            }
+            GaitJoint::Knee => {
+                bell(-508.9, 76.25, 13.44) + bell(567.7, 75.76, 12.88) + bell(5.3288, 19.74, 23.41)
+            }
+        }
+    }
+
     /// Repaired curve without its jump (step 2), degrees at `percent` of the cycle.
     fn closed_deg(joint: GaitJoint, percent: f64) -> f64 {
-        let jump = joint.repaired_deg(100.0) - joint.repaired_deg(0.0);
-        joint.repaired_deg(percent) - jump * (percent / 100.0 - 0.5)
+        let jump = repaired_deg(joint, 100.0) - repaired_deg(joint, 0.0);
+        repaired_deg(joint, percent) - jump * (percent / 100.0 - 0.5)
     }
 
     /// Step 3 in double precision by the discrete transform; 4,096 points alias only harmonics above 4,090.
@@ -186,7 +186,7 @@ mod tests {
         let (mut peak, mut time) = (0.0_f64, 0.0_f64);
         for step in 1..10_000 {
             let percent = f64::from(step) * h;
-            let angle = |percent: f64| GaitJoint::Knee.repaired_deg(percent).to_radians();
+            let angle = |percent: f64| repaired_deg(GaitJoint::Knee, percent).to_radians();
             let curvature = (angle(percent + h) - 2.0 * angle(percent) + angle(percent - h)) / (h * h);
             let acceleration = curvature / (second_per_percent * second_per_percent);
             if acceleration.abs() > peak {
@@ -213,7 +213,7 @@ mod tests {
         };
         let (low, high) = extremes(&printed);
         assert!((low + 131.0).abs() < 1.0 && (high - 625.0).abs() < 1.0, "{low} {high}");
-        let (low, high) = extremes(&|t| GaitJoint::Knee.repaired_deg(t));
+        let (low, high) = extremes(&|t| repaired_deg(GaitJoint::Knee, t));
         assert!((low + 13.1).abs() < 0.1 && (high - 62.5).abs() < 0.1, "{low} {high}");
     }
 

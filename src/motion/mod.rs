@@ -11,7 +11,7 @@
 //! | [`Ramp`] | from a pose to a pose, at rest at both ends |
 //! | [`Periodic`] | whole cycles of a curve, with blends from and to rest by ramping the phase's speed |
 //! | [`Motion`] | any of these motions, or a pose held |
-//! | [`Course`] | one joint, tick by tick, towards a target that may change at any time |
+//! | `Course` | one joint, tick by tick, towards a target that may change at any time |
 //! | [`ExcitationTable`] | a periodic motion as plain numbers, for a constant in an image |
 //! | [`JointEnvelope`], [`Proof`] | bounds of a motion, and the proof that they lie within limits |
 //!
@@ -19,17 +19,17 @@
 //! second in `f32` has a resolution of 0.24 ms; a tick stays exact. Angles are those of the curve. The leg
 //! converts a curve once ([`Fourier::mapped`]) to the model's D-H angles and commands those.
 
-pub mod bounds;
-pub mod course;
-pub mod fourier;
+pub(crate) mod bounds;
+pub(crate) mod course;
+pub(crate) mod fourier;
 pub mod gait;
-pub mod periodic;
-pub mod plan;
-pub mod ramp;
-pub mod table;
+pub(crate) mod periodic;
+pub(crate) mod plan;
+pub(crate) mod ramp;
+pub(crate) mod table;
 
 pub use bounds::{JointEnvelope, LimitViolation, Proof, Quantity};
-pub use course::{Course, Rates};
+pub(crate) use course::{Course, Rates};
 pub use fourier::{Fourier, HARMONICS};
 pub use periodic::{Periodic, Phase};
 pub use plan::Motion;

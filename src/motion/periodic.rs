@@ -25,11 +25,11 @@ use core::num::NonZeroU32;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
     /// Phase in turns (periods); any number, most precise if small.
-    pub turn: f32,
+    pub(crate) turn: f32,
     /// Speed of the phase relative to the steady one, 0..=1.
-    pub speed: f32,
+    pub(crate) speed: f32,
     /// Change of `speed`, 1/s.
-    pub speed_slope_per_s: f32,
+    pub(crate) speed_slope_per_s: f32,
 }
 
 impl Phase {
@@ -111,13 +111,13 @@ impl<const N: usize, const H: usize> Periodic<N, H> {
 
     /// True if the phase runs at full speed at this tick.
     #[must_use]
-    pub fn is_steady(&self, tick: u32) -> bool {
+    pub(crate) fn is_steady(&self, tick: u32) -> bool {
         tick >= self.blend_ticks && tick < self.steady_end
     }
 
     /// Phase `tick` ticks after the start; at rest before and after the motion.
     #[must_use]
-    pub fn phase_at(&self, tick: u32) -> Phase {
+    pub(crate) fn phase_at(&self, tick: u32) -> Phase {
         if self.is_steady(tick) {
             return Phase::steady(
                 ((tick - self.blend_ticks) % self.period_ticks) as f32 * self.turn_per_tick,

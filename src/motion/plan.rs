@@ -1,6 +1,6 @@
 //! All kinds of motion of a leg, as one type.
 
-use super::{Fourier, HARMONICS, JointEnvelope, LimitViolation, MotionState, Periodic, Proof, Ramp, bounds};
+use super::{HARMONICS, JointEnvelope, LimitViolation, MotionState, Periodic, Proof, Ramp, bounds};
 use crate::units::{Radian, RadianPerSecond, RadianPerSecondSquared};
 
 /// Motion of `N` joints with at most `H` harmonics; starts and ends at rest.
@@ -17,7 +17,7 @@ pub enum Motion<const N: usize, const H: usize = HARMONICS> {
 impl<const N: usize, const H: usize> Motion<N, H> {
     /// State `tick` ticks after the start; before and after the motion at rest at its ends.
     #[must_use]
-    pub fn state_at(&self, tick: u32) -> MotionState<N> {
+    pub(crate) fn state_at(&self, tick: u32) -> MotionState<N> {
         match self {
             Self::Hold(pose_rad) => MotionState::at_rest(*pose_rad),
             Self::Ramp(ramp) => ramp.state_at(tick),
@@ -27,7 +27,7 @@ impl<const N: usize, const H: usize> Motion<N, H> {
 
     /// Ticks until the joints are at rest at the motion's end; `None` for a held pose.
     #[must_use]
-    pub fn duration_ticks(&self) -> Option<u32> {
+    pub(crate) fn duration_ticks(&self) -> Option<u32> {
         match self {
             Self::Hold(_) => None,
             Self::Ramp(ramp) => Some(ramp.duration_ticks()),
@@ -35,30 +35,15 @@ impl<const N: usize, const H: usize> Motion<N, H> {
         }
     }
 
-    /// True if the tick lies in the whole cycles at full speed.
-    #[must_use]
-    pub fn is_steady(&self, tick: u32) -> bool {
-        matches!(self, Self::Periodic(periodic) if periodic.is_steady(tick))
-    }
-
-    /// Curve of a periodic motion.
-    #[must_use]
-    pub fn curve(&self) -> Option<&Fourier<N, H>> {
-        match self {
-            Self::Periodic(periodic) => Some(periodic.curve()),
-            Self::Hold(_) | Self::Ramp(_) => None,
-        }
-    }
-
     /// Pose at rest before the motion, rad.
     #[must_use]
-    pub fn start_rad(&self) -> [f32; N] {
+    pub(crate) fn start_rad(&self) -> [f32; N] {
         self.state_at(0).position_rad
     }
 
     /// Pose at rest after the motion, rad.
     #[must_use]
-    pub fn end_rad(&self) -> [f32; N] {
+    pub(crate) fn end_rad(&self) -> [f32; N] {
         self.state_at(u32::MAX).position_rad
     }
 
@@ -103,7 +88,7 @@ mod tests {
         let hold = Motion::<2>::Hold(periodic.end_rad());
         let last = periodic.duration_ticks().expect("it ends");
         assert_eq!(periodic.state_at(last), hold.state_at(0));
-        assert_eq!((hold.duration_ticks(), hold.is_steady(0), approach.is_steady(3)), (None, false, false));
+        assert_eq!(hold.duration_ticks(), None);
     }
 
     #[test]

@@ -70,18 +70,6 @@ impl<const N: usize> Ramp<N> {
         self.duration_ticks
     }
 
-    /// Start pose of the ramp, rad.
-    #[must_use]
-    pub fn from_rad(&self) -> [f32; N] {
-        self.from_rad
-    }
-
-    /// End pose of the ramp, rad.
-    #[must_use]
-    pub fn to_rad(&self) -> [f32; N] {
-        self.to_rad
-    }
-
     /// State `tick` ticks after the start; at rest in the goal from the last tick on.
     #[must_use]
     pub fn state_at(&self, tick: u32) -> MotionState<N> {
@@ -145,7 +133,7 @@ mod tests {
         let last = ramp.state_at(ramp.duration_ticks() - 1);
         // One tick before the end: distance (1-x)^3, 30 (1-x)^2, 60 (1-x), with 1-x = 1/5250.
         for joint in 0..2 {
-            assert!((last.position_rad[joint] - ramp.to_rad()[joint]).abs() < 3e-7);
+            assert!((last.position_rad[joint] - ramp.to_rad[joint]).abs() < 3e-7);
             assert!(last.velocity_rad_per_s[joint].abs() < 1e-5);
             assert!(last.acceleration_rad_per_s2[joint].abs() < 0.01);
         }

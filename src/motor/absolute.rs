@@ -44,14 +44,15 @@ impl AbsoluteAngle {
     /// Angle in a frame; `None` with wrong parity or a set error flag. A line without a chip reads as all
     /// ones, which has the error flag.
     #[must_use]
-    pub const fn from_frame(frame: u16) -> Option<Self> {
+    pub(crate) const fn from_frame(frame: u16) -> Option<Self> {
         let is_valid = frame.count_ones().is_multiple_of(2) && frame & ERROR == 0;
         if is_valid { Some(Self(frame & ANGLE)) } else { None }
     }
 
     /// Frame that carries this angle.
     #[must_use]
-    pub const fn to_frame(self) -> u16 {
+    #[cfg(test)]
+    pub(crate) const fn to_frame(self) -> u16 {
         self.0 | ((self.0.count_ones() & 1) << 15) as u16
     }
 
@@ -73,7 +74,7 @@ const ANGLE: u16 = ERROR - 1;
 
 /// Reduces a difference of positions to half a turn in either direction; zero for a turn of zero.
 #[must_use]
-pub fn within_half_a_turn(difference: i32, turn: i32) -> i32 {
+pub(crate) fn within_half_a_turn(difference: i32, turn: i32) -> i32 {
     let within = difference.checked_rem_euclid(turn).unwrap_or_default();
     if within > turn / 2 { within - turn } else { within }
 }

@@ -46,11 +46,11 @@ pub struct ElectricalAngle(u32);
 
 /// Sine and cosine of an electrical angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rotation {
+pub(crate) struct Rotation {
     /// Sine.
-    pub sine: f32,
+    pub(crate) sine: f32,
     /// Cosine.
-    pub cosine: f32,
+    pub(crate) cosine: f32,
 }
 
 impl Rotation {
@@ -69,7 +69,7 @@ impl Rotation {
 
 impl ElectricalAngle {
     /// Flux along phase A.
-    pub const ZERO: Self = Self(0);
+    pub(crate) const ZERO: Self = Self(0);
 
     /// Converts turns; whole turns are dropped. Valid for -32,768..=32,767.
     #[must_use]
@@ -86,7 +86,7 @@ impl ElectricalAngle {
 
     /// Signed difference from `other` to this angle, turns from -0.5 to 0.5.
     #[must_use]
-    pub fn since(self, other: Self) -> f32 {
+    pub(crate) fn since(self, other: Self) -> f32 {
         Self(self.0.wrapping_sub(other.0)).turns()
     }
 
@@ -98,14 +98,14 @@ impl ElectricalAngle {
 
     /// Difference of both angles, modulo one turn.
     #[must_use]
-    pub const fn minus(self, other: Self) -> Self {
+    pub(crate) const fn minus(self, other: Self) -> Self {
         Self(self.0.wrapping_sub(other.0))
     }
 
     /// Sine and cosine.
     #[must_use]
     #[inline(always)]
-    pub fn rotation(self) -> Rotation {
+    pub(crate) fn rotation(self) -> Rotation {
         let (sine, cosine) = sin_cos_of_turns(self.0);
         Rotation { sine, cosine }
     }
@@ -128,7 +128,7 @@ impl ElectricalAngle {
 
 /// The tracking loop; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpeedTracker {
+pub(crate) struct SpeedTracker {
     estimate: ElectricalAngle,
     /// Units of 2^-32 turns per tick.
     speed: f32,
@@ -149,7 +149,7 @@ impl SpeedTracker {
 
     /// Updates angle and speed with the angle of one tick.
     #[inline(always)]
-    pub fn track(&mut self, angle: ElectricalAngle) {
+    pub(crate) fn track(&mut self, angle: ElectricalAngle) {
         let error = angle.0.wrapping_sub(self.estimate.0).cast_signed() as f32;
         self.speed += TRACKING_SPEED * error;
         self.estimate = self.estimate.turned_by(self.speed + TRACKING_POSITION * error);
@@ -157,14 +157,14 @@ impl SpeedTracker {
 
     /// Electrical speed, rad/s.
     #[must_use]
-    pub fn rad_per_s(&self) -> f32 {
+    pub(crate) fn rad_per_s(&self) -> f32 {
         self.speed * (RADIAN_PER_UNIT * CURRENT_RATE_HZ as f32)
     }
 
     /// Predicted rotation some ticks after this one, at the tracked speed; up to an eighth of a turn ahead.
     #[must_use]
     #[inline(always)]
-    pub fn ahead(&self, rotor: Rotation, ticks: f32) -> Rotation {
+    pub(crate) fn ahead(&self, rotor: Rotation, ticks: f32) -> Rotation {
         let units = ((self.speed * ticks) as i32).clamp(-MOST_AHEAD, MOST_AHEAD - 1);
         rotor.turned_by(units as f32 * RADIAN_PER_UNIT)
     }
@@ -172,7 +172,7 @@ impl SpeedTracker {
 
 /// Scale from encoder counts of one mechanical turn to the electrical angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CountScale {
+pub(crate) struct CountScale {
     counts_per_turn: i32,
     /// Electrical angle of one count. Rounding accumulates to 7.6e-6 turns after 65,536 counts.
     units_per_count: u32,
@@ -195,13 +195,13 @@ impl CountScale {
 
     /// Counts per mechanical turn.
     #[must_use]
-    pub const fn counts_per_turn(&self) -> i32 {
+    pub(crate) const fn counts_per_turn(&self) -> i32 {
         self.counts_per_turn
     }
 
     /// Moves a position within one turn by less than one turn and wraps the result.
     #[must_use]
-    pub const fn moved(&self, position: i32, step: i32) -> i32 {
+    pub(crate) const fn moved(&self, position: i32, step: i32) -> i32 {
         let position = position + step;
         if position >= self.counts_per_turn {
             position - self.counts_per_turn
@@ -214,14 +214,14 @@ impl CountScale {
 
     /// Reduces any number of counts to one turn.
     #[must_use]
-    pub fn within_turn(&self, counts: i32) -> i32 {
+    pub(crate) fn within_turn(&self, counts: i32) -> i32 {
         // A turn has at least 16 counts. The checked form leaves no panic in the image.
         counts.checked_rem_euclid(self.counts_per_turn).unwrap_or_default()
     }
 
     /// Electrical angle at the middle of a count.
     #[must_use]
-    pub const fn angle(&self, position: i32) -> ElectricalAngle {
+    pub(crate) const fn angle(&self, position: i32) -> ElectricalAngle {
         ElectricalAngle(
             position
                 .cast_unsigned()

@@ -115,7 +115,7 @@ pub enum AxisFault {
 
 /// Requested state of the bridge for one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BridgeRequest {
+pub(crate) enum BridgeRequest {
     /// Outputs off.
     Off,
     /// Follow a quadrature current in the joint's sense.
@@ -229,7 +229,7 @@ impl Axis {
     /// Set `long` where the counter may have wrapped. The position within a turn then stays valid only where
     /// the counter's range is a multiple of the turn, as 65,536 of 8,192; otherwise it is lost. Counts may be
     /// off by multiples of the range; the caller has to correct them.
-    pub fn resume(&mut self, sample: &AxisSample, long: bool) {
+    pub(crate) fn resume(&mut self, sample: &AxisSample, long: bool) {
         let constants = &self.constants;
         let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
         self.position = constants.scale.within_turn(self.position + constants.counter_sign * step);
@@ -247,7 +247,7 @@ impl Axis {
     /// Sets the bandwidth of the current loop. It may follow a current: voltage and integrals stay.
     #[cold]
     #[inline(never)]
-    pub fn set_bandwidth(&mut self, bandwidth: Hertz) {
+    pub(crate) fn set_bandwidth(&mut self, bandwidth: Hertz) {
         // A wrong checksum stays wrong.
         let is_sound = self.constants.checksum() == self.checksum;
         self.constants.set_bandwidth(bandwidth);
@@ -257,13 +257,13 @@ impl Axis {
     }
 
     /// Marks the rotor position as lost, because an absolute encoder contradicts it: the motor brakes.
-    pub fn lose_position(&mut self) {
+    pub(crate) fn lose_position(&mut self) {
         self.found(AxisFault::Encoder);
     }
 
     /// Currents of the last tick, in the electrical sense.
     #[must_use]
-    pub fn measured(&self) -> Rotating<Ampere> {
+    pub(crate) fn measured(&self) -> Rotating<Ampere> {
         self.measured
     }
 
@@ -283,18 +283,18 @@ impl Axis {
 
     /// Share of the current limit that is permitted now, 0..=1.
     #[must_use]
-    pub fn current_share(&self) -> f32 {
+    pub(crate) fn current_share(&self) -> f32 {
         self.current_limit / self.constants.current_limit
     }
 
     /// Rotor position or parameters are lost and require a new calibration.
     #[must_use]
-    pub fn is_lost(&self) -> bool {
+    pub(crate) fn is_lost(&self) -> bool {
         self.lost
     }
 
     /// Clears a fault, so that a request may enable again. Returns `false` where the axis is lost.
-    pub fn clear_fault(&mut self) -> bool {
+    pub(crate) fn clear_fault(&mut self) -> bool {
         if !self.lost {
             self.fault = None;
         }
@@ -306,15 +306,10 @@ impl Axis {
         self.act(sample, request.into())
     }
 
-    /// Runs one PWM period with the motor as a passive brake, below the overcurrent bound.
-    pub fn brake(&mut self, sample: &AxisSample) -> AxisCommand {
-        self.act(sample, BridgeRequest::Brake)
-    }
-
     /// Runs one PWM period of either kind. During a fault the outputs are off. With a frozen counter or a
     /// lost rotor position, however, the motor brakes unless the outputs are requested off.
     #[inline(always)]
-    pub fn act(&mut self, sample: &AxisSample, request: BridgeRequest) -> AxisCommand {
+    pub(crate) fn act(&mut self, sample: &AxisSample, request: BridgeRequest) -> AxisCommand {
         let request = match (request, self.fault) {
             (BridgeRequest::Off, _) => BridgeRequest::Off,
             (request, None) => request,
@@ -460,7 +455,7 @@ impl Axis {
     /// Square of the current vector at the last tick, A^2.
     #[inline(always)]
     #[must_use]
-    pub const fn square_a2(&self) -> f32 {
+    pub(crate) const fn square_a2(&self) -> f32 {
         let (d, q) = (self.measured.d.0, self.measured.q.0);
         d * d + q * q
     }
@@ -468,7 +463,7 @@ impl Axis {
     /// Electrical angle of the current rotor position.
     #[inline(always)]
     #[must_use]
-    pub fn angle(&self) -> ElectricalAngle {
+    pub(crate) fn angle(&self) -> ElectricalAngle {
         self.constants.scale.angle(self.position).plus(self.constants.offset)
     }
 
@@ -476,7 +471,7 @@ impl Axis {
     /// bus. Valid while the bridge follows a current or is off, not while it brakes.
     #[inline(always)]
     #[must_use]
-    pub fn power_w(&self) -> f32 {
+    pub(crate) fn power_w(&self) -> f32 {
         self.current_loop.power_w(&self.constants.gains, self.measured, self.speed.rad_per_s())
     }
 
@@ -502,7 +497,7 @@ impl Axis {
         }
     }
 
-    /// Compares voltages with currents and speed ([`ModelWatch`]), and index pulses with the counter. Called
+    /// Compares voltages with currents and speed (`ModelWatch`), and index pulses with the counter. Called
     /// once per servo period, halfway between two joint samples. A fault found here acts from the next tick
     /// on.
     pub fn check(&mut self) {

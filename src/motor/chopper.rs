@@ -30,7 +30,7 @@ pub struct Chopper {
 
 impl Chopper {
     /// Returns `None` unless `begin` is at least 5 V and `full` at least half a volt above it. `full` must
-    /// also lie within the range of the board's divider ([`SenseScale::greatest_bus`], 59.6 V); beyond, the
+    /// also lie within the range of the board's divider (`SenseScale::greatest_bus`, 59.6 V); beyond, the
     /// ramp would never be reached.
     #[must_use]
     pub fn new(begin: Volt, full: Volt) -> Option<Self> {
@@ -42,7 +42,7 @@ impl Chopper {
     /// Whether the resistor conducts at a bus voltage.
     #[inline(always)]
     #[must_use]
-    pub fn conducts(&self, bus: Volt) -> bool {
+    pub(crate) fn conducts(&self, bus: Volt) -> bool {
         bus.0 > self.begin.0
     }
 
@@ -71,7 +71,7 @@ impl Chopper {
 /// stays off until half of the budget is refilled (12 s). Energy regenerated in that time raises the bus
 /// until the axes turn off.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BrakeBudget {
+pub(crate) struct BrakeBudget {
     /// Remaining time at full duty.
     left_s: f32,
     used_up: bool,
@@ -83,18 +83,18 @@ impl BrakeBudget {
     const TICK_S: f32 = 1.0 / CURRENT_RATE_HZ as f32;
 
     /// The full budget.
-    pub const FULL: Self = Self { left_s: Self::WHOLE_S, used_up: false };
+    pub(crate) const FULL: Self = Self { left_s: Self::WHOLE_S, used_up: false };
 
     /// Whether nothing was used.
     #[inline(always)]
     #[must_use]
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.left_s == Self::WHOLE_S
     }
 
     /// Returns the duty the resistor may have in a current tick, and subtracts it from the budget.
     #[must_use]
-    pub fn spend(&mut self, wanted: f32) -> f32 {
+    pub(crate) fn spend(&mut self, wanted: f32) -> f32 {
         let duty = if self.used_up { 0.0 } else { wanted };
         self.left_s = clamp(self.left_s + (Self::REFILL_SHARE - duty) * Self::TICK_S, 0.0, Self::WHOLE_S);
         self.used_up = !(self.left_s > if self.used_up { 0.5 * Self::WHOLE_S } else { 0.0 });

@@ -22,7 +22,7 @@ pub enum Direction {
 impl Direction {
     /// 1 or -1.
     #[must_use]
-    pub const fn sign(self) -> i32 {
+    pub(crate) const fn sign(self) -> i32 {
         match self {
             Self::Up => 1,
             Self::Down => -1,
@@ -61,7 +61,7 @@ pub struct AxisConfiguration {
     pub current_limit: Ampere,
     /// Length of the current vector above which the outputs go off.
     pub overcurrent: Ampere,
-    /// Range of bus voltage in which the bridge may switch; at most [`SenseScale::greatest_bus`].
+    /// Range of bus voltage in which the bridge may switch; at most `SenseScale::greatest_bus`.
     pub bus: [Volt; 2],
     /// Greatest speed of the motor. At this speed a bridge with outputs off must not rectify more than the
     /// greatest bus voltage.
@@ -123,7 +123,7 @@ impl AxisConfiguration {
     /// Scale from counts to the electrical angle.
     ///
     /// # Errors [`AxisError::Encoder`].
-    pub fn scale(&self) -> Result<CountScale, AxisError> {
+    pub(crate) fn scale(&self) -> Result<CountScale, AxisError> {
         CountScale::new(self.counts_per_turn, self.pole_pairs).ok_or(AxisError::Encoder)
     }
 
@@ -149,36 +149,36 @@ const SQRT_3: f32 = 1.732_050_8;
 
 /// Greatest distance of a current-sensor offset from the middle of the converter's range: 6 A on
 /// the board's scale.
-pub const ZERO_SPREAD_CODES: u16 = 150;
+pub(crate) const ZERO_SPREAD_CODES: u16 = 150;
 
 /// Values that a tick reads and never writes. A host may set the bandwidth between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Constants {
     pub sense: SenseScale,
-    pub current_offsets: [f32; 2],
-    pub bus_codes: [u16; 2],
-    pub scale: CountScale,
-    pub offset: ElectricalAngle,
+    pub(crate) current_offsets: [f32; 2],
+    pub(crate) bus_codes: [u16; 2],
+    pub(crate) scale: CountScale,
+    pub(crate) offset: ElectricalAngle,
     /// Index pulses are checked.
-    pub indexed: bool,
+    pub(crate) indexed: bool,
     /// Greatest travel without an index pulse, counts; unlimited without an index.
-    pub unindexed: u32,
-    pub counter_sign: i32,
-    pub flexion_sign: i32,
+    pub(crate) unindexed: u32,
+    pub(crate) counter_sign: i32,
+    pub(crate) flexion_sign: i32,
     /// Sign from the joint's sense to the electrical one.
-    pub current_sign: f32,
-    pub greatest_step: i32,
-    pub gains: CurrentGains,
-    pub modulator: Modulator,
+    pub(crate) current_sign: f32,
+    pub(crate) greatest_step: i32,
+    pub(crate) gains: CurrentGains,
+    pub(crate) modulator: Modulator,
     /// Mean voltage that the dead time takes at the highest bus voltage.
-    pub dead: Volt,
-    pub model: ModelLimits,
+    pub(crate) dead: Volt,
+    pub(crate) model: ModelLimits,
     /// Target current of a phase beyond which its shunt code must change, A.
-    pub stuck_change: f32,
+    pub(crate) stuck_change: f32,
     pub current_limit: f32,
-    pub overcurrent_square: f32,
+    pub(crate) overcurrent_square: f32,
     /// Electrical speed at which a shorted motor carries the overcurrent bound, rad/s.
-    pub brake_speed: f32,
+    pub(crate) brake_speed: f32,
 }
 
 impl Constants {

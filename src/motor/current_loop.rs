@@ -45,27 +45,27 @@ use crate::real::{clamp, exp, min, sqrt};
 use crate::units::{Ampere, Henry, Hertz, Ohm, Volt, Weber};
 
 /// Delay from a sample to the middle of the period in which its command acts, in PWM periods.
-pub const DELAY_PERIODS: f32 = 1.5;
+pub(crate) const DELAY_PERIODS: f32 = 1.5;
 
 /// Share of the voltage limit available to the direct axis.
 const DIRECT_SHARE: f32 = 0.866_025_4;
 
 /// Motor constants that the current loop needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotorConstants {
+pub(crate) struct MotorConstants {
     /// Resistance of one phase.
-    pub resistance: Ohm,
+    pub(crate) resistance: Ohm,
     /// Inductance along the flux.
-    pub direct_inductance: Henry,
+    pub(crate) direct_inductance: Henry,
     /// Inductance across the flux.
-    pub quadrature_inductance: Henry,
+    pub(crate) quadrature_inductance: Henry,
     /// Flux linkage of the magnets with one phase, peak.
-    pub flux: Weber,
+    pub(crate) flux: Weber,
 }
 
 /// Constants of one loop; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CurrentGains {
+pub(crate) struct CurrentGains {
     proportional_ohm: Rotating<f32>,
     resistance_ohm: f32,
     /// `1 - exp(-R T / L)`.
@@ -140,7 +140,7 @@ fn proportional_ohm(bandwidth: Hertz, resistance_ohm: f32, renewal: Rotating<f32
 
 /// State of the loop: the integrals.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CurrentLoop {
+pub(crate) struct CurrentLoop {
     integral_v: Rotating<f32>,
 }
 
@@ -154,7 +154,7 @@ impl CurrentLoop {
     /// Computes the voltage for a quadrature current `target` and zero direct current, no longer than
     /// `limit`; `speed_rad_per_s` is electrical.
     #[inline(always)]
-    pub fn voltage(
+    pub(crate) fn voltage(
         &mut self,
         gains: &CurrentGains,
         target: Ampere,
@@ -211,7 +211,7 @@ impl CurrentLoop {
     }
 
     /// Sets the integrals to zero.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         *self = Self::default();
     }
 }

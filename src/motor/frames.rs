@@ -38,13 +38,13 @@ impl<Q> Quantity for Q where
 
 /// One value per phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Phases<Q> {
+pub(crate) struct Phases<Q> {
     /// Phase A.
-    pub a: Q,
+    pub(crate) a: Q,
     /// Phase B.
-    pub b: Q,
+    pub(crate) b: Q,
     /// Phase C.
-    pub c: Q,
+    pub(crate) c: Q,
 }
 
 /// Vector in the stator's frame.
@@ -58,17 +58,17 @@ pub struct Stationary<Q> {
 
 /// Vector in the rotor's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Rotating<Q> {
+pub(crate) struct Rotating<Q> {
     /// Along the magnets' flux.
-    pub d: Q,
+    pub(crate) d: Q,
     /// A quarter of an electrical turn ahead: produces the torque.
-    pub q: Q,
+    pub(crate) q: Q,
 }
 
 impl<Q: Quantity> Phases<Q> {
     /// Clarke's transformation; the common-mode component is lost.
     #[must_use]
-    pub fn to_stationary(self) -> Stationary<Q> {
+    pub(crate) fn to_stationary(self) -> Stationary<Q> {
         Stationary {
             alpha: (self.a + self.a - self.b - self.c) * (1.0 / 3.0),
             beta: (self.b - self.c) * ONE_OVER_SQRT_3,
@@ -79,20 +79,20 @@ impl<Q: Quantity> Phases<Q> {
 impl<Q: Quantity> Stationary<Q> {
     /// Clarke's transformation of two phases, for a sum of zero over all three: currents without a neutral.
     #[must_use]
-    pub fn from_two_phases(b: Q, c: Q) -> Self {
+    pub(crate) fn from_two_phases(b: Q, c: Q) -> Self {
         Self { alpha: -(b + c), beta: (b - c) * ONE_OVER_SQRT_3 }
     }
 
     /// Inverse Clarke's transformation; the three phases sum to zero.
     #[must_use]
-    pub fn to_phases(self) -> Phases<Q> {
+    pub(crate) fn to_phases(self) -> Phases<Q> {
         let (half, beta) = (self.alpha * -0.5, self.beta * HALF_SQRT_3);
         Phases { a: self.alpha, b: half + beta, c: half - beta }
     }
 
     /// Park's transformation into the frame of a rotor at an angle.
     #[must_use]
-    pub fn to_rotating(self, rotor: Rotation) -> Rotating<Q> {
+    pub(crate) fn to_rotating(self, rotor: Rotation) -> Rotating<Q> {
         Rotating {
             d: self.alpha * rotor.cosine + self.beta * rotor.sine,
             q: self.beta * rotor.cosine - self.alpha * rotor.sine,
@@ -103,7 +103,7 @@ impl<Q: Quantity> Stationary<Q> {
 impl<Q: Quantity> Rotating<Q> {
     /// Inverse Park's transformation, from the frame of a rotor at an angle.
     #[must_use]
-    pub fn to_stationary(self, rotor: Rotation) -> Stationary<Q> {
+    pub(crate) fn to_stationary(self, rotor: Rotation) -> Stationary<Q> {
         Stationary {
             alpha: self.d * rotor.cosine - self.q * rotor.sine,
             beta: self.d * rotor.sine + self.q * rotor.cosine,

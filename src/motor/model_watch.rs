@@ -111,7 +111,7 @@ const MEAN_RANGE_SHARE: f32 = 1.5 * RESISTANCE_SHARE / core::f32::consts::PI;
 
 /// Expected voltages of an axis, and their tolerances.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ModelLimits {
+pub(crate) struct ModelLimits {
     resistance_ohm: f32,
     /// Inductances that the loop does not feed forward; zero with feedforward.
     inductance_h: Rotating<f32>,
@@ -160,7 +160,7 @@ impl ModelLimits {
 
     /// Electrical speed above which a frozen counter is detected at a current, rad/s.
     #[must_use]
-    pub fn frozen_speed(&self, current: Ampere) -> f32 {
+    pub(crate) fn frozen_speed(&self, current: Ampere) -> f32 {
         (self.still_v + self.volt_per_ampere * current.0) / self.back_emf_per_speed
     }
 
@@ -191,22 +191,22 @@ impl ModelLimits {
 
 /// State of an axis once per servo period while its bridge switches.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown<'a> {
+pub(crate) struct Shown<'a> {
     /// Current loop after its last tick.
-    pub current_loop: &'a CurrentLoop,
+    pub(crate) current_loop: &'a CurrentLoop,
     /// Measured current.
-    pub current: Rotating<Ampere>,
+    pub(crate) current: Rotating<Ampere>,
     /// Electrical speed of the counts, rad/s.
-    pub speed_rad_per_s: f32,
+    pub(crate) speed_rad_per_s: f32,
     /// Rotor position within one turn, counts.
-    pub position: i32,
+    pub(crate) position: i32,
     /// Electrical angle of that position.
-    pub angle: ElectricalAngle,
+    pub(crate) angle: ElectricalAngle,
 }
 
 /// Model check of one axis; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ModelWatch {
+pub(crate) struct ModelWatch {
     /// Periods with too large a residual, less those without.
     suspicion: u8,
     /// Rotor position before the first of them.
@@ -267,7 +267,7 @@ impl Stop {
 
 impl ModelWatch {
     /// State before the first servo period.
-    pub const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         suspicion: 0,
         position: 0,
         sum: Stationary { alpha: 0.0, beta: 0.0 },
@@ -284,7 +284,7 @@ impl ModelWatch {
     /// Whether the counter has stood still since voltages and currents began to disagree. Any fault found
     /// then also makes the rotor position doubtful.
     #[must_use]
-    pub fn doubts(&self, limits: &ModelLimits, position: i32) -> bool {
+    pub(crate) fn doubts(&self, limits: &ModelLimits, position: i32) -> bool {
         self.suspicion > 0 && limits.is_still(position, self.position)
     }
 
@@ -300,7 +300,7 @@ impl ModelWatch {
 
     /// Electrical speed whose back-EMF equals the last period's residual, rad/s.
     #[must_use]
-    pub fn uncounted(&self, limits: &ModelLimits) -> f32 {
+    pub(crate) fn uncounted(&self, limits: &ModelLimits) -> f32 {
         sqrt(self.square) / limits.back_emf_per_speed
     }
 

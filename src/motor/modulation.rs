@@ -51,11 +51,11 @@ pub struct BridgeTiming {
     /// Dead time: both sides are off for this long at every edge.
     pub dead_time: Second,
     /// Time from a phase current's commutation to a settled shunt amplifier.
-    pub settling: Second,
+    pub(crate) settling: Second,
     /// From the middle of the lower zero vector to the end of the conversion.
     pub conversion: Second,
     /// Resolution of a duty, as share of a period.
-    pub duty_step: f32,
+    pub(crate) duty_step: f32,
 }
 
 impl BridgeTiming {
@@ -123,15 +123,9 @@ impl Modulator {
         })
     }
 
-    /// Largest duty at which the shunts can still be sampled.
-    #[must_use]
-    pub const fn greatest_duty(&self) -> f32 {
-        self.greatest_duty
-    }
-
     /// Smallest change of a duty, as share of a period.
     #[must_use]
-    pub const fn duty_step(&self) -> f32 {
+    pub(crate) const fn duty_step(&self) -> f32 {
         self.duty_step
     }
 
@@ -226,12 +220,12 @@ mod tests {
         for dead_time in [PLAIN, DeadTime::Compensated { band: Ampere(0.5) }] {
             let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, dead_time).expect("usual");
             // Expected: 2 * (0.119 + 1.2) us of 41.667 us.
-            assert!((modulator.greatest_duty() - 0.9367).abs() < 1e-4, "{}", modulator.greatest_duty());
+            assert!((modulator.greatest_duty - 0.9367).abs() < 1e-4, "{}", modulator.greatest_duty);
             for length in [5.0, 25.0, 1000.0, f32::INFINITY, f32::NAN] {
                 for degrees in 0..360 {
                     let target = Stationary { alpha: Ampere(60.0), beta: Ampere(-20.0) };
                     let duties = modulator.duties(at(length, degrees), 1.0 / 48.0, target);
-                    let within = |duty: &f32| (0.0..=modulator.greatest_duty()).contains(duty);
+                    let within = |duty: &f32| (0.0..=modulator.greatest_duty).contains(duty);
                     if length.is_finite() {
                         assert!(duties.iter().all(within), "{duties:?}");
                     } else {
@@ -311,8 +305,8 @@ mod tests {
         // The tightest direction is between two phases' axes: at 30 degrees the span is sqrt(3)
         // of the length.
         let [a, _, c] = modulator.duties(at(limit, 30), 1.0 / 48.0, NO_CURRENT);
-        assert!((a - modulator.greatest_duty()).abs() < 1e-5 && c.abs() < 1e-5, "{a} {c}");
-        assert!((limit * sqrt(3.0) / 48.0 - modulator.greatest_duty()).abs() < 1e-5);
+        assert!((a - modulator.greatest_duty).abs() < 1e-5 && c.abs() < 1e-5, "{a} {c}");
+        assert!((limit * sqrt(3.0) / 48.0 - modulator.greatest_duty).abs() < 1e-5);
     }
 
     #[test]

@@ -12,7 +12,7 @@ const REST_COUNTS: i32 = 4;
 
 /// Result of one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReferenceStep {
+pub(crate) enum ReferenceStep {
     /// The joint has not stood long enough.
     Running,
     /// The joint stood at the pose.
@@ -23,7 +23,7 @@ pub enum ReferenceStep {
 
 /// Reference by a pose that the operator states; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StatedPose {
+pub(crate) struct StatedPose {
     stand_ticks: u32,
     first: Option<i32>,
     ticks: u32,

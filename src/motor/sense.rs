@@ -47,7 +47,7 @@ impl SenseScale {
     /// at a rail.
     #[must_use]
     #[inline(always)]
-    pub fn currents(&self, codes: [u16; 2], current_offsets: [f32; 2]) -> Option<Stationary<Ampere>> {
+    pub(crate) fn currents(&self, codes: [u16; 2], current_offsets: [f32; 2]) -> Option<Stationary<Ampere>> {
         let [b, c] = codes;
         let width = self.rails[1].wrapping_sub(self.rails[0]);
         if b.wrapping_sub(self.rails[0]) > width || c.wrapping_sub(self.rails[0]) > width {
@@ -61,7 +61,7 @@ impl SenseScale {
     /// Largest phase current that both shunts can measure, for any offsets within `spread` codes
     /// of the middle.
     #[must_use]
-    pub fn range(&self, spread: u16) -> Ampere {
+    pub(crate) fn range(&self, spread: u16) -> Ampere {
         let below = 2048_u16.saturating_sub(self.rails[0]);
         let above = self.rails[1].saturating_sub(2048);
         let codes = below.min(above).saturating_sub(spread);
@@ -72,7 +72,7 @@ impl SenseScale {
     /// Greatest permissible bus-voltage limit: 95 % of the converter's range. A voltage beyond the limit then
     /// still shows with a divider that is 3 % off.
     #[must_use]
-    pub fn greatest_bus(&self) -> Volt {
+    pub(crate) fn greatest_bus(&self) -> Volt {
         self.bus(4095) * 0.95
     }
 

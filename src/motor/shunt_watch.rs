@@ -50,14 +50,14 @@ struct Shunt {
 
 /// Shunt checks of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShuntWatch {
+pub(crate) struct ShuntWatch {
     shunts: [Shunt; 2],
     zero: Stationary<f32>,
 }
 
 impl ShuntWatch {
     /// State before the first tick.
-    pub const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         // Larger than any code.
         shunts: [Shunt { code: u16::MAX, target: 0.0, overdue: 0 }; 2],
         zero: Stationary { alpha: 0.0, beta: 0.0 },
@@ -65,14 +65,14 @@ impl ShuntWatch {
 
     /// Updates the offset in a tick with the outputs off.
     #[inline(always)]
-    pub fn disabled(&mut self, currents: Stationary<Ampere>) {
+    pub(crate) fn disabled(&mut self, currents: Stationary<Ampere>) {
         self.zero.alpha += ZERO_SHARE * (currents.alpha.0 - self.zero.alpha);
         self.zero.beta += ZERO_SHARE * (currents.beta.0 - self.zero.beta);
     }
 
     /// Before the bridge switches: whether the offset is within its limit. Also restarts the check
     /// for stuck codes.
-    pub fn begins_at_zero(&mut self) -> bool {
+    pub(crate) fn begins_at_zero(&mut self) -> bool {
         self.shunts = Self::EMPTY.shunts;
         let Stationary { alpha, beta } = self.zero;
         alpha * alpha + beta * beta <= ZERO_A * ZERO_A
@@ -81,14 +81,19 @@ impl ShuntWatch {
     /// Change of a phase's target current beyond which its code must move; see the module. `dead` is the mean
     /// voltage that dead time takes, `ohm` the loop's proportional gain.
     #[must_use]
-    pub fn target_change(dead: Volt, ohm: f32) -> Ampere {
+    pub(crate) fn target_change(dead: Volt, ohm: f32) -> Ampere {
         Ampere(max(LEAST_CHANGE_A, BEYOND_DEAD_TIME * dead.0 / ohm))
     }
 
     /// Whether a code is stuck, in a tick in which the bridge switches; `least_change_a` is the
     /// change of [`Self::target_change`].
     #[inline(always)]
-    pub fn is_stuck(&mut self, codes: [u16; 2], target: Stationary<Ampere>, least_change_a: f32) -> bool {
+    pub(crate) fn is_stuck(
+        &mut self,
+        codes: [u16; 2],
+        target: Stationary<Ampere>,
+        least_change_a: f32,
+    ) -> bool {
         let phases = target.to_phases();
         let [b, c] = &mut self.shunts;
         let b = b.is_stuck(codes[0], phases.b.0, least_change_a);

@@ -41,40 +41,40 @@ const STEP_S: f64 = 1.0 / CURRENT_RATE_HZ as f64 / SUBSTEPS as f64;
 
 #[derive(Clone, Debug)]
 pub(crate) struct TestMotor {
-    pub resistance: f64,
-    pub inductance: [f64; 2],
-    pub flux: f64,
-    pub pole_pairs: f64,
-    pub counts_per_turn: f64,
+    pub(crate) resistance: f64,
+    pub(crate) inductance: [f64; 2],
+    pub(crate) flux: f64,
+    pub(crate) pole_pairs: f64,
+    pub(crate) counts_per_turn: f64,
     /// Inertia, kg m^2; viscous friction, N m s; Coulomb friction, N m.
-    pub inertia: f64,
-    pub viscous: f64,
-    pub coulomb: f64,
-    pub load: f64,
-    pub bus: f64,
+    pub(crate) inertia: f64,
+    pub(crate) viscous: f64,
+    pub(crate) coulomb: f64,
+    pub(crate) load: f64,
+    pub(crate) bus: f64,
     /// Dead time as a fraction of a period: the current's sign then sets the voltage.
-    pub dead: f64,
-    pub current_offsets: [f64; 2],
-    pub noise_codes: f64,
+    pub(crate) dead: f64,
+    pub(crate) current_offsets: [f64; 2],
+    pub(crate) noise_codes: f64,
     /// Encoder position at zero flux angle, mechanical turns; `encoder_sign` is -1 where it counts backwards.
-    pub encoder_zero: f64,
-    pub encoder_sign: f64,
-    pub encoder_dead: bool,
+    pub(crate) encoder_zero: f64,
+    pub(crate) encoder_sign: f64,
+    pub(crate) encoder_dead: bool,
     /// The wire of phase A is broken.
-    pub open: bool,
+    pub(crate) open: bool,
     /// Width of the index pulse, counts; backwards its other edge is captured.
-    pub index_width: i64,
+    pub(crate) index_width: i64,
     /// Converts the true currents of B and C to the measured ones.
-    pub shunts: fn([f64; 2]) -> [f64; 2],
+    pub(crate) shunts: fn([f64; 2]) -> [f64; 2],
     /// Currents d and q, A.
-    pub current: [f64; 2],
-    pub angle: f64,
-    pub speed: f64,
+    pub(crate) current: [f64; 2],
+    pub(crate) angle: f64,
+    pub(crate) speed: f64,
     /// The speed is held by an external machine.
-    pub driven: bool,
-    pub pending: AxisCommand,
-    pub random: TestRandom,
-    pub turn: Option<i64>,
+    pub(crate) driven: bool,
+    pub(crate) pending: AxisCommand,
+    pub(crate) random: TestRandom,
+    pub(crate) turn: Option<i64>,
 }
 
 impl Default for TestMotor {

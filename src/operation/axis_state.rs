@@ -103,7 +103,7 @@ impl AxisState {
 
     /// Square of the motor's current vector at this tick, A^2.
     #[inline(always)]
-    pub const fn square_a2(&self) -> f32 {
+    pub(crate) const fn square_a2(&self) -> f32 {
         match &self.mode {
             AxisMode::Off => 0.0,
             AxisMode::Calibrating(calibrator) => calibrator.square_a2(),
@@ -159,7 +159,7 @@ impl AxisState {
     /// which the joint's motion is unknown. Returns whether there is an axis that followed the motion before.
     #[cold]
     #[inline(never)]
-    pub fn stood_still(&mut self, sample: &AxisSample, long: bool) -> bool {
+    pub(crate) fn stood_still(&mut self, sample: &AxisSample, long: bool) -> bool {
         // Counter and index of an axis that is not calibrated may have missed a pulse.
         self.search = IndexSearch::EMPTY;
         let axis = self.axis_mut();

@@ -38,28 +38,28 @@ const VOID: u8 = u8::MAX;
 
 /// Inputs of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Situation {
+pub(crate) struct Situation {
     /// The enabling switch is held.
-    pub enabling: bool,
+    pub(crate) enabling: bool,
     /// The start button is pressed.
-    pub start: bool,
+    pub(crate) start: bool,
     /// An inhibit reason is active.
-    pub blocked: bool,
+    pub(crate) blocked: bool,
     /// A host has the drive, or had or stopped it since the last tick.
-    pub host_acts: bool,
+    pub(crate) host_acts: bool,
     /// Both axes have a calibration.
-    pub calibrated: bool,
+    pub(crate) calibrated: bool,
     /// A calibration is under way.
-    pub calibrating: bool,
+    pub(crate) calibrating: bool,
     /// The joints have a reference.
-    pub referenced: bool,
+    pub(crate) referenced: bool,
     /// State of the drive; `None` before the servo runs.
-    pub drive: Option<DriveState>,
+    pub(crate) drive: Option<DriveState>,
 }
 
 /// Request of the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OperatorRequest {
+pub(crate) enum OperatorRequest {
     /// A step of the drive's power states.
     Power(PowerRequest),
     /// Calibrate both axes. The motors turn, unless stored values can be checked at standstill.
@@ -87,7 +87,7 @@ impl From<CommissioningStep> for OperatorRequest {
 impl OperatorRequest {
     /// Word used in records.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Power(PowerRequest::Shutdown) => "shutdown",
             Self::Power(PowerRequest::SwitchOn) => "switch_on",
@@ -124,7 +124,7 @@ impl Contact {
 
 /// State of the contacts; see the module.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Operator {
+pub(crate) struct Operator {
     enabling: Contact,
     start: Contact,
     /// Ticks for which both have been open; nothing is accepted before [`STEADY_TICKS`].
@@ -145,14 +145,14 @@ pub struct Operator {
 impl Operator {
     /// Returns whether the switch is held, debounced, and was open before.
     #[must_use]
-    pub const fn holds(&self) -> bool {
+    pub(crate) const fn holds(&self) -> bool {
         self.trusted && self.enabling.closed
     }
 
     /// Returns why a step of commissioning is refused now, or `None`. The reasons are those for which the
     /// start button requests nothing.
     #[must_use]
-    pub fn refusal(&self, step: CommissioningStep, now: &Situation) -> Option<StepResult> {
+    pub(crate) fn refusal(&self, step: CommissioningStep, now: &Situation) -> Option<StepResult> {
         use CommissioningStep::{Calibrate, Reference, Reset};
         use StepResult::{
             AlreadyDone, Calibrating, ContactsNotOpened, DriveOn, Inhibited, NotCalibrated, SwitchClosed,

@@ -31,11 +31,11 @@ use crate::motor::{AbsoluteAngle, AbsoluteEncoders, Direction, JointZero};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EncoderSettings {
     /// Absolute encoders.
-    pub absolute: AbsoluteEncoders,
+    pub(crate) absolute: AbsoluteEncoders,
     /// Counts per turn of the motor.
-    pub counts_per_turn: u32,
+    pub(crate) counts_per_turn: u32,
     /// Motor turns per joint turn.
-    pub ratio: f32,
+    pub(crate) ratio: f32,
 }
 
 impl EncoderSettings {

@@ -34,12 +34,12 @@ impl<T> Handover<T> {
     }
 
     /// The value, to be filled by the side that asks; `None` while the other has it.
-    pub fn idle(&self) -> Option<MutexGuard<'_, T>> {
+    pub(crate) fn idle(&self) -> Option<MutexGuard<'_, T>> {
         self.at(IDLE)
     }
 
     /// Passes the value to the worker.
-    pub fn give(&self) {
+    pub(crate) fn give(&self) {
         self.turn.set(GIVEN);
     }
 
@@ -54,7 +54,7 @@ impl<T> Handover<T> {
     }
 
     /// The value that the worker passed back, once.
-    pub fn take_back(&self) -> Option<MutexGuard<'_, T>> {
+    pub(crate) fn take_back(&self) -> Option<MutexGuard<'_, T>> {
         let value = self.at(RETURNED)?;
         self.turn.set(IDLE);
         Some(value)

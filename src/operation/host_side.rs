@@ -21,21 +21,21 @@ const LAG_TICKS: f32 = 8.0;
 
 /// Settings of a host for an identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Prepared {
+pub(crate) struct Prepared {
     /// One-time or sequential.
-    pub plan: Plan,
+    pub(crate) plan: Plan,
     /// Seed of the search.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Whether the leg is empty or worn, if the host said so.
-    pub wearing: Option<Wearing>,
+    pub(crate) wearing: Option<Wearing>,
 }
 
 /// A request and, where it begins an identification, its settings.
-pub type HostRequest = (ControlRequest, Option<Prepared>);
+pub(crate) type HostRequest = (ControlRequest, Option<Prepared>);
 
 /// State of the servo's side of the bus.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HostSide<const N: usize> {
+pub(crate) struct HostSide<const N: usize> {
     following: Following<N>,
     commands: Option<[JointCommand; N]>,
     request: Option<LegRequest>,
@@ -75,14 +75,14 @@ impl<const N: usize> HostSide<N> {
     }
 
     /// Resets after a change of the joints' zeros.
-    pub fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.following.restart();
     }
 
     /// Runs instead of a tick while the leg has no zeros: reports the drive's state and drops orders, except
     /// for the reset of a fault. Returns whether a host requests that. A lost host stops nothing here; its
     /// node reports it.
-    pub fn rest(
+    pub(crate) fn rest(
         &mut self,
         drive: DriveState,
         ends: &mut HostEnds<'_, N>,
@@ -122,24 +122,24 @@ impl<const N: usize> HostSide<N> {
     }
 
     /// Reports to the bus that a request other than a step was refused.
-    pub fn refuse(&mut self, reason: RefusalReason) {
+    pub(crate) fn refuse(&mut self, reason: RefusalReason) {
         self.refused = Some(Refusal { joint: Refusal::LEG, reason });
     }
 
     /// Takes the refusal by the bus itself, once.
-    pub fn take_noted(&mut self) -> Option<Refusal> {
+    pub(crate) fn take_noted(&mut self) -> Option<Refusal> {
         self.noted.take()
     }
 
     /// Joints that a host permits to return into their range.
     #[must_use]
-    pub const fn may_return(&self) -> [bool; N] {
+    pub(crate) const fn may_return(&self) -> [bool; N] {
         self.may_return
     }
 
     /// Takes the newest order, unless a request still waits behind the operator's. Reports the faults of a
     /// lost host.
-    pub fn receive(&mut self, ends: &mut HostEnds<'_, N>, mut report: impl FnMut(Fault)) {
+    pub(crate) fn receive(&mut self, ends: &mut HostEnds<'_, N>, mut report: impl FnMut(Fault)) {
         while self.request.is_none()
             && take_first(&mut ends.orders, |order| self.take(order, &mut report)).is_some()
         {}
@@ -166,7 +166,7 @@ impl<const N: usize> HostSide<N> {
     }
 
     /// The request of this tick: the operator's, or else the host's, once.
-    pub fn request(&mut self, by_hand: Option<ControlRequest>) -> Option<HostRequest> {
+    pub(crate) fn request(&mut self, by_hand: Option<ControlRequest>) -> Option<HostRequest> {
         if let Some(request) = by_hand {
             return Some((request, None));
         }
@@ -184,7 +184,7 @@ impl<const N: usize> HostSide<N> {
 
     /// Filters a request while the operator's switch is open: no request that enables passes, and an enabled
     /// leg gets a quick stop.
-    pub fn held(
+    pub(crate) fn held(
         &self,
         request: Option<ControlRequest>,
         state: DriveState,
@@ -203,19 +203,19 @@ impl<const N: usize> HostSide<N> {
     }
 
     /// The host's side of this tick; `waits` if its commands are not followed yet.
-    pub fn host(&mut self, waits: bool) -> Host<'_, N> {
+    pub(crate) fn host(&mut self, waits: bool) -> Host<'_, N> {
         let cancel = core::mem::take(&mut self.cancel);
         Host { following: &mut self.following, commands: self.commands.as_ref(), cancel, waits }
     }
 
     /// Whether a host has the drive.
     #[must_use]
-    pub const fn has_drive(&self) -> bool {
+    pub(crate) const fn has_drive(&self) -> bool {
         self.commands.is_some()
     }
 
     /// Reports the tick's results when a report is due.
-    pub fn report(
+    pub(crate) fn report(
         &mut self,
         control: &Control<N>,
         sample: &Sample<N>,

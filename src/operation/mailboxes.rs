@@ -25,7 +25,7 @@ const MAILBOXES: usize = 3;
 
 /// Scheduler of the transmit mailboxes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TxScheduler {
+pub(crate) struct TxScheduler {
     /// Node that is polled first.
     first: usize,
     /// Time since which frames have been waiting in a passive controller.
@@ -45,7 +45,7 @@ impl TxScheduler {
     }
 
     /// Fills the mailboxes for this round, for a controller in a lasting state.
-    pub fn fill<R: Results, const N: usize, const LOG: usize>(
+    pub(crate) fn fill<R: Results, const N: usize, const LOG: usize>(
         &mut self,
         hardware: &mut impl Hardware<N>,
         controller: Controller,

@@ -48,14 +48,12 @@ mod watch;
 pub use assist::AssistLevel;
 pub use axis_state::{AxisState, Order, Outcome};
 pub use bus_round::{BusRound, StoreJob};
-pub use contacts::{Operator, OperatorRequest, RATE_HZ, Situation};
+pub use contacts::RATE_HZ;
 pub use current::{CurrentLoops, Tick};
 pub use encoders::EncoderSettings;
 pub use handover::Handover;
-pub use host_side::{HostRequest, HostSide};
 pub use housekeeper::{Housekeeper, HousekeepingSettings};
 pub use identify::{IdentificationLevel, Slice};
-pub use mailboxes::TxScheduler;
 pub use queues::{
     AssistEnds, AssistQueues, BusEnds, BusQueues, Calibrated, CurrentEnds, Ends, EventQueue, HostEnds,
     HousekeepingEnds, IdentificationEnds, LegEvent, Queues, ServoAssistEnds, ServoEnds,
@@ -63,6 +61,5 @@ pub use queues::{
 pub use servo::ServoLevel;
 pub use signals::{Inhibit, Signals, Statistics, Word};
 pub use storing::{Purpose, Storing};
-pub use token_bucket::TokenBucket;
 pub use update::{Begun, Update};
 pub use watch::Watch;

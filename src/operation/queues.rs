@@ -55,14 +55,14 @@ pub enum LegEvent<const N: usize> {
 
 /// Length of the event queue: 190 ms of the log. Closing a motion takes 11 million instructions in one call,
 /// which is 89 ms of an otherwise idle processor.
-pub const EVENTS: usize = 104;
+pub(crate) const EVENTS: usize = 104;
 /// Entries of it that samples leave free for other events.
-pub const RESERVED: usize = 8;
+pub(crate) const RESERVED: usize = 8;
 /// Length of the queue of received frames: 1.5 ms of the shortest at 1 Mbit/s.
-pub const FRAMES: usize = 33;
+pub(crate) const FRAMES: usize = 33;
 
 /// Length of the queue of samples to the assistance: three wait at most.
-pub const SAMPLES: usize = 4;
+pub(crate) const SAMPLES: usize = 4;
 
 /// Uses the first item of a queue where it lies, and removes it. A large item that is returned instead is
 /// copied three times. The producer sees the slot occupied until `take` returns.
@@ -102,17 +102,17 @@ pub struct Queues<const N: usize> {
 /// Ends of the current loops.
 pub struct CurrentEnds<'a, const N: usize> {
     /// Orders to each axis.
-    pub orders: [Consumer<'a, Order>; N],
+    pub(crate) orders: [Consumer<'a, Order>; N],
     /// Outcomes of each axis.
-    pub outcomes: [Producer<'a, Outcome>; N],
+    pub(crate) outcomes: [Producer<'a, Outcome>; N],
     /// Samples of each joint for the servo.
-    pub samples: [Producer<'a, JointSample>; N],
+    pub(crate) samples: [Producer<'a, JointSample>; N],
 }
 
 /// Ends of the servo; those of the bus where there is one.
 pub struct ServoEnds<'a, const N: usize> {
     /// Samples of each joint.
-    pub samples: [Consumer<'a, JointSample>; N],
+    pub(crate) samples: [Consumer<'a, JointSample>; N],
     pub(super) requests: Consumer<'a, ControlRequest>,
     pub(super) findings: Consumer<'a, Finding<N>>,
     pub(super) drive: Producer<'a, DriveState>,
@@ -128,11 +128,11 @@ pub struct HousekeepingEnds<'a, const N: usize> {
     pub(super) orders: [Producer<'a, Order>; N],
     pub(super) outcomes: [Consumer<'a, Outcome>; N],
     /// Requests to the servo.
-    pub requests: Producer<'a, ControlRequest>,
+    pub(crate) requests: Producer<'a, ControlRequest>,
     /// Drive states of the servo.
-    pub drive: Consumer<'a, DriveState>,
+    pub(crate) drive: Consumer<'a, DriveState>,
     /// Records for the trace.
-    pub notes: Producer<'a, Record<N>>,
+    pub(crate) notes: Producer<'a, Record<N>>,
     pub(super) calibrated: Producer<'a, Calibrated>,
 }
 
@@ -328,9 +328,9 @@ pub struct BusQueues<const N: usize> {
 /// The servo's ends towards the bus.
 pub struct HostEnds<'a, const N: usize> {
     /// Orders of the bus.
-    pub orders: Consumer<'a, LegOrder<N>>,
+    pub(crate) orders: Consumer<'a, LegOrder<N>>,
     /// Reports of the leg.
-    pub status: Producer<'a, LegStatus<N>>,
+    pub(crate) status: Producer<'a, LegStatus<N>>,
     pub(super) logged: Producer<'a, LoggedSample<N>>,
 }
 

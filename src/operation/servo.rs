@@ -188,16 +188,10 @@ impl<const N: usize> ServoLevel<N> {
         Some(output)
     }
 
-    /// Shares of the torque that the limits of the supply current leave ([`SupplyCurrent::shares`]).
+    /// Shares of the torque that the limits of the supply current leave (`SupplyCurrent::shares`).
     #[must_use]
     pub fn supply_shares(&self) -> [f32; 2] {
         self.supply_current.shares()
-    }
-
-    /// Ticks with valid joint samples since the start.
-    #[must_use]
-    pub const fn ticks(&self) -> u32 {
-        self.tick
     }
 
     /// Runs instead of a tick while the leg has no zeros: requests are dropped, except for the reset of a

@@ -46,13 +46,13 @@ impl Word {
 
     /// Adds one, wrapping; for words that one level writes.
     #[inline(always)]
-    pub fn count(&self) {
+    pub(crate) fn count(&self) {
         self.set(self.get().wrapping_add(1));
     }
 
     /// Sets the value if it is larger; for words that one level writes.
     #[inline(always)]
-    pub fn raise(&self, value: u32) {
+    pub(crate) fn raise(&self, value: u32) {
         if value > self.get() {
             self.set(value);
         }
@@ -60,14 +60,14 @@ impl Word {
 
     /// Sets the value if it is smaller; for words that one level writes.
     #[inline(always)]
-    pub fn lower(&self, value: u32) {
+    pub(crate) fn lower(&self, value: u32) {
         if value < self.get() {
             self.set(value);
         }
     }
 
     /// Sets the value and returns the previous one.
-    pub fn swap(&self, value: u32) -> u32 {
+    pub(crate) fn swap(&self, value: u32) -> u32 {
         self.0.swap(value, Ordering::Relaxed)
     }
 
@@ -123,7 +123,7 @@ impl Inhibit {
     }
 
     /// Sets one reason.
-    pub fn raise(&self, cause: InhibitReason) {
+    pub(crate) fn raise(&self, cause: InhibitReason) {
         self.raise_bits(cause.bit());
     }
 
@@ -147,20 +147,20 @@ impl Inhibit {
     /// No inhibit reason is set.
     #[inline(always)]
     #[must_use]
-    pub fn is_clear(&self) -> bool {
+    pub(crate) fn is_clear(&self) -> bool {
         self.causes() == 0
     }
 
     /// Returns whether the flash is being written, which may stall the processor for seconds.
     #[inline(always)]
     #[must_use]
-    pub fn is_storing(&self) -> bool {
+    pub(crate) fn is_storing(&self) -> bool {
         self.causes() & InhibitReason::Storing.bit() != 0
     }
 
     /// Clears the reasons that the operator's reset may clear: neither permanent ones nor a flash write in
     /// progress.
-    pub fn reset(&self) {
+    pub(crate) fn reset(&self) {
         self.causes.keep_bits(InhibitReason::for_ever() | InhibitReason::Storing.bit());
     }
 
@@ -174,33 +174,33 @@ impl Inhibit {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistics<const N: usize> {
     /// Longest current tick, processor cycles.
-    pub current_worst: Word,
+    pub(crate) current_worst: Word,
     /// Current ticks that came late.
-    pub current_missed: Word,
+    pub(crate) current_missed: Word,
     /// Current ticks of each axis.
-    pub current_ticks: [Word; N],
+    pub(crate) current_ticks: [Word; N],
     /// Longest servo tick, processor cycles, including current ticks in it.
-    pub servo_worst: Word,
+    pub(crate) servo_worst: Word,
     /// Longest run of the assistance, processor cycles, including the levels above it.
-    pub assist_worst: Word,
+    pub(crate) assist_worst: Word,
     /// Servo ticks that came late.
-    pub servo_missed: Word,
+    pub(crate) servo_missed: Word,
     /// Servo ticks.
     pub servo_ticks: Word,
     /// Rounds of the housekeeping.
-    pub rounds: Word,
+    pub(crate) rounds: Word,
     /// Longest current interrupt and servo tick, ns, in the time of the last report.
-    pub longest_ns: [Word; 2],
+    pub(crate) longest_ns: [Word; 2],
     /// Samples lost because the queue to the identification was full.
-    pub samples_lost: Word,
+    pub(crate) samples_lost: Word,
     /// Records lost because the queue to the trace was full.
-    pub records_lost: Word,
+    pub(crate) records_lost: Word,
     /// Code of the bus voltage: newest, lowest, highest.
-    pub bus: [Word; 3],
+    pub(crate) bus: [Word; 3],
     /// Encoder counts of each joint at the servo's last tick.
     pub counts: [Word; N],
     /// Iterations and evaluations of the search under way.
-    pub search: [Word; 2],
+    pub(crate) search: [Word; 2],
 }
 
 impl<const N: usize> Statistics<N> {
@@ -234,7 +234,7 @@ impl<const N: usize> Statistics<N> {
 }
 
 /// Unit of the integrals of squared currents, A^2 s: a sixteenth of A^2 over one servo period.
-pub const I2T_UNIT: f32 = 1.0 / (UNITS_PER_A2 * SERVO_RATE_HZ as f32);
+pub(crate) const I2T_UNIT: f32 = 1.0 / (UNITS_PER_A2 * SERVO_RATE_HZ as f32);
 const UNITS_PER_A2: f32 = 16.0;
 /// Share before the first round: the whole cap.
 const FULL_SHARE: u32 = 1.0_f32.to_bits();
@@ -341,7 +341,7 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Turns all axes off.
-    pub fn disable(&self) {
+    pub(crate) fn disable(&self) {
         self.set_targets(&DriveCommand::OFF);
     }
 
@@ -351,7 +351,7 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Marks the joints' samples as invalid and turns all axes off.
-    pub fn end_servo(&self) {
+    pub(crate) fn end_servo(&self) {
         self.begun.set(0);
         self.disable();
     }
@@ -363,14 +363,14 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Reports a fault to the servo's next tick.
-    pub fn report(&self, fault: BoardFault, joint: usize) {
+    pub(crate) fn report(&self, fault: BoardFault, joint: usize) {
         if let Some(reported) = self.reported.get(joint) {
             reported.set_bits(fault.bit());
         }
     }
 
     /// Takes the faults reported for a joint since the last call.
-    pub fn take_reported(&self, joint: usize) -> impl Iterator<Item = BoardFault> + use<N> {
+    pub(crate) fn take_reported(&self, joint: usize) -> impl Iterator<Item = BoardFault> + use<N> {
         let bits = self
             .reported
             .get(joint)
@@ -379,21 +379,21 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Reports the fault of an axis to the servo's next tick.
-    pub fn report_axis(&self, code: FaultCode, axis: usize) {
+    pub(crate) fn report_axis(&self, code: FaultCode, axis: usize) {
         if let Some(fault) = self.axis_faults.get(axis) {
             fault.set(code.number().into());
         }
     }
 
     /// Takes the fault of an axis that was reported since the last call.
-    pub fn take_axis_fault(&self, axis: usize) -> Option<FaultCode> {
+    pub(crate) fn take_axis_fault(&self, axis: usize) -> Option<FaultCode> {
         let fault = self.axis_faults.get(axis).filter(|fault| fault.get() != 0)?.swap(0);
         FaultCode::ALL.into_iter().find(|code| u32::from(code.number()) == fault)
     }
 
     /// Temperature of the hottest bridge, degrees Celsius; NaN, which leaves no torque, if one is unknown.
     #[must_use]
-    pub fn hottest_c(&self) -> f32 {
+    pub(crate) fn hottest_c(&self) -> f32 {
         let hottest = |hottest: f32, bridge: &Word| {
             let celsius = f32::from_bits(bridge.get());
             if celsius > hottest || celsius.is_nan() { celsius } else { hottest }
@@ -402,7 +402,7 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Sets the temperature of a bridge, degrees Celsius; NaN if it is unknown.
-    pub fn set_bridge_c(&self, axis: usize, degrees_c: f32) {
+    pub(crate) fn set_bridge_c(&self, axis: usize, degrees_c: f32) {
         if let Some(bridge) = self.bridges_c.get(axis) {
             bridge.set(degrees_c.to_bits());
         }
@@ -410,7 +410,7 @@ impl<const N: usize> Signals<N> {
 
     /// Sets the currents of a motor and its rotor's angle.
     #[inline(always)]
-    pub fn set_rotor_currents(&self, axis: usize, current: Rotating<Ampere>, angle: ElectricalAngle) {
+    pub(crate) fn set_rotor_currents(&self, axis: usize, current: Rotating<Ampere>, angle: ElectricalAngle) {
         if let Some([direct, quadrature, rotor]) = self.rotor_currents.get(axis) {
             direct.set(current.d.0.to_bits());
             quadrature.set(current.q.0.to_bits());
@@ -427,7 +427,7 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Sets the bandwidths that a host has set.
-    pub fn set_bandwidths(&self, bandwidths: &[LoopBandwidths; N]) {
+    pub(crate) fn set_bandwidths(&self, bandwidths: &[LoopBandwidths; N]) {
         for (words, LoopBandwidths { position, current }) in self.bandwidths.iter().zip(bandwidths) {
             for (word, bandwidth) in words.iter().zip([position, current]) {
                 word.set(bandwidth.map_or(0, |bandwidth| bandwidth.0.to_bits()));
@@ -437,24 +437,24 @@ impl<const N: usize> Signals<N> {
 
     /// Bandwidths of the position loops that a host has set.
     #[must_use]
-    pub fn position_bandwidths(&self) -> [Option<Hertz>; N] {
+    pub(crate) fn position_bandwidths(&self) -> [Option<Hertz>; N] {
         self.bandwidths.each_ref().map(|[position, _]| bandwidth(position))
     }
 
     /// Bandwidths of the current loops that a host has set.
     #[must_use]
-    pub fn current_bandwidths(&self) -> [Option<Hertz>; N] {
+    pub(crate) fn current_bandwidths(&self) -> [Option<Hertz>; N] {
         self.bandwidths.each_ref().map(|[_, current]| bandwidth(current))
     }
 
     /// Asks for a step of commissioning, from the bus.
-    pub fn ask(&self, step: CommissioningStep) {
+    pub(crate) fn ask(&self, step: CommissioningStep) {
         self.asked.set(step as u32);
     }
 
     /// Takes the step that was asked for. The report says that it is under way before it is taken, so that no
     /// host reads the result of the step before.
-    pub fn take_step(&self) -> Option<CommissioningStep> {
+    pub(crate) fn take_step(&self) -> Option<CommissioningStep> {
         if self.asked.get() == 0 {
             return None;
         }
@@ -463,7 +463,7 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Passes a command for the program on, from the bus.
-    pub fn command_program(&self, command: ProgramCommand) {
+    pub(crate) fn command_program(&self, command: ProgramCommand) {
         self.program[0].set(command as u32 + 1);
     }
 
@@ -479,13 +479,13 @@ impl<const N: usize> Signals<N> {
 
     /// Status of a new image; under way while a command waits.
     #[must_use]
-    pub fn program_status(&self) -> ProgramStatus {
+    pub(crate) fn program_status(&self) -> ProgramStatus {
         ProgramStatus(self.program[1].get()).with(ProgramStatus::UNDER_WAY, self.program[0].get() != 0)
     }
 
     /// Whether the flash is or will be changed for a new image.
     #[must_use]
-    pub fn program_pauses(&self) -> bool {
+    pub(crate) fn program_pauses(&self) -> bool {
         self.program[1].get() & (ProgramStatus::UNDER_WAY | ProgramStatus::STOPPED) != 0
     }
 
@@ -495,13 +495,13 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Sets the report of the step that was taken last.
-    pub fn set_report(&self, report: StepReport) {
+    pub(crate) fn set_report(&self, report: StepReport) {
         self.report.set(u32::from_le_bytes([report.result, report.axis, report.reason, report.detail]));
     }
 
     /// State and telemetry for the bus.
     #[must_use]
-    pub fn board_status(&self) -> BoardStatus<N> {
+    pub(crate) fn board_status(&self) -> BoardStatus<N> {
         let real = |word: &Word| f32::from_bits(word.get());
         let is_asked = self.asked.get() != 0;
         let [result, axis, reason, detail] = self.report.get().to_le_bytes();
@@ -523,7 +523,7 @@ impl<const N: usize> Signals<N> {
 
     /// Adds a motor's squared current (A^2) over one servo period.
     #[inline(always)]
-    pub fn add_i2t(&self, axis: usize, square_a2: f32) {
+    pub(crate) fn add_i2t(&self, axis: usize, square_a2: f32) {
         if let Some(sum) = self.i2t.get(axis) {
             sum.set(sum.get().wrapping_add((square_a2 * UNITS_PER_A2) as u32));
         }
@@ -531,13 +531,13 @@ impl<const N: usize> Signals<N> {
 
     /// Wrapping integral of a motor's squared current, unit: a sixteenth of A^2 over a servo period.
     #[must_use]
-    pub fn i2t(&self, axis: usize) -> u32 {
+    pub(crate) fn i2t(&self, axis: usize) -> u32 {
         self.i2t.get(axis).map_or(0, Word::get)
     }
 
     /// Sets the permitted share of an axis' current limit ([`crate::motor::Axis::current_share`]).
     #[inline(always)]
-    pub fn set_current_share(&self, axis: usize, share: f32) {
+    pub(crate) fn set_current_share(&self, axis: usize, share: f32) {
         if let Some(current_share) = self.current_shares.get(axis) {
             current_share.set(share.to_bits());
         }
@@ -545,13 +545,13 @@ impl<const N: usize> Signals<N> {
 
     /// Permitted share of an axis' current limit; NaN leaves no torque.
     #[must_use]
-    pub fn current_share(&self, axis: usize) -> f32 {
+    pub(crate) fn current_share(&self, axis: usize) -> f32 {
         self.current_shares.get(axis).map_or(f32::NAN, |share| f32::from_bits(share.get()))
     }
 
     /// Sets an axis' electrical power, W ([`crate::motor::Axis::power_w`]).
     #[inline(always)]
-    pub fn set_power(&self, axis: usize, watt: f32) {
+    pub(crate) fn set_power(&self, axis: usize, watt: f32) {
         if let Some(power) = self.powers.get(axis) {
             power.set(watt.to_bits());
         }
@@ -560,7 +560,7 @@ impl<const N: usize> Signals<N> {
     /// Sum of the axes' electrical powers, W; zero while an inhibit reason holds, because shorted motors take
     /// nothing from the bus.
     #[must_use]
-    pub fn power_w(&self) -> f32 {
+    pub(crate) fn power_w(&self) -> f32 {
         if self.inhibit.is_clear() {
             self.powers.iter().fold(0.0, |sum, power| sum + f32::from_bits(power.get()))
         } else {
@@ -571,19 +571,19 @@ impl<const N: usize> Signals<N> {
     /// Least duty of the brake resistor, 0..=0.95, by the servo.
     #[inline(always)]
     #[must_use]
-    pub fn wanted_brake(&self) -> f32 {
+    pub(crate) fn wanted_brake(&self) -> f32 {
         f32::from_bits(self.brake[0].get())
     }
 
     /// Whether the servo wants the brake resistor.
     #[inline(always)]
     #[must_use]
-    pub fn wants_brake(&self) -> bool {
+    pub(crate) fn wants_brake(&self) -> bool {
         self.brake[0].get() != 0
     }
 
     /// Sets the least duty of the brake resistor, which its energy budget still limits.
-    pub fn set_wanted_brake(&self, duty: f32) {
+    pub(crate) fn set_wanted_brake(&self, duty: f32) {
         self.brake[0].set(duty.to_bits());
     }
 
@@ -595,7 +595,7 @@ impl<const N: usize> Signals<N> {
 
     /// Sets the duty that the brake resistor was given.
     #[inline(always)]
-    pub fn set_given_brake(&self, duty: f32) {
+    pub(crate) fn set_given_brake(&self, duty: f32) {
         self.brake[1].set(duty.to_bits());
     }
 
@@ -612,7 +612,7 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Sets temperature and share of a winding.
-    pub fn set_winding(&self, joint: usize, winding: &Winding) {
+    pub(crate) fn set_winding(&self, joint: usize, winding: &Winding) {
         if let Some([celsius, share]) = self.windings.get(joint) {
             celsius.set(winding.temperature_c().to_bits());
             share.set(winding.share().to_bits());
@@ -630,18 +630,18 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Sets the permission of the drive.
-    pub fn set_permission(&self, permission: Permission) {
+    pub(crate) fn set_permission(&self, permission: Permission) {
         self.permission.set(permission as u32);
     }
 
     /// Returns whether a host has the drive; then closing the enabling switch permits but requests nothing.
     #[must_use]
-    pub fn is_hosted(&self) -> bool {
+    pub(crate) fn is_hosted(&self) -> bool {
         self.hosted[0].get() != 0
     }
 
     /// Sets whether a host has the drive. `stopped`: one that does not have it has stopped it.
-    pub fn set_host(&self, hosted: bool, stopped: bool) {
+    pub(crate) fn set_host(&self, hosted: bool, stopped: bool) {
         let [now, acted] = &self.hosted;
         now.set(hosted.into());
         if hosted || stopped {
@@ -650,29 +650,29 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Returns whether a host has the drive, or had or stopped it since the last call.
-    pub fn take_host_action(&self) -> bool {
+    pub(crate) fn take_host_action(&self) -> bool {
         self.hosted[1].swap(0) != 0 || self.is_hosted()
     }
 
     /// Returns the operator's permission: the debounced enabling switch, false during a reset.
     #[must_use]
-    pub fn permits(&self) -> bool {
+    pub(crate) fn permits(&self) -> bool {
         self.permits.get() != 0
     }
 
     /// Sets the operator's permission.
-    pub fn set_permits(&self, permits: bool) {
+    pub(crate) fn set_permits(&self, permits: bool) {
         self.permits.set(permits.into());
     }
 
     /// Returns whether every axis has a calibration.
     #[must_use]
-    pub fn is_calibrated(&self) -> bool {
+    pub(crate) fn is_calibrated(&self) -> bool {
         self.board_state.get() & u32::from(BoardState::CALIBRATED) != 0
     }
 
     /// Sets the state of the board.
-    pub fn set_board_state(&self, state: BoardState) {
+    pub(crate) fn set_board_state(&self, state: BoardState) {
         self.board_state.set(state.0.into());
     }
 
@@ -683,7 +683,7 @@ impl<const N: usize> Signals<N> {
 
     /// Returns whether all stored parameters were erased since the last call.
     #[must_use]
-    pub fn take_forgotten(&self) -> bool {
+    pub(crate) fn take_forgotten(&self) -> bool {
         self.forgotten.get() != 0 && self.forgotten.swap(0) != 0
     }
 }

@@ -22,7 +22,7 @@ const FLICKER_MS: u32 = 100;
 
 /// What the light shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StatusLight {
+pub(crate) enum StatusLight {
     /// This many flashes.
     Flashes(u32),
     /// Flickers.
@@ -33,25 +33,25 @@ pub enum StatusLight {
 
 /// State of the board that the light shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LightInputs {
+pub(crate) struct LightInputs {
     /// The drive is switched on or enabled, or it stops.
-    pub is_on: bool,
+    pub(crate) is_on: bool,
     /// A calibration is under way.
-    pub is_calibrating: bool,
+    pub(crate) is_calibrating: bool,
     /// An inhibit reason is set, or the drive has a fault.
-    pub is_inhibited: bool,
+    pub(crate) is_inhibited: bool,
     /// The image is on trial.
-    pub is_on_trial: bool,
+    pub(crate) is_on_trial: bool,
     /// All axes are calibrated.
-    pub is_calibrated: bool,
+    pub(crate) is_calibrated: bool,
     /// The zeros of the joints are known.
-    pub is_referenced: bool,
+    pub(crate) is_referenced: bool,
 }
 
 impl StatusLight {
     /// Chooses what to show.
     #[must_use]
-    pub const fn from_inputs(inputs: &LightInputs) -> Self {
+    pub(crate) const fn from_inputs(inputs: &LightInputs) -> Self {
         let LightInputs { is_on, is_calibrating, is_inhibited, is_on_trial, is_calibrated, is_referenced } =
             *inputs;
         match () {
@@ -67,7 +67,7 @@ impl StatusLight {
 
     /// Whether the light is lit in a round of level 6.
     #[must_use]
-    pub const fn is_lit(self, round: u32) -> bool {
+    pub(crate) const fn is_lit(self, round: u32) -> bool {
         let ms = round % (CYCLE_MS * RATE_HZ / 1000) * (1000 / RATE_HZ);
         match self {
             Self::Flashes(count) => ms < count * INTERVAL_MS && ms % INTERVAL_MS < FLASH_MS,

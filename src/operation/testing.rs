@@ -29,13 +29,13 @@ pub(super) const VOLT_PER_CODE: Volt = SenseScale::ODRIVE_3_6.volt_per_code;
 /// A watchdog whose new period becomes effective after a while. A write during another write is ignored.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TestWatchdog {
-    pub stretched: bool,
+    pub(crate) stretched: bool,
     /// Milliseconds until a written value is effective, and the value.
-    pub under_way: Option<(u64, bool)>,
+    pub(crate) under_way: Option<(u64, bool)>,
     /// Duration of a write, ms; `None` if it never ends.
-    pub takes_ms: Option<u64>,
+    pub(crate) takes_ms: Option<u64>,
     /// Number of feeds.
-    pub fed: u32,
+    pub(crate) fed: u32,
 }
 
 impl TestWatchdog {
@@ -46,7 +46,7 @@ impl TestWatchdog {
         self.under_way.is_none() && self.stretched == stretched
     }
 
-    pub fn pass(&mut self, milliseconds: u64) {
+    pub(crate) fn pass(&mut self, milliseconds: u64) {
         self.under_way = self.under_way.and_then(|(left, value)| {
             if left > milliseconds {
                 return Some((left - milliseconds, value));
@@ -60,18 +60,18 @@ impl TestWatchdog {
 /// Bus controller with three mailboxes. Frames leave in the order of writing, at once while the plug is in.
 #[derive(Debug)]
 pub(super) struct TestCan {
-    pub controller: Controller,
+    pub(crate) controller: Controller,
     /// A frame was lost since the state was read.
-    pub overrun: bool,
+    pub(crate) overrun: bool,
     /// Mailbox, frame, and time of writing, us.
-    pub waiting: Vec<(u32, Frame, u64)>,
-    pub unplugged: bool,
+    pub(crate) waiting: Vec<(u32, Frame, u64)>,
+    pub(crate) unplugged: bool,
     /// Frames that left, with times of writing and leaving, us.
-    pub sent: Vec<(Frame, u64, u64)>,
+    pub(crate) sent: Vec<(Frame, u64, u64)>,
     /// Number of aborted transmissions.
-    pub aborted: u32,
+    pub(crate) aborted: u32,
     /// Largest number of mailboxes in use at once.
-    pub most: usize,
+    pub(crate) most: usize,
 }
 
 /// Interrupt of received frames: fills the queue whenever the clock is read, and adds processing time per
@@ -79,9 +79,9 @@ pub(super) struct TestCan {
 pub(super) struct Reception {
     queue: Producer<'static, Frame>,
     /// Frames on the wire.
-    pub arriving: VecDeque<Frame>,
+    pub(crate) arriving: VecDeque<Frame>,
     /// Processing time of one frame, us.
-    pub frame_us: u64,
+    pub(crate) frame_us: u64,
     /// Processing time of all frames so far, us.
     spent_us: u64,
     /// Frames in the queue at the last call.
@@ -94,7 +94,7 @@ impl Reception {
     }
 
     /// Frames that were not processed yet.
-    pub fn unheard(&self) -> usize {
+    pub(crate) fn unheard(&self) -> usize {
         self.queue.len() + self.arriving.len()
     }
 
@@ -113,15 +113,15 @@ impl Reception {
 /// An emergency stop whose interrupt comes before an access of the hardware: turns the bridges off, then sets
 /// its inhibit reason.
 pub(super) struct Stop<const N: usize> {
-    pub signals: Rc<Signals<N>>,
+    pub(crate) signals: Rc<Signals<N>>,
     /// Accesses before the stop.
-    pub after: u32,
+    pub(crate) after: u32,
     /// The stop waits for the end of a masked step.
-    pub pending: bool,
+    pub(crate) pending: bool,
     /// The stop was handled.
-    pub handled: bool,
+    pub(crate) handled: bool,
     /// Bridges were enabled after that.
-    pub enabled_since: bool,
+    pub(crate) enabled_since: bool,
 }
 
 impl<const N: usize> Stop<N> {
@@ -134,39 +134,39 @@ impl<const N: usize> Stop<N> {
 /// All registers of a board of `N` axes.
 pub(super) struct TestHardware<const N: usize> {
     /// Outputs and duties of each bridge.
-    pub bridges: [AxisCommand; N],
-    pub brake: f32,
+    pub(crate) bridges: [AxisCommand; N],
+    pub(crate) brake: f32,
     /// The holding brake is released.
-    pub holding_brake_released: bool,
+    pub(crate) holding_brake_released: bool,
     /// The status light is lit.
-    pub is_lit: bool,
-    pub servo_pended: u32,
-    pub bus_pended: u32,
+    pub(crate) is_lit: bool,
+    pub(crate) servo_pended: u32,
+    pub(crate) bus_pended: u32,
     /// Requests of the assistance.
-    pub assist_pended: u32,
-    pub contacts: Contacts,
-    pub encoder_counts: [u16; N],
+    pub(crate) assist_pended: u32,
+    pub(crate) contacts: Contacts,
+    pub(crate) encoder_counts: [u16; N],
     /// Frames of the absolute encoders at rotor and joint.
-    pub encoder_frames: [[u16; 2]; N],
-    pub temperatures: [Option<f32>; N],
+    pub(crate) encoder_frames: [[u16; 2]; N],
+    pub(crate) temperatures: [Option<f32>; N],
     /// Codes of the thermistors in the motors; `None` while the converter is silent.
-    pub motor_codes: [Option<u16>; N],
+    pub(crate) motor_codes: [Option<u16>; N],
     /// Axis whose thermistor is converted, and its code at the start of that.
-    pub converted: Option<(usize, Option<u16>)>,
-    pub gates_hold: [bool; N],
-    pub gate_status: [u32; N],
+    pub(crate) converted: Option<(usize, Option<u16>)>,
+    pub(crate) gates_hold: [bool; N],
+    pub(crate) gate_status: [u32; N],
     /// The gate drivers accept their configuration.
-    pub gates_configure: bool,
+    pub(crate) gates_configure: bool,
     /// Each switching of the gate drivers' supply.
-    pub gates_switched: Vec<bool>,
-    pub now_us: u64,
-    pub can: TestCan,
-    pub reception: Option<RefCell<Reception>>,
-    pub watchdog: TestWatchdog,
-    pub processor_supply_is_low: bool,
-    pub stop: Option<Stop<N>>,
+    pub(crate) gates_switched: Vec<bool>,
+    pub(crate) now_us: u64,
+    pub(crate) can: TestCan,
+    pub(crate) reception: Option<RefCell<Reception>>,
+    pub(crate) watchdog: TestWatchdog,
+    pub(crate) processor_supply_is_low: bool,
+    pub(crate) stop: Option<Stop<N>>,
     /// Accesses that a tick makes, counted for [`Stop`].
-    pub accesses: u32,
+    pub(crate) accesses: u32,
     masked: bool,
 }
 
@@ -212,7 +212,7 @@ impl<const N: usize> TestHardware<N> {
     }
 
     /// Waiting frames leave if the plug is in.
-    pub fn empty_mailboxes(&mut self) {
+    pub(crate) fn empty_mailboxes(&mut self) {
         if !self.can.unplugged {
             let now_us = self.now_us();
             let waiting = self.can.waiting.drain(..);
@@ -221,12 +221,12 @@ impl<const N: usize> TestHardware<N> {
     }
 
     /// Reception of frames.
-    pub fn reception(&self) -> core::cell::RefMut<'_, Reception> {
+    pub(crate) fn reception(&self) -> core::cell::RefMut<'_, Reception> {
         self.reception.as_ref().expect("a bus").borrow_mut()
     }
 
     /// Whether any outputs are on.
-    pub fn is_enabled(&self) -> bool {
+    pub(crate) fn is_enabled(&self) -> bool {
         self.bridges.iter().any(|bridge| bridge.enabled)
     }
 

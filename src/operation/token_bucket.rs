@@ -16,7 +16,7 @@ const LONGEST_US: u64 = 100_000;
 
 /// Balance of processor time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TokenBucket {
+pub(crate) struct TokenBucket {
     left_us: i64,
     /// Times of the last increase and the last payment.
     refilled_us: u64,
@@ -36,26 +36,26 @@ impl TokenBucket {
     }
 
     /// Credits the time since the last call; work from now on has to be paid.
-    pub fn refill(&mut self, now_us: u64) {
+    pub(crate) fn refill(&mut self, now_us: u64) {
         self.left_us = (self.left_us + between(self.refilled_us, now_us)).min(MOST_US);
         (self.refilled_us, self.spent_us) = (now_us, now_us);
     }
 
     /// Pays for the time since the last payment.
-    pub fn spend(&mut self, now_us: u64) {
+    pub(crate) fn spend(&mut self, now_us: u64) {
         self.left_us = (self.left_us - COSTS * between(self.spent_us, now_us)).max(DEBT_US);
         self.spent_us = now_us;
     }
 
     /// Returns whether work may start.
     #[must_use]
-    pub const fn may_start(&self) -> bool {
+    pub(crate) const fn may_start(&self) -> bool {
         self.left_us >= 0
     }
 
     /// Returns whether started work may continue. Many cheap frames in one round cost less than one by one.
     #[must_use]
-    pub const fn may_continue(&self) -> bool {
+    pub(crate) const fn may_continue(&self) -> bool {
         self.left_us > -MOST_US
     }
 }

@@ -35,9 +35,9 @@ const REACTION_S: f32 = 0.04;
 /// Largest share of the speed limit at which a joint beyond its range is brought back.
 const RETURN_SHARE: f32 = 0.25;
 /// Commanded return speed of a joint that was enabled outside its range, rad/s.
-pub const RETURN_SPEED: f32 = 0.1;
+pub(crate) const RETURN_SPEED: f32 = 0.1;
 /// Share of the torque cap available to a returning joint.
-pub const RETURN_TORQUE: f32 = 0.25;
+pub(crate) const RETURN_TORQUE: f32 = 0.25;
 /// Speed above which the returning joint is braked, rad/s: twice the commanded speed, so that torque remains
 /// at that speed.
 const RETURN_BOUND: f32 = 2.0 * RETURN_SPEED;
@@ -50,9 +50,9 @@ pub struct Limited {
     /// The joint would have exceeded its speed limit.
     pub speed: bool,
     /// The torque or its current was above the cap.
-    pub torque: bool,
+    pub(crate) torque: bool,
     /// The torque exceeded the derated cap.
-    pub derated: bool,
+    pub(crate) derated: bool,
 }
 
 impl Limited {
@@ -100,7 +100,7 @@ impl Barrier {
 
     /// Sets the derating: shares of the cap for a torque that drives the joint and for one that the joint
     /// drives.
-    pub fn derate(&mut self, shares: [f32; 2]) {
+    pub(crate) fn derate(&mut self, shares: [f32; 2]) {
         self.left_nm = shares.map(|share| share * self.cap_nm);
     }
 
@@ -147,14 +147,14 @@ impl Barrier {
 
     /// Whether a joint stops before a fault of its range: `margin` beyond its ends, at its present velocity.
     #[must_use]
-    pub fn stops_in_range(&self, position: Radian, velocity: RadianPerSecond, margin: Radian) -> bool {
+    pub(crate) fn stops_in_range(&self, position: Radian, velocity: RadianPerSecond, margin: Radian) -> bool {
         let most = |end_is_at: f32| self.approach_speed(end_is_at + margin.0).0;
         velocity.0 <= most(self.high_rad - position.0) && -velocity.0 <= most(position.0 - self.low_rad)
     }
 
     /// Adds all values to a checksum, except those that derating changes.
     #[must_use]
-    pub fn add_to(&self, sum: Checksum) -> Checksum {
+    pub(crate) fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad, .. } = *self;
         sum.numbers([low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad]).numbers([
             self.twice_braking_rad_per_s2,
@@ -166,7 +166,7 @@ impl Barrier {
 
     /// The torque that opposes the joint's velocity, under the cap.
     #[must_use]
-    pub fn damp(&self, velocity: RadianPerSecond) -> NewtonMetre {
+    pub(crate) fn damp(&self, velocity: RadianPerSecond) -> NewtonMetre {
         NewtonMetre(-self.damping_nm_s_per_rad * velocity.0).limited(NewtonMetre(self.cap_nm))
     }
 

@@ -10,7 +10,7 @@
 
 /// Counters of `N` axes and `M` priority levels at the last feed of the watchdog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CheckIns<const N: usize, const M: usize> {
+pub(crate) struct CheckIns<const N: usize, const M: usize> {
     before: ([u32; N], [u32; M]),
 }
 
@@ -22,7 +22,7 @@ impl<const N: usize, const M: usize> CheckIns<N, M> {
     }
 
     /// Returns whether every counter has moved since this last returned true. Counters wrap.
-    pub fn all(&mut self, counts: ([u32; N], [u32; M])) -> bool {
+    pub(crate) fn all(&mut self, counts: ([u32; N], [u32; M])) -> bool {
         let now = counts.0.iter().chain(&counts.1);
         let all = now.zip(self.before.0.iter().chain(&self.before.1)).all(|(now, before)| now != before);
         if all {
@@ -32,14 +32,14 @@ impl<const N: usize, const M: usize> CheckIns<N, M> {
     }
 }
 
-/// Rate at which [`TickGuard::check`] is called.
+/// Rate at which `TickGuard::check` is called.
 pub const GUARD_RATE_HZ: u32 = 2000;
 
 /// Checks from a lower priority level that the current ticks of `N` axes go on. If all of them stop, no code
 /// at their level can notice, and the bridges hold their last duties. A turning rotor then exceeds the torque
 /// cap within 3 ms. Detected within 1 ms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct TickGuard<const N: usize> {
+pub(crate) struct TickGuard<const N: usize> {
     before: Option<[u32; N]>,
 }
 

@@ -47,11 +47,11 @@ listed! {
         BusLow = 6, "bus_low";
         /// The bus voltage is high.
         BusHigh = 7, "bus_high";
-        /// The motor's winding is hot ([`super::Winding`]).
+        /// The motor's winding is hot (`Winding`).
         Winding = 8, "winding";
         /// The motor's rotor angle is stored and has not been proven by a motion (`motor::Axis`).
         FirstMotion = 9, "first_motion";
-        /// The current from the supply is near its limit ([`super::SupplyCurrent`]).
+        /// The current from the supply is near its limit (`SupplyCurrent`).
         SupplyCurrent = 10, "supply_current";
         /// The current into the supply is near its limit.
         ChargeCurrent = 11, "charge_current";
@@ -63,12 +63,6 @@ listed! {
 pub struct LimitCodes(u16);
 
 impl LimitCodes {
-    /// Returns the bit set.
-    #[must_use]
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
     /// Returns whether the set contains a code.
     #[must_use]
     pub const fn contains(self, code: LimitCode) -> bool {
@@ -83,13 +77,13 @@ impl LimitCodes {
 
     /// Removes the codes of another set.
     #[must_use]
-    pub const fn without(self, others: Self) -> Self {
+    pub(crate) const fn without(self, others: Self) -> Self {
         Self(self.0 & !others.0)
     }
 
     /// Returns the code with the lowest number.
     #[must_use]
-    pub fn first(self) -> Option<LimitCode> {
+    pub(crate) fn first(self) -> Option<LimitCode> {
         // Codes start at 1, so an empty set gives 15 or more, and no entry.
         LimitCode::ALL.get((self.0.trailing_zeros() as usize).wrapping_sub(1)).copied()
     }
@@ -126,14 +120,14 @@ impl LimitCodes {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointShares {
     /// Share that the winding's temperature permits.
-    pub winding: f32,
+    pub(crate) winding: f32,
     /// Share that is permitted until the rotor angle is proven, and while the limit rises afterwards.
-    pub first_motion: f32,
+    pub(crate) first_motion: f32,
 }
 
 impl JointShares {
     /// The whole cap.
-    pub const ALL: Self = Self { winding: 1.0, first_motion: 1.0 };
+    pub(crate) const ALL: Self = Self { winding: 1.0, first_motion: 1.0 };
     const NONE: Self = Self { winding: 0.0, first_motion: 0.0 };
 }
 
@@ -161,7 +155,7 @@ impl<const N: usize> Derating<N> {
 
     /// Shares of a joint for a torque that drives it and for one that it drives.
     #[must_use]
-    pub fn shares(&self, joint: usize) -> [f32; 2] {
+    pub(crate) fn shares(&self, joint: usize) -> [f32; 2] {
         let JointShares { winding, first_motion } = self.of_joint(joint);
         let both = self.bridge * winding * first_motion;
         let [draw, charge] = self.supply;
@@ -170,7 +164,7 @@ impl<const N: usize> Derating<N> {
 
     /// Share of a joint's current until its rotor angle is proven.
     #[must_use]
-    pub fn first_motion(&self, joint: usize) -> f32 {
+    pub(crate) fn first_motion(&self, joint: usize) -> f32 {
         self.of_joint(joint).first_motion
     }
 
@@ -181,7 +175,7 @@ impl<const N: usize> Derating<N> {
 
 /// Linear ramp from the full share to none.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ramp {
+pub(crate) struct Ramp {
     all: f32,
     per_unit: f32,
 }
@@ -197,7 +191,7 @@ impl Ramp {
     /// Remaining share at a value; 0 for NaN.
     #[must_use]
     #[inline(never)]
-    pub fn share(&self, value: f32) -> f32 {
+    pub(crate) fn share(&self, value: f32) -> f32 {
         let taken = (value - self.all) * self.per_unit;
         // NaN fails the comparison and takes the second branch.
         if taken < 1.0 { 1.0 - max(taken, 0.0) } else { 0.0 }
@@ -208,11 +202,11 @@ impl Ramp {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeratingRamps {
     /// Over the temperature of the hottest bridge, degrees Celsius.
-    pub temperature_c: Ramp,
+    pub(crate) temperature_c: Ramp,
     /// Over a falling bus voltage, V.
-    pub low: Ramp,
+    pub(crate) low: Ramp,
     /// Over a rising bus voltage, V.
-    pub high: Ramp,
+    pub(crate) high: Ramp,
 }
 
 impl DeratingRamps {
@@ -250,7 +244,7 @@ impl DeratingRamps {
 /// bridges turn off. Together with what a moving leg returns, that suffices to start damping. A bus that
 /// falls by less than a fifth per second is left to the ramp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SupplyWatch {
+pub(crate) struct SupplyWatch {
     slow_v: f32,
     fallen: u8,
 }
@@ -312,13 +306,12 @@ pub(crate) mod tests {
         let none = Limited::default();
         let usual = [JointShares::ALL];
         let hot = RAMPS.at(90.0, Volt(48.0), usual);
-        let of =
-            |limited: Limited, derating: &Derating<1>| LimitCodes::new(&limited, &HIP, derating, 0).bits();
+        let of = |limited: Limited, derating: &Derating<1>| LimitCodes::new(&limited, &HIP, derating, 0).0;
         assert_eq!(of(none, &hot), 0, "nothing was limited");
         assert_eq!(of(Limited { torque: true, ..none }, &Derating::NONE), 1 << 1);
         let weak = JointLimits { current: crate::units::Ampere(40.0), ..HIP };
         let codes = LimitCodes::new(&Limited { torque: true, ..none }, &weak, &Derating::<1>::NONE, 0);
-        assert_eq!(codes.bits(), 1 << 2);
+        assert_eq!(codes.0, 1 << 2);
         assert_eq!(of(Limited { speed: true, range: true, ..none }, &Derating::NONE), 1 << 3 | 1 << 4);
         assert_eq!(of(Limited { derated: true, ..none }, &hot), 1 << 5);
         assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(22.0), usual)), 1 << 6);

@@ -31,7 +31,7 @@ pub struct BrakeDelays {
 
 /// Command of a holding brake; see the module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct HoldingBrake {
+pub(crate) struct HoldingBrake {
     release_ticks: u32,
     engage_ticks: u32,
     /// Ticks in a row in which the drive was on and not about to turn off.
@@ -51,7 +51,7 @@ impl HoldingBrake {
 
     /// Takes the drive's state of this servo tick and returns whether the brake is released.
     #[must_use]
-    pub const fn follow(&mut self, state: DriveState) -> bool {
+    pub(crate) const fn follow(&mut self, state: DriveState) -> bool {
         let is_on = match state {
             DriveState::OperationEnabled => true,
             DriveState::QuickStopActive { remaining_ticks }
@@ -64,7 +64,7 @@ impl HoldingBrake {
 
     /// Returns whether the brake has been released for the time it needs to open.
     #[must_use]
-    pub const fn is_open(&self) -> bool {
+    pub(crate) const fn is_open(&self) -> bool {
         self.on_ticks > self.release_ticks + 1
     }
 }

@@ -13,7 +13,7 @@
 //! | [`ServoWatch`] | servo without a tick since its last request | three requests in a row |
 //!
 //! **Number of reads.** Off drops the leg, so a spike on a wire must not lead there. A line counts as active
-//! where [`READS`] reads in a row agree, 0.3 to 0.5 us on the board ([`stays_active`]).
+//! where 16 reads in a row agree, 0.3 to 0.5 us on the board ([`stays_active`]).
 //!
 //! | line | reads |
 //! | --- | --- |
@@ -36,11 +36,9 @@
 use super::fault::FaultCode;
 use crate::listed::listed;
 
-/// Reads of a line that must agree. The board's image spends 45 instructions between the first and the last:
-/// 0.27, 0.36, 0.54 us at 1.0, 1.34, 2.0 cycles per instruction of 168 MHz.
-pub const READS: u32 = 16;
-
-/// Returns whether a line is active in [`READS`] reads in a row; the first inactive read ends the check.
+/// Returns whether a line is active in 16 reads in a row; the first inactive read ends the check. The board's
+/// image spends 45 instructions between the first and the last: 0.27, 0.36, 0.54 us at 1.0, 1.34, 2.0 cycles
+/// per instruction of 168 MHz.
 #[inline(always)]
 pub fn stays_active(mut is_active: impl FnMut() -> bool) -> bool {
     // Written out: a loop around each of the sixteen reads doubles the time to an open contact.
@@ -146,7 +144,7 @@ impl InhibitReason {
 
     /// Reason that an axis (from 0) sets for its own fault. Only a switching axis leads to braking.
     #[must_use]
-    pub const fn from_axis_fault(axis: usize, code: FaultCode, switching: bool) -> Self {
+    pub(crate) const fn from_axis_fault(axis: usize, code: FaultCode, switching: bool) -> Self {
         match (code, axis) {
             (FaultCode::EncoderFrozen, _) if switching => Self::EncoderFrozen,
             (FaultCode::EncoderPosition, _) if switching => Self::EncoderPosition,
@@ -241,7 +239,7 @@ impl TickWatch {
 
 /// Checks that the servo answers each request for a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ServoWatch {
+pub(crate) struct ServoWatch {
     /// The servo's tick count at the last request; `None` before the first.
     ticks: Option<u32>,
     unanswered: u8,
@@ -289,8 +287,8 @@ mod tests {
             (believed, reads)
         };
         assert_eq!(read(0), (false, 1), "an inactive line costs one read");
-        assert_eq!([read(1), read(READS - 1)], [(false, 2), (false, READS)]);
-        assert_eq!([read(READS), read(u32::MAX)], [(true, READS); 2]);
+        assert_eq!([read(1), read(15)], [(false, 2), (false, 16)]);
+        assert_eq!([read(16), read(u32::MAX)], [(true, 16); 2]);
     }
 
     #[test]

@@ -21,9 +21,9 @@ pub struct JointLimits {
     /// Largest commanded speed; 1.1 times as much is a fault.
     pub speed: RadianPerSecond,
     /// Largest commanded torque.
-    pub torque: NewtonMetre,
+    pub(crate) torque: NewtonMetre,
     /// Largest commanded motor current.
-    pub current: Ampere,
+    pub(crate) current: Ampere,
     /// Joint torque per motor current; negative where the model's sign is opposite to the drive's.
     pub torque_per_ampere: NewtonMetrePerAmpere,
     /// Largest inertia that the joint moves, with rotor and distal links.
@@ -72,13 +72,13 @@ impl JointLimits {
     /// Assumed deceleration of the joint. A motion with less acceleration is never limited on its way to the
     /// end of the range.
     #[must_use]
-    pub fn braking_acceleration(&self) -> RadianPerSecondSquared {
+    pub(crate) fn braking_acceleration(&self) -> RadianPerSecondSquared {
         RadianPerSecondSquared(BRAKING_SHARE * self.torque_cap().0 / self.inertia.0)
     }
 
     /// Adds all values to a checksum.
     #[must_use]
-    pub fn add_to(&self, sum: Checksum) -> Checksum {
+    pub(crate) fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { low, high, speed, torque, current, torque_per_ampere, inertia } = *self;
         sum.numbers([low.0, high.0, speed.0, torque.0, current.0, torque_per_ampere.0, inertia.0])
     }

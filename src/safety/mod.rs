@@ -9,19 +9,19 @@
 //! | [`Limits`] | bounds of each joint; implausible values are refused by name |
 //! | [`DriveState`] | the states of CiA 402, one for the whole leg, and their transitions |
 //! | [`FaultCode`], [`Fault`], [`NoticeCode`] | faults with fixed numbers and the safe state of each |
-//! | [`StepGate`] | rejection of impossible encoder steps |
+//! | `StepGate` | rejection of impossible encoder steps |
 //! | [`Barrier`] | torque bounds that stop a joint before its range or speed limit |
 //! | [`DeratingRamps`], [`LimitCode`] | derating by temperature and bus voltage; codes of active limits |
-//! | [`Winding`] | temperature of a motor's winding, from its current |
+//! | `Winding` | temperature of a motor's winding, from its current |
 //! | [`Thermistor`] | temperature of a motor's winding, from a thermistor in it |
-//! | [`SupplyWatch`] | detection of a failing supply |
-//! | [`SupplyCurrent`] | estimate and limits of the current from the supply and into it |
-//! | [`Monitor`] | all of the above, once per tick |
-//! | [`HoldingBrake`] | command of a spring-applied brake |
+//! | `SupplyWatch` | detection of a failing supply |
+//! | `SupplyCurrent` | estimate and limits of the current from the supply and into it |
+//! | `Monitor` | all of the above, once per tick |
+//! | `HoldingBrake` | command of a spring-applied brake |
 //! | [`RefusalReason`] | reasons why enabling is refused |
-//! | [`InhibitReason`], [`TickWatch`], [`ServoWatch`] | inhibit reasons; checks of every current tick |
-//! | [`CheckIns`], [`TickGuard`] | check-ins that the watchdog requires; stopped current ticks |
-//! | [`CheckClock`] | periodic checks: gate drivers' registers, temperatures |
+//! | [`InhibitReason`], [`TickWatch`], `ServoWatch` | inhibit reasons; checks of every current tick |
+//! | `CheckIns`, `TickGuard` | check-ins that the watchdog requires; stopped current ticks |
+//! | `CheckClock` | periodic checks: gate drivers' registers, temperatures |
 //!
 //! Safe states: *Off* turns the bridges' outputs off in the same tick. *Damp* opposes every joint's velocity
 //! under its torque cap for at most 300 ms, then goes to Off. *Limit* stays enabled with less torque than
@@ -34,34 +34,44 @@
 //! the board's. docs/safety.md lists what is not detected, docs/results/faults.md the measurements. No
 //! conformity with any safety standard is claimed.
 
-pub mod barrier;
-pub mod check_in;
+pub(crate) mod barrier;
+pub(crate) mod check_in;
 pub mod derating;
 pub mod fault;
-pub mod holding_brake;
-pub mod interlock;
+pub(crate) mod holding_brake;
+pub(crate) mod interlock;
 pub mod limits;
-pub mod monitor;
-pub mod periodic_checks;
-pub mod refusal;
+pub(crate) mod monitor;
+pub(crate) mod periodic_checks;
+pub(crate) mod refusal;
 pub mod state;
-pub mod step_gate;
-pub mod supply_current;
+pub(crate) mod step_gate;
+pub(crate) mod supply_current;
 pub mod thermistor;
 pub mod winding;
 
-pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
-pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
-pub use derating::{Derating, DeratingRamps, JointShares, LimitCode, LimitCodes, Ramp, SupplyWatch};
+pub use barrier::{Barrier, Limited};
+pub(crate) use barrier::{RETURN_SPEED, RETURN_TORQUE};
+pub use check_in::GUARD_RATE_HZ;
+pub(crate) use check_in::{CheckIns, TickGuard};
+pub(crate) use derating::{Derating, SupplyWatch};
+pub use derating::{DeratingRamps, JointShares, LimitCode, LimitCodes};
 pub use fault::{Fault, FaultCode, NO_ERROR, NoticeCode, Reaction};
-pub use holding_brake::{BrakeDelays, HoldingBrake};
-pub use interlock::{Bridges, InhibitReason, ServoWatch, TickState, TickWatch, stays_active};
-pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
-pub use monitor::{Decision, Monitor, Observation, RANGE_TOLERANCE, Request};
-pub use periodic_checks::{BoardFault, CheckClock, of_temperature};
+pub use holding_brake::BrakeDelays;
+pub(crate) use holding_brake::HoldingBrake;
+pub(crate) use interlock::ServoWatch;
+pub use interlock::{Bridges, InhibitReason, TickState, TickWatch, stays_active};
+pub(crate) use limits::LimitsError;
+pub use limits::{JointLimits, LimitQuantity, Limits};
+pub use monitor::{Decision, RANGE_TOLERANCE};
+pub(crate) use monitor::{Monitor, Observation, Request};
+pub(crate) use periodic_checks::{BoardFault, CheckClock, of_temperature};
 pub use refusal::{Refusal, RefusalReason};
-pub use state::{DriveState, Event, Permission, PowerRequest};
-pub use step_gate::{Reading, StepGate};
-pub use supply_current::{SupplyCurrent, SupplyLimits};
+pub(crate) use state::Event;
+pub use state::{DriveState, Permission, PowerRequest};
+pub(crate) use step_gate::{Reading, StepGate};
+pub(crate) use supply_current::SupplyCurrent;
+pub use supply_current::SupplyLimits;
 pub use thermistor::Thermistor;
-pub use winding::{Winding, WindingRating};
+pub(crate) use winding::Winding;
+pub use winding::WindingRating;

@@ -50,31 +50,31 @@ const RETURNED: Radian = Radian(0.001_745);
 
 /// Measurements of `N` joints, in the model's angle and sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observation<const N: usize> {
+pub(crate) struct Observation<const N: usize> {
     /// Joint angles.
-    pub position: [Radian; N],
+    pub(crate) position: [Radian; N],
     /// Joint velocities.
-    pub velocity: [RadianPerSecond; N],
+    pub(crate) velocity: [RadianPerSecond; N],
     /// Measured motor currents, in the drive's sign.
-    pub current: [Ampere; N],
+    pub(crate) current: [Ampere; N],
     /// Encoder readings of this tick that were impossible and not used.
-    pub rejected: [bool; N],
+    pub(crate) rejected: [bool; N],
 }
 
 /// Requested torques and state change of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Request<const N: usize> {
+pub(crate) struct Request<const N: usize> {
     /// Joint torques in the model's sign.
-    pub torque: [NewtonMetre; N],
+    pub(crate) torque: [NewtonMetre; N],
     /// Request of the operator, given in one tick only.
-    pub power: Option<PowerRequest>,
+    pub(crate) power: Option<PowerRequest>,
 }
 
 /// Decision of the monitor at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision<const N: usize> {
     /// Final command to the drives.
-    pub command: DriveCommand<N>,
+    pub(crate) command: DriveCommand<N>,
     /// State that permitted the command.
     pub state: DriveState,
     /// Torques of the command in the model's sign; zero where off.
@@ -84,14 +84,14 @@ pub struct Decision<const N: usize> {
     /// Fault detected at this tick.
     pub fault: Option<Fault>,
     /// Why a request to enable was refused at this tick.
-    pub refused: Option<Refusal>,
+    pub(crate) refused: Option<Refusal>,
     /// Joints that are returning into their range.
     pub returns: [bool; N],
 }
 
 /// The monitor of one leg; see the module's steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Monitor<const N: usize> {
+pub(crate) struct Monitor<const N: usize> {
     limits: Limits<N>,
     barriers: [Barrier; N],
     ampere_per_nm: [f32; N],
@@ -138,7 +138,7 @@ impl<const N: usize> Monitor<N> {
 
     /// Checksum over all constants: limits, values derived from them, times.
     #[must_use]
-    pub fn checksum(&self) -> Checksum {
+    pub(crate) fn checksum(&self) -> Checksum {
         let limits = self.limits.joints().iter().fold(Checksum::EMPTY, |sum, joint| joint.add_to(sum));
         let barriers = self.barriers.iter().fold(limits, |sum, barrier| barrier.add_to(sum));
         barriers
@@ -151,14 +151,14 @@ impl<const N: usize> Monitor<N> {
 
     /// Reports a fault from outside; the next tick treats it like one of the monitor's own detectors. One
     /// whose reaction is Off is not replaced.
-    pub fn report(&mut self, fault: Fault) {
+    pub(crate) fn report(&mut self, fault: Fault) {
         if self.reported.is_none_or(|before| before.code.reaction() != Reaction::Off) {
             self.reported = Some(fault);
         }
     }
 
     /// Sets the derating of each joint's torque cap from the next tick on.
-    pub fn derate(&mut self, derating: &Derating<N>) {
+    pub(crate) fn derate(&mut self, derating: &Derating<N>) {
         if self.derating != *derating {
             self.derating = *derating;
             for (joint, barrier) in self.barriers.iter_mut().enumerate() {
@@ -168,19 +168,19 @@ impl<const N: usize> Monitor<N> {
     }
 
     /// Selects the joints that may be enabled outside their range; all by default.
-    pub const fn permit_return(&mut self, joints: [bool; N]) {
+    pub(crate) const fn permit_return(&mut self, joints: [bool; N]) {
         self.may_return = joints;
     }
 
     /// Joints that are returning into their range.
     #[must_use]
-    pub fn returns(&self) -> [bool; N] {
+    pub(crate) fn returns(&self) -> [bool; N] {
         self.returns.map(|ends| ends.is_some() && self.state.is_enabled())
     }
 
     /// Codes of the limits that a decision applied to each joint.
     #[must_use]
-    pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
+    pub(crate) fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
         core::array::from_fn(|joint| {
             LimitCodes::new(&decision.limited[joint], &self.limits.joints()[joint], &self.derating, joint)
         })
@@ -199,14 +199,14 @@ impl<const N: usize> Monitor<N> {
     }
 
     /// Resets to the state after start: drive off, no rejected reading. A fault stays until its reset.
-    pub const fn restart(&mut self) {
+    pub(crate) const fn restart(&mut self) {
         (self.state, self.glitches) = (self.state.at_rest(), [0; N]);
         self.returns = [None; N];
     }
 
     /// Runs instead of [`Self::decide`] while the joints have no valid readings; `resets` requests the reset
     /// of a fault. Returns a new fault.
-    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
+    pub(crate) fn stand_by(&mut self, resets: bool) -> Option<Fault> {
         let fault = self.reported.take();
         self.state = match (fault, self.state.at_rest()) {
             (Some(fault), state) => state.after(Event::Failed(fault), 0),
@@ -218,7 +218,7 @@ impl<const N: usize> Monitor<N> {
 
     /// Decides one tick.
     #[must_use]
-    pub fn decide(&mut self, observation: &Observation<N>, request: &Request<N>) -> Decision<N> {
+    pub(crate) fn decide(&mut self, observation: &Observation<N>, request: &Request<N>) -> Decision<N> {
         let fault = self.detect(observation, request);
         let mut refused = None;
         self.state = match fault {

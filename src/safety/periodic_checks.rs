@@ -22,7 +22,7 @@ use crate::listed::listed;
 listed! {
     /// Faults that other levels of the board detect and the servo reacts to.
     #[repr(u8)]
-    pub enum BoardFault {
+    pub(crate) enum BoardFault {
         /// All faults, in the order of their bits.
         ALL;
         /// Current ticks are missing.
@@ -43,13 +43,13 @@ listed! {
 impl BoardFault {
     /// Bit of the fault.
     #[must_use]
-    pub const fn bit(self) -> u32 {
+    pub(crate) const fn bit(self) -> u32 {
         1 << self as u8
     }
 
     /// Code of the fault.
     #[must_use]
-    pub const fn code(self) -> FaultCode {
+    pub(crate) const fn code(self) -> FaultCode {
         match self {
             Self::CurrentTicks => FaultCode::CurrentTicks,
             Self::Temperature => FaultCode::Temperature,
@@ -63,7 +63,7 @@ impl BoardFault {
 
 /// Schedule of the checks; counts rounds of the housekeeping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CheckClock {
+pub(crate) struct CheckClock {
     gate_rounds: u32,
     temperature_rounds: u32,
     round: u32,
@@ -71,13 +71,13 @@ pub struct CheckClock {
 
 /// Checks that are due in a round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Due {
+pub(crate) struct Due {
     /// Read the gate drivers' registers.
-    pub gates: bool,
+    pub(crate) gates: bool,
     /// Read the absolute encoders.
-    pub encoders: bool,
+    pub(crate) encoders: bool,
     /// Read the thermistors.
-    pub temperatures: bool,
+    pub(crate) temperatures: bool,
 }
 
 impl CheckClock {
@@ -88,7 +88,7 @@ impl CheckClock {
     }
 
     /// Counts one round and returns the checks due in it.
-    pub const fn next(&mut self) -> Due {
+    pub(crate) const fn next(&mut self) -> Due {
         self.round = self.round.wrapping_add(1);
         Due {
             gates: self.round.is_multiple_of(self.gate_rounds),
@@ -102,7 +102,7 @@ impl CheckClock {
 /// Fault for a bridge's temperature, if any. Temperature and limit `hottest` in degrees Celsius; `None` for a
 /// thermistor that is open or shorted.
 #[must_use]
-pub fn of_temperature(degrees: Option<f32>, hottest: f32) -> Option<BoardFault> {
+pub(crate) fn of_temperature(degrees: Option<f32>, hottest: f32) -> Option<BoardFault> {
     match degrees {
         None => Some(BoardFault::Thermistor),
         Some(degrees) if degrees < hottest => None,

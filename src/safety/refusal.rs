@@ -10,14 +10,14 @@ use crate::listed::listed;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Refusal {
     /// Counted from 0; [`Self::LEG`] for the whole leg.
-    pub joint: u8,
+    pub(crate) joint: u8,
     /// Why the request was refused.
-    pub reason: RefusalReason,
+    pub(crate) reason: RefusalReason,
 }
 
 impl Refusal {
     /// Value of `joint` for the whole leg.
-    pub const LEG: u8 = u8::MAX;
+    pub(crate) const LEG: u8 = u8::MAX;
 
     /// Joint counted from 1; 0 for the leg.
     #[must_use]

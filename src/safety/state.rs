@@ -79,14 +79,14 @@ pub enum PowerRequest {
 impl PowerRequest {
     /// Returns whether the request is a step towards enabled.
     #[must_use]
-    pub const fn enables(self) -> bool {
+    pub(crate) const fn enables(self) -> bool {
         matches!(self, Self::Shutdown | Self::SwitchOn | Self::EnableOperation)
     }
 }
 
 /// Event that may change the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
+pub(crate) enum Event {
     /// A tick without a new fault.
     Tick,
     /// A request of the operator.
@@ -145,7 +145,7 @@ impl DriveState {
 
     /// The state after an event; damping lasts `damp_ticks`.
     #[must_use]
-    pub const fn after(self, event: Event, damp_ticks: u32) -> Self {
+    pub(crate) const fn after(self, event: Event, damp_ticks: u32) -> Self {
         match event {
             Event::Tick => self.after_tick(),
             Event::Requested(request) => self.after_request(request, damp_ticks),

@@ -8,7 +8,7 @@
 
 /// Verdict on a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reading {
+pub(crate) enum Reading {
     /// The joint can make this step.
     Good,
     /// Impossible step; ignore the reading.
@@ -19,7 +19,7 @@ pub enum Reading {
 
 /// Judges the readings of one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StepGate {
+pub(crate) struct StepGate {
     largest_step: u32,
     last: Option<i32>,
     rejected: u32,
@@ -33,13 +33,13 @@ impl StepGate {
     }
 
     /// Forgets all readings.
-    pub const fn restart(&mut self) {
+    pub(crate) const fn restart(&mut self) {
         (self.last, self.rejected) = (None, 0);
     }
 
     /// Checks one reading; the first is always good.
     #[must_use]
-    pub fn judge(&mut self, counts: i32) -> Reading {
+    pub(crate) fn judge(&mut self, counts: i32) -> Reading {
         let step = counts.wrapping_sub(self.last.unwrap_or(counts)).unsigned_abs();
         let reading = if step <= self.largest_step.saturating_mul(self.rejected + 1) {
             Reading::Good

@@ -96,7 +96,7 @@ impl Direction {
 
 /// Estimate and limits of the supply current; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SupplyCurrent {
+pub(crate) struct SupplyCurrent {
     draw: Direction,
     charge: Direction,
     /// Current into the bridges, A, low-passed.
@@ -170,13 +170,13 @@ impl SupplyCurrent {
 
     /// Least duty of the brake resistor.
     #[must_use]
-    pub fn brake_duty(&self) -> f32 {
+    pub(crate) fn brake_duty(&self) -> f32 {
         self.brake_duty
     }
 
     /// Shares of a torque that drives a joint and of one that a joint drives.
     #[must_use]
-    pub fn shares(&self) -> [f32; 2] {
+    pub(crate) fn shares(&self) -> [f32; 2] {
         [self.draw.share, self.charge.share]
     }
 }

@@ -62,7 +62,7 @@ impl WindingRating {
 
 /// Thermal model of one winding; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Winding {
+pub(crate) struct Winding {
     rating: WindingRating,
     temperature_c: f32,
     /// Rounding error of the temperature, added to the next step, K.
@@ -92,7 +92,7 @@ impl Winding {
     /// Whether an assumption so many seconds ago does not matter any more: after three time constants 5 % of
     /// its error are left.
     #[must_use]
-    pub fn has_forgotten(&self, seconds: f32) -> bool {
+    pub(crate) fn has_forgotten(&self, seconds: f32) -> bool {
         seconds > 3.0 * self.rating.time_s
     }
 
@@ -101,7 +101,7 @@ impl Winding {
     ///
     /// Copper, after IEC 60034-1: `T = ratio (235 + T_then) - 235`. Resistances agree within 2 %, which is 6
     /// K; so much is added.
-    pub fn measured(&mut self, ratio: f32, then_c: f32) {
+    pub(crate) fn measured(&mut self, ratio: f32, then_c: f32) {
         let celsius = ratio * (COPPER_C + then_c) - COPPER_C + MEASURED_K;
         if is_finite(celsius) {
             (self.temperature_c, self.rest_c) = (max(celsius, self.rating.ambient_c), 0.0);
@@ -110,7 +110,7 @@ impl Winding {
 
     /// Raises the temperature to that of a thermistor, degrees Celsius; a colder one, or NaN, changes
     /// nothing.
-    pub fn at_least(&mut self, celsius: f32) {
+    pub(crate) fn at_least(&mut self, celsius: f32) {
         if celsius > self.temperature_c {
             (self.temperature_c, self.rest_c) = (celsius, 0.0);
         }
@@ -124,13 +124,13 @@ impl Winding {
 
     /// Whether the winding reached its limit; true for NaN.
     #[must_use]
-    pub fn is_too_hot(&self) -> bool {
+    pub(crate) fn is_too_hot(&self) -> bool {
         !(self.temperature_c < self.rating.limit_c)
     }
 
     /// Remaining share of the torque cap, 0..=1; 0 for NaN.
     #[must_use]
-    pub fn share(&self) -> f32 {
+    pub(crate) fn share(&self) -> f32 {
         clamp((self.rating.limit_c - self.temperature_c) / RAMP_K, 0.0, 1.0)
     }
 }

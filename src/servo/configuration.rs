@@ -21,7 +21,7 @@ pub struct JointConfiguration {
     pub current: Ampere,
     /// Largest inertia that the joint moves, including the rotor and the links beyond it.
     pub inertia: KilogramMetreSquared,
-    /// Bandwidth of the position loop, 0.5..=8 Hz; see [`super::ControllerGains`].
+    /// Bandwidth of the position loop, 0.5..=8 Hz; see `ControllerGains`.
     pub bandwidth: Hertz,
 }
 

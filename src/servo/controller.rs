@@ -36,7 +36,7 @@ const GAIN_PER_INTEGRAL: f32 = 8.0;
 
 /// Gains of one joint; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ControllerGains {
+pub(crate) struct ControllerGains {
     position_per_s: f32,
     damping_nm_s_per_rad: f32,
     integral_nm_per_rad_s: f32,
@@ -60,27 +60,27 @@ impl ControllerGains {
 
     /// Returns the gains of the same joint with another bandwidth.
     #[must_use]
-    pub fn with_bandwidth(&self, bandwidth: Hertz) -> Self {
+    pub(crate) fn with_bandwidth(&self, bandwidth: Hertz) -> Self {
         let inertia = self.damping_nm_s_per_rad / (DAMPING_PER_GAIN * self.position_per_s);
         Self::new(KilogramMetreSquared(inertia), bandwidth, NewtonMetre(self.cap_nm))
     }
 
     /// Adds all gains to a checksum.
     #[must_use]
-    pub fn add_to(&self, sum: Checksum) -> Checksum {
+    pub(crate) fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { position_per_s, damping_nm_s_per_rad, integral_nm_per_rad_s, cap_nm } = *self;
         sum.numbers([position_per_s, damping_nm_s_per_rad, integral_nm_per_rad_s, cap_nm])
     }
 
     /// Torque per velocity error, N m s/rad.
     #[must_use]
-    pub fn damping_nm_s_per_rad(&self) -> f32 {
+    pub(crate) fn damping_nm_s_per_rad(&self) -> f32 {
         self.damping_nm_s_per_rad
     }
 
     /// Torque per position error without the integral, N m/rad.
     #[must_use]
-    pub fn stiffness_nm_per_rad(&self) -> f32 {
+    pub(crate) fn stiffness_nm_per_rad(&self) -> f32 {
         self.damping_nm_s_per_rad * self.position_per_s
     }
 }
@@ -94,7 +94,7 @@ pub struct Controller {
 impl Controller {
     /// Feedback torque for errors of position and velocity (commanded minus estimated).
     #[must_use]
-    pub fn torque(
+    pub(crate) fn torque(
         &self,
         gains: &ControllerGains,
         position_error: Radian,
@@ -105,7 +105,7 @@ impl Controller {
     }
 
     /// Updates the integral from the wanted and the applied torque.
-    pub fn settle(
+    pub(crate) fn settle(
         &mut self,
         gains: &ControllerGains,
         position_error: Radian,
@@ -121,19 +121,13 @@ impl Controller {
     }
 
     /// Sets the integral to this torque, within its cap.
-    pub fn preset(&mut self, gains: &ControllerGains, torque: NewtonMetre) {
+    pub(crate) fn preset(&mut self, gains: &ControllerGains, torque: NewtonMetre) {
         self.integral_nm = clamp(torque.0, -gains.cap_nm, gains.cap_nm);
     }
 
     /// Empties the integral.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.integral_nm = 0.0;
-    }
-
-    /// Torque of the integral.
-    #[must_use]
-    pub fn integral(&self) -> NewtonMetre {
-        NewtonMetre(self.integral_nm)
     }
 }
 
@@ -173,18 +167,18 @@ mod tests {
         let mut controller = Controller::default();
         let error = Radian(0.1);
         controller.settle(&gains, error, NewtonMetre(150.0), NewtonMetre(100.0));
-        assert_eq!(controller.integral(), NewtonMetre::ZERO);
+        assert_eq!(NewtonMetre(controller.integral_nm), NewtonMetre::ZERO);
         controller.settle(&gains, error, NewtonMetre(90.0), NewtonMetre(90.0));
-        let grown = controller.integral();
+        let grown = NewtonMetre(controller.integral_nm);
         assert!(grown.0 > 0.0);
         // Shrinking is always allowed.
         controller.settle(&gains, -error, NewtonMetre(150.0), NewtonMetre(100.0));
-        assert!(controller.integral() < grown);
+        assert!(NewtonMetre(controller.integral_nm) < grown);
         for _ in 0..1_000_000 {
             controller.settle(&gains, error, NewtonMetre(90.0), NewtonMetre(90.0));
         }
-        assert_eq!(controller.integral(), NewtonMetre(100.0));
+        assert_eq!(NewtonMetre(controller.integral_nm), NewtonMetre(100.0));
         controller.reset();
-        assert_eq!(controller.integral(), NewtonMetre::ZERO);
+        assert_eq!(NewtonMetre(controller.integral_nm), NewtonMetre::ZERO);
     }
 }

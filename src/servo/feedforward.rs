@@ -10,19 +10,20 @@ use crate::units::RadianPerSecond;
 /// Commanded speed below which Coulomb friction fades to zero: 0.02 rad/s (1.1 degrees/s). Without it the
 /// torque would jump by twice the Coulomb torque at every reversal. With it the rise lasts 2 * 0.02 rad/s
 /// over the acceleration there (40 ms at 1 rad/s^2), and the drive is quiet while a pose is held.
-pub const COULOMB_BAND: RadianPerSecond = RadianPerSecond(0.02);
+pub(crate) const COULOMB_BAND: RadianPerSecond = RadianPerSecond(0.02);
 
 /// Interface of a model for the servo: torques that move `N` joints as commanded, model's angles and signs.
 pub trait TorqueModel<const N: usize> {
     /// Joint torques, N m, for angles `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s^2)
-    /// with `gravity` in the base frame (m/s^2); friction included, its Coulomb part with [`smoothed_sign`].
+    /// with `gravity` in the base frame (m/s^2); friction included, its Coulomb part with `smoothed_sign`.
     fn torques(&self, q: &[f32; N], qd: &[f32; N], qdd: &[f32; N], gravity: [f32; 3]) -> [f32; N];
 }
 
 /// Absent model: feedback does all the work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NoModel;
+#[cfg(test)]
+pub(crate) struct NoModel;
 
+#[cfg(test)]
 impl<const N: usize> TorqueModel<N> for NoModel {
     fn torques(&self, _: &[f32; N], _: &[f32; N], _: &[f32; N], _: [f32; 3]) -> [f32; N] {
         [0.0; N]
@@ -32,14 +33,14 @@ impl<const N: usize> TorqueModel<N> for NoModel {
 /// Sign of a commanded velocity, smooth within [`COULOMB_BAND`]: `x (3 - x^2) / 2`, x = velocity / band,
 /// limited to -1 and 1 outside; value and slope are continuous.
 #[must_use]
-pub fn smoothed_sign(velocity: RadianPerSecond) -> f32 {
+pub(crate) fn smoothed_sign(velocity: RadianPerSecond) -> f32 {
     let x = clamp(velocity.0 * (1.0 / COULOMB_BAND.0), -1.0, 1.0);
     x * (1.5 - 0.5 * x * x)
 }
 
 /// Torques of the model for a commanded motion, N m; zero without a model.
 #[must_use]
-pub fn feedforward_nm<const N: usize, M: TorqueModel<N>>(
+pub(crate) fn feedforward_nm<const N: usize, M: TorqueModel<N>>(
     model: Option<&M>,
     motion: &MotionState<N>,
     gravity: [f32; 3],

@@ -35,7 +35,7 @@ pub struct LogSample<const N: usize> {
 
 /// Collects ticks into a logged sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LogAverager<const N: usize> {
+pub(crate) struct LogAverager<const N: usize> {
     first: [i32; N],
     /// Sums of counts minus `first`.
     counts: [i32; N],
@@ -45,10 +45,10 @@ pub struct LogAverager<const N: usize> {
 
 impl<const N: usize> LogAverager<N> {
     /// Averager without ticks.
-    pub const EMPTY: Self = Self { first: [0; N], counts: [0; N], current_a: [0.0; N], collected: 0 };
+    pub(crate) const EMPTY: Self = Self { first: [0; N], counts: [0; N], current_a: [0.0; N], collected: 0 };
 
     /// Takes one tick; true at every eighth.
-    pub fn collect(&mut self, sample: &Sample<N>) -> bool {
+    pub(crate) fn collect(&mut self, sample: &Sample<N>) -> bool {
         if self.collected == 0 {
             *self = Self { first: sample.joints.map(|joint| joint.encoder_counts), ..Self::EMPTY };
         }
@@ -67,7 +67,7 @@ impl<const N: usize> LogAverager<N> {
 
     /// Means of eight ticks, the last of which is `tick`.
     #[must_use]
-    pub fn means(&self, tick: u32, scales: &[JointScale; N]) -> LogSample<N> {
+    pub(crate) fn means(&self, tick: u32, scales: &[JointScale; N]) -> LogSample<N> {
         const SHARE: f32 = 1.0 / TICKS_PER_LOG as f32;
         let mean_counts = |joint: usize| self.first[joint] as f32 + self.counts[joint] as f32 * SHARE;
         let eightfold = |joint: usize| self.first[joint].wrapping_mul(TICKS_PER_LOG as i32);

@@ -31,11 +31,11 @@ use crate::units::Hertz;
 
 /// Bandwidth used by the servo. Half of it would double the delay and use up the controller's margin, twice
 /// would double its noise.
-pub const OBSERVER_BANDWIDTH: Hertz = Hertz(100.0);
+pub(crate) const OBSERVER_BANDWIDTH: Hertz = Hertz(100.0);
 
 /// Constants of the loop, for one bandwidth at the servo's rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObserverGains {
+pub(crate) struct ObserverGains {
     position: f32,
     velocity_per_s: f32,
 }
@@ -51,7 +51,7 @@ impl ObserverGains {
 
 /// Estimated state of one joint, in counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Observer {
+pub(crate) struct Observer {
     /// Last reading that was used; `None` before the first.
     reading: Option<i32>,
     /// Estimated position minus that reading, counts.
@@ -61,7 +61,7 @@ pub struct Observer {
 
 impl Observer {
     /// Runs one tick with a reading; `acceleration` is the commanded one in counts/s^2, or 0.
-    pub fn update(&mut self, gains: &ObserverGains, reading: i32, acceleration: f32) {
+    pub(crate) fn update(&mut self, gains: &ObserverGains, reading: i32, acceleration: f32) {
         let Some(last) = self.reading else {
             return self.reseat(reading);
         };
@@ -74,33 +74,33 @@ impl Observer {
 
     /// Runs one tick without a reading.
     #[inline]
-    pub fn coast(&mut self, acceleration: f32) {
+    pub(crate) fn coast(&mut self, acceleration: f32) {
         self.deviation += TICK_S * (self.velocity_per_s + 0.5 * TICK_S * acceleration);
         self.velocity_per_s += TICK_S * acceleration;
     }
 
     /// Moves the position to a new count; the velocity stays.
-    pub fn reseat(&mut self, reading: i32) {
+    pub(crate) fn reseat(&mut self, reading: i32) {
         self.reading = Some(reading);
         self.deviation = 0.0;
     }
 
     /// Estimated position in counts; exact up to 2^24.
     #[must_use]
-    pub fn position_counts(&self) -> f32 {
+    pub(crate) fn position_counts(&self) -> f32 {
         self.reading.unwrap_or(0) as f32 + self.deviation
     }
 
     /// Estimated position, rounded to a whole count.
     #[must_use]
-    pub fn nearest_counts(&self) -> i32 {
+    pub(crate) fn nearest_counts(&self) -> i32 {
         let rounded = if self.deviation < 0.0 { self.deviation - 0.5 } else { self.deviation + 0.5 };
         self.reading.unwrap_or(0).wrapping_add(rounded as i32)
     }
 
     /// Estimated velocity, counts/s.
     #[must_use]
-    pub fn velocity_counts_per_s(&self) -> f32 {
+    pub(crate) fn velocity_counts_per_s(&self) -> f32 {
         self.velocity_per_s
     }
 }

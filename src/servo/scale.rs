@@ -29,13 +29,13 @@ pub struct JointScale {
 impl JointScale {
     /// Model angle for a position in counts, fractions allowed.
     #[must_use]
-    pub fn position(&self, counts: f32) -> Radian {
+    pub(crate) fn position(&self, counts: f32) -> Radian {
         Radian(self.anatomy.angle_to_chain(self.mounted(self.radian_per_count.0) * counts))
     }
 
     /// Model torque for a motor current.
     #[must_use]
-    pub fn torque(&self, current: Ampere) -> NewtonMetre {
+    pub(crate) fn torque(&self, current: Ampere) -> NewtonMetre {
         NewtonMetre(self.signed_torque_per_ampere().0 * current.0)
     }
 
@@ -47,7 +47,7 @@ impl JointScale {
 
     /// Model torque per motor current, of either sign.
     #[must_use]
-    pub fn signed_torque_per_ampere(&self) -> NewtonMetrePerAmpere {
+    pub(crate) fn signed_torque_per_ampere(&self) -> NewtonMetrePerAmpere {
         NewtonMetrePerAmpere(self.anatomy.to_chain(self.mounted(self.torque_per_ampere.0)))
     }
 
@@ -72,13 +72,14 @@ pub(super) mod tests {
     /// Default leg: 8,192 counts at the motor, 50:1, 1.5 N m/A; the hip's sense is the model's.
     pub(in crate::servo) const HIP: JointScale = JointScale {
         radian_per_count: Radian(core::f32::consts::TAU / 409_600.0),
-        anatomy: AnatomicalJoint::SAME,
+        anatomy: AnatomicalJoint { direction: 1.0, zero_offset: 0.0 },
         mirrored: false,
         torque_per_ampere: NewtonMetrePerAmpere(1.5),
     };
 
     /// Joint as [`HIP`], but flexion is negative in the model.
-    pub(in crate::servo) const KNEE: JointScale = JointScale { anatomy: AnatomicalJoint::OPPOSITE, ..HIP };
+    pub(in crate::servo) const KNEE: JointScale =
+        JointScale { anatomy: AnatomicalJoint { direction: -1.0, zero_offset: 0.0 }, ..HIP };
 
     #[test]
     fn angle_and_torque_change_sign_together_and_power_does_not() {

@@ -48,18 +48,18 @@ pub struct ServoCommand<'model, const N: usize, M> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Torque in addition to the motion's, or alone.
-    pub torque: NewtonMetre,
+    pub(crate) torque: NewtonMetre,
     /// True if the motion is held; otherwise `torque` is the whole command.
-    pub held: bool,
+    pub(crate) held: bool,
     /// Limit of the commanded torque; the motion's control does not wind up against it.
-    pub largest: NewtonMetre,
+    pub(crate) largest: NewtonMetre,
     /// Share of the controller's damping that acts while the motion is not held, 0..1.
-    pub damping_share: f32,
+    pub(crate) damping_share: f32,
 }
 
 impl Effort {
     /// Effort of the motion alone.
-    pub const HELD: Self = Self {
+    pub(crate) const HELD: Self = Self {
         torque: NewtonMetre::ZERO,
         held: true,
         largest: NewtonMetre(f32::INFINITY),
@@ -75,13 +75,13 @@ pub struct ServoOutput<const N: usize> {
     /// Estimated velocities.
     pub velocity: [RadianPerSecond; N],
     /// Encoder counts; those of the observer where the reading was impossible.
-    pub accepted_counts: [i32; N],
+    pub(crate) accepted_counts: [i32; N],
     /// Commanded minus estimated angles.
     pub tracking_error: [Radian; N],
     /// Torques of feedforward and feedback before the monitor.
     pub wanted_torque: [NewtonMetre; N],
     /// Damping within the wanted torques that opposes the joints' own velocities.
-    pub braking_torque: [NewtonMetre; N],
+    pub(crate) braking_torque: [NewtonMetre; N],
     /// Decision of the monitor; its command is for the drives.
     pub decision: Decision<N>,
 }
@@ -148,12 +148,12 @@ impl<const N: usize> Servo<N> {
     }
 
     /// Runs instead of a tick while the joints have no valid readings ([`Monitor::stand_by`]).
-    pub fn stand_by(&mut self, resets: bool) -> Option<Fault> {
+    pub(crate) fn stand_by(&mut self, resets: bool) -> Option<Fault> {
         self.monitor.stand_by(resets)
     }
 
     /// Resets to drive off without readings: for joints whose counts get another meaning. A fault stays.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.gates.iter_mut().for_each(StepGate::restart);
         self.observers = [Observer::default(); N];
         self.controllers.iter_mut().for_each(Controller::reset);
@@ -168,7 +168,7 @@ impl<const N: usize> Servo<N> {
 
     /// Sets the bandwidth of each position loop; `None`: the configuration's. Only with the drive off, since
     /// other gains are a step of torque.
-    pub fn set_bandwidths(&mut self, bandwidths: &[Option<Hertz>; N]) {
+    pub(crate) fn set_bandwidths(&mut self, bandwidths: &[Option<Hertz>; N]) {
         for (joint, bandwidth) in self.joints.iter_mut().zip(bandwidths) {
             let configured = joint.configured;
             joint.controller = bandwidth.map_or(configured, |bandwidth| configured.with_bandwidth(bandwidth));
@@ -177,7 +177,7 @@ impl<const N: usize> Servo<N> {
 
     /// Checksum of gains, scales and limits. Only [`Self::set_bandwidths`] changes it.
     #[must_use]
-    pub fn checksum(&self) -> Checksum {
+    pub(crate) fn checksum(&self) -> Checksum {
         self.joints.iter().fold(self.monitor.checksum(), |sum, joint| {
             let Joint { scale, count_per_radian, controller, configured, largest_acceleration_rad_per_s2 } =
                 joint;
@@ -191,7 +191,7 @@ impl<const N: usize> Servo<N> {
 
     /// Damping of a joint's controller, N m s/rad; zero beyond the last joint.
     #[must_use]
-    pub fn damping(&self, joint: usize) -> f32 {
+    pub(crate) fn damping(&self, joint: usize) -> f32 {
         self.joints.get(joint).map_or(0.0, |joint| joint.controller.damping_nm_s_per_rad())
     }
 
@@ -203,7 +203,7 @@ impl<const N: usize> Servo<N> {
 
     /// Conversion of each joint.
     #[must_use]
-    pub fn scales(&self) -> [JointScale; N] {
+    pub(crate) fn scales(&self) -> [JointScale; N] {
         self.joints.map(|joint| joint.scale)
     }
 
@@ -346,7 +346,7 @@ impl<const N: usize> Servo<N> {
 
     /// Flips one bit (of 32, from the lowest) of one of a joint's constants: counts per radian, largest
     /// acceleration, current per torque, overspeed bound, either end of the range.
-    pub fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
+    pub(crate) fn flip_bit(&mut self, joint: usize, number: u8, bit: u8) {
         let Some(this) = self.joints.get_mut(joint) else { return };
         let flipped = match number {
             0 => &mut this.count_per_radian,

@@ -95,7 +95,7 @@ impl Permit {
 
     /// Returns a permit for a drive with this permission; `None` where a bridge may switch.
     #[must_use]
-    pub fn under(permission: Permission) -> Option<Self> {
+    pub(crate) fn under(permission: Permission) -> Option<Self> {
         (permission == Permission::Off).then_some(Self(()))
     }
 }

@@ -136,7 +136,7 @@ impl<const N: usize> ModelRecord<N> {
 /// Layout of one joint in the flash, 81 bytes.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
-pub struct JointLayout {
+pub(crate) struct JointLayout {
     parameters: [F32; PARAMETERS_PER_JOINT],
     stribeck_excess: F32,
     stribeck_velocity: F32,

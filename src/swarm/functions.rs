@@ -89,12 +89,6 @@ impl TestProblem {
         Self { function, dimension: if planar { 2 } else { dimension } }
     }
 
-    /// Function of this problem.
-    #[must_use]
-    pub const fn function(&self) -> TestFunction {
-        self.function
-    }
-
     /// Half the box's width: each coordinate reaches from minus to plus this value.
     #[must_use]
     pub const fn half_width(&self) -> f64 {

@@ -24,11 +24,11 @@ const FIRST_VELOCITY: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InertiaWeight<T> {
     /// Weight at iteration 0.
-    pub first: T,
+    pub(crate) first: T,
     /// Weight from the last iteration on.
-    pub last: T,
+    pub(crate) last: T,
     /// Iteration at which `last` is reached.
-    pub iterations: u32,
+    pub(crate) iterations: u32,
 }
 
 impl<T: Real> InertiaWeight<T> {
@@ -52,23 +52,23 @@ impl<T: Real> InertiaWeight<T> {
 /// Constants of Eq. (19) at one iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct VelocityRule<T> {
-    pub inertia_weight: T,
-    pub individual_learning: T,
-    pub global_learning: T,
+    pub(crate) inertia_weight: T,
+    pub(crate) individual_learning: T,
+    pub(crate) global_learning: T,
     /// Largest speed per coordinate, share of the box.
-    pub limit: T,
+    pub(crate) limit: T,
 }
 
 /// N particles in box coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Particles<T, const N: usize, const D: usize> {
     dimension: usize,
-    pub position: [[T; D]; N],
-    pub velocity: [[T; D]; N],
-    pub personal_best: [[T; D]; N],
+    pub(crate) position: [[T; D]; N],
+    pub(crate) velocity: [[T; D]; N],
+    pub(crate) personal_best: [[T; D]; N],
     /// Value at `position`.
-    pub value: [T; N],
-    pub personal_best_value: [T; N],
+    pub(crate) value: [T; N],
+    pub(crate) personal_best_value: [T; N],
 }
 
 impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
@@ -89,12 +89,12 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
     }
 
     /// Number of coordinates, 1..=D.
-    pub fn dimension(&self) -> usize {
+    pub(crate) fn dimension(&self) -> usize {
         self.dimension
     }
 
     /// Draws new positions uniform in the box and small uniform velocities; discards all values.
-    pub fn scatter(&mut self, random: &mut Random) {
+    pub(crate) fn scatter(&mut self, random: &mut Random) {
         for particle in 0..N {
             for entry in live_mut(&mut self.position[particle], self.dimension) {
                 *entry = random.uniform();
@@ -109,7 +109,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
     }
 
     /// Particle with the best personal best; the first of equals.
-    pub fn leader(&self) -> usize {
+    pub(crate) fn leader(&self) -> usize {
         let mut leader = 0;
         for particle in 1..N {
             if self.personal_best_value[particle] < self.personal_best_value[leader.min(N - 1)] {
@@ -120,7 +120,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
     }
 
     /// Applies Eq. (19) to one particle.
-    pub fn steer(&mut self, particle: usize, rule: &VelocityRule<T>, random: &mut Random) {
+    pub(crate) fn steer(&mut self, particle: usize, rule: &VelocityRule<T>, random: &mut Random) {
         let (particle, leader) = (particle.min(N - 1), self.leader().min(N - 1));
         let position = live(&self.position[particle], self.dimension);
         let own = live(&self.personal_best[particle], self.dimension);
@@ -135,7 +135,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
     }
 
     /// Stores the value at the particle's position; true for a new personal best.
-    pub fn record(&mut self, particle: usize, value: T) -> bool {
+    pub(crate) fn record(&mut self, particle: usize, value: T) -> bool {
         let particle = particle.min(N - 1);
         self.value[particle] = value;
         let better = value < self.personal_best_value[particle];
@@ -149,7 +149,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
     }
 
     /// Moves the particle back to its personal best, at rest.
-    pub fn retreat(&mut self, particle: usize) {
+    pub(crate) fn retreat(&mut self, particle: usize) {
         let particle = particle.min(N - 1);
         self.position[particle] = self.personal_best[particle];
         self.velocity[particle] = [T::zero(); D];
@@ -157,7 +157,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
     }
 
     /// Sorts by personal best, the best first; equals keep their order.
-    pub fn sort(&mut self) {
+    pub(crate) fn sort(&mut self) {
         for end in 1..N {
             for index in (0..end).rev() {
                 if self.personal_best_value[index] <= self.personal_best_value[index + 1] {

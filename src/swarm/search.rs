@@ -72,7 +72,7 @@ pub(super) struct SearchProgress<T, const D: usize> {
 
 impl<T: Real, const D: usize> SearchProgress<T, D> {
     /// Reads and checks the objective's box.
-    pub fn open(objective: &impl Objective<T>) -> Result<Self, SwarmError> {
+    pub(crate) fn open(objective: &impl Objective<T>) -> Result<Self, SwarmError> {
         let dimension = objective.dimension();
         if dimension == 0 {
             return Err(SwarmError::NoDimension);
@@ -102,17 +102,17 @@ impl<T: Real, const D: usize> SearchProgress<T, D> {
     }
 
     /// Number of coordinates, 1..=D.
-    pub fn dimension(&self) -> usize {
+    pub(crate) fn dimension(&self) -> usize {
         self.dimension
     }
 
     /// True if an objective has the dimension that the search began with.
-    pub fn accepts(&self, objective: &impl Objective<T>) -> bool {
+    pub(crate) fn accepts(&self, objective: &impl Objective<T>) -> bool {
         objective.dimension() == self.dimension
     }
 
     /// Converts box coordinates 0..1 to the objective's units; never outside the bounds.
-    pub fn to_position(&self, point: &[T; D]) -> [T; D] {
+    pub(crate) fn to_position(&self, point: &[T; D]) -> [T; D] {
         let mut position = *point;
         for ((entry, &low), &high) in position.iter_mut().zip(&self.low).zip(&self.high) {
             *entry = clamp(low + (high - low) * *entry, low, high);
@@ -121,13 +121,13 @@ impl<T: Real, const D: usize> SearchProgress<T, D> {
     }
 
     /// Evaluates a point given in box coordinates.
-    pub fn evaluate(&mut self, objective: &impl Objective<T>, point: &[T; D]) -> T {
+    pub(crate) fn evaluate(&mut self, objective: &impl Objective<T>, point: &[T; D]) -> T {
         let position = self.to_position(point);
         self.evaluate_position(objective, position)
     }
 
     /// Point of the box nearest to a position, both in the objective's units.
-    pub fn nearest(&self, mut position: [T; D]) -> [T; D] {
+    pub(crate) fn nearest(&self, mut position: [T; D]) -> [T; D] {
         for ((entry, &low), &high) in position.iter_mut().zip(&self.low).zip(&self.high) {
             *entry = clamp(*entry, low, high);
         }
@@ -137,7 +137,7 @@ impl<T: Real, const D: usize> SearchProgress<T, D> {
     /// Evaluates a position in the box, from [`Self::to_position`] or [`Self::nearest`].
     ///
     /// Returns the largest finite number for a cost that is not finite: it sorts last and is never a best.
-    pub fn evaluate_position(&mut self, objective: &impl Objective<T>, position: [T; D]) -> T {
+    pub(crate) fn evaluate_position(&mut self, objective: &impl Objective<T>, position: [T; D]) -> T {
         let value = objective.evaluate(live(&position, self.dimension));
         self.evaluations = self.evaluations.saturating_add(1);
         let value = if is_finite(value) { value } else { T::LARGEST };
@@ -149,20 +149,20 @@ impl<T: Real, const D: usize> SearchProgress<T, D> {
         value
     }
 
-    pub fn close_iteration(&mut self) {
+    pub(crate) fn close_iteration(&mut self) {
         self.iterations = self.iterations.saturating_add(1);
     }
 
-    pub fn best(&self) -> Option<Best<'_, T>> {
+    pub(crate) fn best(&self) -> Option<Best<'_, T>> {
         (self.best_value < T::LARGEST)
             .then(|| Best { position: live(&self.best_position, self.dimension), value: self.best_value })
     }
 
-    pub fn iterations(&self) -> u32 {
+    pub(crate) fn iterations(&self) -> u32 {
         self.iterations
     }
 
-    pub fn evaluations(&self) -> u32 {
+    pub(crate) fn evaluations(&self) -> u32 {
         self.evaluations
     }
 }

@@ -40,15 +40,15 @@ fn send(record: &Record<JOINTS>) {
 }
 
 /// State of the thread.
-pub struct Thread {
+pub(crate) struct Thread {
     /// Identification half of the leg.
-    pub identification: &'static mut LegIdentification,
+    pub(crate) identification: &'static mut LegIdentification,
     /// The thread's ends of the queues.
-    pub ends: IdentificationEnds<'static, JOINTS>,
+    pub(crate) ends: IdentificationEnds<'static, JOINTS>,
     /// Bus voltage per code.
-    pub volt_per_code: Volt,
+    pub(crate) volt_per_code: Volt,
     /// Results for the bus, if there is one, and the leg's configuration.
-    pub bus: Option<(ThreadEnd, &'static Leg)>,
+    pub(crate) bus: Option<(ThreadEnd, &'static Leg)>,
 }
 
 /// Mutable state of the task.
@@ -61,7 +61,7 @@ struct State {
 }
 
 /// Sends the records of the start.
-pub fn introduce(board: &Board) {
+pub(crate) fn introduce(board: &Board) {
     let [uid0, uid1, uid2] = board.identity.unique;
     let [version, version_minor, version_volt] = board.identity.version;
     send(&Record::Boot {
@@ -94,7 +94,7 @@ pub fn introduce(board: &Board) {
 
 /// Task of the thread level.
 #[embassy_executor::task]
-pub async fn run(mut thread: Thread) -> ! {
+pub(crate) async fn run(mut thread: Thread) -> ! {
     let now = Instant::now();
     let mut state = State {
         level: IdentificationLevel::new(thread.identification.swarm_seed()),

@@ -4,18 +4,19 @@
 
 use crate::leg::{Identification, LegConfiguration, MotionWindow};
 
-pub use crate::leg::{BASE, JOINTS};
+pub(crate) use crate::leg::BASE;
+pub use crate::leg::JOINTS;
 
 include!(env!("SCARAB_LEG_SOURCE"));
 
 /// Taps of the filters.
-pub const TAPS: usize = 256;
+pub(crate) const TAPS: usize = 256;
 /// Filter outputs in progress for these taps.
-pub const PENDING: usize = 26;
+pub(crate) const PENDING: usize = 26;
 
 /// Configuration of the leg.
-pub type Leg = LegConfiguration<JOINTS, BASE>;
+pub(crate) type Leg = LegConfiguration<JOINTS, BASE>;
 /// Identification half of the leg.
-pub type LegIdentification = Identification<JOINTS, BASE, TAPS, PENDING, &'static mut LegWindow>;
+pub(crate) type LegIdentification = Identification<JOINTS, BASE, TAPS, PENDING, &'static mut LegWindow>;
 /// Window of motion blocks of the identification.
-pub type LegWindow = MotionWindow<f32, JOINTS, BASE>;
+pub(crate) type LegWindow = MotionWindow<f32, JOINTS, BASE>;

@@ -19,19 +19,19 @@
 use self::leg::JOINTS;
 use crate::operation::Signals;
 
-pub mod assist;
-pub mod bus;
+pub(crate) mod assist;
+pub(crate) mod bus;
 mod composition;
-pub mod current;
-pub mod housekeeping;
-pub mod identify;
-pub mod leg;
+pub(crate) mod current;
+pub(crate) mod housekeeping;
+pub(crate) mod identify;
+pub(crate) mod leg;
 mod memory;
-pub mod servo;
-pub mod storage;
+pub(crate) mod servo;
+pub(crate) mod storage;
 mod vectors;
 
-pub use composition::run;
+pub(crate) use composition::run;
 
 /// Words that all levels share.
-pub static SIGNALS: Signals<JOINTS> = Signals::new();
+pub(crate) static SIGNALS: Signals<JOINTS> = Signals::new();

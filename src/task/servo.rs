@@ -9,21 +9,21 @@ use crate::leg::Control;
 use crate::operation::{ServoEnds, ServoLevel};
 
 /// State of level 1.
-pub struct ServoLoop {
+pub(crate) struct ServoLoop {
     /// Control half of the leg.
-    pub control: Control<JOINTS>,
+    pub(crate) control: Control<JOINTS>,
     /// The servo level.
-    pub level: ServoLevel<JOINTS>,
+    pub(crate) level: ServoLevel<JOINTS>,
     /// The level's ends of the queues.
-    pub ends: ServoEnds<'static, JOINTS>,
+    pub(crate) ends: ServoEnds<'static, JOINTS>,
 }
 
 /// State of level 1, once the start has set it.
-pub static SERVO: spin::Mutex<Option<&'static mut ServoLoop>> = spin::Mutex::new(None);
+pub(crate) static SERVO: spin::Mutex<Option<&'static mut ServoLoop>> = spin::Mutex::new(None);
 
 /// Interrupt of the servo.
 #[inline(always)]
-pub fn interrupt() {
+pub(crate) fn interrupt() {
     let statistics = &SIGNALS.statistics;
     if let Some(mut servo) = SERVO.try_lock()
         && let Some(servo) = servo.as_mut()

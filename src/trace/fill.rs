@@ -6,7 +6,7 @@
 use core::fmt::{Result, Write};
 
 /// A value that can follow a key.
-pub trait Value {
+pub(crate) trait Value {
     /// Writes the value as [`super::Line`] reads it back.
     fn put(&self, out: &mut dyn Write) -> Result;
     /// Writes a whole number in base 16, with `0x`; other values as [`Self::put`].

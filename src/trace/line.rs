@@ -87,36 +87,8 @@ impl<'a> Line<'a> {
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`].
-    pub fn value<'k, V: FromStr>(&self, key: &'k str) -> Result<V, LineError<'k>> {
+    pub(crate) fn value<'k, V: FromStr>(&self, key: &'k str) -> Result<V, LineError<'k>> {
         self.text(key)?.parse().map_err(|_| LineError::Value(key))
-    }
-
-    /// Value of a key as a whole number in base 16.
-    ///
-    /// # Errors
-    /// [`LineError::Missing`], [`LineError::Value`].
-    pub fn hex<'k>(&self, key: &'k str) -> Result<u32, LineError<'k>> {
-        let digits = self.text(key)?.strip_prefix("0x").ok_or(LineError::Value(key))?;
-        u32::from_str_radix(digits, 16).map_err(|_| LineError::Value(key))
-    }
-
-    /// Value of a key as a list of `N` items.
-    ///
-    /// # Errors
-    /// [`LineError::Missing`], [`LineError::Value`]; also for a list of another length.
-    pub fn list<'k, V: FromStr + Copy + Default, const N: usize>(
-        &self,
-        key: &'k str,
-    ) -> Result<[V; N], LineError<'k>> {
-        let wrong = LineError::Value(key);
-        let inside =
-            self.text(key)?.strip_prefix('[').and_then(|text| text.strip_suffix(']')).ok_or(wrong)?;
-        let mut values = [V::default(); N];
-        let mut items = inside.split(", ");
-        for slot in &mut values {
-            *slot = items.next().and_then(|item| item.parse().ok()).ok_or(wrong)?;
-        }
-        if items.next().is_some() { Err(wrong) } else { Ok(values) }
     }
 }
 
@@ -155,9 +127,9 @@ mod tests {
             Line::parse("log n=7 position_rad=[0.5, -1e-7] segment=1 status=0x1f passed=true name=-\n")
                 .expect("a line");
         assert_eq!((line.kind(), line.number()), ("log", Ok(7)));
-        assert_eq!(line.list::<f32, 2>("position_rad"), Ok([0.5, -1e-7]));
+        assert_eq!(line.text("position_rad"), Ok("[0.5, -1e-7]"));
         assert_eq!(line.value::<u8>("segment"), Ok(1));
-        assert_eq!(line.hex("status"), Ok(0x1f));
+        assert_eq!(line.text("status"), Ok("0x1f"));
         assert_eq!(line.value::<bool>("passed"), Ok(true));
         assert_eq!(line.text("name"), Ok("-"));
         assert_eq!(line.pairs().count(), 6);
@@ -175,7 +147,5 @@ mod tests {
         let line = Line::parse("kind a=x c=[1, 2]").expect("a line");
         assert_eq!(line.value::<u8>("a"), Err(LineError::Value("a")));
         assert_eq!(line.value::<u8>("b"), Err(LineError::Missing("b")));
-        assert_eq!(line.list::<u8, 3>("c"), Err(LineError::Value("c")));
-        assert_eq!(line.list::<u8, 1>("c"), Err(LineError::Value("c")));
     }
 }

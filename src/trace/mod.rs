@@ -37,10 +37,10 @@ mod record;
 mod report;
 pub mod words;
 
-pub use fill::Value;
 pub use line::{Line, LineError};
 pub use record::Record;
-pub use report::{Report, judged};
+pub use report::Report;
+pub(crate) use report::judged;
 
 /// Version of records and keys; increases when an older reader would misread a record. A new value gets a new
 /// kind of record, because a reader refuses a record without one of its keys.

@@ -120,9 +120,9 @@ macro_rules! trace_records {
     Assist "assist n={=u32} tick={=u32} event={=str} why={=str}" {
         /// Servo tick.
         tick: u32,
-        /// Event, see [`super::words::assist`].
+        /// Event, see `words::assist`.
         event: &'static str,
-        /// Reason, see [`super::words::assist`].
+        /// Reason, see `words::assist`.
         why: &'static str,
     }
     /// Refusal of a step towards an enabled drive.
@@ -262,7 +262,7 @@ macro_rules! trace_records {
         symbol: &'static str,
         /// Value, SI; NaN where unknown.
         value: f32,
-        /// Unit, see [`super::words::unit`].
+        /// Unit, see `words::unit`.
         unit: &'static str,
         /// Standard deviation; NaN unless measured alone.
         sigma: f32,
@@ -283,7 +283,7 @@ macro_rules! trace_records {
         dropped: bool,
         /// Value, SI; NaN where not determined.
         value: f32,
-        /// Unit, see [`super::words::unit`].
+        /// Unit, see `words::unit`.
         unit: &'static str,
         /// Standard deviation; NaN where not determined.
         sigma: f32,
@@ -397,7 +397,7 @@ macro_rules! trace_records {
     }
     /// Explanation of a change.
     Update "update n={=u32} cause={=str} link={=u8} verdict={=str} offered={=bool}" {
-        /// Cause, see [`super::words::cause`].
+        /// Cause, see `words::cause`.
         cause: &'static str,
         /// Link of a payload, from 1.
         link: u8,

@@ -256,7 +256,7 @@ where
 
 /// Word for a verdict.
 #[must_use]
-pub const fn judged(accepted: bool) -> &'static str {
+pub(crate) const fn judged(accepted: bool) -> &'static str {
     if accepted { "accepted" } else { "refused" }
 }
 

@@ -52,7 +52,7 @@ pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
 
 /// Words for the event of a session of assistance and for its reason.
 #[must_use]
-pub const fn assist(note: AssistNote) -> (&'static str, &'static str) {
+pub(crate) const fn assist(note: AssistNote) -> (&'static str, &'static str) {
     match note {
         AssistNote::Refused(why) => ("refused", why.name()),
         AssistNote::Ending(why) => ("ending", why.name()),
@@ -89,7 +89,7 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
 
 /// Word for the cause of a change, and the link of a payload from 1.
 #[must_use]
-pub const fn cause(cause: Cause) -> (&'static str, u8) {
+pub(crate) const fn cause(cause: Cause) -> (&'static str, u8) {
     match cause {
         Cause::Payload { link } => ("payload", (link as u8).saturating_add(1)),
         Cause::Friction => ("friction", 0),
@@ -100,7 +100,7 @@ pub const fn cause(cause: Cause) -> (&'static str, u8) {
 
 /// Unit of a parameter as one word.
 #[must_use]
-pub const fn unit(parameter: Parameter) -> &'static str {
+pub(crate) const fn unit(parameter: Parameter) -> &'static str {
     match parameter {
         Parameter::XX
         | Parameter::XY

@@ -18,12 +18,12 @@ pub fn prepare() {
 
 /// Engages the brake by one store.
 #[inline]
-pub fn engage() {
+pub(crate) fn engage() {
     store(LEVEL, ENGAGED);
 }
 
 /// Releases or engages the brake.
 #[inline]
-pub fn set(released: bool) {
+pub(crate) fn set(released: bool) {
     store(LEVEL, if released { RELEASED } else { ENGAGED });
 }

@@ -80,7 +80,7 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// Takes the pending store request and encodes each node's objects into `into`. The objects apply only
     /// after [`Self::stored`]. If they do not fit, or two nodes would share a node-ID, nothing is stored;
     /// hosts receive FF0D, then 5530.
-    pub fn take_store(&mut self, into: &mut [StoredNode; N]) -> Option<StoreCommand> {
+    pub(crate) fn take_store(&mut self, into: &mut [StoredNode; N]) -> Option<StoreCommand> {
         self.recall_reset();
         let defaults = self.leg.take_store()?;
         self.nodes.iter_mut().for_each(|node| node.store_begins(defaults));
@@ -123,14 +123,14 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Announces a pause for a new image to hosts, as one for the store, or its end. The state of the store
     /// stays.
-    pub fn pause(&mut self, pauses: bool) {
+    pub(crate) fn pause(&mut self, pauses: bool) {
         let storing = if pauses { Storing::Busy } else { self.storing };
         self.nodes.iter_mut().for_each(|node| node.on_store(storing));
     }
 
     /// Returns the stored bit rate, kbit/s.
     #[must_use]
-    pub fn bit_rate(&self) -> Option<u16> {
+    pub(crate) fn bit_rate(&self) -> Option<u16> {
         self.stored.iter().find_map(|stored| stored_bit_rate(stored.bytes()))
     }
 }

@@ -63,12 +63,12 @@ const HALT: u16 = 1 << 8;
 /// Targets and offsets that a host has written and that are not void.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Targets {
-    pub position: bool,
-    pub velocity: bool,
-    pub torque: bool,
-    pub velocity_offset: bool,
-    pub torque_offset: bool,
-    pub impedance: [bool; 2],
+    pub(crate) position: bool,
+    pub(crate) velocity: bool,
+    pub(crate) torque: bool,
+    pub(crate) velocity_offset: bool,
+    pub(crate) torque_offset: bool,
+    pub(crate) impedance: [bool; 2],
 }
 
 impl Targets {
@@ -184,45 +184,45 @@ const NO_METHOD: i8 = -1;
 /// Objects that a host writes and reads back, in the objects' units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Settings {
-    pub connection_option: i16,
-    pub quick_stop_option: i16,
-    pub mode: i8,
-    pub following_window: u32,
-    pub following_time_ms: u16,
-    pub position_window: u32,
-    pub position_time_ms: u16,
-    pub velocity_window: u16,
-    pub velocity_time_ms: u16,
-    pub standing_speed: u16,
-    pub standing_time_ms: u16,
-    pub target_torque: i16,
-    pub largest_torque: u16,
-    pub target_position: i32,
-    pub home_offset: i32,
-    pub range: [i32; 2],
-    pub profile_velocity: u32,
-    pub profile_acceleration: u32,
-    pub profile_deceleration: u32,
-    pub torque_slope: u32,
-    pub homing_method: i8,
-    pub velocity_offset: i32,
-    pub torque_offset: i16,
-    pub interpolation_data: i32,
-    pub positioning_option: u16,
-    pub period: u8,
-    pub period_index: i8,
-    pub outputs: u32,
-    pub target_velocity: i32,
+    pub(crate) connection_option: i16,
+    pub(crate) quick_stop_option: i16,
+    pub(crate) mode: i8,
+    pub(crate) following_window: u32,
+    pub(crate) following_time_ms: u16,
+    pub(crate) position_window: u32,
+    pub(crate) position_time_ms: u16,
+    pub(crate) velocity_window: u16,
+    pub(crate) velocity_time_ms: u16,
+    pub(crate) standing_speed: u16,
+    pub(crate) standing_time_ms: u16,
+    pub(crate) target_torque: i16,
+    pub(crate) largest_torque: u16,
+    pub(crate) target_position: i32,
+    pub(crate) home_offset: i32,
+    pub(crate) range: [i32; 2],
+    pub(crate) profile_velocity: u32,
+    pub(crate) profile_acceleration: u32,
+    pub(crate) profile_deceleration: u32,
+    pub(crate) torque_slope: u32,
+    pub(crate) homing_method: i8,
+    pub(crate) velocity_offset: i32,
+    pub(crate) torque_offset: i16,
+    pub(crate) interpolation_data: i32,
+    pub(crate) positioning_option: u16,
+    pub(crate) period: u8,
+    pub(crate) period_index: i8,
+    pub(crate) outputs: u32,
+    pub(crate) target_velocity: i32,
     /// Stiffness and damping, units of 2020.
     pub impedance: [u16; 2],
     /// Bandwidths of position and current loop, units of 2021; 0: the ones they were designed for.
     pub position_bandwidth: u16,
     pub current_bandwidth: u16,
-    pub feedforward: bool,
-    pub returns: bool,
-    pub watches: bool,
-    pub node_id: u8,
-    pub bit_rate: u16,
+    pub(crate) feedforward: bool,
+    pub(crate) returns: bool,
+    pub(crate) watches: bool,
+    pub(crate) node_id: u8,
+    pub(crate) bit_rate: u16,
 }
 
 /// Default bit rate, kbit/s.
@@ -230,7 +230,7 @@ pub(in crate::bus) const USUAL_KBIT: u16 = 1000;
 
 impl Settings {
     /// Settings after the start.
-    pub const NEW: Self = Self {
+    pub(crate) const NEW: Self = Self {
         connection_option: 3,
         quick_stop_option: 2,
         mode: 0,
@@ -399,7 +399,7 @@ impl Axis {
 
     /// Takes over the leg's status. Call [`Coupling::power`](super::Coupling::power) afterwards. Returns
     /// whether the joint has just been disabled.
-    pub fn update(&mut self, status: &JointStatus) -> bool {
+    pub(crate) fn update(&mut self, status: &JointStatus) -> bool {
         self.status = *status;
         self.leaves_mode &= status.mode != 0 || status.requests_seen != self.request_count;
         let is_powered = self.is_powered();
@@ -412,7 +412,7 @@ impl Axis {
     }
 
     /// Makes all targets void until they are written again, and a start by bit 4 that was not taken yet.
-    pub fn void_targets(&mut self) {
+    pub(crate) fn void_targets(&mut self) {
         (self.targets, self.asks) = (Targets::default(), false);
     }
 
@@ -423,24 +423,24 @@ impl Axis {
 
     /// Returns object 2001; `None` if it is 0, the board's own.
     #[must_use]
-    pub const fn node_id(&self) -> Option<NodeId> {
+    pub(crate) const fn node_id(&self) -> Option<NodeId> {
         NodeId::new(self.settings.node_id)
     }
 
     /// Returns object 2002.
     #[must_use]
-    pub const fn bit_rate(&self) -> u16 {
+    pub(crate) const fn bit_rate(&self) -> u16 {
         self.settings.bit_rate
     }
 
     /// Sets object 2002, when it was written at another node of the board.
-    pub const fn set_bit_rate(&mut self, kbit_per_s: u16) {
+    pub(crate) const fn set_bit_rate(&mut self, kbit_per_s: u16) {
         self.settings.bit_rate = kbit_per_s;
     }
 
     /// Returns the bandwidths that a host has set (2021).
     #[must_use]
-    pub fn bandwidths(&self) -> LoopBandwidths {
+    pub(crate) fn bandwidths(&self) -> LoopBandwidths {
         let set = |value: u16, unit: f32| (value > 0).then(|| Hertz(unit * f32::from(value)));
         LoopBandwidths {
             position: set(self.settings.position_bandwidth, POSITION_BANDWIDTH_UNIT),
@@ -450,7 +450,7 @@ impl Axis {
 
     /// Returns object 2012.
     #[must_use]
-    pub const fn may_return(&self) -> bool {
+    pub(crate) const fn may_return(&self) -> bool {
         self.settings.returns
     }
 
@@ -480,7 +480,7 @@ impl Axis {
 
     /// Whether a host has sent a controlword other than 0 since the start or the last node reset.
     #[must_use]
-    pub const fn is_commanded(&self) -> bool {
+    pub(crate) const fn is_commanded(&self) -> bool {
         self.commanded
     }
 
@@ -618,7 +618,7 @@ impl Axis {
     }
 
     /// Takes the fault of a lost host if 6007 is 1; returned once.
-    pub fn take_fault(&mut self) -> Option<FaultCode> {
+    pub(crate) fn take_fault(&mut self) -> Option<FaultCode> {
         self.fault.take()
     }
 
@@ -629,7 +629,7 @@ impl Axis {
 
     /// Returns object 6041.
     #[must_use]
-    pub fn statusword(&self) -> u16 {
+    pub(crate) fn statusword(&self) -> u16 {
         let status = &self.status;
         let bit = |is_set: bool, shift: u16| u16::from(is_set) << shift;
         let is_ready = self.own != DriveState::NotReadyToSwitchOn;

@@ -24,13 +24,13 @@ pub(super) const fn level(state: DriveState) -> u8 {
 
 /// Rank of the leg's state at the last call.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Coupling {
+pub(crate) struct Coupling {
     before: u8,
 }
 
 impl Coupling {
     /// Without a host: every joint takes the leg's state, and pending requests are discarded.
-    pub fn follow_leg<const N: usize>(&mut self, axes: [&mut Axis; N], drive: DriveState) {
+    pub(crate) fn follow_leg<const N: usize>(&mut self, axes: [&mut Axis; N], drive: DriveState) {
         self.before = level(drive);
         for axis in axes {
             (axis.own, axis.resets) = (drive, false);
@@ -39,7 +39,7 @@ impl Coupling {
 
     /// Returns the power request for the leg's next tick. `drive` is the state of the leg's drive; `refused`
     /// says whether it refused the last request. Call [`Axis::update`] of every joint before.
-    pub fn power<const N: usize>(
+    pub(crate) fn power<const N: usize>(
         &mut self,
         axes: [&mut Axis; N],
         drive: DriveState,

@@ -18,22 +18,21 @@ mod control;
 mod coupling;
 mod objects;
 
-pub use crate::leg::{
-    ImpedanceTarget, JointCommand, JointStatus, LONGEST_PERIOD, Mode, Reference, SetPoint, Target,
-};
+pub(crate) use crate::leg::LONGEST_PERIOD;
+pub use crate::leg::{ImpedanceTarget, JointCommand, JointStatus, Mode, Reference, SetPoint, Target};
 pub(super) use control::USUAL_KBIT;
 pub use control::{Axis, AxisConstants};
-pub use coupling::Coupling;
+pub(crate) use coupling::Coupling;
 
 use crate::units::Hertz;
 
 /// Bandwidths of a joint's control loops that a host has set; `None`: the one a loop was designed for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LoopBandwidths {
+pub(crate) struct LoopBandwidths {
     /// Bandwidth of the position loop.
-    pub position: Option<Hertz>,
+    pub(crate) position: Option<Hertz>,
     /// Bandwidth of the current loop.
-    pub current: Option<Hertz>,
+    pub(crate) current: Option<Hertz>,
 }
 
 #[cfg(test)]

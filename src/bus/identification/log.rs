@@ -26,7 +26,7 @@ struct Entry<const N: usize> {
 
 /// Samples that wait for a host, at most `L`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Log<const N: usize, const L: usize> {
+pub(crate) struct Log<const N: usize, const L: usize> {
     samples: [Entry<N>; L],
     first: usize,
     length: usize,
@@ -46,7 +46,7 @@ const fn number(segment: Option<Segment>) -> u32 {
 
 impl<const N: usize, const L: usize> Log<N, L> {
     /// Empty queue.
-    pub const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         samples: [Entry { tick: 0, segment: 0, position_rad: [0.0; N], torque_nm: [0.0; N] }; L],
         first: 0,
         length: 0,
@@ -55,7 +55,7 @@ impl<const N: usize, const L: usize> Log<N, L> {
     };
 
     /// Bytes per sample.
-    pub const BYTES: usize = 8 + 8 * N;
+    pub(crate) const BYTES: usize = 8 + 8 * N;
 
     /// Appends a sample; counts it as lost if the queue is full.
     pub fn push(&mut self, logged: &LoggedSample<N>) {
@@ -75,7 +75,7 @@ impl<const N: usize, const L: usize> Log<N, L> {
     }
 
     /// Holds the waiting samples, or (`false`) releases the held ones.
-    pub fn hold(&mut self, hold: bool) {
+    pub(crate) fn hold(&mut self, hold: bool) {
         if hold {
             self.held = self.length;
         } else {
@@ -87,24 +87,24 @@ impl<const N: usize, const L: usize> Log<N, L> {
 
     /// Returns the number of held samples.
     #[must_use]
-    pub const fn held(&self) -> u32 {
+    pub(crate) const fn held(&self) -> u32 {
         self.held as u32
     }
 
     /// Returns the number of waiting samples, held ones included.
     #[must_use]
-    pub const fn waiting(&self) -> u32 {
+    pub(crate) const fn waiting(&self) -> u32 {
         self.length as u32
     }
 
     /// Returns the number of lost samples.
     #[must_use]
-    pub const fn lost(&self) -> u32 {
+    pub(crate) const fn lost(&self) -> u32 {
         self.lost
     }
 
     /// Copies bytes of the held block from `offset` on into `into`; returns the block's size in bytes.
-    pub fn bytes(&self, offset: u32, into: &mut [u8]) -> u32 {
+    pub(crate) fn bytes(&self, offset: u32, into: &mut [u8]) -> u32 {
         for (position, byte) in (offset as usize..).zip(into) {
             let sample = position / Self::BYTES;
             if sample >= self.held {

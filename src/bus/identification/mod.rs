@@ -18,7 +18,7 @@ mod log;
 mod results;
 mod results_copy;
 
-pub use log::Log;
+pub(crate) use log::Log;
 pub use results::Results;
 pub use results_copy::ResultsCopy;
 
@@ -36,7 +36,7 @@ use scarab_boot::Region;
 
 /// Request of a host to the leg, besides power and targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LegCommand {
+pub(crate) enum LegCommand {
     /// Start an identification: excite, solve, validate.
     Identify,
     /// Cancel the identification.
@@ -51,27 +51,27 @@ pub enum LegCommand {
 
 /// Objects of the leg, shared by its nodes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LegObjects<const N: usize, const L: usize> {
+pub(crate) struct LegObjects<const N: usize, const L: usize> {
     /// The 500 Hz log.
-    pub log: Log<N, L>,
+    pub(crate) log: Log<N, L>,
     /// Activity of the leg; to be updated after each tick.
-    pub activity: Activity,
+    pub(crate) activity: Activity,
     /// Model monitor: the model no longer fits; an update is offered. To be updated after each tick.
-    pub change: [bool; 2],
+    pub(crate) change: [bool; 2],
     /// Plan of the next identification: one-time or sequential.
-    pub plan: Plan,
+    pub(crate) plan: Plan,
     /// Seed of the next identification's random numbers.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Number of models accepted on this board.
-    pub generation: u32,
+    pub(crate) generation: u32,
     /// Whether the leg of the next identification is empty or worn, if a host said so.
-    pub wearing: Option<Wearing>,
+    pub(crate) wearing: Option<Wearing>,
     /// Commissioning and telemetry of the board.
-    pub board: BoardObjects<N>,
+    pub(crate) board: BoardObjects<N>,
     /// Program of the board.
-    pub program: ProgramObjects,
+    pub(crate) program: ProgramObjects,
     /// Shares of the next assistance.
-    pub shares: AssistShares,
+    pub(crate) shares: AssistShares,
     /// Last command written.
     command: u8,
     requested: Option<LegCommand>,
@@ -102,12 +102,12 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
 
     /// Whether a request is pending that begins a motion.
     #[must_use]
-    pub fn requests_motion(&self) -> bool {
+    pub(crate) fn requests_motion(&self) -> bool {
         matches!(self.requested, Some(LegCommand::Identify | LegCommand::Assist))
     }
 
     /// Takes over the leg's activity and the model monitor's state after a tick.
-    pub fn update(&mut self, activity: Activity, change: [bool; 2]) {
+    pub(crate) fn update(&mut self, activity: Activity, change: [bool; 2]) {
         let identifies = |activity| matches!(activity, Activity::Identify(_));
         if identifies(activity) && !identifies(self.activity) {
             // The statement belonged to the identification that begins.
@@ -118,19 +118,19 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
 
     /// Discards what a host said about the next identification and assistance, when its session ends, and its
     /// request to begin one. A request to end one stays.
-    pub fn end_session(&mut self) {
+    pub(crate) fn end_session(&mut self) {
         (self.wearing, self.shares) = (None, AssistShares::GRAVITY_ONLY);
         self.requested =
             self.requested.filter(|command| matches!(command, LegCommand::Cancel | LegCommand::EndAssist));
     }
 
     /// Takes the pending request.
-    pub fn take_request(&mut self) -> Option<LegCommand> {
+    pub(crate) fn take_request(&mut self) -> Option<LegCommand> {
         self.requested.take()
     }
 
     /// Takes the pending store request; `true` restores the defaults.
-    pub fn take_store(&mut self) -> Option<bool> {
+    pub(crate) fn take_store(&mut self) -> Option<bool> {
         self.store.take()
     }
 
@@ -256,15 +256,15 @@ const fn state(activity: Activity) -> (u8, u8) {
 }
 
 /// All objects of one node from 2000 on: joint, leg and results.
-pub struct JointObjects<'a, R, const N: usize, const L: usize> {
+pub(crate) struct JointObjects<'a, R, const N: usize, const L: usize> {
     /// Axis of the joint.
-    pub axis: &'a mut Axis,
+    pub(crate) axis: &'a mut Axis,
     /// Index of the joint, from 0.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// Objects of the leg.
-    pub leg: &'a mut LegObjects<N, L>,
+    pub(crate) leg: &'a mut LegObjects<N, L>,
     /// Identification results.
-    pub results: &'a R,
+    pub(crate) results: &'a R,
 }
 
 impl<R: Results, const N: usize, const L: usize> JointObjects<'_, R, N, L> {

@@ -18,7 +18,7 @@ pub struct ResultsCopy<const N: usize, const B: usize> {
     fits: [[Option<FoundFit>; N]; MOTIONS],
     verdict: Option<Verdict>,
     /// Iterations and evaluations of the search; updated also while the rest is unchanged.
-    pub search: [u32; 2],
+    pub(crate) search: [u32; 2],
 }
 
 impl<const N: usize, const B: usize> ResultsCopy<N, B> {

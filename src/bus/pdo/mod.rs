@@ -22,9 +22,9 @@ use super::abort::Abort;
 use super::dictionary::{Mapping, Object, Type, find};
 
 /// Number of PDOs per direction.
-pub const PDOS: usize = 4;
+pub(crate) const PDOS: usize = 4;
 /// Largest number of objects in one PDO.
-pub const MAPPED: usize = 8;
+pub(crate) const MAPPED: usize = 8;
 
 /// Bit of a COB-ID: the message does not exist.
 pub(super) const ABSENT: u32 = 1 << 31;
@@ -46,11 +46,11 @@ const PLACEHOLDERS: [Object; 2] = [Object::at(0x2194, 0), Object::at(0x60FE, 1)]
 
 /// One mapped object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Mapped {
+pub(crate) struct Mapped {
     /// Address of the object.
-    pub object: Object,
+    pub(crate) object: Object,
     /// Size in bytes.
-    pub size: u8,
+    pub(crate) size: u8,
 }
 
 impl Mapped {
@@ -60,14 +60,14 @@ impl Mapped {
 
     /// Whether the entry is a dummy: index 2 to 7, the standard's types. Its bytes are ignored.
     #[must_use]
-    pub const fn is_dummy(self) -> bool {
+    pub(crate) const fn is_dummy(self) -> bool {
         self.object.index <= Type::U32 as u16
     }
 }
 
 /// Communication and mapping parameters of one PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Parameters {
+pub(crate) struct Parameters {
     direction: Mapping,
     identifier: u32,
     kind: u8,
@@ -93,24 +93,24 @@ impl Parameters {
 
     /// Returns the COB-ID, or `None` if the PDO does not exist.
     #[must_use]
-    pub fn identifier(&self) -> Option<u16> {
+    pub(crate) fn identifier(&self) -> Option<u16> {
         (self.identifier & ABSENT == 0).then_some((self.identifier & 0x7FF) as u16)
     }
 
     /// Whether the PDO waits for a SYNC.
     #[must_use]
-    pub const fn is_synchronous(&self) -> bool {
+    pub(crate) const fn is_synchronous(&self) -> bool {
         self.kind <= 240
     }
 
     /// Mapped objects in the order of their bytes.
-    pub fn mapped(&self) -> impl Iterator<Item = Mapped> + use<> {
+    pub(crate) fn mapped(&self) -> impl Iterator<Item = Mapped> + use<> {
         self.map.into_iter().take(usize::from(self.count)).map(Mapped::from_entry)
     }
 
     /// Length of the frame in bytes.
     #[must_use]
-    pub fn length(&self) -> usize {
+    pub(crate) fn length(&self) -> usize {
         self.mapped().map(|mapped| usize::from(mapped.size)).sum()
     }
 

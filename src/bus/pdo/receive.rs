@@ -5,7 +5,7 @@ use crate::hal::Frame;
 
 /// Result of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Received {
+pub(crate) enum Received {
     /// Its values are valid now.
     Now,
     /// Its values become valid at the next SYNC.
@@ -16,9 +16,9 @@ pub enum Received {
 
 /// One received PDO.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Receive {
+pub(crate) struct Receive {
     /// Communication and mapping parameters.
-    pub parameters: Parameters,
+    pub(crate) parameters: Parameters,
     data: [u8; 8],
     waits: bool,
     /// The values that wait belong to a session that has ended.
@@ -36,7 +36,7 @@ impl Receive {
     /// Takes over a frame with this PDO's COB-ID. Bytes beyond the mapped ones are ignored. The event timer
     /// of a synchronous PDO is restarted by the SYNC that makes its values valid: without SYNC its host
     /// commands nothing, however often it sends.
-    pub fn take(&mut self, frame: &Frame, now_us: u64) -> Received {
+    pub(crate) fn take(&mut self, frame: &Frame, now_us: u64) -> Received {
         if frame.data().len() < self.parameters.length() {
             return Received::TooShort;
         }
@@ -51,7 +51,7 @@ impl Receive {
     }
 
     /// Whether values were waiting for this SYNC.
-    pub fn at_sync(&mut self, now_us: u64) -> bool {
+    pub(crate) fn at_sync(&mut self, now_us: u64) -> bool {
         let waited = core::mem::take(&mut self.waits);
         if waited {
             self.restart_event_timer(now_us);
@@ -65,12 +65,12 @@ impl Receive {
     }
 
     /// Whether the event timer has just expired; reported once.
-    pub fn is_missed(&mut self, now_us: u64) -> bool {
+    pub(crate) fn is_missed(&mut self, now_us: u64) -> bool {
         self.due_us.take_if(|due| now_us > *due).is_some()
     }
 
     /// Restarts the timeout after a time in which nothing could be received.
-    pub fn wait(&mut self, now_us: u64) {
+    pub(crate) fn wait(&mut self, now_us: u64) {
         let event_us = self.event_us();
         self.due_us = self.due_us.map(|_| now_us + event_us);
     }
@@ -80,22 +80,22 @@ impl Receive {
     }
 
     /// Discards waiting values and stops the event timer.
-    pub fn stop(&mut self) {
+    pub(crate) fn stop(&mut self) {
         (self.waits, self.due_us) = (false, None);
     }
 
     /// Makes waiting values void. Their SYNC still counts, and writes nothing.
-    pub fn void(&mut self) {
+    pub(crate) fn void(&mut self) {
         self.is_void = true;
     }
 
     /// Whether the values of the last frame are void.
-    pub const fn is_void(&self) -> bool {
+    pub(crate) const fn is_void(&self) -> bool {
         self.is_void
     }
 
     /// Returns the bytes of the last frame.
-    pub const fn data(&self) -> [u8; 8] {
+    pub(crate) const fn data(&self) -> [u8; 8] {
         self.data
     }
 }

@@ -6,9 +6,9 @@ use crate::hal::Frame;
 
 /// One transmitted PDO.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transmit {
+pub(crate) struct Transmit {
     /// Communication and mapping parameters.
-    pub parameters: Parameters,
+    pub(crate) parameters: Parameters,
     /// SYNCs since the last frame; `None` until the SYNC with the start value.
     syncs: Option<u8>,
     due: bool,
@@ -24,12 +24,12 @@ impl Transmit {
     }
 
     /// Forgets what was sent, after a change of the PDO or of the NMT state.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         *self = Self::new(self.parameters);
     }
 
     /// Handles a SYNC with its counter, if it has one.
-    pub fn at_sync(&mut self, counter: Option<u8>) {
+    pub(crate) fn at_sync(&mut self, counter: Option<u8>) {
         let start = self.parameters.sync_start;
         let counts = match (self.syncs, counter) {
             (None, Some(counter)) if start != 0 && counter != start => return,
@@ -47,7 +47,7 @@ impl Transmit {
 
     /// Whether the values must be read: the PDO is due, or a change would send it. At most once per inhibit
     /// time.
-    pub fn is_wanted(&mut self, now_us: u64) -> bool {
+    pub(crate) fn is_wanted(&mut self, now_us: u64) -> bool {
         if self.parameters.identifier().is_none() || self.parameters.count == 0 {
             return false;
         }
@@ -59,7 +59,7 @@ impl Transmit {
     }
 
     /// Returns the frame, or `None` if the PDO is sent on change only and nothing changed.
-    pub fn frame(&mut self, data: [u8; 8], now_us: u64) -> Option<Frame> {
+    pub(crate) fn frame(&mut self, data: [u8; 8], now_us: u64) -> Option<Frame> {
         let changed = self.sent != Some(data);
         let by_change = self.parameters.kind == 0 || !self.parameters.is_synchronous() && !self.due;
         self.due = false;

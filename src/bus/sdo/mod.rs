@@ -20,7 +20,7 @@ use block::{BlockDownload, BlockUpload};
 use segment::{SegmentDownload, SegmentUpload};
 
 /// Timeout of a client, us.
-pub const TIMEOUT_US: u64 = 1_000_000;
+pub(crate) const TIMEOUT_US: u64 = 1_000_000;
 
 /// Bytes of a segment.
 const SEGMENT: u32 = 7;
@@ -46,7 +46,7 @@ enum Step {
 
 /// SDO server of one node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Server {
+pub(crate) struct Server {
     object: Object,
     transfer: Option<Transfer>,
     due_us: u64,
@@ -193,10 +193,15 @@ impl Gathered {
 
 impl Server {
     /// No transfer active.
-    pub const IDLE: Self = Self { object: Object::at(0, 0), transfer: None, due_us: 0, answer: None };
+    pub(crate) const IDLE: Self = Self { object: Object::at(0, 0), transfer: None, due_us: 0, answer: None };
 
     /// Handles a request of the client.
-    pub fn request<O: Objects>(&mut self, request: [u8; 8], now_us: u64, dictionary: &mut Dictionary<'_, O>) {
+    pub(crate) fn request<O: Objects>(
+        &mut self,
+        request: [u8; 8],
+        now_us: u64,
+        dictionary: &mut Dictionary<'_, O>,
+    ) {
         let due_us = core::mem::replace(&mut self.due_us, now_us + TIMEOUT_US);
         // In a block download the first byte is a segment number, except for 0x80 (abort).
         if request[0] == 0x80 {
@@ -258,12 +263,16 @@ impl Server {
     }
 
     /// Restarts the timeout after a time in which nothing could be received.
-    pub fn wait(&mut self, now_us: u64) {
+    pub(crate) fn wait(&mut self, now_us: u64) {
         self.due_us = now_us + TIMEOUT_US;
     }
 
     /// Returns the next answer, the next segment of a block, or the abort after a timeout.
-    pub fn poll<O: Objects>(&mut self, now_us: u64, dictionary: &mut Dictionary<'_, O>) -> Option<[u8; 8]> {
+    pub(crate) fn poll<O: Objects>(
+        &mut self,
+        now_us: u64,
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Option<[u8; 8]> {
         let is_full = match &self.transfer {
             Some(Transfer::Download(segments)) => segments.is_full(dictionary),
             Some(Transfer::BlockDownload(block)) => block.is_full(dictionary),

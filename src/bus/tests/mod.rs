@@ -11,7 +11,7 @@ use crate::leg::{DriveEvent, DriveState, PowerRequest};
 use crate::units::{Ampere, NewtonMetre};
 
 /// 5003 bytes: not a multiple of the segment or block size.
-pub const LONG: usize = 5003;
+pub(crate) const LONG: usize = 5003;
 const BYTES: [u8; LONG] = {
     let mut bytes = [0; LONG];
     let mut index = 0;
@@ -21,16 +21,16 @@ const BYTES: [u8; LONG] = {
     }
     bytes
 };
-pub const LONG_TEXT: &str = match core::str::from_utf8(&BYTES) {
+pub(crate) const LONG_TEXT: &str = match core::str::from_utf8(&BYTES) {
     Ok(text) => text,
     Err(_) => "",
 };
 
-pub const IDENTITY: Identity =
+pub(crate) const IDENTITY: Identity =
     Identity { product: 0x5CA2, revision: 1, texts: ["Scarab", "3.6", LONG_TEXT], ..Identity::scarab(7, "") };
 
 /// Constants of a joint with every mode.
-pub fn constants() -> AxisConstants {
+pub(crate) fn constants() -> AxisConstants {
     AxisConstants {
         rated_torque: NewtonMetre(40.0),
         rated_current: Ampere(20.0),
@@ -39,32 +39,32 @@ pub fn constants() -> AxisConstants {
     }
 }
 
-pub fn axis() -> Axis {
+pub(crate) fn axis() -> Axis {
     Axis::new(constants())
 }
 
 /// COB-ID and code of the emergency messages.
-pub fn codes<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Vec<(u16, u16)> {
+pub(crate) fn codes<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Vec<(u16, u16)> {
     let emergencies = frames.into_iter().filter(|frame| matches!(frame.id(), 0x81..=0xFF));
     emergencies.map(|frame| (frame.id(), u16::from_le_bytes([frame.data()[0], frame.data()[1]]))).collect()
 }
 
 /// Value or abort code of an SDO answer.
-pub fn value(answer: [u8; 8]) -> Result<u32, u32> {
+pub(crate) fn value(answer: [u8; 8]) -> Result<u32, u32> {
     let [command, .., a, b, c, d] = answer;
     let value = u32::from_le_bytes([a, b, c, d]);
     if command == 0x80 { Err(value) } else { Ok(value) }
 }
 
 /// Two nodes, two joints, one drive.
-pub struct Board {
-    pub nodes: [Node; 2],
-    pub axes: [Axis; 2],
-    pub drive: DriveState,
-    pub now_us: u64,
+pub(crate) struct Board {
+    pub(crate) nodes: [Node; 2],
+    pub(crate) axes: [Axis; 2],
+    pub(crate) drive: DriveState,
+    pub(crate) now_us: u64,
     coupling: Coupling,
     /// Whether the leg refuses requests that enable it.
-    pub refuses: bool,
+    pub(crate) refuses: bool,
 }
 
 impl Board {
@@ -81,14 +81,14 @@ impl Board {
     }
 
     /// Board after the boot-up messages and one tick of the leg, with the default of every object.
-    pub fn with_defaults(first: u8) -> Self {
+    pub(crate) fn with_defaults(first: u8) -> Self {
         let mut board = Self::new(first);
         assert_eq!(board.tick().len(), 2);
         board
     }
 
     /// Started board whose emergency messages do not wait for each other (1015).
-    pub fn started(first: u8) -> Self {
+    pub(crate) fn started(first: u8) -> Self {
         let mut board = Self::with_defaults(first);
         for node in &mut board.nodes {
             node.communication_mut().emergency.inhibit = 0;
@@ -97,7 +97,7 @@ impl Board {
     }
 
     /// Puts a frame on the bus.
-    pub fn receive(&mut self, id: u16, data: &[u8]) {
+    pub(crate) fn receive(&mut self, id: u16, data: &[u8]) {
         for (node, axis) in self.nodes.iter_mut().zip(&mut self.axes) {
             node.on_frame(&Frame::new(id, data), self.now_us, axis);
         }
@@ -129,7 +129,7 @@ impl Board {
         self.frames()
     }
 
-    pub fn frames(&mut self) -> Vec<Frame> {
+    pub(crate) fn frames(&mut self) -> Vec<Frame> {
         let mut frames = Vec::new();
         for (node, axis) in self.nodes.iter_mut().zip(&mut self.axes) {
             frames.extend(core::iter::from_fn(|| node.poll(self.now_us, axis)).take(1000));
@@ -138,12 +138,12 @@ impl Board {
         frames
     }
 
-    pub fn run(&mut self, ticks: u32) -> Vec<Frame> {
+    pub(crate) fn run(&mut self, ticks: u32) -> Vec<Frame> {
         (0..ticks).flat_map(|_| self.tick()).collect()
     }
 
     /// Sends an SDO request to the first node and returns its answer.
-    pub fn ask(&mut self, request: [u8; 8]) -> Option<[u8; 8]> {
+    pub(crate) fn ask(&mut self, request: [u8; 8]) -> Option<[u8; 8]> {
         let id = self.nodes[0].id();
         self.receive(id.on(0x600), &request);
         let [node, _] = &mut self.nodes;
@@ -156,7 +156,7 @@ impl Board {
         None
     }
 
-    pub fn read(&mut self, index: u16, sub: u8) -> Result<u32, u32> {
+    pub(crate) fn read(&mut self, index: u16, sub: u8) -> Result<u32, u32> {
         let [low, high] = index.to_le_bytes();
         let answer = self.ask([0x40, low, high, sub, 0, 0, 0, 0]).expect("an answer");
         assert_eq!(answer[1..4], [low, high, sub]);
@@ -164,7 +164,7 @@ impl Board {
     }
 
     /// Writes a number with the given size.
-    pub fn write(&mut self, index: u16, sub: u8, number: u32, size: u8) -> Result<(), u32> {
+    pub(crate) fn write(&mut self, index: u16, sub: u8, number: u32, size: u8) -> Result<(), u32> {
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), number.to_le_bytes());
         let answer = self.ask([0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]).expect("an answer");
         value(answer).map(|_| ())

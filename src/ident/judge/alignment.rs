@@ -40,10 +40,10 @@ use crate::real::{self, Real};
 
 /// Directions tested: the length before each joint but the first, then the zero of each joint but the last.
 /// Enough for three joints.
-pub const DIRECTIONS: usize = 4;
+pub(crate) const DIRECTIONS: usize = 4;
 /// Rows held back, and rows excluded on either side of an unexpectedly large residual: 0.3 s. That is the
 /// longer half of a push plus the filter's reach.
-pub const HELD: usize = 15;
+pub(crate) const HELD: usize = 15;
 /// Smallest share of a direction's power that the parameters must leave, or the direction is not
 /// reported. Single precision leaves 6e-7 of a wholly absorbed direction. The first joint's zero,
 /// mostly gravity, leaves 6e-5.
@@ -147,14 +147,14 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
     /// Starts another motion. A residual above `outlier_bound` (N m) marks a row as disturbed; `noise` is
     /// the standard deviation of an independent row of each joint, N m. Columns that were
     /// `dropped` are not free to follow.
-    pub fn begin(&mut self, outlier_bound: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
+    pub(crate) fn begin(&mut self, outlier_bound: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
         self.break_off();
         (self.outlier_bound, self.weight, self.dropped) =
             (*outlier_bound, noise.map(|noise| T::one() / noise), *dropped);
     }
 
     /// Ends a continuous stretch of samples: all rows that are held back enter the factor.
-    pub fn break_off(&mut self) {
+    pub(crate) fn break_off(&mut self) {
         while self.left < self.rows {
             self.release();
         }
@@ -164,7 +164,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
 
     /// Takes a smoothed instant and the rows that it finished, if any. `reach` is that of the low-pass: a row
     /// is centred that many instants before the instant that finishes it (whole windows only).
-    pub fn take(
+    pub(crate) fn take(
         &mut self,
         model: &RowModel<T, N, B>,
         values: &[T; B],
@@ -241,7 +241,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         B + DIRECTIONS
     };
 
-    /// Errors found so far; call [`Self::break_off`] first to end the last motion. `None` for a direction
+    /// Errors found so far; call `Self::break_off` first to end the last motion. `None` for a direction
     /// that does not exist or that the parameters absorb.
     #[must_use]
     pub fn misalignments(&self) -> Misalignments<T> {

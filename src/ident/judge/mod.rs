@@ -8,8 +8,8 @@
 //! | `verdict` | evidence and limits of every test | |
 //! | `judgement` | judges a solver's result by all tests | |
 
-pub mod alignment;
-pub mod held_out;
-pub mod judgement;
-pub mod residual;
+pub(crate) mod alignment;
+pub(crate) mod held_out;
+pub(crate) mod judgement;
+pub(crate) mod residual;
 pub mod verdict;

@@ -24,7 +24,7 @@ use crate::ident::record::stretch::ROW_S;
 use crate::real::{self, Real};
 
 /// Rows of a block: half a second.
-pub const BLOCK_ROWS: u32 = 25;
+pub(crate) const BLOCK_ROWS: u32 = 25;
 /// Fewest used rows of a valid block.
 const LEAST_FILLED: u32 = 12;
 /// Outlier rows are a minority up to one in this many.
@@ -58,9 +58,9 @@ impl<T: Real> Neighbours<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointResidual<T> {
     /// Rows used.
-    pub rows: u32,
+    pub(crate) rows: u32,
     /// Rows with an error above the limit.
-    pub outliers: u32,
+    pub(crate) outliers: u32,
     all: Neighbours<T>,
     /// Statistics over blocks without an error above the limit.
     undisturbed: Neighbours<T>,
@@ -172,13 +172,13 @@ impl<T: Real, const N: usize> Residual<T, N> {
     }
 
     /// Ends a continuous stretch of rows.
-    pub fn break_off(&mut self) {
+    pub(crate) fn break_off(&mut self) {
         self.joints.iter_mut().for_each(JointResidual::break_off);
         self.common = 0;
     }
 
     /// Takes one row of each joint; an error above `outlier_bound` (N m) is part of a stretch.
-    pub fn take<const B: usize>(
+    pub(crate) fn take<const B: usize>(
         &mut self,
         rows: &FilteredRows<T, N, B>,
         values: &[T; B],

@@ -23,11 +23,11 @@ use crate::real::{self, Real};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baseline<T, const N: usize, const B: usize> {
     /// Base values and their covariance.
-    pub estimate: Estimate<T, B>,
+    pub(crate) estimate: Estimate<T, B>,
     /// Variance of one filtered row of each joint, (N m)^2.
     pub row_variance: [T; N],
     /// Information of one row in units of independent ones.
-    pub row_information: T,
+    pub(crate) row_information: T,
 }
 
 impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
@@ -59,7 +59,7 @@ impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
 
     /// Normalised square `e^2` of one joint's residual.
     #[must_use]
-    pub fn normalised_square(&self, rows: &FilteredRows<T, N, B>, joint: usize) -> T {
+    pub(crate) fn normalised_square(&self, rows: &FilteredRows<T, N, B>, joint: usize) -> T {
         let (Some(row), Some(&torque), Some(&variance)) =
             (rows.regressor.get(joint), rows.torque.get(joint), self.row_variance.get(joint))
         else {

@@ -46,7 +46,7 @@ use crate::ident::signal::kernel::LowPass;
 use crate::real::{self, Real};
 
 /// Moving rows of a joint in a block: half a second.
-pub const ROWS_PER_BLOCK: u32 = 25;
+pub(crate) const ROWS_PER_BLOCK: u32 = 25;
 const ROW_RATE_HZ: f64 = SAMPLE_RATE_HZ / DECIMATION as f64;
 /// Duration of a block for a joint that is never at rest, s.
 const BLOCK_S: f64 = ROWS_PER_BLOCK as f64 / ROW_RATE_HZ;
@@ -57,14 +57,14 @@ const HALVINGS: u32 = 30;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MonitorSettings<T> {
     /// Least mean time between false alarms of a leg that moves all the time, s.
-    pub time_between_false_alarms_s: T,
+    pub(crate) time_between_false_alarms_s: T,
     /// rho: energy of the residual over that at acceptance, for which the sum is optimal; above 1.
-    pub energy_ratio: T,
+    pub(crate) energy_ratio: T,
     /// kappa: factor by which the noise variance may have been underestimated; from 1 to
     /// below `rho ln rho / (rho - 1)`.
-    pub noise_margin: T,
+    pub(crate) noise_margin: T,
     /// Time that even the largest change must last, s.
-    pub persistence_s: T,
+    pub(crate) persistence_s: T,
 }
 
 impl<T: Real> Default for MonitorSettings<T> {
@@ -85,7 +85,7 @@ impl<T: Real> Default for MonitorSettings<T> {
 impl<T: Real> MonitorSettings<T> {
     /// Energy up to which the sums do not grow: `rho ln rho / (rho - 1)`.
     #[must_use]
-    pub fn silent_energy(&self) -> T {
+    pub(crate) fn silent_energy(&self) -> T {
         self.energy_ratio * real::ln(self.energy_ratio) / (self.energy_ratio - T::one())
     }
 }
@@ -100,7 +100,7 @@ pub struct Change<T, const N: usize> {
     /// Sum of each joint.
     pub statistic: [T; N],
     /// Limit h that a sum reached.
-    pub limit: T,
+    pub(crate) limit: T,
 }
 
 /// Cumulative sum of one joint.
@@ -162,7 +162,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
 
     /// Current sum of each joint.
     #[must_use]
-    pub fn statistic(&self) -> [T; N] {
+    pub(crate) fn statistic(&self) -> [T; N] {
         self.charts.map(|chart| chart.sum)
     }
 
@@ -186,7 +186,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
     }
 
     /// Takes normalised squares of residuals directly; `None` for a joint at rest.
-    pub fn take(&mut self, squares: &[Option<T>; N]) -> Option<Change<T, N>> {
+    pub(crate) fn take(&mut self, squares: &[Option<T>; N]) -> Option<Change<T, N>> {
         let mut alarm = None;
         for (joint, square) in squares.iter().enumerate() {
             let chart = &mut self.charts[joint];

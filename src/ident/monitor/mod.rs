@@ -6,6 +6,6 @@
 //! | `detection` | detects a change of the residual in motion | Page 1954; Lorden 1971; Siegmund 1985 |
 //! | `update` | cause of the change, from gait alone | Aitken 1935; Akaike 1974 |
 
-pub mod baseline;
-pub mod detection;
-pub mod update;
+pub(crate) mod baseline;
+pub(crate) mod detection;
+pub(crate) mod update;

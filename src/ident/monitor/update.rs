@@ -33,7 +33,7 @@
 //! refused. For a payload on the first link torque determines the moment but not the mass. A payload
 //! parameter that the motion did not excite (its inertia, in slow gait) has a large sigma.
 
-pub mod hypothesis;
+pub(crate) mod hypothesis;
 
 use super::baseline::Baseline;
 use crate::ident::judge::verdict::{Evidence, Reason, Thresholds, Verdict, VerdictBuilder};
@@ -94,7 +94,7 @@ pub struct Update<T, const N: usize, const B: usize> {
     /// Energy of each joint's residual over that at acceptance, with the values of `estimate`.
     pub energy_after: [T; N],
     /// Base values after the change; the accepted ones without a change or an explanation.
-    pub estimate: Estimate<T, B>,
+    pub(crate) estimate: Estimate<T, B>,
 }
 
 impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
@@ -172,7 +172,7 @@ impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
 
     /// Updated model with its uncertainty, if a change explains the rows; the noise is the old model's.
     #[must_use]
-    pub fn baseline(&self, before: &Baseline<T, N, B>) -> Option<Baseline<T, N, B>> {
+    pub(crate) fn baseline(&self, before: &Baseline<T, N, B>) -> Option<Baseline<T, N, B>> {
         self.is_change().then(|| Baseline { estimate: self.estimate.clone(), ..before.clone() })
     }
 }

@@ -30,13 +30,13 @@ const SMALLEST_NOISE_SHARE: f64 = 1e-5;
 
 /// Sums over the blocks of a motion.
 pub(super) struct Assembly<T, const N: usize, const B: usize> {
-    pub factors: [Factor<T, B>; N],
-    pub torque: [TorqueSize<T>; N],
-    pub rows: [u32; N],
-    pub outliers: Outliers<T, N>,
-    pub stribeck: [Option<StribeckFit<T, B>>; N],
+    pub(crate) factors: [Factor<T, B>; N],
+    pub(crate) torque: [TorqueSize<T>; N],
+    pub(crate) rows: [u32; N],
+    pub(crate) outliers: Outliers<T, N>,
+    pub(crate) stribeck: [Option<StribeckFit<T, B>>; N],
     /// Gain and surplus of the best curve, for each joint that was searched.
-    pub tried: [Option<(T, T)>; N],
+    pub(crate) tried: [Option<(T, T)>; N],
 }
 
 /// Adds up a window. `information` is `m sum h^2`; `model` is `None` when nothing was recorded.

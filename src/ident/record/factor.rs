@@ -59,7 +59,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
 
     /// Takes all rows of another factor, each multiplied by `weight`.
     #[inline(never)]
-    pub fn merge_scaled(&mut self, other: &Self, weight: T) {
+    pub(crate) fn merge_scaled(&mut self, other: &Self, weight: T) {
         for (row, &right) in other.r.iter().zip(&other.z) {
             let mut scaled = *row;
             for element in &mut scaled {
@@ -133,12 +133,6 @@ impl<T: Real, const B: usize> Factor<T, B> {
         self.residual
     }
 
-    /// Number of rows that the factor represents.
-    #[must_use]
-    pub fn rows(&self) -> u32 {
-        self.rows
-    }
-
     /// The triangular matrix, `[row][column]`.
     #[must_use]
     pub fn triangle(&self) -> &[[T; B]; B] {
@@ -166,7 +160,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
     /// result is `columns[i]`.
     #[must_use]
     #[inline(never)]
-    pub fn restricted(&self, columns: &[usize], fixed: &[T; B], weight: T) -> Self {
+    pub(crate) fn restricted(&self, columns: &[usize], fixed: &[T; B], weight: T) -> Self {
         let mut result = Self::new();
         for (row, &right) in self.r.iter().zip(&self.z) {
             let mut compact = [T::zero(); B];
@@ -190,7 +184,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
     /// Holds these columns at zero; the other columns keep their index.
     #[must_use]
     #[inline(never)]
-    pub fn without(&self, columns: &[bool; B]) -> Self {
+    pub(crate) fn without(&self, columns: &[bool; B]) -> Self {
         let mut result = Self::new();
         for (row, &right) in self.r.iter().zip(&self.z) {
             let mut rest = *row;
@@ -208,13 +202,13 @@ impl<T: Real, const B: usize> Factor<T, B> {
 
     /// Rows of this factor with zero on the right.
     #[must_use]
-    pub fn without_right(&self) -> Self {
+    pub(crate) fn without_right(&self) -> Self {
         Self { z: [T::zero(); B], residual: T::zero(), ..self.clone() }
     }
 
     /// Rows of this factor with each right-hand side times `scale`, less the row times `shift`.
     #[must_use]
-    pub fn with_right(&self, scale: T, shift: &[T; B]) -> Self {
+    pub(crate) fn with_right(&self, scale: T, shift: &[T; B]) -> Self {
         let mut result = self.clone();
         for (right, row) in result.z.iter_mut().zip(&self.r) {
             *right *= scale;
@@ -248,7 +242,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
     /// `R^-1` of the first `count` columns (upper triangular), zero where a diagonal is zero.
     #[must_use]
     #[inline(never)]
-    pub fn inverse(&self, count: usize) -> [[T; B]; B] {
+    pub(crate) fn inverse(&self, count: usize) -> [[T; B]; B] {
         let count = count.min(B);
         let mut inverse = [[T::zero(); B]; B];
         for column in 0..count {

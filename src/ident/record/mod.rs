@@ -16,14 +16,14 @@
 //! | `stretch` | durations of disturbances, by a second pass over the rows | |
 
 mod assembly;
-pub mod choice;
+pub(crate) mod choice;
 pub mod factor;
-pub mod motion_record;
+pub(crate) mod motion_record;
 pub mod packed;
 pub mod recorder;
-pub mod reweighting;
-pub mod row_model;
-pub mod rows;
-pub mod stretch;
+pub(crate) mod reweighting;
+pub(crate) mod row_model;
+pub(crate) mod rows;
+pub(crate) mod stretch;
 pub mod stribeck;
 pub mod window;

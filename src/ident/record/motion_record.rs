@@ -15,7 +15,7 @@ pub struct TorqueSize<T> {
     /// Root mean square of the filtered torque, N m.
     pub root_mean_square: T,
     /// Root mean square of the smoothed speed, rad/s.
-    pub speed: T,
+    pub(crate) speed: T,
 }
 
 /// All data that identification and validation need of one motion.
@@ -45,7 +45,7 @@ pub struct Record<T, const N: usize, const B: usize> {
 impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     /// Record without noise, rejected samples and outliers, whose rows are independent.
     #[cfg(test)]
-    pub fn plain(factors: [Factor<T, B>; N], torque: [TorqueSize<T>; N], rows: u32) -> Self {
+    pub(crate) fn plain(factors: [Factor<T, B>; N], torque: [TorqueSize<T>; N], rows: u32) -> Self {
         Self {
             factors,
             torque,
@@ -103,7 +103,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
 /// Replaced samples and down-weighted rows of one motion.
 ///
 /// A result rests on how many samples were replaced ([`crate::ident::signal::hampel`]) and how much of the
-/// motion got less weight ([`super::reweighting`]).
+/// motion got less weight (`reweighting`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outliers<T, const N: usize> {
     /// 500 Hz samples taken in.
@@ -117,13 +117,13 @@ pub struct Outliers<T, const N: usize> {
     /// Longest stretch in which all joints' rows were disturbed at once, s.
     pub longest_common_s: T,
     /// Error over torque, root mean squares over all rows, with the parameters that the weighted rows give.
-    pub whole_error_share: [T; N],
+    pub(crate) whole_error_share: [T; N],
 }
 
 impl<T: Real, const N: usize> Outliers<T, N> {
     /// Empty statistics.
     #[must_use]
-    pub fn none() -> Self {
+    pub(crate) fn none() -> Self {
         Self {
             samples: 0,
             replaced: [0; N],
@@ -178,7 +178,7 @@ impl<T: Real, const N: usize, const B: usize> Selection<T, N, B> {
 
     /// True if this parameter is held at zero.
     #[must_use]
-    pub fn drops(&self, model: &RowModel<T, N, B>, joint: usize, parameter: Parameter) -> bool {
+    pub(crate) fn drops(&self, model: &RowModel<T, N, B>, joint: usize, parameter: Parameter) -> bool {
         model.drive(joint, parameter).and_then(|base| self.dropped.get(base)).copied().unwrap_or(false)
     }
 

@@ -70,7 +70,7 @@ pub fn rows<T: Real>(factor: &[T], columns: usize) -> impl Iterator<Item = (usiz
 
 /// Residual sum of squares at the least-squares optimum.
 #[must_use]
-pub fn residual<T: Real>(factor: &[T], columns: usize) -> T {
+pub(crate) fn residual<T: Real>(factor: &[T], columns: usize) -> T {
     factor.get(size(columns) - 1).copied().unwrap_or(T::zero())
 }
 
@@ -90,7 +90,7 @@ pub fn merge<T: Real>(factor: &mut [T], other: &[T], columns: usize, weight: T) 
 
 /// `|R p - z|^2 + residual`: sum of squares with these parameters.
 #[must_use]
-pub fn cost<T: Real>(factor: &[T], columns: usize, parameters: &[T]) -> T {
+pub(crate) fn cost<T: Real>(factor: &[T], columns: usize, parameters: &[T]) -> T {
     let mut total = residual(factor, columns);
     for (column, row) in rows(factor, columns) {
         let Some((right, elements)) = row.split_last() else { continue };

@@ -36,10 +36,10 @@ pub const SAMPLE_RATE_HZ: f64 = 500.0;
 /// Smoothed speed below which a joint may stick, rad/s, where the encoder is fine enough.
 pub const STILL_SPEED: f64 = 0.03;
 /// Pulse of the smoothed speed at one count of an encoder, in counts per period of the rows' bandwidth.
-pub const PULSE_COUNTS: f64 = 6.2;
+pub(crate) const PULSE_COUNTS: f64 = 6.2;
 /// Speed below which a joint may stick, in pulses of a coarse encoder. A joint that sticks beside an edge
 /// between two counts shows one pulse; the rest is margin.
-pub const STILL_PULSES: f64 = 1.6;
+pub(crate) const STILL_PULSES: f64 = 1.6;
 /// Largest share of standstill in a row's window for the row to be used. Friction at rest takes any value up
 /// to breakaway, so a row beyond it is unreliable. On the MuJoCo leg, whose hip sticks a fifth of the time,
 /// using such rows costs 14 % of Coulomb friction and twelve times the torque error. On the simulated default
@@ -76,7 +76,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
 
     /// Row low-pass, the second filter.
     #[must_use]
-    pub fn low_pass(&self) -> &LowPass<T, TAPS> {
+    pub(crate) fn low_pass(&self) -> &LowPass<T, TAPS> {
         &self.low_pass
     }
 }
@@ -150,7 +150,7 @@ where
     }
 
     /// Builds a recorder in place, from filters that already fit.
-    pub fn new_in<'a>(
+    pub(crate) fn new_in<'a>(
         slot: &'a mut MaybeUninit<Self>,
         filters: &Filters<T, N, B, TAPS, PENDING>,
         estimator: Estimator,

@@ -47,10 +47,10 @@ const HARMLESS_SHARE: f64 = 2e-3;
 pub(super) const INDEPENDENT_SHARE: f64 = 1e-4;
 
 /// Weight of each block's squares, 0..1.
-pub type Weights<T> = [T; LARGEST_BLOCKS];
+pub(crate) type Weights<T> = [T; LARGEST_BLOCKS];
 
 /// Factor of all rows of one joint, each block's squares times its weight.
-pub fn weighted<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
+pub(crate) fn weighted<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
     window: &Window<T, N, B, NUMBERS>,
     joint: usize,
     weights: &Weights<T>,
@@ -69,7 +69,7 @@ pub fn weighted<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
 
 /// Weights of one joint's blocks; `information` is `m sum h^2`.
 #[must_use]
-pub fn weigh<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
+pub(crate) fn weigh<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
     window: &Window<T, N, B, NUMBERS>,
     joint: usize,
     information: T,

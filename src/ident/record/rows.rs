@@ -115,7 +115,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
 
     /// Open outputs that a kernel of `taps` weights needs.
     #[must_use]
-    pub const fn outputs_needed(taps: usize) -> usize {
+    pub(crate) const fn outputs_needed(taps: usize) -> usize {
         taps.div_ceil(DECIMATION)
     }
 
@@ -154,7 +154,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
 
     /// Returns the outputs whose centre was seen, one per call, after the last sample; then `None`, and the
     /// filter is empty.
-    pub fn finish<const TAPS: usize>(
+    pub(crate) fn finish<const TAPS: usize>(
         &mut self,
         low_pass: &LowPass<T, TAPS>,
     ) -> Option<FilteredRows<T, N, B>> {

@@ -46,7 +46,7 @@ pub struct Stretches<T, const N: usize, const B: usize> {
     common: u32,
     has_common_started: bool,
     /// Longest stretch of each joint, s.
-    pub longest_s: [T; N],
+    pub(crate) longest_s: [T; N],
     /// Longest stretch of all joints at once, s.
     pub longest_common_s: T,
 }

@@ -35,7 +35,8 @@
 
 mod curve;
 
-pub use curve::{Combination, bank_columns, combination};
+pub use curve::combination;
+pub(crate) use curve::{Combination, bank_columns};
 
 use curve::slope;
 
@@ -45,14 +46,14 @@ use super::window::Columns;
 use crate::real::{self, Real, dot};
 
 /// Stribeck columns of a joint.
-pub const BANK: usize = 3;
+pub(crate) const BANK: usize = 3;
 /// Speed of the slowest column, rad/s; each is twice the one before.
-pub const SLOWEST_RAD_S: f64 = 0.06;
+pub(crate) const SLOWEST_RAD_S: f64 = 0.06;
 /// Range of the search, rad/s.
-pub const SPEEDS_RAD_S: (f64, f64) = (0.05, 1.0);
+pub(crate) const SPEEDS_RAD_S: (f64, f64) = (0.05, 1.0);
 /// Largest pulse of an encoder's count, rad/s, with which a search under `auto` makes sense: a quarter of the
 /// slowest vs.
-pub const LARGEST_PULSE: f64 = SPEEDS_RAD_S.0 / 4.0;
+pub(crate) const LARGEST_PULSE: f64 = SPEEDS_RAD_S.0 / 4.0;
 /// Least chi-square of a surplus under `auto`. Without a surplus the gain stays below the chi-square of the
 /// bank's three columns, which exceeds 30 in 1.4 of a million motions. In 200 undisturbed runs of the default
 /// leg it was at most 8.7.
@@ -114,13 +115,13 @@ impl<T: Real, const B: usize> StribeckFit<T, B> {
 
 /// One joint's packed rows, bank columns after the base columns, and the standard deviation of a row.
 #[derive(Clone, Copy, Debug)]
-pub struct JointRows<'a, T, const B: usize> {
+pub(crate) struct JointRows<'a, T, const B: usize> {
     /// Packed factor.
-    pub factor: &'a [T; LARGEST_SIZE],
+    pub(crate) factor: &'a [T; LARGEST_SIZE],
     /// Columns of the factor.
-    pub columns: &'a Columns<B>,
+    pub(crate) columns: &'a Columns<B>,
     /// Standard deviation of an independent row, N m.
-    pub noise: T,
+    pub(crate) noise: T,
 }
 
 /// Rotates the factor so that the `front` combinations of the bank precede the base columns.
@@ -178,13 +179,13 @@ fn without_front<T: Real, const B: usize>(
 
 /// Base columns without Stribeck friction: the part that the bank would explain stays in the residual.
 #[must_use]
-pub fn without_bank<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> Factor<T, B> {
+pub(crate) fn without_bank<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> Factor<T, B> {
     without_front(&reordered::<T, B, 0>(joint, &[]), 0, joint.columns)
 }
 
 /// Base columns with the whole bank eliminated: unbiased with and without Stribeck friction.
 #[must_use]
-pub fn bank_eliminated<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> Factor<T, B> {
+pub(crate) fn bank_eliminated<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> Factor<T, B> {
     let unit = core::array::from_fn(|row| Combination {
         bank: core::array::from_fn(|column| if row == column { T::one() } else { T::zero() }),
         friction: [T::zero(); 2],
@@ -271,19 +272,19 @@ impl<T: Real> Reduced<T> {
 }
 
 /// Stribeck curve that explains most of one joint's rows.
-pub struct Strongest<T> {
+pub(crate) struct Strongest<T> {
     reduced: Reduced<T>,
     speed: T,
     /// Chi-square that the curve explains.
-    pub gain: T,
+    pub(crate) gain: T,
     /// Surplus, N m.
-    pub surplus: T,
+    pub(crate) surplus: T,
 }
 
 /// Searches for Stribeck friction of one joint. `others` holds the rows of the other joints, weighted to
 /// chi-square units; `rank` is the number of base parameters.
 #[must_use]
-pub fn strongest<T: Real, const B: usize>(
+pub(crate) fn strongest<T: Real, const B: usize>(
     joint: &JointRows<'_, T, B>,
     others: &Factor<T, B>,
     rank: usize,
@@ -297,7 +298,7 @@ pub fn strongest<T: Real, const B: usize>(
 /// Returns the fit and the joint's factor with surplus and speed eliminated. `None` where gain and surplus
 /// are not both above `least`, or the problem is degenerate.
 #[must_use]
-pub fn eliminate<T: Real, const B: usize>(
+pub(crate) fn eliminate<T: Real, const B: usize>(
     joint: &JointRows<'_, T, B>,
     found: &Strongest<T>,
     least: (T, T),

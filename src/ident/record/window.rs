@@ -1,7 +1,7 @@
 //! A motion as a window of blocks: input of the reweighting, in memory independent of the duration.
 //!
 //! One factor for a whole motion cannot be reweighted: a push inside it cannot be removed. The motion is
-//! therefore cut into blocks of [`BLOCK_ROWS`] filtered rows. Each block stores for each joint a small factor
+//! therefore cut into blocks of `BLOCK_ROWS` filtered rows. Each block stores for each joint a small factor
 //! over the columns that act on this joint's torque. When the memory is full two neighbours become one block:
 //! among the adjacent pairs of equal level (doublings) the lowest and oldest. Blocks then have two
 //! neighbouring levels, the youngest ones finer, whatever the duration. Only factors of similar size ever
@@ -15,7 +15,7 @@
 //! Memory: `NUMBERS` numbers and about 1 kB. For the default leg (9 + 3 and 7 + 3 columns) a block takes 161
 //! numbers, so 8192 numbers hold 50 blocks: 22 s of motion in pieces of 0.32 and 0.64 s.
 //! Cost: a row is rotated into a factor of its joint's columns. Every eighth output two blocks are merged,
-//! one joint per call of [`Window::tidy`], so that no sample bears the whole cost. The sums over blocks stay
+//! one joint per call of `Window::tidy`, so that no sample bears the whole cost. The sums over blocks stay
 //! the same meanwhile.
 //! Limits: with three joints and 28 columns only 10 blocks fit. A chain with a joint that depends on more
 //! than 32 columns is rejected.
@@ -28,11 +28,11 @@ use crate::model::Parameter;
 use crate::real::{self, Real};
 
 /// Outputs of the row filter, 50 a second, in a block.
-pub const BLOCK_ROWS: u32 = 8;
+pub(crate) const BLOCK_ROWS: u32 = 8;
 /// Length of the device's window in numbers: 32 KB in single precision.
 pub const NUMBERS: usize = 8192;
 /// Most blocks of a window.
-pub const LARGEST_BLOCKS: usize = 64;
+pub(crate) const LARGEST_BLOCKS: usize = 64;
 /// Numbers of a joint in a block besides its factor: sum of the absolute torque, and rows.
 const BESIDE: usize = 2;
 
@@ -42,9 +42,9 @@ pub struct Columns<const B: usize> {
     base: [usize; B],
     count: usize,
     /// Indices of the joint's Coulomb and viscous friction among them.
-    pub friction: [Option<usize>; 2],
+    pub(crate) friction: [Option<usize>; 2],
     /// Number of Stribeck columns after them.
-    pub bank: usize,
+    pub(crate) bank: usize,
     /// Offset of the joint's numbers in a block.
     start: usize,
 }
@@ -52,13 +52,13 @@ pub struct Columns<const B: usize> {
 impl<const B: usize> Columns<B> {
     /// Base parameters, in the order of the factor's columns.
     #[must_use]
-    pub fn base(&self) -> &[usize] {
+    pub(crate) fn base(&self) -> &[usize] {
         self.base.get(..self.count).unwrap_or(&[])
     }
 
     /// Number of all columns, Stribeck columns included.
     #[must_use]
-    pub fn all(&self) -> usize {
+    pub(crate) fn all(&self) -> usize {
         self.count + self.bank
     }
 }
@@ -67,11 +67,11 @@ impl<const B: usize> Columns<B> {
 #[derive(Clone, Copy, Debug)]
 pub struct Part<'a, T> {
     /// Packed factor.
-    pub factor: &'a [T],
+    pub(crate) factor: &'a [T],
     /// Sum of the absolute torque, N m.
-    pub absolute_torque: T,
+    pub(crate) absolute_torque: T,
     /// Rows taken.
-    pub rows: T,
+    pub(crate) rows: T,
 }
 
 /// The blocks of one motion.
@@ -136,7 +136,7 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
     }
 
     /// Arranges the columns of a model; discards all blocks.
-    pub fn lay_out(&mut self, model: &RowModel<T, N, B>) {
+    pub(crate) fn lay_out(&mut self, model: &RowModel<T, N, B>) {
         let mut all = self.columns;
         for (joint, columns) in all.iter_mut().enumerate() {
             let (mut base, mut count) = ([0; B], 0);
@@ -200,7 +200,7 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
 
     /// Takes one output of the row filter; `taken` marks the joints whose row is
     /// used. False without capacity.
-    pub fn insert(&mut self, rows: &FilteredRows<T, N, B>, taken: &[bool; N]) -> bool {
+    pub(crate) fn insert(&mut self, rows: &FilteredRows<T, N, B>, taken: &[bool; N]) -> bool {
         if self.capacity < 2 {
             return false;
         }
@@ -231,7 +231,7 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
     }
 
     /// Ends the open block: the next row starts another.
-    pub fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         while self.tidy() {}
         if self.capacity >= 2 && self.outputs[self.slot(self.closed)] > 0 {
             self.end_block();
@@ -262,7 +262,7 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
 
     /// Continues a pending merge by one joint's part of two blocks; true if there was work to do.
     /// [`Self::insert`] does the rest.
-    pub fn tidy(&mut self) -> bool {
+    pub(crate) fn tidy(&mut self) -> bool {
         let Some((index, joint)) = self.joining else { return false };
         let (index, joint) = (usize::from(index), usize::from(joint));
         let (merged, freed) = (self.slot(index), self.slot(index + 1));
@@ -308,20 +308,20 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
 
     /// Number of blocks with rows, including the open one.
     #[must_use]
-    pub fn blocks(&self) -> usize {
+    pub(crate) fn blocks(&self) -> usize {
         let open = self.capacity > 1 && self.joining.is_none() && self.outputs[self.slot(self.closed)] > 0;
         self.closed + usize::from(open)
     }
 
     /// Filter outputs in a block: its length at 50 Hz.
     #[must_use]
-    pub fn outputs(&self, block: usize) -> u32 {
+    pub(crate) fn outputs(&self, block: usize) -> u32 {
         self.outputs[self.slot(block)]
     }
 
     /// One joint's part of a block, oldest block first.
     #[must_use]
-    pub fn part(&self, block: usize, joint: usize) -> Option<Part<'_, T>> {
+    pub(crate) fn part(&self, block: usize, joint: usize) -> Option<Part<'_, T>> {
         let columns = self.columns.get(joint)?;
         let start = self.slot(block) * self.stride + columns.start;
         let all = self.numbers.get(start..start + packed::size(columns.all()) + BESIDE)?;

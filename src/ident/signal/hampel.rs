@@ -32,7 +32,7 @@
 use crate::real::{self, Real};
 
 /// Delay of the filter in samples: neighbours needed on each side.
-pub const REACH: usize = 4;
+pub(crate) const REACH: usize = 4;
 const WINDOW: usize = 2 * REACH + 1;
 const FACTOR: f64 = 6.0;
 const STEP: f64 = 0.02;
@@ -92,11 +92,11 @@ impl<T: Real> Hampel<T> {
     }
 
     /// Begins a new stretch of samples; the learned scale stays.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         (self.filled, self.missing) = (0, 0);
     }
 
-    /// Takes a sample; returns the cleaned sample of [`REACH`] samples ago, once there is one.
+    /// Takes a sample; returns the cleaned sample of `REACH` samples ago, once there is one.
     pub fn push(&mut self, sample: T) -> Option<Cleaned<T>> {
         self.shift(sample);
         self.filled = (self.filled + 1).min(WINDOW);

@@ -8,6 +8,6 @@
 //! | `noise` | noise level of the torque from its own scatter | Jain and Chlamtac 1985 |
 
 pub mod hampel;
-pub mod kernel;
+pub(crate) mod kernel;
 pub mod noise;
-pub mod smoothing;
+pub(crate) mod smoothing;

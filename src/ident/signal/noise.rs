@@ -105,7 +105,7 @@ fn sort<T: Real>(values: &mut [T; 5]) {
 
 /// Running estimate of the standard deviation of one joint's torque noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NoiseLevel<T> {
+pub(crate) struct NoiseLevel<T> {
     /// Newest first.
     last: [T; 3],
     filled: u8,
@@ -120,7 +120,7 @@ impl<T: Real> NoiseLevel<T> {
     }
 
     /// Ends a continuous stretch of samples.
-    pub fn break_off(&mut self) {
+    pub(crate) fn break_off(&mut self) {
         self.filled = 0;
     }
 
@@ -137,7 +137,7 @@ impl<T: Real> NoiseLevel<T> {
 
     /// Standard deviation of the noise of one sample; zero before the fifth difference.
     #[must_use]
-    pub fn sigma(&self) -> T {
+    pub(crate) fn sigma(&self) -> T {
         self.scatter.value().map_or(T::zero(), |median| median / T::from_double(0.674_490 * 4.472_136))
     }
 }

@@ -144,7 +144,7 @@ impl<T: Real> LinkPrior<T> {
 
 /// Search box of the base parameters.
 #[must_use]
-pub fn search_box<T: Real, const N: usize, const B: usize>(
+pub(crate) fn search_box<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &Record<T, N, B>,
     prior: Option<&[LinkPrior<T>; N]>,

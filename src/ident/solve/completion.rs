@@ -42,7 +42,7 @@ const WEAK_SHARE: f64 = 0.02;
 
 /// True if the data hardly separate base parameter `base` from the others.
 #[must_use]
-pub fn is_weak<T: Real, const N: usize, const B: usize>(
+pub(crate) fn is_weak<T: Real, const N: usize, const B: usize>(
     record: &Record<T, N, B>,
     estimate: &Estimate<T, B>,
     base: usize,
@@ -75,16 +75,6 @@ pub fn status<T: Real, const N: usize, const B: usize>(
 /// All parameters of all joints: the nearest to the prior with these base parameters.
 ///
 /// `None` when the groups are degenerate beyond rounding.
-#[must_use]
-pub fn complete<T: Real, const N: usize, const B: usize>(
-    model: &RowModel<T, N, B>,
-    base_values: &[T; B],
-    prior: &LegParameters<T, N>,
-) -> Option<LegParameters<T, N>> {
-    complete_within(model, base_values, prior, &prior_deviations(prior))
-}
-
-/// [`complete`] with the prior's standard deviations given.
 pub(super) fn complete_within<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     base_values: &[T; B],

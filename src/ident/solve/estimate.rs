@@ -98,7 +98,7 @@ impl<T: Real, const B: usize> Stage<T, B> {
 
     /// Number of base parameters that were open in this stage.
     #[must_use]
-    pub fn requested(&self) -> usize {
+    pub(crate) fn requested(&self) -> usize {
         self.requested
     }
 
@@ -217,7 +217,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     /// explains, N m: `tr(R Cov R') / rows`.
     #[must_use]
     #[inline(never)]
-    pub fn uncertainty(&self, joint: usize, estimate: &Estimate<T, B>) -> T {
+    pub(crate) fn uncertainty(&self, joint: usize, estimate: &Estimate<T, B>) -> T {
         let (Some(factor), Some(&rows)) = (self.factors.get(joint), self.rows.get(joint)) else {
             return T::zero();
         };
@@ -284,7 +284,7 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
 
     /// Number of stages of a plan.
     #[must_use]
-    pub const fn stages(plan: Plan) -> usize {
+    pub(crate) const fn stages(plan: Plan) -> usize {
         match plan {
             Plan::OneTime => 1,
             Plan::Sequential => N,
@@ -293,7 +293,13 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
 
     /// One stage of a plan; parameters determined by earlier stages are held at `values`.
     #[must_use]
-    pub fn stage(&self, plan: Plan, index: usize, values: &[T; B], determined: &[bool; B]) -> Stage<T, B> {
+    pub(crate) fn stage(
+        &self,
+        plan: Plan,
+        index: usize,
+        values: &[T; B],
+        determined: &[bool; B],
+    ) -> Stage<T, B> {
         match (plan, self.sequential_joint(index)) {
             (Plan::Sequential, Some(joint)) => {
                 let open = self.open(joint, determined);

@@ -12,13 +12,13 @@
 //! | `scale` | torque constants from two records, without and with a known mass | Gautier and Briot 2014 |
 //! | `solver` | one identification with all these steps, in slices | |
 
-pub mod bounds;
-pub mod completion;
-pub mod consistent;
-pub mod constrained;
-pub mod estimate;
-pub mod scale;
-pub mod search;
+pub(crate) mod bounds;
+pub(crate) mod completion;
+pub(crate) mod consistent;
+pub(crate) mod constrained;
+pub(crate) mod estimate;
+pub(crate) mod scale;
+pub(crate) mod search;
 pub mod selection;
 pub mod solver;
 #[cfg(test)]

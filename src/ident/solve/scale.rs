@@ -45,9 +45,9 @@ pub struct ConstantRatio<T> {
     /// Standard deviation of the ratio.
     pub sigma: T,
     /// Chi-square of the difference between the two runs that the stated mass does not explain.
-    pub mismatch: T,
+    pub(crate) mismatch: T,
     /// Degrees of freedom of `mismatch`.
-    pub freedom: u32,
+    pub(crate) freedom: u32,
 }
 
 /// Largest credible mismatch in spreads of chi-square: as for the prior's box, five are not noise.
@@ -189,7 +189,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
 
 /// Adds the effect of one more uncertain number to an estimate's covariance. `moved` is the estimate for that
 /// number one standard deviation larger.
-pub fn widen<T: Real, const B: usize>(estimate: &mut Estimate<T, B>, moved: &Estimate<T, B>) {
+pub(crate) fn widen<T: Real, const B: usize>(estimate: &mut Estimate<T, B>, moved: &Estimate<T, B>) {
     let mut step = [T::zero(); B];
     for (base, element) in step.iter_mut().enumerate() {
         if estimate.determined[base] && moved.determined[base] {

@@ -13,9 +13,9 @@ use crate::real::{self, Real};
 use crate::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
 
 /// Beetles in the swarm (paper, 4.1).
-pub const BEETLES: usize = 20;
+pub(crate) const BEETLES: usize = 20;
 /// Most iterations of a stage.
-pub const LARGEST_ITERATIONS: u32 = 300;
+pub(crate) const LARGEST_ITERATIONS: u32 = 300;
 /// A stage ends when the best cost fell by less than [`SMALLEST_GAIN`] in this many iterations.
 const PATIENCE: u32 = 15;
 /// Smallest progress in chi-square units; a tenth of a standard deviation of one parameter is 0.01.
@@ -30,10 +30,10 @@ pub(super) struct Patience<T> {
 
 impl<T: Real> Patience<T> {
     /// Patience before the first iteration.
-    pub const NEW: Self = Self { value: T::LARGEST, iteration: 0 };
+    pub(crate) const NEW: Self = Self { value: T::LARGEST, iteration: 0 };
 
     /// Whether a search ends with this best cost after these iterations.
-    pub fn ends(&mut self, value: T, iterations: u32) -> bool {
+    pub(crate) fn ends(&mut self, value: T, iterations: u32) -> bool {
         if value < self.value - T::from_double(SMALLEST_GAIN) {
             *self = Self { value, iteration: iterations };
         }
@@ -93,7 +93,7 @@ pub struct SwarmSearch<T: Real, const B: usize> {
 impl<T: Real, const B: usize> SwarmSearch<T, B> {
     /// Builds a cold search in place. The first [`Self::advance`] scatters the
     /// beetles uniformly over the box.
-    pub fn new_in<'a, const N: usize>(
+    pub(crate) fn new_in<'a, const N: usize>(
         slot: &'a mut MaybeUninit<Self>,
         problem: &Problem<'_, T, N, B>,
         plan: Plan,
@@ -121,7 +121,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
     }
 
     /// Restarts cold, with the columns that remain.
-    pub fn restart<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
+    pub(crate) fn restart<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
         (self.values, self.determined) = ([T::zero(); B], [false; B]);
         self.stage = problem.stage(self.plan, 0, &self.values, &self.determined);
         self.swarm.clear();
@@ -226,7 +226,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
 
     /// Largest cost at which a stage ended above its least-squares optimum, chi-square units.
     #[must_use]
-    pub fn excess(&self) -> T {
+    pub(crate) fn excess(&self) -> T {
         self.excess
     }
 

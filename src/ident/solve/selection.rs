@@ -11,7 +11,7 @@
 //!
 //! (C1) is exact, since the cost is quadratic; a column without information gains nothing. A column at zero
 //! leaves the factor: its entries are removed and the rows rotated to a triangle again
-//! ([`crate::ident::record::factor::Factor::restricted`]), so no row is needed twice.
+//! (`Factor::restricted`), so no row is needed twice.
 //!
 //! **The limit** is three standard deviations. A zero column is retained in 0.27 % of all cases. A nonzero
 //! one is dropped in half of the cases where its value is three of its standard deviations, and hardly ever
@@ -41,7 +41,7 @@ pub const SMALLEST_GAIN: f64 = 9.0;
 
 /// Base parameters that may be dropped: those of one parameter alone. A parameter measured only in a sum has
 /// no column of its own, for example the first joint's rotor with its link's ZZ. The sum is needed anyway.
-pub fn candidates<T: Real, const N: usize, const B: usize>(
+pub(crate) fn candidates<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
 ) -> impl Iterator<Item = usize> + '_ {
     (0..model.base.rank()).filter(|&base| {
@@ -57,7 +57,7 @@ pub fn candidates<T: Real, const N: usize, const B: usize>(
 
 /// Takes one step of the elimination; true when finished.
 #[inline(never)]
-pub fn step<T: Real, const N: usize, const B: usize>(
+pub(crate) fn step<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &mut Record<T, N, B>,
 ) -> bool {

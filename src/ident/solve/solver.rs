@@ -2,7 +2,7 @@
 //!
 //! The leg advances it in slices at the lowest priority; the host's replay of recordings runs the same value
 //! to its end. The swarm searches the base values in the box that the prior allows. The completion turns them
-//! into a physically consistent leg ([`super::consistent`]), whose base values are the result. The covariance
+//! into a physically consistent leg (`consistent`), whose base values are the result. The covariance
 //! is that of the least-squares problem, whose optimum is the swarm's reference.
 
 use core::mem::MaybeUninit;
@@ -38,7 +38,7 @@ pub struct Consistency<T> {
     pub degrees_of_freedom: usize,
 }
 
-/// Least squares and swarm on one record. [`crate::ident::judge::judgement`] judges the result.
+/// Least squares and swarm on one record. `judge::judgement` judges the result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solver<T: Real, const N: usize, const B: usize> {
     record: Record<T, N, B>,
@@ -69,7 +69,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     }
 
     /// Builds a solver in place, see [`Self::new`]: by value it would take a third of the device's stack.
-    pub fn new_in<'a>(
+    pub(crate) fn new_in<'a>(
         slot: &'a mut MaybeUninit<Self>,
         model: &RowModel<T, N, B>,
         mut record: Record<T, N, B>,
@@ -175,7 +175,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     /// Cost of the search's end above least squares, chi-square units; zero where the box keeps it away from
     /// least squares, whose values then count. `None` until the result is complete.
     #[must_use]
-    pub fn search_excess(&self) -> Option<T> {
+    pub(crate) fn search_excess(&self) -> Option<T> {
         self.completed.as_ref()?;
         Some(if self.is_inside() { self.search.excess() } else { T::zero() })
     }

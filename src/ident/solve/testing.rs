@@ -14,18 +14,18 @@ use crate::model::{
 use crate::real::Real;
 use crate::testing::TestRandom;
 
-pub use crate::model::planar::BASE as B;
+pub(crate) use crate::model::planar::BASE as B;
 
 const SIGMA: f64 = 0.3;
 const STATES: u32 = 400;
 
-pub type Model<T> = RowModel<T, 2, B>;
+pub(crate) type Model<T> = RowModel<T, 2, B>;
 
 /// Mask of all columns.
-pub const ALL: ColumnMask<2> = [[true; 14]; 2];
+pub(crate) const ALL: ColumnMask<2> = [[true; 14]; 2];
 
 /// Rows of one or two parallel axes a thigh of `length` metres apart, with the columns of `mask`.
-pub fn planar<T: Real, const N: usize>(length: f64, mask: &ColumnMask<N>) -> RowModel<T, N, B> {
+pub(crate) fn planar<T: Real, const N: usize>(length: f64, mask: &ColumnMask<N>) -> RowModel<T, N, B> {
     let length = |joint: usize| if joint == 0 { 0.0 } else { length };
     let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
     let chain = Chain::<f64, N>::new(&geometry).unwrap().convert();
@@ -43,7 +43,7 @@ pub fn model<T: Real>(choice: Choice, off: &[(usize, Parameter)]) -> Model<T> {
 }
 
 /// Leg with the knee's rotor inertia and both offsets, the candidates for dropping.
-pub fn leg(rotor: f64, offsets: [f64; 2]) -> LegParameters<f64, 2> {
+pub(crate) fn leg(rotor: f64, offsets: [f64; 2]) -> LegParameters<f64, 2> {
     [
         [0.03, 0.0, 0.0, 0.5, 0.0, 0.51, 1.7, 0.1, 0.0, 8.5, 0.12, 3.0, 1.2, offsets[0]],
         [0.01, 0.0, 0.0, 0.25, 0.0, 0.26, 0.86, -0.07, 0.0, 4.8, rotor, 2.0, 0.8, offsets[1]],
@@ -51,7 +51,7 @@ pub fn leg(rotor: f64, offsets: [f64; 2]) -> LegParameters<f64, 2> {
 }
 
 /// Noisy torque of a leg on random states; `angle` maps a random number in -1..1 to the hip's angle.
-pub fn record_on<T: Real>(
+pub(crate) fn record_on<T: Real>(
     model: &Model<T>,
     leg: &LegParameters<f64, 2>,
     seed: u64,
@@ -85,19 +85,19 @@ pub fn record_on<T: Real>(
 }
 
 /// Noisy torque of a leg on random states of all angles.
-pub fn record<T: Real>(model: &Model<T>, leg: &LegParameters<f64, 2>, seed: u64) -> Record<T, 2, B> {
+pub(crate) fn record<T: Real>(model: &Model<T>, leg: &LegParameters<f64, 2>, seed: u64) -> Record<T, 2, B> {
     record_on(model, leg, seed, |angle| angle)
 }
 
 /// Solver of a record at its end, advanced in slices.
-pub fn solved<T: Real>(model: &Model<T>, record: Record<T, 2, B>, slice: u32) -> Solver<T, 2, B> {
+pub(crate) fn solved<T: Real>(model: &Model<T>, record: Record<T, 2, B>, slice: u32) -> Solver<T, 2, B> {
     let mut solver = Solver::new(model, record, Plan::OneTime, None, 1);
     while solver.advance(model, slice) == SearchState::Running {}
     solver
 }
 
 /// Whether the candidates of [`leg`] are dropped.
-pub fn dropped<T: Real>(model: &Model<T>, record: &Record<T, 2, B>) -> [bool; 3] {
+pub(crate) fn dropped<T: Real>(model: &Model<T>, record: &Record<T, 2, B>) -> [bool; 3] {
     [(1, Parameter::IA), (0, Parameter::OFF), (1, Parameter::OFF)]
         .map(|(joint, parameter)| record.selection.drops(model, joint, parameter))
 }

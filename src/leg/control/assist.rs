@@ -47,7 +47,7 @@ listed! {
 
 /// Event of a session, for a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AssistNote {
+pub(crate) enum AssistNote {
     /// A session was refused.
     Refused(AssistRefusal),
     /// A session is ending.
@@ -135,13 +135,13 @@ impl<const N: usize> Assistance<N> {
 impl<const N: usize> Control<N> {
     /// Sets whether the leg of the next identifications is empty or worn; its accepted model becomes that of
     /// [`Self::model_of`].
-    pub fn set_wearing(&mut self, wearing: Option<Wearing>) {
+    pub(crate) fn set_wearing(&mut self, wearing: Option<Wearing>) {
         self.assistance.wearing = wearing;
     }
 
     /// What was said about the leg.
     #[must_use]
-    pub fn wearing(&self) -> Option<Wearing> {
+    pub(crate) fn wearing(&self) -> Option<Wearing> {
         self.assistance.wearing
     }
 
@@ -169,7 +169,7 @@ impl<const N: usize> Control<N> {
 
     /// Session that began since the last call; for the law.
     #[must_use]
-    pub fn take_session(&mut self) -> Option<AssistSession<N>> {
+    pub(crate) fn take_session(&mut self) -> Option<AssistSession<N>> {
         let (shares, gravity) = self.assistance.begun.take()?;
         let empty = self.assistance.empty.as_ref()?;
         let worn = self.assistance.worn.as_ref().filter(|_| shares.need_worn_model());
@@ -178,7 +178,7 @@ impl<const N: usize> Control<N> {
     }
 
     /// Takes the law's answer to a logged sample.
-    pub fn receive_torque(&mut self, torque: &AssistTorque<N>) {
+    pub(crate) fn receive_torque(&mut self, torque: &AssistTorque<N>) {
         if let Some(tick) = &mut self.assistance.tick {
             tick.receive(torque);
         }
@@ -186,7 +186,7 @@ impl<const N: usize> Control<N> {
 
     /// Event of a session since the last call.
     #[must_use]
-    pub fn take_assist_note(&mut self) -> Option<AssistNote> {
+    pub(crate) fn take_assist_note(&mut self) -> Option<AssistNote> {
         self.assistance.note.take()
     }
 

@@ -9,14 +9,14 @@ use crate::motion::{Motion, MotionState};
 #[derive(Debug)]
 pub struct Host<'a, const N: usize> {
     /// State from tick to tick.
-    pub following: &'a mut Following<N>,
+    pub(crate) following: &'a mut Following<N>,
     /// Commands of this tick; `None` while no host has the drive.
-    pub commands: Option<&'a [JointCommand; N]>,
+    pub(crate) commands: Option<&'a [JointCommand; N]>,
     /// Whether the activity is cancelled: of an identification or a tracked motion the joints slow down to
     /// rest along their profiles, assistance fades out.
-    pub cancel: bool,
+    pub(crate) cancel: bool,
     /// Whether the drive holds its pose: commands are not followed yet.
-    pub waits: bool,
+    pub(crate) waits: bool,
 }
 
 impl<const N: usize> Control<N> {

@@ -49,13 +49,13 @@ impl Mode {
 
     /// Returns the mode with this number.
     #[must_use]
-    pub fn from_number(number: i8) -> Option<Self> {
+    pub(crate) fn from_number(number: i8) -> Option<Self> {
         Self::ALL.into_iter().find(|mode| *mode as i8 == number)
     }
 }
 
 /// Longest period of cyclic targets: the largest value of 60C2:1 in milliseconds.
-pub const LONGEST_PERIOD: Second = Second(0.255);
+pub(crate) const LONGEST_PERIOD: Second = Second(0.255);
 
 /// What a relative set-point is relative to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -198,7 +198,7 @@ pub struct JointCommand {
 impl JointCommand {
     /// The command with the positions that a host states relative to its zero, relative to the joint's own.
     #[must_use]
-    pub fn seen_from(mut self, zero: Radian) -> Self {
+    pub(crate) fn seen_from(mut self, zero: Radian) -> Self {
         match &mut self.target {
             Target::ProfilePosition(SetPoint { position, relative_to: None, .. })
             | Target::CyclicPosition { position, .. }
@@ -214,13 +214,13 @@ impl JointCommand {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointStatus {
     /// State of the leg's drive.
-    pub drive: DriveState,
+    pub(crate) drive: DriveState,
     /// Measured position.
     pub position: Radian,
     /// Measured velocity.
     pub velocity: RadianPerSecond,
     /// Torque by the measured motor current.
-    pub torque: NewtonMetre,
+    pub(crate) torque: NewtonMetre,
     /// Commanded position, after profile and interpolation.
     pub position_demand: Radian,
     /// Commanded velocity, after profile and interpolation.
@@ -234,11 +234,11 @@ pub struct JointStatus {
     /// Whether no further set-point can be taken.
     pub is_full: bool,
     /// [`JointCommand::request_count`] of the last tick in which the joint followed commands.
-    pub requests_seen: u8,
+    pub(crate) requests_seen: u8,
     /// Whether the target is reached, or the joint is at rest after a halt.
     pub reached: bool,
     /// Whether the joint stands.
-    pub stands: bool,
+    pub(crate) stands: bool,
     /// Whether a limit reduces the command.
     pub limited: bool,
     /// Whether homing has succeeded.
@@ -248,7 +248,7 @@ pub struct JointStatus {
     /// Digital inputs, bits of CiA 402.
     pub inputs: u32,
     /// Supply voltage.
-    pub bus: Volt,
+    pub(crate) bus: Volt,
 }
 
 impl JointStatus {

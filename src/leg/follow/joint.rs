@@ -53,32 +53,32 @@ const EASE_TICKS: u8 = (SERVO_RATE_HZ / 100) as u8;
 
 /// Limits of a joint, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     /// Lowest and highest angle, rad.
-    pub range: [f32; 2],
+    pub(crate) range: [f32; 2],
     /// Largest speed, rad/s.
-    pub speed: f32,
+    pub(crate) speed: f32,
     /// Largest acceleration, rad/s^2.
-    pub acceleration: f32,
+    pub(crate) acceleration: f32,
     /// Largest torque, N m.
-    pub torque: f32,
+    pub(crate) torque: f32,
     /// Largest stiffness (N m/rad) and damping (N m s/rad) of the impedance mode.
-    pub impedance: [f32; 2],
+    pub(crate) impedance: [f32; 2],
 }
 
 /// Measured values of the previous tick, anatomical.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measured {
+pub(crate) struct Measured {
     /// Joint angle.
-    pub position: Radian,
+    pub(crate) position: Radian,
     /// Joint velocity.
-    pub velocity: RadianPerSecond,
+    pub(crate) velocity: RadianPerSecond,
     /// Torque that the servo wanted, what of it brakes the joint, and the torque that was applied.
-    pub wanted: NewtonMetre,
-    pub braking: NewtonMetre,
-    pub applied: NewtonMetre,
+    pub(crate) wanted: NewtonMetre,
+    pub(crate) braking: NewtonMetre,
+    pub(crate) applied: NewtonMetre,
     /// Whether the joint returns into its range.
-    pub returns: bool,
+    pub(crate) returns: bool,
 }
 
 impl Measured {
@@ -92,21 +92,21 @@ impl Measured {
 
 /// Demand on the servo at one tick, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Demand {
+pub(crate) struct Demand {
     /// Trajectory: position, velocity, acceleration.
-    pub course: Course,
+    pub(crate) course: Course,
     /// Added to the trajectory's velocity, rad/s.
-    pub velocity_offset: f32,
+    pub(crate) velocity_offset: f32,
     /// Added to the controller's torque, or the whole torque if the trajectory is not held, N m.
-    pub torque: f32,
+    pub(crate) torque: f32,
     /// Whether the trajectory is held; otherwise only the torque is applied.
-    pub held: bool,
+    pub(crate) held: bool,
     /// Torque limit, N m.
-    pub largest: f32,
+    pub(crate) largest: f32,
     /// Whether the following error is a fault.
-    pub failed: bool,
+    pub(crate) failed: bool,
     /// New zero for hosts: what they read where the joint's own angle is zero.
-    pub zero: Option<Radian>,
+    pub(crate) zero: Option<Radian>,
 }
 
 /// What is added to a held trajectory.
@@ -125,7 +125,7 @@ impl Added {
 
 /// State of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Follower {
+pub(crate) struct Follower {
     mode: Option<Mode>,
     course: Course,
     /// Torque of the torque modes and of the impedance, N m.
@@ -244,7 +244,7 @@ fn ticks(time: Second) -> u32 {
 
 impl Follower {
     /// Initial state, without a command.
-    pub const NEW: Self = Self {
+    pub(crate) const NEW: Self = Self {
         mode: None,
         course: Course::at_rest(0.0),
         torque: 0.0,
@@ -280,13 +280,13 @@ impl Follower {
     };
 
     /// Whether the joint is commanded to be at rest, without offsets.
-    pub fn is_still(&self) -> bool {
+    pub(crate) fn is_still(&self) -> bool {
         self.course().velocity() == 0.0 && self.added == Added::NONE
     }
 
     /// Holds the joint for [`EASE_TICKS`] before a mode without position control begins: such a mode begins
     /// from the torque that holds the joint, and a speed that the joint has not reached ends first.
-    pub fn settle(&mut self, command: &mut JointCommand, bounds: &Bounds) {
+    pub(crate) fn settle(&mut self, command: &mut JointCommand, bounds: &Bounds) {
         let mode = command.target.mode();
         let settles = matches!(mode, Some(Mode::ProfileTorque | Mode::Impedance))
             && self.held
@@ -302,32 +302,32 @@ impl Follower {
 
     /// Commanded trajectory.
     #[must_use]
-    pub fn course(&self) -> Course {
+    pub(crate) fn course(&self) -> Course {
         self.course.plus(&self.gap)
     }
 
     /// Active mode.
-    pub const fn mode(&self) -> Option<Mode> {
+    pub(crate) const fn mode(&self) -> Option<Mode> {
         self.mode
     }
 
     /// Whether no further set-point can be taken.
-    pub const fn is_full(&self) -> bool {
+    pub(crate) const fn is_full(&self) -> bool {
         matches!(self.mode, Some(Mode::ProfilePosition)) && self.next.is_some()
     }
 
     /// [`JointCommand::request_count`] of the last tick.
-    pub const fn requests_seen(&self) -> u8 {
+    pub(crate) const fn requests_seen(&self) -> u8 {
         self.seen
     }
 
     /// Starts following from `course`. Requests made before are discarded.
-    pub fn start(&mut self, command: &JointCommand, course: Course) {
+    pub(crate) fn start(&mut self, command: &JointCommand, course: Course) {
         *self = Self { seen: command.request_count, course, homed: self.homed, ..Self::NEW };
     }
 
     /// Runs one tick.
-    pub fn follow(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) -> Demand {
+    pub(crate) fn follow(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) -> Demand {
         let begins = command.target.mode() != self.mode;
         if begins {
             self.begin(command, measured, bounds);

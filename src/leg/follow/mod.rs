@@ -19,9 +19,8 @@
 mod command;
 mod joint;
 
-pub use command::{
-    ImpedanceTarget, JointCommand, JointStatus, LONGEST_PERIOD, Mode, Reference, SetPoint, Target,
-};
+pub(crate) use command::LONGEST_PERIOD;
+pub use command::{ImpedanceTarget, JointCommand, JointStatus, Mode, Reference, SetPoint, Target};
 
 use joint::{Bounds, Demand, Follower, Measured};
 
@@ -35,13 +34,13 @@ use crate::units::{NewtonMetre, Radian, RadianPerSecond, Volt};
 
 /// Command for the servo at one tick, in the model's angles and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Commanded<const N: usize> {
+pub(crate) struct Commanded<const N: usize> {
     /// Commanded motion.
-    pub motion: MotionState<N>,
+    pub(crate) motion: MotionState<N>,
     /// Additional torques.
-    pub efforts: [Effort; N],
+    pub(crate) efforts: [Effort; N],
     /// Following error of a joint.
-    pub fault: Option<Fault>,
+    pub(crate) fault: Option<Fault>,
 }
 
 /// Followers of all joints of a leg.
@@ -82,14 +81,14 @@ impl<const N: usize> Following<N> {
     }
 
     /// Resets after a new reference; the zeros set by homing are discarded.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.zeros = [Radian::ZERO; N];
         self.joints = [Follower::NEW; N];
         self.measured = [Measured::default(); N];
     }
 
     /// Starts following from the commanded motion. Requests made before are discarded.
-    pub fn begin(&mut self, commands: &[JointCommand; N], motion: &MotionState<N>) {
+    pub(crate) fn begin(&mut self, commands: &[JointCommand; N], motion: &MotionState<N>) {
         for joint in 0..N {
             let anatomy = &self.anatomy[joint];
             let angle = anatomy.angle_from_chain(motion.position_rad[joint]);
@@ -100,12 +99,12 @@ impl<const N: usize> Following<N> {
 
     /// Whether all joints are commanded to be at rest, without offsets.
     #[must_use]
-    pub fn is_still(&self) -> bool {
+    pub(crate) fn is_still(&self) -> bool {
         self.joints.iter().all(Follower::is_still)
     }
 
     /// Takes over the servo's output of the last tick.
-    pub fn measure(&mut self, output: &ServoOutput<N>) {
+    pub(crate) fn measure(&mut self, output: &ServoOutput<N>) {
         for joint in 0..N {
             self.measured[joint] = self.measured(joint, output).unwrap_or_default();
         }
@@ -126,7 +125,7 @@ impl<const N: usize> Following<N> {
     }
 
     /// Runs one tick of all joints.
-    pub fn follow(&mut self, commands: &[JointCommand; N]) -> Commanded<N> {
+    pub(crate) fn follow(&mut self, commands: &[JointCommand; N]) -> Commanded<N> {
         let mut commanded =
             Commanded { motion: MotionState::at_rest([0.0; N]), efforts: [Effort::HELD; N], fault: None };
         for joint in 0..N {

@@ -76,9 +76,9 @@ pub enum Standing {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation<T> {
     /// Smallest share of a retained column that earlier ones do not explain; above the tolerance.
-    pub smallest_retained: T,
+    pub(crate) smallest_retained: T,
     /// Largest such share of a dropped column; below the tolerance. If the gap is wide, it is pure rounding.
-    pub largest_dropped: T,
+    pub(crate) largest_dropped: T,
 }
 
 /// Base parameters of a leg of `N` joints, at most `B`.
@@ -187,7 +187,7 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
 
     /// Selects the independent columns of a regressor row, so that `out` . beta = row . parameters (without
     /// masked ones). Entries from the rank on become 0.
-    pub fn select(&self, row: &RegressorRow<T, N>, out: &mut [T; B]) {
+    pub(crate) fn select(&self, row: &RegressorRow<T, N>, out: &mut [T; B]) {
         *out = [T::zero(); B];
         for (value, (joint, parameter)) in out.iter_mut().zip(self.columns()) {
             *value = entry(row, *joint, *parameter);
@@ -204,7 +204,7 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
     /// columns' parameters until the projection fits. With zero `others` the independent columns'
     /// parameters are the base values.
     #[must_use]
-    pub fn complete(&self, values: &[T; B], others: &LegParameters<T, N>) -> LegParameters<T, N> {
+    pub(crate) fn complete(&self, values: &[T; B], others: &LegParameters<T, N>) -> LegParameters<T, N> {
         let present = self.project(others);
         let mut parameters = *others;
         for ((joint, parameter), (wanted, present)) in self.columns().iter().zip(values.iter().zip(&present))

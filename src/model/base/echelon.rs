@@ -48,11 +48,11 @@ pub(super) struct Factor<T, const N: usize> {
 /// Result of the reduction.
 pub(super) struct Echelon<T> {
     /// Number of retained columns; the first `rank` rows of the factor belong to them.
-    pub rank: usize,
+    pub(crate) rank: usize,
     /// Smallest share of a retained column that earlier ones do not explain.
-    pub smallest_retained: T,
+    pub(crate) smallest_retained: T,
     /// Largest such share of a dropped column.
-    pub largest_dropped: T,
+    pub(crate) largest_dropped: T,
 }
 
 impl<T: Real, const N: usize> Factor<T, N> {
@@ -61,12 +61,12 @@ impl<T: Real, const N: usize> Factor<T, N> {
     }
 
     /// Rows, in the order of preference of their columns.
-    pub fn rows(&self) -> &[RegressorRow<T, N>] {
+    pub(crate) fn rows(&self) -> &[RegressorRow<T, N>] {
         self.rows.as_flattened()
     }
 
     /// Euclidean norms of the columns over all rows; rotations do not change them.
-    pub fn column_norms(&self) -> LegParameters<T, N> {
+    pub(crate) fn column_norms(&self) -> LegParameters<T, N> {
         let mut norms = [[T::zero(); PARAMETERS_PER_JOINT]; N];
         for row in self.rows() {
             for (norm, value) in norms.iter_mut().flatten().zip(row.iter().flatten()) {
@@ -77,7 +77,7 @@ impl<T: Real, const N: usize> Factor<T, N> {
     }
 
     /// Rotates one more row in.
-    pub fn collect(&mut self, mut row: RegressorRow<T, N>) {
+    pub(crate) fn collect(&mut self, mut row: RegressorRow<T, N>) {
         for (own, (joint, parameter)) in
             self.rows.as_flattened_mut().iter_mut().zip(in_order_of_preference::<N>())
         {
@@ -90,7 +90,7 @@ impl<T: Real, const N: usize> Factor<T, N> {
     ///
     /// A column is dependent if its part beyond the retained ones is at most `tolerance` of its entry in
     /// `lengths`, all of which are positive.
-    pub fn reduce(
+    pub(crate) fn reduce(
         &mut self,
         tolerance: T,
         lengths: &LegParameters<T, N>,
@@ -121,7 +121,7 @@ impl<T: Real, const N: usize> Factor<T, N> {
 
     /// Back-substitution for one retained column: divides its row by the pivot and
     /// clears the column in earlier rows.
-    pub fn substitute(&mut self, index: usize, joint: usize, parameter: Parameter) {
+    pub(crate) fn substitute(&mut self, index: usize, joint: usize, parameter: Parameter) {
         let Some((pivot_row, before)) =
             self.rows.as_flattened_mut().get_mut(..=index).and_then(<[RegressorRow<T, N>]>::split_last_mut)
         else {

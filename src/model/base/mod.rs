@@ -9,9 +9,9 @@
 //! | [`regrouping`] | Gautier's closed form: moves shared terms of a link to the one before it; exact |
 //! | [`analysis`] | numerical rank and null space: any chain, gravity, columns, parallel axes |
 
-pub mod analysis;
+pub(crate) mod analysis;
 mod echelon;
-pub mod regrouping;
+pub(crate) mod regrouping;
 
 pub use analysis::{BaseError, BaseParameters, ColumnMask, Separation, Standing};
 pub use regrouping::regroup;

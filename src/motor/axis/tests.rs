@@ -384,7 +384,7 @@ fn the_squared_current_has_both_components_and_counts_a_brake() {
     let follows = bench.axis.square_a2();
     assert!((follows - 400.0).abs() < 8.0, "{follows}");
     for _ in 0..1200 {
-        let command = bench.axis.brake(&bench.sample);
+        let command = bench.axis.act(&bench.sample, BridgeRequest::Brake);
         bench.sample = bench.motor.period(command);
     }
     let (Rotating { d, q }, brakes) = (bench.axis.measured(), bench.axis.square_a2());

@@ -52,7 +52,7 @@ pub struct MotorFindings {
     /// Quadrature current that friction takes at the calibration's speed.
     pub friction: Ampere,
     /// Quadrature current that the load takes on the path, positive against the field's forward direction.
-    pub load: Ampere,
+    pub(crate) load: Ampere,
     /// Uncertainty of the resistance.
     pub resistance_sigma: Ohm,
     /// Uncertainty of the inductance along the flux.
@@ -105,7 +105,7 @@ pub struct StoredCalibration {
 impl Calibration {
     /// Encoder setting of the calibrated configuration.
     #[must_use]
-    pub fn encoder(&self) -> EncoderSetting {
+    pub(crate) fn encoder(&self) -> EncoderSetting {
         self.encoder
     }
 
@@ -158,13 +158,6 @@ impl Calibration {
         self.offset
     }
 
-    /// Electrical angle at a counter reading; since the calibration the counter may have moved by half
-    /// of its range.
-    #[must_use]
-    pub fn angle_at(&self, scale: &CountScale, direction: Direction, counter: u16) -> ElectricalAngle {
-        scale.angle(self.position_of(scale, direction, counter)).plus(self.offset)
-    }
-
     /// Returns the part to store; `None` where positions count from neither an index nor an absolute encoder,
     /// because the counter resets with the power.
     #[must_use]
@@ -191,7 +184,7 @@ impl Calibration {
     /// Rotor position at a counter reading, counts from the index or the absolute encoder's zero, in the
     /// electrical direction. Since the calibration the counter may have moved by half of its range.
     #[must_use]
-    pub fn position_of(&self, scale: &CountScale, direction: Direction, counter: u16) -> i32 {
+    pub(crate) fn position_of(&self, scale: &CountScale, direction: Direction, counter: u16) -> i32 {
         let moved = i32::from(counter.wrapping_sub(self.counter).cast_signed());
         scale.within_turn(self.position + direction.sign() * moved)
     }

@@ -50,10 +50,10 @@ const RISE_SHARE: f32 = 1.0 / 1024.0;
 /// Inductances along and across the flux.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Inductances {
-    pub direct: Henry,
-    pub quadrature: Henry,
+    pub(crate) direct: Henry,
+    pub(crate) quadrature: Henry,
     /// Part of the inverses' swing that contradicts the rotor's angle, over the inverses' mean.
-    pub residual: f32,
+    pub(crate) residual: f32,
 }
 
 /// Inductances seen along the held current, across it, and at 45 degrees.

@@ -92,7 +92,7 @@ use inductance::{InductanceStage, Inductances, SeenInductances};
 use refine::{QUADRATURE_SHARE, Refine, Refined};
 pub use refusal::{Mismatch, MotorConstant, Phase, Refusal};
 use resistance::{ResistanceStage, VoltageDrop};
-pub use scan::ALIGNMENT_TURNS;
+pub(crate) use scan::ALIGNMENT_TURNS;
 use scan::Scan;
 pub use search::IndexSearch;
 pub(super) use track::INDEX_WIDTH;
@@ -310,7 +310,7 @@ impl Calibrator {
 
     /// Starts a calibration after a power-up. Everything is measured as by [`Self::new`] and must agree with
     /// the stored values; of these only the offset is used. Where an index search is certain
-    /// ([`Self::take_index`]), or an absolute encoder gave the position ([`Self::at_position`]), the motor
+    /// (`Self::take_index`), or an absolute encoder gave the position ([`Self::at_position`]), the motor
     /// stands still and the offset is not measured.
     ///
     /// # Errors As [`Self::new`]. Also [`AxisError::Encoder`] without index and absolute encoder, and
@@ -337,7 +337,7 @@ impl Calibrator {
 
     /// Takes the rotor position of an index search, before the first tick. Where that is certain and stored
     /// values may be checked at standstill, the motor does not turn.
-    pub fn take_index(&mut self, search: &IndexSearch) {
+    pub(crate) fn take_index(&mut self, search: &IndexSearch) {
         let Bench { scale, greatest_step, direction, .. } = &self.bench;
         let may_stand = self.may_stand && self.bench.index;
         if let Some((counter, since)) = search.position(scale, *greatest_step).filter(|_| may_stand) {
@@ -376,7 +376,7 @@ impl Calibrator {
 
     /// Square of the current vector at the last tick with a bridge on, A^2.
     #[must_use]
-    pub const fn square_a2(&self) -> f32 {
+    pub(crate) const fn square_a2(&self) -> f32 {
         self.square_a2
     }
 

@@ -249,10 +249,10 @@ fn approach(length: f32) -> f32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Refined {
     /// Electrical angle at travel zero.
-    pub offset: ElectricalAngle,
-    pub inductances: Inductances,
+    pub(crate) offset: ElectricalAngle,
+    pub(crate) inductances: Inductances,
     /// `None` where the motor has not turned.
-    pub findings: Option<MotorFindings>,
+    pub(crate) findings: Option<MotorFindings>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

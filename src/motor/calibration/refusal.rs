@@ -177,7 +177,7 @@ impl Refusal {
     /// Number beside the reason: a phase from 1, a stored constant (resistance 1, direct inductance 2,
     /// quadrature inductance 3), pole pairs or counts that would fit, or a load in percent; else 0.
     #[must_use]
-    pub const fn detail(self) -> u32 {
+    pub(crate) const fn detail(self) -> u32 {
         match self {
             Self::ShuntOffset(phase) | Self::PhaseOpen(phase) | Self::ShuntInverted(phase) => {
                 phase as u32 + 1
@@ -192,7 +192,7 @@ impl Refusal {
 
     /// Both values of a contradiction to the leg file or to the stored calibration.
     #[must_use]
-    pub const fn mismatch(self) -> Option<Mismatch> {
+    pub(crate) const fn mismatch(self) -> Option<Mismatch> {
         match self {
             Self::OtherMotor(_, mismatch) | Self::Flux(mismatch) | Self::StoredOffset(mismatch) => {
                 Some(mismatch)

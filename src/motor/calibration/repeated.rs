@@ -12,8 +12,8 @@ use crate::real::sqrt;
 /// Mean and its standard deviation, in the unit of the measurements.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Repeated {
-    pub mean: f32,
-    pub sigma: f32,
+    pub(crate) mean: f32,
+    pub(crate) sigma: f32,
 }
 
 impl Repeated {

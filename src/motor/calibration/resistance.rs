@@ -89,9 +89,9 @@ enum Level {
 /// Voltage that a current takes at rest: a resistance, and a constant by the sign of every phase current.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct VoltageDrop {
-    pub resistance: Ohm,
+    pub(crate) resistance: Ohm,
     /// Standard deviation by the three axes; zero where only one was measured.
-    pub resistance_sigma: Ohm,
+    pub(crate) resistance_sigma: Ohm,
     /// Part of dead time and diodes, with the current along the axis of a phase.
     constant: Volt,
 }

@@ -49,7 +49,7 @@ const REST_TICKS: u32 = CURRENT_RATE_HZ / 5;
 const RUN_IN_TURNS: [f32; 2] = [0.25, 1.0];
 /// Travel kept for the first alignment (half a turn), the turn from axis C to A (two thirds) and lag,
 /// electrical turns.
-pub const ALIGNMENT_TURNS: f32 = 1.4;
+pub(crate) const ALIGNMENT_TURNS: f32 = 1.4;
 /// Greatest error of the forward travel, electrical turns. A load that changes on the way makes up to 0.15.
 const GREATEST_TRAVEL_ERROR: f32 = 0.2;
 /// Turns of the field are equal to one part in so many where only the counts are wrong.
@@ -72,16 +72,16 @@ const WHOLE: f32 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ScanResult {
     /// Electrical angle at travel zero, without regard to a load.
-    pub offset: ElectricalAngle,
+    pub(crate) offset: ElectricalAngle,
     /// Travel of the last sample, counts, and the field that holds the rotor there.
-    pub way: i32,
-    pub field: ElectricalAngle,
+    pub(crate) way: i32,
+    pub(crate) field: ElectricalAngle,
     /// Half of the difference between both directions' deviations.
-    pub lag: ElectricalAngle,
+    pub(crate) lag: ElectricalAngle,
     /// Counts per turn that fit the travel better than the configured ones, if any do.
-    pub fitting_counts: Option<u32>,
+    pub(crate) fitting_counts: Option<u32>,
     /// Path that the rotor has passed from there, electrical turns, with its sign.
-    pub path: f32,
+    pub(crate) path: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -35,12 +35,12 @@ pub struct IndexSearch {
 
 impl IndexSearch {
     /// State before the first sample.
-    pub const EMPTY: Self =
+    pub(crate) const EMPTY: Self =
         Self { counter: None, has_pulse: false, since: 0, distance: None, greatest_steps: [0; 2] };
 
     /// Follows one PWM period. Returns whether an index pulse came.
     #[inline(never)]
-    pub fn follow(&mut self, sample: &AxisSample) -> bool {
+    pub(crate) fn follow(&mut self, sample: &AxisSample) -> bool {
         let now = sample.encoder_count;
         let step = now.wrapping_sub(self.counter.unwrap_or(now)).cast_signed();
         self.counter = Some(now);
@@ -56,7 +56,7 @@ impl IndexSearch {
 
     /// Whether the index of this axis is certain.
     #[must_use]
-    pub fn is_certain(&self, axis: &AxisConfiguration) -> bool {
+    pub(crate) fn is_certain(&self, axis: &AxisConfiguration) -> bool {
         let (Ok(scale), Ok(greatest_step)) = (axis.scale(), axis.greatest_step()) else { return false };
         self.position(&scale, greatest_step).is_some()
     }

@@ -80,7 +80,8 @@ pub(crate) fn unproven(found: &Calibration, degrees: f32) -> Calibration {
 /// Error of the offset found, electrical degrees.
 fn offset_error_deg(motor: &mut TestMotor, configuration: &AxisConfiguration, found: &Calibration) -> f64 {
     let scale = configuration.scale().expect("usual");
-    let angle = found.angle_at(&scale, configuration.counter, motor.sample().encoder_count);
+    let position = found.position_of(&scale, configuration.counter, motor.sample().encoder_count);
+    let angle = scale.angle(position).plus(found.offset);
     let truth = motor.electrical() / core::f64::consts::TAU;
     let error = f64::from(angle.turns()) - truth;
     (error - error.round()) * 360.0

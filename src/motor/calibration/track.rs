@@ -19,11 +19,11 @@ const EVEN_SHARE: i32 = 2;
 pub(super) struct Track {
     counter: Option<u16>,
     /// Counts travelled since the beginning.
-    pub way: i32,
+    pub(crate) way: i32,
     /// Travel at the first index pulse.
-    pub index: Option<i32>,
+    pub(crate) index: Option<i32>,
     /// A distance of two index pulses that is not a whole number of turns.
-    pub index_distance: Option<i32>,
+    pub(crate) index_distance: Option<i32>,
 }
 
 impl Track {
@@ -122,8 +122,8 @@ impl Travel {
 /// One pass: distance, evenness, deviation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Followed {
-    pub travel: Travel,
-    pub deviation: Deviation,
+    pub(crate) travel: Travel,
+    pub(crate) deviation: Deviation,
 }
 
 impl Followed {

@@ -1,5 +1,6 @@
+use super::super::Ends;
+use super::super::queues::LegEvent;
 use super::super::testing;
-use super::super::{Ends, LegEvent};
 use super::*;
 use crate::bus::identification::Results;
 use crate::leg::testing::{BASE, configuration};

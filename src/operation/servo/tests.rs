@@ -172,7 +172,7 @@ fn the_leg_does_not_tick_before_every_joint_has_a_zero() {
         assert!(bench.tick().is_none());
     }
     assert_eq!((bench.signals.target(0).enabled, bench.signals.target(1).enabled), (false, false));
-    assert_eq!((bench.signals.permission(), bench.level.ticks()), (Permission::Off, 0));
+    assert_eq!((bench.signals.permission(), bench.level.tick), (Permission::Off, 0));
     // The bus is informed that the leg rests; the request is dropped.
     let joints = bench.status.expect("a report").joints;
     assert!(joints.iter().all(|joint| joint.bus.0 > 40.0));
@@ -180,7 +180,7 @@ fn the_leg_does_not_tick_before_every_joint_has_a_zero() {
     assert!(bench.bus.orders.ready());
     bench.signals.begin_servo();
     assert!(bench.tick().is_some());
-    assert_eq!((bench.control.state(), bench.level.ticks()), (DriveState::SwitchOnDisabled, 1));
+    assert_eq!((bench.control.state(), bench.level.tick), (DriveState::SwitchOnDisabled, 1));
     assert_eq!(bench.signals.statistics.counts.each_ref().map(|count| count.get()), [COUNTS as u32; 2]);
 }
 

@@ -36,26 +36,26 @@ const CURVATURE_ROUNDING: f64 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reach<T> {
     /// Usual whisker length, metric coordinates.
-    pub whisker: T,
+    pub(crate) whisker: T,
     /// Longest whisker and step, box coordinates.
-    pub limit: T,
+    pub(crate) limit: T,
     /// True if a step is the parabola's, where that has a minimum.
-    pub parabola: bool,
+    pub(crate) parabola: bool,
     /// Whisker length in box coordinates, in place of the usual one.
-    pub long: Option<T>,
+    pub(crate) long: Option<T>,
 }
 
 /// One direction of the frame and its beetle's readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Whisker<T> {
     /// Length |d_j| in the box of a metric step of 1.
-    pub box_length: T,
+    pub(crate) box_length: T,
     /// Length l, metric coordinates.
-    pub length: T,
+    pub(crate) length: T,
     /// Coordinate w_j . x_j.
-    pub coordinate: T,
+    pub(crate) coordinate: T,
     /// `None` until both whiskers were read, and where a value was not finite.
-    pub reading: Option<Reading<T>>,
+    pub(crate) reading: Option<Reading<T>>,
 }
 
 impl<T: Real> Whisker<T> {
@@ -68,13 +68,13 @@ impl<T: Real> Whisker<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reading<T> {
     /// Slope g.
-    pub slope: T,
+    pub(crate) slope: T,
     /// Curvature h.
-    pub curvature: T,
+    pub(crate) curvature: T,
     /// Step s from the beetle to the minimum.
-    pub step: T,
+    pub(crate) step: T,
     /// True if curved upwards, or flat within rounding.
-    pub convex: bool,
+    pub(crate) convex: bool,
 }
 
 /// Directions of up to N beetles.
@@ -82,12 +82,12 @@ pub(super) struct Reading<T> {
 pub(super) struct Frame<T, const N: usize, const D: usize> {
     dimension: usize,
     /// Directions z_j, orthonormal, metric coordinates.
-    pub direction: [[T; D]; N],
+    pub(crate) direction: [[T; D]; N],
     /// Images d_j = A z_j, box coordinates.
-    pub displacement: [[T; D]; N],
+    pub(crate) displacement: [[T; D]; N],
     /// Covectors w_j = A^-T z_j: w_j.x is the metric coordinate along z_j of a point x in box coordinates.
-    pub covector: [[T; D]; N],
-    pub whisker: [Whisker<T>; N],
+    pub(crate) covector: [[T; D]; N],
+    pub(crate) whisker: [Whisker<T>; N],
 }
 
 impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
@@ -102,7 +102,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     }
 
     /// Number of directions in use: one per beetle, at most as many as an orthonormal frame can have.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.dimension.min(N)
     }
 
@@ -110,7 +110,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     /// earlier ones. Otherwise it points along a random vector, in the last resort along a coordinate axis.
     ///
     /// The whisker has its usual length where that stays within the limit.
-    pub fn aim(
+    pub(crate) fn aim(
         &mut self,
         index: usize,
         proposal: Option<[T; D]>,
@@ -181,7 +181,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     /// Fits the parabola of direction `index` through the values at the beetle and at its whiskers.
     ///
     /// A value that is not finite leaves no reading: the direction then has no effect on moves or learning.
-    pub fn read(&mut self, index: usize, centre: T, right: T, left: T, reach: Reach<T>) {
+    pub(crate) fn read(&mut self, index: usize, centre: T, right: T, left: T, reach: Reach<T>) {
         let whisker = &mut self.whisker[index.min(N - 1)];
         whisker.reading = None;
         if !(is_usable(centre) && is_usable(right) && is_usable(left)) {

@@ -37,7 +37,7 @@ const LEAP_PROGRESS: f64 = 1e-3;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Leap<T> {
     /// True while the current round is a leap.
-    pub under_way: bool,
+    pub(crate) under_way: bool,
     /// Best standstill so far.
     best: T,
     /// Failed leaps in a row.
@@ -45,7 +45,7 @@ pub(super) struct Leap<T> {
 }
 
 impl<T: Real> Leap<T> {
-    pub fn none() -> Self {
+    pub(crate) fn none() -> Self {
         Self { under_way: false, best: T::LARGEST, in_vain: 0 }
     }
 }

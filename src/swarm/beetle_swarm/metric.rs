@@ -28,7 +28,7 @@ pub(super) struct Metric<T, const D: usize> {
 
 impl<T: Real, const D: usize> Metric<T, D> {
     /// Starts with box coordinates.
-    pub fn identity(dimension: usize) -> Self {
+    pub(crate) fn identity(dimension: usize) -> Self {
         let mut metric = Self { dimension, shape: [[T::zero(); D]; D], inverse: [[T::zero(); D]; D] };
         metric.forget();
         metric
@@ -45,27 +45,27 @@ impl<T: Real, const D: usize> Metric<T, D> {
     }
 
     /// Product A z: a displacement in box coordinates.
-    pub fn to_box(&self, z: &[T; D]) -> [T; D] {
+    pub(crate) fn to_box(&self, z: &[T; D]) -> [T; D] {
         product(&self.shape, z, self.dimension)
     }
 
     /// Product A^-1 u: the metric coordinates of a point or displacement.
-    pub fn to_metric(&self, u: &[T; D]) -> [T; D] {
+    pub(crate) fn to_metric(&self, u: &[T; D]) -> [T; D] {
         product(&self.inverse, u, self.dimension)
     }
 
     /// Product A^T g: converts a gradient from box to metric coordinates.
-    pub fn gradient_to_metric(&self, g: &[T; D]) -> [T; D] {
+    pub(crate) fn gradient_to_metric(&self, g: &[T; D]) -> [T; D] {
         transposed_product(&self.shape, g, self.dimension)
     }
 
     /// Product A^-T g: converts a gradient from metric to box coordinates.
-    pub fn gradient_to_box(&self, g: &[T; D]) -> [T; D] {
+    pub(crate) fn gradient_to_box(&self, g: &[T; D]) -> [T; D] {
         transposed_product(&self.inverse, g, self.dimension)
     }
 
     /// Stretches by `factor` along the unit vector `z`, where `displacement` = A z and `covector` = A^-T z.
-    pub fn stretch(&mut self, z: &[T; D], displacement: &[T; D], covector: &[T; D], factor: T) {
+    pub(crate) fn stretch(&mut self, z: &[T; D], displacement: &[T; D], covector: &[T; D], factor: T) {
         let dimension = self.dimension;
         let (longer, shorter) = (factor - T::one(), T::one() / factor - T::one());
         let (z, covector) = (live(z, dimension), live(covector, dimension));

@@ -11,7 +11,7 @@ impl<T: Real> Thresholds<T> {
     /// Judges the parameters from the weighted rows on all rows of the motion; used only without held-out
     /// motions. It is right to exclude a push. But a machine that was pushed for most of its motion leaves a
     /// few undisturbed rows, and a model that fits nothing else.
-    pub fn judge_whole<const N: usize>(
+    pub(crate) fn judge_whole<const N: usize>(
         &self,
         outliers: &Outliers<T, N>,
         builder: &mut VerdictBuilder<'_, T>,
@@ -30,7 +30,7 @@ impl<T: Real> Thresholds<T> {
 
     /// Judges contact with the floor: a single long stretch with large errors in all joints. If more than
     /// half of the rows have large errors, the model is wrong, not the leg held; other tests cover that.
-    pub fn judge_disturbance<const N: usize>(
+    pub(crate) fn judge_disturbance<const N: usize>(
         &self,
         outliers: &Outliers<T, N>,
         builder: &mut VerdictBuilder<'_, T>,
@@ -50,7 +50,7 @@ impl<T: Real> Thresholds<T> {
 
     /// Judges the shares of replaced samples and disturbed rows, on the motion
     /// identified from or a held-out one.
-    pub fn judge_excluded<const N: usize>(
+    pub(crate) fn judge_excluded<const N: usize>(
         &self,
         outliers: &Outliers<T, N>,
         motion: Option<usize>,

@@ -100,7 +100,7 @@ impl<'a, T: Real> VerdictBuilder<'a, T> {
     }
 
     /// Adds a value that must not exceed its limit; NaN fails.
-    pub fn at_most(
+    pub(crate) fn at_most(
         &mut self,
         reason: Reason,
         test: Test,
@@ -113,12 +113,12 @@ impl<'a, T: Real> VerdictBuilder<'a, T> {
     }
 
     /// Adds a value that must reach its limit; NaN fails.
-    pub fn at_least(&mut self, reason: Reason, test: Test, joint: Option<usize>, value: T, limit: T) {
+    pub(crate) fn at_least(&mut self, reason: Reason, test: Test, joint: Option<usize>, value: T, limit: T) {
         self.note(Evidence { reason, test, joint, motion: None, value, limit, passed: value >= limit });
     }
 
     /// Adds a test with a condition of its own.
-    pub fn note(&mut self, evidence: Evidence<T>) {
+    pub(crate) fn note(&mut self, evidence: Evidence<T>) {
         if !evidence.passed {
             self.verdict = self.verdict.and(Verdict::refused(evidence.reason));
         }

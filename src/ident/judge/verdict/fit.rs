@@ -29,7 +29,7 @@ pub struct Unused<'a, T, const N: usize, const B: usize> {
 
 impl<T: Real> Thresholds<T> {
     /// Judges the fit to the motion identified from.
-    pub fn judge_residual<const N: usize, const B: usize>(
+    pub(crate) fn judge_residual<const N: usize, const B: usize>(
         &self,
         training: &Record<T, N, B>,
         values: &[T; B],
@@ -61,7 +61,7 @@ impl<T: Real> Thresholds<T> {
     }
 
     /// Judges the prediction of a held-out motion: no worse than noise and parameter covariance predict.
-    pub fn judge_validation<const N: usize, const B: usize>(
+    pub(crate) fn judge_validation<const N: usize, const B: usize>(
         &self,
         training: &Record<T, N, B>,
         motion: usize,
@@ -104,7 +104,7 @@ impl<T: Real> Thresholds<T> {
 
     /// Judges whether the torque shows inertia and friction, which the angle alone cannot give. A torque
     /// without them is a recorded command, or the joint carries no moving load.
-    pub fn judge_measurement<const N: usize, const B: usize>(
+    pub(crate) fn judge_measurement<const N: usize, const B: usize>(
         &self,
         model: &RowModel<T, N, B>,
         training: &Record<T, N, B>,

@@ -7,7 +7,7 @@ use crate::real::{self, Real};
 impl<T: Real> Thresholds<T> {
     /// Judges the slow part of a held-out residual: it must be noise, or small. With much noise this is the
     /// sharper test: the part that neighbouring half seconds share contains no noise.
-    pub fn judge_colour<const N: usize, const B: usize>(
+    pub(crate) fn judge_colour<const N: usize, const B: usize>(
         &self,
         motion: usize,
         unused: &Unused<'_, T, N, B>,
@@ -32,7 +32,7 @@ impl<T: Real> Thresholds<T> {
 
     /// Judges contact: one long stretch of errors in all joints, in a motion that
     /// is otherwise predicted well.
-    pub fn judge_contact<const N: usize, const B: usize>(
+    pub(crate) fn judge_contact<const N: usize, const B: usize>(
         &self,
         motion: usize,
         unused: &Unused<'_, T, N, B>,
@@ -65,7 +65,7 @@ impl<T: Real> Thresholds<T> {
     ///
     /// With unknown noise, sigma comes from the model's own errors, which are not white; the tolerance is
     /// then three times as wide.
-    pub fn judge_alignment(
+    pub(crate) fn judge_alignment(
         &self,
         found: &Misalignment<T>,
         noise_is_known: bool,

@@ -72,7 +72,7 @@ impl Verdict {
 
     /// Union of the reasons of both.
     #[must_use]
-    pub const fn and(self, other: Self) -> Self {
+    pub(crate) const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 

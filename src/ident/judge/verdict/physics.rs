@@ -64,7 +64,11 @@ impl<T: Real> Thresholds<T> {
 
     /// Judges the loss of fit of the physically consistent leg against least squares. Beyond the noise of its
     /// degrees of freedom, the data contradict every leg that the prior allows.
-    pub fn judge_consistency(&self, consistency: &Consistency<T>, builder: &mut VerdictBuilder<'_, T>) {
+    pub(crate) fn judge_consistency(
+        &self,
+        consistency: &Consistency<T>,
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
         let limit = self.chance(T::from_double(consistency.degrees_of_freedom as f64));
         builder.at_most(Reason::Unphysical, Test::PriorBox, None, None, consistency.excess, limit);
     }

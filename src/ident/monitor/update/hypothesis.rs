@@ -29,7 +29,7 @@ use crate::model::{PARAMETERS_PER_JOINT, Parameter};
 use crate::real::{self, Real, dot};
 
 /// Most free parameters: the ten of a rigid body.
-pub const DIRECTIONS: usize = 10;
+pub(crate) const DIRECTIONS: usize = 10;
 
 /// Smallest independent share of a column's length for its parameter to be determined.
 const DETERMINED_SHARE: f64 = 1e-3;
@@ -40,7 +40,7 @@ pub struct Hypothesis<T> {
     /// Change of each parameter; zero where it is not determined.
     pub values: [T; DIRECTIONS],
     /// Standard deviations of `values`, including the accepted model's uncertainty.
-    pub sigmas: [T; DIRECTIONS],
+    pub(crate) sigmas: [T; DIRECTIONS],
     /// Parameters that the rows determine.
     pub determined: [bool; DIRECTIONS],
     /// Chi-square of the remaining residual.
@@ -50,19 +50,19 @@ pub struct Hypothesis<T> {
 }
 
 /// A hypothesis with its consequences for the model.
-pub struct Explanation<T, const B: usize> {
+pub(crate) struct Explanation<T, const B: usize> {
     /// Summary of the hypothesis.
-    pub hypothesis: Hypothesis<T>,
+    pub(crate) hypothesis: Hypothesis<T>,
     /// Covariance of the hypothesis' values.
-    pub covariance: [[T; DIRECTIONS]; DIRECTIONS],
+    pub(crate) covariance: [[T; DIRECTIONS]; DIRECTIONS],
     /// Base values after the change.
-    pub estimate: Estimate<T, B>,
+    pub(crate) estimate: Estimate<T, B>,
 }
 
 impl<T: Real> Hypothesis<T> {
     /// Hypothesis without any determined parameter.
     #[must_use]
-    pub fn nothing() -> Self {
+    pub(crate) fn nothing() -> Self {
         Self {
             values: [T::zero(); DIRECTIONS],
             sigmas: [T::zero(); DIRECTIONS],
@@ -86,7 +86,7 @@ impl<T: Real> Hypothesis<T> {
 
     /// Akaike's criterion: smaller is better.
     #[must_use]
-    pub fn score(&self) -> T {
+    pub(crate) fn score(&self) -> T {
         let free = self.determined.iter().filter(|determined| **determined).count();
         self.chi_square + T::from_double((2 * free) as f64)
     }
@@ -95,13 +95,13 @@ impl<T: Real> Hypothesis<T> {
 impl<T: Real, const B: usize> Explanation<T, B> {
     /// Variance of a weighted sum of the values.
     #[must_use]
-    pub fn variance_of(&self, weights: &[T; DIRECTIONS]) -> T {
+    pub(crate) fn variance_of(&self, weights: &[T; DIRECTIONS]) -> T {
         variance(&self.covariance, weights)
     }
 }
 
 /// Rows after a change, compared with the accepted model's prediction.
-pub struct Comparison<'a, T, const B: usize> {
+pub(crate) struct Comparison<'a, T, const B: usize> {
     rows: &'a Factor<T, B>,
     before: &'a Estimate<T, B>,
     rank: usize,
@@ -140,14 +140,14 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
 
     /// Chi-square and degrees of freedom of the old model.
     #[must_use]
-    pub fn unchanged(&self) -> (T, T) {
+    pub(crate) fn unchanged(&self) -> (T, T) {
         (dot(&self.whitened, &self.whitened), T::from_double(self.rank as f64))
     }
 
     /// Fits a hypothesis with these free parameters.
     #[must_use]
     #[inline(never)]
-    pub fn explain<const N: usize>(
+    pub(crate) fn explain<const N: usize>(
         &self,
         model: &RowModel<T, N, B>,
         parameters: &[(usize, Parameter); DIRECTIONS],

@@ -9,7 +9,7 @@ const FASTEST_RAD_S: f64 = 1.5;
 
 /// The bank's columns at a speed, rad/s.
 #[must_use]
-pub fn bank_columns<T: Real>(speed: T) -> [T; BANK] {
+pub(crate) fn bank_columns<T: Real>(speed: T) -> [T; BANK] {
     let ratio = speed / T::from_double(4.0 * SLOWEST_RAD_S);
     let fastest = real::exp(-(ratio * ratio));
     let fourth = |value: T| (value * value) * (value * value);

@@ -26,7 +26,7 @@ use crate::model::LegParameters;
 use crate::real::{self, Real};
 
 /// Newton steps, all barrier values together.
-pub const LARGEST_STEPS: u32 = 150;
+pub(crate) const LARGEST_STEPS: u32 = 150;
 /// Newton steps at one barrier value.
 const STEPS_PER_BARRIER: u32 = 12;
 /// Approximate number of barrier terms of one joint: sets the first `mu`.
@@ -39,7 +39,7 @@ pub struct Effort<T> {
     /// smaller value gives the prior less weight against the data where constraints bind.
     pub pull: T,
     /// Last `mu`, chi-square units: the final cost is within 21 N times this value of the minimum.
-    pub last_barrier: T,
+    pub(crate) last_barrier: T,
 }
 
 impl<T: Real> Effort<T> {
@@ -111,7 +111,7 @@ impl<T: Real, const N: usize> Completion<T, N> {
     }
 
     /// Holds at zero what `selection` drops. Call it before [`Self::start`].
-    pub fn hold<const B: usize>(&mut self, model: &RowModel<T, N, B>, selection: &Selection<T, N, B>) {
+    pub(crate) fn hold<const B: usize>(&mut self, model: &RowModel<T, N, B>, selection: &Selection<T, N, B>) {
         self.limits.hold(model, selection);
         self.cost = LegCost::new(&self.limits);
         self.point = self.cost.scaled_point(&self.limits.inside());
@@ -173,19 +173,20 @@ impl<T: Real, const N: usize> Completion<T, N> {
 
     /// True once base values were given and the completion has ended.
     #[must_use]
-    pub fn is_done(&self) -> bool {
+    pub(crate) fn is_done(&self) -> bool {
         self.phase == Phase::Done
     }
 
     /// True if the completion ended at the minimum, not for lack of steps or by overflow.
     #[must_use]
-    pub fn converged(&self) -> bool {
+    #[cfg(test)]
+    pub(crate) fn converged(&self) -> bool {
         self.converged
     }
 
     /// True while base values are missing.
     #[must_use]
-    pub fn is_waiting(&self) -> bool {
+    pub(crate) fn is_waiting(&self) -> bool {
         self.phase == Phase::Waiting
     }
 
@@ -209,7 +210,8 @@ impl<T: Real, const N: usize> Completion<T, N> {
 
     /// The cost that is minimised.
     #[must_use]
-    pub fn cost(&self) -> &LegCost<T, N> {
+    #[cfg(test)]
+    pub(crate) fn cost(&self) -> &LegCost<T, N> {
         &self.cost
     }
 }

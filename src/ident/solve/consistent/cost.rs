@@ -177,7 +177,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
 
     /// `F` above its unconstrained minimum.
     #[must_use]
-    pub fn excess(&self, point: &LegParameters<T, N>) -> T {
+    pub(crate) fn excess(&self, point: &LegParameters<T, N>) -> T {
         let point = point.as_flattened();
         let rows = self.triangle.as_flattened().iter().zip(self.right.as_flattened());
         rows.enumerate().fold(T::zero(), |total, (index, (row, &right))| {
@@ -198,7 +198,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
 
     /// Converts parameters to scaled coordinates.
     #[must_use]
-    pub fn scaled_point(&self, parameters: &LegParameters<T, N>) -> LegParameters<T, N> {
+    pub(crate) fn scaled_point(&self, parameters: &LegParameters<T, N>) -> LegParameters<T, N> {
         let mut point = *parameters;
         add_scaled(&mut point, &self.origin, -T::one());
         for (value, &scale) in point.as_flattened_mut().iter_mut().zip(self.scale.as_flattened()) {

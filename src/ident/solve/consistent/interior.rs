@@ -50,9 +50,9 @@ pub(super) fn merit<T: Real, const N: usize>(
 
 pub(super) struct Step {
     /// `point` minimises `G`, within what matters or can be resolved.
-    pub settled: bool,
+    pub(crate) settled: bool,
     /// False where the start has no finite merit: outside, or overflow. Such a step is not a valid end.
-    pub inside: bool,
+    pub(crate) inside: bool,
 }
 
 /// Decrement, in units of the barrier, below which a point counts as the minimum. The cost is then within a

@@ -45,16 +45,16 @@ pub(super) const CONDITIONS: usize = 17;
 /// Allowed values of one link and its drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LinkLimits<T> {
-    pub mass: (T, T),
-    pub centre: [T; 3],
+    pub(crate) mass: (T, T),
+    pub(crate) centre: [T; 3],
     /// Half the segment's length: largest distance of the centre of mass from `centre`, each coordinate.
-    pub reach: T,
+    pub(crate) reach: T,
     /// Radius of gyration about the centre of mass.
-    pub gyration: T,
+    pub(crate) gyration: T,
     /// Ranges of IA, FC, FV, OFF.
-    pub drive: [(T, T); 4],
+    pub(crate) drive: [(T, T); 4],
     /// Drive parameters that are estimated, in the order of `drive`.
-    pub estimated: [bool; 4],
+    pub(crate) estimated: [bool; 4],
 }
 
 /// Limits of all links, and the leg assumed before any measurement.
@@ -138,19 +138,19 @@ impl<T: Real, const N: usize> Limits<T, N> {
 
     /// Prior, or a neutral leg without one; zero for parameters that are not estimated.
     #[must_use]
-    pub fn origin(&self) -> &LegParameters<T, N> {
+    pub(crate) fn origin(&self) -> &LegParameters<T, N> {
         &self.origin
     }
 
     /// Standard deviations of [`Self::origin`].
     #[must_use]
-    pub fn deviations(&self) -> &LegParameters<T, N> {
+    pub(crate) fn deviations(&self) -> &LegParameters<T, N> {
         &self.deviations
     }
 
     /// A leg well inside: round bodies with the prior's masses, centres of mass and sizes.
     #[must_use]
-    pub fn inside(&self) -> LegParameters<T, N> {
+    pub(crate) fn inside(&self) -> LegParameters<T, N> {
         core::array::from_fn(|joint| {
             let link = &self.links[joint];
             let extent = real::ln(T::from_double(ROUND) * link.gyration);
@@ -182,7 +182,7 @@ impl<T: Real, const N: usize> Limits<T, N> {
 
     /// True if physically consistent and within the limits.
     #[must_use]
-    pub fn allow(&self, parameters: &LegParameters<T, N>) -> bool {
+    pub(crate) fn allow(&self, parameters: &LegParameters<T, N>) -> bool {
         Self::consistent(parameters)
             && self.links.iter().zip(parameters).all(|(link, joint)| {
                 (0..CONDITIONS).all(|index| {
@@ -205,19 +205,19 @@ fn hold_at_zero<T: Real, const N: usize>(links: &[LinkLimits<T>; N], origin: &mu
 
 /// A linear condition: gradient . parameters + constant > 0.
 pub(super) struct Condition<T> {
-    pub gradient: JointParameters<T>,
-    pub constant: T,
+    pub(crate) gradient: JointParameters<T>,
+    pub(crate) constant: T,
 }
 
 impl<T: Real> Condition<T> {
-    pub fn slack(&self, parameters: &JointParameters<T>) -> T {
+    pub(crate) fn slack(&self, parameters: &JointParameters<T>) -> T {
         self.gradient.iter().zip(parameters).fold(self.constant, |sum, (&slope, &value)| sum + slope * value)
     }
 }
 
 impl<T: Real> LinkLimits<T> {
     /// One of the [`CONDITIONS`]; `None` for a drive parameter that is not estimated.
-    pub fn condition(&self, index: usize) -> Option<Condition<T>> {
+    pub(crate) fn condition(&self, index: usize) -> Option<Condition<T>> {
         let mut gradient = [T::zero(); PARAMETERS_PER_JOINT];
         let mut constant = T::zero();
         let mass = Parameter::M.index();

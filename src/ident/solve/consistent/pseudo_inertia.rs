@@ -24,7 +24,7 @@ pub(super) struct Factored<T> {
     /// `L^-1`, lower triangular.
     inverse: Matrix<T>,
     /// `ln det P`.
-    pub log_determinant: T,
+    pub(crate) log_determinant: T,
 }
 
 impl<T: Real> Factored<T> {
@@ -68,7 +68,7 @@ impl<T: Real> Factored<T> {
 
     /// Ten distinct elements of `M` as functions of the ten parameters, each multiplied by `scale`: four on
     /// the diagonal, then six off-diagonal ones times sqrt(2).
-    pub fn rows(&self, scale: &JointParameters<T>) -> [[T; INERTIAL_PARAMETERS]; 10] {
+    pub(crate) fn rows(&self, scale: &JointParameters<T>) -> [[T; INERTIAL_PARAMETERS]; 10] {
         let mut rows = [[T::zero(); INERTIAL_PARAMETERS]; 10];
         for parameter in 0..INERTIAL_PARAMETERS {
             let mut unit = [T::zero(); INERTIAL_PARAMETERS];

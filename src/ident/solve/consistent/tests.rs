@@ -8,6 +8,7 @@ use crate::ident::record::motion_record::Record;
 use crate::ident::record::recorder::Recorder;
 use crate::ident::record::row_model::RowModel;
 use crate::ident::solve::bounds::{LinkPrior, prior_parameters};
+use crate::ident::solve::completion::{complete_within, prior_deviations};
 use crate::ident::solve::estimate::{Estimate, Plan, Problem};
 use crate::ident::solve::testing::{ALL, B, planar};
 use crate::model::{ColumnMask, JointState, LegParameters, Parameter, RigidBody, regressor};
@@ -195,7 +196,7 @@ fn a_closed_form_that_is_a_leg_is_taken_as_it_is() {
     let (completion, estimate) = complete::<f64, 2>(&ALL, &record, Some(&truth()), Effort::reference());
     assert_eq!(completion.steps(), 0);
     let prior = prior_parameters(&truth());
-    let closed = crate::ident::solve::completion::complete(&model, &estimate.values, &prior).unwrap();
+    let closed = complete_within(&model, &estimate.values, &prior, &prior_deviations(&prior)).unwrap();
     for (found, closed) in completion.parameters().as_flattened().iter().zip(closed.as_flattened()) {
         // Rounding of scaling there and back.
         assert!((found - closed).abs() < 1e-12);

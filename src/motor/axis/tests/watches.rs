@@ -199,7 +199,11 @@ fn a_sound_axis_brakes_for_as_long_as_the_other_one_needs_it() {
     for speed in [20.0, -100.0, 140.0] {
         let mut bench = Bench::settled(speed, 10.0);
         for tick in 0..4800 {
-            assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::BRAKE, "{speed} rad/s, tick {tick}");
+            assert_eq!(
+                bench.axis.act(&bench.sample, BridgeRequest::Brake),
+                AxisCommand::BRAKE,
+                "{speed} rad/s, tick {tick}"
+            );
             bench.sample = bench.motor.period(AxisCommand::BRAKE);
             bench.follow_up(tick);
         }
@@ -213,7 +217,7 @@ fn a_motor_too_fast_to_brake_below_the_current_bound_is_off() {
     // Braking at 150 to 180 rad/s already carries 55 A.
     for speed in [200.0, -260.0] {
         let mut bench = Bench::settled(speed, 0.0);
-        assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::OFF, "{speed} rad/s");
+        assert_eq!(bench.axis.act(&bench.sample, BridgeRequest::Brake), AxisCommand::OFF, "{speed} rad/s");
         assert_eq!(bench.axis.fault(), Some(AxisFault::Overcurrent));
         assert!(bench.axis.clear_fault(), "nothing was lost");
 
@@ -229,7 +233,7 @@ fn a_braking_motor_turns_off_on_request_or_beyond_the_current_bound() {
     let mut bench = Bench::settled(60.0, 10.0);
     assert!(bench.frozen(ask(10.0), TWENTY_MS).is_some());
     for _ in 0..100 {
-        assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::BRAKE);
+        assert_eq!(bench.axis.act(&bench.sample, BridgeRequest::Brake), AxisCommand::BRAKE);
         bench.sample = bench.motor.period(AxisCommand::BRAKE);
     }
     // 60 rad/s make 1.2 V at 0.05 ohm: the motor brakes, whatever the sensors measure.
@@ -237,9 +241,9 @@ fn a_braking_motor_turns_off_on_request_or_beyond_the_current_bound() {
     assert!(torque < -15.0, "{torque} A");
     assert_eq!(bench.tick(AxisRequest::OFF), AxisCommand::OFF);
     bench.sample.shunt_codes = [3700, 2048];
-    assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::OFF);
+    assert_eq!(bench.axis.act(&bench.sample, BridgeRequest::Brake), AxisCommand::OFF);
     assert_eq!(bench.axis.fault(), Some(AxisFault::Overcurrent));
-    assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::OFF);
+    assert_eq!(bench.axis.act(&bench.sample, BridgeRequest::Brake), AxisCommand::OFF);
     assert!(!bench.axis.clear_fault(), "the place that was lost before stays lost");
 }
 

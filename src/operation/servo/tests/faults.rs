@@ -17,7 +17,7 @@ fn changed_gains_or_limits_are_a_fault_within_64_ms() {
     bench.level = ServoLevel::new(&other, RAMPS, VOLT_PER_CODE, None);
     bench.ends.servo.host = None;
     bench.enable();
-    bench.run(255 - bench.level.ticks());
+    bench.run(255 - bench.level.tick);
     assert_eq!(bench.fault(), None);
     bench.tick();
     assert_eq!(bench.fault(), Some(Fault { code: FaultCode::Parameters, joint: 0 }));

@@ -48,7 +48,7 @@ fn an_identification_is_refused_until_the_brake_is_open() {
     bench.ask(ControlRequest::Identify);
     bench.tick();
     assert_eq!(activity(&bench), Activity::Idle);
-    let refused = Record::Request { tick: bench.level.ticks(), name: "identify", accepted: false };
+    let refused = Record::Request { tick: bench.level.tick, name: "identify", accepted: false };
     assert!(bench.events.contains(&LegEvent::Record(refused)), "{:?}", bench.events);
     assert!(!bench.names().contains(&"begun"));
     bench.tick();

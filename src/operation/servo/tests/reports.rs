@@ -25,7 +25,7 @@ fn limits_are_reported_once_a_second_and_one_per_tick() {
         bench.counts = bench.counts.map(|counts| counts + 1);
         bench.tick();
     }
-    bench.run(8100 - bench.level.ticks());
+    bench.run(8100 - bench.level.tick);
     let limits = limits(&bench);
     assert!(limits.iter().all(|(_, code, _)| *code == LimitCode::Temperature as u8), "{limits:?}");
     assert!(limits[0].0 < limits[1].0 && limits[1].0 < 100, "{limits:?}");
@@ -76,7 +76,7 @@ fn a_fault_is_recorded_before_the_state_that_follows() {
     bench.tick();
     assert_eq!(bench.names(), ["fault", "state"]);
     let code = FaultCode::Thermistor.number();
-    let tick = bench.level.ticks();
+    let tick = bench.level.tick;
     let expected = Record::Fault { tick, code, name: FaultCode::Thermistor.name(), joint: 2 };
     assert!(bench.events.contains(&LegEvent::Record(expected)));
     assert_eq!(bench.states, [bench.control.state()]);
@@ -142,7 +142,7 @@ fn a_refused_request_is_recorded_and_begins_nothing() {
     bench.clear();
     bench.ask(ControlRequest::Identify);
     bench.tick();
-    let tick = bench.level.ticks();
+    let tick = bench.level.tick;
     let record = Record::Request { tick, name: "identify", accepted: false };
     assert_eq!(bench.events, [LegEvent::Record(record)]);
 }
