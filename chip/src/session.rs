@@ -372,11 +372,17 @@ impl Session {
     }
 
     fn zeros(&mut self) -> Result<(), ToolError> {
-        let words = ["name=reference", "accepted=true"];
-        if self.probe.find(self.started, "request", &words).is_some() {
-            return Ok(());
+        // A switch that closes before the leg has its zeros enables nothing.
+        let records = [
+            ("request", ["name=reference", "accepted=true"]),
+            ("state", ["drive=switch_on_disabled", "activity=idle"]),
+        ];
+        for (kind, words) in records {
+            if self.probe.find(self.started, kind, &words).is_none() {
+                self.wait(kind, &words, 2.0)?;
+            }
         }
-        self.wait("request", &words, 2.0).map(drop)
+        Ok(())
     }
 
     fn telemetry(&mut self) -> Result<(), ToolError> {

@@ -17,19 +17,19 @@ use nalgebra::{Matrix3, Vector3};
 
 /// One link at the reference pose, in the world frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RigidLink {
+pub(crate) struct RigidLink {
     /// Unit vector of the joint's axis.
-    pub axis: Vector3<f64>,
+    pub(crate) axis: Vector3<f64>,
     /// Vector from the previous joint's point (the base's origin for the first) to this joint's, m.
-    pub from_previous: Vector3<f64>,
+    pub(crate) from_previous: Vector3<f64>,
     /// Vector from the joint's point to the centre of mass, m.
-    pub to_centre: Vector3<f64>,
+    pub(crate) to_centre: Vector3<f64>,
     /// Mass, kg.
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// Inertia tensor about the centre of mass, kg m^2.
-    pub inertia: Matrix3<f64>,
+    pub(crate) inertia: Matrix3<f64>,
     /// Rotor inertia at the joint, kg m^2.
-    pub rotor_inertia: f64,
+    pub(crate) rotor_inertia: f64,
 }
 
 /// Links of a chain at its reference pose, in the world frame.

@@ -39,7 +39,7 @@ const RISE_TIME: f64 = 0.2;
 
 /// Contact of the foot with the floor during one interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Floor {
+pub(crate) struct Floor {
     /// Vector from the last joint to the foot, world frame at the reference pose, m.
     foot: Vector3<f64>,
     /// Start of the contact, s.

@@ -28,7 +28,7 @@ impl FrictionDescription {
     /// Level of the dry friction at a rate (rad/s), N m; the breakaway level at 0.
     #[must_use]
     #[inline(always)]
-    pub fn dry_level(&self, rate: f64) -> f64 {
+    pub(crate) fn dry_level(&self, rate: f64) -> f64 {
         match self.stribeck {
             None => self.coulomb,
             Some(stribeck) => {
@@ -80,15 +80,15 @@ impl Contact {
 /// Problem A u = b - f: find the rates u that friction within its bounds allows.
 pub(crate) struct Slide<const N: usize> {
     /// A: near the inertia matrix, kg m^2.
-    pub matrix: [[f64; N]; N],
+    pub(crate) matrix: [[f64; N]; N],
     /// b: momentum the joints would have without dry friction, N m s.
-    pub momentum: [f64; N],
+    pub(crate) momentum: [f64; N],
     /// Impulse of the dry friction of a sliding joint, N m s.
-    pub sliding: [f64; N],
+    pub(crate) sliding: [f64; N],
     /// Largest impulse that dry friction can hold at a resting joint, N m s.
-    pub breakaway: [f64; N],
+    pub(crate) breakaway: [f64; N],
     /// Joints whose dry friction is known in advance, because they are already moving.
-    pub committed: [bool; N],
+    pub(crate) committed: [bool; N],
 }
 
 impl<const N: usize> Slide<N> {

@@ -16,7 +16,7 @@ const DAMPING: f64 = 90.0;
 
 /// Grip of a hand on one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grip {
+pub(crate) struct Grip {
     joint: usize,
     strength: f64,
     start: f64,

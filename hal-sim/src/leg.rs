@@ -13,7 +13,7 @@
 //! time. So it is of second order, and the energy of a frictionless leg does not drift. Dry friction enters
 //! as an impulse bounded by its level (`friction`). So a stuck joint keeps its position to the last bit, and
 //! no friction level makes a step unstable. Instants at which a joint starts, stops or reverses are met to
-//! within one step only. A servo tick with such an instant is repeated in [`FINE_STEPS`] steps.
+//! within one step only. A servo tick with such an instant is repeated in `FINE_STEPS` steps.
 //!
 //! Measured bias on a driven leg: inertias 7e-5 of their value, viscous friction 3e-5, Coulomb friction 2e-5.
 //! The reference is eighth-order differences of the leg's own motion, turning points included.
@@ -27,7 +27,7 @@ use crate::friction::{Contact, Slide};
 use crate::mechanism::{Mechanism, times};
 
 /// Steps of a tick in which some joint starts, stops or reverses.
-pub const FINE_STEPS: u32 = 8;
+pub(crate) const FINE_STEPS: u32 = 8;
 
 /// Rigid bodies with friction in their joints; all angles and torques are joint (D-H) ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +60,7 @@ impl<const N: usize> Leg<N> {
 
     /// This leg with some joints mechanically blocked; their rates must be 0.
     #[must_use]
-    pub fn with_blocked(mut self, blocked: [bool; N]) -> Self {
+    pub(crate) fn with_blocked(mut self, blocked: [bool; N]) -> Self {
         self.blocked = blocked;
         self
     }

@@ -38,13 +38,13 @@ pub struct Mechanism<const N: usize> {
 
 /// The three terms of Lagrange's equations at one state.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dynamics<const N: usize> {
+pub(crate) struct Dynamics<const N: usize> {
     /// M(q), kg m^2, symmetric.
-    pub inertia: [[f64; N]; N],
+    pub(crate) inertia: [[f64; N]; N],
     /// C(q, v), N m s: times a velocity, the Coriolis and centrifugal torque.
-    pub coriolis: [[f64; N]; N],
+    pub(crate) coriolis: [[f64; N]; N],
     /// G(q), N m: torque that holds the leg against gravity.
-    pub gravity: [f64; N],
+    pub(crate) gravity: [f64; N],
 }
 
 /// Positions and axes in the world frame. Entries `[i][j]` are filled for j <= i.
@@ -89,7 +89,7 @@ impl<const N: usize> Mechanism<N> {
     /// Inertia matrix, Coriolis matrix and gravity torque at joint angles (rad) and rates (rad/s).
     #[must_use]
     #[inline(always)]
-    pub fn dynamics(&self, angles: &[f64; N], rates: &[f64; N]) -> Dynamics<N> {
+    pub(crate) fn dynamics(&self, angles: &[f64; N], rates: &[f64; N]) -> Dynamics<N> {
         let pose = self.pose(angles);
         let mut inertia = [[0.0; N]; N];
         let mut gravity = [0.0; N];
@@ -146,7 +146,7 @@ impl<const N: usize> Mechanism<N> {
     /// Position of a point of the last link at joint angles (rad), and its derivative by each joint, m/rad.
     /// The point is given from the last joint in the world frame at the reference pose, m.
     #[must_use]
-    pub fn point_of_last_link(
+    pub(crate) fn point_of_last_link(
         &self,
         angles: &[f64; N],
         from_joint: &Vector3<f64>,
@@ -166,7 +166,7 @@ impl<const N: usize> Mechanism<N> {
 
     /// Unit vector against gravity; zero without gravity.
     #[must_use]
-    pub fn up(&self) -> Vector3<f64> {
+    pub(crate) fn up(&self) -> Vector3<f64> {
         self.gravity.try_normalize(0.0).map_or_else(Vector3::zeros, |down| -down)
     }
 

@@ -25,7 +25,7 @@ struct Push {
 
 /// Pushes of a wearer, past and planned.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pushes {
+pub(crate) struct Pushes {
     habits: Option<PushDescription>,
     next: Option<Push>,
     generator: Xoshiro256PlusPlus,
@@ -41,7 +41,7 @@ impl Pushes {
     }
 
     /// Changes rate and strength of the pushes from this time (s) on; a push in progress ends.
-    pub fn change_habits(&mut self, habits: Option<PushDescription>, now: f64, joints: usize) {
+    pub(crate) fn change_habits(&mut self, habits: Option<PushDescription>, now: f64, joints: usize) {
         (self.habits, self.next) = (habits, None);
         self.plan(now, joints);
     }

@@ -47,7 +47,7 @@ impl Encoder {
 
 /// Sensor of the torque-producing motor current.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CurrentSensor {
+pub(crate) struct CurrentSensor {
     sigma: f64,
     offset: f64,
     step: f64,
@@ -71,12 +71,12 @@ impl CurrentSensor {
     }
 
     /// Sets the standard deviation of the mean of eight samples, A.
-    pub fn set_noise(&mut self, noise: f64) {
+    pub(crate) fn set_noise(&mut self, noise: f64) {
         self.sigma = noise * SAMPLES_PER_LOGGED_ROOT;
     }
 
     /// Starts a logged sample and decides whether it is an outlier.
-    pub fn begin_logged(&mut self, generator: &mut Xoshiro256PlusPlus) {
+    pub(crate) fn begin_logged(&mut self, generator: &mut Xoshiro256PlusPlus) {
         let Some(outliers) = self.outliers else { return };
         let [chance, size]: [f64; 2] = core::array::from_fn(|_| StandardUniform.sample(generator));
         self.outlier = if chance < outliers.share { outliers.current * (2.0 * size - 1.0) } else { 0.0 };

@@ -24,8 +24,8 @@
 //! Time steps: both bodies take the step of [`crate::leg`] at once (position Verlet with bilinear centrifugal
 //! terms). Cuffs act at the positions of the interval's middle, so the elastic step is symmetric in time and
 //! the energy does not drift. Dampers act at the mean of old and new rates, found by a second pass. A step
-//! turns the fastest motion of the cuffs by at most [`LARGEST_PHASE`]. A step in which a joint of the
-//! exoskeleton starts, stops or reverses is repeated in [`FINE_STEPS`] parts.
+//! turns the fastest motion of the cuffs by at most `LARGEST_PHASE`. A step in which a joint of the
+//! exoskeleton starts, stops or reverses is repeated in `FINE_STEPS` parts.
 //!
 //! Cost: one evaluation of both bodies a step, two with dampers. A servo tick with a wearer takes about five
 //! times as long as one without (1.2 us instead of 0.23 us on a server's core).
@@ -56,7 +56,7 @@ use plane::{ExoskeletonPlane, LimbSegment, Pair, convert_angles, convert_torques
 
 /// Largest phase of the cuffs' fastest motion in a step, rad. The energy of that motion errs by at most an
 /// eighth of its square.
-pub const LARGEST_PHASE: f64 = 0.1;
+pub(crate) const LARGEST_PHASE: f64 = 0.1;
 
 /// Fastest permitted motion of the cuffs, rad/s: 64 steps per servo tick.
 const FASTEST: f64 = 25_600.0;
@@ -240,7 +240,7 @@ impl Wearer {
     }
 
     /// Interaction torque at a state of the exoskeleton, N m, joint (D-H) sign.
-    pub fn interaction<const N: usize>(&self, state: &LegState<N>) -> [f64; N] {
+    pub(crate) fn interaction<const N: usize>(&self, state: &LegState<N>) -> [f64; N] {
         let loads = self.loads(&self.exoskeleton(state), &self.limb);
         as_first_two(self.plane.flipped(convert_torques(sum(loads.map(|load| load.on_exoskeleton)))))
     }

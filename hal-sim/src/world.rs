@@ -29,7 +29,7 @@ use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, SERVO_RATE_
 use scarab::units::Ampere;
 
 /// Servo rate, Hz.
-pub const TICK_RATE_HZ: f64 = SERVO_RATE_HZ as f64;
+pub(crate) const TICK_RATE_HZ: f64 = SERVO_RATE_HZ as f64;
 /// Duration of a servo tick, s.
 pub const TICK_S: f64 = 1.0 / TICK_RATE_HZ;
 
@@ -149,7 +149,7 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// Lets the foot stand on the floor ([`Floor`]) from `delay` s after now, for `duration` s. `foot` is its
+    /// Lets the foot stand on the floor (`Floor`) from `delay` s after now, for `duration` s. `foot` is its
     /// position (m) on the last link, in that link's D-H frame.
     pub fn touch(&mut self, foot: [f64; 3], delay: f64, duration: f64) {
         let mut joints = self.description.joints;
@@ -183,7 +183,7 @@ impl<const N: usize> World<N> {
         self.pushes.push(joint, peak, self.time(), duration);
     }
 
-    /// Lets a hand hold a joint at its present angle ([`Grip`]) for `duration` s, with at most `strength` N
+    /// Lets a hand hold a joint at its present angle (`Grip`) for `duration` s, with at most `strength` N
     /// m.
     pub fn hold(&mut self, joint: usize, strength: f64, duration: f64) {
         self.grip = Some(Grip::new(joint, strength, self.time(), duration));

@@ -24,9 +24,9 @@ use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ};
 /// PWM period, s.
 pub const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
 /// Quarters per period.
-pub const QUARTERS: u32 = 4;
+pub(crate) const QUARTERS: u32 = 4;
 /// Length of a quarter, s.
-pub const QUARTER_S: f64 = PERIOD_S / QUARTERS as f64;
+pub(crate) const QUARTER_S: f64 = PERIOD_S / QUARTERS as f64;
 /// Conduction time after which an amplifier has settled completely, s.
 const SETTLED: f64 = 1.0;
 
@@ -107,7 +107,7 @@ impl Axis {
     }
 
     /// Breaks the wire of an output.
-    pub fn break_wire(&mut self, output: usize) {
+    pub(crate) fn break_wire(&mut self, output: usize) {
         self.description.wiring.open = Some(output);
     }
 
@@ -149,7 +149,7 @@ impl Axis {
     }
 
     /// Adds an error, A, to both shunts at the next sample.
-    pub fn disturb(&mut self, ampere: f64) {
+    pub(crate) fn disturb(&mut self, ampere: f64) {
         self.disturbance = ampere;
     }
 

@@ -185,7 +185,7 @@ impl Bridge {
 
     /// Time for which an output's low side has been conducting at `now`, s; `None` if it does not.
     #[must_use]
-    pub fn low_side_time(&self, output: usize, now: f64) -> Option<f64> {
+    pub(crate) fn low_side_time(&self, output: usize, now: f64) -> Option<f64> {
         let leg = self.legs.get(output)?;
         (self.enabled && !leg.high && leg.conducts_from <= now).then_some(now - leg.conducts_from)
     }
@@ -197,12 +197,6 @@ impl Bridge {
         let within = |edge: f64| i32::from(edge <= to && edge + self.description.dead_time >= from);
         let of_leg = |leg: &HalfBridge| within(leg.edges[0]) - within(leg.edges[1]);
         if self.enabled { self.legs.iter().map(of_leg).sum() } else { 0 }
-    }
-
-    /// Resistance of a switch that is on, ohm.
-    #[must_use]
-    pub fn on_resistance(&self) -> f64 {
-        self.description.on_resistance
     }
 }
 

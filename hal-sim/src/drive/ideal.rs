@@ -17,7 +17,7 @@ use crate::maths::exp;
 
 /// One joint's motor and current loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
+pub(crate) struct Drive {
     torque_per_ampere: f64,
     current_limit: f64,
     /// Share of a deviation that remains after one tick, 0..=1.
@@ -57,7 +57,7 @@ impl Drive {
 
     /// Present motor current, A.
     #[must_use]
-    pub fn current(&self) -> f64 {
+    pub(crate) fn current(&self) -> f64 {
         self.current
     }
 

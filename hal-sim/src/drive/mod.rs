@@ -2,7 +2,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`ideal`] | a current that follows its target with a lag |
+//! | `ideal` | a current that follows its target with a lag |
 //! | [`description`] | parameters of a complete drive |
 //! | [`motor`] | three phases by their flux linkages: currents, torque, heat |
 //! | [`bridge`] | conduction of each switch: centred pulses, dead time |
@@ -21,10 +21,10 @@ pub mod bridge;
 pub mod complete;
 pub mod counter;
 pub mod description;
-pub mod ideal;
+pub(crate) mod ideal;
 pub mod motor;
 pub mod shunts;
 pub mod stand;
 pub mod supply;
 
-pub use ideal::Drive;
+pub(crate) use ideal::Drive;

@@ -58,7 +58,7 @@ impl Direction {
 
     /// Direction of a small angle (rad): exact to 1e-9 for 0.1 rad.
     #[must_use]
-    pub fn small(angle: f64) -> Self {
+    pub(crate) fn small(angle: f64) -> Self {
         let square = angle * angle;
         Self {
             cosine: 1.0 - square / 2.0 * (1.0 - square / 12.0),
@@ -68,7 +68,7 @@ impl Direction {
 
     /// This direction turned by another one's angle.
     #[must_use]
-    pub fn turned(&self, by: &Self) -> Self {
+    pub(crate) fn turned(&self, by: &Self) -> Self {
         Self {
             cosine: self.cosine * by.cosine - self.sine * by.sine,
             sine: self.sine * by.cosine + self.cosine * by.sine,

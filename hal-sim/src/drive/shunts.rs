@@ -20,9 +20,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Reference of the converter, V.
-pub const CONVERTER_VOLT: f64 = 3.3;
+pub(crate) const CONVERTER_VOLT: f64 = 3.3;
 /// Codes of the converter.
-pub const CODES: f64 = 4096.0;
+pub(crate) const CODES: f64 = 4096.0;
 
 /// Input of one shunt at the sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,7 +39,7 @@ pub struct ShuntState {
 
 /// Converts a voltage at the converter to its code.
 #[must_use]
-pub fn convert(volt: f64, error_codes: f64) -> u16 {
+pub(crate) fn convert(volt: f64, error_codes: f64) -> u16 {
     nearest(volt / CONVERTER_VOLT * CODES + error_codes).clamp(0, CODES as i64 - 1) as u16
 }
 

@@ -32,7 +32,7 @@ pub struct Supply {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SupplyEnergy {
     /// Energy from the source, without its own losses.
-    pub source: f64,
+    pub(crate) source: f64,
     /// Energy into the bridges.
     pub bridges: f64,
     /// Energy into the brake resistor.

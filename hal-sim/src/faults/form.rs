@@ -65,7 +65,7 @@ impl Timing {
 
     /// Whether the fault acts at a tick.
     #[must_use]
-    pub const fn holds(&self, tick: u64) -> bool {
+    pub(crate) const fn holds(&self, tick: u64) -> bool {
         let Some(since) = tick.checked_sub(self.begin) else { return false };
         since < self.duration && (self.off == 0 || since % (self.on + self.off) < self.on)
     }

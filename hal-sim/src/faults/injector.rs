@@ -7,7 +7,7 @@ use scarab::hal::{AxisSample, JointSample};
 use scarab::units::Ampere;
 
 /// Largest number of simultaneous injections.
-pub const MOST: usize = 4;
+pub(crate) const MOST: usize = 4;
 
 /// Faulted signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +90,7 @@ impl Injector {
         Self { slots: [None; MOST], generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
     }
 
-    /// Adds a fault; returns `false` where there are [`MOST`] already.
+    /// Adds a fault; returns `false` where there are `MOST` already.
     pub fn add(&mut self, injection: Injection) -> bool {
         let free = self.slots.iter_mut().find(|slot| slot.is_none());
         free.map(|slot| *slot = Some((injection, Memory::EMPTY))).is_some()

@@ -13,8 +13,8 @@
 //! them ([`crate::drive`], [`crate::wearer`], [`crate::floor`]). Time is counted in PWM periods. Cost without
 //! an injection: one comparison per channel.
 
-pub mod form;
-pub mod injector;
+pub(crate) mod form;
+pub(crate) mod injector;
 
 pub use form::{Form, Timing};
 pub use injector::{Channel, Injection, Injector};

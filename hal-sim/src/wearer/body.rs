@@ -21,14 +21,14 @@ use crate::mechanism::times;
 /// Directions of thigh and shank, rad, and their rates, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LimbState {
-    pub angles: Pair,
-    pub rates: Pair,
+    pub(crate) angles: Pair,
+    pub(crate) rates: Pair,
 }
 
 /// Limb of the wearer without muscles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Body {
-    pub chain: TwoLinkChain,
+    pub(crate) chain: TwoLinkChain,
     segments: [SegmentDescription; 2],
     passive: [PassiveDescription; 2],
     gravity: Pair,

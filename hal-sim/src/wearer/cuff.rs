@@ -35,18 +35,18 @@ pub(super) struct Cuff {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct CuffLoad {
     /// Generalised forces on the wearer's and the exoskeleton's segments, N m.
-    pub on_wearer: Pair,
-    pub on_exoskeleton: Pair,
+    pub(crate) on_wearer: Pair,
+    pub(crate) on_exoskeleton: Pair,
     /// Deflection of the wearer, m.
-    pub deflection: Pair,
+    pub(crate) deflection: Pair,
     /// Force on the wearer, N.
-    pub force: Pair,
+    pub(crate) force: Pair,
     /// Power of that force, W.
-    pub received: f64,
+    pub(crate) received: f64,
     /// Power lost in the dampers, W.
-    pub dissipated: f64,
+    pub(crate) dissipated: f64,
     /// Energy in the springs, J.
-    pub stored: f64,
+    pub(crate) stored: f64,
 }
 
 impl CuffSpring {

@@ -28,7 +28,7 @@ use rand_distr::{Distribution, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Duration in which a motion fades in, s.
-pub const START_S: f64 = 1.0;
+pub(crate) const START_S: f64 = 1.0;
 
 /// Motion that a wearer intends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,7 +112,7 @@ pub struct Intended {
     /// Their rates.
     pub velocity: [f64; 2],
     /// Their accelerations.
-    pub acceleration: [f64; 2],
+    pub(crate) acceleration: [f64; 2],
 }
 
 /// Angle of a gait: mean, amplitudes and phases of the harmonics, degrees and rad.

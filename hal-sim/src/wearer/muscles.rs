@@ -23,7 +23,7 @@ use super::plane::Pair;
 use crate::maths::nearest;
 
 /// Longest neural delay, s.
-pub const LONGEST_DELAY_S: f64 = 0.1;
+pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
 
 /// Servo ticks per sample of the reflexes: 1 ms.
 const TICKS_PER_SAMPLE: u64 = 4;

@@ -58,16 +58,16 @@ pub(super) enum LimbSegment {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TwoLinkChain {
     /// Position of the hip axis, m.
-    pub hip: Pair,
+    pub(crate) hip: Pair,
     /// Distance of the knee axis from the hip axis, m.
-    pub thigh: f64,
+    pub(crate) thigh: f64,
 }
 
 /// Point of a chain with its derivatives by the segments' angles, m and m/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChainPoint {
-    pub position: Pair,
-    pub slope: [Pair; 2],
+    pub(crate) position: Pair,
+    pub(crate) slope: [Pair; 2],
 }
 
 impl TwoLinkChain {
@@ -120,10 +120,10 @@ impl ChainPoint {
 /// Exoskeleton's chain in its plane, with what converts its joint angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ExoskeletonPlane {
-    pub chain: TwoLinkChain,
+    pub(crate) chain: TwoLinkChain,
     /// Gravity's acceleration in the plane, m/s^2.
-    pub gravity: Pair,
-    pub anatomy: [Anatomy; 2],
+    pub(crate) gravity: Pair,
+    pub(crate) anatomy: [Anatomy; 2],
 }
 
 impl ExoskeletonPlane {

@@ -68,7 +68,7 @@ impl FileError {
 
     /// Error at a byte of the text.
     #[must_use]
-    pub fn at(file: &str, text: &str, start: Option<usize>, reason: String) -> Self {
+    pub(crate) fn at(file: &str, text: &str, start: Option<usize>, reason: String) -> Self {
         let line = |start| 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
         Self { file: file.to_owned(), line: start.map(line), reason }
     }

@@ -55,7 +55,7 @@ impl Adapter {
     ///
     /// # Errors
     /// Those of the operating system.
-    pub fn try_clone(&self) -> std::io::Result<Self> {
+    pub(crate) fn try_clone(&self) -> std::io::Result<Self> {
         Ok(match self {
             Self::Tcp(stream) => Self::Tcp(stream.try_clone()?),
             Self::Serial(port) => Self::Serial(port.try_clone()?),
@@ -161,7 +161,7 @@ impl AdapterBus {
 
     /// Sends heartbeats from now on, as long as this bus exists: nodes that watch it (1016) stop when the
     /// process ends.
-    pub fn begin_heartbeats(&self) {
+    pub(crate) fn begin_heartbeats(&self) {
         let adapter: Weak<Mutex<Adapter>> = Arc::downgrade(&self.adapter);
         let (identifier, operational) = ALIVE;
         let alive = Frame::new(identifier + u16::from(HOST), &[operational]);

@@ -37,7 +37,7 @@ pub fn reason(bit: u8) -> &'static str {
 
 /// Sentence about an emergency message; information: see `bus::device`.
 #[must_use]
-pub fn words(code: u16, information: [u8; 5]) -> String {
+pub(crate) fn words(code: u16, information: [u8; 5]) -> String {
     let fault = FaultCode::ALL.into_iter().find(|fault| fault.number() == code);
     let notice = NoticeCode::ALL.into_iter().find(|notice| notice.number() == code);
     let [joint, bit, ..] = information;

@@ -7,7 +7,7 @@ use scarab::bus::{Abort, Frame};
 use scarab_base::error::ToolError;
 
 /// Node-ID of this host.
-pub const HOST: u8 = 0x70;
+pub(crate) const HOST: u8 = 0x70;
 /// Longest value that is read, in bytes.
 pub(crate) const MOST_BYTES: usize = 4096;
 
@@ -42,7 +42,7 @@ pub struct Patience {
     /// Longest wait for the answer.
     pub answer: Duration,
     /// Time after which the request is repeated.
-    pub repeat: Duration,
+    pub(crate) repeat: Duration,
 }
 
 impl Patience {
@@ -100,7 +100,7 @@ impl RequestError {
 
     /// Error of the bus as a whole.
     #[must_use]
-    pub fn for_bus(self) -> ToolError {
+    pub(crate) fn for_bus(self) -> ToolError {
         match self {
             Self::Failed(why) => ToolError::input(why),
             Self::Silent(_) | Self::Endless | Self::Aborted(_) => ToolError::input("no answer on the bus"),
@@ -109,7 +109,7 @@ impl RequestError {
 
     /// Error with the node and the object.
     #[must_use]
-    pub fn for_object(self, node: u8, Object(index, sub): Object) -> ToolError {
+    pub(crate) fn for_object(self, node: u8, Object(index, sub): Object) -> ToolError {
         let why = match self {
             Self::Aborted(code) => format!("refused with abort code {code:08X}"),
             Self::Silent(patience) => format!(
@@ -124,7 +124,7 @@ impl RequestError {
         ToolError::input(format!("node {node}, object {index:04X}:{sub}: {why}"))
     }
 
-    /// Like [`Self::for_object`]; a node that aborts has refused.
+    /// Like `Self::for_object`; a node that aborts has refused.
     #[must_use]
     pub fn refused(self, node: u8, object: Object) -> ToolError {
         match self {

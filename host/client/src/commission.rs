@@ -12,7 +12,7 @@
 //! says when it is done: a step that it refuses because of the switch is asked again until the switch is
 //! right. What the board answers (FF0E, 2160:3) is shown.
 //!
-//! Another host ends the procedure ([`OtherHosts`]): it would be taken for the operator's hand.
+//! Another host ends the procedure (`OtherHosts`): it would be taken for the operator's hand.
 
 use std::time::Duration;
 

@@ -28,13 +28,13 @@ const LSS: [u16; 2] = [0x7E5, 0x7E4];
 
 /// Emergency message of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Emergency {
+pub(crate) struct Emergency {
     /// Node-ID.
-    pub node: u8,
+    pub(crate) node: u8,
     /// Error code; 0 when the error has ended.
-    pub code: u16,
+    pub(crate) code: u16,
     /// Bytes behind the error register; those of a short message are 0.
-    pub information: [u8; 5],
+    pub(crate) information: [u8; 5],
 }
 
 /// Connection to the nodes of a bus.
@@ -55,7 +55,7 @@ impl Client {
     }
 
     /// Sends heartbeats as long as this client exists ([`AdapterBus::begin_heartbeats`]).
-    pub fn begin_heartbeats(&self) {
+    pub(crate) fn begin_heartbeats(&self) {
         self.bus.begin_heartbeats();
     }
 }
@@ -68,13 +68,13 @@ impl<B: Bus> Client<B> {
 
     /// Present time of the bus.
     #[must_use]
-    pub fn now(&self) -> Duration {
+    pub(crate) fn now(&self) -> Duration {
         self.bus.now()
     }
 
     /// Whether a frame with this identifier was received.
     #[must_use]
-    pub fn has_heard(&self, identifier: u16) -> bool {
+    pub(crate) fn has_heard(&self, identifier: u16) -> bool {
         self.heard.get(usize::from(identifier)).is_some_and(|heard| *heard)
     }
 
@@ -82,7 +82,7 @@ impl<B: Bus> Client<B> {
     ///
     /// # Errors
     /// The bus failed, or no node can answer any more.
-    pub fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
+    pub(crate) fn send(&mut self, frame: &Frame) -> Result<(), RequestError> {
         self.bus.send(frame)
     }
 
@@ -115,12 +115,12 @@ impl<B: Bus> Client<B> {
     ///
     /// # Errors
     /// The bus failed, or no node can answer any more.
-    pub fn wait(&mut self, time: Duration) -> Result<(), RequestError> {
+    pub(crate) fn wait(&mut self, time: Duration) -> Result<(), RequestError> {
         self.receive(self.now() + time, |_| false).map(drop)
     }
 
     /// Takes the emergency messages since the last call.
-    pub fn take_emergencies(&mut self) -> Vec<Emergency> {
+    pub(crate) fn take_emergencies(&mut self) -> Vec<Emergency> {
         std::mem::take(&mut self.emergencies)
     }
 
@@ -167,7 +167,7 @@ impl<B: Bus> Client<B> {
     ///
     /// # Errors
     /// The bus failed, or no node can answer any more.
-    pub fn lss(
+    pub(crate) fn lss(
         &mut self,
         requests: &[(u8, u32)],
         answer: u8,
@@ -191,7 +191,7 @@ impl<B: Bus> Client<B> {
     ///
     /// # Errors
     /// The bus failed, or no node can answer any more.
-    pub fn manage(&mut self, node: u8, command: u8) -> Result<(), RequestError> {
+    pub(crate) fn manage(&mut self, node: u8, command: u8) -> Result<(), RequestError> {
         self.send(&Frame::new(0, &[command, node]))
     }
 
@@ -244,7 +244,7 @@ impl<B: Bus> Client<B> {
     ///
     /// # Errors
     /// The node refuses or is silent.
-    pub fn real(&mut self, node: u8, object: Object) -> Result<f64, ToolError> {
+    pub(crate) fn real(&mut self, node: u8, object: Object) -> Result<f64, ToolError> {
         self.read(node, object).map(|bits| f64::from(f32::from_bits(bits)))
     }
 

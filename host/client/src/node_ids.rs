@@ -39,7 +39,7 @@ pub struct Board {
     /// Serial number.
     pub serial: u32,
     /// Revision number of its firmware.
-    pub revision: u32,
+    pub(crate) revision: u32,
     /// Node-IDs of hip and knee.
     pub nodes: [u8; 2],
 }

@@ -9,8 +9,8 @@
 //! | a controlword that stands | 6040 |
 //! | a drive that is on | 6041; with 6040 at 0 the operator's contacts have turned it on |
 //!
-//! Limits: a host that has enabled nothing and sends less often than [`LISTENING`] is heard later, by
-//! [`OtherHosts::check`]. Frames of a client behind the same adapter program are not always shown.
+//! Limits: a host that has enabled nothing and sends less often than `LISTENING` is heard later, by
+//! `OtherHosts::check`. Frames of a client behind the same adapter program are not always shown.
 
 use scarab_base::error::ToolError;
 use std::time::Duration;
@@ -20,7 +20,7 @@ use crate::master::Client;
 use crate::words::JointState;
 
 /// Time in which a host that controls a leg shows itself.
-pub const LISTENING: Duration = Duration::from_secs(1);
+pub(crate) const LISTENING: Duration = Duration::from_secs(1);
 /// NMT command: start of a node.
 const START: u8 = 1;
 /// Bit of a COB-ID: the message does not exist.
@@ -34,7 +34,7 @@ const REQUEST: u16 = 0x600;
 
 /// Turning on that a procedure permits before it begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MayBeOn {
+pub(crate) enum MayBeOn {
     /// None.
     No,
     /// By the operator's contacts.
@@ -43,7 +43,7 @@ pub enum MayBeOn {
 
 /// Identifiers that only another host sends.
 #[derive(Clone, Debug)]
-pub struct OtherHosts {
+pub(crate) struct OtherHosts {
     signs: Vec<(u16, String)>,
 }
 

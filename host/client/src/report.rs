@@ -26,7 +26,7 @@ pub struct CommissionReport {
     /// Reasons of the verdict.
     pub reasons: Vec<&'static str>,
     /// Models stored on this board.
-    pub generation: u32,
+    pub(crate) generation: u32,
     /// Base parameters of the leg.
     pub base: Vec<ParameterRead>,
     /// Whether calibration and model are stored.

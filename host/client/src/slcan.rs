@@ -53,12 +53,6 @@ pub struct Line {
 }
 
 impl Line {
-    /// Whether the channel is open.
-    #[must_use]
-    pub const fn is_open(&self) -> bool {
-        self.is_open
-    }
-
     /// Processes a byte from the client. Answers go to `out`, except the one to a returned line.
     pub fn receive(&mut self, byte: u8, out: &mut Vec<u8>) -> Option<Received> {
         match byte {
@@ -208,7 +202,7 @@ mod tests {
         encode(&frame, &mut text);
         assert_eq!(text, b"t60184041600000000000\r");
         assert_eq!(exchange(&mut line, "C\r").1, "\r");
-        assert!(!line.is_open());
+        assert!(!line.is_open);
     }
 
     #[test]

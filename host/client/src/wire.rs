@@ -132,7 +132,7 @@ pub struct Sent {
     /// Index of the sender's mailbox.
     pub sender: usize,
     /// Earliest instant at which the frame could be sent.
-    pub asked_ns: u64,
+    pub(crate) asked_ns: u64,
     /// End of its last bit.
     pub end_ns: u64,
 }

@@ -52,7 +52,7 @@ impl JointState {
 
     /// Whether the motors may be energised.
     #[must_use]
-    pub fn is_on(self) -> bool {
+    pub(crate) fn is_on(self) -> bool {
         matches!(
             self.name(),
             "fault reaction active" | "quick stop active" | "switched on" | "operation enabled"

@@ -1,5 +1,5 @@
-//! Firmware side of a complete drive: all levels of the board ([`levels`]) over simulated registers
-//! ([`registers`]).
+//! Firmware side of a complete drive: all levels of the board (`levels`) over simulated registers
+//! (`registers`).
 //!
 //! The firmware answers the plant's readings of a PWM period in the same period; the answer acts in
 //! the next. The servo's sample is the mean of the six periods since its last tick.
@@ -8,9 +8,9 @@
 //! rotor and counter at the leg's positions. The leg's initial pose is used as the reference: with outputs
 //! off, the leg would swing for the half second that `StatedPose` waits.
 
-pub mod levels;
+pub(crate) mod levels;
 mod locked;
-pub mod registers;
+pub(crate) mod registers;
 
 use core::f64::consts::TAU;
 use std::sync::{Mutex, PoisonError};
@@ -35,7 +35,7 @@ use scarab_identify::formats::leg_file::{JointFile, LegFile, MotorFile};
 use scarab_identify::leg::board_words as words;
 
 /// Bus voltages at which the bridges may switch.
-pub const BUS: [Volt; 2] = drives::bus(SenseScale::DIVIDER);
+pub(crate) const BUS: [Volt; 2] = drives::bus(SenseScale::DIVIDER);
 /// Bus voltages at which the brake resistor conducts.
 pub const BRAKE: [Volt; 2] = drives::chopper(SenseScale::DIVIDER);
 
@@ -53,7 +53,7 @@ const ROTOR_INERTIA: f64 = 1e-4;
 /// Rest before a calibration: half a second.
 const REST_PERIODS: u32 = 12_000;
 /// Limit of a calibration, periods; it takes some seconds.
-pub const LONGEST_CALIBRATION: u64 = 60 * CURRENT_RATE_HZ as u64;
+pub(crate) const LONGEST_CALIBRATION: u64 = 60 * CURRENT_RATE_HZ as u64;
 
 /// Configuration of a joint's axis, derived from the leg file by the board's settings.
 pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfiguration {
@@ -82,7 +82,7 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
 
 /// Motor on its stand, free of its gear, at rest with outputs off; the rotor started at `angle`, rad.
 #[must_use]
-pub fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, seed: u64) -> Stand {
+pub(crate) fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, seed: u64) -> Stand {
     let mut stand = Stand::new(axis, supply, ROTOR, angle, seed);
     // Cogging moves the rotor to a rest position.
     for _ in 0..REST_PERIODS {
@@ -93,7 +93,7 @@ pub fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, se
 
 /// Runs a calibration with `sample`, the readings of a period under the command of the period before. Returns
 /// the period of its end and the result; `None` if it does not end in time.
-pub fn run_calibration(
+pub(crate) fn run_calibration(
     calibrator: &mut Calibrator,
     mut sample: impl FnMut(u64, &AxisCommand) -> AxisSample,
 ) -> Option<(u64, Result<Calibration, Refusal>)> {
@@ -109,7 +109,7 @@ pub fn run_calibration(
 }
 
 /// Calibrates a motor on its stand with the rotor at `angle` (rad); `name` is used in error messages.
-pub fn commission(
+pub(crate) fn commission(
     name: &str,
     configuration: &AxisConfiguration,
     settings: CalibrationSettings,

@@ -1,7 +1,7 @@
 //! The whole firmware with the whole plant, one PWM period at a time, with faults on the registers between
 //! them.
 //!
-//! The firmware is the board's own composition of levels ([`Levels`]); only the registers differ. Order of
+//! The firmware is the board's own composition of levels (`Levels`); only the registers differ. Order of
 //! the levels in one period:
 //!
 //! ```text
@@ -34,15 +34,15 @@ use hal_sim::world::World;
 /// PWM periods per second.
 pub const PERIODS_PER_S: u64 = CURRENT_RATE_HZ as u64;
 /// Duration of a PWM period, ms.
-pub const PERIOD_MS: f64 = 1e3 / PERIODS_PER_S as f64;
+pub(crate) const PERIOD_MS: f64 = 1e3 / PERIODS_PER_S as f64;
 
 /// Actions of the operator that may lead to an enabled drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Edges {
+pub(crate) struct Edges {
     /// Period of the last requested reset.
-    pub reset: Option<u64>,
+    pub(crate) reset: Option<u64>,
     /// Period of the last closing of the enabling switch.
-    pub closed: Option<u64>,
+    pub(crate) closed: Option<u64>,
 }
 
 /// Firmware, plant and the faults between them.
@@ -51,21 +51,21 @@ pub struct Rig<const N: usize, const B: usize> {
     /// The leg, both halves.
     pub leg: Box<DeviceLeg<N, B>>,
     /// The plant.
-    pub world: World<N>,
+    pub(crate) world: World<N>,
     /// The injected faults.
     pub injector: Injector,
     /// The operator's contacts.
     pub hand: Contacts,
     /// Output of the last servo tick.
-    pub output: Option<ControlOutput<N>>,
+    pub(crate) output: Option<ControlOutput<N>>,
     /// Slice of the identification after the last servo tick.
-    pub slice: Slice<N>,
+    pub(crate) slice: Slice<N>,
     /// PWM periods since the start.
     pub period: u64,
     /// Hash of everything that has crossed the registers.
-    pub hash: u64,
+    pub(crate) hash: u64,
     /// Faults whose detectors are disabled, to prove that the campaign detects their absence.
-    pub blind: &'static [FaultCode],
+    pub(crate) blind: &'static [FaultCode],
     /// All levels of the board.
     pub board: Box<Levels<N>>,
     /// Leg in its state after power-on.
@@ -107,7 +107,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     }
 
     /// A board as made by [`Self::new`], on a bus.
-    pub fn on_a_bus(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
+    pub(crate) fn on_a_bus(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
         let mut rig = Self::new(leg, context, seed)?;
         rig.board.join_bus(&rig.leg, Following::new(&context.configuration));
         Ok(rig)
@@ -264,7 +264,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     }
 
     /// Flips a bit in an axis' constants (`Axis::flip_bit`) or in those of the servo's joint.
-    pub fn upset(&mut self, of_axis: bool, joint: usize, number: u8, bit: u8) {
+    pub(crate) fn upset(&mut self, of_axis: bool, joint: usize, number: u8, bit: u8) {
         if of_axis {
             if let Some(axis) = self.board.loops.axis_state_mut(joint).and_then(AxisState::axis_mut) {
                 axis.flip_bit(number, bit);
@@ -275,7 +275,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     }
 
     /// Sets the values of an axis' modulation to NaN.
-    pub fn spoil_modulation(&mut self, joint: usize) {
+    pub(crate) fn spoil_modulation(&mut self, joint: usize) {
         if let Some(axis) = self.board.loops.axis_state_mut(joint).and_then(AxisState::axis_mut) {
             axis.invalidate_modulation();
         }

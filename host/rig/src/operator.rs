@@ -14,7 +14,7 @@ const ENABLED: u64 = PERIODS_PER_S;
 
 /// Opens both contacts until the drive is off, then holds the enabling switch until it is enabled; returns
 /// whether it is.
-pub fn enable<const N: usize, const B: usize>(rig: &mut Rig<N, B>) -> bool {
+pub(crate) fn enable<const N: usize, const B: usize>(rig: &mut Rig<N, B>) -> bool {
     rig.hand = Contacts::default();
     for period in 0..ENABLED {
         if period >= OPEN && rig.state().permission() == Permission::Off {
@@ -34,7 +34,10 @@ pub fn enable<const N: usize, const B: usize>(rig: &mut Rig<N, B>) -> bool {
 
 /// Starts an identification, or what else the leg is configured for, as an operator does: enables the drive,
 /// then presses the button.
-pub fn begin<const N: usize, const B: usize>(leg: &LegFile, rig: &mut Rig<N, B>) -> Result<(), ToolError> {
+pub(crate) fn begin<const N: usize, const B: usize>(
+    leg: &LegFile,
+    rig: &mut Rig<N, B>,
+) -> Result<(), ToolError> {
     enable(rig);
     rig.hand = Contacts { enabling: true, start: true };
     for _ in 0..ENABLED {

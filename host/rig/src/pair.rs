@@ -8,7 +8,7 @@ use hal_sim::world::periods::PERIODS_PER_TICK;
 use hal_sim::world::{TICK_S, World};
 use scarab::hal::{LegDrives, Sample};
 use scarab::ident::{Kernel, LowPass, Record, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
-use scarab::leg::{Activity, AssistLaw, ControlOutput, ControlRequest, IdentifyPhase, Leg, LegConfiguration};
+use scarab::leg::{Activity, ControlOutput, ControlRequest, IdentifyPhase, Leg, LegConfiguration};
 use scarab::model::AnatomicalJoint;
 use scarab::motion::{MotionState, Periodic};
 use scarab::safety::{DriveState, PowerRequest};
@@ -30,7 +30,7 @@ pub const TAPS: usize = 256;
 /// Open outputs of that filter.
 pub const PENDING: usize = 26;
 /// Firmware leg with the device's filter lengths.
-pub type DeviceLeg<const N: usize, const B: usize> = Leg<N, B, TAPS, PENDING>;
+pub(crate) type DeviceLeg<const N: usize, const B: usize> = Leg<N, B, TAPS, PENDING>;
 
 /// Evaluations of the search per servo tick: 8,000 per second. One costs about 7,900 instructions
 /// of the device at 13 base parameters, so a running search takes half of the processor.
@@ -46,22 +46,22 @@ pub struct Context<const N: usize, const B: usize> {
     /// The motions of the run.
     pub motions: Motions<N>,
     /// First stage of the identification's filter chain.
-    pub smoothing: Kernel<f32, TAPS>,
+    pub(crate) smoothing: Kernel<f32, TAPS>,
     /// Second stage.
-    pub low_pass: LowPass<f32, TAPS>,
+    pub(crate) low_pass: LowPass<f32, TAPS>,
     /// Gravity in the base frame, m/s^2.
     pub gravity: [f32; 3],
     /// Standard deviation of each joint's logged torque, N m.
-    pub noise: [f64; N],
+    pub(crate) noise: [f64; N],
     /// Leg for which the current loops are configured; complete drives only.
-    pub complete: Option<Box<LegFile>>,
+    pub(crate) complete: Option<Box<LegFile>>,
     /// Deliberate errors.
-    pub perturbations: Vec<Perturbation>,
+    pub(crate) perturbations: Vec<Perturbation>,
 }
 
 impl<const N: usize, const B: usize> Context<N, B> {
     /// Prepares a run with complete drives.
-    pub fn with_complete_drives(leg: &LegFile, seed: u64) -> Result<Self, ToolError> {
+    pub(crate) fn with_complete_drives(leg: &LegFile, seed: u64) -> Result<Self, ToolError> {
         Self::new(leg, &SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::with_seed(seed) })
     }
 
@@ -108,7 +108,7 @@ impl<const N: usize, const B: usize> Context<N, B> {
 
     /// Anatomical to D-H angles of every joint, as the firmware holds them.
     #[must_use]
-    pub fn anatomy(&self) -> [AnatomicalJoint<f64>; N] {
+    pub(crate) fn anatomy(&self) -> [AnatomicalJoint<f64>; N] {
         self.configuration.joints.map(|joint| joint.scale.anatomy.convert())
     }
 
@@ -130,7 +130,7 @@ pub fn start_position<const N: usize>(leg: &LegFile) -> [f64; N] {
 }
 
 /// Motor torque of the plant in a state of the model, anatomical.
-pub fn torque_at<const N: usize>(
+pub(crate) fn torque_at<const N: usize>(
     anatomy: &[AnatomicalJoint<f64>; N],
     world: &World<N>,
     state: &MotionState<N>,
@@ -224,7 +224,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
     }
 
     /// Exchanges the connectors of two joints, motor and encoder together, before the drive is enabled.
-    pub fn exchange(&mut self, one: usize, other: usize) {
+    pub(crate) fn exchange(&mut self, one: usize, other: usize) {
         self.wiring.swap(one, other);
         self.sample.joints.swap(one, other);
         if let Some(board) = &mut self.board {
@@ -299,12 +299,6 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             }
         }
         None
-    }
-
-    /// Law of the assistance.
-    #[must_use]
-    pub fn law(&self) -> &AssistLaw<N> {
-        self.board.as_ref().map_or(self.leg.law(), |board| board.law())
     }
 
     /// Reason why the drive is no longer enabled.

@@ -32,30 +32,30 @@ use scarab_base::error::FileError;
 use scarab_base::toml_file;
 
 /// Version of the keys.
-pub const PARAMETER_SCHEMA: i64 = 1;
+pub(crate) const PARAMETER_SCHEMA: i64 = 1;
 
 /// Contents of a file; parts not named stay unchanged.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterFile {
     /// [`PARAMETER_SCHEMA`].
-    pub schema: i64,
+    pub(crate) schema: i64,
     /// Objects of the nodes.
     #[serde(default)]
-    pub node: Vec<NodeObjects>,
+    pub(crate) node: Vec<NodeObjects>,
     /// Calibrations of the axes.
     #[serde(default)]
-    pub calibration: Vec<AxisCalibration>,
+    pub(crate) calibration: Vec<AxisCalibration>,
     /// The accepted model of the leg, empty or unknown whether worn.
-    pub model: Option<ModelPart>,
+    pub(crate) model: Option<ModelPart>,
     /// The accepted model of the worn leg.
-    pub worn_model: Option<ModelPart>,
+    pub(crate) worn_model: Option<ModelPart>,
 }
 
 /// Joint of the leg with its node and axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Joint {
+pub(crate) enum Joint {
     /// First joint.
     Hip,
     /// Second joint.
@@ -66,7 +66,7 @@ pub enum Joint {
 
 impl Joint {
     /// All joints, from the base.
-    pub const ALL: [Self; 3] = [Self::Hip, Self::Knee, Self::Ankle];
+    pub(crate) const ALL: [Self; 3] = [Self::Hip, Self::Knee, Self::Ankle];
 
     /// Name in files.
     #[must_use]
@@ -82,62 +82,62 @@ impl Joint {
 /// Objects of a node that a host has changed.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct NodeObjects {
+pub(crate) struct NodeObjects {
     /// Joint of the node.
-    pub joint: Joint,
+    pub(crate) joint: Joint,
     /// All stored objects; the others have their initial values.
-    pub objects: Vec<ObjectValue>,
+    pub(crate) objects: Vec<ObjectValue>,
 }
 
 /// Value of one object.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ObjectValue {
+pub(crate) struct ObjectValue {
     /// Index in the dictionary.
-    pub index: u16,
+    pub(crate) index: u16,
     /// Subindex in the dictionary.
-    pub subindex: u8,
+    pub(crate) subindex: u8,
     /// Name in the dictionary; for people, and checked if present.
-    pub name: Option<String>,
+    pub(crate) name: Option<String>,
     /// Value in the object's own unit.
-    pub value: i64,
+    pub(crate) value: i64,
 }
 
 /// Calibration of an axis.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct AxisCalibration {
+pub(crate) struct AxisCalibration {
     /// Joint of the axis.
-    pub joint: Joint,
+    pub(crate) joint: Joint,
     /// Resistance of one phase, ohm.
-    pub resistance_ohm: f64,
+    pub(crate) resistance_ohm: f64,
     /// Inductance along the flux, H.
-    pub direct_inductance_h: f64,
+    pub(crate) direct_inductance_h: f64,
     /// Inductance across the flux, H.
-    pub quadrature_inductance_h: f64,
+    pub(crate) quadrature_inductance_h: f64,
     /// Electrical angle at the index, from -pi to pi.
-    pub offset_rad: f64,
+    pub(crate) offset_rad: f64,
     /// Encoder settings of the calibration.
     #[serde(with = "Encoder")]
-    pub encoder: EncoderSetting,
+    pub(crate) encoder: EncoderSetting,
     /// Temperature of the winding at the calibration, degrees Celsius, if known.
     #[serde(default)]
-    pub winding_c: Option<f64>,
+    pub(crate) winding_c: Option<f64>,
     /// Readings at the joint's zero, with an absolute encoder at the joint.
     #[serde(default)]
-    pub joint_zero: Option<JointZeroPart>,
+    pub(crate) joint_zero: Option<JointZeroPart>,
 }
 
 /// Readings at a joint's zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct JointZeroPart {
+pub(crate) struct JointZeroPart {
     /// Rotor position within a turn, counts.
-    pub rotor_counts: i32,
+    pub(crate) rotor_counts: i32,
     /// Reading of the joint's encoder, 2^-14 turns.
-    pub joint_steps: u16,
+    pub(crate) joint_steps: u16,
     /// Check of direction and ratio.
-    pub setting: u8,
+    pub(crate) setting: u8,
 }
 
 /// Keys of the settings for which a calibration is valid.
@@ -163,92 +163,91 @@ enum Counter {
 /// Accepted model with its origin.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ModelPart {
+pub(crate) struct ModelPart {
     /// Fingerprint of the leg: 16 hexadecimal digits, as in model files.
-    pub fingerprint: String,
+    pub(crate) fingerprint: String,
     /// Version of the firmware that identified the model.
-    pub firmware: String,
+    pub(crate) firmware: String,
     /// Number of models accepted on the board so far.
-    pub generation: u32,
+    pub(crate) generation: u32,
     /// Seed of the swarm; text, since it may need all 64 bits.
-    pub swarm_seed: String,
+    pub(crate) swarm_seed: String,
     /// Temperature of the warmer bridge, degrees Celsius; absent if unknown.
-    pub bridge_temperature_c: Option<f64>,
+    pub(crate) bridge_temperature_c: Option<f64>,
     /// Whether a person wore the leg; absent if unknown.
-    pub worn: Option<bool>,
+    pub(crate) worn: Option<bool>,
     /// Share of the mass matrix that is certain by 2 sigma, 0 to 1; 0 if unknown.
     #[serde(default)]
-    pub inertia_lower_bound: f64,
+    pub(crate) inertia_lower_bound: f64,
     /// Joints, from the base.
-    pub joint: Vec<ModelJoint>,
+    pub(crate) joint: Vec<ModelJoint>,
 }
 
 /// One joint of a model.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ModelJoint {
+pub(crate) struct ModelJoint {
     /// Joint.
-    pub joint: Joint,
+    pub(crate) joint: Joint,
     /// Fourteen parameters, SI units.
-    pub parameters: Parameters,
+    pub(crate) parameters: Parameters,
     /// Friction that decreases with speed.
-    pub stribeck: StribeckPart,
+    pub(crate) stribeck: StribeckPart,
     /// Meaning of the constant column.
     #[serde(with = "ConstantPart")]
-    pub constant: Constant,
+    pub(crate) constant: Constant,
     /// Friction that is certain by 2 sigma; 0 if unknown.
     #[serde(default)]
-    pub friction_lower_bound: FrictionBound,
+    pub(crate) friction_lower_bound: FrictionBound,
     /// Distance to the previous joint, m.
-    pub length_m: f64,
+    pub(crate) length_m: f64,
     /// Torque constant at the joint, N m/A.
-    pub torque_per_ampere: f64,
+    pub(crate) torque_per_ampere: f64,
     /// RMS of measured minus predicted torque on an unused motion, N m; absent if unknown.
-    pub rms_nm: Option<f64>,
+    pub(crate) rms_nm: Option<f64>,
     /// Mean absolute torque on that motion, N m; absent if unknown.
-    pub mean_absolute_nm: Option<f64>,
+    pub(crate) mean_absolute_nm: Option<f64>,
 }
 
 /// Fourteen parameters of a joint, by symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[serde(rename_all = "UPPERCASE")]
-#[expect(missing_docs, reason = "the symbols of `scarab::model::Parameter`, which explains them")]
-pub struct Parameters {
-    pub xx: f64,
-    pub xy: f64,
-    pub xz: f64,
-    pub yy: f64,
-    pub yz: f64,
-    pub zz: f64,
-    pub hx: f64,
-    pub hy: f64,
-    pub hz: f64,
-    pub m: f64,
-    pub ia: f64,
-    pub fc: f64,
-    pub fv: f64,
-    pub off: f64,
+pub(crate) struct Parameters {
+    pub(crate) xx: f64,
+    pub(crate) xy: f64,
+    pub(crate) xz: f64,
+    pub(crate) yy: f64,
+    pub(crate) yz: f64,
+    pub(crate) zz: f64,
+    pub(crate) hx: f64,
+    pub(crate) hy: f64,
+    pub(crate) hz: f64,
+    pub(crate) m: f64,
+    pub(crate) ia: f64,
+    pub(crate) fc: f64,
+    pub(crate) fv: f64,
+    pub(crate) off: f64,
 }
 
 /// Stribeck curve: Coulomb friction * (1 + excess exp(-(speed / velocity)^2)).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct StribeckPart {
+pub(crate) struct StribeckPart {
     /// Excess, at least 0.
-    pub excess: f64,
+    pub(crate) excess: f64,
     /// Speed of the decay, rad/s.
-    pub velocity_rad_s: f64,
+    pub(crate) velocity_rad_s: f64,
 }
 
 /// Lower bounds of a joint's friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FrictionBound {
+pub(crate) struct FrictionBound {
     /// Coulomb friction, N m.
-    pub coulomb_nm: f64,
+    pub(crate) coulomb_nm: f64,
     /// Viscous friction, N m s/rad.
-    pub viscous_nm_s_rad: f64,
+    pub(crate) viscous_nm_s_rad: f64,
 }
 
 /// Words of a joint's constant column.

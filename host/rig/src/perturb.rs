@@ -136,7 +136,7 @@ impl Perturbation {
 }
 
 /// Rejects perturbations that the simulated drives cannot have.
-pub fn check_drives(options: &SimulationOptions) -> Result<(), ToolError> {
+pub(crate) fn check_drives(options: &SimulationOptions) -> Result<(), ToolError> {
     let ideal = options.drive == DriveModel::Ideal;
     if ideal && options.perturbations.iter().any(Perturbation::needs_complete_drives) {
         return Err(ToolError::input(
@@ -281,7 +281,7 @@ pub fn after_excitation<const N: usize, const B: usize>(
 }
 
 /// Applies the perturbations of the result before its validation.
-pub fn before_validation<const N: usize, const B: usize>(
+pub(crate) fn before_validation<const N: usize, const B: usize>(
     context: &Context<N, B>,
     pair: &mut Pair<N, B>,
     perturbations: &[Perturbation],

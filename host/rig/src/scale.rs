@@ -28,7 +28,7 @@ const ATTACHING_S: f64 = 2.0;
 const LONGEST_RUN_S: f64 = 120.0;
 
 /// Records of the predicted motions.
-pub type Unused<const N: usize, const B: usize> = [Option<Record<f32, N, B>>; VALIDATION_MOTIONS];
+pub(crate) type Unused<const N: usize, const B: usize> = [Option<Record<f32, N, B>>; VALIDATION_MOTIONS];
 
 /// Run solved again with corrected torques.
 #[derive(Clone, Debug)]
@@ -38,11 +38,11 @@ pub struct Corrected<const N: usize, const B: usize> {
     /// Verdict on the corrected result with the corrected records.
     pub verdict: Verdict,
     /// Evidence of that verdict.
-    pub findings: Vec<FindingReport>,
+    pub(crate) findings: Vec<FindingReport>,
     /// Corrected records of the unused motions.
-    pub unused: Unused<N, B>,
+    pub(crate) unused: Unused<N, B>,
     /// First iteration with an excess of at most 0.5.
-    pub iterations_to_half_chi2: Option<u32>,
+    pub(crate) iterations_to_half_chi2: Option<u32>,
 }
 
 /// Unused motions with corrected torques.

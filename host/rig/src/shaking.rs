@@ -29,7 +29,7 @@ const STRIDE: u64 = 40;
 
 /// Speed of each joint beside its command, and the weight of the commanded postures.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shaking<const N: usize> {
+pub(crate) struct Shaking<const N: usize> {
     anatomy: [AnatomicalJoint<f64>; N],
     before: Option<[f64; N]>,
     ticks: u64,
@@ -50,7 +50,7 @@ impl<const N: usize> Shaking<N> {
     }
 
     /// Takes the plant after a tick, and the motion commanded in it.
-    pub fn take(&mut self, world: &World<N>, motion: &MotionState<N>) {
+    pub(crate) fn take(&mut self, world: &World<N>, motion: &MotionState<N>) {
         let now = world.anatomical_position();
         if let Some(before) = self.before.replace(now) {
             for joint in 0..N {

@@ -86,7 +86,7 @@ pub struct Driven<'a, const N: usize, const B: usize> {
     /// Reason for a missing verdict.
     pub stopped: Option<String>,
     /// Speed of the plant beside its command.
-    pub shaking: Shaking<N>,
+    pub(crate) shaking: Shaking<N>,
 }
 
 /// Runs from drive off to the verdict: the firmware of `context` against the plant `simulated`;

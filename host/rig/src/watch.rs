@@ -132,7 +132,7 @@ pub struct Watch<'a, const N: usize, const B: usize> {
     costs: Option<Costs<B>>,
     excess: Vec<(u32, f64)>,
     /// Results of a known mass and a known load, after their evaluation.
-    pub scale: Option<Scale<N, B>>,
+    pub(crate) scale: Option<Scale<N, B>>,
 }
 
 impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
@@ -170,7 +170,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
     }
 
     /// Observes the tick just run; `torque` and `sticking` are from before it.
-    pub fn see(
+    pub(crate) fn see(
         &mut self,
         pair: &Pair<N, B>,
         torque: &[f64; N],

@@ -23,7 +23,7 @@ pub const CADENCE_HZ: f64 = 0.8;
 /// Exoskeleton, its wearer, and the models of both.
 pub struct Worn<const N: usize> {
     /// Leg file of the exoskeleton alone.
-    pub exoskeleton: LegFile,
+    pub(crate) exoskeleton: LegFile,
     wearer: WearerDescription,
     motion: IntendedMotion,
     models: [IdentifiedModel<N>; 2],
@@ -67,7 +67,7 @@ impl<const N: usize> Worn<N> {
     ///
     /// # Errors
     /// The motion is not permitted.
-    pub fn walk<const B: usize>(&self, rig: &mut Rig<N, B>) -> Result<(), ToolError> {
+    pub(crate) fn walk<const B: usize>(&self, rig: &mut Rig<N, B>) -> Result<(), ToolError> {
         self.intend(rig, Intention::Follow(self.motion))
     }
 
@@ -75,7 +75,7 @@ impl<const N: usize> Worn<N> {
     ///
     /// # Errors
     /// The motion is not permitted.
-    pub fn accompany<const B: usize>(&mut self, rig: &mut Rig<N, B>) -> Result<(), ToolError> {
+    pub(crate) fn accompany<const B: usize>(&mut self, rig: &mut Rig<N, B>) -> Result<(), ToolError> {
         let assists = matches!(rig.leg.control().activity(), Activity::Assist(_));
         if core::mem::replace(&mut self.is_moving, assists) == assists {
             return Ok(());
@@ -89,12 +89,12 @@ impl<const N: usize> Worn<N> {
 }
 
 /// Parameters in single precision.
-pub fn single<const N: usize>(parameters: &LegParameters<f64, N>) -> LegParameters<f32, N> {
+pub(crate) fn single<const N: usize>(parameters: &LegParameters<f64, N>) -> LegParameters<f32, N> {
     parameters.map(|joint| joint.map(|value| value as f32))
 }
 
 /// Model of known parameters, which may be compensated wholly.
-pub fn certain<const N: usize, const B: usize>(
+pub(crate) fn certain<const N: usize, const B: usize>(
     context: &Context<N, B>,
     parameters: &LegParameters<f64, N>,
 ) -> IdentifiedModel<N> {

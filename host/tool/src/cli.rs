@@ -2,7 +2,7 @@
 
 mod adapter;
 pub mod arguments;
-pub mod assist;
+pub(crate) mod assist;
 mod commission;
 pub mod common;
 mod compare;
@@ -170,7 +170,7 @@ pub fn main() -> ExitCode {
 }
 
 /// Parses these words, checks their files, and runs the command. Prints an error; returns the exit code. The
-/// command receives the stated arguments of a campaign ([`arguments::stated()`]).
+/// command receives the stated arguments of a campaign (`arguments::stated()`).
 pub fn perform<C: CommandFactory + FromArgMatches>(
     words: Vec<OsString>,
     run: impl FnOnce(&C, Vec<Argument>) -> Result<u8, ToolError>,

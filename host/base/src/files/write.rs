@@ -93,14 +93,6 @@ impl NewFile {
         Ok(Self { out: BufWriter::new(file), named: path.to_owned(), rename: Some((temporary, target)) })
     }
 
-    /// File handle, for another program to write to.
-    ///
-    /// # Errors
-    /// The system has no further handle.
-    pub fn handle(&self) -> Result<File, ToolError> {
-        self.out.get_ref().try_clone().map_err(|error| ToolError::cannot_write(&self.named, &error))
-    }
-
     /// Moves the file to its destination.
     ///
     /// # Errors

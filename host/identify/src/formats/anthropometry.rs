@@ -34,7 +34,7 @@ pub struct Wearer {
 impl Wearer {
     /// Person of this mass (kg) and height (m).
     #[must_use]
-    pub fn from_height(mass: f64, height: f64) -> Self {
+    pub(crate) fn from_height(mass: f64, height: f64) -> Self {
         Self {
             mass,
             thigh: THIGH_OF_HEIGHT * height,
@@ -45,13 +45,13 @@ impl Wearer {
 
     /// The thigh.
     #[must_use]
-    pub fn thigh(&self) -> Segment {
+    pub(crate) fn thigh(&self) -> Segment {
         limb(0.100 * self.mass, self.thigh, 0.323, 0.08)
     }
 
     /// Shank and foot.
     #[must_use]
-    pub fn shank(&self) -> [Segment; 2] {
+    pub(crate) fn shank(&self) -> [Segment; 2] {
         let mass = 0.0145 * self.mass;
         let gyration = 0.475 * self.foot;
         let foot = Segment {
@@ -74,7 +74,7 @@ impl Wearer {
 
 /// Long axis of a solid of revolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Along {
+pub(crate) enum Along {
     /// Along the segment.
     X,
     /// Forward.
@@ -85,17 +85,17 @@ pub enum Along {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     /// Mass, kg.
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// Centre of mass along x, m.
-    pub x: f64,
+    pub(crate) x: f64,
     /// Centre of mass along y, m.
-    pub y: f64,
+    pub(crate) y: f64,
     /// Inertia about the joint's axis through the centre of mass, kg m^2.
-    pub sagittal: f64,
+    pub(crate) sagittal: f64,
     /// Radius, m.
-    pub radius: f64,
+    pub(crate) radius: f64,
     /// Direction of the long axis.
-    pub along: Along,
+    pub(crate) along: Along,
 }
 
 /// Thigh or shank: centre of mass at 0.433 of the length from the upper joint.
@@ -106,7 +106,7 @@ fn limb(mass: f64, length: f64, gyration: f64, radius: f64) -> Segment {
 
 /// Joins segments to a rigid body: mass, centre of mass, and tensor elements XX XY XZ YY YZ ZZ about it.
 #[must_use]
-pub fn joined(segments: &[Segment]) -> (f64, [f64; 3], [f64; 6]) {
+pub(crate) fn joined(segments: &[Segment]) -> (f64, [f64; 3], [f64; 6]) {
     let mass: f64 = segments.iter().map(|segment| segment.mass).sum();
     let x = segments.iter().map(|segment| segment.mass * segment.x).sum::<f64>() / mass;
     let y = segments.iter().map(|segment| segment.mass * segment.y).sum::<f64>() / mass;

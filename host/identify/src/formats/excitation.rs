@@ -28,7 +28,7 @@ const LARGEST_COEFFICIENT: f64 = 100.0;
 #[serde(deny_unknown_fields)]
 pub struct Excitation {
     /// [`SCHEMA`].
-    pub schema: u32,
+    pub(crate) schema: u32,
     /// Name of the leg in the leg file of the design.
     pub leg: String,
     /// Fingerprint of that leg: [`geometry`].
@@ -270,7 +270,7 @@ const HEADER: &str = "\
 
 /// Describes why the numbers do not define a motion.
 #[must_use]
-pub fn motion_error(error: MotionError) -> String {
+pub(crate) fn motion_error(error: MotionError) -> String {
     match error {
         MotionError::NotFinite { joint } => format!("joint {}: a coefficient is not finite", joint + 1),
         MotionError::Period => "`period_s` is invalid".into(),

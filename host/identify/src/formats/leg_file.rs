@@ -54,7 +54,7 @@ mod segments;
 mod switch;
 
 pub use image::{MissingForImage, MissingOfJoint};
-pub use motor::{BrakeFile, JointEncoder, MotorFile, SupplyFile};
+pub use motor::{BrakeFile, MotorFile, SupplyFile};
 pub use segments::{BodySide, SegmentsFile};
 pub use switch::Switch;
 
@@ -271,9 +271,9 @@ pub struct StribeckFile {
 #[serde(deny_unknown_fields)]
 pub struct OutliersFile {
     /// Share of the logged 500 Hz samples, percent.
-    pub percent: f64,
+    pub(crate) percent: f64,
     /// Largest error, either sign, N m at the joint.
-    pub torque_nm: f64,
+    pub(crate) torque_nm: f64,
 }
 
 /// A link with rotor and friction, in the joint's D-H frame.
@@ -306,7 +306,7 @@ pub struct LinkParameters {
 #[cfg(test)]
 impl LinkParameters {
     /// Sums M, HX, HY, ZZ about the joint.
-    pub fn sums(&self) -> [f64; 4] {
+    pub(crate) fn sums(&self) -> [f64; 4] {
         let [x, y, _] = self.com;
         [self.mass, self.mass * x, self.mass * y, self.inertia_com[5] + self.mass * (x * x + y * y)]
     }
@@ -316,9 +316,9 @@ impl LinkParameters {
 pub const DEFAULT_RANGE_DEG: [f64; 2] = [-90.0, 90.0];
 
 /// Speed limit of a joint without `speed_limit_deg_s`, degrees per second.
-pub const DEFAULT_SPEED_LIMIT: f64 = 180.0;
+pub(crate) const DEFAULT_SPEED_LIMIT: f64 = 180.0;
 /// Torque limit of a joint without `torque_limit_nm`, N m.
-pub const DEFAULT_TORQUE_LIMIT: f64 = 100.0;
+pub(crate) const DEFAULT_TORQUE_LIMIT: f64 = 100.0;
 /// Torque constant of a joint without `torque_per_ampere`, N m/A, unless its torque needs too much current.
 const DEFAULT_TORQUE_PER_AMPERE: f64 = 1.5;
 /// Bandwidth of the position loop, which no leg file changes.
@@ -369,7 +369,7 @@ impl JointFile {
 impl LegFile {
     /// Leg of these joints with defaults for every other key.
     #[must_use]
-    pub fn plain(name: &str, gravity: [f64; 3], joints: Vec<JointFile>) -> Self {
+    pub(crate) fn plain(name: &str, gravity: [f64; 3], joints: Vec<JointFile>) -> Self {
         let stated = json!({ "name": name, "gravity": [0.0, 0.0, 0.0], "joint": [] });
         Self { gravity, joints, ..with_defaults(stated) }
     }
@@ -428,7 +428,7 @@ impl LegFile {
 
     /// Whether each joint of a checked leg's text states this key. A default must not convert a recording.
     #[must_use]
-    pub fn joints_that_state(text: &str, key: &str) -> Vec<bool> {
+    pub(crate) fn joints_that_state(text: &str, key: &str) -> Vec<bool> {
         let table = text.parse::<toml::Table>().unwrap_or_default();
         let joints = table.get("joint").and_then(toml::Value::as_array);
         joints.into_iter().flatten().map(|joint| joint.get(key).is_some()).collect()

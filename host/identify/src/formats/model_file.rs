@@ -29,9 +29,9 @@ use serde::{Deserialize, Serialize};
 use crate::formats::leg_file::{BodySide, DhFile, JointFile, LegFile};
 
 /// Version of the keys.
-pub const MODEL_SCHEMA: i64 = 1;
+pub(crate) const MODEL_SCHEMA: i64 = 1;
 /// Capacity of the base set: that of three joints.
-pub const LARGEST_BASE_SET: usize = 28;
+pub(crate) const LARGEST_BASE_SET: usize = 28;
 /// Constant column of a joint whose Coulomb friction differs between the directions.
 const ASYMMETRY: &str = "FCA";
 /// Size limit of a model file, bytes.
@@ -42,15 +42,15 @@ const LARGEST_FILE_BYTES: u64 = 1 << 20;
 #[serde(deny_unknown_fields)]
 pub struct ModelFile {
     /// [`MODEL_SCHEMA`].
-    pub schema: i64,
+    pub(crate) schema: i64,
     /// Checksum of everything else.
-    pub checksum: String,
+    pub(crate) checksum: String,
     /// Fingerprint of geometry, anatomy and torque constants, as the board computes it.
     pub fingerprint: String,
     /// Time of the identification, RFC 3339, UTC.
     pub created: String,
     /// Version of the program that wrote it.
-    pub scarab: String,
+    pub(crate) scarab: String,
     /// Identified leg.
     pub leg: StoredLeg,
     /// Conditions of the identification.
@@ -68,9 +68,9 @@ pub struct StoredLeg {
     /// Name in the leg file.
     pub name: String,
     /// Side of the body.
-    pub side: BodySide,
+    pub(crate) side: BodySide,
     /// Gravity in the base frame, m/s^2, including a lean of the trunk.
-    pub gravity: [f64; 3],
+    pub(crate) gravity: [f64; 3],
     /// Joints, proximal first.
     pub joints: Vec<StoredJoint>,
 }
@@ -82,7 +82,7 @@ pub struct StoredJoint {
     /// Name of the joint.
     pub name: String,
     /// Modified Denavit-Hartenberg, rad and m.
-    pub dh: DhFile,
+    pub(crate) dh: DhFile,
     /// Joint angle = direction * anatomical angle + zero offset.
     pub direction: i64,
     /// Joint angle at the anatomical zero, degrees.
@@ -90,7 +90,7 @@ pub struct StoredJoint {
     /// Anatomical range, degrees.
     pub range_deg: [f64; 2],
     /// Speed limit, degrees per second.
-    pub speed_limit_deg_s: f64,
+    pub(crate) speed_limit_deg_s: f64,
     /// Torque limit at the joint, N m.
     pub torque_limit_nm: f64,
     /// Torque constant at the joint in whose units the parameters are, N m/A: the assumed one, or
@@ -103,27 +103,27 @@ pub struct StoredJoint {
 #[serde(deny_unknown_fields)]
 pub struct Conditions {
     /// `simulation` or `recording`.
-    pub source: String,
+    pub(crate) source: String,
     /// Always `accepted`.
-    pub verdict: String,
+    pub(crate) verdict: String,
     /// `relative` to the assumed torque constants, or `absolute`: identified from a known mass.
     pub scale: String,
     /// `none`, `file` or `wrong:P`.
-    pub prior: String,
+    pub(crate) prior: String,
     /// `one-time` or `sequential`.
-    pub plan: String,
+    pub(crate) plan: String,
     /// Frequency at which the low-pass was 3 dB down, Hz.
-    pub bandwidth_hz: f64,
+    pub(crate) bandwidth_hz: f64,
     /// Duration of all motions, used and held out, s.
-    pub motion_s: f64,
+    pub(crate) motion_s: f64,
     /// Seed of the simulated noise; text, since a seed may need all 64 bits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub seed: Option<String>,
+    pub(crate) seed: Option<String>,
     /// Seed of the swarm.
-    pub swarm_seed: String,
+    pub(crate) swarm_seed: String,
     /// Condition number of the scaled weighted problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<f64>,
+    pub(crate) condition: Option<f64>,
     /// Temperature of the drives, degrees Celsius; absent if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
@@ -138,17 +138,17 @@ pub struct Conditions {
 #[serde(deny_unknown_fields)]
 pub struct StoredFit {
     /// Joint, from 1.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// Name of the motion.
-    pub motion: String,
+    pub(crate) motion: String,
     /// `training` or `validation`.
-    pub role: String,
+    pub(crate) role: String,
     /// Root mean square error, N m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rms_nm: Option<f64>,
+    pub(crate) rms_nm: Option<f64>,
     /// Error in percent of the mean absolute torque.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub percent_of_mean_abs: Option<f64>,
+    pub(crate) percent_of_mean_abs: Option<f64>,
 }
 
 /// Set of base parameters.
@@ -174,12 +174,12 @@ pub struct StoredStribeck {
     pub surplus_nm: f64,
     /// Standard deviation of the surplus; absent in older files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub surplus_sigma_nm: Option<f64>,
+    pub(crate) surplus_sigma_nm: Option<f64>,
     /// Speed of the decay, rad/s.
     pub speed_rad_s: f64,
     /// Standard deviation of the speed; absent in older files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub speed_sigma_rad_s: Option<f64>,
+    pub(crate) speed_sigma_rad_s: Option<f64>,
 }
 
 /// One combination of parameters.
@@ -221,7 +221,7 @@ pub struct StoredParameter {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
     /// SI unit.
-    pub unit: String,
+    pub(crate) unit: String,
     /// `identified`, `grouped`, `weak` or `prior`.
     pub status: String,
 }
@@ -274,14 +274,14 @@ impl ModelFile {
 
     /// Joint and parameter of a name, for example `ZZ1`.
     #[must_use]
-    pub fn parameter(&self, name: &str) -> Option<(usize, Parameter)> {
+    pub(crate) fn parameter(&self, name: &str) -> Option<(usize, Parameter)> {
         parameter_of(name, self.leg.joints.len())
     }
 
     /// Whether the name is that of a friction difference between the directions, which acts only
     /// while its joint moves.
     #[must_use]
-    pub fn is_asymmetry(name: &str) -> bool {
+    pub(crate) fn is_asymmetry(name: &str) -> bool {
         name.starts_with(ASYMMETRY)
     }
 
@@ -314,7 +314,7 @@ impl StoredLeg {
 }
 
 /// Symmetric matrix of `count` rows, padded with ones on the diagonal: linear algebra without a heap.
-pub fn padded(
+pub(crate) fn padded(
     count: usize,
     element: impl Fn(usize, usize) -> f64,
 ) -> SMatrix<f64, LARGEST_BASE_SET, LARGEST_BASE_SET> {

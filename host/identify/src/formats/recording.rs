@@ -27,50 +27,50 @@ use std::path::{Path, PathBuf};
 use scarab_base::error::FileError;
 
 mod chosen;
-pub mod columns;
+pub(crate) mod columns;
 mod decode;
 pub mod dialect;
 mod fault;
 mod foreign;
 pub mod import;
 mod lines;
-pub mod signal;
+pub(crate) mod signal;
 pub(crate) mod source;
 pub(crate) mod suggest;
 
 use columns::{LineNumbers, of_text, refuse};
 pub use decode::Read;
-pub use fault::Fault;
+pub(crate) use fault::Fault;
 use foreign::Foreign;
 use import::Import;
 
 /// Least number of samples of a recording.
-pub const MINIMUM_SAMPLES: usize = 50;
+pub(crate) const MINIMUM_SAMPLES: usize = 50;
 /// Least duration of a recording, s.
-pub const MINIMUM_DURATION_S: f64 = 1.0;
+pub(crate) const MINIMUM_DURATION_S: f64 = 1.0;
 /// Least median rate, Hz.
-pub const MINIMUM_RATE_HZ: f64 = 10.0;
+pub(crate) const MINIMUM_RATE_HZ: f64 = 10.0;
 /// Tolerance on the rate for rounded time stamps.
 const RATE_TOLERANCE: f64 = 1.001;
 /// Deviation from a whole turn within which a jump of an angle is one, rad, and samples on either side.
 const TURN_TOLERANCE_RAD: f64 = 0.5;
 const TURN_SAMPLES: usize = 5;
 /// Longest step that is not a gap, s.
-pub const LARGEST_STEP_S: f64 = 0.1;
+pub(crate) const LARGEST_STEP_S: f64 = 0.1;
 /// Longest step in median steps that is not a gap.
-pub const LARGEST_STEP_IN_MEDIANS: f64 = 20.0;
+pub(crate) const LARGEST_STEP_IN_MEDIANS: f64 = 20.0;
 /// Largest plausible time stamp, s: seconds since 1970 are 2e9, and an f64 still resolves a microsecond
 /// there.
-pub const LARGEST_TIME_S: f64 = 1.0e10;
+pub(crate) const LARGEST_TIME_S: f64 = 1.0e10;
 /// Largest plausible angle, rad; larger ones are in another unit.
-pub const LARGEST_POSITION_RAD: f64 = 1.0e3;
+pub(crate) const LARGEST_POSITION_RAD: f64 = 1.0e3;
 /// Largest plausible torque, N m; larger ones are in another unit.
-pub const LARGEST_TORQUE_NM: f64 = 1.0e5;
+pub(crate) const LARGEST_TORQUE_NM: f64 = 1.0e5;
 
 /// Largest number of samples: eleven hours at 500 Hz, half a gigabyte for two joints.
-pub const MOST_SAMPLES: usize = 20_000_000;
+pub(crate) const MOST_SAMPLES: usize = 20_000_000;
 /// Largest share of rows that may be skipped, percent.
-pub const MOST_BAD_PERCENT: usize = 5;
+pub(crate) const MOST_BAD_PERCENT: usize = 5;
 
 /// Recorded signals of one joint: one entry per sample.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -150,7 +150,7 @@ impl Recording {
     }
 
     /// Median time between two samples, s; zero for fewer than two samples.
-    pub fn median_step_s(&self) -> f64 {
+    pub(crate) fn median_step_s(&self) -> f64 {
         median_step_s(&self.time_s)
     }
 

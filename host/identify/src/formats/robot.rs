@@ -54,81 +54,81 @@ pub enum Kind {
 impl Kind {
     /// Word of the format.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         KINDS.iter().find(|(_, kind)| *kind == self).map_or("unknown", |(word, _)| word)
     }
 
     /// Whether the joint turns about an axis.
     #[must_use]
-    pub fn turns(self) -> bool {
+    pub(crate) fn turns(self) -> bool {
         matches!(self, Self::Revolute | Self::Continuous)
     }
 }
 
 /// Mass of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Inertial {
+pub(crate) struct Inertial {
     /// Centre of mass and axes of the tensor in the link's frame, m.
-    pub origin: Isometry3<f64>,
+    pub(crate) origin: Isometry3<f64>,
     /// Mass, kg.
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// Tensor elements about the centre of mass, kg m^2.
-    pub tensor: Matrix3<f64>,
+    pub(crate) tensor: Matrix3<f64>,
 }
 
 /// Link of a robot.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Link {
-    pub name: String,
-    pub inertial: Option<Inertial>,
+pub(crate) struct Link {
+    pub(crate) name: String,
+    pub(crate) inertial: Option<Inertial>,
 }
 
 /// Stated limits of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Limit {
+pub(crate) struct Limit {
     /// Range, rad or m; 0 if not stated.
-    pub range: [f64; 2],
+    pub(crate) range: [f64; 2],
     /// Largest torque or force, N m or N.
-    pub effort: Option<f64>,
+    pub(crate) effort: Option<f64>,
     /// Largest speed, rad/s or m/s.
-    pub velocity: Option<f64>,
+    pub(crate) velocity: Option<f64>,
 }
 
 /// Joint of a robot.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
-    pub name: String,
-    pub kind: Kind,
+pub(crate) struct Joint {
+    pub(crate) name: String,
+    pub(crate) kind: Kind,
     /// Number of the link before it.
-    pub parent: usize,
+    pub(crate) parent: usize,
     /// Number of the link that it moves.
-    pub child: usize,
+    pub(crate) child: usize,
     /// Child's frame in the parent's at position 0, m.
-    pub origin: Isometry3<f64>,
+    pub(crate) origin: Isometry3<f64>,
     /// Axis in the child's frame.
-    pub axis: Unit<Vector3<f64>>,
-    pub limit: Option<Limit>,
+    pub(crate) axis: Unit<Vector3<f64>>,
+    pub(crate) limit: Option<Limit>,
     /// Viscous friction, N m s/rad, if stated.
-    pub damping: Option<f64>,
+    pub(crate) damping: Option<f64>,
     /// Coulomb friction, N m, if stated.
-    pub friction: Option<f64>,
+    pub(crate) friction: Option<f64>,
     /// Whether the joint follows another one.
-    pub is_mimic: bool,
+    pub(crate) is_mimic: bool,
     /// Line of its element.
-    pub line: usize,
+    pub(crate) line: usize,
 }
 
 /// Tree of links and joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robot {
     /// Path in error messages.
-    pub file: String,
-    pub name: String,
-    pub links: Vec<Link>,
+    pub(crate) file: String,
+    pub(crate) name: String,
+    pub(crate) links: Vec<Link>,
     /// Joints, each after the joints before it in the tree.
-    pub joints: Vec<Joint>,
+    pub(crate) joints: Vec<Joint>,
     /// Number of the link that no joint moves.
-    pub root: usize,
+    pub(crate) root: usize,
 }
 
 impl Robot {
@@ -151,7 +151,7 @@ impl Robot {
 
     /// Error about a joint.
     #[must_use]
-    pub fn joint_error(&self, joint: &Joint, reason: &str) -> FileError {
+    pub(crate) fn joint_error(&self, joint: &Joint, reason: &str) -> FileError {
         let reason = format!("joint `{}`: {reason}", joint.name);
         FileError { file: self.file.clone(), line: Some(joint.line), reason }
     }

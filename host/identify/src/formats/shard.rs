@@ -62,11 +62,11 @@ fn refused(path: &Path, reason: impl std::fmt::Display) -> ToolError {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Program {
     /// Version of the program.
-    pub version: String,
+    pub(crate) version: String,
     /// Fingerprint of its sources (`host/build.rs`).
-    pub sources: String,
+    pub(crate) sources: String,
     /// Processor and operating system; their mathematics may differ in the last digit.
-    pub platform: String,
+    pub(crate) platform: String,
 }
 
 impl Program {
@@ -156,7 +156,7 @@ impl CampaignHeader {
 #[derive(Clone, Debug)]
 pub struct ShardResults<R> {
     /// File in messages; empty for results that this process computed.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// The shard.
     pub shard: Shard,
     /// Its results.

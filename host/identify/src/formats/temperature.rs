@@ -13,9 +13,9 @@
 pub const RANGE_C: (f64, f64) = (-40.0, 125.0);
 /// Difference above which a warning is printed, kelvin. The constants then differ by 1.1 %, several
 /// sigma of the first moments from 22 s of motion.
-pub const LARGEST_DIFFERENCE_K: f64 = 10.0;
+pub(crate) const LARGEST_DIFFERENCE_K: f64 = 10.0;
 /// Temperature coefficient of neodymium's remanence, per kelvin.
-pub const MAGNET_SHARE_PER_KELVIN: f64 = -0.0011;
+pub(crate) const MAGNET_SHARE_PER_KELVIN: f64 = -0.0011;
 
 /// Parses a temperature from the command line.
 ///

@@ -20,53 +20,53 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Axes closer than this to parallel are parallel but for rounding, rad.
-pub const ROUNDING_RAD: f64 = 1e-10;
+pub(crate) const ROUNDING_RAD: f64 = 1e-10;
 /// Lengths and angles below are rounding, m or rad.
 const ROUNDING: f64 = 1e-12;
 
 /// Axis of a joint while all joints are at 0.
 #[derive(Clone, Copy, Debug)]
-pub struct Axis {
+pub(crate) struct Axis {
     /// Unit vector.
-    pub along: Vector3<f64>,
+    pub(crate) along: Vector3<f64>,
     /// Point on the axis, m.
-    pub point: Vector3<f64>,
+    pub(crate) point: Vector3<f64>,
 }
 
 /// Joint of a chain in modified Denavit-Hartenberg numbers.
 #[derive(Clone, Copy, Debug)]
-pub struct DhJoint {
+pub(crate) struct DhJoint {
     /// Twist, rad.
-    pub alpha: f64,
+    pub(crate) alpha: f64,
     /// Length, m.
-    pub a: f64,
+    pub(crate) a: f64,
     /// Offset along the axis, m.
-    pub d: f64,
+    pub(crate) d: f64,
     /// 1, or -1 where the frame's z axis is opposite to the joint's axis.
-    pub direction: i64,
+    pub(crate) direction: i64,
     /// D-H angle at position 0, rad.
-    pub zero: f64,
+    pub(crate) zero: f64,
     /// Axes x, y, z of the frame at position 0, as columns.
-    pub frame: Matrix3<f64>,
+    pub(crate) frame: Matrix3<f64>,
     /// Origin of the frame at position 0, m.
-    pub origin: Vector3<f64>,
+    pub(crate) origin: Vector3<f64>,
     /// Angle from parallel to the axis before, rad; 0 for the first joint.
-    pub angle_to_parallel: f64,
+    pub(crate) angle_to_parallel: f64,
 }
 
 /// Chain of axes with gravity in its base frame.
 #[derive(Clone, Debug)]
-pub struct DhChain {
-    pub joints: Vec<DhJoint>,
+pub(crate) struct DhChain {
+    pub(crate) joints: Vec<DhJoint>,
     /// Gravity's acceleration in the base frame, m/s^2.
-    pub gravity: Vector3<f64>,
+    pub(crate) gravity: Vector3<f64>,
 }
 
 impl DhChain {
     /// Chain of these axes. Axes within `parallel` (rad) of parallel count as parallel. Axes and
     /// gravity are in one frame.
     #[must_use]
-    pub fn from_axes(axes: &[Axis], gravity: &Vector3<f64>, parallel: f64) -> Self {
+    pub(crate) fn from_axes(axes: &[Axis], gravity: &Vector3<f64>, parallel: f64) -> Self {
         let along = aligned(axes, parallel);
         let normals: Vec<_> = (1..axes.len()).map(|next| normal(&along, axes, next)).collect();
         let x = normals_along(&along, &normals, gravity);

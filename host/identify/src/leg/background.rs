@@ -34,7 +34,7 @@ pub struct Background<const N: usize, const B: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StribeckTruth {
     /// Static friction above Coulomb friction, N m.
-    pub surplus: f64,
+    pub(crate) surplus: f64,
     /// Speed of the decay, rad/s.
-    pub speed: f64,
+    pub(crate) speed: f64,
 }

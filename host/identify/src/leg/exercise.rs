@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Why scaled: the exoskeleton must not reach its speed limit, which would stop it. On the cuffs it
-//! overshoots the wearer's speed, so the wearer moves at [`SPEED`] of the limit at most. For the default leg
+//! overshoots the wearer's speed, so the wearer moves at `SPEED` of the limit at most. For the default leg
 //! gait has 81 % of the published knee angles at 0.5 Hz, 50 % at 0.8 Hz and 34 % at 1.2 Hz.
 
 use hal_sim::wearer::motion::{Gait, IntendedMotion, Reaching, Strokes};
@@ -17,7 +17,7 @@ use hal_sim::wearer::motion::{Gait, IntendedMotion, Reaching, Strokes};
 use crate::formats::leg_file::{JointFile, LegFile};
 
 /// Largest speed of the wearer's joints as a share of the leg's limit.
-pub const SPEED: f64 = 0.65;
+pub(crate) const SPEED: f64 = 0.65;
 /// Distance of the gait's least angles from the range's lower end, as a share of the range.
 const ABOVE: f64 = 0.15;
 /// Share of the range that gait uses at most.

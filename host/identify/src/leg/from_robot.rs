@@ -6,10 +6,10 @@
 //!
 //! | leg file | robot description |
 //! | --- | --- |
-//! | `dh`, `direction`, `zero_offset_deg` | axes at position 0 ([`crate::leg::axes`]) |
+//! | `dh`, `direction`, `zero_offset_deg` | axes at position 0 (`crate::leg::axes`) |
 //! | `gravity` | gravity in the root's frame, turned into the base frame |
 //! | `range_deg`, `speed_limit_deg_s`, `torque_limit_nm` | `limit`: `lower`, `upper`, `velocity`, `effort` |
-//! | `prior` | bodies of the chain ([`crate::leg::robot_chain`]), `dynamics`: `friction`, `damping` |
+//! | `prior` | bodies of the chain (`crate::leg::robot_chain`), `dynamics`: `friction`, `damping` |
 
 use nalgebra::Vector3;
 use scarab_base::error::FileError;

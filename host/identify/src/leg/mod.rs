@@ -1,6 +1,6 @@
 //! A leg file becomes the firmware's configuration, its prior and its plant.
 
-pub mod axes;
+pub(crate) mod axes;
 pub mod background;
 pub mod board_words;
 pub mod exercise;
@@ -11,7 +11,7 @@ pub mod model_choice;
 pub mod motions;
 pub mod placed_mass;
 pub mod posture;
-pub mod robot_chain;
+pub(crate) mod robot_chain;
 pub mod setup;
 pub mod size;
 pub mod states;

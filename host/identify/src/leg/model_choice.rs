@@ -7,16 +7,16 @@ use crate::formats::leg_file::{JointFile, Switch};
 /// Model requested for one joint by the leg file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TermSwitches {
-    pub rotor: Switch,
-    pub offset: Switch,
-    pub stribeck: Switch,
-    pub asymmetric: Switch,
+    pub(crate) rotor: Switch,
+    pub(crate) offset: Switch,
+    pub(crate) stribeck: Switch,
+    pub(crate) asymmetric: Switch,
 }
 
 impl TermSwitches {
     /// Reads the request of a joint.
     #[must_use]
-    pub fn from_joint(joint: &JointFile) -> Self {
+    pub(crate) fn from_joint(joint: &JointFile) -> Self {
         Self {
             rotor: joint.rotor,
             offset: joint.offset,
@@ -36,7 +36,7 @@ fn choice(switch: Switch) -> Choice {
 
 /// Choice for a joint's rotor and constant column.
 #[must_use]
-pub fn drive_choice(joint: &JointFile) -> DriveChoice {
+pub(crate) fn drive_choice(joint: &JointFile) -> DriveChoice {
     let (constant, meaning) = match (joint.offset, joint.asymmetric_coulomb) {
         (Switch::Off | Switch::Auto, Switch::On) => (Choice::On, Constant::Asymmetry),
         (Switch::Off, Switch::Auto) => (Choice::Auto, Constant::Asymmetry),
@@ -47,6 +47,6 @@ pub fn drive_choice(joint: &JointFile) -> DriveChoice {
 
 /// Choice for a joint's Stribeck friction.
 #[must_use]
-pub fn stribeck_choice(joint: &JointFile) -> Choice {
+pub(crate) fn stribeck_choice(joint: &JointFile) -> Choice {
     choice(joint.stribeck_model)
 }

@@ -3,7 +3,7 @@
 //!
 //! JOINT is a joint's name or its number from 1; X and Y are in that joint's D-H frame, X along the
 //! link. A wrong mass is worse than none, so implausible values are rejected. These are a mass of
-//! 0, below, or above [`LARGEST_KG`], and a position beyond the link.
+//! 0, below, or above `LARGEST_KG`, and a position beyond the link.
 
 use core::str::FromStr;
 
@@ -14,7 +14,7 @@ use scarab_base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 
 /// Largest mass that a drive of this class moves, kg.
-pub const LARGEST_KG: f64 = 50.0;
+pub(crate) const LARGEST_KG: f64 = 50.0;
 
 /// Mass as stated, not yet checked against a leg.
 #[derive(Clone, Debug, PartialEq)]

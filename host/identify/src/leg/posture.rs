@@ -23,7 +23,7 @@ use scarab_base::error::ToolError;
 use crate::formats::leg_file::{BodySide, LegFile};
 
 /// Largest lean of a trunk, degrees.
-pub const LARGEST_PITCH_DEG: f64 = 90.0;
+pub(crate) const LARGEST_PITCH_DEG: f64 = 90.0;
 
 /// Leg for this side of the body.
 pub fn on_side(leg: &LegFile, side: BodySide) -> Result<LegFile, ToolError> {

@@ -27,24 +27,24 @@ const MOST_NAMES: usize = 200;
 
 /// Body in the root's frame while every chosen joint is at 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LumpedBody {
+pub(crate) struct LumpedBody {
     /// Mass, kg.
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// Centre of mass, m.
-    pub centre: Vector3<f64>,
+    pub(crate) centre: Vector3<f64>,
     /// Tensor about the centre of mass, kg m^2.
-    pub tensor: Matrix3<f64>,
+    pub(crate) tensor: Matrix3<f64>,
 }
 
 /// Chosen joint with all that it moves up to the next one.
 #[derive(Clone, Debug)]
-pub struct ChainJoint<'a> {
-    pub joint: &'a Joint,
+pub(crate) struct ChainJoint<'a> {
+    pub(crate) joint: &'a Joint,
     /// Axis in the root's frame.
-    pub axis: Unit<Vector3<f64>>,
+    pub(crate) axis: Unit<Vector3<f64>>,
     /// Point on the axis in the root's frame, m.
-    pub point: Vector3<f64>,
-    pub body: LumpedBody,
+    pub(crate) point: Vector3<f64>,
+    pub(crate) body: LumpedBody,
 }
 
 /// Owner of a link.

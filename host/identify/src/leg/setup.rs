@@ -86,7 +86,7 @@ pub fn base_rank(leg: &LegFile) -> usize {
 
 /// Columns to be estimated according to a leg file.
 #[must_use]
-pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
+pub(crate) fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
     core::array::from_fn(|joint| {
         let mut columns = [true; PARAMETERS_PER_JOINT];
         if let Some(joint) = leg.joints.get(joint) {
@@ -99,7 +99,7 @@ pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
 
 /// Joint angles of one count of the encoders, rad, by the arithmetic of the board's description.
 #[must_use]
-pub fn encoder_steps<T: Real, const N: usize>(leg: &LegFile) -> [T; N] {
+pub(crate) fn encoder_steps<T: Real, const N: usize>(leg: &LegFile) -> [T; N] {
     core::array::from_fn(|joint| {
         leg.joints.get(joint).map_or(T::zero(), |joint| {
             T::from_double(TAU)
@@ -138,7 +138,7 @@ pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowMod
 }
 
 /// Row model in the device's precision, analysed in that precision.
-pub fn device_model<const N: usize, const B: usize>(
+pub(crate) fn device_model<const N: usize, const B: usize>(
     leg: &LegFile,
     reference: &RowModel<f64, N, B>,
 ) -> Result<RowModel<f32, N, B>, FileError> {
@@ -176,7 +176,7 @@ const PRIOR_STREAM: u64 = 0x0070_7269_6f72;
 /// Prior with an error of `percent` in every number, signs from the seed; physically consistent,
 /// offset zero.
 #[must_use]
-pub fn wrong_prior<const N: usize>(
+pub(crate) fn wrong_prior<const N: usize>(
     truth: &[LinkPrior<f64>; N],
     percent: f64,
     seed: u64,

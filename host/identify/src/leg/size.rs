@@ -30,9 +30,9 @@ use crate::formats::leg_file::{LegFile, LinkParameters, SegmentsFile};
 use crate::leg::link_body::{body, joined_with, linked, without};
 
 /// Shortest and longest thigh, m.
-pub const THIGH_RANGE_M: [f64; 2] = [0.402, 0.505];
+pub(crate) const THIGH_RANGE_M: [f64; 2] = [0.402, 0.505];
 /// Shortest and longest shank, m.
-pub const SHANK_RANGE_M: [f64; 2] = [0.397, 0.506];
+pub(crate) const SHANK_RANGE_M: [f64; 2] = [0.397, 0.506];
 
 /// Wearer as `KG,M` on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]

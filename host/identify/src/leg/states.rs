@@ -44,20 +44,20 @@ impl Angles {
 }
 
 /// All states of a file.
-pub struct States<const N: usize> {
+pub(crate) struct States<const N: usize> {
     file: PathBuf,
     /// States in the order of the file.
-    pub rows: Vec<State<N>>,
+    pub(crate) rows: Vec<State<N>>,
     /// Line of each state.
     lines: LineNumbers,
 }
 
 /// One row of the file.
-pub struct State<const N: usize> {
+pub(crate) struct State<const N: usize> {
     /// Time as written in the file.
-    pub time: Option<String>,
+    pub(crate) time: Option<String>,
     /// State in D-H angles.
-    pub motion: JointState<f64, N>,
+    pub(crate) motion: JointState<f64, N>,
 }
 
 /// Columns of angles, speeds, accelerations, and of the time.
@@ -93,7 +93,7 @@ impl<const N: usize> States<N> {
 
     /// Error of a row whose torque exceeds the range of the number format.
     #[must_use]
-    pub fn out_of_range(&self, row: usize) -> FileError {
+    pub(crate) fn out_of_range(&self, row: usize) -> FileError {
         refuse(&self.file, self.lines.line_of(row), Fault::OutOfRange)
     }
 }

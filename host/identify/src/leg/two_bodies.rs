@@ -63,7 +63,7 @@ fn insisting(damping: f64) -> MuscleDescription {
 impl MuscleTone {
     /// Muscles of hip and knee.
     #[must_use]
-    pub fn muscles(self) -> [MuscleDescription; 2] {
+    pub(crate) fn muscles(self) -> [MuscleDescription; 2] {
         match self {
             Self::Relaxed => [MuscleDescription::HIP, MuscleDescription::KNEE],
             Self::Firm => [MuscleDescription::FIRM_HIP, MuscleDescription::FIRM_KNEE],

@@ -9,7 +9,7 @@
 //!   constants below.
 //! - Wearer: anthropometry after Winter ([`crate::formats::anthropometry`]), segments as long as the
 //!   exoskeleton's.
-//! - Motors: [`MotorFile::D5065_CLASS`], whose 0.03 N m/A times the gear's 50 are the leg's 1.5 N m/A.
+//! - Motors: `MotorFile::D5065_CLASS`, whose 0.03 N m/A times the gear's 50 are the leg's 1.5 N m/A.
 //! - Only sagittal inertias are given. Each segment is completed as a solid of revolution with
 //!   mass * radius^2 / 2 about its long axis; the radii are stated below (ours).
 //!
@@ -84,7 +84,7 @@ pub fn leg_file(body_mass: f64) -> LegFile {
 
 /// Default leg with a wearer's lengths, and a prior that assumes another body mass.
 #[must_use]
-pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
+pub(crate) fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
     let standard = Wearer { mass: prior_mass, ..*wearer };
     let drive = |joint: &mut JointFile| {
         joint.speed_limit_deg_s = 257.8;

@@ -11,32 +11,32 @@ pub struct DoubtReport {
     /// Most likely reason of a refusal; `null` where nothing was refused.
     pub likely_cause: Option<CauseReport>,
     /// Every direction, whatever its value.
-    pub directions: Vec<DirectionReport>,
+    pub(crate) directions: Vec<DirectionReport>,
     /// Root mean square misfit of the filtered torque over its noise, for each joint.
-    pub misfit_over_noise: Vec<Number>,
+    pub(crate) misfit_over_noise: Vec<Number>,
     /// Parameters that end at a limit of the prior.
-    pub at_prior_limit: Vec<String>,
+    pub(crate) at_prior_limit: Vec<String>,
     /// Scatter between the recordings identified from.
-    pub recordings: RecordingsReport,
+    pub(crate) recordings: RecordingsReport,
     /// Bandwidth of the rows.
     #[serde(flatten)]
-    pub bandwidth: Option<BandwidthReport>,
+    pub(crate) bandwidth: Option<BandwidthReport>,
 }
 
 /// Bandwidth of a replay.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct BandwidthReport {
+pub(crate) struct BandwidthReport {
     /// Frequency at which the low-pass is 3 dB down, Hz.
-    pub bandwidth_hz: f64,
+    pub(crate) bandwidth_hz: f64,
     /// Whether it was chosen by the encoders' steps.
     #[serde(rename = "bandwidth_chosen")]
-    pub is_chosen: bool,
+    pub(crate) is_chosen: bool,
     /// Larger bandwidth that the encoders allow, where the noise explains the misfit.
     #[serde(rename = "bandwidth_proposed_hz")]
-    pub proposed_hz: Option<f64>,
+    pub(crate) proposed_hz: Option<f64>,
     /// Largest bandwidth at which Stribeck friction is searched for, where the encoders are too coarse here.
     #[serde(rename = "bandwidth_for_stribeck_hz")]
-    pub stribeck_hz: Option<f64>,
+    pub(crate) stribeck_hz: Option<f64>,
 }
 
 impl BandwidthReport {
@@ -66,11 +66,11 @@ impl BandwidthReport {
 
 /// Scatter of the parameters between recordings, by excluding one at a time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct RecordingsReport {
+pub(crate) struct RecordingsReport {
     /// Number of recordings identified from.
-    pub count: usize,
+    pub(crate) count: usize,
     /// Standard deviation of each base parameter, in their order; empty where it is unknown.
-    pub sigma: Vec<Number>,
+    pub(crate) sigma: Vec<Number>,
 }
 
 impl RecordingsReport {
@@ -99,21 +99,21 @@ pub struct CauseReport {
     /// A word of the closed list.
     pub name: &'static str,
     /// Joint, from 1; `null` for all or unknown.
-    pub joint: Option<usize>,
+    pub(crate) joint: Option<usize>,
     /// Size in the direction's unit; `null` if it has none.
-    pub value: Number,
+    pub(crate) value: Number,
     /// Standard deviation of the size.
-    pub sigma: Number,
+    pub(crate) sigma: Number,
     /// Sentence with the evidence.
     pub words: String,
     /// Units in which the cause reads the columns.
     #[serde(skip)]
-    pub reads: Vec<ReadAs>,
+    pub(crate) reads: Vec<ReadAs>,
 }
 
 /// Reading of the columns in another unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReadAs {
+pub(crate) enum ReadAs {
     /// Joint angles in degrees.
     Degrees,
     /// Joint angles in turns.
@@ -130,54 +130,54 @@ pub enum ReadAs {
 
 /// One direction: an error of the logging chain with its estimate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct DirectionReport {
+pub(crate) struct DirectionReport {
     /// `delay`, `encoder_scale`, `torque_scale`, `gravity`.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// Joint, from 1; `null` for gravity.
-    pub joint: Option<usize>,
+    pub(crate) joint: Option<usize>,
     /// Estimate; `null` where the motion does not determine it.
-    pub value: Number,
+    pub(crate) value: Number,
     /// Standard deviation: the larger of noise and scatter over segments.
-    pub sigma: Number,
+    pub(crate) sigma: Number,
     /// Source of the standard deviation: `noise` or `segments`.
-    pub sigma_from: &'static str,
+    pub(crate) sigma_from: &'static str,
     /// `ms`, `%` or `deg`.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// Largest magnitude that chance explains.
-    pub limit: Number,
+    pub(crate) limit: Number,
     /// Share of the misfit that the direction explains, 0..1.
-    pub explained: Number,
+    pub(crate) explained: Number,
     /// Share of the misfit from which the direction refuses.
-    pub explained_limit: Number,
+    pub(crate) explained_limit: Number,
     /// Largest shift of a parameter, in its sigma, when the direction is fitted.
-    pub largest_shift: Number,
+    pub(crate) largest_shift: Number,
     /// False where the recording is refused for this direction.
-    pub passed: bool,
+    pub(crate) passed: bool,
     /// Directions and parameters that cannot be distinguished from this one.
-    pub alike: Vec<String>,
+    pub(crate) alike: Vec<String>,
 }
 
 /// A fault in a recording's columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SampleFinding {
     /// `saturation`, `held_samples`, `quantised` or `time_stamps`.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// File, as named.
-    pub file: String,
+    pub(crate) file: String,
     /// Joint, from 1; `null` for a fault of all columns.
-    pub joint: Option<usize>,
+    pub(crate) joint: Option<usize>,
     /// Limit of the torque in N m, holding time in s, step in rad or N m, error of the stamps in s.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Unit of the value.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// Standard deviation of the value, if it is an estimate.
-    pub sigma: Option<f64>,
+    pub(crate) sigma: Option<f64>,
     /// Share of the samples, 0..1.
-    pub share: f64,
+    pub(crate) share: f64,
     /// Whether the recording must not be identified from.
-    pub refuses: bool,
+    pub(crate) refuses: bool,
     /// The finding in a sentence.
-    pub text: String,
+    pub(crate) text: String,
 }
 
 impl DirectionReport {
@@ -224,7 +224,7 @@ impl DirectionReport {
 
     /// Test of the verdict.
     #[must_use]
-    pub fn finding(&self) -> FindingReport {
+    pub(crate) fn finding(&self) -> FindingReport {
         let failure = (!self.passed).then(|| {
             format!(
                 "{}, limit {:.3} {}; it explains {:.0} % of the misfit and moves a parameter by {:.1} sigma",

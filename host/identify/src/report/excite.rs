@@ -91,11 +91,11 @@ pub struct JointReport {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Seen {
     /// Range of the angle, degrees.
-    pub angle_deg: [f64; 2],
+    pub(crate) angle_deg: [f64; 2],
     /// Largest speed, degrees per second.
-    pub speed_deg_s: f64,
+    pub(crate) speed_deg_s: f64,
     /// Largest torque, N m, including friction at a reversal and the position loop.
-    pub torque_nm: f64,
+    pub(crate) torque_nm: f64,
     /// Ticks at which the monitor reduced the torque.
     pub limited_ticks: u32,
 }

@@ -144,7 +144,7 @@ pub struct ComparisonReport {
     /// Time of its identification, RFC 3339.
     pub created: String,
     /// `same` or `changed`.
-    pub verdict: &'static str,
+    pub(crate) verdict: &'static str,
     /// Result in words.
     pub line: String,
     /// Squared distance of the two base sets under both covariances.
@@ -193,9 +193,9 @@ pub struct AddedMassReport {
     /// Standard deviations of the position.
     pub place_sigma_m: [Number; 2],
     /// Chi-square that the mass does not explain; friction and offset are not compared.
-    pub chi2: f64,
+    pub(crate) chi2: f64,
     /// Limit that noise exceeds in 1 of 1000 cases.
-    pub chi2_limit: f64,
+    pub(crate) chi2_limit: f64,
 }
 
 impl AddedMassReport {
@@ -210,11 +210,11 @@ impl AddedMassReport {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelDetail {
     /// Covariance of the base parameters, in their order.
-    pub covariance: Vec<Vec<f64>>,
+    pub(crate) covariance: Vec<Vec<f64>>,
     /// Parameter whose column carries each base parameter's value.
-    pub carriers: Vec<String>,
+    pub(crate) carriers: Vec<String>,
     /// Parameters excluded from the estimate, as if they were zero.
-    pub not_estimated: Vec<String>,
+    pub(crate) not_estimated: Vec<String>,
 }
 
 /// Search for a physically consistent leg.

@@ -64,6 +64,6 @@ impl ReadReport {
 }
 
 /// Format that needs no mention.
-pub const PLAIN_FORMAT: &str = "CSV with commas";
+pub(crate) const PLAIN_FORMAT: &str = "CSV with commas";
 /// Format of samples that a program holds.
-pub const ARRAYS: &str = "arrays";
+pub(crate) const ARRAYS: &str = "arrays";

@@ -16,40 +16,40 @@ pub struct ScaleReport {
     pub scale: Word,
     /// Torque constants, one per joint; empty in a replay without a known mass, whose recordings contain
     /// torques.
-    pub torque_constant: Vec<TorqueConstantReport>,
+    pub(crate) torque_constant: Vec<TorqueConstantReport>,
     /// Known mass of the second run.
-    pub payload: Option<MassReport>,
+    pub(crate) payload: Option<MassReport>,
     /// Known load in every run; the parameters exclude it.
-    pub load: Option<MassReport>,
+    pub(crate) load: Option<MassReport>,
 }
 
 /// Torque constant of one joint, N m/A at the joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TorqueConstantReport {
+pub(crate) struct TorqueConstantReport {
     /// Joint, from 1.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// Constant assumed by the firmware.
-    pub used: Number,
+    pub(crate) used: Number,
     /// Constant from the known mass; unknown if the joint is not loaded by it.
-    pub identified: Number,
+    pub(crate) identified: Number,
     /// Standard deviation of the identified constant.
-    pub sigma: Number,
+    pub(crate) sigma: Number,
     /// Whether the two runs differ by the stated mass at the stated position, as far as this joint shows.
-    pub consistent: Option<bool>,
+    pub(crate) consistent: Option<bool>,
     /// Whether the mass is heavy enough to determine this constant.
     #[serde(skip)]
-    pub determined: bool,
+    pub(crate) determined: bool,
 }
 
 /// A known mass.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MassReport {
+pub(crate) struct MassReport {
     /// Mass, kg.
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// Joint whose link carries it, from 1.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// Position in the joint's frame, m.
-    pub place: [f64; 3],
+    pub(crate) place: [f64; 3],
 }
 
 impl From<&Payload<f64>> for MassReport {

@@ -144,7 +144,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     /// Whether the parameter is not estimated and thus zero in the model. `dropped` marks base parameters
     /// held at zero.
-    pub fn is_zero(&self, dropped: &[bool; B], joint: usize, parameter: Parameter) -> bool {
+    pub(crate) fn is_zero(&self, dropped: &[bool; B], joint: usize, parameter: Parameter) -> bool {
         self.model.base.standing(joint, parameter) == Standing::Off
             || self.device.drive(joint, parameter).is_some_and(|base| dropped[base])
     }
@@ -318,7 +318,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
     }
 
     /// Static friction above Coulomb friction, for joints with a true or identified surplus.
-    pub fn surpluses(&self, found: &[StribeckReport], cramer_rao: &[Option<f64>]) -> Vec<BaseReport> {
+    pub(crate) fn surpluses(&self, found: &[StribeckReport], cramer_rao: &[Option<f64>]) -> Vec<BaseReport> {
         let of = |joint: usize| {
             let found = found.iter().find(|found| found.joint == joint + 1);
             let truth = self.stribeck_truth[joint];
@@ -342,7 +342,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
     }
 
     /// Base parameters that are not held at zero.
-    pub fn kept<'a>(&self, dropped: &'a [bool; B]) -> impl Iterator<Item = usize> + 'a {
+    pub(crate) fn kept<'a>(&self, dropped: &'a [bool; B]) -> impl Iterator<Item = usize> + 'a {
         (0..self.model.base.rank()).filter(|&base| !dropped[base])
     }
 
@@ -428,11 +428,11 @@ const SLICE: u32 = 20;
 #[derive(Clone, Debug)]
 pub struct Search {
     /// Iterations and excess over the constrained optimum.
-    pub excess: Vec<(u32, f64)>,
+    pub(crate) excess: Vec<(u32, f64)>,
     /// First iteration with an excess of at most 0.5.
     pub to_half: Option<u32>,
     /// Excess of that optimum over least squares.
-    pub floor: f64,
+    pub(crate) floor: f64,
 }
 
 /// Costs in chi-square units.

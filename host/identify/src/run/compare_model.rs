@@ -30,11 +30,11 @@ const NAMED: usize = 3;
 /// Common base parameters of two models.
 pub(super) struct Common<'a> {
     /// Parameter in the stored model, and its value in the other one.
-    pub pairs: Vec<(&'a StoredBase, f64)>,
+    pub(crate) pairs: Vec<(&'a StoredBase, f64)>,
     /// Covariance of the differences.
-    pub covariance: Vec<Vec<f64>>,
+    pub(crate) covariance: Vec<Vec<f64>>,
     /// Parameters of one model only.
-    pub not_compared: Vec<String>,
+    pub(crate) not_compared: Vec<String>,
 }
 
 impl<'a> Common<'a> {

@@ -8,7 +8,7 @@ use crate::report::disturbances::{OutliersReport, StribeckReport};
 impl OutliersReport {
     /// Report of a training motion's record.
     #[must_use]
-    pub fn from_record<const N: usize, const B: usize>(
+    pub(crate) fn from_record<const N: usize, const B: usize>(
         record: &Record<f32, N, B>,
         estimator: &'static str,
     ) -> Self {

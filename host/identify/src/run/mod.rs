@@ -1,16 +1,16 @@
 //! One experiment each: an identification, a replay, a design, a measurement.
 
-pub mod added_mass;
+pub(crate) mod added_mass;
 pub mod analysis;
 pub mod compare_model;
 pub mod consistent;
 pub mod disturbances;
 pub mod information;
-pub mod logging_errors;
+pub(crate) mod logging_errors;
 pub mod model_choice;
 pub mod predict;
 pub mod regressor;
 pub mod replay;
 pub mod resample;
-pub mod save_model;
+pub(crate) mod save_model;
 pub mod scale;

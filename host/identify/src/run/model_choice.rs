@@ -187,7 +187,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     /// Coulomb friction of both directions, for joints in which they differ according to the data.
     #[must_use]
-    pub fn directions(&self, dropped: &[bool; B], estimate: &Estimate<f32, B>) -> Vec<DirectionsReport> {
+    pub(crate) fn directions(
+        &self,
+        dropped: &[bool; B],
+        estimate: &Estimate<f32, B>,
+    ) -> Vec<DirectionsReport> {
         let of = |joint: usize| {
             if self.meaning(joint) != Constant::Asymmetry {
                 return None;

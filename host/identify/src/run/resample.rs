@@ -36,9 +36,9 @@ use scarab::ident::SAMPLE_RATE_HZ;
 /// Rate of the grid, Hz: that of the firmware's filter chain.
 pub const GRID_RATE_HZ: f64 = SAMPLE_RATE_HZ;
 /// Share of the grid's period below which the median step leads to averaging, above it to interpolation.
-pub const DENSE_STEP: f64 = 0.9;
+pub(crate) const DENSE_STEP: f64 = 0.9;
 /// Share of a recording's own rate up to which its resampled motion can be trusted.
-pub const TRUSTED_BANDWIDTH: f64 = 0.2;
+pub(crate) const TRUSTED_BANDWIDTH: f64 = 0.2;
 
 /// Resampling method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,9 +53,9 @@ pub enum Method {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resampled {
     /// Time of the first grid point on the recording's clock, s.
-    pub start_s: f64,
+    pub(crate) start_s: f64,
     /// Rate of the recording, Hz: one over its median step.
-    pub native_rate_hz: f64,
+    pub(crate) native_rate_hz: f64,
     /// Method chosen by the median step.
     pub method: Method,
     /// Joints, proximal first.

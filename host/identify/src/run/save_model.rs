@@ -19,7 +19,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
     /// Further data for a model file. The covariance is symmetric up to rounding and is made
     /// exactly symmetric.
     #[must_use]
-    pub fn detail(&self, dropped: &[bool; B], estimate: &Estimate<f32, B>) -> ModelDetail {
+    pub(crate) fn detail(&self, dropped: &[bool; B], estimate: &Estimate<f32, B>) -> ModelDetail {
         let base = &self.model.base;
         let kept: Vec<usize> = self.kept(dropped).collect();
         let element = |row: usize, column: usize| {

@@ -27,7 +27,7 @@ use scarab_identify::formats::leg_file::{LegFile, StribeckFile};
 use scarab_identify::leg::two_bodies::{MuscleTone, description};
 
 /// Body masses of drawn wearers, kg.
-pub const BODY_MASS_KG: [f64; 2] = [45.0, 110.0];
+pub(crate) const BODY_MASS_KG: [f64; 2] = [45.0, 110.0];
 /// Largest distance of the knee axes along the thigh, m.
 const KNEE_OFFSET_M: f64 = 0.010;
 /// Largest distance of the hip axes in each direction, m.

@@ -94,7 +94,7 @@ fn given<const B: usize>(subject: &Subject<B>, shares: AssistShares, seed: u64) 
 ///
 /// # Errors
 /// A wearer does not fit, or the firmware refuses a session.
-pub fn energy<const B: usize>(
+pub(crate) fn energy<const B: usize>(
     subject: &Subject<B>,
     shares: &[AssistShares],
     runs: usize,
@@ -151,7 +151,7 @@ fn oscillates<const B: usize>(
 ///
 /// # Errors
 /// A wearer does not fit, or the firmware refuses a session.
-pub fn limit_cycles<const B: usize>(
+pub(crate) fn limit_cycles<const B: usize>(
     subject: &Subject<B>,
     shares: AssistShares,
     legs: usize,

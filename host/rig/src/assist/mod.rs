@@ -2,18 +2,18 @@
 //!
 //! | part | contents |
 //! | --- | --- |
-//! | [`draws`] | random wearers and exoskeletons |
-//! | [`mod@energy`] | energy given to limp and resisting wearers; legs at rest |
+//! | `draws` | random wearers and exoskeletons |
+//! | `energy` | energy given to limp and resisting wearers; legs at rest |
 //! | [`subject`] | leg, wearer, and the models identified of both |
 //! | [`trial`] | one run of leg and wearer |
 //! | [`study`] | every mode, motion and comparison over all seeds |
-//! | [`mod@periodic`] | locking, effort and stopping of a periodic motion |
-//! | [`stability`] | largest stable share of inertia over stiffness and damping of the cuffs |
+//! | `periodic` | locking, effort and stopping of a periodic motion |
+//! | `stability` | largest stable share of inertia over stiffness and damping of the cuffs |
 
-pub mod draws;
-pub mod energy;
-pub mod periodic;
-pub mod stability;
+pub(crate) mod draws;
+pub(crate) mod energy;
+pub(crate) mod periodic;
+pub(crate) mod stability;
 pub mod study;
 pub mod subject;
 pub mod trial;

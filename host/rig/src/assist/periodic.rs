@@ -151,7 +151,7 @@ fn stopped<const B: usize>(
 ///
 /// # Errors
 /// A wearer does not fit, or the firmware refuses the session.
-pub fn periodic<const B: usize>(
+pub(crate) fn periodic<const B: usize>(
     subject: &Subject<B>,
     [rig, wearer]: [&WearerDescription; 2],
     shares: AssistShares,

@@ -81,7 +81,7 @@ const DAMPINGS: [f64; 5] = [20.0, 40.0, 80.0, 160.0, 320.0];
 
 /// What the wearer's limb does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Limb {
+pub(crate) enum Limb {
     /// Muscles relaxed.
     Limp,
     /// Limb held still by its muscles or by a seat.
@@ -90,16 +90,16 @@ pub enum Limb {
 
 /// Compensated parts, 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Compensated {
+pub(crate) struct Compensated {
     /// Share of the inertia.
-    pub inertia: f64,
+    pub(crate) inertia: f64,
     /// Share of viscous friction.
-    pub friction: f64,
+    pub(crate) friction: f64,
 }
 
 /// Exoskeleton and wearer about a posture, with the sampled compensation.
 #[derive(Clone, Copy, Debug)]
-pub struct CompensationLoop {
+pub(crate) struct CompensationLoop {
     /// Mass matrix of the exoskeleton, slopes of its gravity torques, viscous friction.
     inertia: Matrix2<f64>,
     gravity: Matrix2<f64>,
@@ -259,13 +259,13 @@ impl CompensationLoop {
 
     /// Factor by which the slowest decaying or fastest growing vibration changes in a sample.
     #[must_use]
-    pub fn growth(&self, compensated: Compensated) -> f64 {
+    pub(crate) fn growth(&self, compensated: Compensated) -> f64 {
         spectral_radius(self.map(compensated))
     }
 
     /// Largest share of inertia below which every share is stable, at most 1, within `WIDTH`.
     #[must_use]
-    pub fn largest_inertia(&self, friction: f64) -> f64 {
+    pub(crate) fn largest_inertia(&self, friction: f64) -> f64 {
         let is_stable = |inertia: f64| self.growth(Compensated { inertia, friction }) < 1.0;
         if !is_stable(0.0) {
             return 0.0;
@@ -362,7 +362,7 @@ fn rigid_body(leg: &LegDescription<2>, at: [f64; 2]) -> [Matrix2<f64>; 2] {
 
 /// The wearer's limb in place of the exoskeleton's links, without rotors and friction.
 #[must_use]
-pub fn limb_alone(leg: &LegDescription<2>, wearer: &WearerDescription) -> LegDescription<2> {
+pub(crate) fn limb_alone(leg: &LegDescription<2>, wearer: &WearerDescription) -> LegDescription<2> {
     let mut limb = *leg;
     limb.joints[1].frame.a = wearer.thigh_length;
     for (joint, segment) in limb.joints.iter_mut().zip([wearer.thigh, wearer.shank]) {
@@ -400,7 +400,7 @@ fn joint_coupling(wearer: &WearerDescription, thigh: f64, knee: f64) -> [Matrix2
 ///
 /// # Errors
 /// The exoskeleton cannot be simulated.
-pub fn largest_inertia(
+pub(crate) fn largest_inertia(
     exoskeleton: &LegFile,
     wearer: &WearerDescription,
     limb: Limb,
@@ -417,7 +417,7 @@ pub fn largest_inertia(
 ///
 /// # Errors
 /// The exoskeleton cannot be simulated.
-pub fn limits(
+pub(crate) fn limits(
     exoskeleton: &LegFile,
     wearer: &WearerDescription,
     friction: f64,

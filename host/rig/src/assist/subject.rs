@@ -22,20 +22,20 @@ pub struct Models<const B: usize> {
     /// Model that the firmware accepted, with its confidence bounds.
     pub identified: IdentifiedModel<2>,
     /// Its estimate.
-    pub estimate: Estimate<f32, B>,
+    pub(crate) estimate: Estimate<f32, B>,
     /// Model with the true parameters, certain.
-    pub truth: IdentifiedModel<2>,
+    pub(crate) truth: IdentifiedModel<2>,
     /// Model of the leg file's prior, taken as certain.
-    pub prior: Option<IdentifiedModel<2>>,
+    pub(crate) prior: Option<IdentifiedModel<2>>,
     /// True base values.
-    pub true_values: [f32; B],
+    pub(crate) true_values: [f32; B],
 }
 
 /// Leg, wearer and models.
 #[derive(Clone, Debug)]
 pub struct Subject<const B: usize> {
     /// Seed of noise and search.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Exoskeleton alone.
     pub exoskeleton: LegFile,
     /// Wearer and exoskeleton apart.
@@ -45,9 +45,9 @@ pub struct Subject<const B: usize> {
     /// The exoskeleton alone.
     pub empty: Models<B>,
     /// The exoskeleton on its wearer; `None` if the firmware refused that result.
-    pub worn: Option<Models<B>>,
+    pub(crate) worn: Option<Models<B>>,
     /// Refused results.
-    pub refused: Vec<RefusedReport>,
+    pub(crate) refused: Vec<RefusedReport>,
 }
 
 /// Cuffs of a wearer.

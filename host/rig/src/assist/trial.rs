@@ -16,9 +16,9 @@ use crate::pair::Pair;
 
 /// Time from the start of motion and session to the measurement: fade-in, start of the motion, and what
 /// oscillators need to learn it, s.
-pub const SETTLING_S: f64 = 8.0;
+pub(crate) const SETTLING_S: f64 = 8.0;
 /// Duration of a measurement, s: whole cycles of gait and of leg extension.
-pub const MEASURED_S: f64 = 10.0;
+pub(crate) const MEASURED_S: f64 = 10.0;
 /// Ticks per point of a curve: 100 Hz.
 const TICKS_PER_POINT: u64 = 40;
 /// Ticks between two samples of the wearer's gravity torque.
@@ -39,24 +39,24 @@ pub enum Drives<'a> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trial {
     /// Mean square of the interaction torque, (N m)^2.
-    pub interaction: [f64; 2],
+    pub(crate) interaction: [f64; 2],
     /// Mean square of the muscles' torque, (N m)^2.
-    pub muscle: [f64; 2],
+    pub(crate) muscle: [f64; 2],
     /// Share of the wearer's gravity torque that the muscles give: their projection on it.
-    pub gravity_share: [f64; 2],
+    pub(crate) gravity_share: [f64; 2],
     /// Largest deviation of the wearer's angles from the intended ones, rad rms.
-    pub deviation_rad: f64,
+    pub(crate) deviation_rad: f64,
     /// Whether the session ended by itself.
-    pub has_ended: bool,
+    pub(crate) has_ended: bool,
     /// Time (s) and interaction torque (N m) at 100 Hz.
-    pub curve: Vec<(f64, [f64; 2])>,
+    pub(crate) curve: Vec<(f64, [f64; 2])>,
 }
 
 /// Leg and wearer with a running session.
-pub struct Stage<'a, const B: usize> {
+pub(crate) struct Stage<'a, const B: usize> {
     subject: &'a Subject<B>,
     /// Leg and plant.
-    pub pair: Pair<2, B>,
+    pub(crate) pair: Pair<2, B>,
     is_assisted: bool,
 }
 
@@ -66,7 +66,7 @@ impl<'a, const B: usize> Stage<'a, B> {
     ///
     /// # Errors
     /// The wearer does not fit, or the firmware refuses the session.
-    pub fn begin(
+    pub(crate) fn begin(
         subject: &'a Subject<B>,
         wearer: &WearerDescription,
         drives: Drives<'_>,
@@ -108,7 +108,7 @@ impl<'a, const B: usize> Stage<'a, B> {
     }
 
     /// Runs one tick.
-    pub fn tick(&mut self) {
+    pub(crate) fn tick(&mut self) {
         self.pair.tick(None, self.subject.context.gravity);
     }
 
@@ -119,7 +119,7 @@ impl<'a, const B: usize> Stage<'a, B> {
 
     /// Runs for a time, s. Returns the energy that the wearer receives besides the gravity energy of the
     /// limb: the largest rise since any instant, J.
-    pub fn given(&mut self, limb: &LimbAlone, seconds: f64) -> f64 {
+    pub(crate) fn given(&mut self, limb: &LimbAlone, seconds: f64) -> f64 {
         let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
         for _ in 0..(seconds / TICK_S) as u64 {
             self.tick();
@@ -143,13 +143,13 @@ impl<'a, const B: usize> Stage<'a, B> {
 
     /// Whether a session was begun and no longer runs.
     #[must_use]
-    pub fn has_ended(&self) -> bool {
+    pub(crate) fn has_ended(&self) -> bool {
         self.is_assisted && !self.pair.leg.control().activity().assists()
     }
 }
 
 /// The wearer's limb alone: its gravity torque and potential energy.
-pub struct LimbAlone {
+pub(crate) struct LimbAlone {
     world: World<2>,
     mechanism: Mechanism<2>,
     directions: [f64; 2],

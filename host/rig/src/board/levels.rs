@@ -27,8 +27,7 @@ use scarab::bus::device::Device;
 use scarab::bus::identification::Results;
 use scarab::hal::{AxisSample, CURRENT_RATE_HZ, Frame, JointSample};
 use scarab::leg::{
-    AbsoluteAngle, AssistLaw, AxisFault, Control, ControlOutput, ControlRequest, Following, JointZero,
-    Wearing,
+    AbsoluteAngle, AxisFault, Control, ControlOutput, ControlRequest, Following, JointZero, Wearing,
 };
 use scarab::motor::{Chopper, SenseScale};
 use scarab::operation::{
@@ -55,29 +54,30 @@ const BUS_CODE: u16 = 3136;
 
 /// Bus level without its registers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BusLevel<const N: usize> {
+pub(crate) struct BusLevel<const N: usize> {
     queues: Locked<BusQueues<N>>,
     round: BusRound,
     /// Request of a host to store data.
-    pub storage: Handover<StoreJob<N>>,
+    pub(crate) storage: Handover<StoreJob<N>>,
 }
 
 /// Contacts of the board and conversions in one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Conditions {
+pub(crate) struct Conditions {
     /// Emergency-stop contact is open.
-    pub emergency_stop: bool,
+    pub(crate) emergency_stop: bool,
     /// A gate driver reports a fault.
-    pub gate_fault: bool,
+    pub(crate) gate_fault: bool,
     /// Both shunt currents of the axis were converted.
-    pub complete: bool,
+    pub(crate) complete: bool,
     /// The bus voltage was converted.
-    pub supply: bool,
+    pub(crate) supply: bool,
 }
 
 impl Conditions {
     /// Conditions without any fault.
-    pub const SOUND: Self = Self { emergency_stop: false, gate_fault: false, complete: true, supply: true };
+    pub(crate) const SOUND: Self =
+        Self { emergency_stop: false, gate_fault: false, complete: true, supply: true };
 }
 
 /// Levels of a board of `N` axes, except the leg on which they work.
@@ -86,12 +86,12 @@ pub struct Levels<const N: usize> {
     /// Registers, contacts and pins.
     pub registers: Registers<N>,
     /// Signals shared by all levels.
-    pub signals: Signals<N>,
+    pub(crate) signals: Signals<N>,
     queues: Locked<Queues<N>>,
     /// Current loops, level 0.
-    pub loops: CurrentLoops<N>,
+    pub(crate) loops: CurrentLoops<N>,
     /// Bus level, if the board is on a bus.
-    pub bus: Option<Box<BusLevel<N>>>,
+    pub(crate) bus: Option<Box<BusLevel<N>>>,
     events: Locked<EventQueue<N>>,
     assist_queues: Locked<AssistQueues<N>>,
     servo: ServoLevel<N>,
@@ -173,7 +173,7 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Restarts the image and the bus controller. Contacts and pins stay as they are.
-    pub fn boot<const B: usize>(&mut self, leg: &DeviceLeg<N, B>) {
+    pub(crate) fn boot<const B: usize>(&mut self, leg: &DeviceLeg<N, B>) {
         let mut registers = Registers::new();
         registers.contacts = self.registers.contacts;
         registers.gates = self.registers.gates;
@@ -186,7 +186,7 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Connects the board to a bus, before its first tick.
-    pub fn join_bus<const B: usize>(&mut self, leg: &DeviceLeg<N, B>, following: Following<N>) {
+    pub(crate) fn join_bus<const B: usize>(&mut self, leg: &DeviceLeg<N, B>, following: Following<N>) {
         let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
         let derating = drives::derating(SenseScale::DIVIDER);
         self.servo = ServoLevel::new(leg.control(), derating, volt_per_code, Some(following))
@@ -196,19 +196,19 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Replaces the limits of the supply current.
-    pub fn limit_supply(&mut self, limits: SupplyLimits) {
+    pub(crate) fn limit_supply(&mut self, limits: SupplyLimits) {
         (self.servo, self.supply) = (self.servo.clone().with_supply(limits), limits);
     }
 
     /// Shares of the torque that the limits of the supply current leave: of one that drives a joint, and of
     /// one that a joint drives.
     #[must_use]
-    pub fn supply_shares(&self) -> [f32; 2] {
+    pub(crate) fn supply_shares(&self) -> [f32; 2] {
         self.servo.supply_shares()
     }
 
     /// Exchanges two axes with their calibrations: their motors are on each other's connectors.
-    pub fn exchange(&mut self, one: usize, other: usize) {
+    pub(crate) fn exchange(&mut self, one: usize, other: usize) {
         if let (Some(first), Some(second)) =
             (self.loops.axis_state(one).copied(), self.loops.axis_state(other).copied())
         {
@@ -221,24 +221,24 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Queues between the levels.
-    pub fn queues(&mut self) -> &mut Queues<N> {
+    pub(crate) fn queues(&mut self) -> &mut Queues<N> {
         self.queues.get()
     }
 
     /// Housekeeping, level 6, in the periods in which it is due.
-    pub fn housekeeping(&mut self) {
+    pub(crate) fn housekeeping(&mut self) {
         let mut ends = self.queues.get().split(self.events.get()).housekeeping;
         self.housekeeper.round(&mut ends, &self.signals, &mut self.registers);
     }
 
     /// Whether a round of the housekeeping is due in this period.
     #[must_use]
-    pub fn is_round_due(period: u64) -> bool {
+    pub(crate) fn is_round_due(period: u64) -> bool {
         period.is_multiple_of(PERIODS_PER_ROUND)
     }
 
     /// Servo, level 1; `None` while the joints' samples are invalid.
-    pub fn servo(&mut self, control: &mut Control<N>, gravity: [f32; 3]) -> Option<ControlOutput<N>> {
+    pub(crate) fn servo(&mut self, control: &mut Control<N>, gravity: [f32; 3]) -> Option<ControlOutput<N>> {
         let mut ends = self.queues.get().split(self.events.get()).servo;
         ends.assist = Some(self.assist_queues.get().split().0);
         ends.host = self.bus.as_mut().map(|bus| bus.queues.get().split().1);
@@ -255,12 +255,6 @@ impl<const N: usize> Levels<N> {
         }
     }
 
-    /// Law of the assistance.
-    #[must_use]
-    pub fn law(&self) -> &AssistLaw<N> {
-        self.assist.law()
-    }
-
     /// Thread level: processes the servo's samples, then a slice of the search.
     pub fn identify<const B: usize>(&mut self, leg: &mut DeviceLeg<N, B>, evaluations: u32) -> Slice<N> {
         let mut ends = self.queues.get().split(self.events.get()).identification;
@@ -274,18 +268,18 @@ impl<const N: usize> Levels<N> {
 
     /// Seed of the search of this identification.
     #[must_use]
-    pub fn seed(&self) -> u64 {
+    pub(crate) fn seed(&self) -> u64 {
         self.identification.seed()
     }
 
     /// Whether the leg of this identification is empty or worn, if known.
     #[must_use]
-    pub fn wearing(&self) -> Option<Wearing> {
+    pub(crate) fn wearing(&self) -> Option<Wearing> {
         self.identification.wearing()
     }
 
     /// Current tick, level 0, of one axis in a period.
-    pub fn current(&mut self, axis: usize, period: u64, sample: &AxisSample, conditions: Conditions) {
+    pub(crate) fn current(&mut self, axis: usize, period: u64, sample: &AxisSample, conditions: Conditions) {
         let Conditions { emergency_stop, gate_fault, complete, supply } = conditions;
         let now = (period as u32).wrapping_mul(CYCLES.get()).wrapping_add(axis as u32 * CYCLES.get() / 2);
         let tick = Tick { now, emergency_stop, gate_fault, complete, supply, sample: *sample };
@@ -303,7 +297,7 @@ impl<const N: usize> Levels<N> {
 
     /// Newest joint samples waiting for the servo.
     #[must_use]
-    pub fn samples(&self) -> Option<[JointSample; N]> {
+    pub(crate) fn samples(&self) -> Option<[JointSample; N]> {
         let queues = self.queues.lock();
         let mut samples = [JointSample::default(); N];
         for (joint, sample) in samples.iter_mut().enumerate() {
@@ -313,7 +307,7 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Requests an action from the servo that the operator's contacts cannot request.
-    pub fn ask(&mut self, request: ControlRequest) {
+    pub(crate) fn ask(&mut self, request: ControlRequest) {
         let _ = self.queues().requests().enqueue(request);
     }
 
@@ -324,7 +318,7 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Receives a frame, level 4; without free space the frame is lost.
-    pub fn receive(&mut self, frame: &Frame) {
+    pub(crate) fn receive(&mut self, frame: &Frame) {
         let Some(bus) = &mut self.bus else { return };
         if bus.queues.get().split().0.enqueue(*frame).is_err() {
             self.registers.can.overrun = true;
@@ -333,7 +327,7 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Round of the bus, level 5, at this time.
-    pub fn bus_round<R: Results, const LOG: usize>(
+    pub(crate) fn bus_round<R: Results, const LOG: usize>(
         &mut self,
         now_ns: u64,
         device: &mut Device<N, LOG>,

@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Locked value; compared and cloned by content.
 #[derive(Debug, Default)]
-pub struct Locked<T>(Mutex<T>);
+pub(crate) struct Locked<T>(Mutex<T>);
 
 impl<T> Locked<T> {
     /// Wraps a value.
@@ -13,12 +13,12 @@ impl<T> Locked<T> {
     }
 
     /// Locks the value for reading.
-    pub fn lock(&self) -> MutexGuard<'_, T> {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, T> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Accesses the value without locking.
-    pub fn get(&mut self) -> &mut T {
+    pub(crate) fn get(&mut self) -> &mut T {
         self.0.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -10,12 +10,12 @@ use scarab::hal::{AbsoluteEncoderSide, AxisCommand, Contacts, Controller, Frame,
 use scarab_client::wire::Mailbox;
 
 /// Thermistor code of a bridge at 41 degrees Celsius.
-pub const WARM_CODE: u16 = 1500;
+pub(crate) const WARM_CODE: u16 = 1500;
 /// Time for the most expensive common frame of the bus: 2,403 instructions, interrupted by the levels above.
 /// Each reading of the clock within a round of the bus is later by this time.
 const FRAME_US: u64 = 20;
 /// Factor on the watchdog's time during a flash write: 4 s instead of 16 ms.
-pub const STRETCHED: u64 = 250;
+pub(crate) const STRETCHED: u64 = 250;
 
 /// Readings of the clock in a round of the bus.
 #[derive(Debug, Default)]
@@ -35,56 +35,56 @@ impl PartialEq for Readings {
 
 /// State of the bus controller, and the frames in its three mailboxes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CanController {
+pub(crate) struct CanController {
     /// Transmit mailboxes.
-    pub mailbox: Mailbox,
+    pub(crate) mailbox: Mailbox,
     /// State that the firmware reads.
-    pub state: Controller,
+    pub(crate) state: Controller,
     /// Whether a frame was lost and the firmware has not yet read this.
-    pub overrun: bool,
+    pub(crate) overrun: bool,
     /// Time, nanoseconds.
-    pub now_ns: u64,
+    pub(crate) now_ns: u64,
 }
 
 /// Registers, contacts and pins of a board of `N` axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Registers<const N: usize> {
     /// The operator's contacts.
-    pub contacts: Contacts,
+    pub(crate) contacts: Contacts,
     /// Command of each bridge for its next period.
-    pub commands: [AxisCommand; N],
+    pub(crate) commands: [AxisCommand; N],
     /// Duty cycle of the brake resistor.
-    pub brake: f32,
+    pub(crate) brake: f32,
     /// Output of the holding brake: high releases it.
     pub holding_brake: bool,
     /// Encoder counters.
-    pub encoders: [u16; N],
+    pub(crate) encoders: [u16; N],
     /// Frames of the absolute encoders at rotor and joint.
-    pub encoder_frames: [[u16; 2]; N],
+    pub(crate) encoder_frames: [[u16; 2]; N],
     /// Whether the gate drivers hold their configuration.
-    pub gates: [bool; N],
+    pub(crate) gates: [bool; N],
     /// Whether the gate drivers are powered.
-    pub gates_on: bool,
+    pub(crate) gates_on: bool,
     /// Whether the gate drivers were configured since this was cleared: a reset has ended.
-    pub configured: bool,
+    pub(crate) configured: bool,
     /// Codes of the thermistors at the bridges.
-    pub thermistors: [u16; N],
+    pub(crate) thermistors: [u16; N],
     /// Codes of the thermistors in the motors; `None` while the converter is silent.
-    pub motor_thermistors: [Option<u16>; N],
+    pub(crate) motor_thermistors: [Option<u16>; N],
     /// Code of the conversion of a motor's thermistor that was started last.
     converted: Option<u16>,
     /// Whether the servo was requested.
-    pub servo_due: bool,
+    pub(crate) servo_due: bool,
     /// Whether a round of the bus was requested.
-    pub bus_due: bool,
+    pub(crate) bus_due: bool,
     /// The assistance was requested.
-    pub assist_due: bool,
+    pub(crate) assist_due: bool,
     /// The bus controller.
-    pub can: CanController,
+    pub(crate) can: CanController,
     /// Whether the watchdog was fed since this was cleared.
-    pub fed: bool,
+    pub(crate) fed: bool,
     /// Factor on the watchdog's usual time, if it changed.
-    pub stretched: Option<u64>,
+    pub(crate) stretched: Option<u64>,
     /// Readings of the clock in this round of the bus.
     readings: Readings,
 }
@@ -122,7 +122,7 @@ impl<const N: usize> Registers<N> {
     }
 
     /// Sets the time, nanoseconds, at the start of a round of the bus.
-    pub fn set_time(&mut self, now_ns: u64) {
+    pub(crate) fn set_time(&mut self, now_ns: u64) {
         self.can.now_ns = now_ns;
         self.readings = Readings::default();
     }

@@ -18,7 +18,7 @@ use crate::bus::effect::Effect;
 use crate::bus::network::Network;
 
 /// Maximum age of a set-point; also the capacity of the queue in bus time.
-pub const MOST_AGE: Duration = Duration::from_millis(100);
+pub(crate) const MOST_AGE: Duration = Duration::from_millis(100);
 /// Least capacity in bits, independent of speed and bit rate.
 const LEAST_BITS: u64 = 16 * 135;
 /// Frames passed to the bus per tick; more than it can carry in one.
@@ -50,13 +50,13 @@ enum Plug {
 
 /// Client frames that were not sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Dropped {
+pub(crate) struct Dropped {
     /// Refused because the queue was full.
-    pub refused: u64,
+    pub(crate) refused: u64,
     /// Displaced by a stop while the queue was full; an older stop only by a newer one of its kind.
-    pub displaced: u64,
+    pub(crate) displaced: u64,
     /// Set-points that were too old.
-    pub old: u64,
+    pub(crate) old: u64,
 }
 
 /// Whether a stop makes an older one superfluous: the same NMT command, object or PDO of the same node.
@@ -71,7 +71,7 @@ fn supersedes(newer: &Frame, older: &Frame) -> bool {
 
 /// Queue of one client at a time, and the plug of the boards; see the module.
 #[derive(Debug)]
-pub struct Adapter {
+pub(crate) struct Adapter {
     queue: VecDeque<Waiting>,
     /// Bits of the queued frames, and the limit.
     bits: u64,
@@ -105,12 +105,12 @@ impl Adapter {
     }
 
     /// The client has opened the channel.
-    pub fn opened(&mut self) {
+    pub(crate) fn opened(&mut self) {
         self.has_client = true;
     }
 
     /// The client has closed the channel or disconnected. Only its stops are still sent.
-    pub fn closed(&mut self, now_ns: u64) {
+    pub(crate) fn closed(&mut self, now_ns: u64) {
         self.has_client = false;
         if matches!(self.plug, Plug::Out { .. }) {
             // These frames cannot be sent any more, and must not be sent for the next client.
@@ -125,7 +125,7 @@ impl Adapter {
     }
 
     /// Queues a frame sent at `since` or later. Returns whether it fits.
-    pub fn push(&mut self, frame: Frame, since: Instant, effect: Effect) -> bool {
+    pub(crate) fn push(&mut self, frame: Frame, since: Instant, effect: Effect) -> bool {
         let (length, is_stop) = (u64::from(bits(&frame)), effect == Effect::Stop);
         while is_stop && self.bits + length > self.most_bits && self.stops < self.queue.len() {
             let Some(oldest) = self.queue.iter().position(|waiting| !waiting.is_stop) else { break };
@@ -157,7 +157,7 @@ impl Adapter {
     }
 
     /// Simulates one tick of the network, with the frames at the head of the queue.
-    pub fn tick<const N: usize, const B: usize>(
+    pub(crate) fn tick<const N: usize, const B: usize>(
         &mut self,
         network: &mut Network<N, B>,
         now: Instant,
@@ -212,14 +212,8 @@ impl Adapter {
         }
     }
 
-    /// Number of queued frames.
-    #[must_use]
-    pub fn waiting(&self) -> usize {
-        self.queue.len()
-    }
-
     /// Frames not sent since the last call.
-    pub fn take_dropped(&mut self) -> Dropped {
+    pub(crate) fn take_dropped(&mut self) -> Dropped {
         std::mem::take(&mut self.dropped)
     }
 }
@@ -291,7 +285,7 @@ mod tests {
         assert_eq!(bench.adapter.take_dropped(), Dropped { refused, ..Dropped::default() });
         // All are sent while they are young; then the queue accepts frames again.
         bench.run(101);
-        assert_eq!((bench.carried_out().len(), bench.adapter.waiting()), (taken, 0));
+        assert_eq!((bench.carried_out().len(), bench.adapter.queue.len()), (taken, 0));
         assert!(bench.push(0x301, &[0x55; 4]));
     }
 
@@ -343,7 +337,7 @@ mod tests {
             let [low, high, ..] = (number << 4).to_le_bytes();
             assert!(bench.push(0x201, &[low, high]) && bench.push(0, &[2, (number % 128) as u8]));
         }
-        assert!((1000..2000).contains(&bench.adapter.waiting()), "{}", bench.adapter.waiting());
+        assert!((1000..2000).contains(&bench.adapter.queue.len()), "{}", bench.adapter.queue.len());
         for (id, data) in [(0x202, &[0, 0][..]), (0x601, &[0x2B, 0x40, 0x60, 0, 0, 0, 0, 0])] {
             assert!(bench.push(id, data), "{id:x}");
         }
@@ -352,7 +346,7 @@ mod tests {
         bench.run(150);
         let sent = bench.carried_out();
         assert_eq!(sent[sent.len() - 2..], [(0x202, 0), (0x601, 0x2B)]);
-        assert_eq!(bench.adapter.waiting(), 0);
+        assert_eq!(bench.adapter.queue.len(), 0);
     }
 
     #[test]

@@ -7,12 +7,12 @@
 //! each millisecond  one step of storing (`operation::Storing`)
 //! ```
 //!
-//! While the flash is written the processor stalls ([`crate::bus::storing`]). The plant continues, no
+//! While the flash is written the processor stalls (`crate::bus::storing`). The plant continues, no
 //! level runs, and the controller holds three received frames.
 //!
 //! The operator's enabling switch is a contact, with or without a bus. A simulated operator holds it from the
-//! start. The enable request of closing it has ended before the boot-up messages. [`Board::forget`] and
-//! [`Board::enable_by_contacts`] give other beginnings.
+//! start. The enable request of closing it has ended before the boot-up messages. `Board::forget` and
+//! `Board::enable_by_contacts` give other beginnings.
 
 use hal_sim::world::periods::PERIODS_PER_TICK;
 use scarab::board::odrive_v3_6::settings::drives;
@@ -38,7 +38,7 @@ use crate::parameter_file::memory::{Memory, model_name};
 /// Length of a servo tick, ns.
 pub const TICK_NS: u64 = 1_000_000_000 / SERVO_RATE_HZ as u64;
 /// Log samples that can wait for a host: 4 s, 48 KB. A real board may have less memory.
-pub const LOG: usize = 2000;
+pub(crate) const LOG: usize = 2000;
 const PERIOD_NS: u64 = TICK_NS / PERIODS_PER_TICK as u64;
 /// Duration of each contact step. A contact is debounced for 20 ms, and each step takes one of the operator's
 /// rounds.
@@ -68,14 +68,14 @@ fn hold_the_switch<const N: usize, const B: usize>(rig: &mut Rig<N, B>) {
 #[derive(Clone, Copy, Debug)]
 pub struct Label {
     /// Default node-ID of the first node.
-    pub first: u8,
+    pub(crate) first: u8,
     /// Serial number.
-    pub serial: u32,
+    pub(crate) serial: u32,
 }
 
 impl Label {
     /// A single board.
-    pub const SINGLE: Self = Self { first: 1, serial: 1 };
+    pub(crate) const SINGLE: Self = Self { first: 1, serial: 1 };
 }
 
 /// Default node-ID of a joint.
@@ -144,7 +144,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
     }
 
     /// Simulates a power cycle: only the content of the flash remains.
-    pub fn power_on(&mut self) {
+    pub(crate) fn power_on(&mut self) {
         self.rig.power_on();
         self.device = device(&self.context, &self.encoders, self.label);
         self.flashing = Flashing::new();
@@ -152,13 +152,13 @@ impl<const N: usize, const B: usize> Board<N, B> {
     }
 
     /// Begins as a board that knows neither calibration nor zeros; the operator's contacts are open.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.rig.hand = Contacts::default();
         self.power_on();
     }
 
     /// Lets the operator's contacts enable the leg; returns whether they do.
-    pub fn enable_by_contacts(&mut self) -> bool {
+    pub(crate) fn enable_by_contacts(&mut self) -> bool {
         operator::enable(&mut self.rig)
     }
 
@@ -197,7 +197,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
     }
 
     /// Receives a frame of another controller at its end.
-    pub fn receive(&mut self, frame: &Frame, now_ns: u64) {
+    pub(crate) fn receive(&mut self, frame: &Frame, now_ns: u64) {
         if self.mailbox().is_off || !self.flashing.receive(frame, now_ns) {
             return;
         }
@@ -206,14 +206,14 @@ impl<const N: usize, const B: usize> Board<N, B> {
     }
 
     /// Continues after a frame of this board was sent and its mailbox is empty.
-    pub fn sent(&mut self, now_ns: u64) {
+    pub(crate) fn sent(&mut self, now_ns: u64) {
         if !self.flashing.stands(now_ns) {
             self.round(now_ns);
         }
     }
 
     /// Frames of this board that wait for the bus.
-    pub fn mailbox(&mut self) -> &mut Mailbox {
+    pub(crate) fn mailbox(&mut self) -> &mut Mailbox {
         &mut self.rig.board.registers.can.mailbox
     }
 
@@ -224,13 +224,13 @@ impl<const N: usize, const B: usize> Board<N, B> {
     }
 
     /// Storing of parameters.
-    pub fn flashing(&mut self) -> &mut Flashing<N> {
+    pub(crate) fn flashing(&mut self) -> &mut Flashing<N> {
         &mut self.flashing
     }
 
     /// Sets the state of the controller, and whether the firmware can read it. A bus-off controller neither
     /// receives nor sends.
-    pub fn set_controller(&mut self, controller: Controller, readable: bool) {
+    pub(crate) fn set_controller(&mut self, controller: Controller, readable: bool) {
         let can = &mut self.rig.board.registers.can;
         can.mailbox.is_off = controller == Controller::Off;
         can.state = if readable { controller } else { Controller::Active };
@@ -238,13 +238,13 @@ impl<const N: usize, const B: usize> Board<N, B> {
 
     /// Connects or disconnects the bus plug. Without it no frame passes; the controller is error passive, as
     /// no frame is acknowledged.
-    pub fn set_plugged(&mut self, plugged: bool) {
+    pub(crate) fn set_plugged(&mut self, plugged: bool) {
         self.set_controller(if plugged { Controller::Active } else { Controller::Passive }, true);
         self.mailbox().is_off = !plugged;
     }
 
     /// Simulates one servo tick of the leg; each of its PWM periods is shown at its end.
-    pub fn tick(&mut self, now_ns: u64, mut show: impl FnMut(&Rig<N, B>)) {
+    pub(crate) fn tick(&mut self, now_ns: u64, mut show: impl FnMut(&Rig<N, B>)) {
         if self.flashing.stands(now_ns) {
             return self.rig.stand_still(u64::from(PERIODS_PER_TICK));
         }
@@ -291,7 +291,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
 
     /// Whether a frame is an emergency message of this board.
     #[must_use]
-    pub fn is_emergency(&self, frame: &Frame) -> bool {
+    pub(crate) fn is_emergency(&self, frame: &Frame) -> bool {
         frame.full().is_some() && self.device.reports_once(frame)
     }
 

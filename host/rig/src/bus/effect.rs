@@ -22,7 +22,7 @@ const MOST_FRAMES: usize = 32;
 
 /// Effect of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effect {
+pub(crate) enum Effect {
     /// NMT command, or a controlword that disables, stops or resets.
     Stop,
     /// Target, controlword that enables or continues, or SYNC that makes a waiting target effective.
@@ -77,7 +77,7 @@ fn sync_of(mut node: Node, now_us: u64) -> u16 {
 
 impl Effect {
     /// Returns the effect of a frame on these nodes.
-    pub fn from_frame<'a>(frame: &Frame, nodes: impl Iterator<Item = &'a Node>, now_us: u64) -> Self {
+    pub(crate) fn from_frame<'a>(frame: &Frame, nodes: impl Iterator<Item = &'a Node>, now_us: u64) -> Self {
         if frame.id() == NMT {
             // Other lengths are no command.
             return if frame.data().len() == 2 { Self::Stop } else { Self::Other };

@@ -6,7 +6,7 @@
 //! at intervals      heartbeat, and the controlword again
 //! ```
 //!
-//! Each kind of frame can be stopped ([`Speaks`]).
+//! Each kind of frame can be stopped (`Speaks`).
 
 use core::f64::consts::TAU;
 use std::collections::VecDeque;
@@ -27,16 +27,16 @@ use crate::faulty_board::Rig;
 use scarab::model::planar::{BASE, JOINTS};
 
 /// Node-IDs of hip and knee.
-pub const NODES: [u16; JOINTS] = [1, 2];
+pub(crate) const NODES: [u16; JOINTS] = [1, 2];
 /// Node-ID of the host.
 const NUMBER: u16 = 0x70;
 const START: u16 = 0;
 const SYNC: u16 = 0x80;
 /// Servo ticks per second.
-pub const SECOND: u64 = SERVO_RATE_HZ as u64;
+pub(crate) const SECOND: u64 = SERVO_RATE_HZ as u64;
 /// Object of the following window, micro-radian, and the value with which a host requests storing.
-pub const WINDOW: u16 = 0x6065;
-pub const SAVE: u32 = u32::from_le_bytes(*b"save");
+pub(crate) const WINDOW: u16 = 0x6065;
+pub(crate) const SAVE: u32 = u32::from_le_bytes(*b"save");
 /// COB-ID of both joints' targets; hip and knee take their half each.
 pub const TARGETS: u16 = 0x301;
 const WORDS: u16 = 0x200;
@@ -55,13 +55,13 @@ const RATE_HZ: f64 = 0.7;
 
 /// Frames that the host sends by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Speaks {
+pub(crate) struct Speaks {
     /// SYNC and targets.
-    pub targets: bool,
+    pub(crate) targets: bool,
     /// Repeated controlword.
-    pub words: bool,
+    pub(crate) words: bool,
     /// Servo ticks between two heartbeats; 0 for none.
-    pub heartbeat: u64,
+    pub(crate) heartbeat: u64,
 }
 
 /// Writes to a joint's object dictionary that set the compact mapping (docs/bus.md): index, subindex, value,
@@ -88,13 +88,13 @@ pub fn compact_mapping(joint: usize) -> Vec<(u16, u8, u32, u8)> {
 
 /// One leg, one bus, one host.
 #[derive(Clone, Debug)]
-pub struct Host {
+pub(crate) struct Host {
     /// Bus with the board.
-    pub network: Network<JOINTS, BASE>,
+    pub(crate) network: Network<JOINTS, BASE>,
     /// Frames sent at present.
-    pub speaks: Speaks,
+    pub(crate) speaks: Speaks,
     /// Servo ticks per cycle.
-    pub cycle: u64,
+    pub(crate) cycle: u64,
     ticks: u64,
     /// Last reported joint positions, start and amplitude of the motion, all in micro-radian.
     positions: [i32; JOINTS],
@@ -140,17 +140,17 @@ impl Host {
     }
 
     /// Firmware and plant of the leg.
-    pub fn rig(&mut self) -> &mut Rig<JOINTS, BASE> {
+    pub(crate) fn rig(&mut self) -> &mut Rig<JOINTS, BASE> {
         &mut self.board().rig
     }
 
     /// Whether the leg's drive is enabled.
-    pub fn is_enabled(&mut self) -> bool {
+    pub(crate) fn is_enabled(&mut self) -> bool {
         self.rig().state().permission() == Permission::Follow
     }
 
     /// Simulates one servo tick; each of its PWM periods is shown.
-    pub fn tick(&mut self, watch: impl FnMut(&Rig<JOINTS, BASE>)) {
+    pub(crate) fn tick(&mut self, watch: impl FnMut(&Rig<JOINTS, BASE>)) {
         if self.speaks.targets && self.ticks.is_multiple_of(self.cycle) {
             let seconds = self.ticks as f64 * TICK_NS as f64 * 1e-9;
             let share = 0.5 - 0.5 * (TAU * RATE_HZ * seconds).cos();
@@ -209,35 +209,35 @@ impl Host {
     }
 
     /// Sends a controlword.
-    pub fn command(&mut self, node: u16, word: u16) {
+    pub(crate) fn command(&mut self, node: u16, word: u16) {
         self.network.send(Frame::new(WORDS + node, &word.to_le_bytes()));
     }
 
     /// End of the last heartbeat and of the last targets on the wire.
     #[must_use]
-    pub fn sent_ns(&self) -> [u64; 2] {
+    pub(crate) fn sent_ns(&self) -> [u64; 2] {
         self.sent_ns
     }
 
     /// End of the last cyclic frame to each node on the wire: SYNC, targets, controlword.
     #[must_use]
-    pub fn cyclic_ns(&self) -> [u64; JOINTS] {
+    pub(crate) fn cyclic_ns(&self) -> [u64; JOINTS] {
         self.cyclic_ns
     }
 
     /// Steps the motion back by `ticks`, after a pause of the host.
-    pub fn rewind(&mut self, ticks: u64) {
+    pub(crate) fn rewind(&mut self, ticks: u64) {
         self.ticks -= ticks;
     }
 
     /// Sets the targets to the present positions from now on.
-    pub fn follow_positions(&mut self) {
+    pub(crate) fn follow_positions(&mut self) {
         self.from = None;
     }
 
     /// Emergency messages so far: node and code.
     #[must_use]
-    pub fn emergencies(&self) -> &[(u16, u16)] {
+    pub(crate) fn emergencies(&self) -> &[(u16, u16)] {
         &self.emergencies
     }
 
@@ -263,7 +263,7 @@ impl Host {
     ///
     /// # Errors
     /// A node does not answer, or refuses.
-    pub fn write_both(&mut self, index: u16, value: u32, size: u8) -> Result<(), ToolError> {
+    pub(crate) fn write_both(&mut self, index: u16, value: u32, size: u8) -> Result<(), ToolError> {
         NODES.into_iter().try_for_each(|node| self.write(node, index, 0, value, size))
     }
 
@@ -272,7 +272,7 @@ impl Host {
     ///
     /// # Errors
     /// A node refuses.
-    pub fn begin(&mut self) -> Result<(), ToolError> {
+    pub(crate) fn begin(&mut self) -> Result<(), ToolError> {
         self.run(4);
         self.network.send(Frame::new(START, &[1, 0]));
         self.run(4);
@@ -289,7 +289,7 @@ impl Host {
     ///
     /// # Errors
     /// A node refuses, or the leg is not enabled.
-    pub fn move_leg(&mut self, leg: &LegFile) -> Result<(), ToolError> {
+    pub(crate) fn move_leg(&mut self, leg: &LegFile) -> Result<(), ToolError> {
         self.speaks.targets = true;
         self.run(4 * CYCLE);
         for word in [6, 7, ENABLED] {

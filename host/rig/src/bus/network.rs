@@ -45,12 +45,12 @@ impl<const N: usize, const B: usize> Network<N, B> {
     }
 
     /// Removes the host's frames that are not on the wire yet.
-    pub fn recall(&mut self) {
+    pub(crate) fn recall(&mut self) {
         self.host.clear();
     }
 
     /// Connects or disconnects the bus plug of every board.
-    pub fn set_plugged(&mut self, plugged: bool) {
+    pub(crate) fn set_plugged(&mut self, plugged: bool) {
         for board in &mut self.boards {
             board.set_plugged(plugged);
         }
@@ -58,12 +58,12 @@ impl<const N: usize, const B: usize> Network<N, B> {
 
     /// Effect that a frame of the host would have on its nodes now.
     #[must_use]
-    pub fn effect(&self, frame: &Frame) -> Effect {
+    pub(crate) fn effect(&self, frame: &Frame) -> Effect {
         Effect::from_frame(frame, self.boards.iter().flat_map(|board| board.nodes()), self.now_ns / 1000)
     }
 
     /// Sets the frame that a faulty node sends as often as the bus allows; `None` stops it.
-    pub fn babble(&mut self, frame: Option<Frame>) {
+    pub(crate) fn babble(&mut self, frame: Option<Frame>) {
         self.babble = frame;
         self.babbler.clear();
     }
@@ -80,7 +80,7 @@ impl<const N: usize, const B: usize> Network<N, B> {
     }
 
     /// Like [`Self::tick`]; every PWM period of every leg is shown as well.
-    pub fn tick_watched(&mut self, mut show: impl FnMut(&Sent), mut watch: impl FnMut(&Rig<N, B>)) {
+    pub(crate) fn tick_watched(&mut self, mut show: impl FnMut(&Sent), mut watch: impl FnMut(&Rig<N, B>)) {
         let now_ns = self.now_ns;
         self.boards.iter_mut().for_each(|board| board.tick(now_ns, &mut watch));
         let end_ns = now_ns + TICK_NS;

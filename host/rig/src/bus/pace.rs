@@ -19,7 +19,7 @@ const CHUNK_TICKS: u32 = 40;
 /// Ticks for each step of enabling before it.
 const STEP_TICKS: u32 = 20;
 /// Ticks after which all nodes have sent their boot-up messages.
-pub const BOOT_TICKS: u32 = 20;
+pub(crate) const BOOT_TICKS: u32 = 20;
 
 /// Figures of one second.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,9 +27,9 @@ pub struct Second {
     /// Simulated seconds per second.
     pub speed: f64,
     /// Largest delay behind the clock.
-    pub late: Duration,
+    pub(crate) late: Duration,
     /// Time of the clock that was skipped.
-    pub let_go: Duration,
+    pub(crate) let_go: Duration,
 }
 
 /// Pace of a simulation relative to the clock.
@@ -136,7 +136,7 @@ fn spent(begin: Instant) -> Duration {
 /// Speeds that this machine reaches with enabled drives if nothing else runs, in simulated seconds per second
 /// of the processor, in ascending order.
 #[must_use]
-pub fn reachable<const N: usize, const B: usize>(network: &Network<N, B>) -> Vec<f64> {
+pub(crate) fn reachable<const N: usize, const B: usize>(network: &Network<N, B>) -> Vec<f64> {
     let mut network = enabled(network);
     let start = Instant::now();
     let mut speeds: Vec<f64> = (0..CHUNKS)
@@ -154,7 +154,7 @@ pub fn reachable<const N: usize, const B: usize>(network: &Network<N, B>) -> Vec
 ///
 /// # Errors
 /// The speed exceeds the median of the measurements.
-pub fn judge(speed: f64, speeds: &[f64], legs: usize) -> Result<Option<String>, String> {
+pub(crate) fn judge(speed: f64, speeds: &[f64], legs: usize) -> Result<Option<String>, String> {
     let s = if legs == 1 { "" } else { "s" };
     let [quartile, median] = [4, 2].map(|part| speeds.get(speeds.len() / part).copied().unwrap_or(0.0));
     if speed > median {

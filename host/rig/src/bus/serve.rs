@@ -84,7 +84,7 @@ impl ServeOptions {
 }
 
 /// Creates the wearer of each leg, if any.
-pub fn wearers<const N: usize, const B: usize>(
+pub(crate) fn wearers<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ServeOptions,
 ) -> Result<Vec<Worn<N>>, ToolError> {

@@ -54,7 +54,7 @@ pub enum What {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Event {
     /// Address of the connection.
-    pub peer: SocketAddr,
+    pub(crate) peer: SocketAddr,
     /// What happened.
     pub what: What,
 }

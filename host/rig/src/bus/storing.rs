@@ -29,13 +29,13 @@ const QUEUE: usize = 3;
 
 /// Pending store request.
 #[derive(Clone, Copy, Debug)]
-pub struct StorageRequest<const N: usize> {
+pub(crate) struct StorageRequest<const N: usize> {
     /// Store all, or restore the defaults.
-    pub what: StoreCommand,
+    pub(crate) what: StoreCommand,
     /// Objects of each node.
-    pub objects: [StoredNode; N],
+    pub(crate) objects: [StoredNode; N],
     /// Accepted models that are not stored yet, in the order of [`Key::MODELS`].
-    pub models: [Option<ModelRecord<N>>; 2],
+    pub(crate) models: [Option<ModelRecord<N>>; 2],
 }
 
 impl<const N: usize> StorageRequest<N> {
@@ -53,7 +53,7 @@ impl<const N: usize> StorageRequest<N> {
 
     /// Number of stored models after success, if it changes.
     #[must_use]
-    pub fn generation(&self) -> Option<u32> {
+    pub(crate) fn generation(&self) -> Option<u32> {
         match self.what {
             StoreCommand::Defaults => Some(0),
             StoreCommand::All => {
@@ -65,7 +65,7 @@ impl<const N: usize> StorageRequest<N> {
 
 /// Storing and stall of a simulated board; see the module.
 #[derive(Clone, Debug)]
-pub struct Flashing<const N: usize> {
+pub(crate) struct Flashing<const N: usize> {
     storing: Storing,
     requested: Option<StorageRequest<N>>,
     /// Accepted models that are not stored yet, in the order of [`Key::MODELS`].
@@ -80,9 +80,9 @@ pub struct Flashing<const N: usize> {
     queued: Vec<Frame>,
     lost: bool,
     /// Time to erase a sector.
-    pub erasing_ns: u64,
+    pub(crate) erasing_ns: u64,
     /// In campaigns without announcement, the inhibit reason of the store is not set in the firmware.
-    pub unannounced: bool,
+    pub(crate) unannounced: bool,
     unseen: Inhibit,
 }
 
@@ -107,7 +107,7 @@ impl<const N: usize> Flashing<N> {
 
     /// Whether a store request is in progress.
     #[must_use]
-    pub fn is_under_way(&self) -> bool {
+    pub(crate) fn is_under_way(&self) -> bool {
         self.requested.is_some()
     }
 
@@ -120,7 +120,7 @@ impl<const N: usize> Flashing<N> {
 
     /// Whether the processor stalls.
     #[must_use]
-    pub fn stands(&self, now_ns: u64) -> bool {
+    pub(crate) fn stands(&self, now_ns: u64) -> bool {
         now_ns < self.until_ns
     }
 
@@ -141,7 +141,7 @@ impl<const N: usize> Flashing<N> {
     }
 
     /// Whether the flash was changed since the last call.
-    pub fn take_kept(&mut self) -> bool {
+    pub(crate) fn take_kept(&mut self) -> bool {
         core::mem::take(&mut self.has_kept)
     }
 

@@ -49,7 +49,7 @@ pub const MOST_EVALUATIONS: u32 = 10_000_000;
 impl ExciteOptions {
     /// Options for the leg as its file states it, with its best description.
     #[must_use]
-    pub fn plain(design: DesignOptions, margin_percent: f64) -> Self {
+    pub(crate) fn plain(design: DesignOptions, margin_percent: f64) -> Self {
         let (given, torque_noise_percent, carried) = (None, None, Vec::new());
         Self { design, given, torque_noise_percent, carried, margin_percent, assumption: Assumption::Best }
     }
@@ -75,28 +75,28 @@ impl ExciteOptions {
 
 /// Reference of the torque noise.
 #[derive(Clone, Copy, Debug)]
-pub struct NoiseOrigin {
+pub(crate) struct NoiseOrigin {
     /// Percent of each joint's mean absolute torque on the default motion; zero if only N m are stated.
-    pub percent: f64,
+    pub(crate) percent: f64,
     /// Leg whose torque is meant: `truth` or `prior`.
-    pub of: &'static str,
+    pub(crate) of: &'static str,
 }
 
 /// Everything needed to score and simulate motions of one leg.
 #[derive(Clone, Debug)]
 pub struct Bench<const N: usize, const B: usize> {
     /// Assumed leg.
-    pub leg: LegFile,
+    pub(crate) leg: LegFile,
     /// `prior` or `truth`.
-    pub assumed: &'static str,
+    pub(crate) assumed: &'static str,
     /// Data from which firmware and plant are built.
-    pub context: Context<N, B>,
+    pub(crate) context: Context<N, B>,
     /// Scores a curve.
-    pub scorer: Scorer<N, B>,
+    pub(crate) scorer: Scorer<N, B>,
     /// Lower of torque limit and current limit, N m.
-    pub torque_limit: [f64; N],
+    pub(crate) torque_limit: [f64; N],
     /// Reference of the torque noise.
-    pub noise: NoiseOrigin,
+    pub(crate) noise: NoiseOrigin,
 }
 
 impl<const N: usize, const B: usize> Bench<N, B> {

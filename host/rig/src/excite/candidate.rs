@@ -13,14 +13,14 @@ use scarab::motion::{Fourier, HARMONICS, JointEnvelope};
 use scarab::units::{Radian, Second};
 
 /// Share of the range left free at both ends.
-pub const RANGE_MARGIN: f32 = 0.06;
+pub(crate) const RANGE_MARGIN: f32 = 0.06;
 /// Largest used share of the speed and acceleration limits; the rest is for overshoot of the position loop.
-pub const RATE_SHARE: f32 = 0.9;
+pub(crate) const RATE_SHARE: f32 = 0.9;
 /// Smallest share of the inner range.
 const LEAST_SHARE: f64 = 0.3;
 
 /// Coordinates of each joint: its amplitudes, the share of the range and the position in it.
-pub const PER_JOINT: usize = 2 * HARMONICS + 2;
+pub(crate) const PER_JOINT: usize = 2 * HARMONICS + 2;
 
 /// Curve at a point of the box; `None` only if the coordinates define no curve.
 #[must_use]

@@ -22,33 +22,33 @@ use crate::excite::score::{Cut, Scorer};
 
 /// Torque of one joint, N m, model's sign.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Demand {
+pub(crate) struct Demand {
     /// Smallest torque of the assumed leg.
-    pub low_nm: f64,
+    pub(crate) low_nm: f64,
     /// Largest torque of the assumed leg.
-    pub high_nm: f64,
+    pub(crate) high_nm: f64,
     /// Largest magnitude with the margin.
-    pub bound_nm: f64,
+    pub(crate) bound_nm: f64,
     /// Largest magnitude with the margin during the approach.
-    pub approach_nm: f64,
+    pub(crate) approach_nm: f64,
     /// Largest torque, margin included, that would hold the weight in a corner of the range from which no
     /// approach begins, because it exceeds the limit; zero without such a corner.
-    pub unheld_nm: f64,
+    pub(crate) unheld_nm: f64,
     /// Largest reduction of torque by the monitor, margin included: it must be able to stop a joint
     /// before its range ends.
-    pub cut: Cut,
+    pub(crate) cut: Cut,
 }
 
 impl Demand {
     /// Largest magnitude of motion and approach, N m.
     #[must_use]
-    pub fn largest(&self) -> f64 {
+    pub(crate) fn largest(&self) -> f64 {
         self.bound_nm.max(self.approach_nm)
     }
 
     /// The limit that is exceeded most, if any; `joint` counts from 0.
     #[must_use]
-    pub fn obstacle(&self, joint: usize, limit_nm: f64) -> Option<Obstacle> {
+    pub(crate) fn obstacle(&self, joint: usize, limit_nm: f64) -> Option<Obstacle> {
         let torque = |limit: Limit, value: f64| Obstacle { joint, limit, value, allowed: limit_nm };
         let cut = Obstacle {
             joint,
@@ -64,14 +64,14 @@ impl Demand {
 
     /// Whether the torque is below a limit, N m and never reduced by the monitor.
     #[must_use]
-    pub fn is_within(&self, limit_nm: f64) -> bool {
+    pub(crate) fn is_within(&self, limit_nm: f64) -> bool {
         self.largest() <= limit_nm && self.cut.by_nm <= 0.0
     }
 }
 
 /// Torque at every tick of the motion, and on its approaches.
 #[must_use]
-pub fn demand<const N: usize, const B: usize>(
+pub(crate) fn demand<const N: usize, const B: usize>(
     scorer: &Scorer<N, B>,
     configuration: &LegConfiguration<N, B>,
     motion: &Periodic<N>,

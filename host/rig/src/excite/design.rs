@@ -33,7 +33,7 @@ use crate::excite::demand::{Demand, demand};
 use crate::excite::obstacle::Obstacle;
 
 /// Duration of a blend between rest and full speed, s.
-pub const BLEND_S: f32 = 1.0;
+pub(crate) const BLEND_S: f32 = 1.0;
 /// Shortest cycle, s: its highest harmonic lies at a third of the position loop's 6 Hz, so the leg
 /// can follow.
 const SHORTEST_PERIOD_S: f64 = 3.0;
@@ -57,7 +57,7 @@ const SLICE: u32 = 100;
 /// Rounding of the coefficients, rad: the file contains exactly the proved values.
 const GRID_RAD: f64 = 1e-6;
 /// Factor per reduction of a motion with too much torque, and limit of the steps.
-pub const SHRINK: f32 = 0.98;
+pub(crate) const SHRINK: f32 = 0.98;
 const SHRINKINGS: u32 = 60;
 
 /// Options of a design.
@@ -84,11 +84,11 @@ pub enum Goal {
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<const N: usize> {
     /// Table as written to the file.
-    pub table: ExcitationTable<N>,
+    pub(crate) table: ExcitationTable<N>,
     /// The motion of the table.
-    pub motion: Periodic<N>,
+    pub(crate) motion: Periodic<N>,
     /// Torque of each joint.
-    pub demand: [Demand; N],
+    pub(crate) demand: [Demand; N],
 }
 
 /// Returns the best motion found at each pace.
@@ -134,7 +134,7 @@ pub fn candidates<const N: usize, const B: usize>(
 
 impl<const N: usize, const B: usize> Bench<N, B> {
     /// Refusal of a design that names the obstacle which comes nearest to its limit.
-    pub fn refusal(&self, obstacles: Vec<Obstacle>) -> ToolError {
+    pub(crate) fn refusal(&self, obstacles: Vec<Obstacle>) -> ToolError {
         let nearest = obstacles.into_iter().min_by(|one, other| one.excess().total_cmp(&other.excess()));
         let words = nearest.map_or(String::new(), |obstacle| {
             let joints = &self.context.configuration.joints;
@@ -242,7 +242,7 @@ fn search<const N: usize, const B: usize>(
 ///
 /// # Errors
 /// The limit that the smallest motion exceeds.
-pub fn smaller<const N: usize, const B: usize>(
+pub(crate) fn smaller<const N: usize, const B: usize>(
     bench: &Bench<N, B>,
     candidate: &Candidate<N>,
     factor: f32,

@@ -43,28 +43,28 @@ pub struct Rehearsal<const N: usize, const B: usize> {
     model: RowModel<f64, N, B>,
     assumed: [f64; B],
     /// Standard deviation of each joint's logged torque according to the leg file, N m.
-    pub noise_nm: [f64; N],
+    pub(crate) noise_nm: [f64; N],
     /// Share of each joint's rows excluded at standstill.
-    pub lost_share: [f64; N],
+    pub(crate) lost_share: [f64; N],
     /// Extremes of the plant's motion.
-    pub seen: [Seen; N],
+    pub(crate) seen: [Seen; N],
     /// Largest reduction of each joint's torque by the monitor.
-    pub reduced: [Option<Obstacle>; N],
+    pub(crate) reduced: [Option<Obstacle>; N],
 }
 
 /// Expected result of one motion at one noise.
 #[derive(Clone, Debug)]
-pub struct Expectation<const N: usize, const B: usize> {
+pub(crate) struct Expectation<const N: usize, const B: usize> {
     /// Record with the mean effect of noise.
-    pub record: Record<f64, N, B>,
+    pub(crate) record: Record<f64, N, B>,
     /// Covariance and determined parameters; values are those of the noise-free run.
-    pub estimate: Estimate<f64, B>,
+    pub(crate) estimate: Estimate<f64, B>,
     /// ln det of the information of all base parameters.
-    pub log_determinant: f64,
+    pub(crate) log_determinant: f64,
     /// Condition of the scaled, weighted problem.
-    pub condition: Option<f64>,
+    pub(crate) condition: Option<f64>,
     /// Base parameters minus those of the assumed leg, without any noise.
-    pub systematic: [f64; B],
+    pub(crate) systematic: [f64; B],
 }
 
 /// Runs a motion on the assumed leg.
@@ -170,7 +170,7 @@ fn note<const N: usize>(largest: &mut Option<Obstacle>, joint: usize, servo: &Se
 impl<const N: usize, const B: usize> Rehearsal<N, B> {
     /// Expected identification at this noise of each joint's logged torque, N m.
     #[must_use]
-    pub fn at_noise(&self, noise_nm: &[f64; N]) -> Expectation<N, B> {
+    pub(crate) fn at_noise(&self, noise_nm: &[f64; N]) -> Expectation<N, B> {
         let mut record = self.record.clone();
         add_noise(&mut record, noise_nm);
         let problem = Problem::new(&record, &self.model);

@@ -4,22 +4,22 @@
 //! | --- | --- |
 //! | [`assumption`] | leg assumed before the leg has moved |
 //! | [`mod@bench`] | the assumed leg with everything that its motions need |
-//! | [`candidate`] | coordinates in a box to a curve within angle, speed and acceleration |
-//! | [`score`] | information and torque of a curve, cheaply |
-//! | [`demand`] | torque of every tick, blends and approach included |
+//! | `candidate` | coordinates in a box to a curve within angle, speed and acceleration |
+//! | `score` | information and torque of a curve, cheaply |
+//! | `demand` | torque of every tick, blends and approach included |
 //! | [`design`] | the swarm over the curves |
-//! | [`expectation`] | sigma and status of every parameter, through the firmware's own chain |
-//! | [`obstacle`] | limit that a motion exceeds, in words |
+//! | `expectation` | sigma and status of every parameter, through the firmware's own chain |
+//! | `obstacle` | limit that a motion exceeds, in words |
 //! | [`run`] | a designed or given motion with its report |
-//! | [`warnings`] | read before the motion is run |
+//! | `warnings` | read before the motion is run |
 
 pub mod assumption;
 pub mod bench;
-pub mod candidate;
-pub mod demand;
+pub(crate) mod candidate;
+pub(crate) mod demand;
 pub mod design;
-pub mod expectation;
-pub mod obstacle;
+pub(crate) mod expectation;
+pub(crate) mod obstacle;
 pub mod run;
-pub mod score;
-pub mod warnings;
+pub(crate) mod score;
+pub(crate) mod warnings;

@@ -9,7 +9,7 @@ const DIVERGED: f64 = 3.0;
 
 /// Limit that a motion exceeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Limit {
+pub(crate) enum Limit {
     /// Angle, speed or acceleration of the commanded motion; the values are in rad and s.
     Motion(Quantity),
     /// Torque of the motion by the assumed leg, margin included.
@@ -26,27 +26,27 @@ pub enum Limit {
 
 /// Where a joint is, and how fast, in D-H angles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct OperatingPoint {
-    pub position_rad: f64,
-    pub velocity_rad_s: f64,
+pub(crate) struct OperatingPoint {
+    pub(crate) position_rad: f64,
+    pub(crate) velocity_rad_s: f64,
 }
 
 /// Exceeded limit of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Obstacle {
+pub(crate) struct Obstacle {
     /// Joint, counted from 0.
-    pub joint: usize,
-    pub limit: Limit,
+    pub(crate) joint: usize,
+    pub(crate) limit: Limit,
     /// Value that the motion needs.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Value that is allowed, in the same unit.
-    pub allowed: f64,
+    pub(crate) allowed: f64,
 }
 
 impl Obstacle {
     /// Obstacle of a motion that is not within its envelope.
     #[must_use]
-    pub fn from_motion(violation: &LimitViolation) -> Self {
+    pub(crate) fn from_motion(violation: &LimitViolation) -> Self {
         Self {
             joint: violation.joint,
             limit: Limit::Motion(violation.quantity),
@@ -57,7 +57,7 @@ impl Obstacle {
 
     /// Value over what is allowed, above 1.
     #[must_use]
-    pub fn excess(&self) -> f64 {
+    pub(crate) fn excess(&self) -> f64 {
         let (value, allowed) = (self.value.abs(), self.allowed.abs());
         match self.limit {
             Limit::Motion(_) | Limit::Torque | Limit::Approach | Limit::Loop(_) => value / allowed.max(1e-9),

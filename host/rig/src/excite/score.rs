@@ -42,42 +42,42 @@ const NOTHING: f64 = -1e4;
 
 /// Data for scoring curves.
 #[derive(Clone, Debug)]
-pub struct Scorer<const N: usize, const B: usize> {
+pub(crate) struct Scorer<const N: usize, const B: usize> {
     /// Geometry, gravity, base parameters.
-    pub model: RowModel<f64, N, B>,
+    pub(crate) model: RowModel<f64, N, B>,
     /// Base parameters of the assumed leg.
-    pub values: [f64; B],
+    pub(crate) values: [f64; B],
     /// Standard deviation of each joint's logged torque, N m.
-    pub noise_nm: [f64; N],
+    pub(crate) noise_nm: [f64; N],
     /// Assumed error of each base parameter, as a share.
-    pub margin: f64,
+    pub(crate) margin: f64,
     /// Limits of each joint in the firmware's monitor.
-    pub barriers: [Barrier; N],
+    pub(crate) barriers: [Barrier; N],
     /// Share of the low-pass's magnitude in each 10 ms, from its centre outwards.
     weights: Vec<f64>,
 }
 
 /// Reduction of a joint's torque by the monitor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cut {
+pub(crate) struct Cut {
     /// Reduction, N m; zero for none.
-    pub by_nm: f64,
+    pub(crate) by_nm: f64,
     /// Torque that the motion needs, N m.
-    pub wanted_nm: f64,
+    pub(crate) wanted_nm: f64,
     /// Torque that the monitor grants, N m.
-    pub granted_nm: f64,
-    pub point: OperatingPoint,
+    pub(crate) granted_nm: f64,
+    pub(crate) point: OperatingPoint,
 }
 
 /// Score of one curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Score<const N: usize> {
+pub(crate) struct Score<const N: usize> {
     /// ln det of the information of the base parameters.
-    pub merit: f64,
+    pub(crate) merit: f64,
     /// Largest torque of each joint, margin included, N m.
-    pub torque: [f64; N],
+    pub(crate) torque: [f64; N],
     /// Largest reduction of each joint's torque by the monitor, N m.
-    pub cut: [f64; N],
+    pub(crate) cut: [f64; N],
 }
 
 impl<const N: usize, const B: usize> Scorer<N, B> {
@@ -104,7 +104,7 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
 
     /// Base rows at one state, N m per unit.
     #[must_use]
-    pub fn rows(&self, state: &MotionState<N>) -> [[f64; B]; N] {
+    pub(crate) fn rows(&self, state: &MotionState<N>) -> [[f64; B]; N] {
         let state = Smoothed {
             position: state.position_rad.map(f64::from),
             velocity: state.velocity_rad_per_s.map(f64::from),
@@ -126,7 +126,14 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
     /// Reduction of a joint's torque by the monitor at one instant; the monitor must still be able to stop
     /// the joint.
     #[must_use]
-    pub fn cut(&self, joint: usize, position: f32, velocity: f32, torque: f64, uncertainty: f64) -> Cut {
+    pub(crate) fn cut(
+        &self,
+        joint: usize,
+        position: f32,
+        velocity: f32,
+        torque: f64,
+        uncertainty: f64,
+    ) -> Cut {
         let mut worst = Cut::default();
         for wanted_nm in [torque + uncertainty, torque - uncertainty] {
             let (allowed, _) = self.barriers[joint].bound(
@@ -149,7 +156,7 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
 
     /// Scores `cycles` cycles of a curve.
     #[must_use]
-    pub fn score(&self, curve: &Fourier<N>, cycles: u32) -> Score<N> {
+    pub(crate) fn score(&self, curve: &Fourier<N>, cycles: u32) -> Score<N> {
         let rows = ((f64::from(curve.period().0) * SPEED_RATE_HZ) as usize / SPEEDS_PER_ROW).max(8);
         let speeds = rows * SPEEDS_PER_ROW;
         let states: Vec<_> =
@@ -219,7 +226,7 @@ fn add_square<const B: usize>(sum: &mut SMatrix<f64, B, B>, row: &[f64; B]) {
 
 /// ln det of the leading `rank` rows and columns of a symmetric matrix given by its lower half.
 #[must_use]
-pub fn log_determinant<const B: usize>(lower: &SMatrix<f64, B, B>, rank: usize) -> f64 {
+pub(crate) fn log_determinant<const B: usize>(lower: &SMatrix<f64, B, B>, rank: usize) -> f64 {
     let mut scaled = SMatrix::<f64, B, B>::identity();
     let mut merit = 0.0;
     for column in 0..rank {

@@ -13,7 +13,7 @@ use scarab::safety::FaultCode;
 use crate::faulty_board::PERIODS_PER_S;
 
 /// One in this many seeds continues with a reset and enabling after the safe state.
-pub const RESET_EVERY: u64 = 8;
+pub(crate) const RESET_EVERY: u64 = 8;
 
 /// Sequence of a reset: both contacts open; the button pressed until the reset is complete; open again; the
 /// switch held until the drive would be enabled.
@@ -26,11 +26,11 @@ const STEPS: [(u64, Contacts); 4] = [
 const OPEN: Contacts = Contacts { enabling: false, start: false };
 
 /// Periods of the whole sequence.
-pub const RESET: u64 = STEPS[0].0 + STEPS[1].0 + STEPS[2].0 + STEPS[3].0;
+pub(crate) const RESET: u64 = STEPS[0].0 + STEPS[1].0 + STEPS[2].0 + STEPS[3].0;
 
 /// Contacts of the operator, `since` periods after the start of the reset.
 #[must_use]
-pub fn hand(since: u64) -> Contacts {
+pub(crate) fn hand(since: u64) -> Contacts {
     let mut left = since;
     for (periods, hand) in STEPS {
         if left < periods {
@@ -43,7 +43,7 @@ pub fn hand(since: u64) -> Contacts {
 
 /// Safe states that a fault may lead to.
 #[must_use]
-pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
+pub(crate) fn leads_to(code: FaultCode) -> &'static [&'static str] {
     use FaultCode as Code;
     match code {
         // A motor too fast for a short circuit is turned off; both are, if neither was switching.

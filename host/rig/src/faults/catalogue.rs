@@ -1,7 +1,7 @@
 //! The catalogue of faults: what is injected, what detects it, the required reaction and its deadline.
 //!
 //! Each fault is stated once, here. Its runs refer to it: forks of an identification with complete drives
-//! ([`crate::faults::forks`]), a bench of its own ([`crate::faults::bench`]), and the flash image on the
+//! (`crate::faults::forks`), a bench of its own ([`crate::faults::bench`]), and the flash image on the
 //! model of its microcontroller (`cargo chip faults`). docs/safety.md gives the reasons.
 
 use scarab::hal::SERVO_RATE_HZ;
@@ -10,15 +10,15 @@ use scarab::safety::FaultCode;
 use crate::faulty_board::PERIOD_MS;
 
 /// Time of a servo tick, ms.
-pub const TICK_MS: f64 = 1e3 / SERVO_RATE_HZ as f64;
+pub(crate) const TICK_MS: f64 = 1e3 / SERVO_RATE_HZ as f64;
 /// Limit after a host's timeout, ms. The bus checks after every second servo tick, the servo takes the order
 /// in the next tick, and its command acts one period later.
-pub const BUS_MS: f64 = 3.0 * TICK_MS + PERIOD_MS;
+pub(crate) const BUS_MS: f64 = 3.0 * TICK_MS + PERIOD_MS;
 /// PWM periods and time between two checks of an absolute encoder.
-pub const ENCODER_CHECK: u64 = 192;
-pub const ENCODER_CHECK_MS: f64 = ENCODER_CHECK as f64 * PERIOD_MS;
+pub(crate) const ENCODER_CHECK: u64 = 192;
+pub(crate) const ENCODER_CHECK_MS: f64 = ENCODER_CHECK as f64 * PERIOD_MS;
 /// Time between two readings of a motor's thermistor, with two of them, ms.
-pub const THERMISTOR_MS: f64 = 100.0;
+pub(crate) const THERMISTOR_MS: f64 = 100.0;
 /// Time between the sample of such a reading and the check that takes it, ms.
 const THERMISTOR_CHECK_MS: f64 = 50.0;
 
@@ -30,27 +30,27 @@ pub struct Fault {
     /// Description of the fault.
     pub fault: &'static str,
     /// Detector of the fault.
-    pub detector: &'static str,
+    pub(crate) detector: &'static str,
     /// Safe state.
-    pub state: &'static str,
+    pub(crate) state: &'static str,
     /// Safe state that the firmware uses besides or instead of it, where the fault removes a precondition of
     /// `state`.
-    pub instead: Option<&'static str>,
+    pub(crate) instead: Option<&'static str>,
     /// Time limit from the fault to the safe state's first command, ms; infinite where the limit is not a
     /// time.
     pub deadline_ms: f64,
     /// Unit of the magnitude.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// Fault codes that the firmware reports; empty if a bench judges by other means.
-    pub codes: &'static [FaultCode],
+    pub(crate) codes: &'static [FaultCode],
     /// Cases that are not detected yet.
-    pub lacking: Option<&'static str>,
+    pub(crate) lacking: Option<&'static str>,
 }
 
 impl Fault {
     /// Whether this state, or the one instead, is reached by `state`.
     #[must_use]
-    pub fn leads_to(&self, reached: impl Fn(&str) -> bool) -> bool {
+    pub(crate) fn leads_to(&self, reached: impl Fn(&str) -> bool) -> bool {
         reached(self.state) || self.instead.is_some_and(reached)
     }
 }
@@ -89,7 +89,7 @@ pub static ON_THE_CHIP: [&Fault; 5] = [&B6, &K2, &K4, &K5, &M1];
 
 /// Index of a fault in the catalogue.
 #[must_use]
-pub fn index_of(id: &str) -> Option<usize> {
+pub(crate) fn index_of(id: &str) -> Option<usize> {
     ALL.iter().position(|fault| fault.id == id)
 }
 

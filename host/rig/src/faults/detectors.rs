@@ -19,15 +19,15 @@ pub struct DetectorReport {
     /// Word used in records.
     pub code: &'static str,
     /// Rows in whose runs the code was reported.
-    pub faults: Vec<&'static str>,
+    pub(crate) faults: Vec<&'static str>,
     /// Runs in which the code was reported in time.
-    pub seen: usize,
+    pub(crate) seen: usize,
     /// Runs of these that are missed without the code.
-    pub missed_without: usize,
+    pub(crate) missed_without: usize,
     /// Runs of these in which another code reports in time without it.
-    pub seen_by_others: usize,
+    pub(crate) seen_by_others: usize,
     /// Runs of these that cannot be judged without it: the fault did not last, or the joint no longer moved.
-    pub unjudged_without: usize,
+    pub(crate) unjudged_without: usize,
 }
 
 fn forked(rows: &[Entry]) -> impl Iterator<Item = &'static Row> {
@@ -58,7 +58,7 @@ pub(super) fn views(row: &'static Row, rows: &[Entry]) -> Vec<Blind> {
 
 /// Detector reports of a blind campaign; empty for another.
 #[must_use]
-pub fn detectors(rows: &[Entry], campaign: &Campaign) -> Vec<DetectorReport> {
+pub(crate) fn detectors(rows: &[Entry], campaign: &Campaign) -> Vec<DetectorReport> {
     if campaign.singly.is_empty() {
         return Vec::new();
     }

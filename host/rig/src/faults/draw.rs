@@ -8,19 +8,19 @@ use crate::faulty_board::{PERIOD_MS, PERIODS_PER_S};
 use scarab::motor::SenseScale;
 
 /// Scale of the board's shunts and converter, A.
-pub const AMPERE_PER_CODE: f64 = 0.040_283;
+pub(crate) const AMPERE_PER_CODE: f64 = 0.040_283;
 /// Scale of the bus voltage's divider, V.
-pub const VOLT_PER_CODE: f64 = 3.3 * SenseScale::DIVIDER as f64 / 4096.0;
+pub(crate) const VOLT_PER_CODE: f64 = 3.3 * SenseScale::DIVIDER as f64 / 4096.0;
 
 /// Creates an injection.
 #[must_use]
-pub const fn at(channel: Channel, joint: usize, form: Form, timing: Timing) -> Injection {
+pub(crate) const fn at(channel: Channel, joint: usize, form: Form, timing: Timing) -> Injection {
     Injection { channel, joint, form, timing }
 }
 
 /// A run with one injection that is a fault from the start.
 #[must_use]
-pub const fn one(injection: Injection, expected: Expected) -> Scenario {
+pub(crate) const fn one(injection: Injection, expected: Expected) -> Scenario {
     Scenario {
         injections: [Some(injection), None],
         event: Event::None,
@@ -36,7 +36,7 @@ pub const fn one(injection: Injection, expected: Expected) -> Scenario {
 
 /// A run with an event besides the ports.
 #[must_use]
-pub const fn beside(event: Event, expected: Expected) -> Scenario {
+pub(crate) const fn beside(event: Event, expected: Expected) -> Scenario {
     let nothing = at(Channel::Bus, 0, Form::Off, Timing::from(u64::MAX));
     Scenario { injections: [None; 2], event, ..one(nothing, expected) }
 }
@@ -44,7 +44,7 @@ pub const fn beside(event: Event, expected: Expected) -> Scenario {
 /// Makes a lasting fault intermittent in one of four runs: one wrong reading in two to five. The axis rejects
 /// the readings after a number that follows from its count of doubtful readings (`scarab::motor::Axis`). One
 /// wrong reading in five is accepted without limit.
-pub fn now_and_then(random: &mut Random, lasting: Scenario) -> Scenario {
+pub(crate) fn now_and_then(random: &mut Random, lasting: Scenario) -> Scenario {
     if random.below(4) > 0 {
         return lasting;
     }

@@ -1,22 +1,22 @@
 //! Rows that are forks of an identification with complete drives: how their faults are drawn.
 
 pub mod board;
-pub mod current;
-pub mod encoder;
+pub(crate) mod current;
+pub(crate) mod encoder;
 pub mod joint;
 pub mod memory;
-pub mod model;
-pub mod number;
-pub mod stop;
-pub mod supply;
-pub mod timing;
+pub(crate) mod model;
+pub(crate) mod number;
+pub(crate) mod stop;
+pub(crate) mod supply;
+pub(crate) mod timing;
 pub mod wearer;
 
 use crate::faults::catalogue;
 use crate::faults::scenario::Row;
 
 /// All rows, in the catalogue's order.
-pub static ROWS: [Row; 21] = [
+pub(crate) static ROWS: [Row; 21] = [
     Row { fault: &catalogue::E2, draw: encoder::glitch },
     Row { fault: &catalogue::E4, draw: encoder::lost_counts },
     Row { fault: &catalogue::C2, draw: current::rail },

@@ -43,30 +43,30 @@ const PUSHES: PushDescription = PushDescription { rate: 0.5, torque: 20.0, durat
 
 /// Result of the hours. Field names are part of the JSON interface.
 #[derive(Clone, Debug, Serialize)]
-pub struct HoursReport {
+pub(crate) struct HoursReport {
     /// Simulated hours.
-    pub hours: Number,
+    pub(crate) hours: Number,
     /// Number of machines; seeds from 1.
-    pub stretches: usize,
+    pub(crate) stretches: usize,
     /// Those of them that a host shakes by torque.
-    pub shaken: usize,
+    pub(crate) shaken: usize,
     /// Largest push of the wearer, N m.
-    pub greatest_push_nm: f64,
+    pub(crate) greatest_push_nm: f64,
     /// Mean number of pushes per minute.
-    pub pushes_per_minute: f64,
+    pub(crate) pushes_per_minute: f64,
     /// Reported faults: code and time.
-    pub false_alarms: Vec<String>,
+    pub(crate) false_alarms: Vec<String>,
 }
 
 /// Normal motion of one machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stretch {
     /// Periods of the motion.
-    pub periods: u64,
+    pub(crate) periods: u64,
     /// Whether a host shakes the machine by torque.
-    pub is_shaken: bool,
+    pub(crate) is_shaken: bool,
     /// Reported fault, which ends it: code and time.
-    pub alarm: Option<String>,
+    pub(crate) alarm: Option<String>,
 }
 
 impl HoursReport {

@@ -16,19 +16,19 @@ use crate::faulty_board::{Edges, PERIODS_PER_S, Rig};
 const LONGEST_DAMPING: u64 = PERIODS_PER_S * 3 / 10 + 12;
 /// Largest excursion of a driven joint, rad, beyond its range or beyond its rest position outside. The
 /// monitor permits the same 0.5 degrees.
-pub const MARGIN_RAD: f64 = 0.008_727;
+pub(crate) const MARGIN_RAD: f64 = 0.008_727;
 /// Largest torque of a servo tick relative to the cap: ripple, and a step of the current.
 const TORQUE_MARGIN: f64 = 1.1;
 
 /// Invariants for whose violation the firmware, not the injection, is responsible.
 #[derive(Clone, Copy, Debug)]
-pub struct Scope {
+pub(crate) struct Scope {
     /// The measured currents are the true ones.
-    pub torque: bool,
+    pub(crate) torque: bool,
     /// No push is stronger than the drive.
-    pub range: bool,
+    pub(crate) range: bool,
     /// Counts reach the servo unchanged.
-    pub rotor_position: bool,
+    pub(crate) rotor_position: bool,
 }
 
 impl Scope {
@@ -53,7 +53,7 @@ const MOST_WRONG_PERIODS: u64 = PERIODS_PER_S / 50;
 
 /// Checks one run.
 #[derive(Clone, Debug)]
-pub struct Invariants<const N: usize> {
+pub(crate) struct Invariants<const N: usize> {
     scope: Scope,
     /// Ranges of the joints, anatomical, rad.
     range: [[f64; 2]; N],
@@ -108,7 +108,7 @@ impl<const N: usize> Invariants<N> {
     }
 
     /// Checks the period that has ended; `stop` is true if the emergency stop was open in it.
-    pub fn see<const B: usize>(&mut self, rig: &Rig<N, B>, stop: bool) {
+    pub(crate) fn see<const B: usize>(&mut self, rig: &Rig<N, B>, stop: bool) {
         if stop {
             self.stop_open = Some(rig.period);
         }
@@ -163,7 +163,7 @@ impl<const N: usize> Invariants<N> {
 
     /// Checks the rotor positions of switching axes from now on, once the rotors have turned. Lost counts at
     /// rest are detected at the index, a frozen counter by the motor's voltage.
-    pub fn check_positions_from_now(&mut self) {
+    pub(crate) fn check_positions_from_now(&mut self) {
         self.watched = self.scope.rotor_position;
     }
 
@@ -220,7 +220,7 @@ impl<const N: usize> Invariants<N> {
     }
 
     /// Notes a broken invariant.
-    pub fn note<const B: usize>(&mut self, rig: &Rig<N, B>, what: &str) {
+    pub(crate) fn note<const B: usize>(&mut self, rig: &Rig<N, B>, what: &str) {
         if self.broken.len() < 4 {
             let alarm = rig.alarm().map_or("none", FaultCode::name);
             self.broken.push(format!("period {}: {what} (alarm: {alarm})", rig.period));
@@ -229,7 +229,7 @@ impl<const N: usize> Invariants<N> {
 
     /// Descriptions of the broken invariants.
     #[must_use]
-    pub fn into_broken(self) -> Vec<String> {
+    pub(crate) fn into_broken(self) -> Vec<String> {
         self.broken
     }
 }

@@ -15,29 +15,29 @@ pub struct Outcome {
     /// Seed of the run; 0 for one with the emergency stop at every tick, which its period identifies.
     pub seed: u64,
     /// Period of the injection.
-    pub period: u64,
+    pub(crate) period: u64,
     /// The fault was detected in time, and the machine is safe.
-    pub detected: bool,
+    pub(crate) detected: bool,
     /// Nothing detectable happened.
-    pub undetectable: bool,
+    pub(crate) undetectable: bool,
     /// A fault was reported although nothing was wrong.
-    pub false_alarm: bool,
+    pub(crate) false_alarm: bool,
     /// Time from the fault to the safe state's first command, ms.
-    pub after_ms: Option<f64>,
+    pub(crate) after_ms: Option<f64>,
     /// Deadline of this run where it is longer than the row's, ms: an intermittent fault.
-    pub intermittent_ms: Option<f64>,
+    pub(crate) intermittent_ms: Option<f64>,
     /// `Off`, `Damp`, `Limit`; `None` where the motion continued.
     #[serde(deserialize_with = "optional_word")]
-    pub state: Option<Word>,
+    pub(crate) state: Option<Word>,
     /// Fault reported by the firmware.
     #[serde(deserialize_with = "optional_word")]
-    pub alarm: Option<Word>,
+    pub(crate) alarm: Option<Word>,
     /// Size of the fault in the row's unit.
-    pub magnitude: Option<f64>,
+    pub(crate) magnitude: Option<f64>,
     /// Broken invariants.
-    pub broken: Vec<String>,
+    pub(crate) broken: Vec<String>,
     /// Hash of everything that crossed the ports.
-    pub hash: String,
+    pub(crate) hash: String,
     /// Curves of the run, where requested.
     #[serde(skip)]
     pub recording: Option<FaultCurves>,
@@ -69,7 +69,7 @@ pub struct Manner {
 impl Manner {
     /// Returns whether detectors are disabled.
     #[must_use]
-    pub fn is_blind(&self) -> bool {
+    pub(crate) fn is_blind(&self) -> bool {
         self.blind != Blind::None
     }
 }

@@ -25,97 +25,97 @@ pub struct RowReport {
     /// Id in the catalogue.
     pub fault: &'static str,
     /// Seeded runs.
-    pub runs: usize,
+    pub(crate) runs: usize,
     /// Runs that were detected in time and made safe.
-    pub detected: usize,
+    pub(crate) detected: usize,
     /// Those of them detected by this row's own detectors; detection by others says nothing about these.
-    pub seen_by_own: usize,
+    pub(crate) seen_by_own: usize,
     /// Runs neither detected nor undetectable by design.
     pub missed: usize,
     /// Runs in which a fault was reported although nothing was wrong.
     pub false_alarms: usize,
     /// Whether there are runs that could show a false alarm.
-    pub judges_false_alarms: bool,
+    pub(crate) judges_false_alarms: bool,
     /// Longest time from a lasting fault to the safe state's first command, ms.
-    pub worst_ms: Number,
+    pub(crate) worst_ms: Number,
     /// Deadline, ms.
-    pub deadline_ms: Number,
+    pub(crate) deadline_ms: Number,
     /// Longest time from the first reading of an intermittent fault, ms.
-    pub worst_intermittent_ms: Number,
+    pub(crate) worst_intermittent_ms: Number,
     /// Deadline of intermittent faults, ms; the longest of all runs.
-    pub intermittent_deadline_ms: Number,
+    pub(crate) intermittent_deadline_ms: Number,
     /// Safe state: the catalogue's last column.
-    pub state: &'static str,
+    pub(crate) state: &'static str,
     /// Safe state that the firmware uses instead, by design; docs/safety.md gives the reason.
-    pub state_instead: Option<&'static str>,
+    pub(crate) state_instead: Option<&'static str>,
     /// Runs in which either state was reached.
-    pub state_reached: usize,
+    pub(crate) state_reached: usize,
     /// Runs in which nothing detectable happened.
-    pub undetectable_by_design: usize,
+    pub(crate) undetectable_by_design: usize,
     /// Description of the fault.
-    pub what: &'static str,
+    pub(crate) what: &'static str,
     /// Detector of the fault.
-    pub detector: &'static str,
+    pub(crate) detector: &'static str,
     /// Codes that the firmware reported.
-    pub codes: Vec<&'static str>,
+    pub(crate) codes: Vec<&'static str>,
     /// Smallest detected magnitude.
-    pub smallest_seen: Number,
+    pub(crate) smallest_seen: Number,
     /// Largest magnitude that was not detected.
-    pub largest_unseen: Number,
+    pub(crate) largest_unseen: Number,
     /// Unit of both magnitudes.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// Cases that the detector does not cover yet.
-    pub lacking: Option<&'static str>,
+    pub(crate) lacking: Option<&'static str>,
     /// Detected over detected and missed of these runs; unknown where nothing was detectable. Not the
     /// diagnostic coverage of ISO 13849-1, which weighs dangerous faults and counts undetectable ones.
-    pub detected_of_detectable: Number,
+    pub(crate) detected_of_detectable: Number,
 }
 
 /// Runs without a required detection in which no invariant may break. Field names are part of the JSON
 /// interface.
 #[derive(Clone, Debug, Serialize)]
-pub struct TrialsReport {
+pub(crate) struct TrialsReport {
     /// `sweep` or `pairs`.
-    pub kind: &'static str,
+    pub(crate) kind: &'static str,
     /// Seeded runs.
-    pub runs: usize,
+    pub(crate) runs: usize,
     /// Runs in which a fault was reported.
-    pub raised: usize,
+    pub(crate) raised: usize,
     /// Broken invariants.
-    pub invariants_broken: usize,
+    pub(crate) invariants_broken: usize,
 }
 
 /// Report of a campaign. Field names are part of the JSON interface.
 #[derive(Clone, Debug, Serialize)]
 pub struct CampaignReport {
     /// Version of the JSON.
-    pub schema: u32,
+    pub(crate) schema: u32,
     /// Rows that were run.
     pub rows: Vec<RowReport>,
     /// Broken invariants over all runs.
     pub invariants_broken: usize,
     /// Runs that were missed, broke an invariant or raised a false alarm; at most a hundred.
-    pub failures: Vec<Outcome>,
+    pub(crate) failures: Vec<Outcome>,
     /// Detected over detected and missed, over all rows.
-    pub detected_of_detectable: Number,
+    pub(crate) detected_of_detectable: Number,
     /// Runs of all rows.
     pub runs: usize,
     /// Those of them in which nothing detectable happened.
-    pub undetectable_by_design: usize,
+    pub(crate) undetectable_by_design: usize,
     /// Runs with the emergency stop at every tick; included in X1.
-    pub every_tick: usize,
+    pub(crate) every_tick: usize,
     /// Each code of the firmware disabled separately, in a blind campaign.
     pub detectors: Vec<DetectorReport>,
     /// Results of the sweep and of two faults at once.
-    pub trials: Vec<TrialsReport>,
+    pub(crate) trials: Vec<TrialsReport>,
     /// Result of the hours of normal motion, where requested.
-    pub hours: Option<HoursReport>,
+    pub(crate) hours: Option<HoursReport>,
     /// Motion without a fault, s.
-    pub undisturbed_s: f64,
+    pub(crate) undisturbed_s: f64,
     /// Faults reported during it, in words; empty in a good campaign.
     pub base_alarms: Vec<String>,
     /// Hash of all runs, in order.
-    pub trace_hash: String,
+    pub(crate) trace_hash: String,
 }
 
 impl CampaignReport {

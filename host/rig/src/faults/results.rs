@@ -21,28 +21,28 @@ pub struct Campaign {
     pub trials: Vec<Outcome>,
     /// In a blind campaign: the forked rows' runs with every detector enabled, and with one code at a time
     /// disabled.
-    pub singly: Vec<(Blind, Outcome)>,
+    pub(crate) singly: Vec<(Blind, Outcome)>,
     /// Number of runs with the emergency stop at every tick.
-    pub every_tick: usize,
+    pub(crate) every_tick: usize,
     /// Identifications of which the runs are forks.
-    pub bases: Vec<Base>,
+    pub(crate) bases: Vec<Base>,
     /// Stretches of normal motion, where requested.
     pub hours: Option<Vec<Stretch>>,
 }
 
 /// Identification without a fault, of which runs are forks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Base {
+pub(crate) struct Base {
     /// Seed of the identification.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The torque caps are widened.
-    pub widened: bool,
+    pub(crate) widened: bool,
     /// Periods until its last fork, or until the alarm.
-    pub periods: u64,
+    pub(crate) periods: u64,
     /// Fault that was reported although there was none, with its period; the later forks are not run.
-    pub alarm: Option<String>,
+    pub(crate) alarm: Option<String>,
     /// Number of these forks.
-    pub not_run: usize,
+    pub(crate) not_run: usize,
 }
 
 impl Campaign {
@@ -94,13 +94,13 @@ impl Campaign {
 
     /// Duration of motion without a fault, s.
     #[must_use]
-    pub fn undisturbed_s(&self) -> f64 {
+    pub(crate) fn undisturbed_s(&self) -> f64 {
         self.bases.iter().fold(0.0, |sum, base| sum + base.periods as f64 / PERIODS_PER_S as f64)
     }
 
     /// Faults reported during it.
     #[must_use]
-    pub fn base_alarms(&self) -> Vec<String> {
+    pub(crate) fn base_alarms(&self) -> Vec<String> {
         let of = |base: &Base| {
             let alarm = base.alarm.as_ref()?;
             Some(format!("base {}, {alarm}; {} runs not run", base.seed, base.not_run))

@@ -11,7 +11,7 @@ use crate::faults::catalogue::Fault;
 
 /// Required reaction of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Expected {
+pub(crate) enum Expected {
     /// Both bridges off, permanently.
     Off,
     /// Both bridges off, even during the reaction to another fault.
@@ -34,7 +34,7 @@ pub enum Expected {
 
 /// Condition at which the fault begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Onset {
+pub(crate) enum Onset {
     /// At the injection.
     Injection,
     /// Some periods after the injection.
@@ -104,55 +104,55 @@ pub enum Event {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scenario {
     /// Injections; their periods count from the injection's.
-    pub injections: [Option<Injection>; 2],
+    pub(crate) injections: [Option<Injection>; 2],
     /// Event besides the injections.
-    pub event: Event,
+    pub(crate) event: Event,
     /// Condition under which the fault exists.
-    pub onset: Onset,
+    pub(crate) onset: Onset,
     /// Required reaction.
-    pub expected: Expected,
+    pub(crate) expected: Expected,
     /// Size of the fault in the row's unit.
-    pub magnitude: Option<f64>,
+    pub(crate) magnitude: Option<f64>,
     /// Undetectable by design: too small, and harmless.
-    pub by_design: bool,
+    pub(crate) by_design: bool,
     /// Longest wait for the onset, periods.
-    pub patience: u64,
+    pub(crate) patience: u64,
     /// Replaces the row's deadline, ms.
-    pub within_ms: Option<f64>,
+    pub(crate) within_ms: Option<f64>,
     /// Rotor turns within which the fault is detected, for a row without a deadline.
-    pub turns: f64,
+    pub(crate) turns: f64,
 }
 
 /// How a fault of the catalogue is run as forks.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     /// The fault.
-    pub fault: &'static Fault,
+    pub(crate) fault: &'static Fault,
     /// Draws a run for a board with these thresholds.
-    pub draw: fn(&mut Random, &Bounds) -> Scenario,
+    pub(crate) draw: fn(&mut Random, &Bounds) -> Scenario,
 }
 
 /// Detection thresholds of the firmware for the simulated leg.
 #[derive(Clone, Copy, Debug)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     /// Counts per period that no motor exceeds: the lower of both joints, then the higher.
-    pub greatest_step: [i32; 2],
+    pub(crate) greatest_step: [i32; 2],
     /// Rotor counts per turn.
-    pub counts_per_turn: u32,
+    pub(crate) counts_per_turn: u32,
     /// Overcurrent bound of the axes, A.
-    pub overcurrent_a: f64,
+    pub(crate) overcurrent_a: f64,
     /// Bus-voltage range of the axes, V.
-    pub bus_v: [f64; 2],
+    pub(crate) bus_v: [f64; 2],
     /// Joint speed, rad/s, and its increase per ampere, above which back-EMF exceeds dead time and warm
     /// copper; the higher of both joints.
-    pub frozen_speed: [f64; 2],
+    pub(crate) frozen_speed: [f64; 2],
     /// Joint speed from which a counter that stops at once shows, rad/s; the higher of both joints.
-    pub stopped_speed: f64,
+    pub(crate) stopped_speed: f64,
     /// Joint speed at which an electrical turn takes 25 ms, rad/s.
-    pub judged_speed: f64,
+    pub(crate) judged_speed: f64,
     /// Phase-current change, A, that may leave the code unchanged, because dead time outweighs the current
     /// loop.
-    pub stuck_a: f64,
+    pub(crate) stuck_a: f64,
     /// Shunt offset, A, whose voltage exceeds that of dead time and of changes within a turn.
-    pub smallest_offset_a: f64,
+    pub(crate) smallest_offset_a: f64,
 }

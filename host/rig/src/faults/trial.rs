@@ -6,7 +6,7 @@
 //! | sweep | each channel, each form, lasting or intermittent, with random size, joint and time |
 //! | pairs | two faults of catalogue or sweep, the second up to 50 ms after the first |
 //!
-//! The conditions are those of [`Invariants`].
+//! The conditions are those of `Invariants`.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -55,11 +55,11 @@ const CHANNELS: [Channel; 12] = [
 /// Number of forms: off, stuck, garbage, rail, offset, factor, delay, low-pass.
 const FORMS: u64 = 8;
 /// Combinations of the sweep: channels, forms, lasting or not.
-pub const WAYS: u64 = CHANNELS.len() as u64 * FORMS * 2;
+pub(crate) const WAYS: u64 = CHANNELS.len() as u64 * FORMS * 2;
 
 /// Faults of one run.
 #[derive(Clone, Debug, Default)]
-pub struct Trial {
+pub(crate) struct Trial {
     kind: &'static str,
     injections: Vec<Injection>,
     /// Events, with their periods after the start.
@@ -108,7 +108,7 @@ fn is_one_for_all(channel: Channel) -> bool {
 impl Trial {
     /// Draws one run of the sweep.
     #[must_use]
-    pub fn sweep(seed: u64) -> Self {
+    pub(crate) fn sweep(seed: u64) -> Self {
         let mut random = Random::new("S", seed);
         let way = (seed - 1) % WAYS;
         Self { kind: KINDS[0], injections: vec![faulted(&mut random, way)], events: Vec::new(), last: 0 }
@@ -116,7 +116,7 @@ impl Trial {
 
     /// Draws one run of two faults.
     #[must_use]
-    pub fn pair(seed: u64, bounds: &Bounds) -> Self {
+    pub(crate) fn pair(seed: u64, bounds: &Bounds) -> Self {
         let mut random = Random::new("PP", seed);
         let mut trial = Self { kind: KINDS[1], ..Self::default() };
         trial.add(&mut random, bounds, 0);

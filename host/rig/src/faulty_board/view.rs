@@ -8,19 +8,19 @@ use crate::faulty_board::{Edges, Rig};
 
 impl<const N: usize, const B: usize> Rig<N, B> {
     /// Requests something that the contacts do not offer, at the next servo tick.
-    pub fn ask(&mut self, request: ControlRequest) {
+    pub(crate) fn ask(&mut self, request: ControlRequest) {
         self.board.ask(request);
     }
 
     /// Returns whether a request waits for the servo's next tick.
     #[must_use]
-    pub fn is_requested(&mut self) -> bool {
+    pub(crate) fn is_requested(&mut self) -> bool {
         !self.board.queues().requests().is_empty()
     }
 
     /// Inhibit word.
     #[must_use]
-    pub fn causes(&self) -> u32 {
+    pub(crate) fn causes(&self) -> u32 {
         self.board.signals.inhibit.causes()
     }
 
@@ -32,20 +32,14 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// Actions of the operator that may lead to an enabled drive.
     #[must_use]
-    pub fn edges(&self) -> Edges {
+    pub(crate) fn edges(&self) -> Edges {
         self.edges
     }
 
     /// Encoder counts of the joints at the servo's last tick.
     #[must_use]
-    pub fn counts(&self) -> [i32; N] {
+    pub(crate) fn counts(&self) -> [i32; N] {
         self.board.signals.statistics.counts.each_ref().map(|count| count.get().cast_signed())
-    }
-
-    /// Duty of the brake resistor.
-    #[must_use]
-    pub fn brake(&self) -> f32 {
-        self.board.registers.brake
     }
 
     /// State of the drive.
@@ -60,7 +54,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// Fault reported by the firmware: an axis' fault, another inhibit reason, or the leg's fault.
     #[must_use]
-    pub fn alarm(&self) -> Option<FaultCode> {
+    pub(crate) fn alarm(&self) -> Option<FaultCode> {
         let cause = || InhibitReason::ALL.into_iter().find(|cause| self.causes() & cause.bit() != 0);
         self.axis_fault
             .or_else(|| cause().and_then(InhibitReason::code))
@@ -69,20 +63,20 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// Requested current of a joint, A; zero while the drive is off.
     #[must_use]
-    pub fn requested(&self, joint: usize) -> f64 {
+    pub(crate) fn requested(&self, joint: usize) -> f64 {
         let target = self.board.signals.target(joint);
         if target.enabled { f64::from(target.current.0) } else { 0.0 }
     }
 
     /// Returns whether both motors brake.
     #[must_use]
-    pub fn is_braking(&self) -> bool {
+    pub(crate) fn is_braking(&self) -> bool {
         self.board.registers.commands.iter().all(|command| *command == AxisCommand::BRAKE)
     }
 
     /// Returns whether any bridge switches.
     #[must_use]
-    pub fn is_switching(&self) -> bool {
+    pub(crate) fn is_switching(&self) -> bool {
         self.board.registers.commands.iter().any(|command| command.enabled)
     }
 }

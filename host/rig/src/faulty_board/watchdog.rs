@@ -43,12 +43,12 @@ fn patience(hz: f64) -> u64 {
 
 impl<const N: usize, const B: usize> Rig<N, B> {
     /// Sets the frequency of the watchdog's oscillator, Hz: 17 to 47 kHz.
-    pub fn set_oscillator(&mut self, hz: f64) {
+    pub(crate) fn set_oscillator(&mut self, hz: f64) {
         self.watchdog.patience = patience(hz) * self.watchdog.stretched;
     }
 
     /// Applies the firmware's writes to the watchdog's registers.
-    pub fn write_watchdog(&mut self) {
+    pub(crate) fn write_watchdog(&mut self) {
         if let Some(times) = self.board.registers.stretched.take() {
             let dog = &mut self.watchdog;
             dog.patience = dog.patience / dog.stretched * times;
@@ -58,7 +58,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// Stalls the processor for some periods, as a flash write does. The plant continues with every switch
     /// open, and the watchdog counts.
-    pub fn stand_still(&mut self, periods: u64) {
+    pub(crate) fn stand_still(&mut self, periods: u64) {
         for _ in 0..periods {
             self.world.period(&[AxisCommand::OFF; N], 0.0);
         }
@@ -90,7 +90,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     }
 
     /// Restores the power. The operator's contacts and the plant continue.
-    pub fn power_on(&mut self) {
+    pub(crate) fn power_on(&mut self) {
         self.boot(0);
     }
 
@@ -106,7 +106,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// Returns whether the watchdog has reset the board.
     #[must_use]
-    pub fn is_restarted(&self) -> bool {
+    pub(crate) fn is_restarted(&self) -> bool {
         self.restarted
     }
 }

@@ -84,7 +84,7 @@ pub fn build(options: &Options) -> Result<Built, ToolError> {
 }
 
 /// Writes a file unless it is unchanged, to avoid recompilation; returns the whole path.
-pub fn write_if_changed(path: &Path, text: &str) -> Result<PathBuf, ToolError> {
+pub(crate) fn write_if_changed(path: &Path, text: &str) -> Result<PathBuf, ToolError> {
     if std::fs::read_to_string(path).ok().as_deref() != Some(text) {
         files::write(path, text)?;
     }

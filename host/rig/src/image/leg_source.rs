@@ -18,7 +18,7 @@ use scarab_identify::formats::leg_file::{JointFile, LegFile, Side};
 use scarab_identify::leg::setup::{PriorChoice, background, base_rank, configuration};
 
 /// Constant of an image, and the configuration it stands for.
-pub type Described = (LegDescription<JOINTS>, LegConfiguration<JOINTS, BASE>);
+pub(crate) type Described = (LegDescription<JOINTS>, LegConfiguration<JOINTS, BASE>);
 
 /// Description of a leg of two joints with up to 13 base parameters, the capacity of the board.
 pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, FileError> {
@@ -136,9 +136,9 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
          use crate::safety::{{{delays}SupplyLimits, {thermistor}WindingRating}};\n\
          use crate::units::*;\n\n\
          /// The leg.\n\
-         pub const LEG: LegDescription<{JOINTS}> = {description:#?};\n\
+         pub(crate) const LEG: LegDescription<{JOINTS}> = {description:#?};\n\
          }}\n\
-         pub use described::LEG;\n",
+         pub(crate) use described::LEG;\n",
         description.name,
     )
 }

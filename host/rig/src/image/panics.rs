@@ -53,9 +53,9 @@ const QUEUE: [&str; 2] = ["heapless-", "/src/spsc.rs"];
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PanicSite {
     /// Function that contains the branch.
-    pub within: String,
+    pub(crate) within: String,
     /// Name of the panic.
-    pub panic: String,
+    pub(crate) panic: String,
     /// Source file; empty if the image does not contain it.
     pub file: String,
     /// Line in it.
@@ -78,11 +78,11 @@ pub struct Panics {
     /// All locations.
     pub all: Vec<PanicSite>,
     /// Locations that levels 0 and 1 reach.
-    pub interrupts: Vec<PanicSite>,
+    pub(crate) interrupts: Vec<PanicSite>,
     /// Functions that levels 0 and 1 reach.
-    pub reached: usize,
+    pub(crate) reached: usize,
     /// Calls by a pointer in those functions.
-    pub by_pointer: usize,
+    pub(crate) by_pointer: usize,
 }
 
 /// One function.

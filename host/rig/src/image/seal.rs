@@ -40,7 +40,7 @@ fn program(elf: &[u8]) -> Result<Vec<u8>, String> {
 ///
 /// # Errors
 /// The file is no image of the board, or cannot be written.
-pub fn seal(image: &Path) -> Result<PathBuf, ToolError> {
+pub(crate) fn seal(image: &Path) -> Result<PathBuf, ToolError> {
     let mut elf = std::fs::read(image).map_err(|error| FileError::unreadable(image, &error))?;
     let refused = |reason: String| {
         ToolError::input(format!("{}: not an image of the board: {reason}", image.display()))

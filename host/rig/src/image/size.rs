@@ -11,13 +11,13 @@ use scarab_base::error::{FileError, ToolError};
 use scarab_base::table::{Table, cells};
 
 /// Flash limit of an image, bytes.
-pub const FLASH_LIMIT: u64 = Region::IMAGE.bytes() as u64;
+pub(crate) const FLASH_LIMIT: u64 = Region::IMAGE.bytes() as u64;
 /// Share of the limit above which `cargo fw` warns, so that the next change still fits.
 const WARNING: f64 = 0.9;
 /// Memory limit of its variables, bytes: what the stack leaves of 128 KB.
 pub const MEMORY_GOAL: u64 = (128 - 56) * 1024;
 /// Size of the core-coupled memory, bytes.
-pub const CORE_COUPLED: u64 = 64 * 1024;
+pub(crate) const CORE_COUPLED: u64 = 64 * 1024;
 /// Number of listed symbols.
 const LARGEST: usize = 20;
 
@@ -47,9 +47,9 @@ pub struct Section {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Symbol {
     /// Name as in the source.
-    pub name: String,
+    pub(crate) name: String,
     /// Bytes.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
 }
 
 /// Size of an image.
@@ -117,7 +117,7 @@ impl ImageSize {
 
     /// Bytes in core-coupled memory.
     #[must_use]
-    pub fn core_coupled(&self) -> u64 {
+    pub(crate) fn core_coupled(&self) -> u64 {
         self.sections.iter().map(|section| section.core_coupled).sum()
     }
 

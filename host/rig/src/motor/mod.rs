@@ -2,18 +2,18 @@
 //!
 //! | part | measurement |
 //! | --- | --- |
-//! | [`step`] | current steps at rest and at three speeds, with and without feedforward, against the design |
-//! | [`ripple`] | torque ripple, with and without dead-time compensation |
-//! | [`limit`] | a target beyond the voltage limit, and the recovery |
-//! | [`regeneration`] | a spinning inertia braked, with and without the chopper |
+//! | `step` | current steps at rest and at three speeds, with and without feedforward, against the design |
+//! | `ripple` | torque ripple, with and without dead-time compensation |
+//! | `limit` | a target beyond the voltage limit, and the recovery |
+//! | `regeneration` | a spinning inertia braked, with and without the chopper |
 //!
 //! The firmware first calibrates the motor on the stand. Reported currents are actual currents, not
 //! measured ones.
 
-pub mod limit;
-pub mod regeneration;
-pub mod ripple;
-pub mod step;
+pub(crate) mod limit;
+pub(crate) mod regeneration;
+pub(crate) mod ripple;
+pub(crate) mod step;
 
 use crate::report::motor::MotorReport;
 use hal_sim::drive::description::{AxisDescription, SupplyDescription};
@@ -33,25 +33,25 @@ use crate::board::{BRAKE, BUS, axis_configuration, calibration_settings, commiss
 const TRACKED_S: f64 = 0.02;
 
 /// PWM period, s.
-pub const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
+pub(crate) const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
 
 /// Motor with its board in the initial state.
 #[derive(Clone, Debug)]
-pub struct Bench {
+pub(crate) struct Bench {
     /// Joint whose motor it is.
-    pub joint: String,
+    pub(crate) joint: String,
     /// Configuration of the firmware's axis.
-    pub configuration: AxisConfiguration,
+    pub(crate) configuration: AxisConfiguration,
     /// Simulated axis.
-    pub axis: AxisDescription,
+    pub(crate) axis: AxisDescription,
     /// Simulated supply.
-    pub supply: SupplyDescription,
+    pub(crate) supply: SupplyDescription,
     /// Calibration found by the firmware on the stand.
     calibration: Calibration,
     /// Rotor speed at the joint's speed limit, rad/s.
-    pub top_speed: f64,
+    pub(crate) top_speed: f64,
     /// Seed of the sensor noise.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 impl Bench {
@@ -77,7 +77,7 @@ impl Bench {
     }
 
     /// New stand with a rotor turning at `speed` from `angle` on (rad/s, rad).
-    pub fn rig(&self, speed: f64, angle: f64) -> Result<Rig, ToolError> {
+    pub(crate) fn rig(&self, speed: f64, angle: f64) -> Result<Rig, ToolError> {
         let mut stand = Stand::new(&self.axis, &self.supply, Load::Turned(speed), angle, self.seed);
         let sample = stand.period(&AxisCommand::OFF, 0.0);
         let axis = Axis::new(&self.configuration, &self.calibration, &sample).map_err(|error| {
@@ -93,12 +93,12 @@ impl Bench {
 
     /// Limits a current to the axis' limit, A.
     #[must_use]
-    pub fn within_limit(&self, current: f64) -> f64 {
+    pub(crate) fn within_limit(&self, current: f64) -> f64 {
         current.min(f64::from(self.configuration.current_limit.0))
     }
 
     /// Rejects a measurement of an axis that has switched itself off.
-    pub fn must_hold(&self, rig: &Rig, what: &str, speed: f64) -> Result<(), ToolError> {
+    pub(crate) fn must_hold(&self, rig: &Rig, what: &str, speed: f64) -> Result<(), ToolError> {
         let Some(fault) = rig.axis.fault() else { return Ok(()) };
         Err(ToolError::Refused(format!(
             "axis `{}` turned its bridge off ({what}, rotor at {speed:.0} rad/s): {}",
@@ -112,26 +112,26 @@ impl Bench {
 #[derive(Clone, Debug)]
 pub struct Rig {
     /// The plant.
-    pub stand: Stand,
+    pub(crate) stand: Stand,
     /// The firmware.
-    pub axis: Axis,
+    pub(crate) axis: Axis,
     command: AxisCommand,
     chopper: Option<Chopper>,
     /// Share of the time for which the brake resistor is on.
-    pub brake: f32,
+    pub(crate) brake: f32,
     sample: AxisSample,
 }
 
 impl Rig {
     /// Adds the board's brake chopper.
     #[must_use]
-    pub fn with_chopper(mut self) -> Self {
+    pub(crate) fn with_chopper(mut self) -> Self {
         self.chopper = Chopper::new(BRAKE[0], BRAKE[1]);
         self
     }
 
     /// Runs one PWM period with this target; returns direct and quadrature current at its end, A.
-    pub fn period(&mut self, target: f64) -> [f64; 2] {
+    pub(crate) fn period(&mut self, target: f64) -> [f64; 2] {
         self.tick(AxisRequest { enabled: true, current: Ampere(target as f32) });
         self.stand.rotor_currents()
     }

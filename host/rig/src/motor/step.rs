@@ -42,7 +42,7 @@ fn shape(values: &[f64]) -> Shape {
 
 /// Response of the designed bandwidth.
 #[must_use]
-pub fn response(bandwidth_hz: f64) -> Vec<f64> {
+pub(crate) fn response(bandwidth_hz: f64) -> Vec<f64> {
     let gain = TAU * bandwidth_hz * PERIOD_S;
     let mut values = vec![0.0, 0.0];
     while let (true, &[.., before, now]) = (values.len() <= PERIODS, values.as_slice()) {
@@ -53,7 +53,7 @@ pub fn response(bandwidth_hz: f64) -> Vec<f64> {
 
 /// Shape of the designed response.
 #[must_use]
-pub fn designed(bandwidth_hz: f64) -> Shape {
+pub(crate) fn designed(bandwidth_hz: f64) -> Shape {
     shape(&response(bandwidth_hz))
 }
 

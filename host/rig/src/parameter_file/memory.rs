@@ -11,13 +11,13 @@ use scarab::store::{Key, ModelRecord, Permit, Provenance, Store};
 use scarab_boot::Region;
 
 /// Size and number of the sectors on the board.
-pub const SECTOR: usize = Region::PARAMETERS.sector_bytes as usize;
+pub(crate) const SECTOR: usize = Region::PARAMETERS.sector_bytes as usize;
 const SECTORS: usize = Region::PARAMETERS.sectors as usize;
 /// Size of a board's flash.
 pub const BYTES: usize = SECTOR * SECTORS;
 
 /// The simulated flash.
-pub type Cells = Flash<SECTOR, SECTORS>;
+pub(crate) type Cells = Flash<SECTOR, SECTORS>;
 
 /// Flash of one board.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ const KEYS: [Key; 2] = [Key::Objects1, Key::Objects2];
 
 /// Name of a stored model in messages.
 #[must_use]
-pub fn model_name(key: Key) -> &'static str {
+pub(crate) fn model_name(key: Key) -> &'static str {
     if key == Key::WornModel { "the stored model of the worn leg" } else { "the stored model" }
 }
 
@@ -46,7 +46,7 @@ impl Memory {
     }
 
     /// Accesses the store; `None` if it cannot be created.
-    pub fn with<T>(&mut self, ask: impl FnOnce(&mut Store<Cells>) -> T) -> Option<T> {
+    pub(crate) fn with<T>(&mut self, ask: impl FnOnce(&mut Store<Cells>) -> T) -> Option<T> {
         let flash = self.flash.take()?;
         let mut store = Store::new(flash, 0..BYTES as u32).ok()?;
         let answer = ask(&mut store);
@@ -112,7 +112,7 @@ impl Memory {
     ///
     /// # Errors
     /// Reason why it cannot be read or does not belong to this leg.
-    pub fn model<const N: usize, const B: usize>(
+    pub(crate) fn model<const N: usize, const B: usize>(
         &mut self,
         configuration: &LegConfiguration<N, B>,
         key: Key,
@@ -126,7 +126,7 @@ impl Memory {
     }
 
     /// Erases everything; returns whether this succeeded.
-    pub fn forget(&mut self, state: DriveState) -> bool {
+    pub(crate) fn forget(&mut self, state: DriveState) -> bool {
         let Some(permit) = Permit::from_state(state) else { return false };
         self.with(|store| block_on(store.forget_all(&permit))).is_some_and(|forgotten| forgotten.is_ok())
     }

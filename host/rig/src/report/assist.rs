@@ -10,7 +10,7 @@ use scarab_base::number::Number;
 #[derive(Clone, Debug, Serialize)]
 pub struct AssistReport {
     /// Version of the JSON.
-    pub schema: u32,
+    pub(crate) schema: u32,
     /// Name in the leg file.
     pub leg: String,
     /// First and last seed.
@@ -120,7 +120,7 @@ pub struct EnergyReport {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PeriodicReport {
     /// The seed.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Strides per second before the change of cadence.
     pub cadence_hz: f64,
     /// Cycles until the phase error stays below 5 % of a cycle.

@@ -25,7 +25,7 @@ pub struct MonitorRun {
     /// Reasons for a rejected identification; empty if there was a model to monitor.
     pub refused: Vec<&'static str>,
     /// Standard deviation of one filtered row of each joint at acceptance.
-    pub row_sigma_nm: Vec<Number>,
+    pub(crate) row_sigma_nm: Vec<Number>,
     /// Limit for a joint's sum.
     pub limit: Number,
     /// Walking time without any change, hours.
@@ -39,7 +39,7 @@ pub struct MonitorRun {
     /// Result of the quick update.
     pub update: Option<UpdateReport>,
     /// Whether the change was still going on at the alarm.
-    pub still_changing: bool,
+    pub(crate) still_changing: bool,
     /// Whether another alarm came within a minute of the update.
     pub alarm_after_update: bool,
     /// Root mean square position error of all joints before the change, degrees.
@@ -56,7 +56,7 @@ pub struct AlarmReport {
     /// Time after the change, s.
     pub after_s: f64,
     /// Estimated time since the change.
-    pub since_s: Number,
+    pub(crate) since_s: Number,
     /// Names of the affected joints.
     pub joints: Vec<String>,
     /// Sum of each joint.
@@ -71,7 +71,7 @@ pub struct UpdateReport {
     /// The link that carries the payload.
     pub link: Option<String>,
     /// Reasons of the verdict.
-    pub reasons: Vec<&'static str>,
+    pub(crate) reasons: Vec<&'static str>,
     /// Whether the cause is the true one.
     pub right: bool,
     /// Time after the alarm, s.
@@ -116,7 +116,7 @@ pub struct ValueReport {
 
 impl MonitorRun {
     /// Report of a rejected identification.
-    pub fn refused(seed: u64, reasons: Vec<&'static str>) -> Self {
+    pub(crate) fn refused(seed: u64, reasons: Vec<&'static str>) -> Self {
         Self { seed, refused: reasons, ..Self::default() }
     }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Clone, Debug, Serialize)]
 pub struct MotorReport {
     /// Version of the JSON.
-    pub schema: u32,
+    pub(crate) schema: u32,
     /// Name of the leg.
     pub leg: String,
     /// Name of the joint.

@@ -100,7 +100,7 @@ impl Decoder {
 
     /// Frames that were decoded.
     #[must_use]
-    pub fn decoded(&self) -> u64 {
+    pub(crate) fn decoded(&self) -> u64 {
         self.decoded
     }
 
@@ -133,7 +133,7 @@ impl Decoder {
 impl Skipped {
     /// Summary in words; `None` where everything decoded.
     #[must_use]
-    pub fn words(&self) -> Option<String> {
+    pub(crate) fn words(&self) -> Option<String> {
         let mut words = Vec::new();
         if self.first_bytes > 0 {
             words.push(format!("{} bytes before the first whole frame", self.first_bytes));

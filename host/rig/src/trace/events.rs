@@ -25,7 +25,7 @@ pub enum Weight {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// Time since the start, s; unknown for records without a tick.
-    pub time_s: Option<f64>,
+    pub(crate) time_s: Option<f64>,
     /// Severity.
     pub weight: Weight,
     /// Description.
@@ -52,7 +52,7 @@ impl Event {
 
 /// Event of a record; `None` for kinds that do not belong to the timeline.
 #[must_use]
-pub fn from_record(record: &Received, servo_hz: f64) -> Option<Event> {
+pub(crate) fn from_record(record: &Received, servo_hz: f64) -> Option<Event> {
     let at = |tick: u32| Some(f64::from(tick) / servo_hz);
     let (time_s, weight, words) = match record {
         Received::Boot(boot) => {

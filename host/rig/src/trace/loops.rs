@@ -6,17 +6,17 @@ use crate::trace::records::{Loops, Supply};
 
 /// Range of the supply, and highest temperatures.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SupplySeen {
+pub(crate) struct SupplySeen {
     /// Lowest bus voltage, V.
-    pub low_v: f32,
+    pub(crate) low_v: f32,
     /// Highest bus voltage, V.
-    pub high_v: f32,
+    pub(crate) high_v: f32,
     /// Hottest bridge, degrees Celsius.
-    pub bridge_c: f32,
+    pub(crate) bridge_c: f32,
     /// Temperature of the brake chopper, degrees Celsius.
-    pub chopper_c: f32,
+    pub(crate) chopper_c: f32,
     /// Hottest winding by its model, degrees Celsius.
-    pub winding_c: f32,
+    pub(crate) winding_c: f32,
 }
 
 /// Collects the records of loops and supply.
@@ -48,7 +48,7 @@ impl Statistics {
     }
 
     /// Takes a record of the supply; values that are not numbers are ignored.
-    pub fn take_supply(&mut self, supply: &Supply) {
+    pub(crate) fn take_supply(&mut self, supply: &Supply) {
         let before = self.supply.unwrap_or(SupplySeen {
             low_v: f32::NAN,
             high_v: f32::NAN,
@@ -67,7 +67,7 @@ impl Statistics {
     }
 
     /// Starts a new count: the board restarted and its counts begin at zero.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         if let Some(all) = self.loops() {
             self.before = all;
         }

@@ -15,7 +15,7 @@
 //! | [`text`] | finds the record in a line of text, whatever a logger put around it |
 //! | [`read`] | [`Trace`]: lines to records in order, with what was lost |
 //! | [`records`] | records to values, by the firmware's list |
-//! | [`result_records`] | records of one identification's result |
+//! | `result_records` | records of one identification's result |
 //! | [`events`] | the timeline in words |
 //! | [`loops`] | statistics of loops, stack and supply |
 
@@ -24,7 +24,7 @@ pub mod events;
 pub mod loops;
 pub mod read;
 pub mod records;
-pub mod result_records;
+pub(crate) mod result_records;
 pub mod text;
 
 pub use decode::Decoder;

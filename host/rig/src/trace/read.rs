@@ -33,7 +33,7 @@ pub struct Gap {
 impl Gap {
     /// Number of missing records.
     #[must_use]
-    pub fn count(&self) -> u64 {
+    pub(crate) fn count(&self) -> u64 {
         u64::from(self.last - self.first) + 1
     }
 }
@@ -44,7 +44,7 @@ pub struct Trace {
     /// Record of the last start.
     pub boot: Option<Boot>,
     /// Last board that was reported.
-    pub board: Option<Board>,
+    pub(crate) board: Option<Board>,
     /// Number of reported starts.
     pub starts: u32,
     /// Timeline, in order.
@@ -52,11 +52,11 @@ pub struct Trace {
     /// Complete results, in order.
     pub results: Vec<ResultRecords>,
     /// Reasons why other results are incomplete, in order.
-    pub incomplete: Vec<String>,
+    pub(crate) incomplete: Vec<String>,
     /// Last reported state of the leg.
     pub state: Option<State>,
     /// Progress of a running search.
-    pub progress: Option<Progress>,
+    pub(crate) progress: Option<Progress>,
     /// Statistics of loops, stack and supply.
     pub statistics: Statistics,
     /// 500 Hz log in order; each sample with the number of results before it.
@@ -68,7 +68,7 @@ pub struct Trace {
     /// Unreadable records, and why; up to a limit.
     pub problems: Vec<String>,
     /// Number of unreadable records.
-    pub problem_count: u64,
+    pub(crate) problem_count: u64,
     /// Lines read.
     pub lines: u64,
     /// Records read.
@@ -106,7 +106,7 @@ impl Trace {
 
     /// Servo ticks per second.
     #[must_use]
-    pub fn servo_hz(&self) -> f64 {
+    pub(crate) fn servo_hz(&self) -> f64 {
         let announced = self.boot.as_ref().map(|boot| f64::from(boot.servo_hz)).filter(|rate| *rate > 0.0);
         announced.unwrap_or(SERVO_HZ)
     }
@@ -128,7 +128,7 @@ impl Trace {
 
     /// Explains why a trace has no complete result, and how far it went.
     #[must_use]
-    pub fn without_result(&self) -> String {
+    pub(crate) fn without_result(&self) -> String {
         if self.records == 0 {
             return "contains no trace record".into();
         }

@@ -131,7 +131,7 @@ scarab::trace_records!(readers);
 
 /// Description of an error.
 #[must_use]
-pub fn words(kind: &str, error: LineError<'_>) -> String {
+pub(crate) fn words(kind: &str, error: LineError<'_>) -> String {
     match error {
         LineError::Kind => "is no record".into(),
         LineError::Pair(pair) => format!("`{kind}`: `{pair}` is not key=value"),

@@ -12,35 +12,35 @@ use crate::trace::records::{
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ResultRecords {
     /// How the result was found.
-    pub solver: Option<Solver>,
+    pub(crate) solver: Option<Solver>,
     /// Fourteen parameters of every joint.
-    pub parameters: Vec<Parameter>,
+    pub(crate) parameters: Vec<Parameter>,
     /// Base parameters: the combinations that torque determines.
-    pub base: Vec<Base>,
+    pub(crate) base: Vec<Base>,
     /// Elements on and below the diagonal.
-    pub covariance: Vec<Covariance>,
+    pub(crate) covariance: Vec<Covariance>,
     /// Joints with Stribeck friction.
-    pub stribeck: Vec<Stribeck>,
+    pub(crate) stribeck: Vec<Stribeck>,
     /// Recorded motions.
-    pub motions: Vec<Motion>,
+    pub(crate) motions: Vec<Motion>,
     /// Residuals of every joint on every motion.
-    pub fits: Vec<Fit>,
+    pub(crate) fits: Vec<Fit>,
     /// All tests.
-    pub findings: Vec<Finding>,
+    pub(crate) findings: Vec<Finding>,
     /// Reasons for rejection.
     pub reasons: Vec<Reason>,
     /// Verdict, once received.
-    pub verdict: Option<Verdict>,
+    pub(crate) verdict: Option<Verdict>,
     /// End record, once received.
-    pub end: Option<End>,
+    pub(crate) end: Option<End>,
     /// Records read, without the end.
-    pub records: u32,
+    pub(crate) records: u32,
 }
 
 impl Kind {
     /// Whether records of this kind belong to a result.
     #[must_use]
-    pub const fn is_of_result(self) -> bool {
+    pub(crate) const fn is_of_result(self) -> bool {
         matches!(
             self,
             Self::Solver
@@ -60,7 +60,7 @@ impl Kind {
 
 impl ResultRecords {
     /// Takes a record of the result; others are ignored.
-    pub fn take(&mut self, record: Received) {
+    pub(crate) fn take(&mut self, record: Received) {
         match record {
             Received::Solver(solver) => self.solver = Some(solver),
             Received::Parameter(parameter) => self.parameters.push(parameter),
@@ -83,7 +83,7 @@ impl ResultRecords {
 
     /// Reason why the result cannot be reported; `None` for a complete result with a verdict.
     #[must_use]
-    pub fn lacks(&self) -> Option<String> {
+    pub(crate) fn lacks(&self) -> Option<String> {
         let read = self.records;
         match (&self.end, &self.verdict, &self.solver) {
             (None, ..) => Some(format!("breaks off after {read} records, before its end")),

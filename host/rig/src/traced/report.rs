@@ -146,9 +146,9 @@ pub(super) fn known<const N: usize, const B: usize>(
 
 /// Result together with the background of its leg.
 pub(super) struct TracedResult<'a, const N: usize, const B: usize> {
-    pub background: &'a Background<N, B>,
-    pub leg: &'a LegFile,
-    pub records: &'a ResultRecords,
+    pub(crate) background: &'a Background<N, B>,
+    pub(crate) leg: &'a LegFile,
+    pub(crate) records: &'a ResultRecords,
 }
 
 impl<const N: usize, const B: usize> TracedResult<'_, N, B> {

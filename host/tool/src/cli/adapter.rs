@@ -8,7 +8,7 @@ use scarab_client::master::Client;
 
 /// Adapter and its bit rate.
 #[derive(Args, Debug)]
-pub struct AdapterOptions {
+pub(crate) struct AdapterOptions {
     /// Adapter of the bus (slcan): HOST:PORT or a serial device.
     #[arg(long, value_name = "ADAPTER")]
     slcan: String,
@@ -19,12 +19,12 @@ pub struct AdapterOptions {
 
 impl AdapterOptions {
     /// Opens the bus as a host.
-    pub fn client(&self) -> Result<Client, ToolError> {
+    pub(crate) fn client(&self) -> Result<Client, ToolError> {
         Client::new(open(&self.slcan, self.bit_rate)?)
     }
 }
 
 /// Bit rates of the board's controller, kbit/s (object 2002).
-pub fn bit_rates() -> impl TypedValueParser<Value = u64> {
+pub(crate) fn bit_rates() -> impl TypedValueParser<Value = u64> {
     PossibleValuesParser::new(["125", "250", "500", "1000"]).try_map(|rate| rate.parse::<u64>())
 }

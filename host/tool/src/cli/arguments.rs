@@ -5,20 +5,20 @@
 //!
 //! | part | contents |
 //! | --- | --- |
-//! | [`role`] | types of arguments that define the use of a file |
-//! | [`choice`] | parser of arguments that are one of a few words |
+//! | `role` | types of arguments that define the use of a file |
+//! | `choice` | parser of arguments that are one of a few words |
 //! | [`mod@check`] | detects files that a command would overwrite or cannot write |
-//! | [`mod@stated`] | arguments that shards of one campaign have in common |
+//! | `stated` | arguments that shards of one campaign have in common |
 //!
 //! Known limits: names that differ in case only count as different files, even on file systems that ignore
 //! case. Redirections of the shell are not checked.
 
 pub mod check;
-pub mod choice;
-pub mod role;
-pub mod stated;
+pub(crate) mod choice;
+pub(crate) mod role;
+pub(crate) mod stated;
 
-pub use check::check;
+pub(crate) use check::check;
 pub use choice::{Choice, one_of};
 pub use role::{Input, LegName, Output, OutputFolder, Updated};
-pub use stated::stated;
+pub(crate) use stated::stated;

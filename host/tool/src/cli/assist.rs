@@ -36,7 +36,7 @@ const MOST_RUNS: u64 = 100_000;
 
 /// Leg, modes, motions and shares.
 #[derive(Args, Debug)]
-pub struct AssistArguments {
+pub(crate) struct AssistArguments {
     #[command(flatten)]
     leg: LegOptions,
     /// Mode of the leg; may be repeated. All three unless given.
@@ -164,7 +164,7 @@ fn inject(leg: &LegFile, options: &AssistOptions, runs: u64) -> Result<[usize; 2
 }
 
 /// Measures and reports; exit code 3 if a limit was exceeded.
-pub fn run(arguments: &AssistArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &AssistArguments) -> Result<u8, ToolError> {
     let options = arguments.options()?;
     let leg = arguments.leg.load()?;
     let mut report = study(&leg, &options)?;

@@ -12,7 +12,7 @@ use crate::view::html;
 
 /// Bus, nodes and steps.
 #[derive(Args, Debug)]
-pub struct CommissionArguments {
+pub(crate) struct CommissionArguments {
     #[command(flatten)]
     adapter: AdapterOptions,
     /// Node-IDs of hip and knee.
@@ -33,7 +33,7 @@ pub struct CommissionArguments {
 }
 
 /// Runs the procedure; exit code 3 where the board or the operator refuses, 2 where the bus fails.
-pub fn run(arguments: &CommissionArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &CommissionArguments) -> Result<u8, ToolError> {
     let nodes: [u8; 2] = arguments.nodes.as_slice().try_into().map_err(|_| {
         ToolError::input(format!("--nodes: {} numbers, the leg has two: hip and knee", arguments.nodes.len()))
     })?;

@@ -20,7 +20,7 @@ use crate::view::{figures, html, tables};
 
 /// Program that computes a campaign: this one.
 #[must_use]
-pub fn program() -> Program {
+pub(crate) fn program() -> Program {
     Program::from_sources(env!("SCARAB_SOURCES"))
 }
 
@@ -44,46 +44,46 @@ const ESTIMATORS: &[Choice<Estimator>] = &[
 #[derive(Args, Debug)]
 pub struct Common {
     #[command(flatten)]
-    pub leg: LegOptions,
+    pub(crate) leg: LegOptions,
     /// Seed of the swarm's random numbers.
     #[arg(long, help_heading = "Identification")]
-    pub swarm_seed: Option<u64>,
+    pub(crate) swarm_seed: Option<u64>,
     /// Order of the estimate.
     #[arg(long, value_parser = one_of(PLANS), default_value = "one-time", help_heading = "Identification")]
-    pub plan: Plan,
+    pub(crate) plan: Plan,
     /// Treatment of outliers and disturbances.
     #[arg(long, value_parser = one_of(ESTIMATORS), default_value = "robust", help_heading = "Identification")]
-    pub estimator: Estimator,
+    pub(crate) estimator: Estimator,
     /// Prior of the search: none, file, or wrong:PERCENT. Default: that of the leg file.
     #[arg(long, help_heading = "Identification")]
-    pub prior: Option<PriorChoice>,
+    pub(crate) prior: Option<PriorChoice>,
     /// Temperature of the drives, degrees Celsius (-40 to 125), stored with the result. Default: that of the
     /// leg file.
     #[arg(long, value_name = "C", allow_negative_numbers = true, value_parser = temperature::parse, help_heading = "Identification")]
     temperature: Option<f64>,
     /// Write the report as JSON here, for exit codes 0 and 3.
     #[arg(long, help_heading = "Output")]
-    pub json: Option<Output>,
+    pub(crate) json: Option<Output>,
     /// Print all fourteen parameters of every joint with their status.
     #[arg(long, help_heading = "Output")]
-    pub parameters: bool,
+    pub(crate) parameters: bool,
     /// Draw the run into this directory, as SVG files.
     #[arg(long, help_heading = "Output")]
-    pub figures: Option<OutputFolder>,
+    pub(crate) figures: Option<OutputFolder>,
     /// Write the run as one HTML page here: figures, tables, verdict.
     #[arg(long, help_heading = "Output")]
-    pub report: Option<Output>,
+    pub(crate) report: Option<Output>,
 }
 
 impl Common {
     /// Leg with its options and the stated temperature.
-    pub fn leg(&self) -> Result<LegFile, ToolError> {
+    pub(crate) fn leg(&self) -> Result<LegFile, ToolError> {
         let leg = self.leg.load()?;
         Ok(LegFile { temperature_c: self.temperature.or(leg.temperature_c), ..leg })
     }
 
     /// Whether curves are needed.
-    pub fn is_drawn(&self) -> bool {
+    pub(crate) fn is_drawn(&self) -> bool {
         self.figures.is_some() || self.report.is_some()
     }
 }
@@ -101,7 +101,7 @@ pub fn draw(
 }
 
 /// Draws into a directory and a page, if given.
-pub fn draw_into(
+pub(crate) fn draw_into(
     leg: &LegFile,
     directory: Option<&Path>,
     page: Option<&Path>,
@@ -128,7 +128,11 @@ pub fn draw_into(
 }
 
 /// Draws the runs of a campaign if requested, and prints the paths.
-pub fn draw_runs(campaign: &CampaignHeader, common: &Common, runs: &[RunReport]) -> Result<(), ToolError> {
+pub(crate) fn draw_runs(
+    campaign: &CampaignHeader,
+    common: &Common,
+    runs: &[RunReport],
+) -> Result<(), ToolError> {
     let Some(leg) = campaign.leg.as_ref().filter(|_| common.is_drawn()) else { return Ok(()) };
     let spreads = Spread::from_runs(runs);
     let figure = figures::spread(&leg.name, &spreads)?;
@@ -146,7 +150,12 @@ pub fn draw_runs(campaign: &CampaignHeader, common: &Common, runs: &[RunReport])
 }
 
 /// Writes and prints the result for a leg; `preface` precedes it.
-pub fn finish(leg: &LegFile, run: &RunReport, common: &Common, preface: &str) -> Result<u8, ToolError> {
+pub(crate) fn finish(
+    leg: &LegFile,
+    run: &RunReport,
+    common: &Common,
+    preface: &str,
+) -> Result<u8, ToolError> {
     if let Some(path) = &common.json {
         write_json(path, run)?;
     }

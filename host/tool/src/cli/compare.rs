@@ -13,7 +13,7 @@ use crate::view::tables;
 
 /// Two models of one leg.
 #[derive(Args, Debug)]
-pub struct CompareArguments {
+pub(crate) struct CompareArguments {
     /// Model written by --save-model.
     before: Input,
     /// Later model of the same leg.
@@ -24,7 +24,7 @@ pub struct CompareArguments {
 }
 
 /// Compares and reports; returns the exit code.
-pub fn run(arguments: &CompareArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &CompareArguments) -> Result<u8, ToolError> {
     let (before, after) = (ModelFile::load(&arguments.before)?, ModelFile::load(&arguments.after)?);
     refuse_another_leg(&before, &arguments.before.display().to_string(), &after.leg.to_leg_file())?;
     let file = arguments.before.display().to_string();

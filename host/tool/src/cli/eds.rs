@@ -12,14 +12,14 @@ const JOINTS: [&str; 2] = ["hip", "knee"];
 
 /// Destination of the data sheets.
 #[derive(Args, Debug)]
-pub struct EdsArguments {
+pub(crate) struct EdsArguments {
     /// Folder for the sheets, one per joint; created if missing.
     #[arg(long)]
     out: OutputFolder,
 }
 
 /// Writes the files and returns the exit code.
-pub fn run(arguments: &EdsArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &EdsArguments) -> Result<u8, ToolError> {
     let folder = &arguments.out;
     for joint in JOINTS {
         let path = folder.join(format!("scarab-{joint}.eds"));

@@ -21,7 +21,7 @@ use crate::view::excite as text;
 
 /// Leg to be excited, and outputs of the design.
 #[derive(Args, Debug)]
-pub struct ExciteArguments {
+pub(crate) struct ExciteArguments {
     #[command(flatten)]
     leg: LegOptions,
     /// Write the motion here, as TOML for identify.
@@ -68,7 +68,7 @@ pub struct ExciteArguments {
 const EVALUATIONS: u32 = 48_000;
 
 /// Designs, reports and writes; returns the exit code.
-pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
     let leg = &arguments.noise.on(arguments.leg.load()?)?;
     let torque_noise_percent = arguments.noise.percent()?;
     let given = match &arguments.excitation {

@@ -12,7 +12,7 @@ use crate::cli::leg_options::LegOptions;
 
 /// Model and destination.
 #[derive(Args, Debug)]
-pub struct ExportArguments {
+pub(crate) struct ExportArguments {
     /// Model written by --save-model.
     #[arg(long)]
     model: Input,
@@ -25,7 +25,7 @@ pub struct ExportArguments {
 }
 
 /// Writes the file and returns the exit code.
-pub fn run(arguments: &ExportArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &ExportArguments) -> Result<u8, ToolError> {
     let file = arguments.model.display().to_string();
     let leg = arguments.leg.as_ref().map(LegOptions::load).transpose()?;
     let model = ModelFile::load(&arguments.model)?;

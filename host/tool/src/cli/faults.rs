@@ -33,7 +33,7 @@ const MOST_SEEDS: u64 = 1_000_000;
 
 /// Faults and the number of their runs.
 #[derive(Args, Debug)]
-pub struct FaultsArguments {
+pub(crate) struct FaultsArguments {
     #[command(flatten)]
     leg: LegOptions,
     /// Row of the catalogue by its id, or `sweep` or `pairs`, which then run as often as a row; may
@@ -211,7 +211,7 @@ impl FaultsArguments {
 }
 
 /// Injects and reports; exit code 3 if anything was missed.
-pub fn run(arguments: &FaultsArguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &FaultsArguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
     let options = arguments.options()?;
     let leg = arguments.leg()?;
     // Checked first: hours of runs must not end without a document for their table.

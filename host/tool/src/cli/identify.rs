@@ -25,7 +25,7 @@ use crate::view::runs::print_runs;
 
 /// Leg to be identified, and outputs.
 #[derive(Args, Debug)]
-pub struct IdentifyArguments {
+pub(crate) struct IdentifyArguments {
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
@@ -90,7 +90,7 @@ pub(super) fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
 const LARGEST_SEED_COUNT: u64 = 100_000;
 
 /// Identifies and reports; returns the exit code.
-pub fn run(arguments: &IdentifyArguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &IdentifyArguments, stated: Vec<Argument>) -> Result<u8, ToolError> {
     let leg = &arguments.noise.on(arguments.common.leg()?)?;
     let torque_noise_percent = arguments.noise.percent()?;
     let on_leg = |mass: &Option<PlacedMass>, option: &str| -> Result<Option<Payload<f64>>, ToolError> {

@@ -15,7 +15,7 @@ use crate::cli::leg_options::LegOptions;
 
 /// Options of an image.
 #[derive(Args, Debug)]
-pub struct ImageOptions {
+pub(crate) struct ImageOptions {
     #[command(flatten)]
     leg: LegOptions,
     /// Send every sample of the 500 Hz log.
@@ -60,7 +60,7 @@ impl ImageOptions {
 
 /// Image and outputs of its size.
 #[derive(Args, Debug)]
-pub struct FirmwareArguments {
+pub(crate) struct FirmwareArguments {
     #[command(flatten)]
     image: ImageOptions,
     /// Write the sizes as JSON here.
@@ -73,7 +73,7 @@ pub struct FirmwareArguments {
 
 /// Image and options of the probe.
 #[derive(Args, Debug)]
-pub struct FlashArguments {
+pub(crate) struct FlashArguments {
     #[command(flatten)]
     image: ImageOptions,
     /// Arguments for `probe-rs run`.
@@ -82,7 +82,7 @@ pub struct FlashArguments {
 }
 
 /// Builds and prints the sizes; exit code 3 if a goal is missed or an interrupt can panic.
-pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
+pub(crate) fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     let options = arguments.image.load()?;
     if let Some(path) = &arguments.source {
         let (description, _) = describe(&options.leg, DEFAULT_SEED)?;
@@ -119,7 +119,7 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
 }
 
 /// Builds, checks the size, writes the image to the board and prints its records.
-pub fn flash_leg(arguments: &FlashArguments) -> Result<u8, ToolError> {
+pub(crate) fn flash_leg(arguments: &FlashArguments) -> Result<u8, ToolError> {
     arguments.image.leg.require("cargo flash-leg --leg my-leg.toml")?;
     let built = build(&arguments.image.load()?)?;
     let missed = ImageSize::read(&built.image)?.missed();

@@ -12,7 +12,7 @@ use scarab_identify::formats::recording::import::{ColumnChoice, Import, UnitChoi
 
 /// Columns, units and format of all recordings of the command.
 #[derive(Args, Debug)]
-pub struct ImportArguments {
+pub(crate) struct ImportArguments {
     /// Columns by name or number from 1: SIGNAL=COLUMN,.. with the signals t, q1.. (joint angle) or motor1..
     /// (motor angle), tau1.. (joint torque) or i1.. (motor current). Example: t=time,q1=position_0,tau1=4
     #[arg(long, value_name = "SIGNAL=COLUMN,..", value_delimiter = ',', help_heading = "Recordings")]

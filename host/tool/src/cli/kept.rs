@@ -18,7 +18,7 @@ const LARGEST_FILE_BYTES: u64 = 1 << 20;
 
 /// Direction of the transfer.
 #[derive(Args, Debug)]
-pub struct KeptArguments {
+pub(crate) struct KeptArguments {
     #[command(subcommand)]
     way: Way,
 }
@@ -49,7 +49,7 @@ enum Way {
 }
 
 /// Reads or writes; returns the exit code.
-pub fn run(arguments: &KeptArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &KeptArguments) -> Result<u8, ToolError> {
     match &arguments.way {
         Way::Export { flash, board, out } => export(flash, usize::from(*board), out.as_deref()),
         Way::Import { file, flash, board } => import(file, flash, usize::from(*board)),

@@ -20,7 +20,7 @@ const LARGEST_POSITION: f64 = 1000.0;
 /// Source of a leg file, or the file to check.
 #[derive(Args, Debug)]
 #[command(group(ArgGroup::new("job").required(true).args(["urdf", "new", "check"])))]
-pub struct LegArguments {
+pub(crate) struct LegArguments {
     /// Convert a robot description (URDF): D-H numbers, directions, zeros, limits and prior.
     #[arg(long, requires = "out")]
     urdf: Option<Input>,
@@ -57,7 +57,7 @@ pub struct LegArguments {
 }
 
 /// Writes a leg file or checks one; returns the exit code.
-pub fn run(arguments: &LegArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &LegArguments) -> Result<u8, ToolError> {
     if let Some(name) = &arguments.check {
         output::print(&check::text(name)?)?;
         return Ok(EXIT_ACCEPTED);

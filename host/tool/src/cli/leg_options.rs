@@ -17,7 +17,7 @@ const SIDES: &[Choice<BodySide>] = &[
 
 /// Leg and its settings.
 #[derive(Args, Clone, Debug)]
-pub struct LegOptions {
+pub(crate) struct LegOptions {
     /// Name of a shipped leg, or a leg file. Default: x2-wearer-75kg; predict and export: the model's leg.
     /// Replay and flash-leg require it.
     #[arg(long)]
@@ -41,7 +41,7 @@ pub struct LegOptions {
 
 impl LegOptions {
     /// Rejects a command line without a leg; `example` shows a correct one.
-    pub fn require(&self, example: &str) -> Result<(), ToolError> {
+    pub(crate) fn require(&self, example: &str) -> Result<(), ToolError> {
         if self.leg.is_some() {
             return Ok(());
         }
@@ -59,7 +59,7 @@ impl LegOptions {
     }
 
     /// Loads the leg of an image; its file must state every key of the machine.
-    pub fn load_for_image(&self) -> Result<LegFile, ToolError> {
+    pub(crate) fn load_for_image(&self) -> Result<LegFile, ToolError> {
         self.set(LegFile::load_for_image(self.name(), self.side.is_some())?)
     }
 

@@ -47,7 +47,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 
 /// Leg, speed and address.
 #[derive(Args, Debug)]
-pub struct LiveArguments {
+pub(crate) struct LiveArguments {
     #[command(flatten)]
     leg: LegOptions,
     /// Simulated seconds per second.
@@ -202,7 +202,7 @@ impl LiveArguments {
 }
 
 /// Serves the page until Ctrl-C; returns the exit code of the last identification.
-pub fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
     for (is_given, example) in [
         (arguments.recording.is_some(), "live --recording run.csv --leg my-leg.toml"),
         (arguments.trace.is_some(), "live --trace trace.txt --leg my-leg.toml"),

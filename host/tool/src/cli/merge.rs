@@ -16,7 +16,7 @@ use crate::cli::{Cli, Command, faults, identify};
 
 /// Shards, and outputs of the whole.
 #[derive(Args, Debug)]
-pub struct MergeArguments {
+pub(crate) struct MergeArguments {
     /// JSON of all shards, in any order.
     #[arg(required = true, value_name = "FILES")]
     files: Vec<Input>,
@@ -74,7 +74,7 @@ pub fn parsed<C: Parser>(
 }
 
 /// Joins and reports; returns the exit code of the whole campaign.
-pub fn run(arguments: &MergeArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &MergeArguments) -> Result<u8, ToolError> {
     let files: Vec<&Path> = arguments.files.iter().map(|file| &**file).collect();
     let shards = ShardFiles::read(&files, &program(), &["identify", "faults"])?;
     let campaign = shards.campaign();

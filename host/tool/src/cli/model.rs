@@ -13,7 +13,7 @@ use crate::cli::arguments::{Input, Output};
 
 /// Model to compare with, and destination of the result.
 #[derive(Args, Debug)]
-pub struct ModelArguments {
+pub(crate) struct ModelArguments {
     /// Store an accepted result here, for predict, export and comparison; a refused one is not written.
     #[arg(long, help_heading = "Output")]
     save_model: Option<Output>,
@@ -24,7 +24,7 @@ pub struct ModelArguments {
 
 impl ModelArguments {
     /// Reads the model to compare with, if named; a model of another leg is refused before anything runs.
-    pub fn kept(&self, leg: &LegFile) -> Result<Option<ModelFile>, ToolError> {
+    pub(crate) fn kept(&self, leg: &LegFile) -> Result<Option<ModelFile>, ToolError> {
         let Some(path) = &self.compare_model else { return Ok(None) };
         let model = ModelFile::load(path)?;
         refuse_another_leg(&model, &path.display().to_string(), leg)?;
@@ -32,7 +32,7 @@ impl ModelArguments {
     }
 
     /// Adds the comparison to the report.
-    pub fn compare(&self, kept: Option<&ModelFile>, run: &mut RunReport) {
+    pub(crate) fn compare(&self, kept: Option<&ModelFile>, run: &mut RunReport) {
         if let (Some(path), Some(model)) = (&self.compare_model, kept) {
             let (file, found) = (path.display().to_string(), BaseSet::from_run(run));
             run.compared = comparison::compare(model, &file, &found, run.temperature_c.known());
@@ -40,7 +40,7 @@ impl ModelArguments {
     }
 
     /// Stores an accepted result, identified with this bandwidth (Hz).
-    pub fn save(&self, leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Result<(), ToolError> {
+    pub(crate) fn save(&self, leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Result<(), ToolError> {
         let Some(path) = &self.save_model else { return Ok(()) };
         match ModelFile::from_run(leg, run, bandwidth_hz) {
             Some(model) => {

@@ -18,7 +18,7 @@ use crate::view::monitor::print_runs;
 
 /// Changes, their time, and the time without a change.
 #[derive(Args, Debug)]
-pub struct MonitorArguments {
+pub(crate) struct MonitorArguments {
     #[command(flatten)]
     leg: LegOptions,
     /// Mass fixed to a link during the walk, KG@JOINT:X_M[:Y_M]; a minus sign removes a mass. Default: 3 kg
@@ -94,7 +94,7 @@ fn pushes(text: &str) -> Result<PushesFile, ToolError> {
 }
 
 /// Monitors and reports; the exit code is that of the worst run.
-pub fn run(arguments: &MonitorArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &MonitorArguments) -> Result<u8, ToolError> {
     let leg = &arguments.leg.load()?;
     let mut disturbances = Vec::new();
     if let Some(text) = &arguments.payload {

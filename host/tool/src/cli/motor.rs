@@ -13,7 +13,7 @@ use crate::view::{figures, motor as text};
 
 /// Motor and outputs.
 #[derive(Args, Debug)]
-pub struct MotorArguments {
+pub(crate) struct MotorArguments {
     #[command(flatten)]
     leg: LegOptions,
     /// Joint of the measured motor, by name or number from 1.
@@ -31,7 +31,7 @@ pub struct MotorArguments {
 }
 
 /// Measures and prints; returns the exit code.
-pub fn run(arguments: &MotorArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &MotorArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
     let by_name = leg.joints.iter().position(|joint| joint.name == arguments.joint);
     let by_number = arguments.joint.parse::<usize>().ok().and_then(|number| number.checked_sub(1));

@@ -9,7 +9,7 @@ use crate::cli::adapter::AdapterOptions;
 
 /// Bus and node-IDs.
 #[derive(Args, Debug)]
-pub struct NodeIdsArguments {
+pub(crate) struct NodeIdsArguments {
     #[command(flatten)]
     adapter: AdapterOptions,
     /// Node-IDs of hip and knee for the board with this serial number; stored. Can be repeated.
@@ -28,7 +28,7 @@ fn wanted(text: &str) -> Result<(u32, [u8; 2]), String> {
 }
 
 /// Lists and sets; exit code 3 where a board refuses, 2 where the bus fails.
-pub fn run(arguments: &NodeIdsArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &NodeIdsArguments) -> Result<u8, ToolError> {
     let mut ids = NodeIds::new(arguments.adapter.client()?);
     let mut boards = ids.find()?;
     if boards.is_empty() {

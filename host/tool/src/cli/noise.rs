@@ -8,7 +8,7 @@ use scarab_identify::formats::leg_file::check::LARGEST_NOISE_PERCENT;
 
 /// Noise of the logged torque, instead of the leg file's.
 #[derive(Args, Debug)]
-pub struct NoiseOptions {
+pub(crate) struct NoiseOptions {
     /// Noise of the logged torque, percent of each joint's mean absolute torque on the default motion.
     /// Default: that of the leg file.
     #[arg(long, allow_negative_numbers = true, help_heading = "Simulation")]
@@ -33,7 +33,7 @@ impl NoiseOptions {
     ///
     /// # Errors
     /// The value is not a valid percentage.
-    pub fn percent(&self) -> Result<Option<f64>, ToolError> {
+    pub(crate) fn percent(&self) -> Result<Option<f64>, ToolError> {
         if self.torque_noise.is_some_and(|percent| !(0.0..=LARGEST_NOISE_PERCENT).contains(&percent)) {
             return Err(ToolError::input(format!(
                 "--torque-noise: must be a percentage from 0 to {LARGEST_NOISE_PERCENT}"
@@ -46,7 +46,7 @@ impl NoiseOptions {
     ///
     /// # Errors
     /// The number of values differs from the number of joints, or one is invalid.
-    pub fn on(&self, leg: LegFile) -> Result<LegFile, ToolError> {
+    pub(crate) fn on(&self, leg: LegFile) -> Result<LegFile, ToolError> {
         let (given, joints) = (&self.torque_noise_nm, leg.joints.len());
         if let Some(noise) = given.iter().find(|noise| !(0.0..=LARGEST_NM).contains(*noise)) {
             return Err(ToolError::input(format!(

@@ -14,7 +14,7 @@ use crate::cli::states::StatesOptions;
 
 /// Model and states.
 #[derive(Args, Debug)]
-pub struct PredictArguments {
+pub(crate) struct PredictArguments {
     /// Model written by --save-model.
     #[arg(long)]
     model: Input,
@@ -29,7 +29,7 @@ pub struct PredictArguments {
 }
 
 /// Prints or writes the table; returns the exit code.
-pub fn run(arguments: &PredictArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &PredictArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.as_ref().map(LegOptions::load).transpose()?;
     let model = ModelFile::load(&arguments.model)?;
     if let Some(leg) = &leg {

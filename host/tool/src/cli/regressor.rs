@@ -10,7 +10,7 @@ use crate::cli::states::StatesOptions;
 
 /// Leg and states.
 #[derive(Args, Debug)]
-pub struct RegressorArguments {
+pub(crate) struct RegressorArguments {
     #[command(flatten)]
     leg: LegOptions,
     #[command(flatten)]

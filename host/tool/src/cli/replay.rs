@@ -20,7 +20,7 @@ use crate::view::tables;
 
 /// Recordings, and outputs.
 #[derive(Args, Debug)]
-pub struct ReplayArguments {
+pub(crate) struct ReplayArguments {
     /// Recordings, CSV (also .csv.gz): t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several form one
     /// training set.
     #[arg(required = true)]

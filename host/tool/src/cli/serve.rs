@@ -25,7 +25,7 @@ const MOTIONS: &[Choice<Exercise>] = &[
 
 /// Legs, address and speed.
 #[derive(Args, Debug)]
-pub struct ServeArguments {
+pub(crate) struct ServeArguments {
     #[command(flatten)]
     leg: LegOptions,
     /// Address and port of the simulated CAN adapter (slcan over TCP); port 0 selects a free one.
@@ -70,7 +70,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 /// Serves until SIGTERM; returns the exit code.
-pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
     if !(arguments.speed > 0.0 && arguments.speed <= 100.0) {
         return Err(ToolError::input(format!(

@@ -7,11 +7,11 @@ use crate::cli::arguments::Input;
 
 /// States for `predict` and `regressor`.
 #[derive(Args, Debug)]
-pub struct StatesOptions {
+pub(crate) struct StatesOptions {
     /// States of motion, CSV: columns q1.. (or q1_rad..), qd1.., qdd1.. in rad and s, anatomical; predict
     /// copies t_s.
     #[arg(long)]
-    pub states: Input,
+    pub(crate) states: Input,
     /// Read angles and write torques of the D-H frames instead of anatomical ones.
     #[arg(long)]
     dh: bool,
@@ -19,7 +19,7 @@ pub struct StatesOptions {
 
 impl StatesOptions {
     /// Convention of angles and torques.
-    pub fn angles(&self) -> Angles {
+    pub(crate) fn angles(&self) -> Angles {
         if self.dh { Angles::DenavitHartenberg } else { Angles::Anatomical }
     }
 }

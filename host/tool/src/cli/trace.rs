@@ -15,7 +15,7 @@ use crate::view::tables;
 
 /// Trace and outputs.
 #[derive(Args, Debug)]
-pub struct TraceArguments {
+pub(crate) struct TraceArguments {
     /// Recorded trace, or - for standard input: text as a debug probe prints it, or a defmt stream with
     /// --image.
     file: Input,
@@ -51,7 +51,7 @@ pub struct TraceArguments {
 }
 
 /// Reads and reports; returns the exit code.
-pub fn run(arguments: &TraceArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &TraceArguments) -> Result<u8, ToolError> {
     let trace = reading::read(&arguments.file, arguments.image.as_deref(), arguments.text.as_deref())?;
     output::print(&reading::preface(&trace))?;
     let outcome = report(arguments, &trace);

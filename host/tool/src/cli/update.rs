@@ -12,7 +12,7 @@ use crate::cli::arguments::Input;
 
 /// Bus, board and image.
 #[derive(Args, Debug)]
-pub struct UpdateArguments {
+pub(crate) struct UpdateArguments {
     #[command(flatten)]
     adapter: AdapterOptions,
     /// Either node-ID of the board.
@@ -24,7 +24,7 @@ pub struct UpdateArguments {
 }
 
 /// Updates; exit code 3 where the board refuses, 2 where file or bus are wrong.
-pub fn run(arguments: &UpdateArguments) -> Result<u8, ToolError> {
+pub(crate) fn run(arguments: &UpdateArguments) -> Result<u8, ToolError> {
     let path: &Path = &arguments.image;
     let program = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
     let header = check(&program).map_err(|why| ToolError::input(format!("{}: {why}", path.display())))?;

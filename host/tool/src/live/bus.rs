@@ -9,8 +9,8 @@
 //! Positions between two PDOs are interpolated. Torque is predicted by a stored model, or by the base
 //! parameters that a host reads.
 
-pub mod leg;
-pub mod node;
+pub(crate) mod leg;
+pub(crate) mod node;
 
 use std::collections::BTreeSet;
 use std::io::{BufReader, Read};
@@ -52,7 +52,7 @@ const MOST_REPORTED: u32 = 5;
 
 /// Form of the lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lines {
+pub(crate) enum Lines {
     /// Lines of an slcan adapter; they arrive now.
     Slcan,
     /// Lines of `candump`, with their own times.
@@ -70,21 +70,21 @@ impl Lines {
 }
 
 /// Frames of a bus, and its nodes.
-pub struct BusInput {
+pub(crate) struct BusInput {
     /// Lines with the frames.
-    pub input: Box<dyn Read + Send>,
+    pub(crate) input: Box<dyn Read + Send>,
     /// Form of the lines.
-    pub lines: Lines,
+    pub(crate) lines: Lines,
     /// Name for messages.
-    pub name: String,
+    pub(crate) name: String,
     /// Node-IDs, leg by leg, proximal joint first.
-    pub nodes: Vec<u8>,
+    pub(crate) nodes: Vec<u8>,
     /// Bit rate, for the load.
-    pub bits_per_s: u64,
+    pub(crate) bits_per_s: u64,
     /// Model that predicts the torque.
-    pub model: Option<ModelFile>,
+    pub(crate) model: Option<ModelFile>,
     /// Seconds of the bus per second; `None` for frames that arrive now.
-    pub speed: Option<f64>,
+    pub(crate) speed: Option<f64>,
 }
 
 /// Frame or line that the reader has received.
@@ -132,13 +132,13 @@ fn read(input: Box<dyn Read + Send>, lines: Lines, received: &SyncSender<Receive
 }
 
 /// What the status shows of the bus itself.
-pub struct BusStatus<'a> {
+pub(crate) struct BusStatus<'a> {
     /// Load in words.
-    pub load: &'a str,
+    pub(crate) load: &'a str,
     /// Nodes that were heard.
-    pub heard: &'a str,
+    pub(crate) heard: &'a str,
     /// Whether no further frame can come.
-    pub has_ended: bool,
+    pub(crate) has_ended: bool,
 }
 
 /// Time of the picture, s, from the time stamps of the frames.
@@ -236,7 +236,7 @@ fn legs<'a, const N: usize, const B: usize>(
 ///
 /// # Errors
 /// The input has no frame, or the leg file does not fit.
-pub fn watch<const N: usize, const B: usize>(
+pub(crate) fn watch<const N: usize, const B: usize>(
     leg: &LegFile,
     source: BusInput,
     out: &dyn Fn(LiveUpdate),

@@ -11,16 +11,16 @@ use scarab_rig::bus::pace::Pace;
 use crate::live::report::RATE_HZ;
 
 /// Servo ticks between two looks at the clock: one period of the picture.
-pub const PERIOD_TICKS: u64 = (SERVO_RATE_HZ / RATE_HZ) as u64;
+pub(crate) const PERIOD_TICKS: u64 = (SERVO_RATE_HZ / RATE_HZ) as u64;
 /// Longest sleep between two looks.
 const NAP: Duration = Duration::from_millis(2);
 
 /// Clock of a source.
-pub struct Clock {
+pub(crate) struct Clock {
     pace: Pace,
     nap: Duration,
     /// Seconds of the source per second, over the last second.
-    pub measured: Number,
+    pub(crate) measured: Number,
 }
 
 impl Clock {
@@ -33,7 +33,7 @@ impl Clock {
     }
 
     /// Waits until the clock has reached this time of the source. A source that is late does not catch up.
-    pub fn wait(&mut self, ticks: u64) {
+    pub(crate) fn wait(&mut self, ticks: u64) {
         let now_ns = ticks * TICK_NS;
         loop {
             let now = Instant::now();

@@ -2,17 +2,17 @@
 //!
 //! | part | content |
 //! | --- | --- |
-//! | [`clock`], [`picture`], [`progress`] | pace; samples, rows and estimates from logged samples |
-//! | [`simulated`] | a simulated leg that identifies itself |
-//! | [`playback`] | a recording, played back |
-//! | [`bus`] | legs on a CANopen bus, from the frames of a silent listener |
-//! | [`traced`] | the trace of a board, as it arrives or from a file |
+//! | `clock`, `picture`, `progress` | pace; samples, rows and estimates from logged samples |
+//! | `simulated` | a simulated leg that identifies itself |
+//! | `playback` | a recording, played back |
+//! | `bus` | legs on a CANopen bus, from the frames of a silent listener |
+//! | `traced` | the trace of a board, as it arrives or from a file |
 
-pub mod bus;
-pub mod clock;
-pub mod picture;
-pub mod playback;
-pub mod progress;
+pub(crate) mod bus;
+pub(crate) mod clock;
+pub(crate) mod picture;
+pub(crate) mod playback;
+pub(crate) mod progress;
 pub mod report;
-pub mod simulated;
-pub mod traced;
+pub(crate) mod simulated;
+pub(crate) mod traced;

@@ -21,11 +21,11 @@ const SAMPLES: u32 = LOG_RATE_HZ / RATE_HZ;
 const HALF_PERIOD_S: f64 = (SERVO_RATE_HZ / RATE_HZ - 1) as f64 / 2.0 / SERVO_RATE_HZ as f64;
 
 /// Time from the middle of a logged sample to its last servo tick, s.
-pub const HALF_SAMPLE_S: f64 = (TICKS_PER_LOG - 1) as f64 / 2.0 / SERVO_RATE_HZ as f64;
+pub(crate) const HALF_SAMPLE_S: f64 = (TICKS_PER_LOG - 1) as f64 / 2.0 / SERVO_RATE_HZ as f64;
 
 /// Description of a source with one leg.
 #[must_use]
-pub fn scene(leg: &LegFile, source: String, speed: f64) -> Scene {
+pub(crate) fn scene(leg: &LegFile, source: String, speed: f64) -> Scene {
     let joint = |joint: &JointFile| JointScene { name: joint.name.clone() };
     let joints = leg.joints.iter().map(joint).collect();
     Scene { source, speed, legs: vec![LegScene { name: leg.name.clone(), joints }] }
@@ -46,7 +46,7 @@ impl<const N: usize> Sums<N> {
 }
 
 /// Reports about one leg.
-pub struct Picture<'a, const N: usize> {
+pub(crate) struct Picture<'a, const N: usize> {
     leg: &'a LegFile,
     out: &'a dyn Fn(LiveUpdate),
     stick: Stick,
@@ -57,7 +57,7 @@ pub struct Picture<'a, const N: usize> {
     /// Index of the leg in the scene.
     leg_index: usize,
     /// Time of the reports, s: that of the last servo tick.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
 }
 
 impl<'a, const N: usize> Picture<'a, N> {
@@ -69,46 +69,46 @@ impl<'a, const N: usize> Picture<'a, N> {
 
     /// Reports currents as unknown.
     #[must_use]
-    pub fn without_currents(self) -> Self {
+    pub(crate) fn without_currents(self) -> Self {
         Self { has_currents: false, ..self }
     }
 
     /// Reports as the leg with this index in the scene.
     #[must_use]
-    pub fn at(self, leg_index: usize) -> Self {
+    pub(crate) fn at(self, leg_index: usize) -> Self {
         Self { leg_index, ..self }
     }
 
     /// Index of the leg in the scene.
     #[must_use]
-    pub fn leg_index(&self) -> usize {
+    pub(crate) fn leg_index(&self) -> usize {
         self.leg_index
     }
 
     /// Leg of the picture.
     #[must_use]
-    pub fn leg(&self) -> &'a LegFile {
+    pub(crate) fn leg(&self) -> &'a LegFile {
         self.leg
     }
 
     /// Begins a period.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.sums = Sums::EMPTY;
     }
 
     /// Hands on a report.
-    pub fn send(&self, update: LiveUpdate) {
+    pub(crate) fn send(&self, update: LiveUpdate) {
         (self.out)(update);
     }
 
     /// Adds a line to the timeline.
-    pub fn note(&self, weight: Severity, words: impl Into<String>) {
+    pub(crate) fn note(&self, weight: Severity, words: impl Into<String>) {
         let time_s = rounded(self.time_s);
         self.send(LiveUpdate::Note(LiveNote { time_s, weight, words: words.into() }));
     }
 
     /// Takes the commanded angles of one servo tick, D-H, rad.
-    pub fn command(&mut self, position_rad: &[f32; N]) {
+    pub(crate) fn command(&mut self, position_rad: &[f32; N]) {
         self.sums.ticks += 1;
         for (sum, angle) in self.sums.commanded.iter_mut().zip(position_rad) {
             *sum += f64::from(*angle);
@@ -118,7 +118,7 @@ impl<'a, const N: usize> Picture<'a, N> {
     /// Adds a logged sample to the means and to the progress of the identification. In the motion to identify
     /// from, least squares over the motion so far are reported each second. A torque that is not a number is
     /// unknown.
-    pub fn learn<const B: usize>(
+    pub(crate) fn learn<const B: usize>(
         &mut self,
         logged: &LoggedSample<N>,
         progress: &mut Progress<N, B>,
@@ -192,7 +192,7 @@ impl<'a, const N: usize> Picture<'a, N> {
     }
 
     /// Reports an estimate.
-    pub fn estimate(&mut self, origin: EstimateOrigin, iterations: u32, base: &[BaseReport]) {
+    pub(crate) fn estimate(&mut self, origin: EstimateOrigin, iterations: u32, base: &[BaseReport]) {
         let values = base.iter().map(|base| LiveParameter {
             name: base.name.clone(),
             unit: base.unit,
@@ -211,7 +211,7 @@ impl<'a, const N: usize> Picture<'a, N> {
     }
 
     /// Reports the end of a run.
-    pub fn conclude(&mut self, report: &RunReport) {
+    pub(crate) fn conclude(&mut self, report: &RunReport) {
         self.estimate(EstimateOrigin::Result, report.bso.iterations, &report.base_parameters);
         self.send(LiveUpdate::Outcome(LiveOutcome {
             leg: self.leg_index,

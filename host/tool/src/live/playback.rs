@@ -30,7 +30,7 @@ const SAMPLES_PER_LOOK: usize = (SAMPLE_RATE_HZ as u32 / RATE_HZ) as usize;
 ///
 /// # Errors
 /// Those of `replay`.
-pub fn play<const N: usize, const B: usize>(
+pub(crate) fn play<const N: usize, const B: usize>(
     leg: &LegFile,
     recordings: &Recordings,
     options: &ReplayOptions,

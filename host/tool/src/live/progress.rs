@@ -21,7 +21,7 @@ const TAPS: usize = 2048;
 const PENDING: usize = 205;
 
 /// Recorder and newest estimate of one leg.
-pub struct Progress<const N: usize, const B: usize> {
+pub(crate) struct Progress<const N: usize, const B: usize> {
     recorder: Box<Recorder<f32, N, B, TAPS, PENDING>>,
     model: RowModel<f32, N, B>,
     segment: Option<Segment>,
@@ -33,13 +33,13 @@ pub struct Progress<const N: usize, const B: usize> {
 
 /// Filtered torque of all joints and its prediction, D-H signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PredictedRow<const N: usize> {
+pub(crate) struct PredictedRow<const N: usize> {
     /// Seconds from the row's centre to the newest sample.
-    pub age_s: f64,
+    pub(crate) age_s: f64,
     /// Filtered torque, N m.
-    pub measured: [f32; N],
+    pub(crate) measured: [f32; N],
     /// Predicted torque, N m; `None` without a complete estimate, and for a joint at rest.
-    pub predicted: [Option<f32>; N],
+    pub(crate) predicted: [Option<f32>; N],
 }
 
 impl<const N: usize, const B: usize> Progress<N, B> {
@@ -61,7 +61,7 @@ impl<const N: usize, const B: usize> Progress<N, B> {
     }
 
     /// Takes one logged sample; returns the row that it completes.
-    pub fn push(&mut self, logged: &LoggedSample<N>) -> Option<PredictedRow<N>> {
+    pub(crate) fn push(&mut self, logged: &LoggedSample<N>) -> Option<PredictedRow<N>> {
         if logged.segment != self.segment {
             self.begin(logged.segment);
         }
@@ -97,19 +97,19 @@ impl<const N: usize, const B: usize> Progress<N, B> {
     }
 
     /// Separates the next sample from the last one, because samples between them are missing.
-    pub fn break_off(&mut self) {
+    pub(crate) fn break_off(&mut self) {
         self.recorder.break_off();
     }
 
     /// Whether an estimate is due: each second of the motion to identify from.
     #[must_use]
-    pub fn is_due(&self) -> bool {
+    pub(crate) fn is_due(&self) -> bool {
         let rows = self.recorder.rows().into_iter().min().unwrap_or(0);
         self.segment == Some(Segment::Training) && rows >= self.estimated + RATE_HZ
     }
 
     /// Least squares over the motion so far. Predicts from now on, once it determines `rank` parameters.
-    pub fn estimate(&mut self, plan: Plan, rank: usize) -> Estimate<f32, B> {
+    pub(crate) fn estimate(&mut self, plan: Plan, rank: usize) -> Estimate<f32, B> {
         self.estimated = self.recorder.rows().into_iter().min().unwrap_or(0);
         let record = self.recorder.clone().finish();
         let estimate = Problem::new(&record, &self.model).least_squares(plan);
@@ -120,14 +120,14 @@ impl<const N: usize, const B: usize> Progress<N, B> {
     }
 
     /// Predicts with a result from now on.
-    pub fn use_result(&mut self, model: &RowModel<f32, N, B>, values: &[f32; B]) {
+    pub(crate) fn use_result(&mut self, model: &RowModel<f32, N, B>, values: &[f32; B]) {
         self.model = model.clone();
         self.values = Some(*values);
     }
 
     /// Predicts with base values by name from now on, unknown ones zero, and with Stribeck curves: joint from
     /// 0, surplus in N m, speed in rad/s.
-    pub fn use_named(
+    pub(crate) fn use_named(
         &mut self,
         background: &Background<N, B>,
         value: impl Fn(&str) -> Option<f64>,

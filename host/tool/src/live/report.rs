@@ -9,11 +9,11 @@ use scarab_base::number::Number;
 use scarab_identify::report::findings::FindingReport;
 
 /// Samples and rows per second of the source's clock.
-pub const RATE_HZ: u32 = 50;
+pub(crate) const RATE_HZ: u32 = 50;
 
 /// One report of a source.
 #[derive(Clone, Debug, PartialEq)]
-pub enum LiveUpdate {
+pub(crate) enum LiveUpdate {
     /// Description of the source, before anything else.
     Scene(Scene),
     /// Measured motion, [`RATE_HZ`] times per second.
@@ -32,67 +32,67 @@ pub enum LiveUpdate {
 
 /// Constant description of a source.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Scene {
+pub(crate) struct Scene {
     /// Kind of source in words.
-    pub source: String,
+    pub(crate) source: String,
     /// Requested seconds of the source per second.
-    pub speed: f64,
+    pub(crate) speed: f64,
     /// Legs.
-    pub legs: Vec<LegScene>,
+    pub(crate) legs: Vec<LegScene>,
 }
 
 /// Constant description of a leg.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LegScene {
+pub(crate) struct LegScene {
     /// Name in the leg file.
-    pub name: String,
+    pub(crate) name: String,
     /// Joints, proximal first.
-    pub joints: Vec<JointScene>,
+    pub(crate) joints: Vec<JointScene>,
 }
 
 /// Constant description of a joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct JointScene {
+pub(crate) struct JointScene {
     /// Name in the leg file.
-    pub name: String,
+    pub(crate) name: String,
 }
 
 /// Means over one period of [`RATE_HZ`], of every joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LiveSample {
+pub(crate) struct LiveSample {
     /// Leg, from 0.
-    pub leg: usize,
+    pub(crate) leg: usize,
     /// Middle of the period, s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// Measured angles, rad.
-    pub angle_rad: Vec<f32>,
+    pub(crate) angle_rad: Vec<f32>,
     /// Commanded angles, rad; unknown in a recording, and without a target on a bus.
-    pub commanded_rad: Vec<Option<f32>>,
+    pub(crate) commanded_rad: Vec<Option<f32>>,
     /// Torques by the measured currents, N m; unknown on a bus that does not carry them.
-    pub torque_nm: Vec<Option<f32>>,
+    pub(crate) torque_nm: Vec<Option<f32>>,
     /// Measured currents with the torques' signs, A; unknown in a recording.
-    pub current_a: Vec<Option<f32>>,
+    pub(crate) current_a: Vec<Option<f32>>,
     /// Joints and tip in the picture's plane, m: to the right, downwards.
-    pub points_m: Vec<[f32; 2]>,
+    pub(crate) points_m: Vec<[f32; 2]>,
 }
 
 /// Torque behind the identification's filter, and its prediction for the same instant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LiveRow {
+pub(crate) struct LiveRow {
     /// Leg, from 0.
-    pub leg: usize,
+    pub(crate) leg: usize,
     /// Centre of the filter's window, s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// Filtered torques, N m.
-    pub measured_nm: Vec<f32>,
+    pub(crate) measured_nm: Vec<f32>,
     /// Predicted torques, N m; unknown without a complete estimate, and while the joint is at rest.
-    pub predicted_nm: Vec<Option<f32>>,
+    pub(crate) predicted_nm: Vec<Option<f32>>,
 }
 
 /// Origin of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum EstimateOrigin {
+pub(crate) enum EstimateOrigin {
     /// Least squares over the exciting motion so far.
     Motion,
     /// Best of the running search.
@@ -105,84 +105,84 @@ pub enum EstimateOrigin {
 
 /// Estimate of all base parameters at one time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LiveEstimate {
+pub(crate) struct LiveEstimate {
     /// Leg, from 0.
-    pub leg: usize,
+    pub(crate) leg: usize,
     /// Time of the estimate, s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// Origin of the values.
-    pub origin: EstimateOrigin,
+    pub(crate) origin: EstimateOrigin,
     /// Iterations of the search; 0 before it.
-    pub iterations: u32,
+    pub(crate) iterations: u32,
     /// Base parameters.
-    pub values: Vec<LiveParameter>,
+    pub(crate) values: Vec<LiveParameter>,
 }
 
 /// One base parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LiveParameter {
+pub(crate) struct LiveParameter {
     /// Name as in reports.
-    pub name: String,
+    pub(crate) name: String,
     /// SI unit.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// Value; unknown while the data do not determine it.
-    pub value: Number,
+    pub(crate) value: Number,
     /// Standard deviation.
-    pub sigma: Number,
+    pub(crate) sigma: Number,
     /// Value of the simulated leg.
-    pub truth: Number,
+    pub(crate) truth: Number,
 }
 
 /// Present state of a leg.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LiveStatus {
+pub(crate) struct LiveStatus {
     /// Leg, from 0.
-    pub leg: usize,
+    pub(crate) leg: usize,
     /// Time, s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// Number of the identification, from 1.
-    pub run: u32,
+    pub(crate) run: u32,
     /// State of the drive.
-    pub drive: String,
+    pub(crate) drive: String,
     /// Activity and phase.
-    pub doing: String,
+    pub(crate) doing: String,
     /// Event that ends the phase.
-    pub waits_for: String,
+    pub(crate) waits_for: String,
     /// Rest of the running motion, s.
-    pub left_s: Number,
+    pub(crate) left_s: Number,
     /// Reason why the drive is not enabled; empty while it is.
-    pub not_enabled: String,
+    pub(crate) not_enabled: String,
     /// Latched fault, empty without one; `None` if the source does not know.
-    pub fault: Option<String>,
+    pub(crate) fault: Option<String>,
     /// Limits that acted since the last status, each with its joint; `None` if the source does not know.
-    pub limits: Option<Vec<String>>,
+    pub(crate) limits: Option<Vec<String>>,
     /// Seconds of the source per second, measured over the last second.
-    pub speed: Number,
+    pub(crate) speed: Number,
     /// Load of the board's processor in words; empty if unknown.
-    pub processor: String,
+    pub(crate) processor: String,
     /// Load of the bus in words; empty without one.
-    pub bus: String,
+    pub(crate) bus: String,
 }
 
 /// Verdict and its tests.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct LiveOutcome {
+pub(crate) struct LiveOutcome {
     /// Leg, from 0.
-    pub leg: usize,
+    pub(crate) leg: usize,
     /// `accepted` or `refused`; empty before the last motion has ended.
-    pub verdict: String,
+    pub(crate) verdict: String,
     /// Whether unused motions were predicted.
-    pub validated: bool,
+    pub(crate) validated: bool,
     /// Words of the reasons for rejection.
-    pub reasons: Vec<String>,
+    pub(crate) reasons: Vec<String>,
     /// Tests evaluated so far.
-    pub findings: Vec<FindingReport>,
+    pub(crate) findings: Vec<FindingReport>,
 }
 
 /// Importance of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Severity {
+pub(crate) enum Severity {
     /// Information only.
     Note,
     /// Something was refused, lost or out of order.
@@ -193,11 +193,11 @@ pub enum Severity {
 
 /// Line of the timeline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LiveNote {
+pub(crate) struct LiveNote {
     /// Time, s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// Importance.
-    pub weight: Severity,
+    pub(crate) weight: Severity,
     /// Sentence.
-    pub words: String,
+    pub(crate) words: String,
 }

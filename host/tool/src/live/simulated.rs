@@ -30,18 +30,18 @@ const STATUS_TICKS: u64 = 10 * PERIOD_TICKS;
 
 /// Options of a live run.
 #[derive(Clone, Copy, Debug)]
-pub struct LiveOptions {
+pub(crate) struct LiveOptions {
     /// Simulated seconds per second.
-    pub speed: f64,
+    pub(crate) speed: f64,
     /// Identifications, one after the other, with growing seeds.
-    pub runs: u32,
+    pub(crate) runs: u32,
 }
 
 /// Identifies a simulated leg and reports it to `out`; returns the report of the last run.
 ///
 /// # Errors
 /// Those of `identify`.
-pub fn identify<const N: usize, const B: usize>(
+pub(crate) fn identify<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &SimulationOptions,
     live: &LiveOptions,

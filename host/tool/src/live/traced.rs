@@ -31,22 +31,22 @@ use crate::live::report::{LiveStatus, LiveUpdate, Severity};
 const PIECE: usize = 256;
 
 /// Input of a trace.
-pub struct TraceInput {
+pub(crate) struct TraceInput {
     /// Records as text, or `defmt` frames.
-    pub input: Box<dyn Read + Send>,
+    pub(crate) input: Box<dyn Read + Send>,
     /// Reader with the image's decoder, if any.
-    pub reader: StreamReader,
+    pub(crate) reader: StreamReader,
     /// Name for messages.
-    pub name: String,
+    pub(crate) name: String,
     /// Seconds of the board per second; `None` for a board that sends now.
-    pub speed: Option<f64>,
+    pub(crate) speed: Option<f64>,
 }
 
 /// Reports a trace to `out` until its end; returns the report of the last result.
 ///
 /// # Errors
 /// The input cannot be read, has no record, or its last result belongs to another leg.
-pub fn follow<const N: usize, const B: usize>(
+pub(crate) fn follow<const N: usize, const B: usize>(
     leg: &LegFile,
     source: TraceInput,
     out: &dyn Fn(LiveUpdate),

@@ -23,7 +23,7 @@ fn percent(part: Number, whole: Number) -> String {
 
 /// Torques of every mode, motion and joint, N m rms.
 #[must_use]
-pub fn rows(report: &AssistReport) -> Table {
+pub(crate) fn rows(report: &AssistReport) -> Table {
     let is_compared = report.rows.iter().any(|row| row.drives_off_rms_nm.known().is_some());
     let is_carried = report.rows.iter().any(|row| row.wearer_gravity_share.known().is_some());
     let mut table = Table::default()
@@ -77,7 +77,7 @@ pub fn shares(report: &AssistReport) -> Table {
 
 /// Periodic assistance: the worst of all seeds for each cadence, the mean for the effort.
 #[must_use]
-pub fn periodic(report: &AssistReport) -> Table {
+pub(crate) fn periodic(report: &AssistReport) -> Table {
     let mut table = Table::default().label("cadence, Hz").numbers([
         "lock, cycles",
         "relock, cycles",
@@ -110,7 +110,7 @@ pub fn periodic(report: &AssistReport) -> Table {
 
 /// Base sums of the wearer's leg against anthropometry.
 #[must_use]
-pub fn wearer_sums(report: &AssistReport) -> Table {
+pub(crate) fn wearer_sums(report: &AssistReport) -> Table {
     let is_spread = report.wearer_sums.iter().any(|sum| sum.spread.known().is_some());
     let mut table = Table::default()
         .label("worn - empty")
@@ -140,7 +140,7 @@ pub fn wearer_sums(report: &AssistReport) -> Table {
 
 /// Lines about energy, rest, faults and stability; only what was run.
 #[must_use]
-pub fn notes(report: &AssistReport) -> Vec<String> {
+pub(crate) fn notes(report: &AssistReport) -> Vec<String> {
     let mut notes: Vec<String> =
         report.failures().into_iter().map(|failure| format!("FAILED: {failure}")).collect();
     for refused in &report.refused {

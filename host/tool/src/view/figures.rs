@@ -18,11 +18,11 @@
 //! Curves also differ in lightness and width, so they can be distinguished in grey. Drawings have four
 //! times the shown size with a `viewBox` of that size, since the backend rounds to whole pixels.
 
-pub mod assist;
+pub(crate) mod assist;
 pub mod canvas;
 pub mod curve;
-pub mod faults;
-pub mod motor;
+pub(crate) mod faults;
+pub(crate) mod motor;
 mod parameters;
 mod residuals;
 mod search;
@@ -131,7 +131,7 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
 }
 
 /// Base parameters of many runs of one leg about their truth.
-pub fn spread(leg: &str, spreads: &[Spread]) -> Result<Figure, ToolError> {
+pub(crate) fn spread(leg: &str, spreads: &[Spread]) -> Result<Figure, ToolError> {
     let file = "spread.svg".to_owned();
     let svg = render(WIDTH, spread::HEAD + 60 + 26 * spreads.len() as u32, &|area| {
         spread::whole(area, leg, spreads)

@@ -8,16 +8,16 @@
 //! Keys without a section of their own, for example from a later report, are shown in a generic
 //! table (`html/generic.rs`).
 
-pub mod assist;
+pub(crate) mod assist;
 mod choices;
-pub mod commission;
-pub mod faults;
+pub(crate) mod commission;
+pub(crate) mod faults;
 mod generic;
 mod head;
 mod limits;
-pub mod parameters;
+pub(crate) mod parameters;
 mod results;
-pub mod seeds;
+pub(crate) mod seeds;
 pub mod table;
 mod verdict;
 
@@ -43,7 +43,7 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src dat
 ///
 /// `SOURCE_DATE_EPOCH` (s since 1970) replaces it, for reproducible pages.
 #[must_use]
-pub fn time_utc() -> String {
+pub(crate) fn time_utc() -> String {
     let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
     let now = stated.and_then(|seconds| Timestamp::from_second(seconds).ok()).unwrap_or_else(Timestamp::now);
     now.round(Unit::Second).unwrap_or(now).to_string()
@@ -53,21 +53,21 @@ pub fn time_utc() -> String {
 #[derive(Clone, Debug)]
 pub struct Circumstances {
     /// Time, UTC.
-    pub time_utc: String,
+    pub(crate) time_utc: String,
     /// Command line.
     pub command: String,
     /// Identified leg.
-    pub leg: LegFile,
+    pub(crate) leg: LegFile,
 }
 
 impl Circumstances {
     /// Command line of this process and the current time ([`time_utc`]).
     #[must_use]
-    pub fn now(leg: &LegFile) -> Self {
+    pub(crate) fn now(leg: &LegFile) -> Self {
         Self::from_command(leg, std::env::args().skip(1).filter(|word| word != BY_CARGO))
     }
 
-    /// Command line of these words and the current time, as in [`Self::now`].
+    /// Command line of these words and the current time, as in `Self::now`.
     #[must_use]
     pub fn from_command(leg: &LegFile, words: impl IntoIterator<Item = String>) -> Self {
         let words: Vec<String> = words.into_iter().map(|word| quoted(&word)).collect();

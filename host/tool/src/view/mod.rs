@@ -1,13 +1,13 @@
 //! Results as tables, figures and pages. Runs nothing.
 
-pub mod assist;
+pub(crate) mod assist;
 pub mod document;
-pub mod excite;
+pub(crate) mod excite;
 pub mod figures;
 pub mod html;
 pub mod live;
-pub mod monitor;
-pub mod motor;
-pub mod runs;
-pub mod spread;
+pub(crate) mod monitor;
+pub(crate) mod motor;
+pub(crate) mod runs;
+pub(crate) mod spread;
 pub mod tables;

@@ -92,7 +92,7 @@ fn mean_and_spread(values: &[f64]) -> (f64, f64) {
 }
 
 /// Prints statistics of many runs, or all of a few.
-pub fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
+pub(crate) fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
     let runs = &report.runs;
     say!("{}: walking, 3 s cycle", report.leg);
     if runs.len() < 4 {

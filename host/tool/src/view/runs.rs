@@ -184,7 +184,7 @@ fn coverage(report: &RunsReport, sigmas: f64) -> f64 {
 }
 
 /// Prints statistics of many runs.
-pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
+pub(crate) fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
     let runs = &report.runs;
     let Some(first) = runs.first() else { return Ok(()) };
     say!("{}: {} runs, prior {}, plan {}\n", first.leg, runs.len(), first.prior, first.plan);

@@ -6,25 +6,25 @@ use scarab_identify::report::RunReport;
 
 /// One base parameter over all runs that determine it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Spread {
+pub(crate) struct Spread {
     /// Name in reports.
-    pub name: String,
+    pub(crate) name: String,
     /// SI unit.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// True value of the simulated leg.
-    pub truth: f64,
+    pub(crate) truth: f64,
     /// Value minus truth, over the sigma of its run.
-    pub errors: Vec<f64>,
+    pub(crate) errors: Vec<f64>,
     /// Root mean square of the reported sigma.
-    pub sigma: f64,
+    pub(crate) sigma: f64,
     /// Root mean square error over the Cramér-Rao bound; `None` if no run has one.
-    pub over_bound: Option<f64>,
+    pub(crate) over_bound: Option<f64>,
 }
 
 impl Spread {
     /// Spread of every base parameter with a truth, in the order of first appearance.
     #[must_use]
-    pub fn from_runs(runs: &[RunReport]) -> Vec<Self> {
+    pub(crate) fn from_runs(runs: &[RunReport]) -> Vec<Self> {
         let mut names: Vec<&str> = Vec::new();
         for base in runs.iter().flat_map(|run| &run.base_parameters) {
             if !names.contains(&base.name.as_str()) {
@@ -57,20 +57,20 @@ impl Spread {
 
     /// Mean error in sigma.
     #[must_use]
-    pub fn mean(&self) -> f64 {
+    pub(crate) fn mean(&self) -> f64 {
         self.errors.iter().sum::<f64>() / self.errors.len().max(1) as f64
     }
 
     /// Standard deviation of the errors about their mean, in sigma; 1 if the reported sigma is right.
     #[must_use]
-    pub fn deviation(&self) -> f64 {
+    pub(crate) fn deviation(&self) -> f64 {
         let mean = self.mean();
         rms(self.errors.iter().map(|error| error - mean))
     }
 
     /// Share of the errors within a number of sigma.
     #[must_use]
-    pub fn within(&self, sigmas: f64) -> f64 {
+    pub(crate) fn within(&self, sigmas: f64) -> f64 {
         let inside = self.errors.iter().filter(|error| error.abs() <= sigmas).count();
         inside as f64 / self.errors.len().max(1) as f64
     }

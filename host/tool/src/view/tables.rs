@@ -19,7 +19,7 @@ use crate::view::html::table::html_cell;
 
 /// Table of the base parameters: value, sigma with its parts, truth and error in sigma.
 #[must_use]
-pub fn base_parameters(run: &RunReport) -> Table {
+pub(crate) fn base_parameters(run: &RunReport) -> Table {
     let any = |known: fn(&BaseReport) -> Number| {
         run.base_parameters.iter().any(|base| known(base).known().is_some())
     };
@@ -73,7 +73,10 @@ fn terms(terms: &BTreeMap<String, f64>) -> String {
 
 /// Table of parameters with their status.
 #[must_use]
-pub fn parameters<'a>(parameters: impl Iterator<Item = &'a ParameterReport>, is_truth_known: bool) -> Table {
+pub(crate) fn parameters<'a>(
+    parameters: impl Iterator<Item = &'a ParameterReport>,
+    is_truth_known: bool,
+) -> Table {
     let mut table = Table::with_class("parameters")
         .label("parameter")
         .numbers(["value", "sigma"])
@@ -101,7 +104,7 @@ pub fn parameters<'a>(parameters: impl Iterator<Item = &'a ParameterReport>, is_
 
 /// All parameters, and the meaning of their status.
 #[must_use]
-pub fn all_parameters(run: &RunReport) -> String {
+pub(crate) fn all_parameters(run: &RunReport) -> String {
     let truth = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
     parameters(run.parameters.iter(), truth).to_text()
         + &format!(
@@ -113,7 +116,7 @@ pub fn all_parameters(run: &RunReport) -> String {
 
 /// Table of the torque errors on all motions; `joint` names a joint.
 #[must_use]
-pub fn fits(run: &RunReport, joint: impl Fn(usize) -> String) -> Table {
+pub(crate) fn fits(run: &RunReport, joint: impl Fn(usize) -> String) -> Table {
     // Figures use this name for the motion identified from, too: an unused one may have the same course.
     let is_recorded = run.seed.is_none() && run.trace.is_none();
     let all = || {
@@ -144,7 +147,7 @@ pub fn fits(run: &RunReport, joint: impl Fn(usize) -> String) -> Table {
 
 /// Table of the training and validation files, with the rows used for each joint.
 #[must_use]
-pub fn sources(sources: &[Source]) -> Table {
+pub(crate) fn sources(sources: &[Source]) -> Table {
     let joints = sources.first().map_or(0, |source| source.used.len());
     let mut table = Table::default()
         .text(["file", "use"])
@@ -166,7 +169,7 @@ pub fn sources(sources: &[Source]) -> Table {
 
 /// Table of the columns and conversions of the files, if any differs from the documented format.
 #[must_use]
-pub fn conversions(read: &[ReadReport]) -> Option<Table> {
+pub(crate) fn conversions(read: &[ReadReport]) -> Option<Table> {
     let mut table = Table::default().text(["file", "signal", "column", "unit", "times", "by"]);
     let mut files: Vec<&ReadReport> = Vec::new();
     for file in read.iter().filter(|file| file.is_notable()) {
@@ -211,11 +214,11 @@ pub fn reading_notes(read: &[ReadReport]) -> Vec<String> {
 }
 
 /// Meaning of the rows in the table of the files.
-pub const SOURCES: &str = "rows: decimated to 50 a second and used for that joint's torque; still: excluded, at rest \
+pub(crate) const SOURCES: &str = "rows: decimated to 50 a second and used for that joint's torque; still: excluded, at rest \
                            or near a reversal, because friction at rest is undetermined.";
 
 /// Prints one run of a leg.
-pub fn print_run(run: &RunReport, leg: &LegFile) -> Result<(), ToolError> {
+pub(crate) fn print_run(run: &RunReport, leg: &LegFile) -> Result<(), ToolError> {
     print(&run_text(run, leg))
 }
 
@@ -276,7 +279,7 @@ pub fn run_text(run: &RunReport, leg: &LegFile) -> String {
 
 /// Sentence of a failed test, or the name of the likely cause that says the same.
 #[must_use]
-pub fn failure(run: &RunReport, finding: &FindingReport) -> String {
+pub(crate) fn failure(run: &RunReport, finding: &FindingReport) -> String {
     let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
     match cause.filter(|cause| cause.says(finding)) {
         Some(cause) => format!("{}, see the likely cause", cause.name.replace('_', " ")),
@@ -286,7 +289,7 @@ pub fn failure(run: &RunReport, finding: &FindingReport) -> String {
 
 /// Comparison with a stored model, and the mass that explains the difference.
 #[must_use]
-pub fn comparison_lines(compared: &ComparisonReport) -> Vec<String> {
+pub(crate) fn comparison_lines(compared: &ComparisonReport) -> Vec<String> {
     let mut lines = vec![format!(
         "compared with {}: {} (chi-square {} of at most {})",
         compared.model,
@@ -341,7 +344,7 @@ fn search_line(run: &RunReport) -> String {
 
 /// Formats chi-square units above an optimum; smaller ones than 1e-6 are rounding.
 #[must_use]
-pub fn excess(units: Number) -> String {
+pub(crate) fn excess(units: Number) -> String {
     match units.known() {
         Some(units) if units.abs() < 1e-6 => "< 1e-6".into(),
         _ => plain(units),
@@ -373,7 +376,7 @@ fn consistent_line(run: &RunReport) -> String {
 
 /// Explanation of a reason from the closed list.
 #[must_use]
-pub fn explanation(reason: &str) -> &'static str {
+pub(crate) fn explanation(reason: &str) -> &'static str {
     match reason {
         "unphysical" => {
             "no physically consistent leg has these parameters (friction, inertia, kinetic energy), or none within its limits"

@@ -22,24 +22,24 @@ pub const LENGTH: [f64; 2] = [-5.0, 5.0];
 /// Zero offset, degrees.
 pub const ZERO_OFFSET: [f64; 2] = [-360.0, 360.0];
 /// Ends of a range, degrees.
-pub const RANGE_END: [f64; 2] = [-3600.0, 3600.0];
+pub(crate) const RANGE_END: [f64; 2] = [-3600.0, 3600.0];
 /// Smallest range that the firmware's limits accept.
-pub const SMALLEST_RANGE_DEG: f64 = 2.0;
+pub(crate) const SMALLEST_RANGE_DEG: f64 = 2.0;
 /// Largest speed limit, degrees per second.
-pub const LARGEST_SPEED: f64 = 2800.0;
+pub(crate) const LARGEST_SPEED: f64 = 2800.0;
 /// Largest torque limit, N m.
-pub const LARGEST_TORQUE: f64 = 1000.0;
+pub(crate) const LARGEST_TORQUE: f64 = 1000.0;
 /// Largest simulated noise of the torque, percent; leg files state at most 100.
 pub const LARGEST_NOISE_PERCENT: f64 = 1000.0;
 /// Largest current limit, A.
-pub const LARGEST_CURRENT_A: f64 = 300.0;
+pub(crate) const LARGEST_CURRENT_A: f64 = 300.0;
 /// Longest time of a holding brake, ms.
 const LONGEST_BRAKE_MS: f64 = 500.0;
 
 /// Position of a value; creates faults.
 pub(super) struct KeyLocation<'a> {
-    pub joint: Option<(usize, &'a str)>,
-    pub table: Option<&'static str>,
+    pub(crate) joint: Option<(usize, &'a str)>,
+    pub(crate) table: Option<&'static str>,
 }
 
 impl KeyLocation<'_> {

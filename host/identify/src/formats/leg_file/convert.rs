@@ -10,7 +10,7 @@ use crate::formats::leg_file::{BodySide, EncoderFile, JointFile, LegFile, LinkPa
 
 /// Distance of the simulated mechanical end stops from the range, degrees: wide enough for the default leg,
 /// which hangs at its anatomical zero.
-pub const END_STOP_DEG: f64 = 7.0;
+pub(crate) const END_STOP_DEG: f64 = 7.0;
 
 /// Mechanical end stops of a joint with this range, rad.
 fn stops([low, high]: [f64; 2]) -> [f64; 2] {

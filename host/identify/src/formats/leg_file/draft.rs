@@ -39,13 +39,13 @@ pub struct DraftJoint {
 /// Body of a joint without its rotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DraftPrior {
-    pub mass: f64,
-    pub com: [f64; 3],
-    pub inertia_com: [f64; 6],
+    pub(crate) mass: f64,
+    pub(crate) com: [f64; 3],
+    pub(crate) inertia_com: [f64; 6],
     /// Coulomb friction, N m, if known.
-    pub coulomb: Option<f64>,
+    pub(crate) coulomb: Option<f64>,
     /// Viscous friction, N m s/rad, if known.
-    pub viscous: Option<f64>,
+    pub(crate) viscous: Option<f64>,
 }
 
 impl Draft {

@@ -6,7 +6,7 @@
 /// Key with the line that states it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KeyLine {
-    pub key: &'static str,
+    pub(crate) key: &'static str,
     /// Line or lines of TOML, with words in capitals to replace.
     pub line: &'static str,
     /// Meaning and accepted values.
@@ -14,7 +14,7 @@ pub struct KeyLine {
 }
 
 /// Side of the body.
-pub const SIDE: KeyLine = KeyLine {
+pub(crate) const SIDE: KeyLine = KeyLine {
     key: "side",
     line: "side = SIDE",
     meaning: "\"right\"; \"left\": the drives are mounted mirrored",
@@ -37,7 +37,7 @@ pub const PRIOR: KeyLine = KeyLine {
 };
 
 /// Keys of each joint that an image needs, in the order in which they are written.
-pub const JOINT: [KeyLine; 10] = [
+pub(crate) const JOINT: [KeyLine; 10] = [
     KeyLine {
         key: "direction",
         line: "direction = SIGN",
@@ -75,7 +75,7 @@ pub const JOINT: [KeyLine; 10] = [
 ];
 
 /// Keys of each joint's `prior` that an image needs.
-pub const IN_PRIOR: [KeyLine; 3] = [
+pub(crate) const IN_PRIOR: [KeyLine; 3] = [
     KeyLine { key: "rotor_inertia", line: "rotor_inertia = KG_M2", meaning: "at the joint, 0..100" },
     KeyLine { key: "coulomb", line: "coulomb = NM", meaning: "0..1000" },
     KeyLine { key: "viscous", line: "viscous = NM_S_RAD", meaning: "0..1000" },

@@ -61,16 +61,16 @@ pub struct MotorFile {
     pub inductance_q_uh: f64,
     /// Peak of the cogging torque at the rotor, N m.
     #[serde(default)]
-    pub cogging_nm: f64,
+    pub(crate) cogging_nm: f64,
     /// Periods of the cogging torque per turn.
     #[serde(default = "default_cogging_periods")]
-    pub cogging_periods: u32,
+    pub(crate) cogging_periods: u32,
     /// Electrical angle at the joint's anatomical zero, degrees.
     #[serde(default)]
-    pub electrical_zero_deg: f64,
+    pub(crate) electrical_zero_deg: f64,
     /// Rotor angle of the encoder's index pulse, degrees.
     #[serde(default)]
-    pub index_deg: f64,
+    pub(crate) index_deg: f64,
     /// Thermal resistance from winding to ambient, K/W.
     #[serde(default = "default_thermal_resistance")]
     pub thermal_resistance_k_w: f64,
@@ -102,11 +102,11 @@ pub struct MotorFile {
 #[serde(deny_unknown_fields)]
 pub struct ThermistorFile {
     /// Resistor from the pin to 3.3 V, ohm.
-    pub pull_up_ohm: f64,
+    pub(crate) pull_up_ohm: f64,
     /// Resistance of the thermistor at 25 degrees Celsius, ohm.
-    pub r25_ohm: f64,
+    pub(crate) r25_ohm: f64,
     /// Constant beta of its data sheet, K.
-    pub beta_k: f64,
+    pub(crate) beta_k: f64,
 }
 
 /// Direction of an absolute encoder at a joint.
@@ -196,7 +196,7 @@ impl MotorFile {
     /// Motor of the class of ODrive's D5065 with 270 rpm/V: 8.27/270 = 0.0306 N m/A, 7 pole pairs and 12
     /// slots, at most 65 A. Resistance and inductance are typical of such outrunners (15..40 mohm, 9..35
     /// uH). Cogging (1 % of the greatest torque), saliency and thermal values are our assumptions.
-    pub const D5065_CLASS: Self = Self {
+    pub(crate) const D5065_CLASS: Self = Self {
         pole_pairs: 7,
         resistance_ohm: 0.039,
         inductance_d_uh: 15.0,
@@ -294,7 +294,7 @@ impl MotorFile {
 
     /// Flux linkage of the magnets, V s.
     #[must_use]
-    pub fn flux(&self, joint: &JointFile) -> f64 {
+    pub(crate) fn flux(&self, joint: &JointFile) -> f64 {
         joint.torque_per_ampere / (1.5 * f64::from(self.pole_pairs) * joint.encoder.ratio)
     }
 

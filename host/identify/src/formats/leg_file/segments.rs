@@ -10,13 +10,13 @@ use crate::formats::leg_file::LegFile;
 #[serde(deny_unknown_fields)]
 pub struct SegmentsFile {
     /// Length from knee to ankle, m. The thigh extends to the last joint.
-    pub shank_m: f64,
+    pub(crate) shank_m: f64,
     /// Length of the wearer's foot, m.
-    pub foot_m: f64,
+    pub(crate) foot_m: f64,
     /// Body mass of the wearer in `truth`, kg.
-    pub wearer_kg: f64,
+    pub(crate) wearer_kg: f64,
     /// Body mass of the wearer that `prior` assumes, kg.
-    pub prior_wearer_kg: f64,
+    pub(crate) prior_wearer_kg: f64,
 }
 
 impl SegmentsFile {
@@ -56,7 +56,7 @@ impl LegFile {
     /// Length of the link beyond a joint, m, up to the next joint's axis. The last link has the
     /// shank's length if stated, else twice the distance of its centre of mass, if known.
     #[must_use]
-    pub fn link_length(&self, joint: usize) -> f64 {
+    pub(crate) fn link_length(&self, joint: usize) -> f64 {
         if let Some(next) = self.joints.get(joint + 1) {
             return next.dh.a.hypot(next.dh.d);
         }

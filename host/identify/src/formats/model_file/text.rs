@@ -54,7 +54,7 @@ impl ModelFile {
     }
 
     /// Adds the checksum of the content.
-    pub fn sealed(mut self) -> Self {
+    pub(crate) fn sealed(mut self) -> Self {
         let raw: toml::Table =
             toml::from_str(&self.to_toml()).unwrap_or_else(|fault| unreachable!("own text: {fault}"));
         self.checksum = checksum::of_table(&raw);

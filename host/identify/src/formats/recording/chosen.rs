@@ -25,7 +25,7 @@ pub(crate) struct Names {
 
 impl Names {
     /// Unit of this quantity that the file or the column's name states.
-    pub(crate) fn unit(&self, index: usize, quantity: Quantity) -> Option<Unit> {
+    pub fn unit(&self, index: usize, quantity: Quantity) -> Option<Unit> {
         let of_file = self.units.get(index).copied().flatten().filter(|unit| unit.quantity == quantity);
         of_file.or_else(|| unit_in_name(self.names.get(index)?, quantity))
     }
@@ -74,7 +74,7 @@ impl Chosen {
     }
 
     /// How the column is read, for a proposal.
-    pub(crate) fn reading(&self) -> Reading {
+    pub fn reading(&self) -> Reading {
         let Column { index, name } = &self.column;
         let column = if name.contains(',') { (index + 1).to_string() } else { name.clone() };
         Reading { signal: self.signal, column, unit: self.unit }

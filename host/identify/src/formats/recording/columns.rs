@@ -17,7 +17,7 @@ pub(crate) struct Rows<R> {
 }
 
 impl<R: BufRead> Rows<R> {
-    pub(crate) fn new(source: R, delimiter: Delimiter) -> Self {
+    pub fn new(source: R, delimiter: Delimiter) -> Self {
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -28,7 +28,7 @@ impl<R: BufRead> Rows<R> {
     }
 
     /// Next row, or `None` at the end.
-    pub(crate) fn next(&mut self) -> Result<Option<&StringRecord>, Fault> {
+    pub fn next(&mut self) -> Result<Option<&StringRecord>, Fault> {
         self.reader.get_mut().begin_record();
         match self.reader.read_record(&mut self.row) {
             Ok(true) => Ok(Some(&self.row)),
@@ -42,7 +42,7 @@ impl<R: BufRead> Rows<R> {
     }
 
     /// Line on which the last row began.
-    pub(crate) fn line(&self) -> usize {
+    pub fn line(&self) -> usize {
         self.reader.get_ref().record_line()
     }
 

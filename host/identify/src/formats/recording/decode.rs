@@ -47,7 +47,7 @@ pub(crate) struct Decoder<'a> {
 
 impl<'a> Decoder<'a> {
     /// Chooses the columns by their names.
-    pub(crate) fn new(file: &'a Path, names: &Names, import: &'a Import) -> Result<Self, Fault> {
+    pub fn new(file: &'a Path, names: &Names, import: &'a Import) -> Result<Self, Fault> {
         let (columns, joints_in_file) = choose(names, import)?;
         let joints = import.drives.len();
         let recording = Recording {
@@ -247,7 +247,12 @@ pub(crate) fn samples(name: &Path, time_s: &[f64], joints: &[JointSeries]) -> Re
 }
 
 /// Reads a CSV text.
-pub fn csv(file: &Path, source: impl BufRead, packing: &str, import: &Import) -> Result<Read, FileError> {
+pub(crate) fn csv(
+    file: &Path,
+    source: impl BufRead,
+    packing: &str,
+    import: &Import,
+) -> Result<Read, FileError> {
     let unreadable = |error: std::io::Error| refuse(file, None, Fault::Unreadable(error.to_string()));
     let (begin, source) = peeked(source, LOOKED_AT).map_err(unreadable)?;
     if begin.starts_with(&[0xFF, 0xFE]) || begin.starts_with(&[0xFE, 0xFF]) {

@@ -24,7 +24,7 @@ impl Delimiter {
     const ALL: [Self; 3] = [Self::Comma, Self::Semicolon, Self::Tab];
 
     #[must_use]
-    pub fn byte(self) -> u8 {
+    pub(crate) fn byte(self) -> u8 {
         match self {
             Self::Comma => b',',
             Self::Semicolon => b';',
@@ -34,7 +34,7 @@ impl Delimiter {
 
     /// Word of the option `--delimiter`.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Comma => "comma",
             Self::Semicolon => "semicolon",
@@ -64,9 +64,9 @@ impl Decimal {
 
 /// How a file writes its rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Dialect {
-    pub delimiter: Delimiter,
-    pub decimal: Decimal,
+pub(crate) struct Dialect {
+    pub(crate) delimiter: Delimiter,
+    pub(crate) decimal: Decimal,
 }
 
 impl Dialect {
@@ -74,7 +74,7 @@ impl Dialect {
     ///
     /// # Errors
     /// The first rows allow two readings.
-    pub fn detect(begin: &[u8], stated: (Option<Delimiter>, Option<Decimal>)) -> Result<Self, Fault> {
+    pub(crate) fn detect(begin: &[u8], stated: (Option<Delimiter>, Option<Decimal>)) -> Result<Self, Fault> {
         let text = String::from_utf8_lossy(begin);
         let mut lines: Vec<&str> =
             text.split_inclusive('\n').filter(|line| !is_skipped(line.as_bytes())).collect();

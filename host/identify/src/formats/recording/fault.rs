@@ -9,7 +9,7 @@ use crate::formats::recording::{
 
 /// Fault of a recording, in plain words.
 #[derive(Debug, thiserror::Error)]
-pub enum Fault {
+pub(crate) enum Fault {
     /// The file is empty or has blank lines only.
     #[error("the file is empty")]
     Empty,
@@ -215,7 +215,7 @@ pub enum Fault {
 impl Fault {
     /// Whether the fault is one row's, so that the row can be skipped.
     #[must_use]
-    pub fn is_of_row(&self) -> bool {
+    pub(crate) fn is_of_row(&self) -> bool {
         matches!(
             self,
             Self::FieldCount { .. }
@@ -228,7 +228,7 @@ impl Fault {
 
     /// Whether the fault is the unit of all rows.
     #[must_use]
-    pub fn is_of_unit(&self) -> bool {
+    pub(crate) fn is_of_unit(&self) -> bool {
         matches!(self, Self::Absurd { advice, .. } if !advice.is_empty())
     }
 }

@@ -74,7 +74,7 @@ impl Foreign {
     }
 
     /// Reads or refuses the file.
-    pub(crate) fn read(self, file: &Path, is_packed: bool, import: &Import) -> Result<Read, FileError> {
+    pub fn read(self, file: &Path, is_packed: bool, import: &Import) -> Result<Read, FileError> {
         let refused = |reason: &str| Err(refuse(file, None, Fault::Unreadable(reason.to_owned())));
         match self {
             Self::Refused(reason) => refused(reason),

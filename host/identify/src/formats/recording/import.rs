@@ -26,8 +26,8 @@ pub enum ColumnName {
 /// One part of `--columns`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnChoice {
-    pub signal: Signal,
-    pub column: ColumnName,
+    pub(crate) signal: Signal,
+    pub(crate) column: ColumnName,
 }
 
 impl FromStr for ColumnChoice {
@@ -52,8 +52,8 @@ impl FromStr for ColumnChoice {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitChoice {
     /// Signal, or all of the unit's quantity.
-    pub signal: Option<Signal>,
-    pub unit: Unit,
+    pub(crate) signal: Option<Signal>,
+    pub(crate) unit: Unit,
 }
 
 impl FromStr for UnitChoice {

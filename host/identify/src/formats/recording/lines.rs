@@ -6,7 +6,7 @@
 use std::io::{self, BufRead, Read};
 
 /// Longest line, bytes: longer ones are not a recording's.
-pub(crate) const LONGEST_LINE: usize = 1 << 20;
+pub const LONGEST_LINE: usize = 1 << 20;
 
 const UTF8_MARK: [u8; 3] = [0xEF, 0xBB, 0xBF];
 
@@ -25,7 +25,7 @@ pub(crate) struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    pub(crate) fn new(source: R) -> Self {
+    pub fn new(source: R) -> Self {
         Self { source, line: Vec::new(), passed: 0, number: 0, record: None, is_open: false }
     }
 

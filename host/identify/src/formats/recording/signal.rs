@@ -14,7 +14,7 @@ use std::str::FromStr;
 
 /// Physical quantity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quantity {
+pub(crate) enum Quantity {
     Time,
     Angle,
     Torque,
@@ -22,11 +22,11 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    pub const ALL: [Self; 4] = [Self::Time, Self::Angle, Self::Torque, Self::Current];
+    pub(crate) const ALL: [Self; 4] = [Self::Time, Self::Angle, Self::Torque, Self::Current];
 
     /// SI unit, which is the default.
     #[must_use]
-    pub fn si(self) -> Unit {
+    pub(crate) fn si(self) -> Unit {
         match self {
             Self::Time => UNITS[0],
             Self::Angle => UNITS[4],
@@ -40,8 +40,8 @@ impl Quantity {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
     /// Name on the command line and in names of columns.
-    pub name: &'static str,
-    pub quantity: Quantity,
+    pub(crate) name: &'static str,
+    pub(crate) quantity: Quantity,
     /// SI value = value * `times` / `over`. Two numbers, so that 1 ms is the double nearest to 0.001 s.
     times: f64,
     over: f64,
@@ -97,30 +97,30 @@ const SPELLINGS: [(&str, &str); 23] = [
 impl Unit {
     /// Value in the SI unit.
     #[must_use]
-    pub fn to_si(&self, value: f64) -> f64 {
+    pub(crate) fn to_si(&self, value: f64) -> f64 {
         value * self.times / self.over
     }
 
     /// SI value of one unit.
     #[must_use]
-    pub fn factor(&self) -> f64 {
+    pub(crate) fn factor(&self) -> f64 {
         self.times / self.over
     }
 
     /// Units of a quantity, the SI unit first.
-    pub fn for_quantity(quantity: Quantity) -> impl Iterator<Item = Self> {
+    pub(crate) fn for_quantity(quantity: Quantity) -> impl Iterator<Item = Self> {
         UNITS.into_iter().filter(move |unit| unit.quantity == quantity)
     }
 
     /// Unit of this name on the command line.
     #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         UNITS.into_iter().find(|unit| unit.name == name)
     }
 
     /// Unit that a word of a column's name states, in any case and spelling.
     #[must_use]
-    pub fn spelt(word: &str) -> Option<Self> {
+    pub(crate) fn spelt(word: &str) -> Option<Self> {
         let lower = word.to_lowercase();
         let name =
             SPELLINGS.iter().find(|(spelling, _)| *spelling == lower).map_or(&*lower, |(_, name)| name);
@@ -129,7 +129,7 @@ impl Unit {
 
     /// Names of all units, for messages.
     #[must_use]
-    pub fn names() -> String {
+    pub(crate) fn names() -> String {
         UNITS.map(|unit| unit.name).join(", ")
     }
 }
@@ -146,7 +146,7 @@ pub enum Signal {
 
 impl Signal {
     #[must_use]
-    pub fn quantity(self) -> Quantity {
+    pub(crate) fn quantity(self) -> Quantity {
         match self {
             Self::Time => Quantity::Time,
             Self::Angle(_) | Self::MotorAngle(_) => Quantity::Angle,
@@ -168,7 +168,7 @@ impl Signal {
 
     /// Name of its column in a file that follows the documented names.
     #[must_use]
-    pub fn column(self, unit: Unit) -> String {
+    pub(crate) fn column(self, unit: Unit) -> String {
         format!("{self}_{}", unit.name)
     }
 }

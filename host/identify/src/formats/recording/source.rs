@@ -22,7 +22,7 @@ const LARGEST_EXPANSION: u64 = 200;
 const UNPACKED_FREELY: u64 = 64_000_000;
 
 /// Opened file.
-pub(crate) struct Source {
+pub struct Source {
     pub(crate) text: Box<dyn BufRead>,
     pub(crate) is_gzip: bool,
     progress: ProgressBar,
@@ -35,7 +35,7 @@ impl Drop for Source {
 }
 
 /// Opens a file.
-pub(crate) fn open(path: &Path) -> Result<Source, FileError> {
+pub fn open(path: &Path) -> Result<Source, FileError> {
     if path.is_dir() {
         let reason = "is a folder: name the recording in it; only the folder of a ROS 2 bag (`.mcap`) is read as a whole";
         return Err(FileError { file: path.display().to_string(), line: None, reason: reason.into() });

@@ -330,7 +330,7 @@ pub(crate) fn readings(import: &Import) -> Vec<Reading> {
 }
 
 /// Complete command with these readings.
-pub(crate) fn command(import: &Import, readings: &[Reading]) -> String {
+pub fn command(import: &Import, readings: &[Reading]) -> String {
     format!("{} {}", import.command, options(readings))
 }
 

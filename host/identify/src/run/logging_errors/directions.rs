@@ -36,14 +36,14 @@ use crate::run::logging_errors::fit::{Fit, Score};
 use crate::run::logging_errors::rows::Equations;
 
 /// Standard deviations that chance exceeds once in ten million tests.
-pub const CHANCE: f64 = 5.2;
+pub(crate) const CHANCE: f64 = 5.2;
 /// Shift of a parameter that is tolerated, in its sigma.
-pub const TOLERATED_SHIFT: f64 = 2.0;
+pub(crate) const TOLERATED_SHIFT: f64 = 2.0;
 /// Share of the misfit that a direction must explain where none of it is noise.
-pub const EXPLAINED_SHARE: f64 = 0.1;
+pub(crate) const EXPLAINED_SHARE: f64 = 0.1;
 /// Part of the misfit that is never noise, however well the model fits: over hours of motion any small error
 /// becomes significant.
-pub const SMALLEST_SYSTEMATIC: f64 = 0.02;
+pub(crate) const SMALLEST_SYSTEMATIC: f64 = 0.02;
 /// Correlation of two columns from which they count as indistinguishable.
 const ALIKE: f64 = 0.95;
 /// Share of a column that the parameters must leave. Rounding leaves 1e-12 of an absorbed column; gravity of
@@ -72,7 +72,7 @@ pub enum Kind {
 impl Kind {
     /// All directions of a leg.
     #[must_use]
-    pub fn all(joints: usize) -> Vec<Self> {
+    pub(crate) fn all(joints: usize) -> Vec<Self> {
         let delays = (0..joints).map(Self::Delay);
         let scales = (0..joints).map(Self::EncoderScale);
         delays.chain(scales).chain((1..joints).map(Self::TorqueScale)).chain([Self::Gravity]).collect()
@@ -129,64 +129,64 @@ impl Kind {
 
 /// One direction with the parameters fitted beside it.
 #[derive(Clone, Debug)]
-pub struct Found<const B: usize> {
+pub(crate) struct Found<const B: usize> {
     /// Kind of error.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// Value, SI.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Standard deviation by the noise of the rows.
-    pub noise_sigma: f64,
+    pub(crate) noise_sigma: f64,
     /// Standard deviation by the scatter of the segments.
-    pub segment_sigma: f64,
+    pub(crate) segment_sigma: f64,
     /// Whether the motion determines it at all.
-    pub seen: bool,
+    pub(crate) seen: bool,
     /// Cost without and with the direction.
-    pub cost: (f64, f64),
+    pub(crate) cost: (f64, f64),
     /// Parameters of the training motion, with the direction minus without it.
-    pub shift: [f64; B],
+    pub(crate) shift: [f64; B],
     /// All parameters with the direction.
-    pub values: [f64; B],
+    pub(crate) values: [f64; B],
     /// Directions that cannot be distinguished from this one.
-    pub alike: Vec<String>,
+    pub(crate) alike: Vec<String>,
     column: Vec<f64>,
 }
 
 impl<const B: usize> Found<B> {
     /// The larger standard deviation.
     #[must_use]
-    pub fn sigma(&self) -> f64 {
+    pub(crate) fn sigma(&self) -> f64 {
         self.noise_sigma.max(self.segment_sigma)
     }
 
     /// Value over its standard deviation.
     #[must_use]
-    pub fn significance(&self) -> f64 {
+    pub(crate) fn significance(&self) -> f64 {
         if self.seen { self.value.abs() / self.sigma() } else { 0.0 }
     }
 
     /// Share of the misfit that the direction explains.
     #[must_use]
-    pub fn explained(&self) -> f64 {
+    pub(crate) fn explained(&self) -> f64 {
         if self.seen { ((self.cost.0 - self.cost.1) / self.cost.0).max(0.0) } else { 0.0 }
     }
 
     /// Variance that a possible error adds to each parameter: the shift, reduced by the part that chance
     /// explains.
     #[must_use]
-    pub fn variance(&self) -> [f64; B] {
+    pub(crate) fn variance(&self) -> [f64; B] {
         let certain = (1.0 - (2.0 / self.significance().max(1e-9)).powi(2)).max(0.0);
         self.shift.map(|shift| shift * shift * certain)
     }
 }
 
 /// Joint's zero in chain angles, and its torques.
-pub struct Directions<'a, const N: usize, const B: usize> {
+pub(crate) struct Directions<'a, const N: usize, const B: usize> {
     /// Filtered rows.
-    pub equations: &'a Equations<N, B>,
+    pub(crate) equations: &'a Equations<N, B>,
     /// Chain angle of each joint's zero, rad.
-    pub zero: [f64; N],
+    pub(crate) zero: [f64; N],
     /// Axis of the first joint in the base frame.
-    pub axis: Vector3<f64>,
+    pub(crate) axis: Vector3<f64>,
 }
 
 type System<'a, const B: usize> = (Cow<'a, [[f64; B]]>, Cow<'a, [f64]>);
@@ -194,7 +194,7 @@ type System<'a, const B: usize> = (Cow<'a, [[f64; B]]>, Cow<'a, [f64]>);
 impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     /// Fits every direction and lists those that cannot be distinguished from it.
     #[must_use]
-    pub fn all(&self) -> Vec<Found<B>> {
+    pub(crate) fn all(&self) -> Vec<Found<B>> {
         let plain = self.equations.fit(&self.equations.columns, &self.equations.torque, false);
         let training = self.equations.fit(&self.equations.columns, &self.equations.torque, true);
         let mut found: Vec<Found<B>> =
@@ -218,7 +218,7 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
 
     /// Columns and torques with a direction at `value`.
     #[must_use]
-    pub fn system(&self, kind: Kind, value: f64) -> System<'a, B> {
+    pub(crate) fn system(&self, kind: Kind, value: f64) -> System<'a, B> {
         let all = self.equations;
         let plain = Cow::Borrowed(all.torque.as_slice());
         match kind {
@@ -242,7 +242,7 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
 
     /// Columns with the angle of a joint multiplied about its zero.
     #[must_use]
-    pub fn scaled(&self, joint: usize, factor: f64) -> Vec<[f64; B]> {
+    pub(crate) fn scaled(&self, joint: usize, factor: f64) -> Vec<[f64; B]> {
         let zero = self.zero[joint];
         let change = |instant: &mut Smoothed<f64, N>| {
             instant.position[joint] = zero + factor * (instant.position[joint] - zero);

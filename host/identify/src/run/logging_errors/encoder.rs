@@ -48,27 +48,27 @@ const PHASES: usize = 4;
 const NEGLIGIBLE: f64 = 1e-6;
 /// Largest error of a joint's predicted torque by the steps, as a share of its rms. Sources: the parameters'
 /// bias, and steps in the motion from which the torque is predicted.
-pub const LARGEST_SHARE: f64 = 0.03;
+pub(crate) const LARGEST_SHARE: f64 = 0.03;
 /// Largest noise of the steps in an inertial column, as a share of its power. An inertia is too small by this
 /// share; once it is small, the second reading shows less.
-pub const LARGEST_NOISE: f64 = 0.1;
+pub(crate) const LARGEST_NOISE: f64 = 0.1;
 /// Bandwidths to choose from, Hz.
-pub const BANDWIDTHS_HZ: [f64; 8] = [16.0, 12.5, 10.0, 8.0, 6.3, 5.0, 4.0, 3.2];
+pub(crate) const BANDWIDTHS_HZ: [f64; 8] = [16.0, 12.5, 10.0, 8.0, 6.3, 5.0, 4.0, 3.2];
 
 /// How an angle was read: step and averaging.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Encoder {
+pub(crate) struct Encoder {
     /// Angle of one count, rad.
-    pub step_rad: f64,
+    pub(crate) step_rad: f64,
     /// Readings whose mean is one sample.
-    pub readings: usize,
+    pub(crate) readings: usize,
 }
 
 impl Encoder {
     /// Encoder of a column of angles; `None` for a continuous one. `described_rad` is the step by the leg
     /// file, which distinguishes a mean of readings from finer counts.
     #[must_use]
-    pub fn detect(angle: &[f64], described_rad: f64) -> Option<Self> {
+    pub(crate) fn detect(angle: &[f64], described_rad: f64) -> Option<Self> {
         let mut changes: Vec<f64> =
             angle.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|&change| change > 1e-12).collect();
         changes.sort_by(f64::total_cmp);
@@ -98,46 +98,46 @@ impl Encoder {
 
 /// Encoders of the recordings' angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Encoders<const N: usize> {
+pub(crate) struct Encoders<const N: usize> {
     /// Encoder of each joint; `None` where the angle is continuous.
-    pub joints: [Option<Encoder>; N],
+    pub(crate) joints: [Option<Encoder>; N],
     /// Time between two samples, s.
-    pub sample_s: f64,
+    pub(crate) sample_s: f64,
 }
 
 /// Effect of the steps on the parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bias<const N: usize, const B: usize> {
+pub(crate) struct Bias<const N: usize, const B: usize> {
     /// Bias of each base parameter, as a standard deviation.
-    pub sigma: [f64; B],
+    pub(crate) sigma: [f64; B],
     /// Error of each joint's predicted torque, share of its rms.
-    pub torque_share: [f64; N],
+    pub(crate) torque_share: [f64; N],
     /// Power of the steps' noise over that of a joint's noisiest inertial column.
-    pub column_noise: [f64; N],
+    pub(crate) column_noise: [f64; N],
 }
 
 impl<const N: usize, const B: usize> Bias<N, B> {
     /// Joint with the largest torque error, and that error as a share.
     #[must_use]
-    pub fn largest_share(&self) -> (usize, f64) {
+    pub(crate) fn largest_share(&self) -> (usize, f64) {
         largest(&self.torque_share)
     }
 
     /// Joint whose columns are noisiest, and their noise.
     #[must_use]
-    pub fn largest_noise(&self) -> (usize, f64) {
+    pub(crate) fn largest_noise(&self) -> (usize, f64) {
         largest(&self.column_noise)
     }
 
     /// Whether the bias is too large for the second reading to show it.
     #[must_use]
-    pub fn is_beyond(&self) -> bool {
+    pub(crate) fn is_beyond(&self) -> bool {
         self.largest_noise().1 > LARGEST_NOISE
     }
 
     /// Whether the bias refuses the recording.
     #[must_use]
-    pub fn refuses(&self) -> bool {
+    pub(crate) fn refuses(&self) -> bool {
         self.is_beyond() || self.largest_share().1 > LARGEST_SHARE
     }
 }
@@ -146,7 +146,7 @@ impl<const N: usize> Encoders<N> {
     /// Describes the encoders to a model, for rows of this bandwidth: standstill by the leg file, pulses by
     /// the coarser of leg file and recordings. The counts of a recording alone do not determine standstill:
     /// with 2.9 mrad, slow rows of the real pendulum `sp` still predict well.
-    pub fn describe<T: Real, const B: usize>(
+    pub(crate) fn describe<T: Real, const B: usize>(
         &self,
         leg: &LegFile,
         bandwidth_hz: f64,
@@ -170,7 +170,7 @@ impl<const N: usize> Encoders<N> {
     ///
     /// # Errors
     /// The filter cannot be built for the bandwidth.
-    pub fn bias<const B: usize>(
+    pub(crate) fn bias<const B: usize>(
         &self,
         equations: &Equations<N, B>,
         fit: &Fit<B>,
@@ -230,7 +230,7 @@ impl<const N: usize> Encoders<N> {
     ///
     /// # Errors
     /// The filter cannot be built for a bandwidth.
-    pub fn bandwidth_hz<const B: usize>(
+    pub(crate) fn bandwidth_hz<const B: usize>(
         &self,
         largest_hz: f64,
         rows: impl Fn(f64) -> Result<Option<Equations<N, B>>, KernelError>,

@@ -17,27 +17,27 @@ const DETERMINED_SHARE: f64 = 1e-9;
 
 /// Solution of a weighted least-squares problem.
 #[derive(Clone, Debug)]
-pub struct Fit<const B: usize> {
+pub(crate) struct Fit<const B: usize> {
     /// Values; zero where not determined.
-    pub values: [f64; B],
+    pub(crate) values: [f64; B],
     /// Inverse of A: covariance if the weights are one over sigma.
-    pub inverse: Box<[[f64; B]; B]>,
+    pub(crate) inverse: Box<[[f64; B]; B]>,
     /// Sum of squared weighted residuals.
-    pub cost: f64,
+    pub(crate) cost: f64,
     /// Number of determined columns.
-    pub rank: usize,
+    pub(crate) rank: usize,
 }
 
 impl<const B: usize> Fit<B> {
     /// Torque minus prediction of every equation.
     #[must_use]
-    pub fn residuals(&self, columns: &[[f64; B]], torque: &[f64]) -> Vec<f64> {
+    pub(crate) fn residuals(&self, columns: &[[f64; B]], torque: &[f64]) -> Vec<f64> {
         columns.iter().zip(torque).map(|(row, torque)| torque - dot(row, &self.values)).collect()
     }
 
     /// Predicted torque of every equation.
     #[must_use]
-    pub fn predictions(&self, columns: &[[f64; B]]) -> Vec<f64> {
+    pub(crate) fn predictions(&self, columns: &[[f64; B]]) -> Vec<f64> {
         columns.iter().map(|row| dot(row, &self.values)).collect()
     }
 }
@@ -97,7 +97,7 @@ fn apply<const B: usize>(matrix: &[[f64; B]; B], vector: &[f64; B]) -> [f64; B] 
 
 /// Solves in closed form.
 #[must_use]
-pub fn solve<const B: usize>(
+pub(crate) fn solve<const B: usize>(
     columns: &[[f64; B]],
     torque: &[f64],
     weight: &[f64],
@@ -128,30 +128,30 @@ pub fn solve<const B: usize>(
 
 /// Estimate of a further column beside the parameters.
 #[derive(Clone, Debug)]
-pub struct Score {
+pub(crate) struct Score {
     /// Value.
-    pub delta: f64,
+    pub(crate) delta: f64,
     /// Standard deviation by the noise of the rows.
-    pub noise_sigma: f64,
+    pub(crate) noise_sigma: f64,
     /// Standard deviation by the scatter of the segments.
-    pub segment_sigma: f64,
+    pub(crate) segment_sigma: f64,
     /// Share of the column's power that the parameters leave.
-    pub seen: f64,
+    pub(crate) seen: f64,
     /// Weighted column minus the part that the parameters explain.
-    pub column: Vec<f64>,
+    pub(crate) column: Vec<f64>,
 }
 
 impl Score {
     /// The larger standard deviation.
     #[must_use]
-    pub fn sigma(&self) -> f64 {
+    pub(crate) fn sigma(&self) -> f64 {
         self.noise_sigma.max(self.segment_sigma)
     }
 }
 
 /// Estimates column `z` beside the parameters of `fit`. `segment` is the segment of each equation.
 #[must_use]
-pub fn score<const B: usize>(
+pub(crate) fn score<const B: usize>(
     fit: &Fit<B>,
     columns: &[[f64; B]],
     torque: &[f64],
@@ -213,7 +213,7 @@ fn small_sample(sums: &[f64]) -> f64 {
 
 /// Standard deviations of the parameters by the scatter of the segments.
 #[must_use]
-pub fn segment_sigma<const B: usize>(
+pub(crate) fn segment_sigma<const B: usize>(
     fit: &Fit<B>,
     columns: &[[f64; B]],
     torque: &[f64],

@@ -38,26 +38,26 @@ enum Kind {
 }
 
 /// A lag with the parameters fitted beside it.
-pub struct Lag<const B: usize> {
+pub(crate) struct Lag<const B: usize> {
     /// The lag as a cause.
-    pub cause: CauseReport,
+    pub(crate) cause: CauseReport,
     /// Time over its standard deviation.
-    pub significance: f64,
+    pub(crate) significance: f64,
     /// Part of the misfit's power that remains.
-    pub remaining: f64,
+    pub(crate) remaining: f64,
     /// Cost of the equations of the lagging joints.
     own_cost: f64,
     /// All parameters with the lag.
-    pub values: [f64; B],
+    pub(crate) values: [f64; B],
     /// Columns with the lag.
-    pub columns: Vec<[f64; B]>,
+    pub(crate) columns: Vec<[f64; B]>,
     /// Torques without the lag.
-    pub torque: Vec<f64>,
+    pub(crate) torque: Vec<f64>,
 }
 
 /// Delay of all torques, then the low-pass of all and of each joint where it fits better than a delay.
 #[must_use]
-pub fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Vec<Lag<B>> {
+pub(crate) fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Vec<Lag<B>> {
     let search = Search { equations, every_row: equations.every_row() };
     let mut found = Vec::new();
     let joints = (0..N).map(Some);

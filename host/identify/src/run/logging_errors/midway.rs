@@ -27,29 +27,29 @@ const POINTS: usize = 39;
 
 /// Best change.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Midway {
+pub(crate) struct Midway {
     /// Joint, from 0; `None` for all.
-    pub joint: Option<usize>,
+    pub(crate) joint: Option<usize>,
     /// Share of the recording after which the change acts.
-    pub share: f64,
+    pub(crate) share: f64,
     /// Relative change of the gain; -2 is a change of sign.
-    pub change: f64,
+    pub(crate) change: f64,
     /// Standard deviation of the change.
-    pub sigma: f64,
+    pub(crate) sigma: f64,
     /// Part of the misfit that the change explains.
-    pub explained: f64,
+    pub(crate) explained: f64,
 }
 
 impl Midway {
     /// Whether the change refuses the recording.
     #[must_use]
-    pub fn refuses(&self) -> bool {
+    pub(crate) fn refuses(&self) -> bool {
         self.change.abs() > self.limit()
     }
 
     /// Limit of the change.
     #[must_use]
-    pub fn limit(&self) -> f64 {
+    pub(crate) fn limit(&self) -> f64 {
         LARGEST_CHANGE + CHANCE * self.sigma
     }
 }
@@ -101,7 +101,7 @@ fn change<const B: usize>(plain: &Fit<B>, whole: &Sums<B>, after: &Sums<B>) -> (
 /// Searches once with the robust weights, which ignore a push, and once with every row: after a change of
 /// sign, robust weights exclude the rows after it.
 #[must_use]
-pub fn find<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
+pub(crate) fn find<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
     let robust = strongest(all);
     let whole = strongest(&all.with_equal_weights())
         .filter(|found| found.refuses() && found.change < -1.0 && found.explained > EXPLAINED_BY_SIGN);

@@ -20,17 +20,17 @@
 //!
 //! Runs on the host only.
 
-pub mod cause;
-pub mod directions;
-pub mod encoder;
-pub mod fit;
-pub mod lag;
-pub mod midway;
-pub mod noise;
-pub mod report;
-pub mod rows;
-pub mod samples;
-pub mod stamps;
+pub(crate) mod cause;
+pub(crate) mod directions;
+pub(crate) mod encoder;
+pub(crate) mod fit;
+pub(crate) mod lag;
+pub(crate) mod midway;
+pub(crate) mod noise;
+pub(crate) mod report;
+pub(crate) mod rows;
+pub(crate) mod samples;
+pub(crate) mod stamps;
 
 use nalgebra::Vector3;
 use scarab::ident::record::recorder::STILL_SPEED;
@@ -46,43 +46,43 @@ use midway::Midway;
 use rows::{Equations, Filters, Motion};
 
 /// Recordings and the chosen model: input of all checks.
-pub struct Question<const N: usize, const B: usize> {
+pub(crate) struct Question<const N: usize, const B: usize> {
     /// Model that was chosen.
-    pub model: RowModel<f64, N, B>,
+    pub(crate) model: RowModel<f64, N, B>,
     /// Columns that were estimated.
-    pub active: [bool; B],
+    pub(crate) active: [bool; B],
     /// Anatomical angles of the joints.
-    pub anatomy: [AnatomicalJoint<f64>; N],
+    pub(crate) anatomy: [AnatomicalJoint<f64>; N],
     /// Axis of the first joint in the base frame.
-    pub axis: Vector3<f64>,
+    pub(crate) axis: Vector3<f64>,
     /// Whole recordings.
-    pub motions: Vec<Motion<N>>,
+    pub(crate) motions: Vec<Motion<N>>,
     /// Bandwidth of the rows, Hz.
-    pub bandwidth_hz: f64,
+    pub(crate) bandwidth_hz: f64,
     /// Base parameters of the prior.
-    pub prior: Option<[f64; B]>,
+    pub(crate) prior: Option<[f64; B]>,
     /// Torque limit of each joint, N m.
-    pub torque_limit: [f64; N],
+    pub(crate) torque_limit: [f64; N],
     /// Density of each joint's torque noise, (N m)^2 s.
-    pub noise: [Option<f64>; N],
+    pub(crate) noise: [Option<f64>; N],
     /// Standard deviation of each base parameter by noise.
-    pub sigma: [f64; B],
+    pub(crate) sigma: [f64; B],
     /// Motor turns per joint turn, where the leg file states an encoder at the motor.
-    pub motor_ratio: [Option<f64>; N],
+    pub(crate) motor_ratio: [Option<f64>; N],
     /// How the angles were read.
-    pub encoders: Encoders<N>,
+    pub(crate) encoders: Encoders<N>,
 }
 
 impl<const N: usize, const B: usize> Question<N, B> {
     /// Chain angles of the joints' zeros, rad.
     #[must_use]
-    pub fn zero(&self) -> [f64; N] {
+    pub(crate) fn zero(&self) -> [f64; N] {
         self.anatomy.map(|joint| joint.zero_offset())
     }
 
     /// This input with every column and without Stribeck friction; `None` if nothing changes.
     #[must_use]
-    pub fn with_all_columns(&self) -> Option<Self> {
+    pub(crate) fn with_all_columns(&self) -> Option<Self> {
         let active = core::array::from_fn(|base| base < self.model.base.rank());
         let is_plain = self.model.stribeck.iter().all(|curve| curve.excess == 0.0);
         if is_plain && active == self.active {
@@ -96,7 +96,7 @@ impl<const N: usize, const B: usize> Question<N, B> {
     ///
     /// # Errors
     /// The filter cannot be built for the bandwidth.
-    pub fn equations(&self, motions: &[Motion<N>]) -> Result<Option<Equations<N, B>>, KernelError> {
+    pub(crate) fn equations(&self, motions: &[Motion<N>]) -> Result<Option<Equations<N, B>>, KernelError> {
         self.equations_at(motions, self.bandwidth_hz)
     }
 
@@ -104,7 +104,7 @@ impl<const N: usize, const B: usize> Question<N, B> {
     ///
     /// # Errors
     /// The filter cannot be built for the bandwidth.
-    pub fn equations_at(
+    pub(crate) fn equations_at(
         &self,
         motions: &[Motion<N>],
         bandwidth_hz: f64,
@@ -136,45 +136,45 @@ impl<const N: usize, const B: usize> Question<N, B> {
 }
 
 /// Results of all checks.
-pub struct LoggingErrors<const N: usize, const B: usize> {
+pub(crate) struct LoggingErrors<const N: usize, const B: usize> {
     /// Rows of all recordings.
-    pub equations: Equations<N, B>,
+    pub(crate) equations: Equations<N, B>,
     /// Directions with their fits.
-    pub found: Vec<Found<B>>,
+    pub(crate) found: Vec<Found<B>>,
     /// Directions as reported.
-    pub directions: Vec<DirectionReport>,
+    pub(crate) directions: Vec<DirectionReport>,
     /// Change midway.
-    pub midway: Option<Midway>,
+    pub(crate) midway: Option<Midway>,
     /// Misfit over noise of each joint; `None` where the noise is unknown.
-    pub misfit_over_noise: [Option<f64>; N],
+    pub(crate) misfit_over_noise: [Option<f64>; N],
     /// Standard deviation of each base parameter: noise, scatter over segments, and possible errors that were
     /// not refused.
-    pub sigma: [Sigma; B],
+    pub(crate) sigma: [Sigma; B],
     /// Effect of the encoders' steps; `None` where they are negligible.
-    pub encoder: Option<Bias<N, B>>,
+    pub(crate) encoder: Option<Bias<N, B>>,
     /// Bandwidth at which the steps are negligible, Hz; only where they refuse.
     better_hz: Option<f64>,
 }
 
 /// Standard deviation of a parameter in its parts.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sigma {
+pub(crate) struct Sigma {
     /// Part caused by noise.
-    pub noise: f64,
+    pub(crate) noise: f64,
     /// Part caused by the scatter over segments of the recording.
-    pub segments: f64,
+    pub(crate) segments: f64,
     /// Part caused by the scatter between recordings; zero where unknown.
-    pub recordings: f64,
+    pub(crate) recordings: f64,
     /// Part caused by directions that are not significant.
-    pub logging: f64,
+    pub(crate) logging: f64,
     /// Part caused by the steps of the encoders.
-    pub encoder: f64,
+    pub(crate) encoder: f64,
 }
 
 impl Sigma {
     /// Part caused by unmodelled effects.
     #[must_use]
-    pub fn misfit(&self) -> f64 {
+    pub(crate) fn misfit(&self) -> f64 {
         self.segments.max(self.recordings)
     }
 
@@ -186,7 +186,7 @@ impl Sigma {
 
     /// Largest part.
     #[must_use]
-    pub fn source(&self) -> &'static str {
+    pub(crate) fn source(&self) -> &'static str {
         let scatter = self.noise.max(self.misfit());
         if self.logging.max(self.encoder) > scatter {
             if self.encoder > self.logging { "encoder" } else { "doubt" }
@@ -205,7 +205,7 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
     ///
     /// # Errors
     /// The filter cannot be built for the bandwidth.
-    pub fn fit(question: &Question<N, B>) -> Result<Option<Self>, KernelError> {
+    pub(crate) fn fit(question: &Question<N, B>) -> Result<Option<Self>, KernelError> {
         let Some(equations) = question.equations(&question.motions)? else { return Ok(None) };
         let found = Directions { equations: &equations, zero: question.zero(), axis: question.axis }.all();
         let fit = equations.fit(&equations.columns, &equations.torque, true);
@@ -287,7 +287,7 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
 
     /// Report without a cause.
     #[must_use]
-    pub fn report(&self) -> DoubtReport {
+    pub(crate) fn report(&self) -> DoubtReport {
         DoubtReport {
             directions: self.directions.clone(),
             misfit_over_noise: self.misfit_over_noise.map(Number::from).to_vec(),
@@ -298,7 +298,7 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
 
 /// Finding about samples, for the verdict.
 #[must_use]
-pub fn sample_finding(finding: &SampleFinding) -> FindingReport {
+pub(crate) fn sample_finding(finding: &SampleFinding) -> FindingReport {
     let failure = finding.refuses.then(|| format!("{}: {}", finding.file, finding.text));
     let values = [finding.value.into(), Number::UNKNOWN];
     FindingReport::judged("input", finding.name, finding.joint, values, failure)
@@ -306,7 +306,7 @@ pub fn sample_finding(finding: &SampleFinding) -> FindingReport {
 
 /// Finding about samples, as the likely cause.
 #[must_use]
-pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
+pub(crate) fn sample_cause(finding: &SampleFinding) -> CauseReport {
     CauseReport {
         name: finding.name,
         joint: finding.joint,
@@ -319,7 +319,7 @@ pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
 
 /// Message about a change midway.
 #[must_use]
-pub fn midway_words(midway: &Midway) -> String {
+pub(crate) fn midway_words(midway: &Midway) -> String {
     let joints = joint_words(midway.joint);
     let what = if midway.change < -1.0 {
         "changes its sign".into()

@@ -21,7 +21,7 @@ const FEWEST: usize = 20;
 
 /// Scatter of one file's torque in units of sqrt(density), one number for each difference.
 #[must_use]
-pub fn scatter(time_s: &[f64], torque: &[f64], bandwidth_hz: f64) -> Vec<f64> {
+pub(crate) fn scatter(time_s: &[f64], torque: &[f64], bandwidth_hz: f64) -> Vec<f64> {
     let samples = time_s.len().min(torque.len());
     if samples < 8 {
         return Vec::new();
@@ -46,7 +46,7 @@ pub fn scatter(time_s: &[f64], torque: &[f64], bandwidth_hz: f64) -> Vec<f64> {
 
 /// Density of the noise, (N m)^2 s, from the scatter of all files; `None` with too few differences.
 #[must_use]
-pub fn density(scatter: Vec<f64>) -> Option<f64> {
+pub(crate) fn density(scatter: Vec<f64>) -> Option<f64> {
     (scatter.len() >= FEWEST).then(|| (quantile(scatter, 0.5) / NORMAL_MEDIAN).powi(2))
 }
 

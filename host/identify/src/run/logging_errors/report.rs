@@ -39,7 +39,7 @@ impl DirectionReport {
 impl CauseReport {
     /// A direction as the likely cause.
     #[must_use]
-    pub fn direction(kind: Kind, direction: &DirectionReport) -> Self {
+    pub(crate) fn direction(kind: Kind, direction: &DirectionReport) -> Self {
         Self {
             name: kind.name(),
             joint: direction.joint,

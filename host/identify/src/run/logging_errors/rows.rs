@@ -42,16 +42,16 @@ const ROWS_PER_PARAMETER: usize = 5;
 #[derive(Clone, Debug)]
 pub struct Motion<const N: usize> {
     /// Duration of its training part from the start, s; infinite for a training file.
-    pub training_s: f64,
+    pub(crate) training_s: f64,
     /// Chain angles, rad.
-    pub position: Vec<[f64; N]>,
+    pub(crate) position: Vec<[f64; N]>,
     /// Chain torques, N m.
-    pub torque: Vec<[f64; N]>,
+    pub(crate) torque: Vec<[f64; N]>,
 }
 
 /// Smoothing filter and low-pass filter.
 #[derive(Clone, Debug)]
-pub struct Filters {
+pub(crate) struct Filters {
     smoothing: Box<Kernel<f64, TAPS>>,
     low_pass: Box<LowPass<f64, TAPS>>,
 }
@@ -156,41 +156,41 @@ impl<const N: usize> Part<N> {
 
 /// Origin of an equation.
 #[derive(Clone, Copy, Debug)]
-pub struct RowSource {
+pub(crate) struct RowSource {
     /// Index of its motion.
-    pub motion: usize,
+    pub(crate) motion: usize,
     /// Index of the row in its motion, at 50 Hz.
     row: usize,
     /// Joint, from 0.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// Whether it belongs to the training motion.
-    pub training: bool,
+    pub(crate) training: bool,
     /// Segment of at most two seconds.
-    pub cluster: usize,
+    pub(crate) cluster: usize,
     /// Time from the start of its motion, as a share of the motion's duration.
-    pub share: f64,
+    pub(crate) share: f64,
 }
 
 /// All usable rows of all joints, one equation each.
 #[derive(Clone, Debug)]
-pub struct Equations<const N: usize, const B: usize> {
+pub(crate) struct Equations<const N: usize, const B: usize> {
     filters: Filters,
     parts: Vec<Part<N>>,
     model: RowModel<f64, N, B>,
     /// Columns that are estimated.
-    pub active: [bool; B],
+    pub(crate) active: [bool; B],
     /// Origin of each equation.
-    pub sources: Vec<RowSource>,
+    pub(crate) sources: Vec<RowSource>,
     /// Regressor columns.
-    pub columns: Vec<[f64; B]>,
+    pub(crate) columns: Vec<[f64; B]>,
     /// Low-passed torque, N m.
-    pub torque: Vec<f64>,
+    pub(crate) torque: Vec<f64>,
     /// Weight of each equation, 1/(N m).
-    pub weight: Vec<f64>,
+    pub(crate) weight: Vec<f64>,
     /// Standard deviation of an independent row of each joint, N m, from the residual.
-    pub row_sigma: [f64; N],
+    pub(crate) row_sigma: [f64; N],
     /// Rows of each joint's factor that count, in complete rows.
-    pub rows: [f64; N],
+    pub(crate) rows: [f64; N],
 }
 
 impl<const N: usize, const B: usize> Equations<N, B> {
@@ -230,7 +230,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// Largest delay that can be tried, s.
     #[must_use]
-    pub fn largest_delay_s(&self) -> f64 {
+    pub(crate) fn largest_delay_s(&self) -> f64 {
         (self.filters.smoothing.reach() as f64 - 3.0) / SAMPLE_RATE_HZ
     }
 
@@ -242,7 +242,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// Share of a 500 Hz sample's noise variance that the low-pass leaves.
     #[must_use]
-    pub fn energy(&self) -> f64 {
+    pub(crate) fn energy(&self) -> f64 {
         self.filters.low_pass.energy()
     }
 
@@ -282,7 +282,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// Columns with a changed motion or model, for the same equations.
     #[must_use]
-    pub fn columns_of(
+    pub(crate) fn columns_of(
         &self,
         model: &RowModel<f64, N, B>,
         change: &dyn Fn(&mut Smoothed<f64, N>),
@@ -292,7 +292,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// [`Self::columns_of`] for the equations of another motion with the same number of samples.
     #[must_use]
-    pub fn columns_at(
+    pub(crate) fn columns_at(
         &self,
         sources: &[RowSource],
         model: &RowModel<f64, N, B>,
@@ -303,38 +303,38 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Smoothed motion of every recording on the 500 Hz grid, with the duration of its training part, s.
-    pub fn smoothed(&self) -> impl Iterator<Item = (&[Smoothed<f64, N>], f64)> {
+    pub(crate) fn smoothed(&self) -> impl Iterator<Item = (&[Smoothed<f64, N>], f64)> {
         let late_s = self.filters.smoothing.reach() as f64 / SAMPLE_RATE_HZ;
         self.parts.iter().map(move |part| (&part.instants[..], part.training_s - late_s))
     }
 
     /// Standard deviations of the parameters of a fit to the training motion, by the scatter of its segments.
     #[must_use]
-    pub fn scatter(&self, fit: &Fit<B>) -> [f64; B] {
+    pub(crate) fn scatter(&self, fit: &Fit<B>) -> [f64; B] {
         segment_sigma(fit, &self.columns, &self.torque, &self.training_weight(), &self.clusters())
     }
 
     /// Cluster of each equation.
     #[must_use]
-    pub fn clusters(&self) -> Vec<usize> {
+    pub(crate) fn clusters(&self) -> Vec<usize> {
         self.sources.iter().map(|source| source.cluster).collect()
     }
 
     /// Estimates column `z` beside the parameters of `fit`, which are those of these columns and torques.
     #[must_use]
-    pub fn score(&self, fit: &Fit<B>, columns: &[[f64; B]], torque: &[f64], z: &[f64]) -> Score {
+    pub(crate) fn score(&self, fit: &Fit<B>, columns: &[[f64; B]], torque: &[f64], z: &[f64]) -> Score {
         score(fit, columns, torque, z, &self.weight, &self.clusters())
     }
 
     /// Unchanged row model.
     #[must_use]
-    pub fn model(&self) -> &RowModel<f64, N, B> {
+    pub(crate) fn model(&self) -> &RowModel<f64, N, B> {
         &self.model
     }
 
     /// Torque of all equations; that of `joint`, or of all joints, taken `late_s` after the angle.
     #[must_use]
-    pub fn delayed(&self, joint: Option<usize>, late_s: f64) -> Vec<f64> {
+    pub(crate) fn delayed(&self, joint: Option<usize>, late_s: f64) -> Vec<f64> {
         let pairs = self.sources.iter().zip(&self.torque);
         pairs
             .map(|(source, &torque)| {
@@ -349,7 +349,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// Columns of every row of every recording, including rows without an equation.
     #[must_use]
-    pub fn every_row(&self) -> Vec<Vec<[[f64; B]; N]>> {
+    pub(crate) fn every_row(&self) -> Vec<Vec<[[f64; B]; N]>> {
         let rows = self.parts.iter().map(|part| part.rows(&self.filters, &self.model, &|_| {}));
         rows.map(|rows| rows.into_iter().map(|row| row.regressor).collect()).collect()
     }
@@ -357,7 +357,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     /// Columns of all equations; those of `joint`, or of all joints, behind a first-order low-pass of this
     /// time constant. Exact where the columns of `every_row` are straight between two rows.
     #[must_use]
-    pub fn low_passed(
+    pub(crate) fn low_passed(
         &self,
         every_row: &[Vec<[[f64; B]; N]>],
         joint: Option<usize>,
@@ -386,7 +386,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     /// Rate of change of a series given at the equations, within each joint and motion; zero at gaps and
     /// ends.
     #[must_use]
-    pub fn rate_of(&self, series: &[f64]) -> Vec<f64> {
+    pub(crate) fn rate_of(&self, series: &[f64]) -> Vec<f64> {
         let step = DECIMATION as f64 / SAMPLE_RATE_HZ;
         let mut slots: Vec<[usize; N]> = Vec::new();
         let mut starts = Vec::with_capacity(self.parts.len());
@@ -417,7 +417,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// Least squares with these columns and torques, all equations or those of the training motion.
     #[must_use]
-    pub fn fit(&self, columns: &[[f64; B]], torque: &[f64], training_only: bool) -> Fit<B> {
+    pub(crate) fn fit(&self, columns: &[[f64; B]], torque: &[f64], training_only: bool) -> Fit<B> {
         if !training_only {
             return solve(columns, torque, &self.weight, &self.active);
         }
@@ -426,14 +426,14 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// Copy in which every equation has the weight of its joint.
     #[must_use]
-    pub fn with_equal_weights(&self) -> Self {
+    pub(crate) fn with_equal_weights(&self) -> Self {
         let weight = self.sources.iter().map(|source| 1.0 / self.row_sigma[source.joint]).collect();
         Self { weight, ..self.clone() }
     }
 
     /// Weights of the equations of the training motion; zero for the others.
     #[must_use]
-    pub fn training_weight(&self) -> Vec<f64> {
+    pub(crate) fn training_weight(&self) -> Vec<f64> {
         let pairs = self.weight.iter().zip(&self.sources);
         pairs.map(|(&weight, source)| if source.training { weight } else { 0.0 }).collect()
     }

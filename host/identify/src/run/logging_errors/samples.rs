@@ -36,11 +36,11 @@ use crate::report::doubt::SampleFinding;
 use crate::run::logging_errors::encoder::Encoder;
 
 /// Finding of saturated torque.
-pub const SATURATION: &str = "saturation";
+pub(crate) const SATURATION: &str = "saturation";
 /// Finding of values that are repeated.
-pub const HELD: &str = "held_samples";
+pub(crate) const HELD: &str = "held_samples";
 /// Finding of a coarse column; never refuses.
-pub const QUANTISED: &str = "quantised";
+pub(crate) const QUANTISED: &str = "quantised";
 
 /// Speed above which a leg moves, rad/s, and half the time over which it is measured, s.
 const MOVING_RADPS: f64 = 0.03;
@@ -73,18 +73,18 @@ const COARSE_SHARE: f64 = 0.01;
 
 /// Findings of one recording, and the stretches that must be excluded.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Screened {
+pub(crate) struct Screened {
     /// Findings about the samples.
-    pub findings: Vec<SampleFinding>,
+    pub(crate) findings: Vec<SampleFinding>,
     /// Times without a valid sample in some column, on the recording's clock, s; ordered, not overlapping.
-    pub spans: Vec<Range<f64>>,
+    pub(crate) spans: Vec<Range<f64>>,
 }
 
 /// Examines recordings of one machine. Limits of the torque are searched in each recording alone and in all
 /// together. `described_rad` are the steps of the encoders by the leg file. `reach_s` is the time lost on
 /// either side of an excluded stretch.
 #[must_use]
-pub fn screen(recordings: &[&Recording], described_rad: &[f64], reach_s: f64) -> Vec<Screened> {
+pub(crate) fn screen(recordings: &[&Recording], described_rad: &[f64], reach_s: f64) -> Vec<Screened> {
     let mut examinations: Vec<Examination> =
         recordings.iter().map(|recording| Examination::new(recording, described_rad)).collect();
     for examination in &mut examinations {

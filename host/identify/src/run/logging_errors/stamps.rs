@@ -27,7 +27,7 @@ use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
 
 /// Finding of wrong time stamps.
-pub const TIME_STAMPS: &str = "time_stamps";
+pub(crate) const TIME_STAMPS: &str = "time_stamps";
 
 /// Error of the stamps that is always negligible, in median steps.
 const HARMLESS_STEPS: f64 = 0.1;
@@ -45,7 +45,7 @@ const SPEED_S: f64 = 0.03;
 
 /// Examines the time stamps of a recording for rows with this bandwidth.
 #[must_use]
-pub fn examine(recording: &Recording, bandwidth_hz: f64) -> Option<SampleFinding> {
+pub(crate) fn examine(recording: &Recording, bandwidth_hz: f64) -> Option<SampleFinding> {
     let time = &recording.time_s;
     let median_step = recording.median_step_s();
     if time.len() < 20 || !(median_step > 0.0) {

@@ -14,13 +14,13 @@ use crate::report::findings::FindingReport;
 
 /// Verdict and what it rests on.
 pub(super) struct Judged<const N: usize, const B: usize> {
-    pub verdict: Verdict,
+    pub(crate) verdict: Verdict,
     /// Every test of the verdict.
-    pub findings: Vec<FindingReport>,
+    pub(crate) findings: Vec<FindingReport>,
     /// Record of the held-out part, if there is one.
-    pub unused: Option<Record<f32, N, B>>,
-    pub predictions: Vec<Prediction<N>>,
-    pub sources: Vec<Source>,
+    pub(crate) unused: Option<Record<f32, N, B>>,
+    pub(crate) predictions: Vec<Prediction<N>>,
+    pub(crate) sources: Vec<Source>,
 }
 
 /// Judges the result by the held-out part, whose torques have this noise.

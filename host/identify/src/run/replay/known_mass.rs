@@ -38,10 +38,10 @@ pub(super) fn settled<const N: usize, const B: usize>(
 
 /// Scale of the torques, and the recordings with the mass.
 pub(super) struct Found<const N: usize, const B: usize> {
-    pub scale: Scale<N, B>,
+    pub(crate) scale: Scale<N, B>,
     /// How the recordings with the mass were read.
-    pub read: Vec<ReadReport>,
-    pub warnings: Vec<String>,
+    pub(crate) read: Vec<ReadReport>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// Scale of the torques from the recordings with the mass and those without it.

@@ -141,20 +141,20 @@ pub(super) fn chosen_bandwidth<const N: usize, const B: usize>(
 
 /// Data for all checks of the recordings.
 pub(super) struct Subject<'a, const N: usize, const B: usize> {
-    pub leg: &'a LegFile,
-    pub background: &'a Background<N, B>,
-    pub anatomy: &'a [AnatomicalJoint<f64>; N],
-    pub solver: &'a Solver<f32, N, B>,
-    pub wholes: &'a [Whole],
-    pub options: &'a ReplayOptions,
-    pub noise: [Option<f64>; N],
-    pub screening: &'a Screening,
+    pub(crate) leg: &'a LegFile,
+    pub(crate) background: &'a Background<N, B>,
+    pub(crate) anatomy: &'a [AnatomicalJoint<f64>; N],
+    pub(crate) solver: &'a Solver<f32, N, B>,
+    pub(crate) wholes: &'a [Whole],
+    pub(crate) options: &'a ReplayOptions,
+    pub(crate) noise: [Option<f64>; N],
+    pub(crate) screening: &'a Screening,
     /// Base parameters of a known load, which the recorded torque contains.
-    pub load: [f32; B],
+    pub(crate) load: [f32; B],
     /// Larger bandwidth that the encoders allow.
-    pub proposed_hz: Option<f64>,
+    pub(crate) proposed_hz: Option<f64>,
     /// Largest bandwidth of the Stribeck search, where the encoders are too coarse for it.
-    pub stribeck_hz: Option<f64>,
+    pub(crate) stribeck_hz: Option<f64>,
 }
 
 impl<const N: usize, const B: usize> Subject<'_, N, B> {

@@ -10,10 +10,10 @@ use scarab_base::files::NewFile;
 
 /// Measured and predicted torque of one instant, D-H.
 pub(super) struct Prediction<const N: usize> {
-    pub file: usize,
-    pub time_s: f64,
-    pub measured: [f32; N],
-    pub predicted: [f32; N],
+    pub(crate) file: usize,
+    pub(crate) time_s: f64,
+    pub(crate) measured: [f32; N],
+    pub(crate) predicted: [f32; N],
 }
 
 /// Writes a table of anatomical torques.

@@ -10,8 +10,8 @@ use crate::report::reading::ReadReport;
 
 /// Whole recording, with the duration of its training part.
 pub(super) struct Whole {
-    pub recording: Recording,
-    pub training_s: f64,
+    pub(crate) recording: Recording,
+    pub(crate) training_s: f64,
 }
 
 /// Recording with an even clock, and with the torque scaled and delayed, as requested. `ratios` are the

@@ -17,7 +17,7 @@ const REACH_PERIODS: f64 = 0.983;
 /// Findings about the recordings, and their stretches to be excluded.
 pub(super) struct Screening {
     /// Everything that was found.
-    pub findings: Vec<SampleFinding>,
+    pub(crate) findings: Vec<SampleFinding>,
     spans: Vec<(PathBuf, Vec<Range<f64>>)>,
 }
 

@@ -13,15 +13,15 @@ use crate::run::analysis::Search;
 
 /// Result of the search over the training part.
 pub(super) struct Solved<const N: usize, const B: usize> {
-    pub solver: Solver<f32, N, B>,
+    pub(crate) solver: Solver<f32, N, B>,
     /// Recorder of the training part, cleared: held-out parts are judged by its noise.
-    pub recorder: Box<HostRecorder<N, B>>,
-    pub sources: Vec<Source>,
+    pub(crate) recorder: Box<HostRecorder<N, B>>,
+    pub(crate) sources: Vec<Source>,
     /// Base parameters of a known load, which the recorded torque contains.
-    pub load: Option<[f32; B]>,
+    pub(crate) load: Option<[f32; B]>,
     /// Whether the torques' noise explains the misfit.
-    pub noise_is_known: bool,
-    pub search: Search,
+    pub(crate) noise_is_known: bool,
+    pub(crate) search: Search,
 }
 
 impl<const N: usize, const B: usize> Solved<N, B> {

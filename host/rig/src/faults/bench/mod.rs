@@ -12,7 +12,7 @@ mod hosted;
 pub mod hostile;
 mod hot;
 mod lost;
-pub mod offsets;
+pub(crate) mod offsets;
 mod outside;
 mod parts;
 mod random_sessions;
@@ -31,22 +31,22 @@ use crate::faults::catalogue::{self, Fault};
 use crate::faults::run::Outcome;
 
 /// Outcomes of some seeds.
-pub type Outcomes = Result<Vec<Outcome>, ToolError>;
+pub(crate) type Outcomes = Result<Vec<Outcome>, ToolError>;
 
 /// Runs a bench for some seeds. If blind, the fault's detector is disabled as stated by each bench.
-pub type Runs = fn(&Fault, &LegFile, &[u64], bool) -> Outcomes;
+pub(crate) type Runs = fn(&Fault, &LegFile, &[u64], bool) -> Outcomes;
 
 /// A row with its own bench.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
     /// The fault.
-    pub fault: &'static Fault,
+    pub(crate) fault: &'static Fault,
     /// Runs the row for these seeds.
-    pub run: Runs,
+    pub(crate) run: Runs,
 }
 
 /// All benches.
-pub static BENCHES: [Bench; 28] = [
+pub(crate) static BENCHES: [Bench; 28] = [
     Bench { fault: &catalogue::E6, run: absolute::silent },
     Bench { fault: &catalogue::E7, run: absolute::contradict },
     Bench { fault: &catalogue::E3, run: offsets::shift },

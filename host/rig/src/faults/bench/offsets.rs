@@ -25,7 +25,7 @@ use crate::faults::run::Outcome;
 use scarab::model::planar::JOINTS;
 
 /// Number of start values of a counter.
-pub const OFFSETS: u64 = 65_536;
+pub(crate) const OFFSETS: u64 = 65_536;
 /// Duration of the motion: 25 ms, about a hundred counts.
 const PERIODS: usize = 600;
 /// Amplitude (A) and frequency (Hz) of the requested current.

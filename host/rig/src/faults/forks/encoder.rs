@@ -34,7 +34,7 @@ pub(super) fn glitch(random: &mut Random, bounds: &Bounds) -> Scenario {
 
 /// Rotor turns within which lost counts are detected: at the second index, at the latest 2 1/8 turns after
 /// the last correct one.
-pub const LOST_TURNS: f64 = 2.15;
+pub(crate) const LOST_TURNS: f64 = 2.15;
 
 /// E4: a counter that lost or gained counts; an index that no longer comes; a glitch on the index line.
 pub(super) fn lost_counts(random: &mut Random, bounds: &Bounds) -> Scenario {

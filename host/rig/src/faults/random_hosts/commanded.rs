@@ -32,23 +32,23 @@ enum Command {
 /// Commands of a joint.
 pub(super) struct Commanded {
     /// Mode; `None` while that is uncertain.
-    pub mode: Option<i8>,
+    pub(crate) mode: Option<i8>,
     /// Commands, each with the tick in which it was sent.
     sent: Vec<(Command, u64)>,
     /// Whether each event that makes its targets void is known.
-    pub is_certain: bool,
+    pub(crate) is_certain: bool,
     /// Whether 6072 may be too small to hold the pose.
-    pub may_sag: bool,
+    pub(crate) may_sag: bool,
     /// Whether the halt bit is set for certain.
     halts: bool,
     /// Whether a host may have taken control of the leg.
-    pub may_be_hosted: bool,
+    pub(crate) may_be_hosted: bool,
     /// Whether another mapping may be loaded at a reset.
-    pub may_have_saved: bool,
+    pub(crate) may_have_saved: bool,
     /// Whether the node may reject a SYNC.
     may_reject_sync: bool,
     /// Whether the node may be stopped when its host is lost, and then reports nothing.
-    pub may_stop: bool,
+    pub(crate) may_stop: bool,
     /// Objects of each received PDO, and whether they are certain.
     maps: [(Vec<Object>, bool); PDOS],
     /// Whether each received PDO is synchronous, and the bytes that may wait for a SYNC.
@@ -94,7 +94,7 @@ impl Commanded {
     }
 
     /// The node has confirmed the value of an object.
-    pub fn confirm(&mut self, index: u16, sub: u8, value: i32) {
+    pub(crate) fn confirm(&mut self, index: u16, sub: u8, value: i32) {
         self.is_certain |= index == 0x60FF;
         self.halts |= index == WORD && value & 0x100 != 0;
         if let (0x1400..=0x1403, 2) = (index, sub) {
@@ -104,7 +104,7 @@ impl Commanded {
     }
 
     /// A controlword is on its way. A start by bit 4 belongs to profile position mode.
-    pub fn word(&mut self, word: u16, tick: u64) {
+    pub(crate) fn word(&mut self, word: u16, tick: u64) {
         if word & 0x10 != 0 && self.may_be_in(1) {
             self.note(Command::Start, tick);
         }
@@ -117,7 +117,7 @@ impl Commanded {
     }
 
     /// Targets that name the present position of a joint at rest are on their way.
-    pub fn stay(&mut self, tick: u64) {
+    pub(crate) fn stay(&mut self, tick: u64) {
         self.note(Command::Stay, tick);
     }
 
@@ -131,12 +131,12 @@ impl Commanded {
     }
 
     /// Whether the target may be the position in which the joint rests; it may still approach it.
-    pub fn stays(&self) -> bool {
+    pub(crate) fn stays(&self) -> bool {
         self.has(Command::Stay)
     }
 
     /// The node has confirmed a mode, or may have another one.
-    pub fn set_mode(&mut self, mode: Option<i8>) {
+    pub(crate) fn set_mode(&mut self, mode: Option<i8>) {
         self.mode = mode;
         if !self.may_be_in(1) {
             self.sent.retain(|(command, _)| *command != Command::Start);
@@ -157,7 +157,7 @@ impl Commanded {
     }
 
     /// Commands that were sent before this tick are void, but those that were on their way.
-    pub fn void(&mut self, tick: u64, delay: u32) {
+    pub(crate) fn void(&mut self, tick: u64, delay: u32) {
         let is_recent = |at: u64| at + ON_ITS_WAY + u64::from(delay) > tick;
         // The state that a request to enable brings about is seen late, its end at once by a boot-up message.
         let is_asked = |at: u64| at + 2 * ON_ITS_WAY + 4 * u64::from(delay) > tick;
@@ -168,34 +168,34 @@ impl Commanded {
     }
 
     /// The joint was homed: its targets would name other positions.
-    pub fn home(&mut self) {
+    pub(crate) fn home(&mut self) {
         self.sent.retain(|(command, _)| *command == Command::Enable);
     }
 
     /// The host was lost, `delay` ticks ago at most: its commands are void.
-    pub fn lose(&mut self, tick: u64, delay: u32) {
+    pub(crate) fn lose(&mut self, tick: u64, delay: u32) {
         self.is_certain = false;
         self.void(tick, delay);
     }
 
     /// The leg was enabled: a start from before does not count.
-    pub fn enable(&mut self, tick: u64, delay: u32) {
+    pub(crate) fn enable(&mut self, tick: u64, delay: u32) {
         let is_recent = |at: u64| at + ON_ITS_WAY + 2 * u64::from(delay) > tick;
         self.sent.retain(|(command, at)| *command != Command::Start || is_recent(*at));
     }
 
     /// Whether a host has asked to enable the leg since it was disabled.
-    pub fn has_asked(&self) -> bool {
+    pub(crate) fn has_asked(&self) -> bool {
         self.has(Command::Enable)
     }
 
     /// Whether a target or an offset was written.
-    pub fn has_any(&self) -> bool {
+    pub(crate) fn has_any(&self) -> bool {
         self.sent.iter().any(|(command, _)| *command != Command::Enable)
     }
 
     /// Whether a target that the mode needs was written.
-    pub fn may_move_in(&self, mode: i8) -> bool {
+    pub(crate) fn may_move_in(&self, mode: i8) -> bool {
         let has = |index, sub| self.has(Command::Value(index, sub));
         match mode {
             1 => self.has(Command::Start),
@@ -208,19 +208,19 @@ impl Commanded {
     }
 
     /// Whether a host may move the joint.
-    pub fn may_move(&self) -> bool {
+    pub(crate) fn may_move(&self) -> bool {
         // A halt lets the torque of profile torque mode fade.
         let is_halted = self.halts && !self.may_be_in(4);
         !is_halted && self.mode.map_or_else(|| self.has_any(), |mode| self.may_move_in(mode))
     }
 
     /// Whether a received PDO may hold the mode.
-    pub fn maps_mode(&self) -> bool {
+    pub(crate) fn maps_mode(&self) -> bool {
         self.maps.iter().flat_map(|(objects, _)| objects).any(|object| object.0 == MODE)
     }
 
     /// A received PDO is mapped: for certain, or perhaps.
-    pub fn map(&mut self, pdo: usize, objects: [Object; 2], is_certain: bool) {
+    pub(crate) fn map(&mut self, pdo: usize, objects: [Object; 2], is_certain: bool) {
         let map = &mut self.maps[pdo];
         if is_certain {
             map.0.clear();
@@ -231,7 +231,7 @@ impl Commanded {
     }
 
     /// The node has started again: with its default mapping, or a saved one.
-    pub fn reset(&mut self, tick: u64, delay: u32) {
+    pub(crate) fn reset(&mut self, tick: u64, delay: u32) {
         self.set_mode(None);
         self.lose(tick, delay);
         for (map, object) in self.maps.iter_mut().zip(DEFAULT_MAPS) {
@@ -242,14 +242,14 @@ impl Commanded {
     }
 
     /// A received PDO is on its way. Returns the objects that it may write now.
-    pub fn receive(&mut self, pdo: usize, bytes: [u8; 8], tick: u64) -> Vec<u16> {
+    pub(crate) fn receive(&mut self, pdo: usize, bytes: [u8; 8], tick: u64) -> Vec<u16> {
         let is_synchronous = self.is_synchronous[pdo];
         self.waiting[pdo] = Some((bytes, tick)).filter(|_| is_synchronous != Some(false));
         if is_synchronous == Some(true) { Vec::new() } else { self.act(pdo, bytes, tick) }
     }
 
     /// A SYNC is on its way. Returns the objects that it may write.
-    pub fn synchronise(&mut self, tick: u64) -> Vec<u16> {
+    pub(crate) fn synchronise(&mut self, tick: u64) -> Vec<u16> {
         let waiting = self.waiting;
         if !self.may_reject_sync {
             self.waiting = [None; PDOS];
@@ -259,7 +259,7 @@ impl Commanded {
     }
 
     /// Whether a mode may wait for a SYNC.
-    pub fn mode_waits(&self) -> bool {
+    pub(crate) fn mode_waits(&self) -> bool {
         let mut pdos = self.waiting.iter().zip(&self.maps);
         pdos.any(|(waiting, map)| waiting.is_some() && map.0.iter().any(|object| object.0 == MODE))
     }

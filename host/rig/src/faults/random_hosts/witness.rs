@@ -145,24 +145,24 @@ pub trait HostedLeg {
 
 /// A leg, and what was seen of it.
 pub(super) struct Play<L> {
-    pub leg: L,
-    pub bounds: [JointBounds; JOINTS],
-    pub ticks: u64,
+    pub(crate) leg: L,
+    pub(crate) bounds: [JointBounds; JOINTS],
+    pub(crate) ticks: u64,
     pub is_enabled: bool,
     pub fault: Option<u16>,
     pub moves_itself: bool,
     torque: [f64; JOINTS],
     pub speed: [f32; JOINTS],
     pub position: [f64; JOINTS],
-    pub commanded: [Commanded; JOINTS],
+    pub(crate) commanded: [Commanded; JOINTS],
     /// Tick until which a step of each joint's torque is explained.
-    pub explained: [u64; JOINTS],
+    pub(crate) explained: [u64; JOINTS],
     /// Whether a torque was written for it since the leg was last enabled.
-    pub pending: [bool; JOINTS],
+    pub(crate) pending: [bool; JOINTS],
     pub returns: [bool; JOINTS],
     bounded: [bool; JOINTS],
     /// Tick until which a new mode or a controlword may stop a joint.
-    pub stops: [u64; JOINTS],
+    pub(crate) stops: [u64; JOINTS],
     /// Tick from which a joint must be at rest but for [`COMES_TO_REST`], and its position then.
     pose: [(u64, f64); JOINTS],
     /// Tick before the leg was enabled, and how far each joint was beyond its range then, rad.
@@ -171,20 +171,20 @@ pub(super) struct Play<L> {
     /// Tick from which a joint is held, and its least commanded speed since, rad/s: it only slows down.
     slows: [(u64, f32); JOINTS],
     /// Code that must be heard from each node, and the tick in which the leg had it.
-    pub unheard: Option<(u16, u64)>,
+    pub(crate) unheard: Option<(u16, u64)>,
     /// Code of each node's last emergency message, and its tick.
-    pub heard: [(u16, u64); JOINTS],
+    pub(crate) heard: [(u16, u64); JOINTS],
     /// Tick in which each node last reported that its host is lost.
-    pub lost_at: [u64; JOINTS],
+    pub(crate) lost_at: [u64; JOINTS],
     /// Tick until which the leg may be writing its flash memory.
-    pub writes_flash_until: u64,
-    pub plugged: bool,
+    pub(crate) writes_flash_until: u64,
+    pub(crate) plugged: bool,
     /// Whether the operator may have enabled the leg.
-    pub by_hand: bool,
+    pub(crate) by_hand: bool,
     is_switch_closed: bool,
-    pub answer: Option<[u8; 8]>,
+    pub(crate) answer: Option<[u8; 8]>,
     /// Nodes whose boot-up message came since the last reset.
-    pub has_booted: [bool; JOINTS],
+    pub(crate) has_booted: [bool; JOINTS],
 }
 
 impl<L: HostedLeg> Play<L> {
@@ -225,7 +225,7 @@ impl<L: HostedLeg> Play<L> {
         self.leg.send(Frame::new(id, data));
     }
 
-    pub fn hand(&mut self, enabling: bool, start: bool) {
+    pub(crate) fn hand(&mut self, enabling: bool, start: bool) {
         // Closing the switch enables the leg.
         self.by_hand |= enabling && !self.is_switch_closed || start;
         self.is_switch_closed = enabling;
@@ -340,7 +340,7 @@ impl<L: HostedLeg> Play<L> {
     }
 
     /// Whether a joint of the enabled leg is held and has come to rest.
-    pub fn is_at_rest(&self, joint: usize) -> bool {
+    pub(crate) fn is_at_rest(&self, joint: usize) -> bool {
         self.is_enabled && self.ticks >= self.pose[joint].0 + COMES_TO_REST
     }
 

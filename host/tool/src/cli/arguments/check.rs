@@ -1,6 +1,6 @@
 //! Detects files that a command would overwrite or cannot write, before it computes anything.
 //!
-//! The roles of its arguments ([`crate::cli::arguments::role`]) define the use of each file, so one check
+//! The roles of its arguments (`crate::cli::arguments::role`) define the use of each file, so one check
 //! serves every command. Each written file is compared with every other file of the command, by its resolved
 //! path and by its file number (hard links). Then a write is tried.
 
@@ -98,7 +98,7 @@ pub fn check(command: &Command, matches: &ArgMatches) -> Result<(), ToolError> {
 
 /// Whether the type of an argument defines the use of its file.
 #[must_use]
-pub fn has_role(argument: &Arg) -> bool {
+pub(crate) fn has_role(argument: &Arg) -> bool {
     let kind = argument.get_value_parser().type_id();
     [
         TypeId::of::<Input>(),

@@ -18,7 +18,7 @@ const SHARD: &str = "shard";
 
 /// Stated arguments of a campaign, in the order of its help; none of a command that cannot be divided.
 #[must_use]
-pub fn stated(command: &Command, matches: &ArgMatches) -> Vec<Argument> {
+pub(crate) fn stated(command: &Command, matches: &ArgMatches) -> Vec<Argument> {
     let (mut command, mut matches) = (command, matches);
     while let Some((name, inner)) = matches.subcommand() {
         let Some(next) = command.find_subcommand(name) else { break };

@@ -29,7 +29,7 @@ const LONG_LINK: f64 = 1.5;
 ///
 /// # Errors
 /// Input ends before the last answer, or an answer from a pipe is invalid.
-pub fn ask_on_terminal() -> Result<String, ToolError> {
+pub(crate) fn ask_on_terminal() -> Result<String, ToolError> {
     let stdin = io::stdin().lock();
     let is_terminal = stdin.is_terminal();
     asked(&mut Dialogue { input: stdin, is_terminal, print: output::print, asked: 0, given: Vec::new() })

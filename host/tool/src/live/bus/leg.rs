@@ -65,7 +65,7 @@ struct Measured<const N: usize> {
 }
 
 /// One leg of the bus.
-pub struct Leg<'a, const N: usize, const B: usize> {
+pub(crate) struct Leg<'a, const N: usize, const B: usize> {
     picture: Picture<'a, N>,
     progress: Progress<N, B>,
     background: Background<N, B>,
@@ -133,7 +133,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     }
 
     /// Takes a frame of the bus; `prefix` names the leg in the timeline.
-    pub fn take(&mut self, frame: &Frame, now_s: f64, prefix: &str) {
+    pub(crate) fn take(&mut self, frame: &Frame, now_s: f64, prefix: &str) {
         self.picture.time_s = now_s;
         for joint in 0..N {
             let name = &self.picture.leg().joints[joint].name;

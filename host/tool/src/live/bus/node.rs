@@ -28,7 +28,7 @@ const FIRST_OBJECT: u16 = 0x1000;
 
 /// NMT state in a heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NmtState {
+pub(crate) enum NmtState {
     /// 0: the node has started.
     BootUp,
     /// 4.
@@ -52,7 +52,7 @@ impl NmtState {
 
     /// State as the end of a sentence.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::BootUp => "has started",
             Self::Stopped => "is stopped",
@@ -64,7 +64,7 @@ impl NmtState {
 
 /// What a frame was, besides values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
+pub(crate) enum Event {
     /// Emergency message of the node.
     Emergency,
     /// Another NMT state in its heartbeat.
@@ -94,7 +94,7 @@ enum Asked {
 
 /// What the frames have shown about one node.
 #[derive(Clone, Debug, Default)]
-pub struct Node {
+pub(crate) struct Node {
     id: u8,
     values: BTreeMap<(u16, u8), Known>,
     asked: Option<Asked>,
@@ -119,19 +119,19 @@ impl Node {
 
     /// Node-ID.
     #[must_use]
-    pub fn id(&self) -> u8 {
+    pub(crate) fn id(&self) -> u8 {
         self.id
     }
 
     /// Time of the node's last own frame, s.
     #[must_use]
-    pub fn heard_s(&self) -> Option<f64> {
+    pub(crate) fn heard_s(&self) -> Option<f64> {
         self.heard_s
     }
 
     /// COB-ID of its emergency messages.
     #[must_use]
-    pub fn emergency(&self) -> u16 {
+    pub(crate) fn emergency(&self) -> u16 {
         (self.parameter(0x1014, 0) & 0x7FF) as u16
     }
 
@@ -141,20 +141,20 @@ impl Node {
 
     /// Raw value of an object, if known.
     #[must_use]
-    pub fn raw(&self, index: u16, sub: u8) -> Option<u32> {
+    pub(crate) fn raw(&self, index: u16, sub: u8) -> Option<u32> {
         self.known(index, sub).map(|known| known.raw)
     }
 
     /// The object among these that was seen last.
     #[must_use]
-    pub fn newest(&self, indices: &[u16]) -> Option<u16> {
+    pub(crate) fn newest(&self, indices: &[u16]) -> Option<u16> {
         let seen = indices.iter().filter_map(|index| Some((*index, self.time_s(*index, 0)?)));
         seen.max_by(|one, other| one.1.total_cmp(&other.1)).map(|(index, _)| index)
     }
 
     /// Value of a signed object, if known.
     #[must_use]
-    pub fn signed(&self, index: u16) -> Option<i32> {
+    pub(crate) fn signed(&self, index: u16) -> Option<i32> {
         let known = self.known(index, 0)?;
         let unused = 32 - 8 * known.bytes.clamp(1, 4) as u32;
         Some((known.raw << unused) as i32 >> unused)
@@ -162,13 +162,13 @@ impl Node {
 
     /// Value of a REAL32 object, if known and a number.
     #[must_use]
-    pub fn real(&self, index: u16, sub: u8) -> Option<f32> {
+    pub(crate) fn real(&self, index: u16, sub: u8) -> Option<f32> {
         self.raw(index, sub).map(f32::from_bits).filter(|value| value.is_finite())
     }
 
     /// Time at which a value was last seen, s.
     #[must_use]
-    pub fn time_s(&self, index: u16, sub: u8) -> Option<f64> {
+    pub(crate) fn time_s(&self, index: u16, sub: u8) -> Option<f64> {
         self.known(index, sub).map(|known| known.at_s)
     }
 
@@ -181,7 +181,7 @@ impl Node {
     }
 
     /// Takes a frame of the bus at this time, s.
-    pub fn take(&mut self, frame: &Frame, now_s: f64) -> Option<Event> {
+    pub(crate) fn take(&mut self, frame: &Frame, now_s: f64) -> Option<Event> {
         let own = u16::from(self.id);
         let id = frame.id();
         if id == 0x600 + own {

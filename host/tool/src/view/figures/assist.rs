@@ -25,7 +25,7 @@ const SHOWN_S: f64 = 6.0;
 const DASHES: (i32, i32) = (5, 4);
 
 /// Draws all figures.
-pub fn all(report: &AssistReport) -> Result<Vec<Figure>, ToolError> {
+pub(crate) fn all(report: &AssistReport) -> Result<Vec<Figure>, ToolError> {
     let mut figures = Vec::new();
     let mut add = |file: &str, group, title: &str, height: i32, draw: Draw<'_>| {
         let svg = render(WIDTH, height.unsigned_abs(), draw)

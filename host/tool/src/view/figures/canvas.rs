@@ -32,7 +32,7 @@ pub const DARK: RGBColor = BLACK;
 /// Background of excluded ranges.
 pub const SHADE: RGBColor = RGBColor(222, 222, 222);
 /// Background of expected ranges.
-pub const BAND: RGBColor = RGBColor(224, 237, 248);
+pub(crate) const BAND: RGBColor = RGBColor(224, 237, 248);
 
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
@@ -85,7 +85,7 @@ pub fn text(
 }
 
 /// Raises the exponents of a unit: `kg m2` becomes `kg m\u{b2}`.
-pub fn unit(plain: &str) -> String {
+pub(crate) fn unit(plain: &str) -> String {
     plain.replace("m2", "m\u{b2}")
 }
 
@@ -193,7 +193,7 @@ fn labels(range: &Range<f64>, most: usize) -> usize {
 }
 
 /// Formats a number on an axis with a true minus sign and without rounding noise.
-pub fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     let rounded = (value * 1e6).round() / 1e6;
     let words = format!("{}", if rounded == 0.0 { 0.0 } else { rounded });
     words.replace('-', "\u{2212}")

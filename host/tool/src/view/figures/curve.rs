@@ -34,7 +34,7 @@ pub fn draw(
 }
 
 /// Draws a short dashed curve; lengths of dash and gap in pixels.
-pub fn dashed(
+pub(crate) fn dashed(
     chart: &mut Chart<'_, '_>,
     points: impl Iterator<Item = (f64, f64)>,
     style: ShapeStyle,

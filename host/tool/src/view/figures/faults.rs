@@ -16,7 +16,7 @@ const ROW: i32 = 170;
 const HEAD: i32 = 44;
 
 /// Draws one run; `what` is the title.
-pub fn drawn(file: String, what: &str, recording: &FaultCurves) -> Result<Figure, ToolError> {
+pub(crate) fn drawn(file: String, what: &str, recording: &FaultCurves) -> Result<Figure, ToolError> {
     let height = (HEAD + 3 * ROW) as u32;
     let svg = render(WIDTH, height, &|area| whole(area, what, recording))
         .map_err(|error| ToolError::input(format!("{file}: cannot be drawn: {error}")))?;

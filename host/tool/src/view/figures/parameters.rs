@@ -14,11 +14,11 @@ use scarab_identify::report::{BaseReport, RunReport};
 
 use crate::view::figures::canvas::{Area, DARK, DrawingError, GRID, font, line, px, text, unit};
 
-pub const ONE_SIGMA: RGBColor = RGBColor(190, 205, 225);
-pub const THREE_SIGMA: RGBColor = RGBColor(228, 235, 244);
+pub(crate) const ONE_SIGMA: RGBColor = RGBColor(190, 205, 225);
+pub(crate) const THREE_SIGMA: RGBColor = RGBColor(228, 235, 244);
 
 /// Draws values, standard deviations and truths.
-pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
+pub(crate) fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("{}: {}", run.leg, what(run)))?;
     let (_, area) = area.split_vertically(px(30));
     dots(&area, run, (90, 260), &|base| {
@@ -33,7 +33,7 @@ pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
 }
 
 /// Draws the values only.
-pub fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
+pub(crate) fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("Base parameters: {}", what(run)))?;
     let (_, area) = area.split_vertically(px(30));
     dots(&area, run, (56, 136), &|base| match base.value.known() {
@@ -46,7 +46,7 @@ pub fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
 const NOT_DETERMINED: &str = "not determined";
 
 /// Title of the figure: it depends on whether the truth is known.
-pub fn what(run: &RunReport) -> &'static str {
+pub(crate) fn what(run: &RunReport) -> &'static str {
     if truth_is_known(run) { "errors, bands of one and three sigma" } else { "sigma in percent of the value" }
 }
 
@@ -107,7 +107,7 @@ pub fn frame<'a, 'b>(area: &'a Area<'b>, (left, right): (i32, i32)) -> ChartBuil
 }
 
 /// Axis of errors in sigma: bands of one and three, a line at zero.
-pub fn sigma_axis(
+pub(crate) fn sigma_axis(
     chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
     rows: f64,
 ) -> Result<(), DrawingError> {
@@ -119,7 +119,7 @@ pub fn sigma_axis(
 }
 
 /// Draws vertical grid lines from one numeric axis.
-pub fn mesh<'b, X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
+pub(crate) fn mesh<'b, X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
     chart: &mut ChartContext<'_, SVGBackend<'b>, Cartesian2d<X, RangedCoordf64>>,
     label: &str,
     numbers: &dyn Fn(&f64) -> String,
@@ -161,7 +161,7 @@ fn rows_of<X: Ranged<ValueType = f64>>(
 }
 
 /// Writes a name to the left and text to the right of a row at `y`, relative to the figure's corner.
-pub fn labels(
+pub(crate) fn labels(
     area: &Area<'_>,
     y: i32,
     (left, right): (i32, i32),

@@ -24,12 +24,12 @@ const BAR: f64 = 0.5;
 /// Time from one row to the next, s.
 const ROW_S: f64 = scarab::ident::DECIMATION as f64 / scarab::ident::SAMPLE_RATE_HZ;
 
-pub fn height(joints: usize) -> u32 {
+pub(crate) fn height(joints: usize) -> u32 {
     (HEAD + JOINT_HEIGHT * joints.max(1) as i32).unsigned_abs()
 }
 
 /// Draws a row for each joint.
-pub fn whole(area: &Area<'_>, joints: &[&str], series: &Series) -> Result<(), DrawingError> {
+pub(crate) fn whole(area: &Area<'_>, joints: &[&str], series: &Series) -> Result<(), DrawingError> {
     let title = "Residuals where the joint moves: distribution, and autocorrelation of those of the motion identified from";
     text(area, (12, 14), 13, HPos::Left, title)?;
     let entries = [

@@ -20,7 +20,7 @@ const SMALLEST_FLOOR: f64 = 1e-6;
 const GOAL: f64 = 0.5;
 
 /// Draws the cost above the optimum after each iteration.
-pub fn whole(area: &Area<'_>, series: &Series) -> Result<(), DrawingError> {
+pub(crate) fn whole(area: &Area<'_>, series: &Series) -> Result<(), DrawingError> {
     let floor = match series.floor_chi2 {
         Some(above) if above > SMALLEST_FLOOR => {
             format!(", which lies {} chi-square units above least squares", plain(above.into()))

@@ -10,16 +10,16 @@ use crate::view::figures::canvas::{Area, BLUE, DARK, DrawingError, Key, legend, 
 use crate::view::figures::parameters::{ONE_SIGMA, THREE_SIGMA, frame, labels, sigma_axis};
 
 /// Largest number of dots that remains readable; the printed numbers count all runs.
-pub const LARGEST_RUNS: usize = 500;
+pub(crate) const LARGEST_RUNS: usize = 500;
 
 /// Most runs that are drawn with larger dots.
 const FEW_RUNS: usize = 100;
 
 /// Height of title and legend, pixels.
-pub const HEAD: u32 = 50;
+pub(crate) const HEAD: u32 = 50;
 
 /// Draws one row per parameter: errors in reported sigma.
-pub fn whole(area: &Area<'_>, leg: &str, spreads: &[Spread]) -> Result<(), DrawingError> {
+pub(crate) fn whole(area: &Area<'_>, leg: &str, spreads: &[Spread]) -> Result<(), DrawingError> {
     let runs = spreads.iter().map(|spread| spread.errors.len()).max().unwrap_or(0);
     let radius = if runs > FEW_RUNS { 1 } else { 2 };
     let title = format!("{leg}: errors of the base parameters in {runs} runs, in units of each run's sigma");

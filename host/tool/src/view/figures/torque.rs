@@ -20,11 +20,11 @@ const JOINT_HEIGHT: i32 = 181;
 /// Height of title and legends in the small figure.
 const REST_HEIGHT: i32 = 74;
 
-pub fn small_height(joints: usize) -> u32 {
+pub(crate) fn small_height(joints: usize) -> u32 {
     (REST_HEIGHT + JOINT_HEIGHT * joints.max(1) as i32).unsigned_abs()
 }
 
-pub fn height(motions: &[MotionSeries]) -> u32 {
+pub(crate) fn height(motions: &[MotionSeries]) -> u32 {
     let (title, upper, lower) = CELL;
     (HEAD + (title + upper + lower) * motions.len().div_ceil(2) as i32).unsigned_abs()
 }
@@ -53,7 +53,7 @@ fn measured_error() -> ShapeStyle {
 }
 
 /// Draws one joint on all motions, two side by side; `sigma` is the noise of its filtered torque.
-pub fn whole(
+pub(crate) fn whole(
     area: &Area<'_>,
     name: &str,
     joint: usize,
@@ -100,7 +100,7 @@ pub fn whole(
 }
 
 /// Draws all joints on one motion.
-pub fn small(area: &Area<'_>, joints: &[&str], motion: &MotionSeries) -> Result<(), DrawingError> {
+pub(crate) fn small(area: &Area<'_>, joints: &[&str], motion: &MotionSeries) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("Torque on {} ({})", motion.name, motion.role.name()))?;
     let mut entries = vec![("measured", Key::Curve(measured())), ("predicted", Key::Curve(predicted()))];
     let simulated = motion.joints.iter().any(|curves| !curves.noise_free_nm.is_empty());

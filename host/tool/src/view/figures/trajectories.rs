@@ -25,7 +25,7 @@ fn commanded(motions: &[MotionSeries]) -> bool {
     motions.iter().flat_map(|motion| &motion.joints).any(|curves| !curves.commanded_deg.is_empty())
 }
 
-pub fn height(motions: &[MotionSeries]) -> u32 {
+pub(crate) fn height(motions: &[MotionSeries]) -> u32 {
     let cell = if commanded(motions) { CELL.0 + CELL.1 + CELL.2 } else { BARE_CELL.0 + BARE_CELL.1 };
     (HEAD + cell * motions.len().div_ceil(2) as i32).unsigned_abs()
 }
@@ -54,7 +54,7 @@ fn head(area: &Area<'_>, joints: &[&str], with_commands: bool) -> Result<(), Dra
 }
 
 /// Draws all motions, two side by side.
-pub fn whole(area: &Area<'_>, joints: &[&str], motions: &[MotionSeries]) -> Result<(), DrawingError> {
+pub(crate) fn whole(area: &Area<'_>, joints: &[&str], motions: &[MotionSeries]) -> Result<(), DrawingError> {
     let with_commands = commanded(motions);
     head(area, joints, with_commands)?;
     let (_, cells) = area.split_vertically(px(HEAD));

@@ -31,7 +31,7 @@ fn section(title: &str, words: &str, shown: &Markup) -> Markup {
 
 /// Creates the page.
 #[must_use]
-pub fn page(circumstances: &Circumstances, report: &AssistReport, figures: &[Figure]) -> String {
+pub(crate) fn page(circumstances: &Circumstances, report: &AssistReport, figures: &[Figure]) -> String {
     let failures = report.failures();
     let is_good = failures.is_empty();
     let verdict = if is_good { "no limit exceeded".to_owned() } else { failures.join(", ") };

@@ -10,7 +10,7 @@ use crate::view::html::table::ToHtml;
 use crate::view::html::{exact, joint_name, measured, number, sigma, signed};
 
 /// Terms of each joint's model, with identified Stribeck and directional friction.
-pub fn model(run: &RunReport, leg: &LegFile) -> Markup {
+pub(crate) fn model(run: &RunReport, leg: &LegFile) -> Markup {
     let mut terms = Table::with_class("choices")
         .text(["joint", "term", "leg file", "used"])
         .numbers(["explains, chi-square units", "limit"])
@@ -69,7 +69,7 @@ fn asked(choice: &str) -> &str {
 }
 
 /// Outliers and disturbances of the motion identified from.
-pub fn outliers(run: &RunReport, leg: &LegFile) -> Markup {
+pub(crate) fn outliers(run: &RunReport, leg: &LegFile) -> Markup {
     let found = &run.outliers;
     let percent = |share: Option<&Number>| {
         number(Number(share.and_then(|share| share.known()).map(|share| 100.0 * share)))
@@ -103,7 +103,7 @@ pub fn outliers(run: &RunReport, leg: &LegFile) -> Markup {
 }
 
 /// Comparison with a stored model; empty if none was given.
-pub fn comparison(run: &RunReport) -> Markup {
+pub(crate) fn comparison(run: &RunReport) -> Markup {
     html! { @if let Some(compared) = &run.compared {
         section {
             h2 { "Compared with a stored model" }

@@ -57,7 +57,7 @@ fn joints(report: &CommissionReport) -> Table {
 
 /// Creates the page, with the present time.
 #[must_use]
-pub fn page(report: &CommissionReport) -> String {
+pub(crate) fn page(report: &CommissionReport) -> String {
     let verdict = match (report.verdict, report.stored) {
         (Some("accepted"), true) => "accepted and stored",
         (Some("accepted"), false) => "accepted, not stored",

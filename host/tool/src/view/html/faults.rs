@@ -9,22 +9,22 @@ use crate::view::html::{Circumstances, drawing, page_head};
 
 /// Results of a campaign.
 #[derive(Clone, Copy, Debug)]
-pub struct Campaign<'a> {
+pub(crate) struct Campaign<'a> {
     /// Result in a few words.
-    pub verdict: &'a str,
+    pub(crate) verdict: &'a str,
     /// Results of each row of the catalogue.
-    pub table: &'a Table,
+    pub(crate) table: &'a Table,
     /// Notes, a line each.
-    pub notes: &'a str,
+    pub(crate) notes: &'a str,
     /// Lines about repeated runs.
-    pub runs: &'a [String],
+    pub(crate) runs: &'a [String],
     /// Curves of repeated runs.
-    pub figures: &'a [Figure],
+    pub(crate) figures: &'a [Figure],
 }
 
 /// Creates the page.
 #[must_use]
-pub fn page(circumstances: &Circumstances, campaign: &Campaign<'_>) -> String {
+pub(crate) fn page(circumstances: &Circumstances, campaign: &Campaign<'_>) -> String {
     let verdict = campaign.verdict;
     let page = html! {
         (DOCTYPE)

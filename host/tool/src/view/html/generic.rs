@@ -17,7 +17,7 @@ use crate::view::html::table::{ToHtml, html_cell};
 const DEEPEST: usize = 3;
 
 /// Sections of findings in the samples and of a board's trace; empty ones are omitted.
-pub fn sections(run: &RunReport) -> Result<Markup, ToolError> {
+pub(crate) fn sections(run: &RunReport) -> Result<Markup, ToolError> {
     let values =
         [("samples", serde_json::to_value(&run.samples)), ("trace", serde_json::to_value(&run.trace))];
     let mut sections = Vec::new();
@@ -39,7 +39,7 @@ fn is_empty(value: &Value) -> bool {
 }
 
 /// Title of a key: `model_choice` becomes `Model choice`, `longest_s` becomes `Longest, s`.
-pub fn words(key: &str) -> String {
+pub(crate) fn words(key: &str) -> String {
     let units =
         [("_s", ", s"), ("_nm", ", N m"), ("_deg", ", deg"), ("_kg", ", kg"), ("_m", ", m"), ("_hz", ", Hz")];
     let (stem, unit) =
@@ -57,7 +57,7 @@ fn section(name: &str, value: &Value) -> Markup {
 }
 
 /// Formats any value.
-pub fn content(value: &Value, depth: usize) -> Markup {
+pub(crate) fn content(value: &Value, depth: usize) -> Markup {
     match value {
         Value::Array(items) if depth < DEEPEST && items.iter().any(Value::is_object) => rows(items, depth),
         Value::Object(keys) if depth < DEEPEST => {

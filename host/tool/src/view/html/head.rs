@@ -7,7 +7,7 @@ use scarab_identify::report::{FitReport, RunReport};
 use crate::view::html::{Circumstances, exact, joint_name, number, signed};
 
 /// Title: name of the leg and date.
-pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
+pub(crate) fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
     let kind = match (&run.trace, run.seed) {
         (Some(_), _) => "trace of a board",
         (None, Some(_)) => "simulated run",
@@ -23,7 +23,7 @@ pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
 }
 
 /// Circumstances of the run.
-pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
+pub(crate) fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
     let leg = &circumstances.leg;
     let joints: Vec<&str> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
     let gravity: Vec<String> = leg.gravity.iter().map(|element| exact((*element).into())).collect();
@@ -66,7 +66,7 @@ pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
 }
 
 /// Description of the simulated drives.
-pub fn drive(name: &str) -> String {
+pub(crate) fn drive(name: &str) -> String {
     match name {
         "ideal" => "simulated; currents follow their targets with a lag".into(),
         "full" => "simulated with motors, inverters, current and angle sensors, supply".into(),
@@ -75,7 +75,7 @@ pub fn drive(name: &str) -> String {
 }
 
 /// Description of a prior.
-pub fn prior(name: &str) -> String {
+pub(crate) fn prior(name: &str) -> String {
     match (name, name.strip_prefix("wrong:")) {
         ("none", _) => "none".into(),
         ("file", _) => "the leg file's".into(),
@@ -125,7 +125,7 @@ pub fn numbers(run: &RunReport, leg: &LegFile) -> Markup {
 }
 
 /// Last line of the page.
-pub fn colophon(run: &RunReport) -> Markup {
+pub(crate) fn colophon(run: &RunReport) -> Markup {
     let time = if run.trace.is_some() { String::new() } else { format!(" in {:.2} s", run.wall_s) };
     html! {
         footer {

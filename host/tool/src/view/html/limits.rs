@@ -7,7 +7,7 @@ use crate::view::html::count;
 use crate::view::html::parameters::split;
 
 /// Paragraph with the affected parameters.
-pub fn section(run: &RunReport) -> Markup {
+pub(crate) fn section(run: &RunReport) -> Markup {
     let with = |status: &str| -> Vec<&str> {
         let all = run.parameters.iter().filter(|parameter| parameter.status == status);
         all.map(|parameter| parameter.name.as_str()).collect()

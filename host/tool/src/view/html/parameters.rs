@@ -13,7 +13,7 @@ use crate::view::tables;
 const BAR: (f64, f64) = (150.0, 16.0);
 
 /// Section of the base parameters.
-pub fn base(run: &RunReport) -> Markup {
+pub(crate) fn base(run: &RunReport) -> Markup {
     let bounded = run.base_parameters.iter().any(|base| base.cramer_rao.known().is_some());
     let misfit = run.base_parameters.iter().any(|base| base.sigma_misfit.known().is_some());
     html! {
@@ -27,7 +27,7 @@ pub fn base(run: &RunReport) -> Markup {
 }
 
 /// Tables of all parameters, one for each joint.
-pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
+pub(crate) fn all(run: &RunReport, leg: &LegFile) -> Markup {
     let truth = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
     let joints = run.parameters.iter().map(|parameter| parameter.joint).max().unwrap_or(0);
     html! {
@@ -47,12 +47,12 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
 
 /// What splits a measured sum of parameters.
 #[must_use]
-pub const fn split(has_prior: bool) -> &'static str {
+pub(crate) const fn split(has_prior: bool) -> &'static str {
     if has_prior { "the prior splits them" } else { "without a prior nothing splits them" }
 }
 
 /// Meaning of each status.
-pub fn statuses(has_prior: bool) -> Markup {
+pub(crate) fn statuses(has_prior: bool) -> Markup {
     html! {
         p { (badge("identified")) " measured alone. " (badge("grouped"))
             " only sums with the parameters beside it are measured, " (split(has_prior)) ". " (badge("weak"))
@@ -62,7 +62,7 @@ pub fn statuses(has_prior: bool) -> Markup {
 }
 
 /// Status of a parameter.
-pub fn badge(status: &str) -> Markup {
+pub(crate) fn badge(status: &str) -> Markup {
     html! { span class={ "badge " (status) } { (status) } }
 }
 
@@ -78,7 +78,7 @@ fn half_range(parameter: &ParameterReport, value: f64) -> f64 {
 }
 
 /// Bar with value, sigma, truth and prior.
-pub fn bar(parameter: &ParameterReport) -> Markup {
+pub(crate) fn bar(parameter: &ParameterReport) -> Markup {
     let Some(value) = parameter.value.known() else {
         return html! { "\u{2013}" };
     };

@@ -10,7 +10,7 @@ use crate::view::html::{joint_name, number};
 use crate::view::tables;
 
 /// Section of a replay's files.
-pub fn sources(run: &RunReport, sources: &[Source]) -> Markup {
+pub(crate) fn sources(run: &RunReport, sources: &[Source]) -> Markup {
     let read = run.read.as_deref().unwrap_or_default();
     html! {
         section {
@@ -26,7 +26,7 @@ pub fn sources(run: &RunReport, sources: &[Source]) -> Markup {
 }
 
 /// Caption of the angles.
-pub fn trajectory_words(run: &RunReport) -> Markup {
+pub(crate) fn trajectory_words(run: &RunReport) -> Markup {
     let words = if run.seed.is_some() {
         "The first motion is identified from, the others are only predicted. The deviation is that of the position loop \
          without a model."
@@ -39,7 +39,7 @@ pub fn trajectory_words(run: &RunReport) -> Markup {
 }
 
 /// Caption of the torques.
-pub fn torque_words(run: &RunReport) -> Markup {
+pub(crate) fn torque_words(run: &RunReport) -> Markup {
     html! { p {
         "Measured and predicted torque, both through the filter of the identification. The blue band is two standard \
         deviations of the filtered noise to both sides, as the identification estimates it: nineteen of twenty residuals \
@@ -50,7 +50,7 @@ pub fn torque_words(run: &RunReport) -> Markup {
 }
 
 /// Caption of the residuals.
-pub fn residual_words() -> Markup {
+pub(crate) fn residual_words() -> Markup {
     html! { p {
         "A model that lacks nothing leaves noise. Then the bars follow the normal curve, and the autocorrelation that of \
         white noise behind the same filter; correlation beyond it is motion that the model does not explain."
@@ -58,7 +58,7 @@ pub fn residual_words() -> Markup {
 }
 
 /// Table of the residuals on every motion.
-pub fn fits(run: &RunReport, leg: &LegFile) -> Markup {
+pub(crate) fn fits(run: &RunReport, leg: &LegFile) -> Markup {
     html! { h3 { "Torque errors" } (tables::fits(run, |joint| joint_name(leg, joint)).to_html()) }
 }
 
@@ -82,7 +82,7 @@ pub fn search(run: &RunReport) -> Markup {
 }
 
 /// Units of the parameters and load of the leg; empty for a recording, which contains torques.
-pub fn scale(run: &RunReport) -> Markup {
+pub(crate) fn scale(run: &RunReport) -> Markup {
     let lines = scale::lines(run);
     html! { @if !lines.is_empty() {
         section { h2 { "Scale and load" } @for line in lines { p { (capital(&line)) "." } } }
@@ -95,7 +95,7 @@ fn capital(words: &str) -> String {
 }
 
 /// Searches for a physically consistent leg.
-pub fn consistent(run: &RunReport) -> Markup {
+pub(crate) fn consistent(run: &RunReport) -> Markup {
     let found = &run.consistent;
     let mut table = Table::default()
         .text(["search"])
@@ -142,7 +142,7 @@ pub fn consistent(run: &RunReport) -> Markup {
 }
 
 /// Effect of the model on the servo.
-pub fn tracking(run: &RunReport, leg: &LegFile) -> Markup {
+pub(crate) fn tracking(run: &RunReport, leg: &LegFile) -> Markup {
     let mut table = Table::default().text(["joint"]).numbers([
         "without the model, deg rms",
         "with it, deg rms",

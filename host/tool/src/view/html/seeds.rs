@@ -16,7 +16,7 @@ use crate::view::html::{
 };
 
 /// Creates the page of runs that differ in their seed.
-pub fn page(
+pub(crate) fn page(
     circumstances: &Circumstances,
     runs: &[RunReport],
     spreads: &[Spread],

@@ -4,7 +4,7 @@ use maud::{Markup, PreEscaped, Render, html};
 use scarab_base::table::{Cell, Kind, Table, typeset};
 
 /// A table that a page shows.
-pub trait ToHtml {
+pub(crate) trait ToHtml {
     /// Renders the table; without a header if all heads are empty.
     fn to_html(&self) -> Markup;
 }
@@ -31,7 +31,7 @@ impl ToHtml for Table {
 
 /// Cell that only a page shows.
 #[must_use]
-pub fn html_cell(markup: Markup) -> Cell {
+pub(crate) fn html_cell(markup: Markup) -> Cell {
     Cell::Html(String::new(), markup.into_string())
 }
 

@@ -12,7 +12,7 @@ use crate::view::html::{count, exact, joint_name, number};
 use crate::view::tables;
 
 /// Verdict in large type and in words, with each reason and its limit.
-pub fn banner(run: &RunReport) -> Markup {
+pub(crate) fn banner(run: &RunReport) -> Markup {
     let validated = !run.validation.is_empty();
     html! {
         section.verdict.accepted[run.accepted()].refused[!run.accepted()] {
@@ -40,7 +40,7 @@ pub fn banner(run: &RunReport) -> Markup {
 }
 
 /// Faults and warnings of a board; empty for other runs.
-pub fn alarms(run: &RunReport) -> Markup {
+pub(crate) fn alarms(run: &RunReport) -> Markup {
     let trace = run.trace.as_ref();
     let (faults, warnings) = trace.map_or((&[][..], &[][..]), |trace| (&trace.faults, &trace.warnings));
     html! {
@@ -122,7 +122,7 @@ fn meaning(test: &str) -> (bool, &str) {
 }
 
 /// Errors of the logging chain, the misfit over noise, and parameters at a limit of the prior.
-pub fn doubts(run: &RunReport) -> Markup {
+pub(crate) fn doubts(run: &RunReport) -> Markup {
     html! { @if let Some(doubt) = &run.doubt {
         section {
             h2 { "Errors of the logging chain" }
@@ -146,7 +146,7 @@ fn nearness(finding: &FindingReport) -> f64 {
 }
 
 /// Every kind of test with its case nearest to the limit. A passed test without a limit says nothing.
-pub fn tests(findings: &[FindingReport], leg: &LegFile) -> Markup {
+pub(crate) fn tests(findings: &[FindingReport], leg: &LegFile) -> Markup {
     let is_tested = |finding: &&FindingReport| finding.limit.known().is_some() || !finding.passed;
     let findings: Vec<FindingReport> = findings.iter().filter(is_tested).cloned().collect();
     let mut kinds: Vec<(&str, &str)> = Vec::new();

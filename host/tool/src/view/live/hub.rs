@@ -16,15 +16,15 @@ use crate::live::report::{
 };
 
 /// Points in the ring: 80 s of samples and rows of one leg at the speed of the clock.
-pub const MOST_POINTS: usize = 8192;
+pub(crate) const MOST_POINTS: usize = 8192;
 /// Lines of the timeline.
-pub const MOST_NOTES: usize = 200;
+pub(crate) const MOST_NOTES: usize = 200;
 /// Points in one message.
 pub const MOST_IN_MESSAGE: usize = 400;
 
 /// Report shared by the ring and the messages that contain it.
 #[derive(Debug)]
-pub struct Shared<T>(Arc<T>);
+pub(crate) struct Shared<T>(Arc<T>);
 
 impl<T> Shared<T> {
     fn new(report: T) -> Self {
@@ -82,7 +82,7 @@ struct State {
 
 /// Reports of a source, for any number of pages.
 #[derive(Debug)]
-pub struct Hub {
+pub(crate) struct Hub {
     state: Mutex<State>,
     /// Distinguishes the sources of successive processes.
     id: u64,
@@ -90,7 +90,7 @@ pub struct Hub {
 
 /// Position of a page.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Cursor {
+pub(crate) struct Cursor {
     /// Number of the next point.
     point: u64,
     /// Newest version that was read.
@@ -102,46 +102,46 @@ pub struct Cursor {
 impl Cursor {
     /// Position behind this point, for a page that returns.
     #[must_use]
-    pub fn behind(point: u64) -> Self {
+    pub(crate) fn behind(point: u64) -> Self {
         Self { point, version: 0, started: true }
     }
 }
 
 /// One message to a page. Absent keys have not changed.
 #[derive(Debug, Default, Serialize)]
-pub struct Message {
+pub(crate) struct Message {
     /// Number of the next point.
-    pub next: u64,
+    pub(crate) next: u64,
     /// Points lost since the last message.
     #[serde(skip_serializing_if = "is_zero")]
-    pub dropped: u64,
+    pub(crate) dropped: u64,
     /// Number of the source, with the scene.
     #[serde(skip_serializing_if = "is_zero")]
-    pub id: u64,
+    pub(crate) id: u64,
     /// Description of the source.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub scene: Option<Shared<Scene>>,
+    pub(crate) scene: Option<Shared<Scene>>,
     /// New samples.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub samples: Vec<Shared<LiveSample>>,
+    pub(crate) samples: Vec<Shared<LiveSample>>,
     /// New rows.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub rows: Vec<Shared<LiveRow>>,
+    pub(crate) rows: Vec<Shared<LiveRow>>,
     /// New estimates.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub estimates: Vec<Shared<LiveEstimate>>,
+    pub(crate) estimates: Vec<Shared<LiveEstimate>>,
     /// For a new page: the newest estimate of each leg, which may have left the ring.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub latest: Vec<Shared<LiveEstimate>>,
+    pub(crate) latest: Vec<Shared<LiveEstimate>>,
     /// Changed states.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub status: Vec<Shared<LiveStatus>>,
+    pub(crate) status: Vec<Shared<LiveStatus>>,
     /// Changed outcomes.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub outcomes: Vec<Shared<LiveOutcome>>,
+    pub(crate) outcomes: Vec<Shared<LiveOutcome>>,
     /// New lines of the timeline.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub notes: Vec<Shared<LiveNote>>,
+    pub(crate) notes: Vec<Shared<LiveNote>>,
 }
 
 fn is_zero(value: &u64) -> bool {
@@ -180,7 +180,7 @@ impl Hub {
     }
 
     /// Takes one report of the source. Reports about a leg that the scene lacks are ignored.
-    pub fn push(&self, update: LiveUpdate) {
+    pub(crate) fn push(&self, update: LiveUpdate) {
         let state = &mut *self.lock();
         let version = state.version + 1;
         match update {
@@ -219,7 +219,7 @@ impl Hub {
 
     /// Next message for a page, and its new position; `None` without news, and before the scene.
     #[must_use]
-    pub fn read(&self, cursor: Cursor) -> Option<(Message, Cursor)> {
+    pub(crate) fn read(&self, cursor: Cursor) -> Option<(Message, Cursor)> {
         let state = self.lock();
         state.scene.as_ref()?;
         // A position ahead of the ring belongs to an earlier source.

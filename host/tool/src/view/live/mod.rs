@@ -7,10 +7,10 @@
 //! | part | content |
 //! | --- | --- |
 //! | [`hub`] | bounded distribution; a slow page is overtaken |
-//! | [`request`] | which request gets what: methods, Host header, token |
+//! | `request` | which request gets what: methods, Host header, token |
 //! | [`server`] | connections, on one thread of their own |
 //! | `page` | HTML, styles, scripts; `page/uplot` is vendored |
 
 pub mod hub;
-pub mod request;
+pub(crate) mod request;
 pub mod server;

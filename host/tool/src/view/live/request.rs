@@ -13,13 +13,13 @@ use sha2::{Digest, Sha256};
 use crate::view::live::hub::Cursor;
 
 /// Content policy of every answer.
-pub const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
+pub(crate) const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
                           img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 /// Fewest characters of a token.
-pub const LEAST_TOKEN: usize = 16;
+pub(crate) const LEAST_TOKEN: usize = 16;
 
 /// Parts of the page: path, type, content.
-pub const FILES: [(&str, &str, &str); 9] = [
+pub(crate) const FILES: [(&str, &str, &str); 9] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("/palette.css", "text/css; charset=utf-8", include_str!("../palette.css")),
     ("/live.css", "text/css; charset=utf-8", include_str!("page/live.css")),
@@ -34,16 +34,16 @@ const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// Access to the page.
 #[derive(Clone, Debug)]
-pub struct Access {
+pub(crate) struct Access {
     /// Address of the server.
-    pub address: SocketAddr,
+    pub(crate) address: SocketAddr,
     /// Token of requests for data; none on loopback.
-    pub token: Option<String>,
+    pub(crate) token: Option<String>,
 }
 
 /// Answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Answer {
+pub(crate) enum Answer {
     /// Part of the page: type and content.
     File(&'static str, &'static str),
     /// Stream of messages from this position on.
@@ -55,7 +55,7 @@ pub enum Answer {
 impl Access {
     /// Decides about a request.
     #[must_use]
-    pub fn answer(&self, method: &Method, uri: &Uri, headers: &HeaderMap) -> Answer {
+    pub(crate) fn answer(&self, method: &Method, uri: &Uri, headers: &HeaderMap) -> Answer {
         if method != Method::GET {
             return Answer::Refused(
                 StatusCode::METHOD_NOT_ALLOWED,
@@ -131,7 +131,7 @@ fn is_equal(given: &str, token: &str) -> bool {
 ///
 /// # Errors
 /// An address outside loopback without a token, or an invalid token.
-pub fn check_token(address: SocketAddr, token: Option<&str>) -> Result<(), String> {
+pub(crate) fn check_token(address: SocketAddr, token: Option<&str>) -> Result<(), String> {
     match token {
         None if address.ip().is_loopback() => Ok(()),
         None => Err(format!(

@@ -56,7 +56,7 @@ const HEADERS: [(HeaderName, HeaderValue); 7] = [
 ];
 
 /// Server with its open port.
-pub struct Server {
+pub(crate) struct Server {
     listener: std::net::TcpListener,
     access: Access,
 }
@@ -110,7 +110,7 @@ impl Server {
 
     /// Address of the page, to be opened in a browser.
     #[must_use]
-    pub fn url(&self) -> String {
+    pub(crate) fn url(&self) -> String {
         let Access { address, token } = &self.access;
         // A wildcard address is no destination.
         let host = match address.ip() {
@@ -126,7 +126,7 @@ impl Server {
     ///
     /// # Errors
     /// The system refuses a thread's event queue.
-    pub fn serve(self, hub: Arc<Hub>) -> Result<(), ToolError> {
+    pub(crate) fn serve(self, hub: Arc<Hub>) -> Result<(), ToolError> {
         let failed =
             |error: std::io::Error| ToolError::input(format!("the live page cannot be served: {error}"));
         let runtime = tokio::runtime::Builder::new_current_thread()
