@@ -68,7 +68,7 @@ impl<T: Real> LogCholesky<T> {
     ///
     /// Each coordinate is limited to its range first; NaN counts as the lower limit.
     #[must_use]
-    pub(crate) fn to_parameters(&self) -> InertialParameters<T> {
+    pub(crate) fn parameters(&self) -> InertialParameters<T> {
         let [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = self.0;
         let logarithm = T::from_double(LOGARITHM_LIMIT);
         let length = T::from_double(LENGTH_LIMIT_M);
@@ -132,7 +132,7 @@ mod tests {
         let mut worst = 0.0_f64;
         for _ in 0..200 {
             let body = LogCholesky(random.body().0.map(T::from_double));
-            let back = LogCholesky::from_parameters(&body.to_parameters()).unwrap();
+            let back = LogCholesky::from_parameters(&body.parameters()).unwrap();
             for (one, other) in body.0.iter().zip(&back.0) {
                 worst = worst.max((*one - *other).to_double().abs());
             }
@@ -161,7 +161,7 @@ mod tests {
                 [s13, s23, exp(d3), 0.0],
                 [t1, t2, t3, 1.0],
             ]) * exp(alpha);
-            let difference = factor * factor.transpose() - pseudo_inertia(&body.to_parameters());
+            let difference = factor * factor.transpose() - pseudo_inertia(&body.parameters());
             // A few roundings of numbers up to 20.
             assert!(difference.abs().max() < 1e-14);
         }
@@ -172,7 +172,7 @@ mod tests {
         let mut random = TestRandom::new(54);
         let (mut consistent, mut inconsistent) = (0, 0);
         for _ in 0..500 {
-            let mut parameters = random.body().to_parameters();
+            let mut parameters = random.body().parameters();
             for value in &mut parameters {
                 *value *= 1.0 + random.within(0.5);
             }
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn extreme_coordinates_stay_finite_in_single_precision() {
         for extreme in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, 10.0, -10.0] {
-            let parameters = LogCholesky([extreme; 10]).to_parameters();
+            let parameters = LogCholesky([extreme; 10]).parameters();
             assert!(parameters.iter().all(|value| value.is_finite()), "{extreme}: {parameters:?}");
             assert!(parameters[9] > 0.0 && parameters[0] > 0.0);
         }
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn impossible_bodies_are_refused() {
-        let good = TestRandom::new(55).body().to_parameters();
+        let good = TestRandom::new(55).body().parameters();
         assert!(is_physically_consistent(&good));
         let changed = |index: usize, value: f64| {
             let mut parameters = good;

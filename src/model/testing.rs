@@ -57,7 +57,7 @@ impl TestRandom {
         core::array::from_fn(|_| {
             let drive =
                 [0.5 + self.within(0.4), 3.0 + self.within(2.0), 1.0 + self.within(0.8), self.within(1.0)];
-            joint(&self.body().to_parameters(), &drive)
+            joint(&self.body().parameters(), &drive)
         })
     }
 }

@@ -114,9 +114,11 @@ mod tests {
 
     /// Equation (31), or (32) with a tenth of its two large amplitudes: degrees at `percent` of the cycle.
     fn repaired_deg(joint: GaitJoint, percent: f64) -> f64 {
-        let bell =
-            |height: f64, centre: f64, width: f64| height * (-((percent - centre) / width).powi(2)).exp();
-        let wave = |height: f64, rate: f64, phase: f64| height * (rate * percent + phase).sin();
+        let bell = |height: f64, centre: f64, width: f64| {
+            let x = (percent - centre) / width;
+            height * exp(-(x * x))
+        };
+        let wave = |height: f64, rate: f64, phase: f64| height * sin_cos(rate * percent + phase).0;
         match joint {
             GaitJoint::Hip => {
                 wave(118.7, 0.092, 0.016) + wave(3.085, 0.025, 1.632) + wave(111.8, 0.0938, 3.02)

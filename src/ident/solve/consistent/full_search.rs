@@ -68,7 +68,7 @@ impl<'a, T: Real, const N: usize> FullObjective<'a, T, N> {
             coordinates[joint][index] = if logarithmic { real::exp(value) } else { value };
         }
         for (joint, link) in coordinates.iter_mut().zip(&self.limits.links) {
-            let mut body = LogCholesky(crate::model::inertia::inertial(joint)).to_parameters();
+            let mut body = LogCholesky(crate::model::inertia::inertial(joint)).parameters();
             let ball = T::from_double(EXTENTS.0) * link.gyration;
             for axis in [Parameter::XX, Parameter::YY, Parameter::ZZ] {
                 body[axis.index()] += T::from_double(2.0) * body[Parameter::M.index()] * ball * ball;

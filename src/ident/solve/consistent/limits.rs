@@ -157,7 +157,7 @@ impl<T: Real, const N: usize> Limits<T, N> {
             let mass = T::from_double(0.5) * real::ln(self.origin[joint][Parameter::M.index()]);
             let [x, y, z] = link.centre;
             let zero = T::zero();
-            let body = LogCholesky([mass, extent, extent, extent, zero, zero, zero, x, y, z]).to_parameters();
+            let body = LogCholesky([mass, extent, extent, extent, zero, zero, zero, x, y, z]).parameters();
             let drive: [T; 4] = core::array::from_fn(|index| {
                 let (low, high) = link.drive[index];
                 if link.estimated[index] {

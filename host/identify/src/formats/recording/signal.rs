@@ -97,7 +97,7 @@ const SPELLINGS: [(&str, &str); 23] = [
 impl Unit {
     /// Value in the SI unit.
     #[must_use]
-    pub(crate) fn to_si(&self, value: f64) -> f64 {
+    pub(crate) fn to_si(self, value: f64) -> f64 {
         value * self.times / self.over
     }
 
