@@ -100,8 +100,10 @@ pub(crate) struct Host {
     positions: [i32; JOINTS],
     from: Option<[f64; JOINTS]>,
     way: [f64; JOINTS],
-    /// End of the last heartbeat and of the last targets on the wire.
+    /// End of the last heartbeat on the wire, and of the SYNC that made the last targets valid.
     sent_ns: [u64; 2],
+    /// Whether targets wait for their SYNC.
+    targets_wait: bool,
     /// End of the last cyclic frame to each node on the wire.
     cyclic_ns: [u64; JOINTS],
     /// SDO answers that were not read yet.
@@ -127,6 +129,7 @@ impl Host {
             way: [0.0; JOINTS],
             cycle: CYCLE,
             sent_ns: [0; 2],
+            targets_wait: false,
             cyclic_ns: [0; JOINTS],
             answers: VecDeque::new(),
             emergencies: Vec::new(),
@@ -169,7 +172,8 @@ impl Host {
         if self.speaks.heartbeat > 0 && self.ticks.is_multiple_of(self.speaks.heartbeat) {
             self.network.send(Frame::new(HEARTBEAT + NUMBER, &[5]));
         }
-        let (sent_ns, answers, cyclic_ns) = (&mut self.sent_ns, &mut self.answers, &mut self.cyclic_ns);
+        let (sent_ns, targets_wait) = (&mut self.sent_ns, &mut self.targets_wait);
+        let (answers, cyclic_ns) = (&mut self.answers, &mut self.cyclic_ns);
         let (emergencies, positions) = (&mut self.emergencies, &mut self.positions);
         let show = |sent: &Sent| {
             let id = sent.frame.id();
@@ -180,7 +184,8 @@ impl Host {
                 _ => {}
             }
             match (sent.sender, id) {
-                (0, TARGETS) => sent_ns[1] = sent.end_ns,
+                (0, TARGETS) => *targets_wait = true,
+                (0, SYNC) if core::mem::take(targets_wait) => sent_ns[1] = sent.end_ns,
                 (0, _) if id == HEARTBEAT + NUMBER => sent_ns[0] = sent.end_ns,
                 (0, _) => {}
                 (_, 0x81..=0xFF) => {
@@ -213,7 +218,7 @@ impl Host {
         self.network.send(Frame::new(WORDS + node, &word.to_le_bytes()));
     }
 
-    /// End of the last heartbeat and of the last targets on the wire.
+    /// End of the last heartbeat on the wire, and of the SYNC that made the last targets valid.
     #[must_use]
     pub(crate) fn sent_ns(&self) -> [u64; 2] {
         self.sent_ns
