@@ -78,7 +78,7 @@ pub fn exp<T: Real>(value: T) -> T {
 
 /// Natural logarithm; NaN for negative numbers.
 #[must_use]
-pub(crate) fn ln<T: Real>(value: T) -> T {
+pub fn ln<T: Real>(value: T) -> T {
     value.door_ln()
 }
 
@@ -90,19 +90,19 @@ pub fn atan2<T: Real>(y: T, x: T) -> T {
 
 /// Magnitude; one instruction on the device.
 #[must_use]
-pub(crate) fn abs<T: Real>(value: T) -> T {
+pub fn abs<T: Real>(value: T) -> T {
     value.door_abs()
 }
 
 /// The smaller of two numbers; if one is NaN, the other.
 #[must_use]
-pub(crate) fn min<T: Real>(one: T, other: T) -> T {
+pub fn min<T: Real>(one: T, other: T) -> T {
     if other < one || is_nan(one) { other } else { one }
 }
 
 /// The larger of two numbers; if one is NaN, the other.
 #[must_use]
-pub(crate) fn max<T: Real>(one: T, other: T) -> T {
+pub fn max<T: Real>(one: T, other: T) -> T {
     if other > one || is_nan(one) { other } else { one }
 }
 
@@ -112,7 +112,7 @@ fn is_nan<T: Real>(value: T) -> bool {
 
 /// Limits `value` to `low..=high`; NaN gives `low`.
 #[must_use]
-pub(crate) fn clamp<T: Real>(value: T, low: T, high: T) -> T {
+pub fn clamp<T: Real>(value: T, low: T, high: T) -> T {
     if value > high {
         high
     } else if value >= low {
@@ -136,7 +136,7 @@ pub fn sign<T: Real>(value: T) -> T {
 
 /// True if neither NaN nor infinite.
 #[must_use]
-pub(crate) fn is_finite<T: Real>(value: T) -> bool {
+pub fn is_finite<T: Real>(value: T) -> bool {
     abs(value) <= T::LARGEST
 }
 

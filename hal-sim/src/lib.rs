@@ -12,11 +12,11 @@
 //! | [`mechanism`] | rigid bodies: inertia matrix, Christoffel symbols, gravity, energies |
 //! | [`friction`] | Coulomb that sticks, viscous, Stribeck, offset; which joint sticks and which slides |
 //! | [`leg`] | time integration of mechanism and friction |
-//! | [`end_stop`], [`floor`] | a joint's mechanical end stops; contact under the foot |
+//! | [`end_stop`], `floor` | a joint's mechanical end stops; contact under the foot |
 //! | [`drive`] | ideal: a current with lag; complete: motor, bridge, shunts, counter, supply |
 //! | [`faults`] | faults injected into a board's ports at given ticks |
 //! | [`flash`] | flash memory with a power cut at any byte |
-//! | [`sensors`], [`pushes`] | encoder and current sensor; pushes of the wearer |
+//! | [`sensors`], `pushes` | encoder and current sensor; pushes of the wearer |
 //! | [`wearer`] | a wearer with a body of their own: limb, cuffs, muscles, intended motions |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 
@@ -26,13 +26,13 @@ pub mod drive;
 pub mod end_stop;
 pub mod faults;
 pub mod flash;
-pub mod floor;
+pub(crate) mod floor;
 pub mod friction;
-pub mod grip;
+pub(crate) mod grip;
 pub mod leg;
 mod maths;
 pub mod mechanism;
-pub mod pushes;
+pub(crate) mod pushes;
 pub mod sensors;
 pub mod wearer;
 pub mod world;

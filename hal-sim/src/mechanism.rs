@@ -38,13 +38,13 @@ pub struct Mechanism<const N: usize> {
 
 /// The three terms of Lagrange's equations at one state.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Dynamics<const N: usize> {
+pub struct Dynamics<const N: usize> {
     /// M(q), kg m^2, symmetric.
-    pub(crate) inertia: [[f64; N]; N],
+    pub inertia: [[f64; N]; N],
     /// C(q, v), N m s: times a velocity, the Coriolis and centrifugal torque.
-    pub(crate) coriolis: [[f64; N]; N],
+    pub coriolis: [[f64; N]; N],
     /// G(q), N m: torque that holds the leg against gravity.
-    pub(crate) gravity: [f64; N],
+    pub gravity: [f64; N],
 }
 
 /// Positions and axes in the world frame. Entries `[i][j]` are filled for j <= i.
@@ -89,7 +89,7 @@ impl<const N: usize> Mechanism<N> {
     /// Inertia matrix, Coriolis matrix and gravity torque at joint angles (rad) and rates (rad/s).
     #[must_use]
     #[inline(always)]
-    pub(crate) fn dynamics(&self, angles: &[f64; N], rates: &[f64; N]) -> Dynamics<N> {
+    pub fn dynamics(&self, angles: &[f64; N], rates: &[f64; N]) -> Dynamics<N> {
         let pose = self.pose(angles);
         let mut inertia = [[0.0; N]; N];
         let mut gravity = [0.0; N];

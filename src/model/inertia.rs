@@ -26,7 +26,7 @@ use crate::real::{Real, is_finite};
 pub const INERTIAL_PARAMETERS: usize = 10;
 
 /// XX XY XZ YY YZ ZZ HX HY HZ M about the joint frame's origin.
-pub(crate) type InertialParameters<T> = [T; INERTIAL_PARAMETERS];
+pub type InertialParameters<T> = [T; INERTIAL_PARAMETERS];
 
 /// Rigid body in the terms of a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,12 +2,12 @@
 //!
 //! Every module that predicts or explains torque uses this one, so the conventions are fixed once:
 //!
-//! - **Frames**: modified Denavit-Hartenberg (Khalil, Craig), see `chain`. Joint
+//! - **Frames**: modified Denavit-Hartenberg (Khalil, Craig), see [`Chain`]. Joint
 //!   i turns about z of frame i.
 //! - **Parameters**: 14 per joint in the order of [`Parameter`]. The ten inertial ones are about the origin
 //!   of the joint's frame, in that frame, and inertias are ELEMENTS of the tensor (XY = -integral of x y dm).
 //! - **Gravity** is an argument: the acceleration vector in the base frame, m/s2. It turns with the trunk.
-//! - **Angles** in this module are the chain's; `anatomy` converts from and to flexion.
+//! - **Angles** in this module are the chain's; [`AnatomicalJoint`] converts from and to flexion.
 //!
 //! ```text
 //! torque = regressor(chain, q, qd, qdd, gravity) . parameters
@@ -37,12 +37,12 @@ pub use anatomy::{AnatomicalJoint, AnatomyError};
 pub use base::{BaseError, BaseParameters, ColumnMask, Separation, Standing, regroup};
 pub use chain::{Chain, ChainError, DenavitHartenberg};
 pub use fingerprint::Fingerprint;
-pub use inertia::{INERTIAL_PARAMETERS, RigidBody};
+pub use inertia::{INERTIAL_PARAMETERS, InertialParameters, RigidBody};
 pub(crate) use log_cholesky::LogCholesky;
 pub use log_cholesky::is_physically_consistent;
 pub use mass_matrix::mass_matrix;
 pub use newton_euler::{JointState, joint_torques, rigid_body_torques};
-pub use parameter::{JointParameters, LegParameters, PARAMETERS_PER_JOINT, Parameter};
+pub use parameter::{JointParameters, LegParameters, PARAMETERS_PER_JOINT, Parameter, RegressorRow};
 pub use payload::Payload;
 pub use regressor::regressor;
 pub(crate) use regressor::row_torque;

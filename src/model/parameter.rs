@@ -16,7 +16,7 @@ pub type JointParameters<T> = [T; PARAMETERS_PER_JOINT];
 pub type LegParameters<T, const N: usize> = [JointParameters<T>; N];
 
 /// Derivative of one torque by each parameter of each joint.
-pub(crate) type RegressorRow<T, const N: usize> = [JointParameters<T>; N];
+pub type RegressorRow<T, const N: usize> = [JointParameters<T>; N];
 
 listed! {
     /// One of the parameters of a joint; the discriminant is its index in [`JointParameters`].

@@ -17,7 +17,7 @@ pub enum Motion<const N: usize, const H: usize = HARMONICS> {
 impl<const N: usize, const H: usize> Motion<N, H> {
     /// State `tick` ticks after the start; before and after the motion at rest at its ends.
     #[must_use]
-    pub(crate) fn state_at(&self, tick: u32) -> MotionState<N> {
+    pub fn state_at(&self, tick: u32) -> MotionState<N> {
         match self {
             Self::Hold(pose_rad) => MotionState::at_rest(*pose_rad),
             Self::Ramp(ramp) => ramp.state_at(tick),
@@ -27,7 +27,7 @@ impl<const N: usize, const H: usize> Motion<N, H> {
 
     /// Ticks until the joints are at rest at the motion's end; `None` for a held pose.
     #[must_use]
-    pub(crate) fn duration_ticks(&self) -> Option<u32> {
+    pub fn duration_ticks(&self) -> Option<u32> {
         match self {
             Self::Hold(_) => None,
             Self::Ramp(ramp) => Some(ramp.duration_ticks()),
@@ -37,13 +37,13 @@ impl<const N: usize, const H: usize> Motion<N, H> {
 
     /// Pose at rest before the motion, rad.
     #[must_use]
-    pub(crate) fn start_rad(&self) -> [f32; N] {
+    pub fn start_rad(&self) -> [f32; N] {
         self.state_at(0).position_rad
     }
 
     /// Pose at rest after the motion, rad.
     #[must_use]
-    pub(crate) fn end_rad(&self) -> [f32; N] {
+    pub fn end_rad(&self) -> [f32; N] {
         self.state_at(u32::MAX).position_rad
     }
 

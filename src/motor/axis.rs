@@ -28,7 +28,7 @@
 //!
 //! Once per servo period ([`Axis::check`]) voltages are compared with currents and speed ([`ModelWatch`]). An
 //! open phase and a drifted current-sensor offset turn the outputs off. A frozen counter turns the motor into
-//! a passive brake ([`Axis::brake`]), so that a leg does not drop when its encoder fails.
+//! a passive brake (`BridgeRequest::Brake`), so that a leg does not drop when its encoder fails.
 //!
 //! **First motion.** After a check at standstill the rotor angle is the stored one. Until the back-EMF has
 //! agreed, current and speed are limited, and a contradiction counts as a lost rotor position
@@ -294,7 +294,7 @@ impl Axis {
     }
 
     /// Clears a fault, so that a request may enable again. Returns `false` where the axis is lost.
-    pub(crate) fn clear_fault(&mut self) -> bool {
+    pub fn clear_fault(&mut self) -> bool {
         if !self.lost {
             self.fault = None;
         }

@@ -10,7 +10,7 @@
 //! | [`JointScale`] | counts and currents to the model's angles and torques; all signs |
 //! | `Observer` | position and velocity from counts |
 //! | [`Controller`] | position and velocity control with an integral that cannot wind up |
-//! | [`TorqueModel`] | model interface of the feedforward; `NoModel` for none |
+//! | [`TorqueModel`] | model interface of the feedforward, which may be `None` |
 //! | [`Servo`] | the tick, a pure function of its state and arguments |
 //! | `LogAverager` | means of eight ticks for identification, 500 Hz |
 //!

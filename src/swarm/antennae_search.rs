@@ -24,13 +24,13 @@ use super::search::{Best, Search, SearchProgress};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BasSettings<T> {
     /// delta at the first iteration, in the unit of the coordinates; default 1.
-    pub(crate) first_step: T,
+    pub first_step: T,
     /// e1, factor on the step length per iteration; default 0.95.
-    pub(crate) step_decay: T,
+    pub step_decay: T,
     /// e0, added to the step length per iteration; default 0.005.
-    pub(crate) step_offset: T,
+    pub step_offset: T,
     /// e2, step length over whisker length; default 10, not zero.
-    pub(crate) step_per_whisker: T,
+    pub step_per_whisker: T,
 }
 
 impl<T: Real> Default for BasSettings<T> {

@@ -24,11 +24,11 @@ const FIRST_VELOCITY: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InertiaWeight<T> {
     /// Weight at iteration 0.
-    pub(crate) first: T,
+    pub first: T,
     /// Weight from the last iteration on.
-    pub(crate) last: T,
+    pub last: T,
     /// Iteration at which `last` is reached.
-    pub(crate) iterations: u32,
+    pub iterations: u32,
 }
 
 impl<T: Real> InertiaWeight<T> {

@@ -26,12 +26,12 @@ impl Random {
     }
 
     /// Uniform number in 0 (included) to 1 (excluded), in steps of 2^-24.
-    pub(crate) fn uniform<T: Real>(&mut self) -> T {
+    pub fn uniform<T: Real>(&mut self) -> T {
         nalgebra::convert((self.0.next_u32() >> 8) as f32 * UNIFORM_SPACING)
     }
 
     /// Uniform number in -1 (included) to 1 (excluded).
-    pub(crate) fn signed<T: Real>(&mut self) -> T {
+    pub fn signed<T: Real>(&mut self) -> T {
         let uniform: T = self.uniform();
         uniform + uniform - T::one()
     }
@@ -44,7 +44,7 @@ impl Random {
     }
 
     /// Uniform integer in `0..count`; 0 for a `count` of 0. Bias at most count / 2^32.
-    pub(crate) fn below(&mut self, count: usize) -> usize {
+    pub fn below(&mut self, count: usize) -> usize {
         ((u64::from(self.0.next_u32()) * count as u64) >> 32) as usize
     }
 }

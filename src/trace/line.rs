@@ -87,7 +87,7 @@ impl<'a> Line<'a> {
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`].
-    pub(crate) fn value<'k, V: FromStr>(&self, key: &'k str) -> Result<V, LineError<'k>> {
+    pub fn value<'k, V: FromStr>(&self, key: &'k str) -> Result<V, LineError<'k>> {
         self.text(key)?.parse().map_err(|_| LineError::Value(key))
     }
 }

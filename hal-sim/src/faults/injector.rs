@@ -90,7 +90,7 @@ impl Injector {
         Self { slots: [None; MOST], generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
     }
 
-    /// Adds a fault; returns `false` where there are `MOST` already.
+    /// Adds a fault; returns `false` where there is no room.
     pub fn add(&mut self, injection: Injection) -> bool {
         let free = self.slots.iter_mut().find(|slot| slot.is_none());
         free.map(|slot| *slot = Some((injection, Memory::EMPTY))).is_some()

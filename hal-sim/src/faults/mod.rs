@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Failed supplies and phases, a kicking wearer and a foot on the floor are not signals; the world simulates
-//! them ([`crate::drive`], [`crate::wearer`], [`crate::floor`]). Time is counted in PWM periods. Cost without
+//! them ([`crate::drive`], [`crate::wearer`], the floor). Time is counted in PWM periods. Cost without
 //! an injection: one comparison per channel.
 
 pub(crate) mod form;

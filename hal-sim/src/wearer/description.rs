@@ -23,7 +23,7 @@ pub struct WearerDescription {
     pub passive: [PassiveDescription; 2],
     /// Muscles of hip and knee.
     pub muscles: [MuscleDescription; 2],
-    /// Delay of the reflexes, s, at most `LONGEST_DELAY_S`; used in whole milliseconds.
+    /// Delay of the reflexes, s, at most 0.1; used in whole milliseconds.
     pub neural_delay: f64,
     /// Cuffs at thigh and shank.
     pub cuffs: [CuffDescription; 2],

@@ -57,14 +57,14 @@ const HALVINGS: u32 = 30;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MonitorSettings<T> {
     /// Least mean time between false alarms of a leg that moves all the time, s.
-    pub(crate) time_between_false_alarms_s: T,
+    pub time_between_false_alarms_s: T,
     /// rho: energy of the residual over that at acceptance, for which the sum is optimal; above 1.
-    pub(crate) energy_ratio: T,
+    pub energy_ratio: T,
     /// kappa: factor by which the noise variance may have been underestimated; from 1 to
     /// below `rho ln rho / (rho - 1)`.
-    pub(crate) noise_margin: T,
+    pub noise_margin: T,
     /// Time that even the largest change must last, s.
-    pub(crate) persistence_s: T,
+    pub persistence_s: T,
 }
 
 impl<T: Real> Default for MonitorSettings<T> {

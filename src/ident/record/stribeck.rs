@@ -35,8 +35,8 @@
 
 mod curve;
 
-pub use curve::combination;
-pub(crate) use curve::{Combination, bank_columns};
+pub(crate) use curve::bank_columns;
+pub use curve::{Combination, combination};
 
 use curve::slope;
 

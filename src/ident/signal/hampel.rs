@@ -96,7 +96,7 @@ impl<T: Real> Hampel<T> {
         (self.filled, self.missing) = (0, 0);
     }
 
-    /// Takes a sample; returns the cleaned sample of `REACH` samples ago, once there is one.
+    /// Takes a sample; returns the cleaned sample of four samples ago, once there is one.
     pub fn push(&mut self, sample: T) -> Option<Cleaned<T>> {
         self.shift(sample);
         self.filled = (self.filled + 1).min(WINDOW);

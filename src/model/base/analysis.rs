@@ -76,9 +76,9 @@ pub enum Standing {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation<T> {
     /// Smallest share of a retained column that earlier ones do not explain; above the tolerance.
-    pub(crate) smallest_retained: T,
+    pub smallest_retained: T,
     /// Largest such share of a dropped column; below the tolerance. If the gap is wide, it is pure rounding.
-    pub(crate) largest_dropped: T,
+    pub largest_dropped: T,
 }
 
 /// Base parameters of a leg of `N` joints, at most `B`.

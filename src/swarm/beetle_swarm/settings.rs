@@ -123,23 +123,23 @@ impl<T: Real> AdaptiveSettings<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PaperSettings<T> {
     /// w of Eqs (19), (20); default 0.8 throughout.
-    pub(crate) inertia_weight: InertiaWeight<T>,
+    pub inertia_weight: InertiaWeight<T>,
     /// c1 of Eq. (19); default 1.4.
-    pub(crate) individual_learning: T,
+    pub individual_learning: T,
     /// c2 of Eq. (19); default 1.4.
-    pub(crate) global_learning: T,
+    pub global_learning: T,
     /// Largest speed per coordinate and iteration; demanded but not given by the paper; default 0.2.
-    pub(crate) velocity_limit: T,
+    pub velocity_limit: T,
     /// lambda of Eq. (29), share of the velocity in a move; not given by the paper; default 0.4.
-    pub(crate) velocity_share: T,
+    pub velocity_share: T,
     /// delta at the first iteration; default 1.
-    pub(crate) first_step: T,
+    pub first_step: T,
     /// e1 of Eq. (25), factor on delta per iteration; default 0.95.
-    pub(crate) step_decay: T,
+    pub step_decay: T,
     /// e0 of Eq. (25), added to delta per iteration; default 0.005.
-    pub(crate) step_offset: T,
+    pub step_offset: T,
     /// e2 of Eq. (26), delta over whisker length; default 10, not zero.
-    pub(crate) step_per_whisker: T,
+    pub step_per_whisker: T,
 }
 
 impl<T: Real> Default for PaperSettings<T> {
