@@ -22,7 +22,7 @@ use core::arch::naked_asm;
 /// # Safety The compiler is the caller: both ranges are valid for `length` bytes and aligned to 4.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
-pub(crate) unsafe extern "C" fn __aeabi_memcpy4(to: *mut u8, from: *const u8, length: usize) {
+pub unsafe extern "C" fn __aeabi_memcpy4(to: *mut u8, from: *const u8, length: usize) {
     // Registers r3 and r12 are the callee's; r4 to r9 are restored. Subtracting 32 leaves the low five bits
     // of the length.
     naked_asm!(
@@ -68,7 +68,7 @@ pub(crate) unsafe extern "C" fn __aeabi_memcpy4(to: *mut u8, from: *const u8, le
 /// As for [`__aeabi_memcpy4`].
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
-pub(crate) unsafe extern "C" fn __aeabi_memcpy8(to: *mut u8, from: *const u8, length: usize) {
+pub unsafe extern "C" fn __aeabi_memcpy8(to: *mut u8, from: *const u8, length: usize) {
     naked_asm!("b {aligned}", aligned = sym __aeabi_memcpy4)
 }
 
@@ -77,7 +77,7 @@ pub(crate) unsafe extern "C" fn __aeabi_memcpy8(to: *mut u8, from: *const u8, le
 /// # Safety The compiler is the caller: both ranges are valid for `length` bytes.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
-pub(crate) unsafe extern "C" fn __aeabi_memcpy(to: *mut u8, from: *const u8, length: usize) {
+pub unsafe extern "C" fn __aeabi_memcpy(to: *mut u8, from: *const u8, length: usize) {
     naked_asm!(
         "orr r3, r0, r1",
         "lsls r3, r3, #30",

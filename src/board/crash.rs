@@ -58,23 +58,23 @@ unsafe extern "C" {
 /// Crash record of the previous run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, Immutable)]
 #[repr(C)]
-pub(crate) struct Crash {
+pub struct Crash {
     magic: u32,
     cause: u32,
     /// Program counter; zero where the processor could not store it.
-    pub(crate) pc: u32,
+    pub pc: u32,
     /// Return address.
-    pub(crate) lr: u32,
+    pub lr: u32,
     /// Fault status, or the number of an interrupt.
-    pub(crate) status: u32,
+    pub status: u32,
     /// Address of a bus fault, or all ones.
-    pub(crate) address: u32,
+    pub address: u32,
     /// Line of a panic.
-    pub(crate) line: u32,
+    pub line: u32,
     /// Clock when the outputs were off.
-    pub(crate) released: u32,
+    pub released: u32,
     /// Clock when this record was complete except for its checksum.
-    pub(crate) kept: u32,
+    pub kept: u32,
     length: u32,
     name: [u8; NAME],
     check: u32,
@@ -86,7 +86,7 @@ const WORDS: usize = size_of::<Crash>() / 4;
 listed! {
     /// Kind of crash.
     #[repr(u32)]
-    pub(crate) enum CrashCause {
+    pub enum CrashCause {
         /// All causes, in the order of their numbers.
         ALL,
         /// Word used in records.
@@ -132,13 +132,13 @@ impl Crash {
 
     /// Name used in records.
     #[must_use]
-    pub(crate) fn cause(&self) -> &'static str {
+    pub fn cause(&self) -> &'static str {
         CrashCause::ALL.get(self.cause.wrapping_sub(1) as usize).map_or("unknown", |cause| cause.name())
     }
 
     /// End of a panic's file name, or `-`.
     #[must_use]
-    pub(crate) fn file(&self) -> &str {
+    pub fn file(&self) -> &str {
         let name = self.name.get(..self.length as usize).unwrap_or(&[]);
         let name = core::str::from_utf8(name).unwrap_or("");
         if name.is_empty() { "-" } else { name }
@@ -149,7 +149,7 @@ impl Crash {
 static mut RECORD: core::mem::MaybeUninit<Crash> = core::mem::MaybeUninit::uninit();
 
 /// Takes the crash record of the previous run, if there is one.
-pub(crate) fn take() -> Option<&'static Crash> {
+pub fn take() -> Option<&'static Crash> {
     static FOUND: StaticCell<Crash> = StaticCell::new();
     let address = (&raw mut RECORD).cast::<u32>();
     // SAFETY: the static exists, is aligned, has so many words, and any bit pattern is a valid word. The read
@@ -178,7 +178,7 @@ fn end(mut crash: Crash) -> ! {
 }
 
 /// Panic handler: outputs off, record, reset.
-pub(crate) fn panic(information: &PanicInfo<'_>) -> ! {
+pub fn panic(information: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
     let mut crash = Crash::new(CrashCause::Panic, scarab_disable_all());
     if let Some(location) = information.location() {
@@ -193,7 +193,7 @@ pub(crate) fn panic(information: &PanicInfo<'_>) -> ! {
 }
 
 /// Ends the run from a board's own handler; the caller chooses the meaning of `status`.
-pub(crate) fn give_up(cause: CrashCause, status: u32) -> ! {
+pub fn give_up(cause: CrashCause, status: u32) -> ! {
     cortex_m::interrupt::disable();
     end(Crash { status, ..Crash::new(cause, scarab_disable_all()) })
 }

@@ -3,13 +3,13 @@
 //! Requirements on a board, and how to port: docs/board.md.
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
-pub(crate) mod copy;
+pub mod copy;
 #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
-pub(crate) mod crash;
+pub mod crash;
 #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
-pub(crate) mod critical_section;
+pub mod critical_section;
 pub mod odrive_v3_6;
 #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
-pub(crate) mod stack;
+pub mod stack;
 #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
-pub(crate) mod windings;
+pub mod windings;

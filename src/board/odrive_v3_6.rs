@@ -19,22 +19,22 @@ macro_rules! target_only {
 }
 
 target_only! {
-    pub(crate) mod brake;
-    pub(crate) mod bridge;
-    pub(crate) mod can;
-    pub(crate) mod contacts;
-    pub(crate) mod converter;
-    pub(crate) mod crash;
-    pub(crate) mod encoder;
-    pub(crate) mod flash;
-    pub(crate) mod gate_driver;
-    pub(crate) mod hardware;
-    pub(crate) mod holding_brake;
-    pub(crate) mod identity;
-    pub(crate) mod interrupts;
-    pub(crate) mod program;
+    pub mod brake;
+    pub mod bridge;
+    pub mod can;
+    pub mod contacts;
+    pub mod converter;
+    pub mod crash;
+    pub mod encoder;
+    pub mod flash;
+    pub mod gate_driver;
+    pub mod hardware;
+    pub mod holding_brake;
+    pub mod identity;
+    pub mod interrupts;
+    pub mod program;
     mod registers;
-    pub(crate) mod start;
-    pub(crate) mod status_light;
-    pub(crate) mod watchdog;
+    pub mod start;
+    pub mod status_light;
+    pub mod watchdog;
 }

@@ -23,13 +23,13 @@ fn ends() -> (*mut u32, *mut u32) {
 
 /// Address of the stack's lowest word.
 #[must_use]
-pub(crate) fn bottom() -> u32 {
+pub fn bottom() -> u32 {
     ends().0 as u32
 }
 
 /// Word of the stack; `None` for addresses outside it.
 #[must_use]
-pub(crate) fn word(address: u32) -> Option<u32> {
+pub fn word(address: u32) -> Option<u32> {
     let (bottom, top) = ends();
     let inside = (bottom as u32..top as u32).contains(&address) && address.is_multiple_of(4);
     // SAFETY: an aligned word between the stack's ends, which are the linker's; any content is valid.
@@ -38,7 +38,7 @@ pub(crate) fn word(address: u32) -> Option<u32> {
 
 /// Size of the stack in bytes.
 #[must_use]
-pub(crate) fn bytes() -> u32 {
+pub fn bytes() -> u32 {
     let (bottom, top) = ends();
     (top as usize - bottom as usize) as u32
 }
@@ -65,7 +65,7 @@ pub fn prepare() {
 
 /// Deepest use so far, bytes.
 #[must_use]
-pub(crate) fn used() -> u32 {
+pub fn used() -> u32 {
     let (bottom, top) = ends();
     let words = (top as usize - bottom as usize) / 4;
     // SAFETY: reads words of the stack, which always exist; concurrent writes are above the paint.

@@ -20,7 +20,7 @@ fn sum(words: [u32; 2]) -> u32 {
 }
 
 /// Writes both temperatures, degrees Celsius. Called by the housekeeping alone.
-pub(crate) fn store(celsius: [f32; 2]) {
+pub fn store(celsius: [f32; 2]) {
     let [first, second] = celsius.map(f32::to_bits);
     let address = (&raw mut STORED).cast::<u32>();
     // A reset between two of these stores leaves a wrong checksum, and the windings are assumed warm.

@@ -6,7 +6,7 @@ use crate::operation::{AssistEnds, AssistLevel};
 use cortex_m::peripheral::DWT;
 
 /// State of the assistance.
-pub(crate) struct AssistLoop {
+pub struct AssistLoop {
     level: AssistLevel<JOINTS>,
     ends: AssistEnds<'static, JOINTS>,
 }
@@ -20,10 +20,10 @@ impl AssistLoop {
 }
 
 /// State of the assistance, once the start has set it.
-pub(crate) static ASSIST: spin::Mutex<Option<&'static mut AssistLoop>> = spin::Mutex::new(None);
+pub static ASSIST: spin::Mutex<Option<&'static mut AssistLoop>> = spin::Mutex::new(None);
 
 /// Interrupt of the assistance.
-pub(crate) fn interrupt() {
+pub fn interrupt() {
     let begun = DWT::cycle_count();
     if let Some(mut assist) = ASSIST.try_lock()
         && let Some(assist) = assist.as_mut()

@@ -32,15 +32,15 @@ use crate::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, StoreJo
 use crate::store::ModelRecord;
 
 /// Length of the log's queue to a host, samples: 384 ms.
-pub(crate) const LOG: usize = 192;
+pub const LOG: usize = 192;
 
 /// Nodes and axes of this board.
-pub(crate) type BoardDevice = Device<JOINTS, LOG>;
+pub type BoardDevice = Device<JOINTS, LOG>;
 /// Results of this board's leg.
-pub(crate) type BoardResults = ResultsCopy<JOINTS, BASE>;
+pub type BoardResults = ResultsCopy<JOINTS, BASE>;
 
 /// Queues of the bus, and buffers that are lent.
-pub(crate) struct Memory {
+pub struct Memory {
     queues: BusQueues<JOINTS>,
     found: Queue<&'static mut BoardResults, 2>,
     spare: Queue<&'static mut BoardResults, 2>,
@@ -50,24 +50,24 @@ pub(crate) struct Memory {
 }
 
 /// The identification's end of the queues.
-pub(crate) struct ThreadEnd {
+pub struct ThreadEnd {
     found: Producer<'static, &'static mut BoardResults>,
     spare: Consumer<'static, &'static mut BoardResults>,
     accepted: Producer<'static, ModelRecord<JOINTS>>,
 }
 
 /// The storage's end of the queues.
-pub(crate) struct StorageEnd {
+pub struct StorageEnd {
     /// Data to store.
-    pub(crate) storage: &'static Handover<StoreJob<JOINTS>>,
+    pub storage: &'static Handover<StoreJob<JOINTS>>,
     /// Accepted models.
-    pub(crate) accepted: Consumer<'static, ModelRecord<JOINTS>>,
+    pub accepted: Consumer<'static, ModelRecord<JOINTS>>,
     /// Bytes of a new image.
-    pub(crate) program: Consumer<'static, u8>,
+    pub program: Consumer<'static, u8>,
 }
 
 /// State of level 5.
-pub(crate) struct BusLoop {
+pub struct BusLoop {
     device: &'static mut BoardDevice,
     fresh: Consumer<'static, &'static mut BoardResults>,
     spare: Producer<'static, &'static mut BoardResults>,
@@ -78,13 +78,13 @@ pub(crate) struct BusLoop {
 }
 
 /// State of level 5, once the start has set it.
-pub(crate) static BUS: spin::Mutex<Option<&'static mut BusLoop>> = spin::Mutex::new(None);
+pub static BUS: spin::Mutex<Option<&'static mut BusLoop>> = spin::Mutex::new(None);
 /// Queue of frames from level 4, once the start has set it.
-pub(crate) static FRAMES_IN: spin::Mutex<Option<Producer<'static, Frame>>> = spin::Mutex::new(None);
+pub static FRAMES_IN: spin::Mutex<Option<Producer<'static, Frame>>> = spin::Mutex::new(None);
 
 impl Memory {
     /// Builds an empty memory in its place.
-    pub(crate) fn new_in(slot: &mut MaybeUninit<Self>) -> &mut Self {
+    pub fn new_in(slot: &mut MaybeUninit<Self>) -> &mut Self {
         fill!(
             slot,
             {
@@ -118,7 +118,7 @@ impl Memory {
 
 impl ThreadEnd {
     /// Replaces the results that the bus answers with; returns whether a buffer was free.
-    pub(crate) fn publish(&mut self, fill: impl FnOnce(&mut BoardResults)) -> bool {
+    pub fn publish(&mut self, fill: impl FnOnce(&mut BoardResults)) -> bool {
         let Some(found) = self.spare.dequeue() else { return false };
         fill(found);
         self.found.enqueue(found).is_ok()
@@ -144,7 +144,7 @@ impl BusLoop {
 
 /// Interrupt of level 5.
 #[inline(always)]
-pub(crate) fn interrupt() {
+pub fn interrupt() {
     if let Some(mut bus) = BUS.try_lock()
         && let Some(bus) = bus.as_mut()
     {
@@ -154,7 +154,7 @@ pub(crate) fn interrupt() {
 
 /// Interrupt of level 4: queues a received frame; returns whether there was space.
 #[inline(always)]
-pub(crate) fn received(frame: Frame) -> bool {
+pub fn received(frame: Frame) -> bool {
     match FRAMES_IN.try_lock() {
         Some(mut frames) => frames.as_mut().is_some_and(|frames| frames.enqueue(frame).is_ok()),
         None => false,

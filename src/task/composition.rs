@@ -30,7 +30,7 @@ use crate::trace::Record;
 type Housekeeping = (Housekeeper<JOINTS>, HousekeepingEnds<'static, JOINTS>, Odrive);
 
 /// Builds the leg, hands everything to its level and starts the levels; does not return.
-pub(crate) fn run(board: Board) -> ! {
+pub fn run(board: Board) -> ! {
     let (thread, keeping, storage) = hand_out(board);
     vectors::enable();
     if !watchdog::tighten_at_once() {

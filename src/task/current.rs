@@ -20,13 +20,13 @@ const HAS_BRAKE_RESISTOR: bool = option_env!("SCARAB_BRAKE_RESISTOR").is_some();
 const CYCLES: NonZeroU32 = NonZeroU32::new(CLOCK_HZ / CURRENT_RATE_HZ).expect("more than one");
 
 /// State of level 0.
-pub(crate) struct Current {
+pub struct Current {
     loops: CurrentLoops<JOINTS>,
     ends: CurrentEnds<'static, JOINTS>,
 }
 
 /// State of level 0, once the start has set it.
-pub(crate) static LOOPS: spin::Mutex<Option<&'static mut Current>> = spin::Mutex::new(None);
+pub static LOOPS: spin::Mutex<Option<&'static mut Current>> = spin::Mutex::new(None);
 
 impl Current {
     /// Both axes off, on a board with this bus-voltage divider.
@@ -63,7 +63,7 @@ impl Current {
 
 /// Interrupt of the converters.
 #[inline(always)]
-pub(crate) fn interrupt() {
+pub fn interrupt() {
     let finished = converter::finished();
     // Once the interrupt is enabled, only this handler takes the lock.
     if let Some(mut current) = LOOPS.try_lock()

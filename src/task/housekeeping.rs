@@ -11,7 +11,7 @@ use crate::safety::GUARD_RATE_HZ;
 
 /// Turns both bridges off where current ticks stop, and feeds the watchdog while everything else runs.
 #[embassy_executor::task]
-pub(crate) async fn watch() -> ! {
+pub async fn watch() -> ! {
     let mut ticker = Ticker::every(Duration::from_hz(u64::from(GUARD_RATE_HZ)));
     let mut watch = Watch::new(&SIGNALS);
     loop {
@@ -24,7 +24,7 @@ pub(crate) async fn watch() -> ! {
 
 /// Runs all other work of this level.
 #[embassy_executor::task]
-pub(crate) async fn run(
+pub async fn run(
     mut keeper: Housekeeper<JOINTS>,
     mut ends: HousekeepingEnds<'static, JOINTS>,
     mut board: Odrive,

@@ -40,15 +40,15 @@ fn send(record: &Record<JOINTS>) {
 }
 
 /// State of the thread.
-pub(crate) struct Thread {
+pub struct Thread {
     /// Identification half of the leg.
-    pub(crate) identification: &'static mut LegIdentification,
+    pub identification: &'static mut LegIdentification,
     /// The thread's ends of the queues.
-    pub(crate) ends: IdentificationEnds<'static, JOINTS>,
+    pub ends: IdentificationEnds<'static, JOINTS>,
     /// Bus voltage per code.
-    pub(crate) volt_per_code: Volt,
+    pub volt_per_code: Volt,
     /// Results for the bus, if there is one, and the leg's configuration.
-    pub(crate) bus: Option<(ThreadEnd, &'static Leg)>,
+    pub bus: Option<(ThreadEnd, &'static Leg)>,
 }
 
 /// Mutable state of the task.
@@ -61,7 +61,7 @@ struct State {
 }
 
 /// Sends the records of the start.
-pub(crate) fn introduce(board: &Board) {
+pub fn introduce(board: &Board) {
     let [uid0, uid1, uid2] = board.identity.unique;
     let [version, version_minor, version_volt] = board.identity.version;
     send(&Record::Boot {
@@ -94,7 +94,7 @@ pub(crate) fn introduce(board: &Board) {
 
 /// Task of the thread level.
 #[embassy_executor::task]
-pub(crate) async fn run(mut thread: Thread) -> ! {
+pub async fn run(mut thread: Thread) -> ! {
     let now = Instant::now();
     let mut state = State {
         level: IdentificationLevel::new(thread.identification.swarm_seed()),

@@ -4,19 +4,18 @@
 
 use crate::leg::{Identification, LegConfiguration, MotionWindow};
 
-pub(crate) use crate::leg::BASE;
-pub use crate::leg::JOINTS;
+pub use crate::leg::{BASE, JOINTS};
 
 include!(env!("SCARAB_LEG_SOURCE"));
 
 /// Taps of the filters.
-pub(crate) const TAPS: usize = 256;
+pub const TAPS: usize = 256;
 /// Filter outputs in progress for these taps.
-pub(crate) const PENDING: usize = 26;
+pub const PENDING: usize = 26;
 
 /// Configuration of the leg.
-pub(crate) type Leg = LegConfiguration<JOINTS, BASE>;
+pub type Leg = LegConfiguration<JOINTS, BASE>;
 /// Identification half of the leg.
-pub(crate) type LegIdentification = Identification<JOINTS, BASE, TAPS, PENDING, &'static mut LegWindow>;
+pub type LegIdentification = Identification<JOINTS, BASE, TAPS, PENDING, &'static mut LegWindow>;
 /// Window of motion blocks of the identification.
-pub(crate) type LegWindow = MotionWindow<f32, JOINTS, BASE>;
+pub type LegWindow = MotionWindow<f32, JOINTS, BASE>;

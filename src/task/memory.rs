@@ -35,7 +35,7 @@ pub fn identification() -> Option<(&'static Leg, &'static mut LegIdentification)
 static EVENTS: StaticCell<EventQueue<JOINTS>> = StaticCell::new();
 
 /// Queue from the servo to the identification, once.
-pub(crate) fn events() -> &'static mut EventQueue<JOINTS> {
+pub fn events() -> &'static mut EventQueue<JOINTS> {
     EVENTS.init_with(EventQueue::new)
 }
 
@@ -52,13 +52,13 @@ static BUS: StaticCell<bus::Memory> = StaticCell::new();
 
 /// Data exchanged between the bus and the other levels, once.
 #[inline(never)]
-pub(crate) fn bus() -> &'static mut bus::Memory {
+pub fn bus() -> &'static mut bus::Memory {
     bus::Memory::new_in(BUS.uninit())
 }
 
 /// Task state of the storage, once; `None` where the flash has no valid size.
 #[inline(never)]
-pub(crate) fn storage() -> Option<&'static mut StorageTask> {
+pub fn storage() -> Option<&'static mut StorageTask> {
     static STORAGE: StaticCell<StorageTask> = StaticCell::new();
     Some(STORAGE.init(StorageTask::new(SmallSectors::parameters(), Region::PARAMETERS.bytes())?))
 }

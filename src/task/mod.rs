@@ -19,19 +19,19 @@
 use self::leg::JOINTS;
 use crate::operation::Signals;
 
-pub(crate) mod assist;
-pub(crate) mod bus;
+pub mod assist;
+pub mod bus;
 mod composition;
-pub(crate) mod current;
-pub(crate) mod housekeeping;
-pub(crate) mod identify;
-pub(crate) mod leg;
+pub mod current;
+pub mod housekeeping;
+pub mod identify;
+pub mod leg;
 mod memory;
-pub(crate) mod servo;
-pub(crate) mod storage;
+pub mod servo;
+pub mod storage;
 mod vectors;
 
-pub(crate) use composition::run;
+pub use composition::run;
 
 /// Words that all levels share.
-pub(crate) static SIGNALS: Signals<JOINTS> = Signals::new();
+pub static SIGNALS: Signals<JOINTS> = Signals::new();

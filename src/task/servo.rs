@@ -9,21 +9,21 @@ use crate::leg::Control;
 use crate::operation::{ServoEnds, ServoLevel};
 
 /// State of level 1.
-pub(crate) struct ServoLoop {
+pub struct ServoLoop {
     /// Control half of the leg.
-    pub(crate) control: Control<JOINTS>,
+    pub control: Control<JOINTS>,
     /// The servo level.
-    pub(crate) level: ServoLevel<JOINTS>,
+    pub level: ServoLevel<JOINTS>,
     /// The level's ends of the queues.
-    pub(crate) ends: ServoEnds<'static, JOINTS>,
+    pub ends: ServoEnds<'static, JOINTS>,
 }
 
 /// State of level 1, once the start has set it.
-pub(crate) static SERVO: spin::Mutex<Option<&'static mut ServoLoop>> = spin::Mutex::new(None);
+pub static SERVO: spin::Mutex<Option<&'static mut ServoLoop>> = spin::Mutex::new(None);
 
 /// Interrupt of the servo.
 #[inline(always)]
-pub(crate) fn interrupt() {
+pub fn interrupt() {
     let statistics = &SIGNALS.statistics;
     if let Some(mut servo) = SERVO.try_lock()
         && let Some(servo) = servo.as_mut()

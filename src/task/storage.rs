@@ -29,17 +29,17 @@ const ROUND_MS: u64 = 10;
 const STEP_MS: u64 = 1;
 
 /// A stored model that belongs to this leg.
-pub(crate) struct RestoredModel {
+pub struct RestoredModel {
     /// The model.
-    pub(crate) model: IdentifiedModel<JOINTS>,
+    pub model: IdentifiedModel<JOINTS>,
     /// Whether the identified leg was empty or worn, if known.
-    pub(crate) wearing: Option<Wearing>,
+    pub wearing: Option<Wearing>,
     /// Number of models accepted on this board when it was stored.
-    pub(crate) generation: u32,
+    pub generation: u32,
 }
 
 /// The store and the ends of its queues.
-pub(crate) struct StorageTask {
+pub struct StorageTask {
     storage: store::Storage<SmallSectors, JOINTS>,
     storing: Storing,
     program: BoardProgram,
@@ -64,14 +64,14 @@ impl StorageTask {
     }
 
     /// Sets the sources of requests and of calibrations.
-    pub(crate) fn serve(&mut self, end: StorageEnd, calibrated: Consumer<'static, Calibrated>) {
+    pub fn serve(&mut self, end: StorageEnd, calibrated: Consumer<'static, Calibrated>) {
         // Before the bus answers: a host must not take an image on trial for a confirmed one.
         self.update.end(true, &SIGNALS);
         self.ends = Some((end, calibrated));
     }
 
     /// Reads the stored objects of a node; returns their length, or `None` where they cannot be read.
-    pub(crate) fn objects(&mut self, joint: usize, into: &mut [u8; LONGEST]) -> Option<usize> {
+    pub fn objects(&mut self, joint: usize, into: &mut [u8; LONGEST]) -> Option<usize> {
         at_once(self.storage.objects(joint, into))?
     }
 
@@ -115,7 +115,7 @@ fn change(storage: &mut store::Storage<SmallSectors, JOINTS>, job: &mut StoreJob
 
 /// Task of the storage.
 #[embassy_executor::task]
-pub(crate) async fn run(storage: &'static mut StorageTask) -> ! {
+pub async fn run(storage: &'static mut StorageTask) -> ! {
     let StorageTask { storage, storing, program, update, ends } = storage;
     loop {
         Timer::after_millis(ROUND_MS).await;

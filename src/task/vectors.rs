@@ -12,7 +12,7 @@ use crate::safety::InhibitReason;
 
 /// Enables the interrupts of emergency stop, converters, index pulses, bus and servo; their data must
 /// be in place.
-pub(crate) fn enable() {
+pub fn enable() {
     // SAFETY: called once, from `main`, outside any critical section. Levels are set, and the handlers take
     // their locks only by trying.
     unsafe {
@@ -74,11 +74,10 @@ fn OTG_FS() {
 }
 
 /// Executor of the housekeeping.
-pub(crate) static HOUSEKEEPING: embassy_executor::InterruptExecutor =
-    embassy_executor::InterruptExecutor::new();
+pub static HOUSEKEEPING: embassy_executor::InterruptExecutor = embassy_executor::InterruptExecutor::new();
 
 /// Interrupt vector of the housekeeping.
-pub(crate) const HOUSEKEEPING_VECTOR: interrupt::Interrupt = I2C3_EV;
+pub const HOUSEKEEPING_VECTOR: interrupt::Interrupt = I2C3_EV;
 
 #[interrupt]
 unsafe fn I2C3_EV() {

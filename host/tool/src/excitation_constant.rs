@@ -19,7 +19,7 @@ pub fn source(motion: &Excitation) -> String {
          use scarab::motion::ExcitationTable;\n\n\
          /// {:.1} s, blends included.\n\
          #[rustfmt::skip]\n\
-         pub(crate) const EXCITATION: ExcitationTable<{joints}, {HARMONICS}> = ExcitationTable {{\n",
+         pub const EXCITATION: ExcitationTable<{joints}, {HARMONICS}> = ExcitationTable {{\n",
         motion.leg,
         motion.geometry,
         names.join(", "),

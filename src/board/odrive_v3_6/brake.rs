@@ -12,7 +12,7 @@ const HIGH: u32 = BASE + 0x40;
 
 /// Sets the duty of the resistor.
 #[inline(always)]
-pub(crate) fn set(duty: f32) {
+pub fn set(duty: f32) {
     let [low, high] = compare(duty);
     if u32::from(high) > load(HIGH) {
         store(HIGH, high.into());
@@ -29,6 +29,6 @@ pub fn duty() -> f32 {
 }
 
 /// Whether the resistor has a duty.
-pub(crate) fn is_on() -> bool {
+pub fn is_on() -> bool {
     load(HIGH) < TOP
 }

@@ -15,14 +15,14 @@ const NO_VOLTAGE: u32 = TOP as u32 / 2;
 
 /// Turns both bridges off at once, then engages the holding brake.
 #[inline]
-pub(crate) fn disable_all() {
+pub fn disable_all() {
     store(BASES[0] + BDTR, OFF);
     store(BASES[1] + BDTR, OFF);
     holding_brake::engage();
 }
 
 /// Whether both bridges are off.
-pub(crate) fn are_disabled() -> bool {
+pub fn are_disabled() -> bool {
     BASES.iter().all(|base| load(base + BDTR) & MOE == 0)
 }
 
@@ -32,7 +32,7 @@ pub(crate) fn are_disabled() -> bool {
 /// would have the duties of the last period before. This function therefore sets the duties to one half,
 /// which is no voltage.
 #[inline]
-pub(crate) fn disable(axis: usize) {
+pub fn disable(axis: usize) {
     let Some(&base) = BASES.get(axis) else { return };
     store(base + BDTR, OFF);
     for channel in [CCR1, CCR1 + 4, CCR1 + 8] {
@@ -42,7 +42,7 @@ pub(crate) fn disable(axis: usize) {
 
 /// Sets the duties of a bridge for its next period.
 #[inline]
-pub(crate) fn set_duty(axis: usize, duty: &[f32; 3]) {
+pub fn set_duty(axis: usize, duty: &[f32; 3]) {
     let Some(&base) = BASES.get(axis) else { return };
     let [a, b, c] = *duty;
     store(base + CCR1, compare(a).into());
@@ -53,7 +53,7 @@ pub(crate) fn set_duty(axis: usize, duty: &[f32; 3]) {
 /// Switches the outputs of a bridge on. Call only with interrupts masked and after reading the inhibit word:
 /// a stop that comes after the read then switches the outputs off again.
 #[inline]
-pub(crate) fn enable(axis: usize) {
+pub fn enable(axis: usize) {
     if let Some(&base) = BASES.get(axis) {
         store(base + BDTR, OFF | MOE);
     }

@@ -42,7 +42,7 @@ static LOST: AtomicBool = AtomicBool::new(false);
 static TAKES_PART: AtomicBool = AtomicBool::new(false);
 
 /// Starts the controller; the vectors are still masked. Returns whether the controller answered.
-pub(crate) fn start(kbit: u16) -> bool {
+pub fn start(kbit: u16) -> bool {
     apply(&CLOCK);
     for pin in &PINS {
         apply(&pin.writes());
@@ -59,7 +59,7 @@ pub(crate) fn start(kbit: u16) -> bool {
 }
 
 /// Takes the oldest received frame, if any.
-pub(crate) fn receive() -> Option<Frame> {
+pub fn receive() -> Option<Frame> {
     let queue = load(RF0R);
     if queue & OVERRUN != 0 {
         LOST.store(true, Ordering::Relaxed);
@@ -79,12 +79,12 @@ pub(crate) fn receive() -> Option<Frame> {
 }
 
 /// Mailboxes with a frame that waits for transmission, one bit each.
-pub(crate) fn waiting() -> u32 {
+pub fn waiting() -> u32 {
     !(load(TSR) >> EMPTY) & 0b111
 }
 
 /// Puts a frame into an empty mailbox.
-pub(crate) fn send(mailbox: u32, frame: &Frame) {
+pub fn send(mailbox: u32, frame: &Frame) {
     let mailbox = MAILBOX + 0x10 * mailbox;
     let mut bytes = [0; 8];
     for (to, from) in bytes.iter_mut().zip(frame.data()) {
@@ -99,7 +99,7 @@ pub(crate) fn send(mailbox: u32, frame: &Frame) {
 }
 
 /// Aborts all waiting frames. After seconds of bus-off they are out of date.
-pub(crate) fn give_up() {
+pub fn give_up() {
     store(TSR, GIVE_UP);
 }
 
@@ -120,17 +120,17 @@ pub fn status() -> Controller {
 }
 
 /// Records the loss of a received frame for want of space in the next queue.
-pub(crate) fn lose() {
+pub fn lose() {
     LOST.store(true, Ordering::Relaxed);
 }
 
 /// Clears the cause of the level-5 interrupt.
-pub(crate) fn acknowledge() {
+pub fn acknowledge() {
     store(TSR, ANSWERED);
 }
 
 /// Requests a run of level 5.
 #[inline(always)]
-pub(crate) fn pend() {
+pub fn pend() {
     CAN1_TX.pend();
 }

@@ -20,13 +20,13 @@ fn is_high(letter: u8, number: u32) -> bool {
 
 /// Whether the emergency stop's contact (GPIO5) is open, and was in 16 reads in a row.
 #[inline(always)]
-pub(crate) fn emergency_stop() -> bool {
+pub fn emergency_stop() -> bool {
     stays_active(|| !is_high(b'C', 4))
 }
 
 /// Interrupt of the contact's falling edge: turns both bridges off if the contact stays open, and returns
 /// whether it did.
-pub(crate) fn stop_came() -> bool {
+pub fn stop_came() -> bool {
     store(PENDING, 1 << STOP_LINE);
     let open = emergency_stop();
     if open {
@@ -37,17 +37,17 @@ pub(crate) fn stop_came() -> bool {
 
 /// Whether a gate driver reports a fault in 16 reads in a row; only true where the gate drivers are on.
 #[inline(always)]
-pub(crate) fn gate_fault() -> bool {
+pub fn gate_fault() -> bool {
     stays_active(|| !is_high(b'D', 2))
 }
 
 /// Whether the enabling switch (GPIO3) is held.
-pub(crate) fn enabling() -> bool {
+pub fn enabling() -> bool {
     is_high(b'A', 2)
 }
 
 /// Whether the start button (GPIO4) is pressed.
-pub(crate) fn start() -> bool {
+pub fn start() -> bool {
     is_high(b'A', 3)
 }
 

@@ -17,7 +17,7 @@ const MOST_READS: u32 = 800;
 /// Axes with conversions finished since the last call; `Some(true)` where both shunts are. Clears the flags
 /// it returns.
 #[inline(always)]
-pub(crate) fn finished() -> [Option<bool>; 2] {
+pub fn finished() -> [Option<bool>; 2] {
     let seen = ends();
     // Both converters end in the same cycle. If it lies between the two loads, a second look shows both.
     let seen = if seen[0] == seen[1] { [seen[0]; 2] } else { ends_again() };
@@ -43,7 +43,7 @@ fn ends_again() -> [u32; 2] {
 /// Whether bus voltage and thermistors were converted since the last call. Their scan ends after the shunts'
 /// of axis 0, so in that axis' interrupt this is the preceding scan.
 #[inline(always)]
-pub(crate) fn supply_finished() -> bool {
+pub fn supply_finished() -> bool {
     let seen = load(ADC1 + SR) & JEOC;
     store(ADC1 + SR, cleared(seen));
     seen != 0
@@ -51,24 +51,24 @@ pub(crate) fn supply_finished() -> bool {
 
 /// Shunt codes of B and C of an axis.
 #[inline(always)]
-pub(crate) fn shunts(axis: usize) -> [u16; 2] {
+pub fn shunts(axis: usize) -> [u16; 2] {
     let result = if axis == 0 { JDR1 } else { DR };
     [load(ADC2 + result) as u16, load(ADC3 + result) as u16]
 }
 
 /// Code of the bus voltage.
 #[inline(always)]
-pub(crate) fn bus() -> u16 {
+pub fn bus() -> u16 {
     load(ADC1 + JDR1) as u16
 }
 
 /// Codes of the thermistors of bridge 0, bridge 1 and chopper.
-pub(crate) fn thermistors() -> [u16; 3] {
+pub fn thermistors() -> [u16; 3] {
     [JDR1 + 4, JDR1 + 8, JDR1 + 12].map(|result| load(ADC1 + result) as u16)
 }
 
 /// Makes the pins of these motors' thermistors analog inputs.
-pub(crate) fn prepare_thermistors(fitted: [bool; 2]) {
+pub fn prepare_thermistors(fitted: [bool; 2]) {
     for (pin, _) in MOTOR_THERMISTORS.iter().zip(fitted).filter(|(_, fitted)| *fitted) {
         apply(&pin.writes());
     }
@@ -78,7 +78,7 @@ pub(crate) fn prepare_thermistors(fitted: [bool; 2]) {
 ///
 /// Another channel during the scan of the bus voltage would restart that scan (RM0090 13.3.5), so this waits
 /// for the half period without one, 22 us at most. Without running timers it starts nothing.
-pub(crate) fn convert_thermistor(axis: usize) {
+pub fn convert_thermistor(axis: usize) {
     let Some(channel) = MOTORS.get(axis) else { return };
     for _ in 0..MOST_READS {
         let started = cortex_m::interrupt::free(|_| {
@@ -97,6 +97,6 @@ pub(crate) fn convert_thermistor(axis: usize) {
 }
 
 /// Code of the last conversion of a motor's thermistor; `None` if it has not ended.
-pub(crate) fn thermistor_code() -> Option<u16> {
+pub fn thermistor_code() -> Option<u16> {
     (load(ADC1 + SR) & EOC != 0).then(|| load(ADC1 + DR) as u16)
 }

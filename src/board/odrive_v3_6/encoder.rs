@@ -15,13 +15,13 @@ static SAMPLED: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
 
 /// Present counter of an axis.
 #[inline(always)]
-pub(crate) fn count(axis: usize) -> u16 {
+pub fn count(axis: usize) -> u16 {
     BASES.get(axis).map_or(0, |base| load(base + CNT) as u16)
 }
 
 /// Samples the counter of an axis for its tick.
 #[inline(always)]
-pub(crate) fn sample(axis: usize) -> u16 {
+pub fn sample(axis: usize) -> u16 {
     let count = count(axis);
     if let Some(sampled) = SAMPLED.get(axis) {
         // Ticks and index interrupts share one priority, so none can come between load and store.
@@ -32,7 +32,7 @@ pub(crate) fn sample(axis: usize) -> u16 {
 
 /// Takes the count at the index pulse, if one came since the last call.
 #[inline(always)]
-pub(crate) fn index(axis: usize) -> Option<u16> {
+pub fn index(axis: usize) -> Option<u16> {
     let slot = INDEX.get(axis)?;
     // Mostly there is no pulse, and a load is cheaper than a swap.
     if slot.load(Ordering::Relaxed) == 0 {
@@ -44,7 +44,7 @@ pub(crate) fn index(axis: usize) -> Option<u16> {
 
 /// Interrupt of an index pulse: captures the count, late by the interrupt latency and at worst by a current
 /// tick. That is up to 10 us, or 3 counts at 36 turns per second of 8192. A glitch at rest is dropped.
-pub(crate) fn index_came(axis: usize) {
+pub fn index_came(axis: usize) {
     if let (Some(slot), Some(sampled), Some(line)) =
         (INDEX.get(axis), SAMPLED.get(axis), INDEX_LINES.get(axis))
     {

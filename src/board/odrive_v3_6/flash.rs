@@ -37,7 +37,7 @@ const COUNTS: u32 = 1;
 
 /// Reason for which nothing was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FlashError {
+pub enum FlashError {
     /// Range beyond the region.
     OutOfBounds,
     /// Range not in whole words or sectors.
@@ -61,7 +61,7 @@ impl NorFlashError for FlashError {
 }
 
 /// Polls a future that must complete at once: the flash driver never waits.
-pub(crate) fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
+pub fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(value) => Some(value),
         Poll::Pending => None,
@@ -70,18 +70,18 @@ pub(crate) fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
 
 /// A region of the flash as one range that begins at 0. Each region has one owner; two would undo each
 /// other's writes. All sectors of a region have `SECTOR` bytes.
-pub(crate) struct Flash<const SECTOR: usize> {
+pub struct Flash<const SECTOR: usize> {
     region: Region,
 }
 
 /// A new image.
-pub(crate) type LargeSectors = Flash<{ Region::NEW_IMAGE.sector_bytes as usize }>;
+pub type LargeSectors = Flash<{ Region::NEW_IMAGE.sector_bytes as usize }>;
 /// Stored parameters, or the state of an update.
-pub(crate) type SmallSectors = Flash<{ Region::PARAMETERS.sector_bytes as usize }>;
+pub type SmallSectors = Flash<{ Region::PARAMETERS.sector_bytes as usize }>;
 
 impl LargeSectors {
     /// Space of the new image, for the owner of the update.
-    pub(crate) const fn new_image() -> Self {
+    pub const fn new_image() -> Self {
         Self { region: Region::NEW_IMAGE }
     }
 }
@@ -99,13 +99,13 @@ impl SmallSectors {
 }
 
 /// Copies bytes of a region.
-pub(crate) fn read(region: &Region, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+pub fn read(region: &Region, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
     copy(checked_address(region, offset, bytes.len())?, bytes);
     Ok(())
 }
 
 /// Whether the processor's supply is too low to change the flash.
-pub(crate) fn supply_is_low() -> bool {
+pub fn supply_is_low() -> bool {
     let (register, is_low) = settings::SUPPLY;
     load(register) & is_low != 0
 }

@@ -23,7 +23,7 @@ const ENABLE: u32 = 12;
 const CYCLES_PER_US: u32 = CLOCK_HZ / 1_000_000;
 
 /// Both gate drivers, and the encoders on their SPI.
-pub(crate) struct GateDrivers {
+pub struct GateDrivers {
     spi: Spi<'static, Blocking, Master>,
     encoders: [AbsoluteEncoders; 2],
 }
@@ -55,7 +55,7 @@ impl GateDrivers {
 
     /// Frame with an encoder's angle; all ones without that encoder. After an error the chip's error register
     /// is read, so that the next frame is valid again.
-    pub(crate) fn encoder(&mut self, axis: usize, side: AbsoluteEncoderSide) -> u16 {
+    pub fn encoder(&mut self, axis: usize, side: AbsoluteEncoderSide) -> u16 {
         let encoders = self.encoders.get(axis).copied();
         let Some(pin) = encoders.and_then(|encoders| absolute_encoders::select(axis, side, encoders)) else {
             return u16::MAX;
@@ -70,12 +70,12 @@ impl GateDrivers {
     }
 
     /// Turns both off, for at least 40 us; the bridges must be off.
-    pub(crate) fn off(&mut self) {
+    pub fn off(&mut self) {
         drive(b'B', ENABLE, false);
     }
 
     /// Turns both on; they answer 20 ms later.
-    pub(crate) fn on(&mut self) {
+    pub fn on(&mut self) {
         drive(b'B', ENABLE, true);
     }
 
@@ -88,7 +88,7 @@ impl GateDrivers {
     }
 
     /// Writes both configurations; returns whether each axis' driver holds its own. Takes 0.3 ms.
-    pub(crate) fn configure(&mut self) -> [bool; 2] {
+    pub fn configure(&mut self) -> [bool; 2] {
         for axis in 0..2 {
             for _ in 0..TIMES {
                 self.frame(axis, write(Register::Control1, CONTROL_1));
@@ -100,7 +100,7 @@ impl GateDrivers {
     }
 
     /// Whether a driver still holds its configuration; a disturbed frame is read a second time.
-    pub(crate) fn holds(&mut self, axis: usize) -> bool {
+    pub fn holds(&mut self, axis: usize) -> bool {
         self.reads_back(axis) || self.reads_back(axis)
     }
 

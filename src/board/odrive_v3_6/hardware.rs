@@ -14,7 +14,7 @@ static GATE_DRIVERS: Mutex<Option<GateDrivers>> = Mutex::new(None);
 
 /// Access to the registers of this board; each level has its own value.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Odrive;
+pub struct Odrive;
 
 impl Odrive {
     /// Creates the access and stores the gate drivers.

@@ -18,12 +18,12 @@ pub fn prepare() {
 
 /// Engages the brake by one store.
 #[inline]
-pub(crate) fn engage() {
+pub fn engage() {
     store(LEVEL, ENGAGED);
 }
 
 /// Releases or engages the brake.
 #[inline]
-pub(crate) fn set(released: bool) {
+pub fn set(released: bool) {
     store(LEVEL, if released { RELEASED } else { ENGAGED });
 }

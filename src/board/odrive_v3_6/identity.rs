@@ -13,14 +13,14 @@ const STATED: [u8; 3] = stated(option_env!("SCARAB_BOARD_VOLTS"));
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
     /// Unique number, lowest word first.
-    pub(crate) unique: [u32; 3],
+    pub unique: [u32; 3],
     /// Factory version: major, minor, voltage. Without a factory entry the version stated for the
     /// image, else 255.
-    pub(crate) version: [u8; 3],
+    pub version: [u8; 3],
     /// Reason of the last reset.
-    pub(crate) reset: Reset,
+    pub reset: Reset,
     /// Brown-out reset level, 0 (off) to 3.
-    pub(crate) brown_out: u8,
+    pub brown_out: u8,
 }
 
 listed! {

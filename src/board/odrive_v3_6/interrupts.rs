@@ -45,11 +45,11 @@ pub(super) fn set_levels() {
 
 /// Requests a run of the servo after level 0.
 #[inline(always)]
-pub(crate) fn pend_servo() {
+pub fn pend_servo() {
     OTG_HS.pend();
 }
 
 /// Requests a run of the assistance.
-pub(crate) fn pend_assist() {
+pub fn pend_assist() {
     OTG_FS.pend();
 }

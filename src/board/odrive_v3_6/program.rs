@@ -15,7 +15,7 @@ use crate::hal::ProgramMemory;
 static HEADER: [u32; HEADER_BYTES / 4] = Header::UNSEALED;
 
 /// Check sum of the running image; 0 if it was not sealed.
-pub(crate) fn checksum() -> u32 {
+pub fn checksum() -> u32 {
     let mut bytes = [0; HEADER_BYTES];
     for (address, byte) in (Region::IMAGE.address + HEADER_AT..).zip(&mut bytes) {
         *byte = self::byte(address);
@@ -24,7 +24,7 @@ pub(crate) fn checksum() -> u32 {
 }
 
 /// Flash of an update.
-pub(crate) struct BoardProgram {
+pub struct BoardProgram {
     image: LargeSectors,
 }
 
@@ -35,7 +35,7 @@ impl BoardProgram {
     }
 
     /// Whether the running image is not confirmed: the bootloader has swapped it in.
-    pub(crate) fn is_on_trial(&self) -> bool {
+    pub fn is_on_trial(&self) -> bool {
         let mut word = [0; 4];
         let state = at_once(FirmwareState::new(SmallSectors::state(), &mut word).get_state());
         matches!(state, Some(Ok(State::Swap)))

@@ -20,17 +20,17 @@ use crate::board::stack;
 use crate::leg::AbsoluteEncoders;
 
 /// A started board, all outputs off.
-pub(crate) struct Board {
+pub struct Board {
     /// Gate drivers, for repeated checks.
-    pub(crate) gate_drivers: GateDrivers,
+    pub gate_drivers: GateDrivers,
     /// Identity of the board.
-    pub(crate) identity: Identity,
+    pub identity: Identity,
     /// Crash record of the previous run.
-    pub(crate) crash: Option<&'static Crash>,
+    pub crash: Option<&'static Crash>,
     /// Whether each axis' gate driver holds its configuration.
-    pub(crate) gates_configured: [bool; 2],
+    pub gates_configured: [bool; 2],
     /// Whether both bridges' timers run half a period apart and take compare values over at zero.
-    pub(crate) timers_in_phase: bool,
+    pub timers_in_phase: bool,
 }
 
 /// Longest wait for a timer event: more than two periods.
@@ -41,7 +41,7 @@ const SHIFT_READINGS: u32 = 4;
 
 /// Starts everything but the interrupts of the current loops. Call once, before anything else. `encoders` of
 /// each axis share the gate drivers' bus.
-pub(crate) fn start(encoders: [AbsoluteEncoders; 2]) -> Board {
+pub fn start(encoders: [AbsoluteEncoders; 2]) -> Board {
     stack::prepare();
     apply(&CLOCKS);
     for pin in &pins::GATES_OFF {

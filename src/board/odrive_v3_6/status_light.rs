@@ -5,7 +5,7 @@ use super::registers::{apply, store};
 use super::settings::pins::{BSRR, STATUS_LIGHT, port};
 
 /// Whether a light is connected; set when the image is built.
-pub(crate) const HAS_LIGHT: bool = option_env!("SCARAB_STATUS_LIGHT").is_some();
+pub const HAS_LIGHT: bool = option_env!("SCARAB_STATUS_LIGHT").is_some();
 
 /// Makes the pin an output, initially low.
 pub fn prepare() {
@@ -16,7 +16,7 @@ pub fn prepare() {
 
 /// Switches the light. Engaging a brake that is not there also turns it off, until the next call.
 #[inline]
-pub(crate) fn set(is_lit: bool) {
+pub fn set(is_lit: bool) {
     if HAS_LIGHT {
         let shift = if is_lit { 0 } else { 16 };
         store(port(STATUS_LIGHT.port) + BSRR, 1 << (STATUS_LIGHT.number + shift));

@@ -25,18 +25,18 @@ pub(super) fn start() {
 }
 
 /// Sets 16 ms and waits until they apply. Returns whether they do.
-pub(crate) fn tighten_at_once() -> bool {
+pub fn tighten_at_once() -> bool {
     (0..PATIENCE).any(|_| tighten())
 }
 
 /// Requests 16 ms. Returns whether they apply; call again until they do.
-pub(crate) fn tighten() -> bool {
+pub fn tighten() -> bool {
     set(0, 127)
 }
 
 /// Requests the long time, 4 s (2.7 to 7.5): longer than the erase of a sector, 2 s at most. The bridges must
 /// be off. Returns whether it applies, as [`tighten`].
-pub(crate) fn stretch() -> bool {
+pub fn stretch() -> bool {
     set(6, 500)
 }
 
@@ -60,6 +60,6 @@ fn set(prescaler: u32, reload: u32) -> bool {
 }
 
 /// Restarts the watchdog's count.
-pub(crate) fn feed() {
+pub fn feed() {
     store(KEY, FEED);
 }

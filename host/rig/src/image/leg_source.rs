@@ -136,9 +136,9 @@ pub fn source(description: &LegDescription<JOINTS>) -> String {
          use crate::safety::{{{delays}SupplyLimits, {thermistor}WindingRating}};\n\
          use crate::units::*;\n\n\
          /// The leg.\n\
-         pub(crate) const LEG: LegDescription<{JOINTS}> = {description:#?};\n\
+         pub const LEG: LegDescription<{JOINTS}> = {description:#?};\n\
          }}\n\
-         pub(crate) use described::LEG;\n",
+         pub use described::LEG;\n",
         description.name,
     )
 }

@@ -14,11 +14,11 @@ pub const VERSION_ADDRESS: u32 = 0x1FFF_7803;
 pub const BLANK: u8 = 0xFF;
 
 /// Coefficients a, b, c, d of the thermistor's polynomial.
-pub(crate) const THERMISTOR: [f32; 4] = [363.939_1, -462.153_7, 307.551_3, -27.725_695];
+pub const THERMISTOR: [f32; 4] = [363.939_1, -462.153_7, 307.551_3, -27.725_695];
 /// Bridge temperature above which outputs go off, degrees Celsius; ODrive begins to reduce the current here.
 pub const HOTTEST_C: f32 = 100.0;
 /// Code range of a thermistor that is neither open nor shorted: some -20 to 150 degrees.
-pub(crate) const THERMISTOR_CODES: [u16; 2] = [100, 3700];
+pub const THERMISTOR_CODES: [u16; 2] = [100, 3700];
 
 /// Divider ratio of the bus voltage on a board of this version; `None` for versions of other boards.
 #[must_use]

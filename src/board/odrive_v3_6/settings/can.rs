@@ -17,9 +17,9 @@ use super::Write;
 use super::pins::{Mode, Pin, Pull, port};
 
 /// First register of CAN1.
-pub(crate) const CAN: u32 = 0x4000_6400;
+pub const CAN: u32 = 0x4000_6400;
 /// Master control register.
-pub(crate) const MCR: u32 = CAN;
+pub const MCR: u32 = CAN;
 /// Master status register.
 pub const MSR: u32 = CAN + 0x04;
 /// Transmit status register.
@@ -37,7 +37,7 @@ pub const RECEIVED: u32 = CAN + 0x1B0;
 const FILTERS: u32 = CAN + 0x200;
 
 /// Request for initialisation mode (INRQ), and its acknowledgement (INAK).
-pub(crate) const SET_UP: u32 = 1;
+pub const SET_UP: u32 = 1;
 /// Bus-off (BOFF) and error-passive (EPVF) flags.
 pub const ERRORS: [u32; 2] = [1 << 2, 1 << 1];
 
@@ -49,7 +49,7 @@ const AFTER: u32 = 4;
 const JUMP: u32 = 4;
 
 /// Default bit rate, kbit/s.
-pub(crate) const USUAL_KBIT: u16 = 1000;
+pub const USUAL_KBIT: u16 = 1000;
 
 /// Clock enable of the controller (RCC_APB1ENR CAN1EN).
 pub const CLOCK: [Write; 1] = [Write::bits("RCC_APB1ENR", 0x4002_3840, 1 << 25, 1 << 25)];

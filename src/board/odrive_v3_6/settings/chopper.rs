@@ -13,7 +13,7 @@
 use super::Write;
 
 /// First register of TIM2.
-pub(crate) const BASE: u32 = 0x4000_0000;
+pub const BASE: u32 = 0x4000_0000;
 /// Top of the counter.
 pub const TOP: u32 = 4096;
 /// Least distance of both sides, counts of the timer: 0.48 us.
@@ -22,7 +22,7 @@ pub const GAP: u32 = 40;
 /// Starts the timer in its off state; pins are connected afterwards. The buffered compare values are loaded
 /// before an output is enabled. Otherwise the reset's zeros would keep the high side on until the counter's
 /// first end, 49 us later.
-pub(crate) const CHOPPER: [Write; 7] = [
+pub const CHOPPER: [Write; 7] = [
     // PWM mode 2, compare values buffered.
     Write::whole("TIM2_CCMR2", BASE + 0x1C, 0x7878),
     Write::whole("TIM2_ARR", BASE + 0x2C, TOP),

@@ -16,14 +16,14 @@ use super::timers::DOWN;
 use super::{FAST_TIMER_HZ, Write};
 
 /// First registers of ADC1, ADC2, ADC3.
-pub(crate) const BASES: [u32; 3] = [0x4001_2000, 0x4001_2100, 0x4001_2200];
+pub const BASES: [u32; 3] = [0x4001_2000, 0x4001_2100, 0x4001_2200];
 /// Common control register ADC_CCR with the prescaler of all three.
 const COMMON: u32 = 0x4001_2304;
 /// Clock of the converters, Hz.
 pub const CLOCK_HZ: u32 = 21_000_000;
 
 /// Offset of the status register.
-pub(crate) const SR: u32 = 0x00;
+pub const SR: u32 = 0x00;
 /// Offset of the first injected result; three follow.
 pub const JDR1: u32 = 0x3C;
 /// Offset of the regular result.
@@ -34,9 +34,9 @@ pub const EOC: u32 = 1 << 1;
 pub const JEOC: u32 = 1 << 2;
 
 /// Channels of the shunts of B and C, by axis.
-pub(crate) const SHUNTS: [[u32; 2]; 2] = [[10, 11], [13, 12]];
+pub const SHUNTS: [[u32; 2]; 2] = [[10, 11], [13, 12]];
 /// Channels of bus voltage, bridge of axis 0, bridge of axis 1, chopper: all four injected ranks of ADC1.
-pub(crate) const SLOW: [u32; 4] = [6, 15, 4, 5];
+pub const SLOW: [u32; 4] = [6, 15, 4, 5];
 
 /// Offset of the register with the channel of a regular conversion.
 pub const SQR3: u32 = 0x34;
@@ -66,7 +66,7 @@ macro_rules! adc {
 }
 
 /// Turns all converters on and sets channels and sequences; nothing triggers them yet. Settling takes 3 us.
-pub(crate) const CONVERTERS: [Write; 21] = [
+pub const CONVERTERS: [Write; 21] = [
     Write::whole("ADC_CCR", COMMON, 0b01 << 16),
     // Scan mode: four injected conversions per trigger.
     adc!(1, "CR1", 0x04, 1 << 8),

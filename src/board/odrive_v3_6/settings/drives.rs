@@ -15,13 +15,13 @@ pub const BANDWIDTH: Hertz = Hertz(1000.0);
 /// Half width of the band in which the dead-time compensation changes its sign.
 pub const DEAD_TIME_BAND: Ampere = Ampere(2.0);
 /// Length of the current vector above which the bridges turn off: the shunts' range less their offsets.
-pub(crate) const OVERCURRENT: Ampere = Ampere(61.0);
+pub const OVERCURRENT: Ampere = Ampere(61.0);
 /// Bus-voltage range in which the bridges may switch, on boards of 56 V and of 24 V.
-pub(crate) const BUS: [[Volt; 2]; 2] = [[Volt(20.0), Volt(58.0)], [Volt(12.0), Volt(25.7)]];
+pub const BUS: [[Volt; 2]; 2] = [[Volt(20.0), Volt(58.0)], [Volt(12.0), Volt(25.7)]];
 /// Bus voltages at which a brake resistor begins to conduct and reaches its greatest duty; boards as above.
-pub(crate) const CHOPPER: [[Volt; 2]; 2] = [[Volt(50.0), Volt(54.0)], [Volt(25.0), Volt(25.5)]];
+pub const CHOPPER: [[Volt; 2]; 2] = [[Volt(50.0), Volt(54.0)], [Volt(25.0), Volt(25.5)]];
 /// Greatest plausible speed of a counter, relative to the joint's limit.
-pub(crate) const SPEED_MARGIN: f32 = 2.0;
+pub const SPEED_MARGIN: f32 = 2.0;
 /// Current, voltage, speed and travel of a calibration. The inertia lies between those of the default leg's
 /// hip (2.1e-3) and knee (0.9e-3); the image takes each joint's own ([`calibrations`]).
 pub const CALIBRATION: CalibrationSettings = CalibrationSettings {

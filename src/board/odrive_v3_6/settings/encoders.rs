@@ -8,7 +8,7 @@
 use super::Write;
 
 /// First registers of TIM3 and TIM4.
-pub(crate) const BASES: [u32; 2] = [0x4000_0400, 0x4000_0800];
+pub const BASES: [u32; 2] = [0x4000_0400, 0x4000_0800];
 /// Offset of the counter.
 pub const CNT: u32 = 0x24;
 /// Both inputs direct, filter 4.
@@ -26,7 +26,7 @@ const fn encoder(base: u32, names: [&'static str; 5]) -> [Write; 5] {
 }
 
 /// Configures and starts both counters.
-pub(crate) const ENCODERS: [[Write; 5]; 2] = [
+pub const ENCODERS: [[Write; 5]; 2] = [
     encoder(BASES[0], ["TIM3_CCMR1", "TIM3_CCER", "TIM3_ARR", "TIM3_SMCR", "TIM3_CR1"]),
     encoder(BASES[1], ["TIM4_CCMR1", "TIM4_CCER", "TIM4_ARR", "TIM4_SMCR", "TIM4_CR1"]),
 ];

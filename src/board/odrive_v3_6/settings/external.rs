@@ -5,15 +5,15 @@
 use super::Write;
 
 /// Lines of the index pulses: PC9, PC15.
-pub(crate) const INDEX_LINES: [u32; 2] = [9, 15];
+pub const INDEX_LINES: [u32; 2] = [9, 15];
 /// Line of the emergency stop's contact: PC4.
-pub(crate) const STOP_LINE: u32 = 4;
+pub const STOP_LINE: u32 = 4;
 
 /// External interrupt controller.
 const EXTI: u32 = 0x4001_3C00;
 const SYSCFG: u32 = 0x4001_3800;
 /// Register of pending lines; a one clears.
-pub(crate) const PENDING: u32 = EXTI + 0x14;
+pub const PENDING: u32 = EXTI + 0x14;
 
 /// All lines on port C: rising edges of the index pulses, falling edge of the contact.
 pub const EXTERNAL: [Write; 7] = [

@@ -10,7 +10,7 @@ pub const GAIN: f32 = 40.0;
 /// Number of writes of the first control register: it "tends to be ignored if only done once".
 pub const TIMES: usize = 5;
 /// Answer of a driver without supply.
-pub(crate) const FRAME_FAULT: u16 = 0xBEEF;
+pub const FRAME_FAULT: u16 = 0xBEEF;
 
 /// Registers by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

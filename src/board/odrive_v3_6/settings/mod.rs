@@ -41,7 +41,7 @@ impl Write {
 
     /// Writes some bits of a register.
     #[must_use]
-    pub(crate) const fn bits(register: &'static str, address: u32, mask: u32, value: u32) -> Self {
+    pub const fn bits(register: &'static str, address: u32, mask: u32, value: u32) -> Self {
         #[cfg(target_os = "none")]
         let _ = register;
         Self {

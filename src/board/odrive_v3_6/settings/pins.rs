@@ -115,14 +115,14 @@ pub const MOTOR_THERMISTORS: [Pin; 2] = [pin(b'A', 0, Mode::Analog), pin(b'A', 1
 
 /// Address of a port's first register.
 #[must_use]
-pub(crate) const fn port(letter: u8) -> u32 {
+pub const fn port(letter: u8) -> u32 {
     0x4002_0000 + 0x400 * (letter as u32 - b'A' as u32)
 }
 
 /// Offset of the input register.
 pub const IDR: u32 = 0x10;
 /// Offset of the register that sets (low half) and clears (high half) outputs.
-pub(crate) const BSRR: u32 = 0x18;
+pub const BSRR: u32 = 0x18;
 
 impl Pin {
     /// Writes that configure the pin: level, pull, slowest edges, function, and the mode last.

@@ -19,31 +19,31 @@ use super::Write;
 use crate::hal::SHUNT_TRIGGER_CLOCKS;
 
 /// Timer of each bridge: 0 is the hip's, 1 the knee's.
-pub(crate) const BASES: [u32; 2] = [0x4001_0000, 0x4001_0400];
+pub const BASES: [u32; 2] = [0x4001_0000, 0x4001_0400];
 /// Top of the counter: half a period.
 pub const TOP: u16 = 3500;
 /// Dead time, timer clocks: 119 ns.
-pub(crate) const DEAD_TIME: u32 = 20;
+pub const DEAD_TIME: u32 = 20;
 /// Counters at the start, half a period apart: TIM1 rises from zero, TIM8 falls from the top. Writing the top
 /// makes the counter fall, zero makes it rise (RM0090 17.3.10, hints on the centre-aligned mode).
-pub(crate) const START: [u16; 2] = [0, TOP];
+pub const START: [u16; 2] = [0, TOP];
 /// Largest deviation from half a period that the start accepts, timer clocks: 0.19 us.
-pub(crate) const SHIFT_TOLERANCE: u16 = 32;
+pub const SHIFT_TOLERANCE: u16 = 32;
 
 /// Offset of the control register; bit 0 starts the counter.
-pub(crate) const CR1: u32 = 0x00;
+pub const CR1: u32 = 0x00;
 /// Offset of the status register; bit 0 is the update flag.
 pub const SR: u32 = 0x10;
 /// Offset of the counter.
-pub(crate) const CNT: u32 = 0x24;
+pub const CNT: u32 = 0x24;
 /// Offset of the first compare register; three follow each other.
-pub(crate) const CCR1: u32 = 0x34;
+pub const CCR1: u32 = 0x34;
 /// Offset of the register with the main output enable.
-pub(crate) const BDTR: u32 = 0x44;
+pub const BDTR: u32 = 0x44;
 /// Main output enable.
 pub const MOE: u32 = 1 << 15;
 /// Counting down (CR1).
-pub(crate) const DOWN: u32 = 1 << 4;
+pub const DOWN: u32 = 1 << 4;
 
 /// Centre-aligned, interrupt flags at both ends, reload buffered; dead-time clock undivided.
 const CR1_VALUE: u32 = 0b11 << 5 | 1 << 7;
@@ -68,7 +68,7 @@ const fn trigger(clocks: i16) -> (u32, u32) {
 
 /// Configures a bridge's timer: stopped, main output off, every phase at one half.
 #[must_use]
-pub(crate) const fn bridge(axis: usize) -> [Write; 15] {
+pub const fn bridge(axis: usize) -> [Write; 15] {
     let base = BASES[if axis == 0 { 0 } else { 1 }];
     macro_rules! write {
         ($name:literal, $offset:expr, $value:expr) => {
@@ -102,7 +102,7 @@ pub(crate) const fn bridge(axis: usize) -> [Write; 15] {
 
 /// Enables the channels and sets the counters; the last writes before the start.
 #[must_use]
-pub(crate) const fn ready() -> [Write; 4] {
+pub const fn ready() -> [Write; 4] {
     [
         Write::whole("TIM1_CCER", BASES[0] + 0x20, OUTPUTS),
         Write::whole("TIM8_CCER", BASES[1] + 0x20, OUTPUTS),
