@@ -52,7 +52,10 @@
 use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;
 use super::model_watch::Shown;
-use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, ShuntWatch, SpeedTracker};
+use super::{
+    Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, Rotation, ShuntWatch, SpeedTracker,
+    Stationary,
+};
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample, SERVO_RATE_HZ};
 use crate::real::{abs, clamp, is_finite, min};
@@ -307,8 +310,9 @@ impl Axis {
     }
 
     /// Runs one PWM period of either kind. During a fault the outputs are off. With a frozen counter or a
-    /// lost rotor position, however, the motor brakes unless the outputs are requested off.
-    #[inline(always)]
+    /// lost rotor position, however, the motor brakes unless the outputs are requested off. Not inlined: the
+    /// caller's registers would be spilled in the middle of it.
+    #[inline(never)]
     pub(crate) fn act(&mut self, sample: &AxisSample, request: BridgeRequest) -> AxisCommand {
         let request = match (request, self.fault) {
             (BridgeRequest::Off, _) => BridgeRequest::Off,
@@ -316,16 +320,13 @@ impl Axis {
             (_, Some(AxisFault::EncoderFrozen | AxisFault::Encoder)) => BridgeRequest::Brake,
             _ => BridgeRequest::Off,
         };
+        if let Err(fault) = self.step(sample, request) {
+            self.found(fault);
+            self.current_loop.reset();
+            self.last = AxisCommand::OFF;
+        }
         // Field by field: copying the whole struct would also carry the padding, byte by byte.
-        let AxisCommand { enabled, duty } = match self.step(sample, request) {
-            Ok(command) => command,
-            Err(fault) => {
-                self.found(fault);
-                self.current_loop.reset();
-                AxisCommand::OFF
-            }
-        };
-        self.last = AxisCommand { enabled, duty };
+        let AxisCommand { enabled, duty } = self.last;
         AxisCommand { enabled, duty }
     }
 
@@ -341,24 +342,11 @@ impl Axis {
             doubted || matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters);
     }
 
+    /// Runs one PWM period; its command becomes `self.last`.
     #[inline(always)]
-    fn step(&mut self, sample: &AxisSample, request: BridgeRequest) -> Result<AxisCommand, AxisFault> {
+    fn step(&mut self, sample: &AxisSample, request: BridgeRequest) -> Result<(), AxisFault> {
+        let plausible = self.count(sample);
         let constants = &self.constants;
-        let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
-        // A return from a wrong reading just small enough to be accepted is no jump.
-        let plausible =
-            step.abs() <= constants.greatest_step || (step + self.step).abs() <= constants.greatest_step;
-        if plausible {
-            self.counter = sample.encoder_count;
-            self.step = step;
-            self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
-            self.position = constants.scale.moved(self.position, constants.counter_sign * step);
-            if let Some(at) = sample.index_count {
-                let since =
-                    constants.counter_sign * i32::from(sample.encoder_count.wrapping_sub(at).cast_signed());
-                self.index.on_pulse(self.position - since, step);
-            }
-        }
         let angle = self.angle();
         self.speed.track(angle);
         let rotor = angle.rotation();
@@ -391,7 +379,10 @@ impl Axis {
                 return Err(fault);
             }
             self.doubtful = true;
-            return Ok(if switching { self.last } else { AxisCommand::OFF });
+            if !switching {
+                self.last = AxisCommand::OFF;
+            }
+            return Ok(());
         }
         self.doubtful = false;
         self.doubts = self.doubts.saturating_sub(1);
@@ -400,7 +391,8 @@ impl Axis {
                 self.shunt_watch.disabled(currents);
             }
             self.current_loop.reset();
-            return Ok(AxisCommand::OFF);
+            self.last = AxisCommand::OFF;
+            return Ok(());
         }
         if self.square_a2() > constants.overcurrent_square {
             return Err(AxisFault::Overcurrent);
@@ -410,8 +402,38 @@ impl Axis {
                 return Err(AxisFault::Overcurrent);
             }
             self.current_loop.reset();
-            return Ok(AxisCommand::BRAKE);
+            self.last = AxisCommand::BRAKE;
+            return Ok(());
         };
+        self.follow(sample, wanted, acting)
+    }
+
+    /// Counts the encoder's step since the last sample. Returns whether a motor can have made it.
+    #[inline(always)]
+    fn count(&mut self, sample: &AxisSample) -> bool {
+        let constants = &self.constants;
+        let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
+        // A return from a wrong reading just small enough to be accepted is no jump.
+        let plausible =
+            step.abs() <= constants.greatest_step || (step + self.step).abs() <= constants.greatest_step;
+        if plausible {
+            self.counter = sample.encoder_count;
+            self.step = step;
+            self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
+            self.position = constants.scale.moved(self.position, constants.counter_sign * step);
+            if let Some(at) = sample.index_count {
+                let since =
+                    constants.counter_sign * i32::from(sample.encoder_count.wrapping_sub(at).cast_signed());
+                self.index.on_pulse(self.position - since, step);
+            }
+        }
+        plausible
+    }
+
+    /// Follows a quadrature current in the joint's sense with the voltage that acts at `acting`.
+    #[inline(always)]
+    fn follow(&mut self, sample: &AxisSample, wanted: Ampere, acting: Rotation) -> Result<(), AxisFault> {
+        let constants = &self.constants;
         if !is_finite(wanted.0) {
             return Err(AxisFault::NotANumber);
         }
@@ -434,7 +456,7 @@ impl Axis {
         if !is_finite(voltage.d.0 + voltage.q.0) {
             return Err(AxisFault::NotANumber);
         }
-        let target = Rotating { d: Ampere::ZERO, q: target }.to_stationary(acting);
+        let target = Stationary::from_quadrature(target, acting);
         if self.shunt_watch.is_stuck(sample.shunt_codes, target, constants.stuck_change) {
             return Err(AxisFault::StuckConversion);
         }
@@ -443,7 +465,8 @@ impl Axis {
         if !(duty[0] + duty[1] + duty[2] >= 0.0) {
             return Err(AxisFault::NotANumber);
         }
-        Ok(AxisCommand { enabled: true, duty })
+        self.last = AxisCommand { enabled: true, duty };
+        Ok(())
     }
 
     /// Whether the index pulses show a lost rotor position.

@@ -83,6 +83,12 @@ impl<Q: Quantity> Stationary<Q> {
         Self { alpha: -(b + c), beta: (b - c) * ONE_OVER_SQRT_3 }
     }
 
+    /// [`Rotating::to_stationary`] of a vector without direct component.
+    #[must_use]
+    pub(crate) fn from_quadrature(q: Q, rotor: Rotation) -> Self {
+        Self { alpha: -(q * rotor.sine), beta: q * rotor.cosine }
+    }
+
     /// Inverse Clarke's transformation; the three phases sum to zero.
     #[must_use]
     pub(crate) fn to_phases(self) -> Phases<Q> {

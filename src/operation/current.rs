@@ -304,9 +304,11 @@ impl AxisLoop {
         period: NonZeroU32,
         signals: &Signals<N>,
     ) -> Option<u32> {
-        // Rounded: half a period late is one missed period, a gap of three periods two.
-        let since = |last| tick.now.wrapping_sub(last).saturating_add(period.get() / 2) / period;
-        let periods = self.last.map_or(1, since).saturating_sub(1);
+        // Rounded: half a period late is one missed period, a gap of three periods two. No division on time.
+        let since = self.last.map_or(0, |last| tick.now.wrapping_sub(last));
+        let half = period.get() / 2;
+        let is_late = since.saturating_add(half) >= 2 * period.get();
+        let periods = if is_late { (since.saturating_add(half) / period).saturating_sub(1) } else { 0 };
         let stood = signals.inhibit.is_storing().then_some(periods);
         let missed = if stood.is_some() { 0 } else { periods.min(255) as u8 };
         self.last = Some(tick.now);

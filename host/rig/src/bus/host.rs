@@ -56,12 +56,20 @@ const RATE_HZ: f64 = 0.7;
 /// Frames that the host sends by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Speaks {
-    /// SYNC and targets.
+    pub(crate) sync: bool,
+    /// Targets, which the next SYNC makes valid.
     pub(crate) targets: bool,
     /// Repeated controlword.
     pub(crate) words: bool,
     /// Servo ticks between two heartbeats; 0 for none.
     pub(crate) heartbeat: u64,
+}
+
+impl Speaks {
+    /// Starts or stops both frames of a cycle.
+    pub(crate) fn set_cycle(&mut self, sends: bool) {
+        (self.sync, self.targets) = (sends, sends);
+    }
 }
 
 /// Writes to a joint's object dictionary that set the compact mapping (docs/bus.md): index, subindex, value,
@@ -104,7 +112,7 @@ pub(crate) struct Host {
     sent_ns: [u64; 2],
     /// Whether targets wait for their SYNC.
     targets_wait: bool,
-    /// End of the last cyclic frame to each node on the wire.
+    /// End of the last cyclic frame to each node on the wire that took effect: SYNC or controlword.
     cyclic_ns: [u64; JOINTS],
     /// SDO answers that were not read yet.
     answers: VecDeque<Frame>,
@@ -154,6 +162,9 @@ impl Host {
 
     /// Simulates one servo tick; each of its PWM periods is shown.
     pub(crate) fn tick(&mut self, watch: impl FnMut(&Rig<JOINTS, BASE>)) {
+        if self.speaks.sync && self.ticks.is_multiple_of(self.cycle) {
+            self.network.send(Frame::new(SYNC, &[]));
+        }
         if self.speaks.targets && self.ticks.is_multiple_of(self.cycle) {
             let seconds = self.ticks as f64 * TICK_NS as f64 * 1e-9;
             let share = 0.5 - 0.5 * (TAU * RATE_HZ * seconds).cos();
@@ -163,7 +174,6 @@ impl Host {
                 Some(from) => [0, 1].map(|joint| (from[joint] + share * self.way[joint]) as i32),
             };
             let targets = targets.map(i32::to_le_bytes).concat();
-            self.network.send(Frame::new(SYNC, &[]));
             self.network.send(Frame::new(TARGETS, &targets));
         }
         if self.speaks.words && self.ticks.is_multiple_of(4 * self.cycle) {
@@ -178,7 +188,7 @@ impl Host {
         let show = |sent: &Sent| {
             let id = sent.frame.id();
             match (sent.sender, id) {
-                (0, SYNC | TARGETS) => *cyclic_ns = [sent.end_ns; JOINTS],
+                (0, SYNC) => *cyclic_ns = [sent.end_ns; JOINTS],
                 (0, 0x201) => cyclic_ns[0] = sent.end_ns,
                 (0, 0x202) => cyclic_ns[1] = sent.end_ns,
                 _ => {}
@@ -224,7 +234,7 @@ impl Host {
         self.sent_ns
     }
 
-    /// End of the last cyclic frame to each node on the wire: SYNC, targets, controlword.
+    /// End of the last cyclic frame to each node on the wire that took effect: SYNC or controlword.
     #[must_use]
     pub(crate) fn cyclic_ns(&self) -> [u64; JOINTS] {
         self.cyclic_ns
@@ -295,7 +305,7 @@ impl Host {
     /// # Errors
     /// A node refuses, or the leg is not enabled.
     pub(crate) fn move_leg(&mut self, leg: &LegFile) -> Result<(), ToolError> {
-        self.speaks.targets = true;
+        self.speaks.set_cycle(true);
         self.run(4 * CYCLE);
         for word in [6, 7, ENABLED] {
             NODES.into_iter().for_each(|node| self.command(node, word));
@@ -447,7 +457,7 @@ mod tests {
         for (joint, (from, there)) in from.iter().zip(there).enumerate() {
             assert!((there - from).abs() > 0.9 * WAY_RAD, "joint {joint}: {from} {there}");
         }
-        host.speaks.targets = false;
+        host.speaks.set_cycle(false);
         host.run(1000);
         let stands = position(&mut host);
         assert!(host.is_enabled());

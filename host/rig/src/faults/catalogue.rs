@@ -328,7 +328,7 @@ catalogue! {
     }
 
     B1 = "B1" {
-        fault: "host's heartbeat or targets no longer come",
+        fault: "host's heartbeat, targets or SYNC no longer come",
         detector: "heartbeat consumer, event timer of the received PDO",
         state: "Damp",
         deadline_ms: BUS_MS,

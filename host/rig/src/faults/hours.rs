@@ -150,7 +150,7 @@ fn shaken(leg: &LegFile, seed: u64, length: u64) -> Result<Stretch, ToolError> {
     let mut host = Host::new(Board::new(leg, context, seed, Label::SINGLE, Memory::new(None))?);
     host.begin()?;
     host.move_leg(leg)?;
-    host.speaks.targets = false;
+    host.speaks.set_cycle(false);
     host.write_both(0x6060, 10, 1)?;
     let mut random = Random::new("shaken", seed);
     let mut waves = [0; JOINTS].map(|_| Wave::new(&mut random));

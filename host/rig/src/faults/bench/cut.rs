@@ -91,7 +91,7 @@ fn one(mut fork: Fork<'_>, remembers: Option<Board>) -> Result<Outcome, ToolErro
         fork.host.tick(|_| {});
         enabled |= fork.host.is_enabled() || fork.host.rig().is_switching();
     }
-    fork.host.speaks.targets = false;
+    fork.host.speaks.set_cycle(false);
     fork.host.speaks.words = false;
     let windows = [fork.host.read(1, WINDOW, 0)?, fork.host.read(2, WINDOW, 0)?];
     let safe = !enabled && windows == [KEPT; 2];

@@ -159,7 +159,7 @@ fn flooded(mut fork: Fork<'_>, off: bool) -> Result<Outcome, ToolError> {
         fork.tick();
         switched |= fork.host.rig().is_switching();
     }
-    fork.host.speaks.targets = false;
+    fork.host.speaks.set_cycle(false);
     fork.host.speaks.words = false;
     for _ in 0..DRAINED {
         if fork.host.network.waiting() == 0 {

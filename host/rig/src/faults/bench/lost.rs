@@ -2,7 +2,7 @@
 //!
 //! | row | fault | detector | reaction |
 //! | --- | --- | --- | --- |
-//! | B1 | heartbeat or targets end during the motion | consumer (1016), event timer (1401:5) | Damp, Off |
+//! | B1 | heartbeat, or targets or their SYNC, end during the motion | consumer (1016), event timer (1401:5) | Damp, Off |
 //! | B2 | bus off, error passive | status of the controller | Damp, Off |
 //!
 //! Object 6007 selects the kind of damping (1 or 3). Times count from the host's timeout: its consumer time
@@ -149,7 +149,9 @@ fn silent(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
         fork.host.speaks.heartbeat = 0;
     }
     if silent[1] {
-        (fork.host.speaks.targets, fork.host.speaks.words) = (false, !silent[0]);
+        let kept = fork.random.below(3);
+        (fork.host.speaks.sync, fork.host.speaks.targets) = (kept == 1, kept == 2);
+        fork.host.speaks.words = !silent[0];
     }
     let (state, after_ms) = until_safe(&mut fork, |host| patience.due_ns(host));
     let alarm = fork.host.rig().alarm().map(FaultCode::name);

@@ -105,7 +105,7 @@ fn is_refused(fork: &mut Fork<'_>) -> Result<bool, ToolError> {
 
 fn begins(fork: &mut Fork<'_>) -> bool {
     fork.host.follow_positions();
-    fork.host.speaks = Speaks { targets: true, ..Speaks::default() };
+    fork.host.speaks = Speaks { sync: true, targets: true, ..Speaks::default() };
     fork.run(40);
     // A swinging leg is refused, so the request is repeated.
     (0..8).any(|_| {

@@ -4,10 +4,11 @@
 //! below 100 ms) and 6007 (1 or 3). First the host pauses three times for less than 95 ms: no fault may be
 //! reported.
 //!
-//! In a quarter of the runs the host then stops either SYNC and targets or its controlwords, and continues
-//! the other. Again no fault may be reported, and the run counts as undetectable. In the other runs it stops
-//! completely. Its timeout is 100 ms after the last frame that a node received. The requirements are those of
-//! B1: damped, reported within 10 ms, and not enabled by a host that returns.
+//! In a quarter of the runs the host then stops its controlwords, or its targets, or SYNC and targets, and
+//! continues the others. Again no fault may be reported, and the run counts as undetectable. In the other
+//! runs it stops completely, or sends targets without a SYNC, which have no effect. Its timeout is 100 ms
+//! after the last SYNC or controlword that a node received. The requirements are those of B1: damped,
+//! reported within 10 ms, and not enabled by a host that returns.
 
 use scarab::safety::FaultCode;
 use scarab_base::error::ToolError;
@@ -49,14 +50,16 @@ fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     fork.run(800);
     let mut false_alarm = !fork.host.is_enabled();
     if fork.random.below(4) == 0 {
-        let targets = fork.random.coin();
-        fork.host.speaks = Speaks { targets, words: !targets, heartbeat: 0 };
+        let (sync, targets, words) =
+            [(true, true, false), (true, false, false), (true, false, true), (false, false, true)]
+                [fork.random.below(4) as usize];
+        fork.host.speaks = Speaks { sync, targets, words, heartbeat: 0 };
         fork.run(2000);
         false_alarm |= !fork.host.is_enabled();
         let found = fork.ended(None, None);
         return Ok(Outcome { detected: false, undetectable: true, false_alarm, ..found });
     }
-    fork.host.speaks = Speaks::default();
+    fork.host.speaks = Speaks { targets: fork.random.coin(), ..Speaks::default() };
     let due_ns = |host: &Host| host.cyclic_ns().into_iter().min().unwrap_or(0) + TIME_NS;
     let (state, after_ms) = until_safe(&mut fork, due_ns);
     let alarm = fork.host.rig().alarm().map(FaultCode::name);

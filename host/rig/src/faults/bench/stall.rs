@@ -114,7 +114,7 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let calm = alarm.is_none() && !fork.host.rig().is_restarted();
     // The leg is commanded to keep its position, which takes some cycles to send.
-    fork.host.speaks.targets = true;
+    fork.host.speaks.set_cycle(true);
     fork.run(START_TICKS);
     for word in [6, 7, 15] {
         NODES.into_iter().for_each(|node| fork.host.command(node, word));
