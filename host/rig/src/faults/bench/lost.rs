@@ -2,7 +2,7 @@
 //!
 //! | row | fault | detector | reaction |
 //! | --- | --- | --- | --- |
-//! | B1 | heartbeat, or targets or their SYNC, end during the motion | consumer (1016), event timer (1401:5) | Damp, Off |
+//! | B1 | heartbeat, targets or SYNC end in motion | consumer (1016), event timer (1401:5) | Damp, Off |
 //! | B2 | bus off, error passive | status of the controller | Damp, Off |
 //!
 //! Object 6007 selects the kind of damping (1 or 3). Times count from the host's timeout: its consumer time
